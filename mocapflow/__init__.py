@@ -1,0 +1,1 @@
+"""mocapflow: motion capture of people in loose clothes."""

@@ -1,0 +1,199 @@
+"""The roles a plugin can play: one base class, one verb each.
+
+A component is a frozen pydantic model, so its fields are its settings: validated, printable, part of the cache
+key. Steps are pure functions of their arguments and keep no state between calls; that makes resuming exact.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from mocapflow.data import (
+    Body,
+    Cloth,
+    Estimate,
+    Frame,
+    FrameState,
+    GarmentMesh,
+    Matches,
+    Past,
+    Pose,
+    PoseBatch,
+    Residual,
+    Segmentation,
+    Surface,
+    Turn,
+)
+from mocapflow.records import F64, I32
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from mocapflow.model import ClothedModel
+    from mocapflow.scene import Scene
+
+
+class Component(BaseModel, ABC):
+    """Anything a pipeline can name; `role` is set by the role base, `name` by the component."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    role: ClassVar[str]
+    name: ClassVar[str]
+
+
+class Predictor(Component):
+    """Guesses the next pose before looking."""
+
+    role: ClassVar[str] = "predictor"
+
+    @abstractmethod
+    def predict(self, frame: Frame, past: Past, scene: Scene) -> Pose:
+        """Return a first guess of the pose of `frame`; `past` holds at least one moment."""
+
+
+class Segmenter(Component):
+    """Finds the silhouette in each image."""
+
+    role: ClassVar[str] = "segmenter"
+
+    @abstractmethod
+    def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
+        """Return one silhouette per usable view; `state` holds the current pose and the last turn's silhouettes."""
+
+
+class Matcher(Component):
+    """Pairs image points with surface points."""
+
+    role: ClassVar[str] = "matcher"
+    share: Annotated[float, Field(gt=0)] = 1.0  # how much it counts beside other matchers
+
+    @abstractmethod
+    def match(
+        self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn
+    ) -> Matches:
+        """Return pairs of image points and vertices of the posed surface."""
+
+
+class PoseSolver(Component):
+    """Computes the pose from matches and priors."""
+
+    role: ClassVar[str] = "pose_solver"
+
+    @abstractmethod
+    def solve(
+        self,
+        match: Callable[[Surface], Matches],
+        state: FrameState,
+        model: ClothedModel,
+        priors: Sequence[Prior],
+        past: Past,
+        turn: Turn,
+    ) -> Estimate:
+        """Return the pose that explains the matches; it may pose, drape and match again as it goes."""
+
+
+class Draper(Component):
+    """Lays a garment on posed bodies: the forward model."""
+
+    role: ClassVar[str] = "draper"
+
+    @abstractmethod
+    def drape(self, poses: PoseBatch, parameters: F64, past: Past, scene: Scene) -> F64:
+        """Return cloth vertices (B, W, 3) m in the world for B poses and parameters (B, Q); pure."""
+
+    def velocity(self, pose: Pose, parameters: F64, vertices: I32, past: Past, scene: Scene) -> F64:
+        """Return the velocities (M, 3, 6 + D + Q) of cloth vertices (M,) for unit changes of pose and parameters.
+
+        The default takes central differences of one batch of drapes.
+        """
+        from mocapflow.model import drape_differences
+
+        return drape_differences(self, pose, parameters, vertices, past, scene)
+
+
+class ClothFitter(Component):
+    """Chooses the cloth parameters and forces that explain the images."""
+
+    role: ClassVar[str] = "cloth_fitter"
+
+    @abstractmethod
+    def fit(
+        self,
+        frame: Frame,
+        segmentation: Segmentation,
+        estimate: Estimate,
+        model: ClothedModel,
+        past: Past,
+        turn: Turn,
+    ) -> Cloth:
+        """Return the cloth at the estimated pose with the parameters that fit best."""
+
+
+class Prior(Component):
+    """A term the pose solver adds: limits, learned poses, smoothness."""
+
+    role: ClassVar[str] = "prior"
+    weight: Annotated[float, Field(ge=0)] = 1.0
+
+    @abstractmethod
+    def residual(self, pose: Pose, past: Past, scene: Scene) -> Residual:
+        """Return the whitened error at `pose` with its Jacobian; an increment of the root is (omega, v)."""
+
+
+class Garment(Component):
+    """Sews a garment from tape measures."""
+
+    role: ClassVar[str] = "garment"
+
+    @abstractmethod
+    def sew(self, body: Body) -> GarmentMesh:
+        """Return the garment at rest on the rest body."""
+
+
+class BodyModel(Component):
+    """Loads a body."""
+
+    role: ClassVar[str] = "body"
+
+    @abstractmethod
+    def load(self, recording: Path) -> Body:
+        """Return the body at rest; `recording` is the folder of the recording."""
+
+    def inputs(self, recording: Path) -> Sequence[Path]:
+        """Return the files `load` reads: their content is part of the cache key."""
+        return ()
+
+
+class Stage(Component):
+    """A whole-sequence step; the annotations of `run` are its wiring.
+
+    A subclass defines `run(self, **typed_inputs) -> Artifact`. Each parameter receives the result of the nearest
+    earlier stage that makes its type; `Scene`, `Recording`, `Checkpoint` and `RunFolder` come from the runner;
+    `X | None = None` makes an input optional.
+    """
+
+    role: ClassVar[str] = "stage"
+    run: ClassVar[Callable[..., Any]]
+
+
+def pool(parts: Sequence[tuple[float, Matches]]) -> Matches:
+    """Return the matches of several matchers as one set, each weighted by its share."""
+    if len(parts) == 1 and parts[0][0] == 1.0:
+        return parts[0][1]
+    matches = [m for _, m in parts]
+    return Matches(
+        camera=np.concatenate([m.camera for m in matches]),
+        pixel=np.concatenate([m.pixel for m in matches]),
+        direction=np.concatenate([m.direction for m in matches]),
+        vertex=np.concatenate([m.vertex for m in matches]),
+        weight=np.concatenate([share * m.weight for share, m in parts]),
+    )
+
+
+Observe = Callable[[int, Turn, FrameState], None]
+Energies = Mapping[str, float]

@@ -1,0 +1,66 @@
+"""Every error a user can meet: what happened, where, and how to go on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class MocapflowError(Exception):
+    """A problem the user can mend; the command line prints it without a traceback.
+
+    Args:
+        message: what is wrong, in one sentence.
+        where: the place, as `file:line:column` or `file`.
+        hint: what exists instead, or how to go on.
+    """
+
+    exit_status = 2
+
+    def __init__(self, message: str, *, where: str = "", hint: str = "") -> None:
+        self.message, self.where, self.hint = message, where, hint
+        super().__init__(str(self))
+
+    def __str__(self) -> str:
+        head = f"{self.where}  {self.message}" if self.where else self.message
+        return "\n".join([head, *(f"       {line}" for line in self.hint.splitlines())])
+
+
+class PipelineError(MocapflowError):
+    """The pipeline file does not say what it should."""
+
+
+class PluginError(MocapflowError):
+    """A plugin does not keep to its role."""
+
+
+class UnknownComponent(PipelineError):
+    """The pipeline names a component that no plugin provides."""
+
+
+class ShapeError(MocapflowError):
+    """An array has the wrong shape or kind."""
+
+
+class RecordingError(MocapflowError):
+    """A recording folder is incomplete or contradicts itself."""
+
+
+class StoreError(MocapflowError):
+    """The store can't be read or written."""
+
+    exit_status = 1
+
+
+class ComponentFailed(MocapflowError):
+    """A component raised while a run was going on."""
+
+    exit_status = 1
+
+
+def alternatives(wanted: str, available: Iterable[str]) -> str:
+    """Return the hint `available: a, b — did you mean 'a'?` for a name that is not there."""
+    names = sorted(available)
+    close = get_close_matches(wanted, names, n=1)
+    guess = f" — did you mean '{close[0]}'?" if close else ""
+    return f"available: {', '.join(names) or 'none'}{guess}"

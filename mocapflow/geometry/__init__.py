@@ -1,0 +1,1 @@
+"""Shared geometry: twists, Plücker lines, cameras, the kinematic chain, meshes, silhouettes."""

@@ -1,0 +1,131 @@
+"""The kinematic chain as a product of exponentials, and linear blend skinning."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numba
+import numpy as np
+
+from mocapflow.data import Body, Pose, PoseBatch
+from mocapflow.records import F64
+
+
+def chain(body: Body, pose: Pose) -> tuple[F64, F64]:
+    """Return where each joint and each screw of the chain is.
+
+    Returns:
+        `joints` (J, 4, 4) m, world_from_rest of what moves with each joint, and `screws` (D, 6), the twist in the
+        world by which a unit change of each angle moves everything below it.
+
+    Source: Rosenhahn 2008, Eq. (12.8)
+    """
+    joints = np.empty((len(body.parents), 4, 4))
+    screws = np.empty((len(body.twists), 6))
+    _chain(pose.root, pose.angles, body.twists, body.screw_joint, body.parents, joints, screws)
+    return joints, screws
+
+
+def chain_batch(body: Body, poses: PoseBatch) -> F64:
+    """Return world_from_rest of each joint for B poses: (B, J, 4, 4) m."""
+    joints = np.empty((len(poses.root), len(body.parents), 4, 4))
+    screws = np.empty((len(body.twists), 6))
+    for row in range(len(poses.root)):
+        _chain(poses.root[row], poses.angles[row], body.twists, body.screw_joint, body.parents, joints[row], screws)
+    return joints
+
+
+def skin(body: Body, joints: F64) -> F64:
+    """Return the posed body vertices (V, 3) m of a chain `joints` (J, 4, 4), by linear blend skinning."""
+    posed = np.empty_like(body.vertices)
+    _skin(body.vertices, body.skin_joint, body.skin_weight, joints, posed)
+    return posed
+
+
+def joint_positions(body: Body, joints: F64) -> F64:
+    """Return the joint centres (..., J, 3) m of chains `joints` (..., J, 4, 4)."""
+    rest = np.concatenate([body.positions, np.ones((len(body.positions), 1))], axis=1)
+    positions: F64 = np.einsum("...jab,jb->...ja", joints[..., :3, :], rest)
+    return positions
+
+
+def descendants(parents: Any) -> np.ndarray:
+    """Return (J, J) booleans: [i, j] is True where joint j is joint i or below it."""
+    count = len(parents)
+    below = np.eye(count, dtype=bool)
+    for joint in range(count):
+        if parents[joint] >= 0:
+            below[:, joint] |= below[:, parents[joint]]
+    return below
+
+
+@numba.njit(cache=True)
+def _chain(root, angles, twists, screw_joint, parents, joints, screws):  # type: ignore[no-untyped-def]
+    motion = np.empty((3, 4))
+    step = np.empty((3, 4))
+    product = np.empty((3, 4))
+    screw = 0
+    for joint in range(len(parents)):
+        parent = parents[joint]
+        for a in range(3):
+            for b in range(4):
+                motion[a, b] = root[a, b] if parent < 0 else joints[parent, a, b]
+        while screw < len(screw_joint) and screw_joint[screw] == joint:
+            _carry(motion, twists[screw], screws[screw])
+            _exp_unit(twists[screw], angles[screw], step)
+            _compose(motion, step, product)
+            motion[:] = product
+            screw += 1
+        joints[joint, :3] = motion
+        joints[joint, 3, :3] = 0.0
+        joints[joint, 3, 3] = 1.0
+
+
+@numba.njit(cache=True)
+def _carry(motion, twist, out):  # type: ignore[no-untyped-def]
+    """Write Ad_motion twist."""
+    for a in range(3):
+        out[a] = motion[a, 0] * twist[0] + motion[a, 1] * twist[1] + motion[a, 2] * twist[2]
+        out[3 + a] = motion[a, 0] * twist[3] + motion[a, 1] * twist[4] + motion[a, 2] * twist[5]
+    out[3] += motion[1, 3] * out[2] - motion[2, 3] * out[1]
+    out[4] += motion[2, 3] * out[0] - motion[0, 3] * out[2]
+    out[5] += motion[0, 3] * out[1] - motion[1, 3] * out[0]
+
+
+@numba.njit(cache=True)
+def _exp_unit(twist, angle, out):  # type: ignore[no-untyped-def]
+    """Write exp(angle twist) of a zero-pitch unit twist: a turn about a fixed axis."""
+    s, c = math.sin(angle), 1.0 - math.cos(angle)
+    x, y, z = twist[0], twist[1], twist[2]
+    out[0, 0], out[0, 1], out[0, 2] = 1.0 - c * (y * y + z * z), c * x * y - s * z, c * x * z + s * y
+    out[1, 0], out[1, 1], out[1, 2] = c * x * y + s * z, 1.0 - c * (x * x + z * z), c * y * z - s * x
+    out[2, 0], out[2, 1], out[2, 2] = c * x * z - s * y, c * y * z + s * x, 1.0 - c * (x * x + y * y)
+    px, py, pz = y * twist[5] - z * twist[4], z * twist[3] - x * twist[5], x * twist[4] - y * twist[3]
+    for a in range(3):  # (I - R)(omega x v): the point of the axis nearest the origin stays
+        p = px if a == 0 else (py if a == 1 else pz)
+        out[a, 3] = p - (out[a, 0] * px + out[a, 1] * py + out[a, 2] * pz)
+
+
+@numba.njit(cache=True)
+def _compose(left, right, out):  # type: ignore[no-untyped-def]
+    for a in range(3):
+        for b in range(4):
+            out[a, b] = left[a, 0] * right[0, b] + left[a, 1] * right[1, b] + left[a, 2] * right[2, b]
+        out[a, 3] += left[a, 3]
+
+
+@numba.njit(cache=True)
+def _skin(vertices, skin_joint, skin_weight, joints, out):  # type: ignore[no-untyped-def]
+    for v in range(len(vertices)):
+        x, y, z = vertices[v, 0], vertices[v, 1], vertices[v, 2]
+        px = py = pz = 0.0
+        for k in range(skin_joint.shape[1]):
+            w = skin_weight[v, k]
+            if w == 0.0:
+                continue
+            m = joints[skin_joint[v, k]]
+            px += w * (m[0, 0] * x + m[0, 1] * y + m[0, 2] * z + m[0, 3])
+            py += w * (m[1, 0] * x + m[1, 1] * y + m[1, 2] * z + m[1, 3])
+            pz += w * (m[2, 0] * x + m[2, 1] * y + m[2, 2] * z + m[2, 3])
+        out[v, 0], out[v, 1], out[v, 2] = px, py, pz

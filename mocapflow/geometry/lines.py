@@ -1,0 +1,49 @@
+"""Projection rays as Plücker lines (n, m): every point X on the line satisfies X x n = m."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mocapflow.data import Camera
+from mocapflow.records import F64
+
+
+def through(pixels: F64, camera: Camera) -> F64:
+    """Return the Plücker lines of the projection rays of undistorted pixels.
+
+    Args:
+        pixels: (M, 2) px.
+        camera: a pinhole camera.
+
+    Returns:
+        (M, 6): unit direction n and moment m = centre x n, in m.
+
+    Source: Rosenhahn 2008, Eq. (12.2)
+    """
+    homogeneous = np.column_stack([pixels, np.ones(len(pixels))])
+    rotation, translation = camera.camera_from_world[:3, :3], camera.camera_from_world[:3, 3]
+    directions = homogeneous @ np.linalg.inv(camera.intrinsics).T @ rotation
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    moments = np.cross(-rotation.T @ translation, directions)
+    return np.hstack([directions, moments])
+
+
+def error(points: F64, lines: F64) -> F64:
+    """Return the error vectors X x n - m of points against lines; their norm is the perpendicular distance.
+
+    Args:
+        points: (M, 3) m.
+        lines: (M, 6).
+
+    Returns:
+        (M, 3) m, orthogonal to the lines.
+
+    Source: Rosenhahn 2008, Eq. (12.3)
+    """
+    return np.cross(points, lines[:, :3]) - lines[:, 3:]
+
+
+def closest(points: F64, lines: F64) -> F64:
+    """Return the point of each line (M, 6) that is closest to each point (M, 3), in m."""
+    n, m = lines[:, :3], lines[:, 3:]
+    return np.cross(n, m) + np.sum(n * points, axis=1, keepdims=True) * n

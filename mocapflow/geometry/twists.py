@@ -1,0 +1,133 @@
+"""Twists (omega, v), their exponentials and logarithms in SE(3), and the adjoint.
+
+Every function takes arrays with any leading axes. Source of the closed forms: Murray, Li, Sastry 1994, chapter 2.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mocapflow.records import F64
+
+SMALL_ANGLE = 1e-4  # rad; below it series replace the quotients, which would cancel
+
+
+def hat(vector: F64) -> F64:
+    """Return the matrix of the cross product, `hat(a) @ b == cross(a, b)`.
+
+    Args:
+        vector: (..., 3).
+
+    Returns:
+        (..., 3, 3).
+
+    Source: Rosenhahn 2008, Eq. (12.4)
+    """
+    x, y, z = np.moveaxis(vector, -1, 0)
+    zero = np.zeros_like(x)
+    rows = [np.stack(row, -1) for row in ((zero, -z, y), (z, zero, -x), (-y, x, zero))]
+    return np.stack(rows, -2)
+
+
+def _coefficients(angle: F64) -> tuple[F64, F64, F64]:
+    """Return sin t / t, (1 - cos t) / t^2 and (t - sin t) / t^3, stable at zero."""
+    small = angle < SMALL_ANGLE
+    t = np.where(small, 1.0, angle)
+    t2 = angle**2
+    a = np.where(small, 1 - t2 / 6 + t2**2 / 120, np.sin(t) / t)
+    b = np.where(small, 0.5 - t2 / 24 + t2**2 / 720, (1 - np.cos(t)) / t**2)
+    c = np.where(small, 1 / 6 - t2 / 120 + t2**2 / 5040, (t - np.sin(t)) / t**3)
+    return a, b, c
+
+
+def exp(twist: F64) -> F64:
+    """Return the rigid motion that a twist generates.
+
+    Args:
+        twist: (..., 6) rad and m.
+
+    Returns:
+        (..., 4, 4).
+
+    Source: Rosenhahn 2008, Eq. (12.6)
+    """
+    omega, v = twist[..., :3], twist[..., 3:]
+    a, b, c = (q[..., None, None] for q in _coefficients(np.linalg.norm(omega, axis=-1)))
+    w = hat(omega)
+    w2 = w @ w
+    motion = np.zeros((*twist.shape[:-1], 4, 4))
+    motion[..., :3, :3] = np.eye(3) + a * w + b * w2
+    motion[..., :3, 3] = ((np.eye(3) + b * w + c * w2) @ v[..., None])[..., 0]
+    motion[..., 3, 3] = 1.0
+    return motion
+
+
+def log_rotation(rotation: F64) -> F64:
+    """Return the rotation vector of a rotation, stable at zero and at pi.
+
+    Args:
+        rotation: (..., 3, 3).
+
+    Returns:
+        (..., 3) rad, of norm at most pi.
+    """
+    from scipy.spatial.transform import Rotation  # a heavy import; only some commands need it
+
+    flat = np.asarray(rotation).reshape(-1, 3, 3)
+    vectors: F64 = Rotation.from_matrix(flat).as_rotvec()
+    return vectors.reshape(*rotation.shape[:-2], 3)
+
+
+def log(motion: F64) -> F64:
+    """Return the twist of a rigid motion: the inverse of `exp` for angles up to pi.
+
+    Args:
+        motion: (..., 4, 4).
+
+    Returns:
+        (..., 6) rad and m.
+    """
+    omega = log_rotation(motion[..., :3, :3])
+    _, b, c = (q[..., None, None] for q in _coefficients(np.linalg.norm(omega, axis=-1)))
+    w = hat(omega)
+    v = np.linalg.solve(np.eye(3) + b * w + c * (w @ w), motion[..., :3, 3:])[..., 0]
+    return np.concatenate([omega, v], axis=-1)
+
+
+def adjoint(motion: F64) -> F64:
+    """Return the matrix that carries twists from body to world: `exp(Ad_T x) = T exp(x) T^-1`.
+
+    Args:
+        motion: (..., 4, 4).
+
+    Returns:
+        (..., 6, 6).
+    """
+    rotation = motion[..., :3, :3]
+    matrix = np.zeros((*motion.shape[:-2], 6, 6))
+    matrix[..., :3, :3] = matrix[..., 3:, 3:] = rotation
+    matrix[..., 3:, :3] = hat(motion[..., :3, 3]) @ rotation
+    return matrix
+
+
+def screw(axis: F64, point: F64) -> F64:
+    """Return the zero-pitch twist that turns about an axis through a point.
+
+    Args:
+        axis: (..., 3) unit.
+        point: (..., 3) m.
+
+    Returns:
+        (..., 6), with v = point x axis.
+    """
+    return np.concatenate([axis, np.cross(point, axis)], axis=-1)
+
+
+def inverse(motion: F64) -> F64:
+    """Return the inverse of rigid motions (..., 4, 4)."""
+    out = np.zeros_like(motion)
+    transposed = np.swapaxes(motion[..., :3, :3], -1, -2)
+    out[..., :3, :3] = transposed
+    out[..., :3, 3] = -(transposed @ motion[..., :3, 3:])[..., 0]
+    out[..., 3, 3] = 1.0
+    return out

@@ -1,0 +1,87 @@
+"""The coupled loop of one frame: segment, match, solve, fit the cloth, until the surface stops moving."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+
+from mocapflow.components import ClothFitter, Matcher, Observe, PoseSolver, Predictor, Prior, Segmenter, pool
+from mocapflow.data import Change, Frame, FrameResult, FrameState, Matches, Past, Segmentation, Surface, Turn
+from mocapflow.model import ClothedModel
+from mocapflow.records import record
+from mocapflow.scene import Scene
+
+
+@record
+class Steady:
+    """When the loop counts as at rest, and how long it may go on."""
+
+    surface: float  # m
+    angle: float  # rad
+    turns: int  # consecutive turns within both tolerances
+    max_turns: int
+
+    def holds(self, change: Change) -> bool:
+        """True where a change is within both tolerances."""
+        return change.surface <= self.surface and change.angles <= self.angle
+
+
+@record
+class Steps:
+    """The components of the loop."""
+
+    predictor: Predictor
+    segmenter: Segmenter
+    matchers: Sequence[Matcher]
+    pose_solver: PoseSolver
+    cloth_fitter: ClothFitter
+    priors: Sequence[Prior]
+    steady: Steady
+
+
+def settle(
+    frame: Frame, state: FrameState, past: Past, steps: Steps, model: ClothedModel, observe: Observe
+) -> FrameResult:
+    """Repeat segmentation, pose and cloth until the surface stops moving.
+
+    Source: Rosenhahn 2008, Fig. 12.14
+    """
+    calm, earlier, turn = 0, state, Turn(index=0, cap=steps.steady.max_turns)
+    for index in range(steps.steady.max_turns):
+        turn = Turn(index=index, cap=turn.cap, change=turn.change)
+        segmentation = steps.segmenter.segment(frame, state, past, model.scene, turn)
+        match = partial(pool_matches, steps.matchers, frame, segmentation, past, model.scene, turn)
+        estimate = steps.pose_solver.solve(match, state, model, steps.priors, past, turn)
+        cloth = steps.cloth_fitter.fit(frame, segmentation, estimate, model, past, turn)
+        matches = match(model.surface(estimate.pose, cloth))
+        new = FrameState(segmentation=segmentation, matches=matches, estimate=estimate, cloth=cloth)
+        change, swing = measure_change(state, new, model), measure_change(earlier, new, model)
+        observe(frame.index, turn, new)
+        earlier, state = state, new
+        turn = Turn(index=index, cap=turn.cap, change=change)
+        calm = calm + 1 if steps.steady.holds(change) else 0
+        if calm >= steps.steady.turns:
+            break
+    assert turn.change is not None
+    return FrameResult(
+        state=state, iterations=turn.index + 1, steady=calm >= steps.steady.turns, change=turn.change,
+        oscillating=calm == 0 and turn.index > 1 and steps.steady.holds(swing),
+    )
+
+
+def pool_matches(
+    matchers: Sequence[Matcher], frame: Frame, segmentation: Segmentation, past: Past, scene: Scene, turn: Turn,
+    surface: Surface,
+) -> Matches:
+    """Return the matches of all matchers together, each with its share."""
+    return pool([(m.share, m.match(frame, segmentation, surface, past, scene, turn)) for m in matchers])
+
+
+def measure_change(old: FrameState, new: FrameState, model: ClothedModel) -> Change:
+    """Return how far the surface and the joint angles moved between two states."""
+    before = model.surface(old.estimate.pose, old.cloth).vertices
+    after = model.surface(new.estimate.pose, new.cloth).vertices
+    angles = np.abs(new.estimate.pose.angles - old.estimate.pose.angles)
+    return Change(surface=float(np.linalg.norm(after - before, axis=1).max()), angles=float(angles.max(initial=0)))

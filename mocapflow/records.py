@@ -1,0 +1,101 @@
+"""Frozen dataclasses whose array fields declare axes, unit and kind once.
+
+The declaration drives the check on construction, the dimension names in the store and the help text.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from functools import cache
+from typing import Any, NamedTuple, TypeVar, dataclass_transform
+
+import numpy as np
+import numpy.typing as npt
+
+from mocapflow.errors import ShapeError
+
+F64 = npt.NDArray[np.float64]
+F32 = npt.NDArray[np.float32]
+I32 = npt.NDArray[np.int32]
+I16 = npt.NDArray[np.int16]
+U8 = npt.NDArray[np.uint8]
+Bool = npt.NDArray[np.bool_]
+
+DTYPES = {"F64": "f8", "F32": "f4", "I32": "i4", "I16": "i2", "U8": "u1", "Bool": "?"}
+
+Class = TypeVar("Class", bound=type)
+
+
+class Axes(NamedTuple):
+    """What an array field promises: named or fixed axes, unit and dtype."""
+
+    axes: tuple[str | int, ...]
+    unit: str
+    dtype: np.dtype[Any] | None
+    optional: bool
+
+
+def array(*axes: str | int, unit: str, default: Any = dataclasses.MISSING) -> Any:
+    """Declare an array field: axes are names (equal names, equal lengths) or fixed lengths."""
+    return dataclasses.field(default=default, metadata={"axes": axes, "unit": unit})
+
+
+@cache
+def array_fields(record_class: type) -> dict[str, Axes]:
+    """Return the declaration of each array field of a record class."""
+    fields = dataclasses.fields(record_class)
+    return {field.name: _axes(field) for field in fields if "axes" in field.metadata}
+
+
+def _axes(field: dataclasses.Field[Any]) -> Axes:
+    name, _, rest = str(field.type).partition(" | ")
+    return Axes(field.metadata["axes"], field.metadata["unit"], np.dtype(DTYPES[name]), rest == "None")
+
+
+def check_arrays(record: Any) -> None:
+    """Check every array field of a record against its declaration and make it read-only in place.
+
+    Raises:
+        ShapeError: an array's dtype, number of axes or a length contradicts the declaration.
+    """
+    lengths: dict[str, int] = {}
+    for name, declared in array_fields(type(record)).items():
+        value = getattr(record, name)
+        if value is None and declared.optional:
+            continue
+        where = f"{type(record).__name__}.{name}"
+        if not isinstance(value, np.ndarray):
+            raise ShapeError(f"{where} is {type(value).__name__}, not a numpy array")
+        if value.dtype != declared.dtype:
+            raise ShapeError(f"{where} has dtype {value.dtype}; expected {declared.dtype}")
+        _check_shape(where, value.shape, declared.axes, lengths)
+        value.flags.writeable = False
+
+
+def _check_shape(where: str, shape: tuple[int, ...], axes: tuple[str | int, ...], lengths: dict[str, int]) -> None:
+    expected = [axis if isinstance(axis, int) else lengths.get(axis) for axis in axes]
+    fits = len(shape) == len(axes) and all(
+        want is None or want == have for want, have in zip(expected, shape, strict=True)
+    )
+    if not fits:
+        wanted = ", ".join(
+            str(axis) if isinstance(axis, int) or length is None else f"{axis}={length}"
+            for axis, length in zip(axes, expected, strict=True)
+        )
+        raise ShapeError(f"{where} has shape {shape}; expected ({wanted})")
+    lengths.update({axis: have for axis, have in zip(axes, shape, strict=True) if isinstance(axis, str)})
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(array, dataclasses.field))
+def record(cls: Class) -> Class:
+    """Make a frozen, keyword-only dataclass that checks its arrays when built."""
+    own_check: Callable[[Any], None] | None = cls.__dict__.get("__post_init__")
+
+    def check(self: Any) -> None:
+        check_arrays(self)
+        if own_check is not None:
+            own_check(self)
+
+    cls.__post_init__ = check  # type: ignore[attr-defined]
+    return dataclasses.dataclass(frozen=True, kw_only=True, eq=False)(cls)  # type: ignore[return-value]

@@ -1,0 +1,47 @@
+"""What does not change during a recording: rig, body, garment, background."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from mocapflow.data import BODY, CLOTH, Background, Body, Camera, Cloth, GarmentMesh, Pose, Surface
+from mocapflow.geometry import kinematics
+from mocapflow.records import I32, U8, record
+
+
+@record
+class Scene:
+    """The cameras (pinhole) and the clothed person."""
+
+    cameras: tuple[Camera, ...]
+    body: Body
+    garment: GarmentMesh | None = None
+    background: Background | None = None
+
+    def with_background(self, background: Background | None) -> Scene:
+        """Return the scene with the empty room known."""
+        return replace(self, background=background)
+
+    @cached_property
+    def faces(self) -> I32:
+        """Faces of the whole surface, body first: (F, 3)."""
+        if self.garment is None:
+            return self.body.faces
+        return np.concatenate([self.body.faces, self.garment.faces + np.int32(len(self.body.vertices))])
+
+    @cached_property
+    def layer(self) -> U8:
+        """Layer of each surface vertex, body first: (N,)."""
+        cloth = 0 if self.garment is None else len(self.garment.vertices)
+        return np.repeat(np.array([BODY, CLOTH], np.uint8), [len(self.body.vertices), cloth])
+
+    def surface(self, pose: Pose, cloth: Cloth) -> Surface:
+        """Return body and garment posed in the world."""
+        joints, screws = kinematics.chain(self.body, pose)
+        vertices = kinematics.skin(self.body, joints)
+        if len(cloth.vertices):
+            vertices = np.concatenate([vertices, cloth.vertices])
+        return Surface(vertices=vertices, faces=self.faces, layer=self.layer, joints=joints, screws=screws)
