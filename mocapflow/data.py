@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -246,6 +247,8 @@ class FrameResult:
     steady: bool
     oscillating: bool
     change: Change
+    overlap: F64 = array("C", unit="1, intersection over union of model and image silhouette; NaN where unseen")
+    seconds: Mapping[str, float] = field(default_factory=dict)  # CPU time of each step; never part of a result
 
 
 @record
@@ -291,11 +294,37 @@ class Track:
     iterations: I16 = array("T", unit="turns of the loop")
     steady: Bool = array("T", unit="True where the loop came to rest")
     usable: Bool = array("T", "C", unit="False: lost or corrupted view")
+    overlap: F64 = array("T", "C", unit="1, intersection over union of model and image silhouette")
+    seconds: F64 = array("T", "K", unit="s of CPU per step of the loop")
+    step_names: tuple[str, ...]  # the K steps
     notes: tuple[str, ...] = ()  # what happened to frames, e.g. "frame 12: cam02 black"
 
     def pose(self, row: int) -> Pose:
         """Return the pose of one row."""
         return Pose(root=self.root[row].copy(), angles=self.angles[row].copy())
+
+
+@record
+class RunFolder:
+    """Where a run writes its results, and how it was made."""
+
+    path: Path
+    recipe: Mapping[str, Any]  # pipeline, settings, versions, and per finished stage: key, cached, seconds
+
+
+@record
+class Files:
+    """Files written into the run folder; a stage that returns them always runs."""
+
+    paths: tuple[Path, ...]
+
+
+@record
+class Evaluation:
+    """One row per compared angle; a stage that returns it always runs."""
+
+    reference: str  # the file compared with
+    rows: tuple[Mapping[str, float | str], ...]
 
 
 def empty_matches() -> Matches:

@@ -67,7 +67,7 @@ def settle(
     assert turn.change is not None
     return FrameResult(
         state=state, iterations=turn.index + 1, steady=calm >= steps.steady.turns, change=turn.change,
-        oscillating=calm == 0 and turn.index > 1 and steps.steady.holds(swing),
+        overlap=np.full(len(model.scene.cameras), np.nan), oscillating=calm == 0 and turn.index > 1 and steps.steady.holds(swing),
     )
 
 
