@@ -1,1 +1,14 @@
-"""Built-in plugin."""
+"""Draping: the garment laid on the posed body, and who chooses its parameters."""
+
+from __future__ import annotations
+
+from mocapflow.components import ClothFitter
+from mocapflow.hookspecs import hookimpl
+
+
+@hookimpl
+def mocapflow_cloth_fitters() -> list[type[ClothFitter]]:
+    """Return the cloth fitters of this package."""
+    from mocapflow_draping.fixed import Fixed
+
+    return [Fixed]
