@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from mocapflow.data import BODY, CLOTH, Background, Body, Camera, Cloth, GarmentMesh, Pose, Surface
-from mocapflow.geometry import kinematics
+from mocapflow.geometry import kinematics, meshes
 from mocapflow.records import I32, U8, record
 
 
@@ -33,6 +33,11 @@ class Scene:
         return np.concatenate([self.body.faces, self.garment.faces + np.int32(len(self.body.vertices))])
 
     @cached_property
+    def edges(self) -> I32:
+        """Edges of the whole surface: (E, 4), see `Surface.edges`."""
+        return meshes.edges(self.faces)
+
+    @cached_property
     def layer(self) -> U8:
         """Layer of each surface vertex, body first: (N,)."""
         cloth = 0 if self.garment is None else len(self.garment.vertices)
@@ -44,4 +49,6 @@ class Scene:
         vertices = kinematics.skin(self.body, joints)
         if len(cloth.vertices):
             vertices = np.concatenate([vertices, cloth.vertices])
-        return Surface(vertices=vertices, faces=self.faces, layer=self.layer, joints=joints, screws=screws)
+        return Surface(
+            vertices=vertices, faces=self.faces, edges=self.edges, layer=self.layer, joints=joints, screws=screws
+        )

@@ -1,0 +1,131 @@
+"""Compiled kernels of `silhouettes`: projection, occluding edges, winding numbers, distances to segments."""
+
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+
+REACH = 1.0  # px beyond a segment at which its outside is looked up
+
+
+@numba.njit(cache=True)
+def project(vertices, matrix, pixels, depth):  # type: ignore[no-untyped-def]
+    """Write pixels (N, 2) and depths (N,) m of world points (N, 3)."""
+    for v in range(len(vertices)):
+        x, y, z = vertices[v, 0], vertices[v, 1], vertices[v, 2]
+        w = matrix[2, 0] * x + matrix[2, 1] * y + matrix[2, 2] * z + matrix[2, 3]
+        depth[v] = w
+        inverse = 1.0 / w if w > 1e-6 else 0.0
+        pixels[v, 0] = (matrix[0, 0] * x + matrix[0, 1] * y + matrix[0, 2] * z + matrix[0, 3]) * inverse
+        pixels[v, 1] = (matrix[1, 0] * x + matrix[1, 1] * y + matrix[1, 2] * z + matrix[1, 3]) * inverse
+
+
+@numba.njit(cache=True)
+def face_directions(pixels, depth, faces, facing):  # type: ignore[no-untyped-def]
+    """Write +1 for faces that look at the camera, -1 for those that look away, 0 for those behind it."""
+    for f in range(len(faces)):
+        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        if depth[a] <= 1e-6 or depth[b] <= 1e-6 or depth[c] <= 1e-6:
+            facing[f] = 0
+            continue
+        area = (pixels[b, 0] - pixels[a, 0]) * (pixels[c, 1] - pixels[a, 1]) - (pixels[c, 0] - pixels[a, 0]) * (
+            pixels[b, 1] - pixels[a, 1]
+        )
+        facing[f] = 1 if area < 0 else -1  # y points down: counterclockwise from outside is negative
+
+
+@numba.njit(cache=True)
+def occluding_edges(edges, faces, facing, cloth):  # type: ignore[no-untyped-def]
+    """Return directed occluding edges (K, 2), covered side on the same hand, and how many layers end there (K,)."""
+    out = np.empty((len(edges), 2), np.int32)
+    times = np.empty(len(edges), np.int32)
+    count = 0
+    for e in range(len(edges)):
+        a, b, left, right = edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
+        two_sided = cloth[a]
+        ends = _share(left, facing, two_sided) - _share(right, facing, two_sided)
+        if ends == 0:
+            continue
+        out[count, 0], out[count, 1] = (a, b) if ends > 0 else (b, a)
+        times[count] = abs(ends)
+        count += 1
+    return out[:count], times[:count]
+
+
+@numba.njit(cache=True)
+def _share(face, facing, two_sided):  # type: ignore[no-untyped-def]
+    """Return what a face adds along its own direction: 1 if it covers, -1 if it covers turned over."""
+    if face < 0:
+        return 0
+    direction = facing[face]
+    return direction if two_sided else max(direction, 0)
+
+
+@numba.njit(cache=True)
+def wind(ends, times, corner, cover):  # type: ignore[no-untyped-def]
+    """Add up directed segments to the number of layers over each pixel of the crop."""
+    height, width = cover.shape
+    for s in range(len(ends)):
+        x0, y0 = ends[s, 0, 0] - corner[0], ends[s, 0, 1] - corner[1]
+        x1, y1 = ends[s, 1, 0] - corner[0], ends[s, 1, 1] - corner[1]
+        sign = times[s]
+        if y0 > y1:
+            x0, y0, x1, y1, sign = x1, y1, x0, y0, -sign
+        first, last = max(math.ceil(y0), 0), min(math.ceil(y1), height)
+        slope = (x1 - x0) / (y1 - y0) if y1 > y0 else 0.0
+        for row in range(first, last):
+            column = max(math.ceil(x0 + slope * (row - y0)), 0)
+            if column < width:
+                cover[row, column] += sign
+    for row in range(height):
+        layers = 0
+        for column in range(width):
+            layers += cover[row, column]
+            cover[row, column] = layers
+
+
+@numba.njit(cache=True)
+def on_boundary(ends, corner, cover):  # type: ignore[no-untyped-def]
+    """Return which segments have nothing beyond them: the boundary of the covered region."""
+    height, width = cover.shape
+    outer = np.zeros(len(ends), np.bool_)
+    for s in range(len(ends)):
+        dx, dy = ends[s, 1, 0] - ends[s, 0, 0], ends[s, 1, 1] - ends[s, 0, 1]
+        length = math.sqrt(dx * dx + dy * dy)
+        if length == 0.0:
+            continue
+        x = 0.5 * (ends[s, 0, 0] + ends[s, 1, 0]) - REACH * dy / length - corner[0]
+        y = 0.5 * (ends[s, 0, 1] + ends[s, 1, 1]) + REACH * dx / length - corner[1]
+        column, row = int(round(x)), int(round(y))
+        outer[s] = not (0 <= column < width and 0 <= row < height) or cover[row, column] == 0
+    return outer
+
+
+@numba.njit(cache=True)
+def paint_distance(ends, corner, cover, band, distance):  # type: ignore[no-untyped-def]
+    """Write the signed distance to the nearest segment into pixels within the band; the inside beyond it is +band."""
+    height, width = cover.shape
+    rows, columns = distance.shape
+    for row in range(height):
+        for column in range(width):
+            if cover[row, column] > 0:
+                distance[row + corner[1], column + corner[0]] = band
+    square = np.full(distance.shape, np.float32(band * band))
+    for s in range(len(ends)):
+        ax, ay = ends[s, 0, 0], ends[s, 0, 1]
+        dx, dy = ends[s, 1, 0] - ax, ends[s, 1, 1] - ay
+        inverse = 1.0 / max(dx * dx + dy * dy, 1e-12)
+        top, bottom = max(math.ceil(min(ay, ay + dy) - band), 0), min(math.floor(max(ay, ay + dy) + band), rows - 1)
+        left, right = max(math.ceil(min(ax, ax + dx) - band), 0), min(math.floor(max(ax, ax + dx) + band), columns - 1)
+        for row in range(top, bottom + 1):
+            for column in range(left, right + 1):
+                px, py = column - ax, row - ay
+                t = min(max((px * dx + py * dy) * inverse, 0.0), 1.0)
+                ex, ey = px - t * dx, py - t * dy
+                d = np.float32(ex * ex + ey * ey)
+                if d < square[row, column]:
+                    square[row, column] = d
+                    inside = distance[row, column] > 0
+                    distance[row, column] = math.sqrt(d) if inside else -math.sqrt(d)
