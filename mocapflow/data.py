@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -149,13 +150,23 @@ class Surface:
     joints: F64 = array("J", 4, 4, unit="m, world_from_rest")
     screws: F64 = array("D", 6, unit="twist (omega, v) in the world")
 
+    @cached_property
+    def normals(self) -> F64:
+        """Unit vertex normals (N, 3)."""
+        from mocapflow.geometry.meshes import vertex_normals  # compiled code, loaded where it is used
+
+        return vertex_normals(self.vertices, self.faces)
+
 
 @record
 class Contour:
-    """The occluding contour of a surface in one view: points on the boundary of its silhouette."""
+    """The occluding contour of a surface in one view: evenly spaced points on the boundary of its silhouette.
 
-    camera: int
+    A point lies on an edge of the mesh; `vertex` is the nearer end of that edge and `anchor` where it projects.
+    """
+
     vertex: I32 = array("K", unit="surface vertex index")
+    anchor: F64 = array("K", 2, unit="px, image of the vertex")
     pixel: F64 = array("K", 2, unit="px")
     normal: F64 = array("K", 2, unit="1, unit, out of the silhouette")
 
@@ -299,6 +310,8 @@ class Track:
     seconds: F64 = array("T", "K", unit="s of CPU per step of the loop")
     step_names: tuple[str, ...]  # the K steps
     notes: tuple[str, ...] = ()  # what happened to frames, e.g. "frame 12: cam02 black"
+    raw_root: F64 | None = array("T", 4, 4, unit="m, world_from_body, before smoothing", default=None)
+    raw_angles: F64 | None = array("T", "D", unit="rad, before smoothing", default=None)
 
     def pose(self, row: int) -> Pose:
         """Return the pose of one row."""

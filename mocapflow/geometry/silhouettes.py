@@ -9,6 +9,7 @@ triangles. Cloth is two-sided: both its sides cover.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mocapflow.data import CLOTH, Camera, Contour, Surface
 from mocapflow.geometry import silhouette_kernels as kernels
@@ -71,29 +72,37 @@ def model_distance(surface: Surface, camera: Camera, band_px: float) -> F32:
     return signed_distance(outline(surface, camera), camera, band_px)
 
 
-def occluding_contour(surface: Surface, camera: Camera, index: int, normals: F64) -> Contour:
-    """Return the vertices on the boundary of the silhouette within the image, with their outward image normals.
+def occluding_contour(surface: Surface, camera: Camera, spacing_px: float) -> Contour:
+    """Return points on the boundary of the silhouette within the image, evenly spaced along it.
 
-    Args:
-        surface: the posed surface.
-        camera: the view.
-        index: the number of the view.
-        normals: (N, 3) unit vertex normals of the surface; they look along the image plane at an occluding
-            contour, and their projection is smoother than the direction of the short edges.
+    Their normals are the projected surface normals, which look along the image plane at an occluding contour and
+    are smoother than the short edges; at cloth, which has a rim, they are those of the edges.
     """
     boundary = outline(surface, camera)
-    vertex, first = np.unique(boundary.vertex[:, 0], return_index=True)
-    pixel = boundary.pixel[first, 0]
-    inside = ((pixel >= 0) & (pixel <= camera.size - 1)).all(1)
-    vertex, pixel, along = vertex[inside], pixel[inside], np.diff(boundary.pixel[first[inside]], axis=1)[:, 0]
+    segment, share = _even_samples(boundary.pixel, spacing_px)
+    ends, vertices = boundary.pixel[segment], boundary.vertex[segment]
+    near = (share > 0.5).astype(np.intp)
+    rows = np.arange(len(segment))
+    vertex, anchor = vertices[rows, near], ends[rows, near]
+    pixel = ends[:, 0] + share[:, None] * (ends[:, 1] - ends[:, 0])
+    along = ends[:, 1] - ends[:, 0]
     outward = np.column_stack([-along[:, 1], along[:, 0]])
-    smooth = _image_normals(normals[vertex], surface.vertices[vertex], camera)
-    against = np.sum(smooth * outward, axis=1) < 0
-    rim = surface.layer[vertex] == CLOTH  # at a hem the surface normal says nothing about the image normal
-    smooth[against & ~rim] *= -1
-    smooth[rim] = outward[rim]
-    length = np.linalg.norm(smooth, axis=1, keepdims=True)
-    return Contour(camera=index, vertex=vertex, pixel=pixel, normal=smooth / np.where(length > 0, length, 1.0))
+    smooth = _image_normals(surface.normals[vertex], surface.vertices[vertex], camera)
+    usable = (np.sum(smooth * outward, axis=1) > 0) & (surface.layer[vertex] != CLOTH)
+    normal = np.where(usable[:, None], smooth, outward)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    inside = ((pixel >= 0) & (pixel <= camera.size - 1)).all(1)
+    return Contour(vertex=vertex[inside], anchor=anchor[inside], pixel=pixel[inside], normal=normal[inside])
+
+
+def _even_samples(ends: F64, spacing: float) -> tuple[NDArray[np.intp], F64]:
+    """Return segment numbers and shares along them of points every `spacing` px of the total length."""
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    total = np.cumsum(length)
+    at = np.arange(0.5 * spacing, total[-1] if len(total) else 0.0, spacing)
+    segment = np.searchsorted(total, at)
+    share = 1.0 - (total[segment] - at) / length[segment]
+    return segment, share
 
 
 def _image_normals(normals: F64, points: F64, camera: Camera) -> F64:

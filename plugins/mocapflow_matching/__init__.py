@@ -1,1 +1,14 @@
-"""Built-in plugin."""
+"""Matchers: pairs of image points and surface points."""
+
+from __future__ import annotations
+
+from mocapflow.components import Matcher
+from mocapflow.hookspecs import hookimpl
+
+
+@hookimpl
+def mocapflow_matchers() -> list[type[Matcher]]:
+    """Return the built-in matchers."""
+    from mocapflow_matching.contour_icp import ContourIcp
+
+    return [ContourIcp]

@@ -1,0 +1,100 @@
+"""Matcher `contour_icp`: nearest neighbours between image contours and the occluding contour of the model."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from mocapflow.components import Matcher, pool
+from mocapflow.data import Camera, Contour, Frame, Matches, Past, Segmentation, Surface, Turn, empty_matches
+from mocapflow.geometry.silhouettes import occluding_contour
+from mocapflow.records import F64, I32
+from mocapflow.scene import Scene
+from mocapflow_matching.contours import ImageContour, image_contour, nearest_compatible
+from mocapflow_matching.robust import Loss, robust_weights
+
+Positive = Annotated[float, Field(gt=0)]
+
+
+class ContourIcp(Matcher):
+    """Forward pairs (image contour to nearest model contour) and backward pairs, in every view.
+
+    All components of the contours take part, holes too. The first turn of the loop uses the loss `first_loss`,
+    later turns `later_loss`: a redescending loss helps only once the pose is nearly right.
+    """
+
+    name = "contour_icp"
+    direction: Literal["both", "forward", "backward"] = "both"
+    residual: Literal["normal", "point"] = "normal"  # let points slide along the contour, or not (the chapter)
+    spacing_px: Positive = 4.0
+    first_reach_px: Positive = 40.0
+    later_reach_px: Positive = 10.0
+    normal_angle_deg: Annotated[float, Field(gt=0, le=180)] = 60.0
+    first_loss: Loss = "huber"
+    later_loss: Loss = "geman_mcclure"
+    scale_px: Positive = 2.0
+    sigma_px: Positive = 1.0
+    correlation_px: Positive = 15.0  # neighbouring contour errors are alike over this length
+    border_px: Annotated[int, Field(ge=1)] = 3
+
+    def match(
+        self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn
+    ) -> Matches:
+        """Return pairs of contour points; see the class."""
+        parts = [
+            (1.0, self.match_view(silhouette.camera, scene.cameras[silhouette.camera], image, surface, turn))
+            for silhouette in segmentation.silhouettes
+            if silhouette.layer == "person"
+            and len((image := image_contour(silhouette.distance, self.spacing_px, self.border_px)).pixel)
+        ]
+        return pool(parts) if parts else empty_matches()
+
+    def match_view(self, index: int, camera: Camera, image: ImageContour, surface: Surface, turn: Turn) -> Matches:
+        """Return the pairs of one view."""
+        model = _sorted_by_row(occluding_contour(surface, camera, self.spacing_px))
+        reach = self.first_reach_px if turn.index == 0 else self.later_reach_px
+        cosine = float(np.cos(np.radians(self.normal_angle_deg)))
+        nothing = np.empty(0, np.int32)
+        seen, shown, seeing, showing = nothing, nothing, nothing, nothing
+        if self.direction != "backward":  # every image point asks the model
+            found = nearest_compatible(image.pixel, image.normal, model.pixel, model.normal, reach, cosine)
+            seen, shown = np.flatnonzero(found >= 0).astype(np.int32), found[found >= 0]
+        if self.direction != "forward":  # every model point asks the image
+            found = nearest_compatible(model.pixel, model.normal, image.pixel, image.normal, reach, cosine)
+            seeing, showing = found[found >= 0], np.flatnonzero(found >= 0).astype(np.int32)
+        pairs = np.concatenate([seen, seeing]), np.concatenate([shown, showing])
+        return self.weigh(index, image, model, *pairs, turn)
+
+    def weigh(self, index: int, image: ImageContour, model: Contour, seen: I32, shown: I32, turn: Turn) -> Matches:
+        """Return pairs of image points `seen` (M,) and model points `shown` (M,) with their weights."""
+        offset = model.pixel[shown] - image.pixel[seen]
+        if self.residual == "normal":
+            direction = image.normal[seen]
+            distance = np.abs(np.sum(offset * direction, axis=1))
+        else:
+            direction = np.zeros_like(offset)
+            distance = np.linalg.norm(offset, axis=1)
+        loss = self.first_loss if turn.index == 0 else self.later_loss
+        return Matches(
+            camera=np.full(len(seen), index, np.int16),
+            # a model point lies between vertices: moving the target by as much makes the vertex stand for it
+            pixel=image.pixel[seen] - (model.pixel - model.anchor)[shown],
+            direction=direction,
+            vertex=model.vertex[shown],
+            weight=robust_weights(distance, loss, self.scale_px) * self.information(),
+        )
+
+    def information(self) -> float:
+        """Return what one pair tells, px^-2: less than 1 / sigma^2, for neighbours repeat each other."""
+        directions = 2 if self.direction == "both" else 1
+        return min(self.spacing_px / self.correlation_px, 1.0) / (directions * self.sigma_px**2)
+
+
+def _sorted_by_row(contour: Contour) -> Contour:
+    order: F64 = np.argsort(contour.pixel[:, 1], kind="stable")
+    return Contour(
+        vertex=contour.vertex[order], anchor=contour.anchor[order], pixel=contour.pixel[order],
+        normal=contour.normal[order],
+    )

@@ -1,0 +1,91 @@
+"""The contour of an image silhouette: sub-pixel zero crossings of its signed distance, with normals."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from mocapflow.records import F32, F64, array, record
+
+
+@record
+class ImageContour:
+    """Points on the zero level of a signed distance, all components and holes included, sorted by row."""
+
+    pixel: F64 = array("K", 2, unit="px")
+    normal: F64 = array("K", 2, unit="1, unit, out of the silhouette")
+
+
+def image_contour(distance: F32, spacing_px: float, border_px: int) -> ImageContour:
+    """Return the zero crossings of a signed distance (H, W) px, thinned to about one every `spacing_px`.
+
+    Crossings nearer than `border_px` to the image border are left out: there a silhouette is cut, not occluding.
+    """
+    pixel, normal = _crossings(distance, max(border_px, 1))
+    stride = max(round(spacing_px * 4 / np.pi), 1)  # a contour crosses 4/pi grid lines per pixel of its length
+    order = stride * np.argsort(pixel[::stride, 1], kind="stable")
+    return ImageContour(pixel=pixel[order], normal=normal[order])
+
+
+@numba.njit(cache=True)
+def _crossings(distance, border):  # type: ignore[no-untyped-def]
+    height, width = distance.shape
+    capacity = 4096
+    pixel, normal = np.empty((capacity, 2)), np.empty((capacity, 2))
+    count = 0
+    for row in range(border, height - border - 1):
+        for column in range(border, width - border - 1):
+            here = distance[row, column]
+            for down in range(2):
+                there = distance[row + down, column + 1 - down]
+                if (here > 0) == (there > 0):
+                    continue
+                t = here / (here - there)
+                gx = (1 - t) * _slope(distance, row, column, 0) + t * _slope(distance, row + down, column + 1 - down, 0)
+                gy = (1 - t) * _slope(distance, row, column, 1) + t * _slope(distance, row + down, column + 1 - down, 1)
+                length = np.sqrt(gx * gx + gy * gy)
+                if length == 0.0:
+                    continue
+                if count == capacity:
+                    pixel, normal = np.concatenate((pixel, pixel)), np.concatenate((normal, normal))
+                    capacity *= 2
+                pixel[count, 0], pixel[count, 1] = column + (1 - down) * t, row + down * t
+                normal[count, 0], normal[count, 1] = -gx / length, -gy / length
+                count += 1
+    return pixel[:count], normal[:count]
+
+
+@numba.njit(cache=True)
+def _slope(distance, row, column, axis):  # type: ignore[no-untyped-def]
+    if axis == 0:
+        return distance[row, column + 1] - distance[row, column - 1]
+    return distance[row + 1, column] - distance[row - 1, column]
+
+
+@numba.njit(cache=True)
+def nearest_compatible(points, normals, others, other_normals, reach, least_cosine):  # type: ignore[no-untyped-def]
+    """Return, for each point, the nearest other within reach whose normal agrees, or -1.
+
+    The others are visited outward from the point's row in the order of their rows (they must be sorted by y).
+    """
+    found = np.full(len(points), -1, np.int32)
+    rows = others[:, 1].copy()
+    for p in range(len(points)):
+        x, y = points[p, 0], points[p, 1]
+        best = reach * reach
+        start = np.searchsorted(rows, y)
+        for direction in (-1, 1):
+            k = start - 1 if direction < 0 else start
+            while 0 <= k < len(others):
+                dy = rows[k] - y
+                if dy * dy >= best:
+                    break
+                dx = others[k, 0] - x
+                d = dx * dx + dy * dy
+                if d < best:
+                    cosine = normals[p, 0] * other_normals[k, 0] + normals[p, 1] * other_normals[k, 1]
+                    if cosine >= least_cosine:
+                        best = d
+                        found[p] = k
+                k += direction
+    return found

@@ -1,0 +1,123 @@
+"""Silhouettes against shapes whose outline is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mocapflow.data import BODY, CLOTH, Camera, Surface
+from mocapflow.geometry import meshes, silhouettes
+from mocapflow.records import F64, I32
+
+FOCAL, DISTANCE, RADIUS = 500.0, 3.0, 0.5
+
+
+def camera() -> Camera:
+    """Look along +y from the origin; image right is world x, image down is world -z."""
+    pose = np.eye(4)
+    pose[:3, :3] = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]
+    intrinsics = np.array([[FOCAL, 0, 159.5], [0, FOCAL, 119.5], [0, 0, 1.0]])
+    return Camera(
+        name="cam", size=np.array([320, 240], np.int32), intrinsics=intrinsics, distortion=np.zeros(5),
+        camera_from_world=pose,
+    )
+
+
+def surface(vertices: F64, faces: I32, layer: int = BODY) -> Surface:
+    return Surface(
+        vertices=vertices, faces=faces, edges=meshes.edges(faces), layer=np.full(len(vertices), layer, np.uint8),
+        joints=np.zeros((1, 4, 4)), screws=np.zeros((0, 6)),
+    )
+
+
+def sphere(centre: tuple[float, float, float], rows: int = 60, columns: int = 120) -> tuple[F64, I32]:
+    """A closed sphere: rings from pole to pole, the poles as small caps of one vertex."""
+    polar = np.linspace(0, np.pi, rows + 2)[1:-1, None]
+    azimuth = np.linspace(0, 2 * np.pi, columns, endpoint=False)
+    ring = [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar) + 0 * azimuth]
+    points = np.stack(ring, -1).reshape(-1, 3)
+    vertices = np.concatenate([points, [[0, 0, 1.0]], [[0, 0, -1.0]]]) * RADIUS + centre
+    body = meshes.grid_faces(rows, columns, closed=True)
+    around, last = np.arange(columns, dtype=np.int32), (rows - 1) * columns
+    after, north, south = (around + 1) % columns, np.full(columns, len(points)), np.full(columns, len(points) + 1)
+    caps = [np.column_stack([north, around, after]), np.column_stack([south, last + after, last + around])]
+    return vertices, np.concatenate([body, *caps]).astype(np.int32)
+
+
+def circle_radius() -> float:
+    return FOCAL * RADIUS / np.sqrt(DISTANCE**2 - RADIUS**2)
+
+
+def circle_distance(offset: float = 0.0) -> F64:
+    x, y = np.meshgrid(np.arange(320), np.arange(240))
+    return circle_radius() - np.hypot(x - 159.5 - offset, y - 119.5)
+
+
+def test_every_edge_of_a_closed_mesh_has_two_faces() -> None:
+    _, faces = sphere((0, DISTANCE, 0))
+    edges = meshes.edges(faces)
+    assert len(edges) == 3 * len(faces) / 2
+    assert (edges[:, 2:] >= 0).all()
+
+
+def test_normals_of_a_sphere_point_outward() -> None:
+    vertices, faces = sphere((0, DISTANCE, 0))
+    radial = (vertices - [0, DISTANCE, 0]) / RADIUS
+    assert np.abs(meshes.vertex_normals(vertices, faces) - radial).max() < 0.02
+
+
+def test_a_sphere_covers_its_disc_once() -> None:
+    boundary = silhouettes.outline(surface(*sphere((0, DISTANCE, 0))), camera())
+    mask = silhouettes.mask(boundary, camera())
+    expected = circle_distance() > 0
+    assert (mask ^ expected).sum() < 0.002 * expected.sum()
+    assert set(np.unique(boundary.cover)) == {0, 1}
+
+
+def test_the_distance_to_the_outline_is_subpixel() -> None:
+    distance = silhouettes.model_distance(surface(*sphere((0, DISTANCE, 0))), camera(), 12.0)
+    truth = np.clip(circle_distance(), -12, 12)
+    assert np.abs(distance - truth).max() < 0.12  # a polygon of 120 corners leaves the circle by up to 0.03 px
+
+
+def test_contour_points_lie_on_the_circle_evenly_with_outward_normals() -> None:
+    contour = silhouettes.occluding_contour(surface(*sphere((0, DISTANCE, 0))), camera(), 4.0)
+    radial = contour.pixel - [159.5, 119.5]
+    radius = np.linalg.norm(radial, axis=1)
+    assert len(radius) == pytest.approx(2 * np.pi * circle_radius() / 4.0, abs=2)
+    assert np.abs(radius - circle_radius()).max() < 0.1
+    assert np.sum(radial * contour.normal, axis=1).min() > 0.97 * radius.min()
+
+
+def test_a_sphere_before_another_hides_the_edge_between() -> None:
+    near, far = sphere((0.1, DISTANCE, 0)), sphere((-0.1, DISTANCE + 1.5, 0))
+    vertices = np.concatenate([near[0], far[0]])
+    both = surface(vertices, np.concatenate([near[1], far[1] + np.int32(len(near[0]))]))
+    contour = silhouettes.occluding_contour(both, camera(), 4.0)
+    distance = silhouettes.model_distance(both, camera(), 12.0)
+    columns, rows = np.round(contour.pixel).astype(int).T
+    assert np.abs(distance[rows, columns]).max() < 1.2
+
+
+def test_an_open_sheet_of_cloth_is_seen_from_both_sides() -> None:
+    grid = np.array([[x, DISTANCE, z] for z in np.linspace(0.3, -0.3, 7) for x in np.linspace(-0.3, 0.3, 7)])
+    faces = meshes.grid_faces(7, 7, closed=False)
+    for turned in (faces, faces[:, ::-1].copy()):
+        boundary = silhouettes.outline(surface(grid, turned, CLOTH), camera())
+        assert silhouettes.mask(boundary, camera()).sum() == pytest.approx((0.6 * FOCAL / DISTANCE) ** 2, rel=0.03)
+        assert len(boundary.pixel) == 24
+
+
+def test_a_folded_sheet_ends_at_its_fold() -> None:
+    z = np.linspace(0.2, -0.2, 5)
+    x, y = np.array([-0.2, 0.0, 0.2, 0.0, -0.2]), DISTANCE + np.array([0, 0.02, 0.05, 0.08, 0.1])
+    grid = np.array([[x[k], y[k], z[row]] for row in range(5) for k in range(5)])
+    boundary = silhouettes.outline(surface(grid, meshes.grid_faces(5, 5, closed=False), CLOTH), camera())
+    assert boundary.pixel[..., 0].max() == pytest.approx(159.5 + FOCAL * 0.2 / (DISTANCE + 0.05), abs=1e-6)
+    assert boundary.cover.max() == 2
+
+
+def test_a_surface_behind_the_camera_has_no_outline() -> None:
+    boundary = silhouettes.outline(surface(*sphere((0, -DISTANCE, 0))), camera())
+    assert len(boundary.pixel) == 0
+    assert not silhouettes.mask(boundary, camera()).any()
