@@ -1,0 +1,193 @@
+"""The pipeline file: what it may say, and the pipeline of components it stands for."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from mocapflow.components import BodyModel, Garment, Stage
+from mocapflow.errors import MocapflowError, PipelineError, RecordingError, UnknownComponent
+from mocapflow.registry import Registry, load_registry
+from mocapflow.resolve import Resolver
+from mocapflow.yamlfile import read
+
+
+class Strict(BaseModel):
+    """A part of the file that takes no other names than its own."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Frames(Strict):
+    """The part of the recording to work on: `start` up to, without, `stop`."""
+
+    start: Annotated[int, Field(ge=0)] = 0
+    stop: Annotated[int, Field(ge=1)] | None = None
+    step: Annotated[int, Field(ge=1)] = 1
+
+
+class PipelineFile(Strict):
+    """What a pipeline file may say at its top level."""
+
+    name: ClassVar[str] = "a pipeline"
+    mocapflow: Literal[1] = 1
+    recording: str | None = None
+    plugins: tuple[str, ...] = ()
+    body: Any = "scanned"
+    garment: Any = None
+    frames: Frames = Frames()
+    scale: Annotated[float, Field(gt=0, le=1)] = 1.0
+    stages: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class NamedStage:
+    """A stage with its label; `wiring` names the stages that parameters are taken from."""
+
+    label: str
+    stage: Stage
+    wiring: Mapping[str, str]
+    where: str
+
+
+@dataclass(frozen=True)
+class Pipeline:
+    """A pipeline file with every name resolved."""
+
+    name: str
+    path: Path
+    recording: Path
+    body: BodyModel
+    garment: Garment | None
+    stages: tuple[NamedStage, ...]
+    registry: Registry
+    start: int = 0
+    stop: int | None = None
+    step: int = 1
+    scale: float = 1.0  # of the images
+
+
+def load_pipeline(
+    path: Path,
+    registry: Registry | None = None,
+    *,
+    recording: Path | None = None,
+    changes: Iterable[str] = (),
+    frames: slice | None = None,
+) -> Pipeline:
+    """Read a pipeline file and resolve every name in it.
+
+    Args:
+        path: the YAML file.
+        registry: where components are looked up; None: the installed plugins and those the file names.
+        recording: replaces the recording of the file.
+        changes: `PATH=VALUE` as in `--set`.
+        frames: replaces the frames of the file.
+
+    Raises:
+        MocapflowError: what is wrong, at which line, and what exists instead.
+    """
+    document = read(Path(path), changes)
+    plain = Resolver(document, Registry())
+    said = plain.build(PipelineFile, document.values, ())
+    assert isinstance(said, PipelineFile)
+    resolver = Resolver(document, registry or _registry_with(said.plugins, plain))
+    recording = recording or _recording(said, resolver)
+    if not recording.is_dir():
+        raise RecordingError("there is no such folder", where=str(recording), hint="--recording DIR names another")
+    part = _frames(frames) if frames else said.frames
+    if part.stop is not None and part.stop <= part.start:
+        raise resolver.located(PipelineError(f"{part.start}:{part.stop} holds no frame"), ("frames",))
+    return Pipeline(
+        name=Path(path).stem,
+        path=Path(path),
+        recording=recording,
+        body=resolver.component("body", said.body, ("body",)),
+        garment=_garment(said.garment, recording, resolver),
+        stages=tuple(_stage(label, value, resolver) for label, value in said.stages.items() if value is not None),
+        registry=resolver.registry,
+        start=part.start,
+        stop=part.stop,
+        step=part.step,
+        scale=said.scale,
+    )
+
+
+def _registry_with(plugins: tuple[str, ...], resolver: Resolver) -> Registry:
+    files = [resolver.file(plugin, ("plugins", index)) for index, plugin in enumerate(plugins)]
+    registry = load_registry(files)
+    for failure in registry.failures:
+        for index, file in enumerate(files):
+            if failure.origin.distribution == str(file):
+                raise resolver.located(PipelineError(str(failure)), ("plugins", index)) from failure.error
+    return registry
+
+
+def _recording(said: PipelineFile, resolver: Resolver) -> Path:
+    if said.recording is None:
+        raise resolver.located(PipelineError("no recording: write `recording: DIR`, or give --recording DIR"), ())
+    return resolver.file(said.recording, ("recording",))
+
+
+def _frames(part: slice) -> Frames:
+    return Frames(start=part.start or 0, stop=part.stop, step=part.step or 1)
+
+
+def _stage(label: str, value: Any, resolver: Resolver) -> NamedStage:
+    steps = ("stages", label)
+    wiring: Mapping[str, str] = {}
+    if isinstance(value, dict) and "from" in value:
+        wiring, value = value["from"], {key: inner for key, inner in value.items() if key != "from"}
+        if not isinstance(wiring, dict) or not all(isinstance(source, str) for source in wiring.values()):
+            message = "write {parameter: label of an earlier stage}"
+            raise resolver.located(PipelineError(message), (*steps, "from"))
+    stage = resolver.component("stage", value, steps)
+    return NamedStage(label, stage, wiring, resolver.place(steps))
+
+
+def _garment(value: Any, recording: Path, resolver: Resolver) -> Garment | None:
+    """Return the garment, its measures from the recording where the file gives none."""
+    if value is None:
+        return None
+    file = recording / "subject" / "garment.json"
+    kind, measures = _measures(file)
+    named = value.get("use") if isinstance(value, dict) else value
+    if named == "from_recording":
+        if kind is None:
+            raise _no_garment(file)
+        named, value = kind, {**value, "use": kind} if isinstance(value, dict) else kind
+    if named != kind:
+        measures = {}
+    try:
+        garment: Garment = resolver.component("garment", value, ("garment",), measures)
+        return garment
+    except MocapflowError as error:
+        if isinstance(error, UnknownComponent) or error.where != resolver.place(("garment",)):
+            raise
+        source = f"describes a {kind}" if kind else "does not exist"
+        note = f"measures come from {file}, which {source}; a value written here overrides them"
+        raise type(error)(error.message, where=error.where, hint="\n".join(filter(None, [error.hint, note]))) from None
+
+
+def _no_garment(file: Path) -> RecordingError:
+    hint = 'write {"type": "skirt", ...} with tape measures in metres there, or name the garment in the pipeline'
+    return RecordingError(
+        "the pipeline takes the garment from the recording, which names none", where=str(file), hint=hint
+    )
+
+
+def _measures(path: Path) -> tuple[str | None, dict[str, Any]]:
+    """Return the garment's type and its settings from a recording's tape measures."""
+    if not path.exists():
+        return None, {}
+    try:
+        said = json.loads(path.read_text(encoding="utf-8"))
+        return str(said["type"]), {f"{key}_m": value for key, value in said.items() if key != "type"}
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        hint = 'write {"type": "skirt", "waist_height": 1.05, ...}, in metres'
+        raise RecordingError(f"not a garment description: {error!r}", where=str(path), hint=hint) from None

@@ -1,0 +1,218 @@
+"""Finds plugins, checks what they provide, and keeps their failures for whoever asks for what is missing.
+
+A plugin is imported when the registry is loaded; its providers are called role by role, when a role is first
+asked for, so that a command pays only for the components it uses.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import inspect
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import partial
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from types import ModuleType, TracebackType
+from typing import Any
+
+import pluggy
+
+from mocapflow import components, hookspecs
+from mocapflow.components import Component
+from mocapflow.errors import MocapflowError, PluginError, UnknownComponent, alternatives
+from mocapflow.observers import Observers
+
+GROUP = "mocapflow"  # entry point group, and the distribution of the built-in plugins
+PROVIDERS: Mapping[str, tuple[str, type[Component]]] = {
+    "predictor": ("mocapflow_predictors", components.Predictor),
+    "segmenter": ("mocapflow_segmenters", components.Segmenter),
+    "matcher": ("mocapflow_matchers", components.Matcher),
+    "pose_solver": ("mocapflow_pose_solvers", components.PoseSolver),
+    "draper": ("mocapflow_drapers", components.Draper),
+    "cloth_fitter": ("mocapflow_cloth_fitters", components.ClothFitter),
+    "prior": ("mocapflow_priors", components.Prior),
+    "garment": ("mocapflow_garments", components.Garment),
+    "body": ("mocapflow_bodies", components.BodyModel),
+    "stage": ("mocapflow_stages", components.Stage),
+}
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a component comes from; a plugin file has its path as distribution and no version."""
+
+    plugin: str
+    distribution: str
+    version: str = ""
+
+    def __str__(self) -> str:
+        return f"plugin '{self.plugin}' ({' '.join(filter(None, [self.distribution, self.version]))})"
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A plugin, or one of its roles, that did not load."""
+
+    origin: Origin
+    error: Exception
+    role: str = ""  # empty: the whole plugin
+
+    def __str__(self) -> str:
+        part = f" its {self.role} components" if self.role else ""
+        text = self.error.message if isinstance(self.error, MocapflowError) else ""
+        return f"{self.origin} did not load{part}: {text or f'{type(self.error).__name__}: {self.error}'}"
+
+
+class Registry:
+    """The components of all plugins by role and name; see `load_registry`."""
+
+    def __init__(self) -> None:
+        self._manager = pluggy.PluginManager("mocapflow")
+        self._manager.add_hookspecs(hookspecs)
+        self._plugins: dict[Origin, Any] = {}
+        self._provided: dict[str, dict[str, list[type[Component]]]] = {}
+        self._origins: dict[type[Component], Origin] = {}
+        self._failures: list[Failure] = []
+        self.observers = Observers(self._manager)
+
+    @property
+    def plugins(self) -> tuple[Origin, ...]:
+        """The plugins that loaded."""
+        return tuple(self._plugins)
+
+    @property
+    def failures(self) -> tuple[Failure, ...]:
+        """What did not load so far; asking for the names of every role makes it complete."""
+        return tuple(self._failures)
+
+    def names(self, role: str) -> tuple[str, ...]:
+        """Return the names of all components of a role, sorted."""
+        return tuple(sorted(self._components(role)))
+
+    def get(self, role: str, name: str) -> type[Component]:
+        """Return the component class of a role by name.
+
+        Raises:
+            UnknownComponent: no plugin provides it; the hint says what exists and what did not load.
+            PluginError: two plugins provide it.
+        """
+        found = self._components(role).get(name, [])
+        if len(found) == 1:
+            return found[0]
+        if found:
+            first, second = (self._origins[cls] for cls in found[:2])
+            message = f"two plugins provide a {role} named '{name}': {first} and {second}"
+            raise PluginError(message, hint="uninstall one of them, or give its component another name")
+        notes = [f"note: {failure}" for failure in self._failures if failure.role in {"", role}]
+        hint = "\n".join([alternatives(name, self.names(role)), *notes])
+        raise UnknownComponent(f"no {role} named '{name}'", hint=hint)
+
+    def origin(self, cls: type[Component]) -> Origin:
+        """Return the plugin that provides a component class."""
+        return self._origins[cls]
+
+    def culprit(self, traceback: TracebackType | None) -> Origin | None:
+        """Return the plugin of the innermost frame of a traceback that lies in plugin code."""
+        packages = {_package(plugin): origin for origin, plugin in self._plugins.items()}
+        found = None
+        while traceback is not None:
+            module = traceback.tb_frame.f_globals.get("__name__", "")
+            found = packages.get(module.partition(".")[0], found)
+            traceback = traceback.tb_next
+        return found
+
+    def add(self, origin: Origin, load: Callable[[], Any]) -> None:
+        """Load and register one plugin; remember its failure and go on."""
+        try:
+            plugin = load()
+            _check_hooks(plugin)
+            self._manager.register(plugin, name=f"{origin.distribution}:{origin.plugin}")
+            self._plugins[origin] = plugin
+        except (Exception, SystemExit) as error:  # a foreign module may raise anything; it must not stop the others
+            cause = error if isinstance(error, Exception) else PluginError(f"it left with status {error.code}")
+            self._failures.append(Failure(origin, cause))
+
+    def _components(self, role: str) -> dict[str, list[type[Component]]]:
+        if role not in PROVIDERS:
+            raise UnknownComponent(f"there is no role '{role}'", hint=alternatives(role, PROVIDERS))
+        if role not in self._provided:
+            self._provided[role] = {}
+            for origin, plugin in self._plugins.items():
+                self._call_provider(role, origin, plugin)
+        return self._provided[role]
+
+    def _call_provider(self, role: str, origin: Origin, plugin: Any) -> None:
+        hook, base = PROVIDERS[role]
+        try:
+            classes = [_checked(cls, base, hook) for cls in getattr(plugin, hook, tuple)()]
+        except Exception as error:
+            self._failures.append(Failure(origin, error, role))
+            return
+        for cls in classes:
+            self._provided[role].setdefault(cls.name, []).append(cls)
+            self._origins[cls] = origin
+
+
+def load_registry(local_files: Iterable[Path] = ()) -> Registry:
+    """Return a registry of all installed plugins, the built-in ones first, and of plugin files."""
+    registry = Registry()
+    for entry in sorted(entry_points(group=GROUP), key=lambda e: (_distribution(e) != GROUP, _distribution(e), e.name)):
+        version = entry.dist.version if entry.dist else ""
+        registry.add(Origin(entry.name, _distribution(entry), version), entry.load)
+    for path in local_files:
+        registry.add(Origin(path.stem, str(path)), partial(_import_file, path))
+    return registry
+
+
+def _distribution(entry: EntryPoint) -> str:
+    return entry.dist.name if entry.dist else ""
+
+
+def _import_file(path: Path) -> ModuleType:
+    name = f"mocapflow_file_{path.stem}_{hashlib.blake2b(str(path.resolve()).encode(), digest_size=4).hexdigest()}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise PluginError(f"{path} is not a Python file")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # pydantic and typing look annotations up there
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[name]
+        raise
+    return module
+
+
+def _check_hooks(plugin: Any) -> None:
+    known = {name for name in vars(hookspecs) if name.startswith("mocapflow_")}
+    for name, function in inspect.getmembers(plugin, inspect.isroutine):
+        marked = hasattr(function, "mocapflow_impl")
+        if marked and name not in known:
+            close = get_close_matches(name, known, n=1)
+            guess = f" — did you mean '{close[0]}'?" if close else ""
+            raise PluginError(f"unknown hook '{name}'{guess}")
+        if name in known and not marked:
+            raise PluginError(f"{name} lacks @mocapflow.hookimpl")
+
+
+def _checked(cls: Any, base: type[Component], hook: str) -> type[Component]:
+    label = getattr(cls, "__name__", repr(cls))
+    if not (isinstance(cls, type) and issubclass(cls, base)):
+        raise PluginError(f"{hook} returned {label}, which is not a {base.__name__}")
+    if not isinstance(getattr(cls, "name", None), str):
+        raise PluginError(f'{base.__name__} {label} has no name: write `name = "..."` in the class')
+    missing = sorted(getattr(cls, "__abstractmethods__", ())) or (
+        [] if hasattr(cls, "run") or base.role != "stage" else ["run"]
+    )
+    if missing:
+        raise PluginError(f"{base.__name__} {label} does not define {', '.join(missing)}")
+    return cls
+
+
+def _package(plugin: Any) -> str:
+    name: str = getattr(plugin, "__name__", type(plugin).__module__)
+    return name.partition(".")[0]

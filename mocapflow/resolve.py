@@ -1,0 +1,137 @@
+"""Turns what a pipeline file says into components: names looked up, settings checked, errors with their line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+from pydantic.errors import PydanticUserError
+
+from mocapflow.components import Component
+from mocapflow.errors import MocapflowError, PipelineError, alternatives
+from mocapflow.registry import Registry
+from mocapflow.yamlfile import Document, Steps, dotted
+
+
+class Resolver:
+    """Builds the components a document names."""
+
+    def __init__(self, document: Document, registry: Registry) -> None:
+        self._document, self.registry = document, registry
+
+    def component(self, role: str, value: Any, steps: Steps, defaults: Mapping[str, Any] | None = None) -> Any:
+        """Return the component written at `steps` as a name or as {use: name, setting: value}.
+
+        Args:
+            role: which kind of component.
+            value: what the file says.
+            steps: where it says so.
+            defaults: settings that hold where the file gives none.
+
+        Raises:
+            MocapflowError: no such component or setting, or a wrong value; with its line.
+        """
+        name, given = self._name_and_settings(role, value, steps)
+        try:
+            cls = self.registry.get(role, name)
+        except MocapflowError as error:
+            raise self.located(error, steps) from None
+        fields = cls.model_fields
+        settings = {key: self._setting(fields[key].annotation, inner, (*steps, key)) if key in fields else inner
+                    for key, inner in given.items()}  # fmt: skip
+        return self.build(cls, {**(defaults or {}), **settings}, steps)
+
+    def build(self, cls: type[BaseModel], settings: Mapping[str, Any], steps: Steps) -> BaseModel:
+        """Return an instance of a pydantic model, its validation error told by line."""
+        try:
+            return cls(**settings)
+        except ValidationError as error:
+            raise self._wrong_setting(cls, error, steps) from None
+        except PydanticUserError as error:
+            message = f"{_title(cls)} is not complete: {error.message.splitlines()[0]}"
+            hint = "import the types of its settings when the module is imported, not under TYPE_CHECKING"
+            raise self.located(PipelineError(message, hint=hint), steps) from None
+
+    def place(self, steps: Steps) -> str:
+        """Return where a value is written, as file:line:column."""
+        return self._document.place(steps).text
+
+    def located(self, error: MocapflowError, steps: Steps) -> MocapflowError:
+        """Return an error told with the place and the path of a value."""
+        message = f"{dotted(steps)}: {error.message}" if steps else error.message
+        return type(error)(message, where=self.place(steps), hint=error.hint)
+
+    def file(self, value: str, steps: Steps) -> Path:
+        """Return a path written in the file; a relative one starts at the folder of the file."""
+        path = Path(value).expanduser()
+        return path if path.is_absolute() else self._document.place(steps).folder / path
+
+    def _name_and_settings(self, role: str, value: Any, steps: Steps) -> tuple[str, dict[str, Any]]:
+        if isinstance(value, str):
+            return value, {}
+        if isinstance(value, dict) and isinstance(value.get("use"), str):
+            return value["use"], {key: inner for key, inner in value.items() if key != "use"}
+        hint = f"available: {', '.join(self.registry.names(role)) or 'none'}"
+        message = f"name a {role}, as `name` or as {{use: name, setting: value}}"
+        raise self.located(PipelineError(message, hint=hint), steps)
+
+    def _setting(self, annotation: Any, value: Any, steps: Steps) -> Any:
+        """Return a value of the file as the model takes it: nested components built, paths made absolute."""
+        base = _component_base(annotation)
+        if value is None:
+            return None
+        if base is None:
+            return self.file(value, steps) if isinstance(value, str) and Path in _parts(annotation) else value
+        if isinstance(value, list) and not (isinstance(annotation, type) and issubclass(annotation, Component)):
+            return tuple(self.component(base.role, item, (*steps, index)) for index, item in enumerate(value))
+        return self.component(base.role, value, steps)
+
+    def _wrong_setting(self, cls: type[BaseModel], error: ValidationError, steps: Steps) -> MocapflowError:
+        first = error.errors(include_url=False)[0]
+        location = first["loc"]
+        if first["type"] == "missing":
+            described = ", ".join(dotted(wrong["loc"]) for wrong in error.errors() if wrong["type"] == "missing")
+            return self.located(PipelineError(f"{_title(cls)} needs {described}"), steps)
+        if first["type"] == "extra_forbidden":
+            owner = _model_at(cls, location[:-1])
+            known = [name for name in owner.model_fields]
+            message = f"unknown setting of {_title(owner)} ({', '.join(sorted(known)) or 'it has none'})"
+            _, dash, guess = alternatives(str(location[-1]), known).partition(" — ")
+            return self.located(PipelineError(message, hint=guess if dash else ""), (*steps, *location))
+        while location and not self._is_setting(cls, location, steps):
+            location = location[:-1]  # pydantic also names the members of a union
+        reason = first["msg"].removeprefix("Value error, ")
+        got = "" if isinstance(first["input"], dict | BaseModel) else f", not {first['input']!r}"
+        message = reason if first["type"] == "value_error" else reason[:1].lower() + reason[1:] + got
+        return self.located(PipelineError(message), (*steps, *location))
+
+    def _is_setting(self, cls: type[BaseModel], location: tuple[str | int, ...], steps: Steps) -> bool:
+        return (*steps, *location) in self._document.places or location[-1] in _model_at(
+            cls, location[:-1]
+        ).model_fields
+
+
+def _title(cls: type[BaseModel]) -> str:
+    return str(getattr(cls, "name", cls.__name__.lower()))
+
+
+def _parts(annotation: Any) -> set[Any]:
+    """Return the plain types an annotation is made of."""
+    if get_origin(annotation) is None:
+        return {annotation}
+    return set().union(*(_parts(part) for part in get_args(annotation)))
+
+
+def _component_base(annotation: Any) -> type[Component] | None:
+    bases = [part for part in _parts(annotation) if isinstance(part, type) and issubclass(part, Component)]
+    return bases[0] if bases else None
+
+
+def _model_at(cls: type[BaseModel], location: tuple[str | int, ...]) -> type[BaseModel]:
+    for step in location:
+        inner = cls.model_fields[step].annotation if step in cls.model_fields else None
+        models = [part for part in _parts(inner) if isinstance(part, type) and issubclass(part, BaseModel)]
+        cls = models[0] if models else cls
+    return cls

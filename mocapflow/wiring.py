@@ -1,0 +1,105 @@
+"""Connects stages by the types of `run`: each parameter gets the nearest earlier result of its type."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping, Sequence
+from types import NoneType, UnionType
+from typing import Any, Union, get_args, get_origin, get_type_hints
+
+from mocapflow.components import Stage
+from mocapflow.data import Body
+from mocapflow.errors import MocapflowError, PipelineError, PluginError, alternatives
+from mocapflow.pipeline import NamedStage, Pipeline
+
+SUPPLIED = {"Scene": "scene", "Recording": "recording", "Checkpoint": "checkpoint", "RunFolder": "run folder"}
+
+
+def wire(pipeline: Pipeline) -> dict[str, dict[str, str | None]]:
+    """Return, for each stage, where each parameter of its `run` comes from.
+
+    A source is the label of an earlier stage, `scene`, `recording`, `checkpoint` or `run folder` (supplied by the
+    runner), or None for an optional input that nobody makes. See also `body_source`.
+
+    Raises:
+        PipelineError: no earlier stage makes what a stage needs, or `from` names a wrong one.
+    """
+    return {named.label: _wire_stage(named, pipeline.stages[:index]) for index, named in enumerate(pipeline.stages)}
+
+
+def body_source(pipeline: Pipeline, label: str) -> str | None:
+    """Return the latest stage before `label` that makes a Body, which replaces the scene's; None: the pipeline's."""
+    labels = [named.label for named in pipeline.stages]
+    return _latest(Body, pipeline.stages[: labels.index(label)])
+
+
+def makes(stage: Stage) -> Any:
+    """Return the type a stage makes."""
+    return _hints(stage).get("return")
+
+
+def _wire_stage(named: NamedStage, earlier: Sequence[NamedStage]) -> dict[str, str | None]:
+    hints = {name: hint for name, hint in _told(named, _hints, named.stage).items() if name != "return"}
+    for parameter in named.wiring:
+        if parameter not in hints:
+            message = f"stage '{named.label}' has no input '{parameter}'"
+            raise PipelineError(message, where=named.where, hint=alternatives(parameter, hints))
+    return {name: _source(named, name, hint, earlier) for name, hint in hints.items()}
+
+
+def _source(named: NamedStage, parameter: str, hint: Any, earlier: Sequence[NamedStage]) -> str | None:
+    wanted, optional = _without_none(hint)
+    if parameter in named.wiring:
+        return _chosen(named, parameter, wanted, earlier)
+    supplied = SUPPLIED.get(wanted.__name__) if wanted.__module__.startswith("mocapflow.") else None
+    source = supplied or _latest(wanted, earlier)
+    if source is None and not optional:
+        article = "an" if wanted.__name__[0] in "AEIOU" else "a"
+        message = f"stage '{named.label}' needs {article} {wanted.__name__} but no earlier stage makes one"
+        raise PipelineError(message, where=named.where)
+    return source
+
+
+def _chosen(named: NamedStage, parameter: str, wanted: type, earlier: Sequence[NamedStage]) -> str:
+    label = named.wiring[parameter]
+    fitting = [other.label for other in earlier if _fits(makes(other.stage), wanted)]
+    if label not in fitting:
+        message = f"stage '{named.label}' wants its {parameter} from '{label}', but no earlier '{label}' makes one"
+        raise PipelineError(message, where=named.where, hint=alternatives(label, fitting))
+    return label
+
+
+def _latest(wanted: type, earlier: Sequence[NamedStage]) -> str | None:
+    makers = [named.label for named in earlier if _fits(_told(named, makes, named.stage), wanted)]
+    return makers[-1] if makers else None
+
+
+def _fits(made: Any, wanted: type) -> bool:
+    return isinstance(made, type) and issubclass(made, wanted)
+
+
+def _without_none(hint: Any) -> tuple[type, bool]:
+    if get_origin(hint) in {Union, UnionType}:
+        kinds = [kind for kind in get_args(hint) if kind is not NoneType]
+        return kinds[0], len(kinds) < len(get_args(hint))
+    return hint, False
+
+
+def _told(named: NamedStage, ask: Any, stage: Stage) -> Any:
+    try:
+        return ask(stage)
+    except MocapflowError as error:
+        raise type(error)(f"stage '{named.label}': {error.message}", where=named.where, hint=error.hint) from None
+
+
+def _hints(stage: Stage) -> Mapping[str, Any]:
+    run = type(stage).run
+    try:
+        hints = get_type_hints(run)
+    except NameError as error:
+        hint = "import the types that run names when the module is imported, not under TYPE_CHECKING"
+        raise PluginError(f"the inputs of {stage.name} can't be read: {error}", hint=hint) from None
+    parameters = [name for name in inspect.signature(run).parameters if name != "self"]
+    if missing := [name for name in [*parameters, "return"] if name not in hints]:
+        raise PluginError(f"{stage.name}: run needs a type for {', '.join(missing)}")
+    return {name: hints[name] for name in [*parameters, "return"]}

@@ -1,0 +1,169 @@
+"""Reads a YAML file and remembers where every value was written; applies `extends`, `change` and `--set`."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from mocapflow.errors import PipelineError, alternatives
+
+Steps = tuple[str | int, ...]  # the way to a value: keys of mappings, indices of lists
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a value was written; relative paths in it start at `folder`."""
+
+    text: str  # file:line:column, or the option of the command line
+    folder: Path
+
+
+@dataclass(frozen=True)
+class Document:
+    """The values of a file with the place of each."""
+
+    values: dict[str, Any]
+    places: Mapping[Steps, Place]
+
+    def place(self, steps: Steps) -> Place:
+        """Return where a value stands, or the nearest one that contains it."""
+        while steps not in self.places:
+            steps = steps[:-1]
+        return self.places[steps]
+
+
+def dotted(steps: Steps) -> str:
+    """Return the path of a value as people write it."""
+    return ".".join(map(str, steps))
+
+
+def read(path: Path, changes: Iterable[str] = ()) -> Document:
+    """Read a YAML file, the one it extends, and changes `PATH=VALUE` (of the command line) on top.
+
+    Raises:
+        PipelineError: no such file, not YAML, or a change of something that is not there.
+    """
+    document = _read_file(path)
+    if "extends" in document.values:
+        document = _extended(document, path)
+    for change in changes:
+        target, equals, text = change.partition("=")
+        place = Place(f"--set {change}", Path())
+        if not equals:
+            raise PipelineError("a change is written PATH=VALUE", where=place.text)
+        value = _parse(text, place.text, None)
+        document = _changed(document, target, Document(value.values, dict.fromkeys(value.places, place)))
+    return document
+
+
+def _read_file(path: Path) -> Document:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        here = [p.name for p in path.parent.glob("*.y*ml")]
+        raise PipelineError("there is no such file", where=str(path), hint=alternatives(path.name, here)) from None
+    except OSError as error:
+        raise PipelineError(f"can't be read: {error.strerror}", where=str(path)) from None
+    except UnicodeDecodeError:
+        raise PipelineError("is not UTF-8 text", where=str(path)) from None
+    document = _parse(text, str(path), path)
+    if not isinstance(document.values, dict):
+        raise PipelineError("the file should hold `name: value` lines", where=f"{path}:1:1")
+    return document
+
+
+def _parse(text: str, file: str, path: Path | None) -> Document:
+    """Return the value of a YAML text; `path` None: a value from the command line, without line numbers."""
+    places: dict[Steps, Place] = {}
+    folder = path.parent if path else Path()
+
+    def mark(node_mark: yaml.Mark) -> str:
+        return f"{file}:{node_mark.line + 1}:{node_mark.column + 1}" if path else file
+
+    def build(node: yaml.Node, steps: Steps) -> Any:
+        places.setdefault(steps, Place(mark(node.start_mark), folder))
+        if isinstance(node, yaml.MappingNode):
+            return {key: build(value, (*steps, key)) for key, value in keys(node, steps)}
+        if isinstance(node, yaml.SequenceNode):
+            return [build(item, (*steps, index)) for index, item in enumerate(node.value)]
+        return loader.construct_object(node)
+
+    def keys(node: yaml.MappingNode, steps: Steps) -> Iterable[tuple[str, yaml.Node]]:
+        for key_node, value in node.value:
+            key: Hashable = loader.construct_object(key_node)
+            where = mark(key_node.start_mark)
+            if not isinstance(key, str):
+                raise PipelineError(f"a name should be text, not {key!r}: put it in quotes", where=where)
+            if (*steps, key) in places:
+                raise PipelineError(f"'{dotted((*steps, key))}' is written twice", where=where)
+            places[*steps, key] = Place(where, folder)
+            yield key, value
+
+    try:
+        loader = yaml.SafeLoader(text)
+        node = loader.get_single_node()
+        return Document(build(node, ()) if node else {}, places or {(): Place(f"{file}:1:1" if path else file, folder)})
+    except yaml.MarkedYAMLError as error:
+        where = mark(error.problem_mark) if error.problem_mark else file
+        context = f" ({error.context})" if error.context else ""
+        raise PipelineError(f"not YAML: {error.problem}{context}", where=where) from None
+    except yaml.YAMLError as error:
+        raise PipelineError(f"not YAML: {str(error).splitlines()[0]}", where=file) from None
+
+
+def _extended(child: Document, path: Path) -> Document:
+    if unknown := set(child.values) - {"extends", "change", "mocapflow"}:
+        name = min(unknown)
+        raise PipelineError(
+            f"'{name}' has no place in a file that extends another: only `extends` and `change` do",
+            where=child.place((name,)).text, hint=f"write it as change: {{{name}: ...}}",
+        )  # fmt: skip
+    base = _read_file(path.parent / str(child.values["extends"]))
+    if "extends" in base.values:
+        message = f"{child.values['extends']} itself extends another file; `extends` goes one level deep"
+        raise PipelineError(message, where=child.place(("extends",)).text)
+    changes = child.values.get("change") or {}
+    if not isinstance(changes, dict):
+        raise PipelineError("change: write `path.to.value: new value` lines", where=child.place(("change",)).text)
+    for target, value in changes.items():
+        steps: Steps = ("change", target)
+        places = {at[2:]: place for at, place in child.places.items() if at[:2] == steps}
+        base = _changed(base, target, Document(value, places))
+    return base
+
+
+def _changed(document: Document, target: str, new: Document) -> Document:
+    """Return the document with the value at a dotted path replaced."""
+    *inner, last = target.split(".")
+    steps: Steps = ()
+    values = holder = _copy(document.values)
+    for part in [*inner, last]:
+        where = new.place(()).text
+        key: str | int = int(part) if isinstance(holder, list) and part.isdecimal() else part
+        if isinstance(holder, list):
+            known: Iterable[str] = map(str, range(len(holder)))
+            missing = key not in range(len(holder))
+        elif isinstance(holder, dict):
+            known, missing = holder, key not in holder and len(steps) < len(inner)
+        else:
+            known, missing = (), True
+        if missing:
+            raise PipelineError(f"there is no '{dotted((*steps, part))}'", where=where, hint=alternatives(part, known))
+        steps = (*steps, key)
+        if len(steps) <= len(inner):
+            if isinstance(holder[key], str):  # a bare name, about to be given settings
+                holder[key] = {"use": holder[key]}
+            holder = holder[key]
+    holder[steps[-1]] = new.values
+    kept = {at: place for at, place in document.places.items() if at[: len(steps)] != steps}
+    return Document(values, {**kept, **{(*steps, *at): place for at, place in new.places.items()}})
+
+
+def _copy(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _copy(inner) for key, inner in value.items()}
+    return [_copy(inner) for inner in value] if isinstance(value, list) else value
