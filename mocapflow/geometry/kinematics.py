@@ -36,11 +36,41 @@ def chain_batch(body: Body, poses: PoseBatch) -> F64:
     return joints
 
 
-def skin(body: Body, joints: F64) -> F64:
-    """Return the posed body vertices (V, 3) m of a chain `joints` (J, 4, 4), by linear blend skinning."""
-    posed = np.empty_like(body.vertices)
-    _skin(body.vertices, body.skin_joint, body.skin_weight, joints, posed)
+def skin(body: Body, joints: F64, angles: F64 | None = None) -> F64:
+    """Return the posed body vertices (V, 3) m of a chain `joints` (J, 4, 4), by linear blend skinning.
+
+    Args:
+        body: the body at rest.
+        joints: (J, 4, 4) m, world_from_rest of each joint.
+        angles: (D,) rad; needed only by a body whose shape changes with an angle.
+    """
+    rest = body.vertices if body.morph_offset is None else _morphed(body, angles)
+    posed = np.empty_like(rest)
+    _skin(rest, body.skin_joint, body.skin_weight, joints, posed)
     return posed
+
+
+def morph_velocity(body: Body, joints: F64, angles: F64) -> F64:
+    """Return the velocities (V, 3) m/rad of the skin for a unit change of the morph's angle, by the morph alone.
+
+    They add to what the screw of that angle does. A pose solver may leave them out: they are some ten times smaller.
+    """
+    start, stop = body.morph_range
+    if body.morph_offset is None or not min(start, stop) < angles[body.morph_screw] < max(start, stop):
+        return np.zeros_like(body.vertices)
+    turned, offset = joints.copy(), body.morph_offset / (stop - start)
+    turned[:, :3, 3] = 0.0
+    velocity = np.empty_like(offset)
+    _skin(offset, body.skin_joint, body.skin_weight, turned, velocity)
+    return velocity
+
+
+def _morphed(body: Body, angles: F64 | None) -> F64:
+    if angles is None or body.morph_offset is None:
+        raise ValueError("the shape of this body changes with an angle: pass the angles to skin()")
+    start, stop = body.morph_range
+    share = np.clip((angles[body.morph_screw] - start) / (stop - start), 0.0, 1.0)
+    return np.asarray(body.vertices + share * body.morph_offset)
 
 
 def joint_positions(body: Body, joints: F64) -> F64:

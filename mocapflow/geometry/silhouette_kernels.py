@@ -87,6 +87,17 @@ def wind(ends, times, corner, cover):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
+def bounds(ends):  # type: ignore[no-untyped-def]
+    """Return the least and greatest x and y of segments: ((x, y), (x, y)) px."""
+    low, high = np.full(2, np.inf), np.full(2, -np.inf)
+    for s in range(len(ends)):
+        for axis in range(2):
+            low[axis] = min(low[axis], ends[s, 0, axis], ends[s, 1, axis])
+            high[axis] = max(high[axis], ends[s, 0, axis], ends[s, 1, axis])
+    return low, high
+
+
+@numba.njit(cache=True)
 def on_boundary(ends, corner, cover):  # type: ignore[no-untyped-def]
     """Return which segments have nothing beyond them: the boundary of the covered region."""
     height, width = cover.shape
@@ -105,27 +116,52 @@ def on_boundary(ends, corner, cover):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True)
 def paint_distance(ends, corner, cover, band, distance):  # type: ignore[no-untyped-def]
-    """Write the signed distance to the nearest segment into pixels within the band; the inside beyond it is +band."""
-    height, width = cover.shape
+    """Write the signed distance to the nearest segment into a field of -band; the inside beyond reach is +band.
+
+    Args:
+        ends: (B, 2, 2) px, the segments.
+        corner: (2,) px, column and row of `cover` in the image.
+        cover: (h, w), positive inside.
+        band: px, as float32.
+        distance: (H, W) float32, all -band.
+    """
     rows, columns = distance.shape
-    for row in range(height):
-        for column in range(width):
-            if cover[row, column] > 0:
-                distance[row + corner[1], column + corner[0]] = band
-    square = np.full(distance.shape, np.float32(band * band))
+    pad = int(math.ceil(band))
+    left, top = max(corner[0] - pad, 0), max(corner[1] - pad, 0)
+    right, bottom = min(corner[0] + cover.shape[1] + pad, columns), min(corner[1] + cover.shape[0] + pad, rows)
+    square = np.full((max(bottom - top, 0), max(right - left, 0)), band * band)
+    _lower_to_segments(ends, left, top, band, square)
+    for row in range(square.shape[0]):
+        for column in range(square.shape[1]):
+            y, x = row + top - corner[1], column + left - corner[0]
+            inside = 0 <= y < cover.shape[0] and 0 <= x < cover.shape[1] and cover[y, x] > 0
+            if inside or square[row, column] < band * band:
+                d = np.float32(math.sqrt(square[row, column]))
+                distance[row + top, column + left] = d if inside else -d
+
+
+@numba.njit(cache=True)
+def _lower_to_segments(ends, left, top, band, square):  # type: ignore[no-untyped-def]
+    """Lower each element of `square` within the band to its squared distance from the segments (float32, SIMD)."""
+    zero, one = np.float32(0), np.float32(1)
+    columns = np.arange(square.shape[1]).astype(np.float32)
     for s in range(len(ends)):
-        ax, ay = ends[s, 0, 0], ends[s, 0, 1]
-        dx, dy = ends[s, 1, 0] - ax, ends[s, 1, 1] - ay
-        inverse = 1.0 / max(dx * dx + dy * dy, 1e-12)
-        top, bottom = max(math.ceil(min(ay, ay + dy) - band), 0), min(math.floor(max(ay, ay + dy) + band), rows - 1)
-        left, right = max(math.ceil(min(ax, ax + dx) - band), 0), min(math.floor(max(ax, ax + dx) + band), columns - 1)
-        for row in range(top, bottom + 1):
-            for column in range(left, right + 1):
-                px, py = column - ax, row - ay
-                t = min(max((px * dx + py * dy) * inverse, 0.0), 1.0)
+        ax, ay = np.float32(ends[s, 0, 0] - left), np.float32(ends[s, 0, 1] - top)
+        dx, dy = np.float32(ends[s, 1, 0] - ends[s, 0, 0]), np.float32(ends[s, 1, 1] - ends[s, 0, 1])
+        inverse = one / max(dx * dx + dy * dy, np.float32(1e-12))
+        first = max(math.ceil(min(ay, ay + dy) - band), 0)
+        last = min(math.floor(max(ay, ay + dy) + band) + 1, square.shape[0])
+        begin = max(math.ceil(min(ax, ax + dx) - band), 0)
+        end = min(math.floor(max(ax, ax + dx) + band) + 1, square.shape[1])
+        for row in range(first, last):
+            line = square[row, begin:end]
+            place = columns[begin:end]
+            py = np.float32(row) - ay
+            for k in range(len(line)):
+                px = place[k] - ax
+                t = (px * dx + py * dy) * inverse
+                t = zero if t < zero else t
+                t = one if t > one else t
                 ex, ey = px - t * dx, py - t * dy
-                d = np.float32(ex * ex + ey * ey)
-                if d < square[row, column]:
-                    square[row, column] = d
-                    inside = distance[row, column] > 0
-                    distance[row, column] = math.sqrt(d) if inside else -math.sqrt(d)
+                d = ex * ex + ey * ey
+                line[k] = d if d < line[k] else line[k]

@@ -40,16 +40,21 @@ def outline(surface: Surface, camera: Camera) -> Outline:
     kernels.face_directions(pixels, depth, surface.faces, facing)
     segments, times = kernels.occluding_edges(surface.edges, surface.faces, facing, surface.layer == CLOTH)
     ends = pixels[segments]
-    width, height = int(camera.size[0]), int(camera.size[1])
-    if len(ends):
-        low = np.clip(np.floor(ends.reshape(-1, 2).min(0)) - MARGIN, 0, (width, height)).astype(np.int32)
-        high = np.clip(np.ceil(ends.reshape(-1, 2).max(0)) + MARGIN + 1, 0, (width, height)).astype(np.int32)
-    else:
-        low = high = np.zeros(2, np.int32)
-    cover = np.zeros((max(high[1] - low[1], 0), max(high[0] - low[0], 0)), np.int32)
+    low, high = _crop(ends, camera)
+    cover = np.zeros((high[1] - low[1], high[0] - low[0]), np.int32)
     kernels.wind(ends, times, low, cover)
     outer = kernels.on_boundary(ends, low, cover)
     return Outline(vertex=segments[outer], pixel=ends[outer], corner=low, cover=cover)
+
+
+def _crop(ends: F64, camera: Camera) -> tuple[I32, I32]:
+    """Return the first and last-but-one column and row that a silhouette can cover."""
+    if not len(ends):
+        return np.zeros(2, np.int32), np.zeros(2, np.int32)
+    low, high = kernels.bounds(ends)
+    first = np.clip(np.floor(low) - MARGIN, 0, camera.size).astype(np.int32)
+    last = np.clip(np.ceil(high) + MARGIN + 1, first, camera.size).astype(np.int32)
+    return first, last
 
 
 def mask(boundary: Outline, camera: Camera) -> Bool:
@@ -63,7 +68,7 @@ def mask(boundary: Outline, camera: Camera) -> Bool:
 def signed_distance(boundary: Outline, camera: Camera, band_px: float) -> F32:
     """Return the distance (H, W) to the boundary in px, exact to the segment, positive inside, clipped to the band."""
     distance = np.full((camera.size[1], camera.size[0]), -band_px, np.float32)
-    kernels.paint_distance(boundary.pixel, boundary.corner, boundary.cover, band_px, distance)
+    kernels.paint_distance(boundary.pixel, boundary.corner, boundary.cover, np.float32(band_px), distance)
     return distance
 
 
