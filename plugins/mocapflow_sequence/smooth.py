@@ -1,0 +1,88 @@
+"""Stage `smooth`: a zero-lag, covariance-weighted smoother of a whole track."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from mocapflow.components import Stage
+from mocapflow.data import Track
+from mocapflow.geometry import twists
+from mocapflow.records import F64
+from mocapflow_sequence.banded import difference_weights, minimise
+from mocapflow_sequence.lost import lost_rows
+
+Positive = Annotated[float, Field(gt=0)]
+LOST = 100.0  # rad^2 and m^2, the variance of a lost frame: its neighbours decide
+
+
+class Smooth(Stage):
+    """Balances each pose, weighted by its covariance, against accelerations that people do not make.
+
+    The smallest sum of squares over the whole sequence of (correction / its standard deviation) and
+    (acceleration / the settings below): a Rauch-Tung-Striebel smoother, solved at once as a banded system. With
+    good images hardly anything changes; a frame that was lost is bridged by its neighbours. The settings are
+    standard deviations of what people do, not limits. Corrections act about the pelvis.
+    """
+
+    name: ClassVar[str] = "smooth"
+    angle_acceleration_deg_s2: Positive = 4000.0
+    root_acceleration_deg_s2: Positive = 2000.0
+    root_acceleration_m_s2: Positive = 15.0
+
+    def run(self, track: Track) -> Track:
+        """Return the smoothed track, which keeps the poses it was made from.
+
+        The covariances stay those of the single frames: neighbouring frames err alike, so that averaging them
+        does not make the result as much better as their number suggests. Lost frames get that of the bridge.
+        """
+        if len(track.frame) < 3:
+            return replace(track, raw_root=track.root, raw_angles=track.angles)
+        lost = lost_rows(track)
+        about_pelvis = _about(track.root[:, :3, 3], track.covariance.shape[1])
+        spread = about_pelvis @ track.covariance @ np.swapaxes(about_pelvis, 1, 2)
+        spread[lost] = LOST * np.eye(spread.shape[1])
+        change, bridged = minimise(spread, _second_differences(track), self._limits(track), track.time, lost)
+        root = track.root.copy()
+        root[:, :3, :3] = twists.exp(np.pad(change[:, :3], ((0, 0), (0, 3))))[:, :3, :3] @ root[:, :3, :3]
+        root[:, :3, 3] += change[:, 3:6]
+        covariance = track.covariance.copy()
+        back = np.linalg.inv(about_pelvis[lost])
+        covariance[lost] = back @ bridged @ np.swapaxes(back, 1, 2)
+        return replace(
+            track, root=root, angles=track.angles + change[:, 6:], covariance=covariance,
+            cloth=_carried(track.cloth, track.root, root), raw_root=track.root, raw_angles=track.angles,
+        )  # fmt: skip
+
+    def _limits(self, track: Track) -> F64:
+        """Return the standard deviation of each acceleration (6 + D,) per s^2."""
+        turn, angle = np.radians(self.root_acceleration_deg_s2), np.radians(self.angle_acceleration_deg_s2)
+        parts = [np.full(3, turn), np.full(3, self.root_acceleration_m_s2), np.full(track.angles.shape[1], angle)]
+        return np.concatenate(parts)
+
+
+def _about(points: F64, size: int) -> F64:
+    """Return the matrices (T, R, R) from increments (omega, v, angles) to (omega, displacement of a point, angles)."""
+    matrices = np.broadcast_to(np.eye(size), (len(points), size, size)).copy()
+    matrices[:, 3:6, :3] = -twists.hat(points)
+    return matrices
+
+
+def _second_differences(track: Track) -> F64:
+    """Return the accelerations (T - 2, 6 + D) at the inner frames; turns are compared as rotation vectors."""
+    weights = difference_weights(track.time)
+    rotation = track.root[:, :3, :3]
+    turns = twists.log_rotation(rotation[1:] @ np.swapaxes(rotation[:-1], 1, 2))
+    turning = weights[:, 2, None] * turns[1:] - weights[:, 0, None] * turns[:-1]
+    straight = np.concatenate([track.root[:, :3, 3], track.angles], axis=1)
+    moving = sum(weights[:, k, None] * straight[k : len(straight) - 2 + k] for k in range(3))
+    return np.concatenate([turning, moving], axis=1)
+
+
+def _carried(cloth: F64, before: F64, after: F64) -> F64:
+    """Return cloth vertices (T, W, 3) moved along with the root."""
+    motion = after @ twists.inverse(before)
+    return cloth @ np.swapaxes(motion[:, :3, :3], 1, 2) + motion[:, None, :3, 3]

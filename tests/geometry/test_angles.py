@@ -1,0 +1,100 @@
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mocapflow.data import Body
+from mocapflow.geometry import angles, twists
+from mocapflow.model import moved
+from mocapflow.data import Pose
+
+DEMO = Path(__file__).parents[2] / "examples" / "data"
+
+
+def stick_body(clip: str = "skirt_steps", keep: tuple[str, ...] = ()) -> Body:
+    entries = json.loads((DEMO / clip / "subject" / "skeleton.json").read_text())["joints"]
+    entries = [e for e in entries if not keep or e["name"].split("_")[0] in keep]
+    names = [e["name"] for e in entries]
+    positions = np.array([e["position"] for e in entries], np.float64)
+    moving = np.repeat(np.arange(1, len(names)), 3)
+    return Body(
+        vertices=positions, faces=np.zeros((0, 3), np.int32), joint_names=tuple(names),
+        parents=np.array([names.index(e["parent"]) if e["parent"] else -1 for e in entries], np.int32),
+        positions=positions, screw_names=tuple(f"{names[j]}.{k}" for k, j in enumerate(moving)),
+        twists=twists.screw(np.tile(np.eye(3), (len(names) - 1, 1)), positions[moving]),
+        screw_joint=moving.astype(np.int32), limits=np.tile([-3.0, 3.0], (len(moving), 1)),
+        rest_spread=np.full(len(moving), np.inf), skin_joint=np.zeros((len(names), 5), np.int32),
+        skin_weight=np.tile([1.0, 0, 0, 0, 0], (len(names), 1)), cut=np.zeros(len(names), bool),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("clip", ["skirt_steps", "shorts_steps"])
+def test_columns_and_three_point_angles_are_those_of_the_truth(clip: str) -> None:
+    header, *lines = (DEMO / clip / "truth" / "angles.csv").read_text().splitlines()
+    truth = np.array([line.split(",") for line in lines], np.float64)[:, 1:]
+    joints = np.load(DEMO / clip / "truth" / "joints.npz")
+    names = tuple(str(n) for n in joints["names"])
+    wanted = angles.definitions(names)
+    assert ["frame", *(d.name for d in wanted)] == header.split(",")
+    for column, wish in enumerate(wanted):
+        if len(wish.points) == 3:
+            points = joints["positions"][:, [names.index(p) for p in wish.points]].astype(np.float64)
+            assert np.abs(angles.three_point(points) + wish.offset - truth[:, column]).max() < 2e-3
+
+
+@pytest.mark.parametrize("clip", ["skirt_steps", "shorts_steps"])
+def test_hip_flexion_is_that_of_the_truth(clip: str) -> None:
+    header, *lines = (DEMO / clip / "truth" / "angles.csv").read_text().splitlines()
+    truth = np.array([line.split(",") for line in lines], np.float64)
+    joints, body = np.load(DEMO / clip / "truth" / "joints.npz"), stick_body(clip)
+    names, places = [str(n) for n in joints["names"]], joints["positions"].astype(np.float64)
+    rigid = [names.index(n) for n in ("pelvis", "hip_l", "hip_r", "spine")]
+    rest = body.positions[[body.joint(names[i]) for i in rigid]]
+    for side in "lr":
+        column = header.split(",").index(f"hip_flexion_{side}")
+        for row in range(0, len(places), 7):
+            u, _, vt = np.linalg.svd((places[row, rigid] - places[row, rigid].mean(0)).T @ (rest - rest.mean(0)))
+            pelvis = u @ np.diag([1, 1, np.linalg.det(u @ vt)]) @ vt
+            thigh = pelvis.T @ (places[row, names.index(f"knee_{side}")] - places[row, names.index(f"hip_{side}")])
+            forward, up, _ = angles.anatomical_axes(body)
+            assert abs(np.degrees(np.arctan2(thigh @ forward, -thigh @ up)) - truth[row, column]) < 0.02
+
+
+def test_gradients_agree_with_finite_differences() -> None:
+    body = stick_body()
+    rng = np.random.default_rng(3)
+    size = 6 + len(body.twists)
+    pose = Pose(root=twists.exp(rng.normal(size=6)), angles=rng.normal(scale=0.4, size=size - 6))
+    step = 1e-6
+    ends = [moved(pose, sign * step * unit) for unit in np.eye(size) for sign in (1, -1)]
+    value = angles.measure(body, np.stack([p.root for p in ends]), np.stack([p.angles for p in ends])).value
+    numeric = np.radians(value[0::2] - value[1::2]) / (2 * step)  # (S, A)
+    root, at = pose.root[None], pose.angles[None]
+    for k in range(size):  # a covariance of one direction gives the size of the gradient in it
+        direction = np.zeros((1, size, size))
+        direction[0, k, k] = 1.0
+        sd = np.radians(angles.measure(body, root, at, direction).sd[0])
+        assert np.abs(sd - np.abs(numeric[k])).max() < 1e-7
+    factor = rng.normal(size=(size, size))
+    sd = np.radians(angles.measure(body, root, at, (factor @ factor.T)[None]).sd[0])
+    assert np.allclose(sd, np.linalg.norm(factor.T @ numeric, axis=0), rtol=1e-6)
+
+
+def test_standard_deviation_of_a_straight_limb_is_finite() -> None:
+    body = stick_body()
+    straight = np.array(body.positions)
+    straight[body.joint("ankle_l")] = 2 * straight[body.joint("knee_l")] - straight[body.joint("hip_l")]
+    from dataclasses import replace
+
+    body = replace(body, positions=straight, twists=twists.screw(body.twists[:, :3], straight[body.screw_joint]))
+    size = 6 + len(body.twists)
+    series = angles.measure(body, np.eye(4)[None], np.zeros((1, size - 6)), 1e-4 * np.eye(size)[None])
+    assert series.value[0, 0] < 1e-5
+    assert 0.5 < series.sd[0, 0] < 2.0  # 0.01 rad about the axes of the knee, and what hip and root add
+
+
+def test_legs_only_body_has_no_elbows() -> None:
+    body = stick_body(keep=("pelvis", "hip", "knee", "ankle", "toe"))
+    names = angles.measure(body, np.eye(4)[None], np.zeros((1, len(body.twists)))).names
+    assert names == ("knee_flexion_l", "knee_flexion_r", "hip_flexion_l", "hip_flexion_r", "ankle_l", "ankle_r")

@@ -1,0 +1,117 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mocapflow_sequence.banded import difference_weights, minimise
+from mocapflow_sequence.smooth import Smooth
+from results_scene import ball_body, make_track, start_pose, stepping
+
+from mocapflow.geometry import angles, twists
+
+DEMO = Path(__file__).parents[2] / "examples" / "data"
+
+
+def rms(values: np.ndarray) -> np.ndarray:
+    return np.sqrt(np.mean(values**2, axis=0))
+
+
+def true_curves(clip: str) -> np.ndarray:
+    lines = (DEMO / clip / "truth" / "angles.csv").read_text().splitlines()[1:]
+    return np.radians(np.array([line.split(",") for line in lines], np.float64)[:, 1:])
+
+
+@pytest.mark.parametrize("clip", ["skirt_steps", "shorts_steps"])
+@pytest.mark.parametrize("sd_deg", [0.3, 0.5, 1.0])
+def test_costs_less_than_015_degrees_on_true_curves(clip: str, sd_deg: float) -> None:
+    curves = true_curves(clip)
+    track = make_track(np.tile(np.eye(4), (len(curves), 1, 1)), curves, sd=np.radians(sd_deg))
+    smoothed = Smooth().run(track=track)
+    assert np.degrees(rms(smoothed.angles - curves)).max() < 0.15
+
+
+def test_reduces_noise_at_high_frame_rates() -> None:
+    rng = np.random.default_rng(0)
+    curves = true_curves("skirt_steps")
+    fine = np.stack([np.interp(np.arange(0, 59, 0.25), np.arange(60), c) for c in curves.T], 1)
+    noisy = fine + np.radians(0.7) * rng.normal(size=fine.shape)
+    track = make_track(np.tile(np.eye(4), (len(fine), 1, 1)), noisy, sd=np.radians(0.7), fps=120)
+    smoothed = Smooth().run(track=track)
+    assert rms(smoothed.angles - fine).mean() < 0.75 * rms(noisy - fine).mean()
+    assert smoothed.raw_angles is not None and (smoothed.raw_angles == noisy).all()
+
+
+def test_constant_velocity_is_left_alone() -> None:
+    count = 20
+    steps = np.arange(count)[:, None]
+    root = twists.exp(steps * np.array([[0.0, 0.0, 0.1, 0.0, 0.0, 0.0]]))
+    root[:, :3, 3] = steps * np.array([0.01, 0.02, 0.0]) + [3.0, 5.0, 1.0]
+    track = make_track(root, steps * 0.01 * np.ones((1, 4)))
+    smoothed = Smooth().run(track=track)
+    assert np.abs(smoothed.root - root).max() < 1e-9
+    assert np.abs(smoothed.angles - track.angles).max() < 1e-9
+
+
+def test_lost_frame_is_bridged_and_uncertain() -> None:
+    body = ball_body()
+    track = stepping(body)
+    wrong = track.angles.copy()
+    wrong[10] += 1.0
+    shifted = track.root.copy()
+    shifted[10, :3, 3] += 0.5
+    lost = replace(track, angles=wrong, root=shifted, notes=("frame 10: lost, no view usable",))
+    smoothed = Smooth().run(track=lost)
+    assert np.degrees(np.abs(smoothed.angles[10] - track.angles[10])).max() < 1.0
+    assert np.abs(smoothed.root[10] - track.root[10]).max() < 1e-3
+    sd = angles.measure(body, smoothed.root, smoothed.angles, smoothed.covariance).sd[:, 0]
+    assert sd[10] > 1.5 * sd[9]
+    assert np.isfinite(smoothed.covariance).all()
+
+
+def test_weights_by_covariance() -> None:
+    track = make_track(np.tile(np.eye(4), (30, 1, 1)), np.zeros((30, 2)), sd=np.radians(0.5), fps=100)
+    spiked, covariance = track.angles.copy(), track.covariance.copy()
+    spiked[15] = 0.1
+    covariance[15, 6, 6] *= 400  # the first angle is uncertain there, the second is not
+    smoothed = Smooth().run(track=replace(track, angles=spiked, covariance=covariance))
+    assert smoothed.angles[15, 0] < 0.2 * smoothed.angles[15, 1]
+
+
+def test_cloth_goes_with_the_root() -> None:
+    rng = np.random.default_rng(1)
+    root = np.tile(np.eye(4), (8, 1, 1))
+    root[:, :3, 3] += 0.01 * rng.normal(size=(8, 3))
+    track = make_track(root, np.zeros((8, 1)), sd=0.1, cloth=1)
+    track = replace(track, cloth=root[:, None, :3, 3].copy())
+    smoothed = Smooth().run(track=track)
+    assert np.allclose(smoothed.cloth[:, 0], smoothed.root[:, :3, 3], atol=1e-12)
+
+
+def test_solution_is_the_least_squares_minimum_and_its_covariance() -> None:
+    rng = np.random.default_rng(2)
+    count, size = 7, 3
+    factors = rng.normal(size=(count, size, size))
+    covariance = factors @ np.swapaxes(factors, 1, 2) + np.eye(size)
+    time = np.cumsum(rng.uniform(0.5, 1.5, count))
+    acceleration, limits = rng.normal(size=(count - 2, size)), rng.uniform(0.5, 2, size)
+    got, bridged = minimise(covariance, acceleration, limits, time, np.arange(count) == 3)
+    weights = difference_weights(time)
+    second = np.zeros((count - 2, count))
+    for k in range(3):
+        second[np.arange(count - 2), np.arange(count - 2) + k] = weights[:, k]
+    operator = np.kron(second, np.eye(size))
+    precision = np.kron(np.eye(count - 2), np.diag(1 / limits**2))
+    blocks = np.zeros((count * size, count * size))
+    for t in range(count):
+        blocks[t * size : (t + 1) * size, t * size : (t + 1) * size] = np.linalg.inv(covariance[t])
+    hessian = blocks + operator.T @ precision @ operator
+    expected = np.linalg.solve(hessian, -operator.T @ precision @ acceleration.ravel())
+    assert np.allclose(got.ravel(), expected, atol=1e-7)
+    assert np.allclose(bridged[0], np.linalg.inv(hessian)[9:12, 9:12], atol=1e-7)
+
+
+def test_two_frames_are_returned_as_they_are() -> None:
+    body = ball_body(("pelvis", "hip_l", "knee_l", "ankle_l"))
+    pose = start_pose(body)
+    track = make_track(np.tile(pose.root, (2, 1, 1)), np.tile(pose.angles, (2, 1)))
+    assert (Smooth().run(track=track).angles == track.angles).all()
