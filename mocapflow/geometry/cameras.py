@@ -9,6 +9,9 @@ import numpy as np
 from mocapflow.data import Camera
 from mocapflow.records import F64
 
+UNDISTORT_STEPS = 100
+UNDISTORT_TOLERANCE = 1e-12  # of the focal length
+
 
 def projection(camera: Camera) -> F64:
     """Return the 3 x 4 matrix that maps world points (m) to homogeneous pixels of an undistorted view."""
@@ -37,25 +40,42 @@ def pinhole(camera: Camera) -> Camera:
 
 def scaled(camera: Camera, factor: float) -> Camera:
     """Return the camera of an image resized by a factor (pixel centres stay on integers)."""
-    scale = np.array([[factor, 0, (factor - 1) / 2], [0, factor, (factor - 1) / 2], [0, 0, 1.0]])
     size = np.round(camera.size * factor).astype(np.int32)
+    fx, fy = size / camera.size  # not quite the factor where the size had to be rounded
+    scale = np.array([[fx, 0, (fx - 1) / 2], [0, fy, (fy - 1) / 2], [0, 0, 1.0]])
     return replace(camera, intrinsics=scale @ camera.intrinsics, size=size)
 
 
 def undistort(pixels: F64, camera: Camera) -> F64:
     """Return pixels (M, 2) with the lens distortion of the camera removed."""
-    import cv2
-
     if not len(pixels) or not camera.distortion.any():
         return pixels
-    points = np.ascontiguousarray(pixels, np.float64)[:, None]
+    if not camera.fisheye:
+        return _undistort_radial(pixels, camera)
+    import cv2
+
     k = np.asarray(camera.intrinsics)
-    if camera.fisheye:
-        undistorted = cv2.fisheye.undistortPoints(points, k, camera.distortion[:4], P=k)
-    else:
-        many = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-10)
-        undistorted = cv2.undistortPointsIter(points, k, camera.distortion, np.eye(3), k, many)
-    return np.asarray(undistorted, np.float64)[:, 0]
+    points = np.ascontiguousarray(pixels, np.float64)[:, None]
+    return np.asarray(cv2.fisheye.undistortPoints(points, k, camera.distortion[:4], P=k), np.float64)[:, 0]
+
+
+def _undistort_radial(pixels: F64, camera: Camera) -> F64:
+    """Invert OpenCV's model by fixed-point iteration (OpenCV itself stops too early, or renames the function)."""
+    k1, k2, p1, p2, k3 = camera.distortion
+    homogeneous = np.column_stack([pixels, np.ones(len(pixels))])
+    seen = (homogeneous @ np.linalg.inv(camera.intrinsics).T)[:, :2]
+    x, y = seen.T.copy()
+    for _ in range(UNDISTORT_STEPS):
+        r2 = x * x + y * y
+        radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        new_x = (seen[:, 0] - 2 * p1 * x * y - p2 * (r2 + 2 * x * x)) / radial
+        new_y = (seen[:, 1] - p1 * (r2 + 2 * y * y) - 2 * p2 * x * y) / radial
+        moved = max(np.abs(new_x - x).max(), np.abs(new_y - y).max())
+        x, y = new_x, new_y
+        if moved < UNDISTORT_TOLERANCE:
+            break
+    ideal: F64 = (np.column_stack([x, y, np.ones(len(x))]) @ camera.intrinsics.T)[:, :2]
+    return ideal
 
 
 def distort(pixels: F64, camera: Camera) -> F64:
@@ -67,9 +87,7 @@ def distort(pixels: F64, camera: Camera) -> F64:
     rays = np.column_stack([pixels, np.ones(len(pixels))]) @ np.linalg.inv(camera.intrinsics).T
     zero = np.zeros(3)
     if camera.fisheye:
-        distorted, _ = cv2.fisheye.projectPoints(
-            rays[:, None], zero, zero, camera.intrinsics, camera.distortion[:4]
-        )
+        distorted, _ = cv2.fisheye.projectPoints(rays[:, None], zero, zero, camera.intrinsics, camera.distortion[:4])
     else:
         distorted, _ = cv2.projectPoints(rays[:, None], zero, zero, camera.intrinsics, camera.distortion)
     return np.asarray(distorted, np.float64)[:, 0]

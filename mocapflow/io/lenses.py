@@ -1,0 +1,61 @@
+"""From what a lens shows to what the steps see: an undistorted, resized image of a pinhole camera."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from mocapflow.data import Camera
+from mocapflow.geometry.cameras import pinhole, scaled, undistort
+from mocapflow.records import F64, U8, record
+
+
+@record
+class View:
+    """A lens and the camera that remains once its images are resized and undistorted.
+
+    Images are made smaller first: undistorting costs per pixel.
+    """
+
+    lens: Camera
+    scale: float = 1.0
+
+    @cached_property
+    def camera(self) -> Camera:
+        """The pinhole camera of `image`'s results."""
+        return pinhole(scaled(self.lens, self.scale))
+
+    def image(self, image: U8) -> U8:
+        """Return an image (H, W, 3) of the lens, resized and undistorted."""
+        import cv2
+
+        width, height = (int(n) for n in self.camera.size)
+        if image.shape[:2] != (height, width):
+            image = np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
+        if self._maps is None:
+            return image
+        return np.asarray(cv2.remap(image, *self._maps, cv2.INTER_LINEAR), np.uint8)
+
+    def points(self, points: F64) -> F64:
+        """Return keypoints (N, K, 3: px, px, confidence) of the lens where they are in `image`'s results."""
+        if not points.size:
+            return points
+        moved = points.copy()
+        pixels = undistort(points[..., :2].reshape(-1, 2), self.lens)
+        factor = self.camera.size / self.lens.size
+        moved[..., :2] = ((pixels + 0.5) * factor - 0.5).reshape(*points.shape[:2], 2)
+        moved[points[..., 2] <= 0] = 0.0  # not seen
+        return moved
+
+    @cached_property
+    def _maps(self) -> tuple[Any, Any] | None:
+        import cv2
+
+        if not self.lens.distortion.any():
+            return None
+        k, size = self.camera.intrinsics, (int(self.camera.size[0]), int(self.camera.size[1]))
+        if self.lens.fisheye:
+            return cv2.fisheye.initUndistortRectifyMap(k, self.lens.distortion[:4], np.eye(3), k, size, cv2.CV_16SC2)
+        return cv2.initUndistortRectifyMap(k, self.lens.distortion, np.eye(3), k, size, cv2.CV_16SC2)

@@ -1,0 +1,61 @@
+"""OpenCV/EasyMocap calibration: `intri.yml` with K_<name> and dist_<name>, `extri.yml` with R_<name> and T_<name>."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mocapflow.data import Camera
+from mocapflow.errors import RecordingError
+from mocapflow.io.cameras import camera
+from mocapflow.records import F64
+
+
+def cameras(folder: Path) -> tuple[Camera, ...]:
+    """Read the pair `intri.yml` and `extri.yml` of a folder.
+
+    Raises:
+        RecordingError: a file or a matrix is missing, or a file can't be read.
+    """
+    inner, outer = _open(folder / "intri.yml"), _open(folder / "extri.yml")
+    names = inner.getNode("names")
+    return tuple(_camera(names.at(i).string(), inner, outer, folder) for i in range(names.size()))
+
+
+def _camera(name: str, inner: Any, outer: Any, folder: Path) -> Camera:
+    intri, extri = folder / "intri.yml", folder / "extri.yml"
+    turn = outer.getNode(f"R_{name}")
+    turn = outer.getNode(f"Rot_{name}") if turn.empty() else turn
+    rotation = _matrix(turn, f"R_{name} and Rot_{name}", name, extri)
+    translation = _matrix(outer.getNode(f"T_{name}"), f"T_{name}", name, extri)
+    matrix = _matrix(inner.getNode(f"K_{name}"), f"K_{name}", name, intri)
+    distortion = _matrix(inner.getNode(f"dist_{name}"), f"dist_{name}", name, intri).ravel()
+    size = [inner.getNode(f"{axis}_{name}").real() for axis in "WH"]
+    return camera(name, size, matrix, distortion, rotation, translation, where=intri)
+
+
+def _open(path: Path) -> Any:
+    import cv2
+
+    if not path.is_file():
+        raise RecordingError(
+            "no such calibration file",
+            where=str(path),
+            hint="EasyMocap calibrations are a pair: intri.yml and extri.yml",
+        )
+    try:
+        storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
+    except (cv2.error, SystemError) as error:
+        raise RecordingError("not an OpenCV YAML file", where=str(path)) from error
+    if not storage.isOpened():
+        raise RecordingError("not an OpenCV YAML file", where=str(path))
+    return storage
+
+
+def _matrix(node: Any, key: str, name: str, path: Path) -> F64:
+    found = None if node.empty() else node.mat()
+    if found is None:
+        raise RecordingError(f"camera '{name}' lacks {key}", where=str(path))
+    return np.asarray(found, np.float64)

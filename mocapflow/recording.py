@@ -1,0 +1,164 @@
+"""A recording folder: cameras, videos, keypoints and clean plates, read one frame at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from mocapflow.data import Background, Camera, Frame
+from mocapflow.errors import RecordingError
+from mocapflow.io import folders
+from mocapflow.io.keypoints import keypoint_files, read_keypoints, unseen
+from mocapflow.io.lenses import View
+from mocapflow.io.plates import background
+from mocapflow.io.video import Video, read_frames
+from mocapflow.records import F64, U8, record
+
+
+@record
+class Recording:
+    """The frames of a recording folder that a run looks at; nothing is written there."""
+
+    folder: Path
+    views: tuple[View, ...]
+    videos: tuple[Video, ...]
+    keypoint_folders: tuple[Path | None, ...]
+    calibration: Path
+    frame_rate: float  # per second
+    indices: range  # frame numbers in the videos
+    length: int  # frames in the videos
+    warnings: tuple[str, ...] = ()  # what a user should know; also in run.json
+
+    @cached_property
+    def cameras(self) -> tuple[Camera, ...]:
+        """The pinhole cameras of the frames: undistorted, scaled."""
+        return tuple(view.camera for view in self.views)
+
+    @property
+    def lenses(self) -> tuple[Camera, ...]:
+        """The cameras as calibrated, of the videos' real size."""
+        return tuple(view.lens for view in self.views)
+
+    def frames(self, since: int | None = None) -> Iterator[Frame]:
+        """Yield the frames in order, from the first one whose number is at least `since`."""
+        indices = (
+            self.indices if since is None else self.indices[len(range(self.indices.start, since, self.indices.step)) :]
+        )
+        pictures = [read_frames(video, indices) for video in self.videos]
+        files = [None if folder is None else keypoint_files(folder) for folder in self.keypoint_folders]
+        for index, row in zip(indices, zip(*pictures, strict=True), strict=True):
+            yield self._frame(index, row, files)
+
+    def frame(self, index: int) -> Frame:
+        """Return one frame by its number in the videos; it decodes all before it.
+
+        Raises:
+            RecordingError: the videos have no such frame.
+        """
+        if not 0 <= index < self.length:
+            raise RecordingError(
+                f"no frame {index}: the videos have frames 0 to {self.length - 1}", where=str(self.folder)
+            )
+        pictures = [next(read_frames(video, range(index, index + 1))) for video in self.videos]
+        files = [None if folder is None else keypoint_files(folder) for folder in self.keypoint_folders]
+        return self._frame(index, pictures, files)
+
+    def background(self) -> Background | None:
+        """Return the empty scene from the clean plates, or None where there are none."""
+        return background(self.folder, self.views, self.videos)
+
+    def static(self) -> Recording | None:
+        """Return the standing trial, seen by the same cameras, or None where there is none."""
+        if not (self.folder / "static" / "videos").is_dir():
+            return None
+        return open_recording(self.folder / "static", scale=self.views[0].scale, calibration=self.calibration)
+
+    @cached_property
+    def content(self) -> Mapping[str, Path]:
+        """Every file and folder that `frames` and `background` read, by its name within the recording."""
+        paths = [self.calibration, *(video.path for video in self.videos)]
+        paths += [folder for folder in self.keypoint_folders if folder is not None]
+        paths += [plate for view in self.views for plate in folders.plates(self.folder, view.lens.name)]
+        return {
+            path.relative_to(self.folder).as_posix() if path.is_relative_to(self.folder) else path.name: path
+            for path in paths
+        }
+
+    def _frame(
+        self,
+        index: int,
+        pictures: tuple[tuple[U8 | None, str], ...] | list[tuple[U8 | None, str]],
+        files: list[dict[int, Path] | None],
+    ) -> Frame:
+        images = tuple(
+            np.zeros((view.camera.size[1], view.camera.size[0], 3), np.uint8) if image is None else view.image(image)
+            for view, (image, _) in zip(self.views, pictures, strict=True)
+        )
+        usable = np.array([image is not None for image, _ in pictures])
+        reasons = () if usable.all() else tuple(reason for _, reason in pictures)
+        keypoints = (
+            None
+            if all(f is None for f in files)
+            else tuple(view.points(_detections(f, index)) for view, f in zip(self.views, files, strict=True))
+        )
+        return Frame(
+            index=index,
+            time=index / self.frame_rate,
+            images=images,
+            usable=usable,
+            reasons=reasons,
+            keypoints=keypoints,
+        )
+
+
+def open_recording(
+    folder: Path,
+    *,
+    start: int = 0,
+    stop: int | None = None,
+    step: int = 1,
+    scale: float = 1.0,
+    calibration: Path | None = None,
+) -> Recording:
+    """Open a recording folder; nothing is decoded but the ends of the videos.
+
+    Args:
+        folder: cameras.toml (or another calibration) and videos/; keypoints/, background/ and static/ if there.
+        start: first frame.
+        stop: frame after the last; None: to the end.
+        step: take every so many frames.
+        scale: size of the images against the videos, e.g. 0.5.
+        calibration: a calibration file outside the folder.
+
+    Raises:
+        RecordingError: a part is missing, can't be read, or contradicts another.
+    """
+    folder = Path(folder)
+    parts = folders.gather(folder, calibration)
+    indices = range(start, parts.length if stop is None else stop, step)
+    if not indices or start < 0 or indices[-1] >= parts.length:
+        raise RecordingError(
+            f"frames {start}:{'' if stop is None else stop} are not in this recording",
+            where=str(folder),
+            hint=f"it has {parts.length} frames: 0:{parts.length}",
+        )
+    return Recording(
+        folder=folder,
+        views=tuple(View(lens=lens, scale=scale) for lens in parts.lenses),
+        videos=parts.videos,
+        keypoint_folders=parts.keypoint_folders,
+        calibration=parts.calibration,
+        frame_rate=parts.frame_rate,
+        indices=indices,
+        length=parts.length,
+        warnings=parts.warnings,
+    )
+
+
+def _detections(files: dict[int, Path] | None, index: int) -> F64:
+    if files is None or index not in files:
+        return np.empty((0, 0, 3))
+    return unseen(read_keypoints(files[index]))
