@@ -1,0 +1,98 @@
+"""Image contours, nearest neighbours and robust weights."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mocapflow_matching.contours import image_contour, nearest_compatible
+from mocapflow_matching.robust import robust_weights, zhang_keeps
+
+from mocapflow.records import F32, F64
+
+
+def disc(radius: float, x: float = 50.2, y: float = 40.7) -> F32:
+    columns, rows = np.meshgrid(np.arange(100), np.arange(80))
+    return np.clip(radius - np.hypot(columns - x, rows - y), -12, 12).astype(np.float32)
+
+
+def test_the_contour_of_a_disc_lies_on_its_circle() -> None:
+    contour = image_contour(disc(20.3), 2.0, 3)
+    radial = contour.pixel - [50.2, 40.7]
+    radius = np.linalg.norm(radial, axis=1)
+    assert np.abs(radius - 20.3).max() < 0.02
+    assert np.sum(radial * contour.normal, axis=1) == pytest.approx(radius, rel=2e-3)
+    assert len(radius) == pytest.approx(2 * np.pi * 20.3 / 2.0, rel=0.2)
+    assert (np.diff(contour.pixel[:, 1]) >= 0).all()
+
+
+def test_holes_and_several_components_are_all_found() -> None:
+    ring = np.minimum(disc(30.0), -disc(15.0)).astype(np.float32)
+    radius = np.linalg.norm(image_contour(ring, 2.0, 3).pixel - [50.2, 40.7], axis=1)
+    assert set(np.round(radius)) == {15.0, 30.0}
+
+
+def test_a_contour_at_the_image_border_is_left_out() -> None:
+    contour = image_contour(disc(60.0), 1.0, 3)
+    assert ((contour.pixel >= 3) & (contour.pixel <= [96, 76])).all()
+
+
+def test_nearest_neighbours_are_exact_and_agree_in_direction() -> None:
+    rng = np.random.default_rng(3)
+    points, others = rng.uniform(0, 50, (200, 2)), rng.uniform(0, 50, (300, 2))
+    others = others[np.argsort(others[:, 1])]
+    angles = rng.uniform(0, 2 * np.pi, 500)
+    normals = np.column_stack([np.cos(angles), np.sin(angles)])
+    found = nearest_compatible(points, normals[:200], others, normals[200:], 3.0, 0.5)
+    gaps = np.linalg.norm(points[:, None] - others, axis=2)
+    gaps[(normals[:200] @ normals[200:].T < 0.5) | (gaps >= 3.0)] = np.inf
+    expected = np.where(np.isfinite(gaps.min(1)), gaps.argmin(1), -1)
+    assert (found == expected).all()
+    assert (found == -1).any()
+
+
+def test_icp_of_rigid_point_sets_never_gets_worse() -> None:
+    """T-ICP1: exact neighbours and an exact fit lower the matched cost at every step."""
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        fixed = rng.uniform(0, 100, (60, 2))
+        fixed = fixed[np.argsort(fixed[:, 1])]
+        moving = (fixed - 50) @ _turn(rng.normal(0, 0.3)).T + 50 + rng.normal(0, 8, 2)
+        costs = []
+        for _ in range(15):
+            ones = np.tile([1.0, 0.0], (60, 1))
+            target = fixed[nearest_compatible(moving, ones, fixed, ones, 1e3, -1.0)]
+            costs.append(np.sum((moving - target) ** 2))
+            moving = _fit(moving, target)
+        assert (np.diff(costs) <= 1e-9 * costs[0]).all()
+
+
+def _turn(angle: float) -> F64:
+    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+
+
+def _fit(points: F64, target: F64) -> F64:
+    middle, goal = points.mean(0), target.mean(0)
+    u, _, vt = np.linalg.svd((points - middle).T @ (target - goal))
+    rotation = vt.T @ np.diag([1, np.linalg.det(vt.T @ u.T)]) @ u.T
+    return (points - middle) @ rotation.T + goal
+
+
+def test_robust_weights_at_their_scale() -> None:
+    distance = np.array([0.0, 1.0, 2.0, 8.0])
+    assert robust_weights(distance, "none", 2.0) == pytest.approx([1, 1, 1, 1])
+    assert robust_weights(distance, "huber", 2.0) == pytest.approx([1, 1, 1, 0.25])
+    assert robust_weights(distance, "geman_mcclure", 2.0) == pytest.approx([1, 0.64, 0.25, (4 / 68) ** 2])
+
+
+def test_zhang_rejects_clutter_and_keeps_good_pairs() -> None:
+    rng = np.random.default_rng(1)
+    distance = np.concatenate([np.abs(rng.normal(0, 1, 300)), rng.uniform(15, 40, 30)])
+    kept = zhang_keeps(distance, 2.0)
+    assert kept[:300].all()
+    assert kept[300:].mean() < 0.5
+
+
+def test_zhang_finds_the_valley_when_everything_is_far() -> None:
+    rng = np.random.default_rng(1)
+    distance = np.concatenate([rng.normal(20, 1, 300), rng.normal(60, 1, 100)])
+    assert zhang_keeps(distance, 2.0).sum() == pytest.approx(300, abs=3)
