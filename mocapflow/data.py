@@ -77,6 +77,9 @@ class Body:
     skin_joint: I32 = array("V", 5, unit="joint index")
     skin_weight: F64 = array("V", 5, unit="1, rows sum to one")
     cut: Bool = array("V", unit="True on the rim where a partial body was cut off")
+    morph_offset: F64 | None = array("V", 3, unit="m, added at rest in full where the morph is complete", default=None)
+    morph_screw: int = -1  # the angle that drives the morph
+    morph_range: tuple[float, float] = (0.0, 1.0)  # rad, where the morph begins and where it is complete
 
     def joint(self, name: str) -> int:
         """Return the index of a joint by name."""

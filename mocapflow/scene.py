@@ -46,7 +46,7 @@ class Scene:
     def surface(self, pose: Pose, cloth: Cloth) -> Surface:
         """Return body and garment posed in the world."""
         joints, screws = kinematics.chain(self.body, pose)
-        vertices = kinematics.skin(self.body, joints)
+        vertices = kinematics.skin(self.body, joints, pose.angles)
         if len(cloth.vertices):
             vertices = np.concatenate([vertices, cloth.vertices])
         return Surface(

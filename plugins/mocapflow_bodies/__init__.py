@@ -1,1 +1,14 @@
-"""Built-in plugin."""
+"""Bodies: mesh, skeleton and skinning, scanned or scaled from a template."""
+
+from __future__ import annotations
+
+from mocapflow.components import BodyModel
+from mocapflow.hookspecs import hookimpl
+
+
+@hookimpl
+def mocapflow_bodies() -> list[type[BodyModel]]:
+    """Return the bodies of this package."""
+    from mocapflow_bodies.scanned import Scanned
+
+    return [Scanned]

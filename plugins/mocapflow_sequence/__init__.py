@@ -1,1 +1,14 @@
-"""Built-in plugin."""
+"""Whole-sequence stages: the first pose, fitting the subject, smoothing, evaluation, export, report."""
+
+from __future__ import annotations
+
+from mocapflow.components import Stage
+from mocapflow.hookspecs import hookimpl
+
+
+@hookimpl
+def mocapflow_stages() -> list[type[Stage]]:
+    """Return the stages of this package."""
+    from mocapflow_sequence.start_from_file import StartFromFile
+
+    return [StartFromFile]

@@ -1,0 +1,129 @@
+"""Putting a body together from mesh, skeleton and weights; cutting parts out of it."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from mocapflow.data import Body
+from mocapflow.errors import RecordingError
+from mocapflow.geometry.meshes import edges
+from mocapflow.records import F64, I32, Bool
+from mocapflow_bodies.joints import base, screws
+from mocapflow_bodies.skeleton import Skeleton
+from mocapflow_bodies.weights import strongest
+
+Part = Literal["full", "legs", "arms"]
+KEPT_JOINTS = {
+    "legs": ("pelvis", "hip", "knee", "ankle", "toe"),
+    "arms": ("pelvis", "spine", "chest", "neck", "head", "clavicle", "shoulder", "elbow", "wrist"),
+}
+TALLEST, SMALLEST = 3.0, 0.3  # m, extents of a plausible body
+
+
+class Cut(NamedTuple):
+    """A part of a body."""
+
+    used: I32  # (V,) indices of the vertices that stay
+    faces: I32  # (F, 3)
+    skeleton: Skeleton
+    weights: F64  # (V, J)
+    rim: Bool  # (V,)
+
+
+def assemble(
+    vertices: F64, faces: I32, skeleton: Skeleton, weights: F64, part: Part = "full", offset: F64 | None = None
+) -> Body:
+    """Return the body of a mesh (V, 3) m, (F, 3), a skeleton and weights (V, J), or a part of it.
+
+    `offset` (V, 3) m leads to a second shape of the mesh; the caller says which angle drives it.
+    """
+    rim = np.zeros(len(vertices), bool)
+    if part != "full":
+        used, faces, skeleton, weights, rim = cut_out(faces, skeleton, weights, KEPT_JOINTS[part])
+        vertices, offset = vertices[used], None if offset is None else offset[used]
+    skin_joint, skin_weight = strongest(weights)
+    chain = screws(skeleton)
+    return Body(
+        vertices=np.array(vertices, np.float64), faces=np.array(faces, np.int32),
+        joint_names=skeleton.names, parents=skeleton.parents, positions=skeleton.positions,
+        screw_names=chain.names, twists=chain.twists, screw_joint=chain.joint, limits=chain.limits,
+        rest_spread=chain.rest_spread, skin_joint=skin_joint, skin_weight=skin_weight, cut=rim,
+        morph_offset=offset,
+    )  # fmt: skip
+
+
+def cut_out(faces: I32, skeleton: Skeleton, weights: F64, kept: tuple[str, ...]) -> Cut:
+    """Return the part of a body that the joints named in `kept` move, and which vertices lie on the new rim.
+
+    A vertex stays if most of its weight does; what weight it loses goes to the nearest kept joint above.
+
+    Raises:
+        RecordingError: a kept joint hangs below one that goes, or nothing is left.
+    """
+    stays = np.array([base(name) in kept for name in skeleton.names])
+    inside = weights[:, stays].sum(axis=1) > 0.5 * weights.sum(axis=1)
+    whole = inside[faces].all(axis=1)
+    lost = [j for j in np.flatnonzero(stays & (skeleton.parents >= 0)) if not stays[skeleton.parents[j]]]
+    if lost or not whole.any():
+        what = (
+            f"joint '{skeleton.names[lost[0]]}' would lose its parent" if lost else "no face of the mesh would be left"
+        )
+        raise RecordingError(f"this part can't be cut from the body: {what}", hint=f"joints kept: {', '.join(kept)}")
+    used = np.unique(faces[whole])
+    number = np.full(len(weights), -1)
+    number[used] = np.arange(len(used))
+    rim = np.zeros(len(weights), bool)
+    rim[_boundary(faces[whole])] = True
+    rim[_boundary(faces)] = False  # an opening the mesh had before is no cut
+    joints = np.flatnonzero(stays)
+    renumber = np.full(len(stays) + 1, -1)  # the last entry: the root's parent
+    renumber[joints] = np.arange(len(joints))
+    part = Skeleton(
+        tuple(skeleton.names[j] for j in joints),
+        renumber[skeleton.parents[joints]].astype(np.int32),
+        skeleton.positions[joints],
+    )
+    moved = _handed_up(weights, skeleton, stays)[used][:, joints]
+    return Cut(used.astype(np.int32), number[faces[whole]].astype(np.int32), part, moved, rim[used])
+
+
+def check_size(vertices: F64, skeleton: Skeleton, where: str) -> None:
+    """Check that mesh and skeleton are in metres, upright along z and in the same place.
+
+    Raises:
+        RecordingError: they are not.
+    """
+    extents = np.ptp(vertices, axis=0)
+    size = ", ".join(f"{extent:.4g}" for extent in extents)
+    if extents.max() > TALLEST:
+        guess = "in millimetres: divide by 1000" if extents.max() > 300 else "not in metres"
+        raise RecordingError(
+            f"the mesh measures {size}: it seems to be {guess}", where=where, hint="expected metres, z up"
+        )
+    if extents.max() < SMALLEST:
+        raise RecordingError(
+            f"the mesh measures {size} m: too small for a person", where=where, hint="expected metres, z up"
+        )
+    if extents.argmax() == 1 and extents[1] > 1.3 * extents[2]:
+        hint = "expected z up: swap (x, y, z) to (x, -z, y)"
+        raise RecordingError(f"the mesh measures {size} m: it seems to stand along y", where=where, hint=hint)
+    outside = (skeleton.positions < vertices.min(axis=0) - 0.1) | (skeleton.positions > vertices.max(axis=0) + 0.1)
+    if outside.any():
+        joint = skeleton.names[int(np.flatnonzero(outside.any(axis=1))[0])]
+        hint = "both are expected in metres and in the same coordinates"
+        raise RecordingError(f"joint '{joint}' lies more than 10 cm outside the mesh", where=where, hint=hint)
+
+
+def _boundary(faces: I32) -> I32:
+    pairs = edges(faces)
+    return np.asarray(pairs[pairs[:, 3] < 0, :2].ravel())
+
+
+def _handed_up(weights: F64, skeleton: Skeleton, stays: Bool) -> F64:
+    moved = weights.copy()
+    for joint in reversed(range(len(stays))):
+        if not stays[joint] and skeleton.parents[joint] >= 0:
+            moved[:, skeleton.parents[joint]] += moved[:, joint]
+    return moved

@@ -1,0 +1,88 @@
+"""Body `scanned`: mesh, skeleton and weights from the recording's `subject/`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import ClassVar
+
+from pydantic import BaseModel, ConfigDict, model_validator
+
+from mocapflow.components import BodyModel
+from mocapflow.data import Body
+from mocapflow.errors import PipelineError, RecordingError, alternatives
+from mocapflow.records import F64
+from mocapflow_bodies.assemble import Part, assemble, check_size
+from mocapflow_bodies.objfile import read_mesh
+from mocapflow_bodies.skeleton import read_skeleton
+from mocapflow_bodies.weights import heat_weights, read_weights
+
+
+class Morph(BaseModel):
+    """A second shape of the same mesh, blended in as one angle goes through a range (method: local morphing)."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    mesh: str  # path inside the recording, with the vertices of body.obj in the same order
+    angle: str  # e.g. knee_l.flexion
+    from_deg: float  # where the shape of body.obj begins to change
+    to_deg: float  # where the second shape is complete
+
+    @model_validator(mode="after")
+    def _not_empty(self) -> Morph:
+        if self.from_deg == self.to_deg:
+            raise ValueError("from_deg and to_deg must differ")
+        return self
+
+
+class Scanned(BodyModel):
+    """A scan of the person: `subject/body.obj`, `skeleton.json` and, if there, `weights.npz`."""
+
+    name: ClassVar[str] = "scanned"
+    part: Part = "full"
+    morph: Morph | None = None
+
+    def inputs(self, recording: Path) -> Sequence[Path]:
+        """Return the files that are read."""
+        subject = recording / "subject"
+        files = [subject / "body.obj", subject / "skeleton.json"]
+        if (subject / "weights.npz").exists():
+            files.append(subject / "weights.npz")
+        return [*files, recording / self.morph.mesh] if self.morph else files
+
+    def load(self, recording: Path) -> Body:
+        """Return the body at rest.
+
+        Raises:
+            RecordingError: a file is missing, malformed, not in metres, or contradicts another.
+            PipelineError: the morph names an angle the body lacks.
+        """
+        subject = recording / "subject"
+        vertices, faces = read_mesh(subject / "body.obj")
+        skeleton = read_skeleton(subject / "skeleton.json")
+        check_size(vertices, skeleton, str(subject / "body.obj"))
+        if (subject / "weights.npz").exists():
+            weights = read_weights(subject / "weights.npz", skeleton, len(vertices))
+        else:
+            weights = heat_weights(vertices, faces, skeleton)
+        if self.morph is None:
+            return assemble(vertices, faces, skeleton, weights, self.part)
+        offset = self._second_shape(recording, vertices, self.morph) - vertices
+        body = assemble(vertices, faces, skeleton, weights, self.part, offset)
+        if self.morph.angle not in body.screw_names:
+            hint = alternatives(self.morph.angle, body.screw_names)
+            raise PipelineError(f"the body has no angle '{self.morph.angle}'", where="body.morph.angle", hint=hint)
+        between = (math.radians(self.morph.from_deg), math.radians(self.morph.to_deg))
+        return replace(body, morph_screw=body.screw_names.index(self.morph.angle), morph_range=between)
+
+    @staticmethod
+    def _second_shape(recording: Path, vertices: F64, morph: Morph) -> F64:
+        path = recording / morph.mesh
+        shape, _ = read_mesh(path)
+        if shape.shape != vertices.shape:
+            hint = "both shapes must be the same mesh, vertex by vertex"
+            raise RecordingError(
+                f"the second shape has {len(shape)} vertices, body.obj has {len(vertices)}", where=str(path), hint=hint
+            )
+        return shape
