@@ -1,1 +1,130 @@
-"""mocapflow: motion capture of people in loose clothes."""
+"""mocapflow: motion capture of people in loose clothes.
+
+The public names; each is imported when it is first used, so that `import mocapflow` costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mocapflow.components import (
+        BodyModel,
+        ClothFitter,
+        Component,
+        Draper,
+        Garment,
+        Matcher,
+        PoseSolver,
+        Predictor,
+        Prior,
+        Segmenter,
+        Stage,
+    )
+    from mocapflow.data import (
+        Background,
+        Body,
+        Camera,
+        Cloth,
+        Estimate,
+        Files,
+        Frame,
+        FrameResult,
+        FrameState,
+        GarmentMesh,
+        Matches,
+        Past,
+        Pose,
+        PoseBatch,
+        Residual,
+        RunFolder,
+        Segmentation,
+        Silhouette,
+        Start,
+        Surface,
+        Track,
+        Turn,
+    )
+    from mocapflow.errors import MocapflowError, PipelineError, PluginError
+    from mocapflow.hookspecs import hookimpl
+    from mocapflow.model import ClothedModel
+    from mocapflow.pipeline import Pipeline, load_pipeline
+    from mocapflow.recording import Recording
+    from mocapflow.registry import Registry, load_registry
+    from mocapflow.runner import plan, run
+    from mocapflow.scene import Scene
+
+_HOMES = {
+    "components": "BodyModel ClothFitter Component Draper Garment Matcher PoseSolver Predictor Prior Segmenter Stage",
+    "data": "Background Body Camera Cloth Estimate Files Frame FrameResult FrameState GarmentMesh Matches Past Pose "
+    "PoseBatch Residual RunFolder Segmentation Silhouette Start Surface Track Turn",
+    "errors": "MocapflowError PipelineError PluginError",
+    "hookspecs": "hookimpl",
+    "model": "ClothedModel",
+    "pipeline": "Pipeline load_pipeline",
+    "recording": "Recording",
+    "registry": "Registry load_registry",
+    "runner": "plan run",
+    "scene": "Scene",
+}
+
+__all__ = [  # noqa: PLE0604
+    "Background",
+    "Body",
+    "BodyModel",
+    "Camera",
+    "Cloth",
+    "ClothFitter",
+    "ClothedModel",
+    "Component",
+    "Draper",
+    "Estimate",
+    "Files",
+    "Frame",
+    "FrameResult",
+    "FrameState",
+    "Garment",
+    "GarmentMesh",
+    "Matcher",
+    "Matches",
+    "MocapflowError",
+    "Past",
+    "Pipeline",
+    "PipelineError",
+    "PluginError",
+    "Pose",
+    "PoseBatch",
+    "PoseSolver",
+    "Predictor",
+    "Prior",
+    "Recording",
+    "Registry",
+    "Residual",
+    "RunFolder",
+    "Scene",
+    "Segmentation",
+    "Segmenter",
+    "Silhouette",
+    "Stage",
+    "Start",
+    "Surface",
+    "Track",
+    "Turn",
+    "hookimpl",
+    "load_pipeline",
+    "load_registry",
+    "plan",
+    "run",
+]
+
+
+def __getattr__(name: str) -> Any:
+    for module, names in _HOMES.items():
+        if name in names.split():
+            return getattr(import_module(f"mocapflow.{module}"), name)
+    raise AttributeError(f"module 'mocapflow' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -10,7 +10,7 @@ import hashlib
 import importlib.util
 import inspect
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import partial
@@ -91,7 +91,7 @@ class Registry:
 
     def names(self, role: str) -> tuple[str, ...]:
         """Return the names of all components of a role, sorted."""
-        return tuple(sorted(self._components(role)))
+        return tuple(sorted(self.provided(role)))
 
     def get(self, role: str, name: str) -> type[Component]:
         """Return the component class of a role by name.
@@ -100,7 +100,7 @@ class Registry:
             UnknownComponent: no plugin provides it; the hint says what exists and what did not load.
             PluginError: two plugins provide it.
         """
-        found = self._components(role).get(name, [])
+        found = self.provided(role).get(name, [])
         if len(found) == 1:
             return found[0]
         if found:
@@ -136,7 +136,8 @@ class Registry:
             cause = error if isinstance(error, Exception) else PluginError(f"it left with status {error.code}")
             self._failures.append(Failure(origin, cause))
 
-    def _components(self, role: str) -> dict[str, list[type[Component]]]:
+    def provided(self, role: str) -> Mapping[str, Sequence[type[Component]]]:
+        """Return the components of a role by name; a name with two of them is an error for who asks for it."""
         if role not in PROVIDERS:
             raise UnknownComponent(f"there is no role '{role}'", hint=alternatives(role, PROVIDERS))
         if role not in self._provided:

@@ -1,0 +1,52 @@
+"""The command line: parse, call, print. Heavy modules are imported by the command that needs them."""
+
+from __future__ import annotations
+
+import logging
+import shlex
+import sys
+from typing import Any
+
+import typer
+import typer.core
+
+from mocapflow.commands import cache, looking, results, running
+from mocapflow.errors import MocapflowError
+
+
+class Commands(typer.core.TyperGroup):
+    """Prints a problem the user can mend without a traceback; anything else is a bug and shows its own."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command and turn errors into exit status 1 or 2, an interrupt into 130."""
+        try:
+            return super().invoke(ctx)
+        except MocapflowError as error:
+            typer.echo(f"error: {error}", err=True)
+            raise typer.Exit(error.exit_status) from None
+        except KeyboardInterrupt:
+            again = shlex.join(["mocapflow", *sys.argv[1:]])
+            typer.echo(f"\ninterrupted; finished frames are saved. To go on: {again}", err=True)
+            raise typer.Exit(130) from None
+
+
+app = typer.Typer(
+    cls=Commands,
+    help="Markerless motion capture of people in their own loose clothes.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+for command in (running.run, running.plan, running.status, running.demo):
+    app.command()(command)
+for command in (looking.plugins, looking.show, looking.equations, looking.doctor):
+    app.command()(command)
+for command in (results.evaluate, results.export):
+    app.command()(command)
+app.add_typer(cache.app, name="cache")
+
+
+def main() -> None:
+    """Run the command line; warnings of the framework go to stderr."""
+    logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING, stream=sys.stderr)
+    app(prog_name="mocapflow")

@@ -1,0 +1,65 @@
+"""Commands that show what there is: plugins, settings, equations, the state of a recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mocapflow.errors import RecordingError
+
+
+def plugins() -> None:
+    """List the installed plugins and what they provide."""
+    from mocapflow.registry import PROVIDERS, load_registry
+
+    registry = load_registry()
+    for origin in registry.plugins:
+        typer.echo(f"{origin.plugin}  ({origin.distribution} {origin.version})")
+        for role in PROVIDERS:
+            provided = registry.provided(role)
+            own = sorted(name for name, found in provided.items() if any(registry.origin(c) == origin for c in found))
+            if own:
+                typer.echo(f"  {role + ':':<13} {', '.join(own)}")
+    for failure in registry.failures:
+        typer.echo(f"note: {failure}", err=True)
+
+
+def show(
+    role: Annotated[str, typer.Argument(help="draper, garment, matcher, stage, …")],
+    name: Annotated[str, typer.Argument(help="Its name, as in a pipeline file.")],
+) -> None:
+    """Show what a component does and its settings."""
+    from mocapflow.describe import describe
+    from mocapflow.registry import load_registry
+
+    registry = load_registry()
+    cls = registry.get(role, name)
+    typer.echo(f"{role} {name}, from {registry.origin(cls)}")
+    for line in describe(cls):
+        typer.echo(line)
+
+
+def equations(
+    wanted: Annotated[str, typer.Argument(metavar="[FILTER]", help="A number or a word.", show_default=False)] = "",
+) -> None:
+    """List the equations of the paper with the functions that implement them."""
+    from mocapflow.equations import table
+
+    for row in table():
+        if wanted.lower() in f"{row.number} {row.what} {row.function}".lower():
+            typer.echo(f"{row.number:<12} {row.what:<50} {row.place()}")
+
+
+def doctor(recording: Annotated[Path, typer.Argument(metavar="DIR", help="A recording folder.")]) -> None:
+    """Check a recording folder and say what to mend."""
+    from mocapflow.doctor import examine
+
+    findings = list(examine(recording))
+    for finding in findings:
+        typer.echo(finding)
+    if any(getattr(finding, "level", "") == "error" for finding in findings):
+        raise RecordingError("this recording can't be used as it is", where=str(recording))
+    if not findings:
+        typer.echo(f"{recording}: nothing to mend")
