@@ -340,8 +340,9 @@ class Files:
 class Evaluation:
     """One row per compared angle; a stage that returns it always runs."""
 
-    reference: str  # the file compared with
+    reference: str  # the file compared with, "" where there is none
     rows: tuple[Mapping[str, float | str], ...]
+    note: str = ""  # why there are no rows
 
 
 def empty_matches() -> Matches:
