@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mocapflow.components import ClothFitter
+from mocapflow.components import ClothFitter, Draper
 from mocapflow.hookspecs import hookimpl
 
 
@@ -12,3 +12,11 @@ def mocapflow_cloth_fitters() -> list[type[ClothFitter]]:
     from mocapflow_draping.fixed import Fixed
 
     return [Fixed]
+
+
+@hookimpl
+def mocapflow_drapers() -> list[type[Draper]]:
+    """Return the drapers of this package."""
+    from mocapflow_draping.kinematic import Kinematic
+
+    return [Kinematic]

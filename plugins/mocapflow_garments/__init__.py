@@ -1,1 +1,14 @@
-"""Built-in plugin."""
+"""Garments sewn from tape measures."""
+
+from __future__ import annotations
+
+from mocapflow.components import Garment
+from mocapflow.hookspecs import hookimpl
+
+
+@hookimpl
+def mocapflow_garments() -> list[type[Garment]]:
+    """Return the garments of this package."""
+    from mocapflow_garments.skirt import Skirt
+
+    return [Skirt]
