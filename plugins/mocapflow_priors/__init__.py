@@ -1,1 +1,25 @@
-"""Built-in plugin."""
+"""What is known before looking: limits, rest, smooth motion; and guesses of the next pose."""
+
+from __future__ import annotations
+
+from mocapflow.components import Predictor, Prior
+from mocapflow.hookspecs import hookimpl
+
+
+@hookimpl
+def mocapflow_priors() -> list[type[Prior]]:
+    """Return the priors of this plugin."""
+    from mocapflow_priors.joint_limits import JointLimits
+    from mocapflow_priors.rest_pose import RestPose
+    from mocapflow_priors.smooth_motion import SmoothMotion
+
+    return [JointLimits, RestPose, SmoothMotion]
+
+
+@hookimpl
+def mocapflow_predictors() -> list[type[Predictor]]:
+    """Return the predictors of this plugin."""
+    from mocapflow_priors.constant_velocity import ConstantVelocity
+    from mocapflow_priors.hold import Hold
+
+    return [ConstantVelocity, Hold]

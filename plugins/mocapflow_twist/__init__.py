@@ -1,1 +1,14 @@
-"""Built-in plugin."""
+"""Pose from matches: twists, linear equations, Gauss–Newton (section 12.2.2)."""
+
+from __future__ import annotations
+
+from mocapflow.components import PoseSolver
+from mocapflow.hookspecs import hookimpl
+
+
+@hookimpl
+def mocapflow_pose_solvers() -> list[type[PoseSolver]]:
+    """Return the pose solvers of this plugin."""
+    from mocapflow_twist.solver import TwistGaussNewton
+
+    return [TwistGaussNewton]

@@ -1,0 +1,95 @@
+"""Each match as rows: planes on which the surface point should lie.
+
+A row gives the point X the error (a . X + a0) / (b . X + b0), where (a, a0) is a plane through the target and
+(b, b0) a divisor. In the image, the plane runs through the projection centre and the contour's tangent and the
+divisor is the depth, which makes it the exact perspective error in pixels. For a projection ray as a Plücker line,
+three planes give the components of X x n - m and the divisor is one: an error in metres.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mocapflow.data import Camera, Matches
+from mocapflow.geometry import cameras as pinhole
+from mocapflow.geometry import lines, twists
+from mocapflow.records import F64, I32, Bool, array, record
+
+
+@record
+class Rows:
+    """Scalar errors of surface points; half of weight times squared error is the energy."""
+
+    plane: F64 = array("R", 4, unit="px m or m: error times divisor, as a plane in the world")
+    divisor: F64 = array("R", 4, unit="m or 1, as a plane in the world")
+    vertex: I32 = array("R", unit="surface vertex index")
+    weight: F64 = array("R", unit="one over the variance of the error")
+    match: I32 = array("R", unit="index of the match a row comes from")
+
+    def part(self, chosen: Bool, weight: F64, first_vertex: int = 0) -> Rows:
+        """Return the chosen rows with new weights and vertices counted from `first_vertex`."""
+        return Rows(
+            plane=self.plane[chosen],
+            divisor=self.divisor[chosen],
+            vertex=self.vertex[chosen] - np.int32(first_vertex),
+            weight=weight[chosen],
+            match=self.match[chosen],
+        )
+
+
+def image_rows(matches: Matches, cameras: Sequence[Camera]) -> Rows:
+    """Return distances in the image: along the direction of a match, or along x and y where it has none.
+
+    Args:
+        matches: M matches in undistorted pixels.
+        cameras: the pinhole cameras.
+
+    Returns:
+        One row per match with a direction, two for the others; errors in px.
+    """
+    free: Bool = np.all(matches.direction == 0, axis=1)
+    match = np.concatenate([np.arange(len(free)), np.flatnonzero(free)])
+    direction = matches.direction[match].copy()
+    direction[: len(free)][free] = [1.0, 0.0]
+    direction[len(free) :] = [0.0, 1.0]
+    projections = np.stack([pinhole.projection(camera) for camera in cameras])[matches.camera[match]]
+    offset = np.sum(direction * matches.pixel[match], axis=1, keepdims=True)
+    divisor = projections[:, 2]
+    plane = direction[:, :1] * projections[:, 0] + direction[:, 1:] * projections[:, 1] - offset * divisor
+    return Rows(
+        plane=plane,
+        divisor=np.ascontiguousarray(divisor),
+        vertex=matches.vertex[match],
+        weight=matches.weight[match],
+        match=match.astype(np.int32),
+    )
+
+
+def line_rows(matches: Matches, cameras: Sequence[Camera], sigma: float) -> Rows:
+    """Return the components of X x n - m for the projection ray (n, m) of every match, all weighted alike.
+
+    Args:
+        matches: M matches in undistorted pixels; only those with a weight above zero count.
+        cameras: the pinhole cameras.
+        sigma: standard deviation given to every error, m.
+
+    Returns:
+        Three rows per match; errors in m.
+
+    Source: Rosenhahn 2008, Eq. (12.7)
+    """
+    rays = np.zeros((len(matches.camera), 6))
+    for index, camera in enumerate(cameras):
+        seen = matches.camera == index
+        rays[seen] = lines.through(matches.pixel[seen], camera)
+    cross = -twists.hat(rays[:, :3])  # X x n = -n x X
+    match = np.repeat(np.arange(len(rays), dtype=np.int32), 3)
+    return Rows(
+        plane=np.concatenate([cross, -rays[:, 3:, None]], axis=2).reshape(-1, 4),
+        divisor=np.tile([0.0, 0.0, 0.0, 1.0], (len(match), 1)),
+        vertex=matches.vertex[match],
+        weight=(matches.weight[match] > 0) / sigma**2,
+        match=match,
+    )

@@ -1,0 +1,135 @@
+"""The energy of a frame for fixed matches (data, priors, damping) and its quadratic model about the root."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from mocapflow.components import Prior
+from mocapflow.data import Cloth, Past, Pose, Residual
+from mocapflow.geometry import kinematics, twists
+from mocapflow.model import ClothedModel
+from mocapflow.records import F64
+from mocapflow_twist import normal_equations
+from mocapflow_twist.constraint import Rows
+from mocapflow_twist.normal_equations import Equations
+from mocapflow_twist.solve import about_origin
+
+
+class Guess(NamedTuple):
+    """A pose with the cloth on it."""
+
+    pose: Pose
+    cloth: Cloth
+
+    @property
+    def centre(self) -> F64:
+        """The position of the root (3,) m, about which increments are solved."""
+        return self.pose.root[:3, 3].copy()
+
+
+class Data(NamedTuple):
+    """The rows of one set of matches, split by what carries their points."""
+
+    body: Rows
+    cloth: Rows  # vertices counted within the garment
+    measurements: float  # independent measurements among them
+
+
+class Anchor(NamedTuple):
+    """Where the unknowns are held, weakly, and one over the variance (S,) of each: the system is never singular."""
+
+    guess: Guess
+    precision: F64
+
+    def equations(self, guess: Guess) -> Equations:
+        """Return the damping's energy; its gradient about the root is exact, its Hessian that of small turns."""
+        held, pose = self.guess.pose, guess.pose
+        turn = twists.log_rotation(pose.root[:3, :3] @ held.root[:3, :3].T)
+        shift = pose.root[:3, 3] - held.root[:3, 3]
+        cloth = guess.cloth.parameters - self.guess.cloth.parameters
+        error = np.concatenate([turn, shift, pose.angles - held.angles, cloth])[: len(self.precision)]
+        pull = self.precision * error
+        return Equations(np.diag(self.precision), pull, 0.5 * float(pull @ error))
+
+
+class Quadratic(NamedTuple):
+    """The quadratic models about the root: of the data, and of priors with damping."""
+
+    data: Equations
+    prior: Equations
+
+    @property
+    def total(self) -> Equations:
+        """The whole quadratic model."""
+        d, p = self.data, self.prior
+        return Equations(d.hessian + p.hessian, d.gradient + p.gradient, d.energy + p.energy)
+
+
+class Problem(NamedTuple):
+    """All terms of the energy for one set of matches."""
+
+    model: ClothedModel
+    data: Data
+    priors: Sequence[Prior]
+    past: Past
+    anchor: Anchor
+
+    @property
+    def unknowns(self) -> int:
+        """Number S of unknowns."""
+        return len(self.anchor.precision)
+
+    def energies(self, guess: Guess) -> Mapping[str, float]:
+        """Return each term of the energy at a guess."""
+        body = self.model.scene.body
+        joints, _ = kinematics.chain(body, guess.pose)
+        data = normal_equations.body_energy(self.data.body, body, joints)
+        if len(self.data.cloth.vertex):
+            error, _ = normal_equations.point_errors(self.data.cloth, guess.cloth.vertices[self.data.cloth.vertex])
+            data += 0.5 * float(self.data.cloth.weight @ error**2)
+        terms = {"data": data, "damping": self.anchor.equations(guess).energy}
+        for prior in self.priors:
+            energy = prior.weight * self._residual(prior, guess).energy
+            terms[prior.name] = terms.get(prior.name, 0.0) + energy
+        return terms
+
+    def quadratic(self, guess: Guess, velocity: F64 | None) -> Quadratic:
+        """Return the quadratic models at a guess.
+
+        Args:
+            guess: the pose and cloth to linearise at.
+            velocity: (R, 3, S) of the points of the cloth rows for unit increments about the world's origin.
+        """
+        return Quadratic(self._data_equations(guess, velocity), self._prior_equations(guess))
+
+    def _data_equations(self, guess: Guess, velocity: F64 | None) -> Equations:
+        body = self.model.scene.body
+        joints, screws = kinematics.chain(body, guess.pose)
+        skin = normal_equations.body_equations(self.data.body, body, joints, screws, guess.centre)
+        hessian, gradient = np.zeros((self.unknowns, self.unknowns)), np.zeros(self.unknowns)
+        moved = len(skin.gradient)
+        hessian[:moved, :moved], gradient[:moved] = skin.hessian, skin.gradient
+        if velocity is None:
+            return Equations(hessian, gradient, skin.energy)
+        points = guess.cloth.vertices[self.data.cloth.vertex]
+        about_root = velocity[..., : self.unknowns] @ about_origin(guess.centre, self.unknowns)
+        worn = normal_equations.dense_equations(self.data.cloth, points, about_root)
+        return Equations(hessian + worn.hessian, gradient + worn.gradient, skin.energy + worn.energy)
+
+    def _prior_equations(self, guess: Guess) -> Equations:
+        hessian, gradient, energy = self.anchor.equations(guess)
+        move = about_origin(guess.centre, self.unknowns)
+        for prior in self.priors:
+            residual = self._residual(prior, guess)
+            columns = min(residual.jacobian.shape[1], self.unknowns)
+            jacobian = residual.jacobian[:, :columns] @ move[:columns]
+            hessian = hessian + prior.weight * jacobian.T @ jacobian
+            gradient = gradient + prior.weight * jacobian.T @ residual.error
+            energy += prior.weight * residual.energy
+        return Equations(hessian, gradient, energy)
+
+    def _residual(self, prior: Prior, guess: Guess) -> Residual:
+        return prior.residual(guess.pose, self.past, self.model.scene)

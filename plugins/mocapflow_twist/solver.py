@@ -1,0 +1,150 @@
+"""Pose from matches by twists: Gauss–Newton with Levenberg–Marquardt damping, priors and re-matching."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from mocapflow.components import PoseSolver, Prior
+from mocapflow.data import Estimate, FrameState, Matches, Past, Surface, Turn
+from mocapflow.model import ClothedModel
+from mocapflow.records import F64
+from mocapflow_twist import solve
+from mocapflow_twist.constraint import image_rows, line_rows
+from mocapflow_twist.covariance import covariance, effective_share, view_balance
+from mocapflow_twist.motion import ClothMotion
+from mocapflow_twist.problem import Anchor, Data, Guess, Problem
+
+Positive = Annotated[float, Field(gt=0)]
+TRIALS = 8  # times that the damping is raised before a step is given up
+RAISED, LOWERED = 10.0, 0.1  # what a rejected and an accepted step do to the damping
+LEAST_GAIN = 1e-14  # share of the energy below which a step is only rounding
+
+
+class TwistGaussNewton(PoseSolver):
+    """Gauss–Newton on twists: moves the pose until matched surface points meet their image points.
+
+    Rosenhahn 2008, section 12.2.2. The chapter's own choice is residual: line with steps_per_match: 4.
+    """
+
+    name = "twist_gauss_newton"
+
+    iterations: Annotated[int, Field(ge=1)] = 10  # times that it matches anew, at most
+    steps_per_match: Annotated[int, Field(ge=1)] = 1
+    residual: Literal["image", "line"] = "image"  # pixels, or distance to projection rays in space
+    line_sigma_mm: Positive = 3.0  # standard deviation of every distance to a ray
+    damping: Annotated[float, Field(ge=0)] = 1e-4  # share of the mean diagonal; ten times more after a worse step
+    cap_deg: Positive = 10.0  # a step, each angle
+    cap_mm: Positive = 100.0  # a step, the root
+    correlation_px: Annotated[float, Field(ge=0)] = 15.0  # length over which contour errors agree; 0: independent
+    balance_views: bool = False  # every view counts the same
+    cloth_unknowns: bool = False  # also solves for the cloth parameters
+    redrape: Literal["every", "once"] = "every"  # drape at each new pose, or once and move the cloth linearly
+    cloth_jacobian: Literal["every", "once"] = "once"  # how often the motion of the cloth is measured
+    root_damping_m: Positive = 0.1  # standard deviation about the prediction
+    root_damping_deg: Positive = 11.5
+    angle_damping_deg: Positive = 60.0
+    cloth_damping: Positive = 0.3  # share of each parameter's range
+    stop_surface_mm: Annotated[float, Field(ge=0)] = 0.1
+    stop_angle_deg: Annotated[float, Field(ge=0)] = 0.02
+
+    def solve(
+        self,
+        match: Callable[[Surface], Matches],
+        state: FrameState,
+        model: ClothedModel,
+        priors: Sequence[Prior],
+        past: Past,
+        turn: Turn,
+    ) -> Estimate:
+        """Return the pose that explains the matches best, with its covariance.
+
+        Source: Rosenhahn 2008, Eq. (12.8)
+        """
+        guess = Guess(state.estimate.pose, state.cloth)
+        motion = ClothMotion(model, past, self.cloth_unknowns, self.redrape == "every", self.cloth_jacobian == "once")
+        anchor = Anchor(guess, self._precision(model, guess))
+        surface, damping = model.surface(guess.pose, guess.cloth), self.damping
+        for _ in range(self.iterations):
+            problem = Problem(model, self._data(match(surface), model), priors, past, anchor)
+            if problem.data.measurements == 0:
+                break
+            before, old = guess, surface
+            for _ in range(self.steps_per_match):
+                guess, damping = self._descend(problem, guess, motion, damping)
+            surface = model.surface(guess.pose, guess.cloth)
+            if self._settled(before, guess, old, surface):
+                break
+        return self._estimate(problem, guess, motion)
+
+    def _data(self, matches: Matches, model: ClothedModel) -> Data:
+        """Return the matches as rows, weighted by how many independent measurements they hold."""
+        cameras = model.scene.cameras
+        line = self.residual == "line"
+        rows = line_rows(matches, cameras, self.line_sigma_mm / 1000) if line else image_rows(matches, cameras)
+        share = effective_share(matches, self.correlation_px)
+        balance = view_balance(matches, share) if self.balance_views else np.ones(len(share))
+        weight = rows.weight * (share * balance)[rows.match]
+        used = np.isfinite(weight) & (weight > 0)
+        components = 2 / 3 if line else 1.0  # of the three components of X x n - m, two are independent
+        body = len(model.scene.body.vertices)
+        return Data(
+            body=rows.part(used & (rows.vertex < body), weight),
+            cloth=rows.part(used & (rows.vertex >= body), weight, body),
+            measurements=components * float(share[rows.match[used]].sum()),
+        )
+
+    def _precision(self, model: ClothedModel, guess: Guess) -> F64:
+        """Return one over the variance of the damping of every unknown."""
+        turn, bend = np.radians(self.root_damping_deg), np.radians(self.angle_damping_deg)
+        spread = [np.full(3, turn), np.full(3, self.root_damping_m), np.full(len(guess.pose.angles), bend)]
+        if self.cloth_unknowns and model.clothed:
+            spread.append(np.maximum(self.cloth_damping * parameter_ranges(model), 1e-12))
+        precision: F64 = np.concatenate(spread) ** -2.0
+        return precision
+
+    def _descend(self, problem: Problem, guess: Guess, motion: ClothMotion, damping: float) -> tuple[Guess, float]:
+        """Return a guess of lower energy for the same matches, or the same guess where there is none."""
+        equations = problem.quadratic(guess, motion.velocity(guess, problem.data.cloth.vertex)).total
+        equations = motion.within_bounds(equations, guess)
+        angles = len(guess.pose.angles)
+        ranges = parameter_ranges(problem.model) if problem.unknowns > 6 + angles else np.empty(0)
+        lever = solve.levers(angles, ranges)
+        energy = sum(problem.energies(guess).values())
+        for _ in range(TRIALS):
+            increment = solve.step(equations, lever, damping)
+            increment = solve.capped(increment, angles, np.radians(self.cap_deg), self.cap_mm / 1000)
+            if solve.gain(equations, increment) <= LEAST_GAIN * energy:
+                return guess, damping
+            trial = motion.moved(guess, solve.about_origin(guess.centre, len(increment)) @ increment)
+            if sum(problem.energies(trial).values()) <= energy:
+                return trial, max(self.damping, LOWERED * damping)
+            damping = max(RAISED * damping, 1e-6)
+        return guess, damping
+
+    def _settled(self, before: Guess, after: Guess, old: Surface, new: Surface) -> bool:
+        angles = np.abs(after.pose.angles - before.pose.angles).max(initial=0.0)
+        surface = np.sqrt(np.sum((new.vertices - old.vertices) ** 2, axis=1).max())
+        return bool(angles <= np.radians(self.stop_angle_deg) and surface <= self.stop_surface_mm / 1000)
+
+    def _estimate(self, problem: Problem, guess: Guess, motion: ClothMotion) -> Estimate:
+        quadratic = problem.quadratic(guess, motion.velocity(guess, problem.data.cloth.vertex))
+        data, prior = quadratic.data, quadratic.prior
+        about_root = covariance(data.hessian, prior.hessian, data.energy, problem.data.measurements)
+        to_origin = solve.about_origin(guess.centre, problem.unknowns)
+        return Estimate(
+            pose=guess.pose,
+            parameters=np.array(guess.cloth.parameters),
+            covariance=to_origin @ about_root @ to_origin.T,
+            energies=problem.energies(guess),
+        )
+
+
+def parameter_ranges(model: ClothedModel) -> F64:
+    """Return the width of the bounds of each cloth parameter: (Q,)."""
+    assert model.scene.garment is not None
+    ranges: F64 = np.ptp(model.scene.garment.parameter_bounds, axis=1)
+    return ranges
