@@ -13,9 +13,9 @@ from pydantic import BaseModel, ConfigDict, model_validator
 from mocapflow.components import BodyModel
 from mocapflow.data import Body
 from mocapflow.errors import PipelineError, RecordingError, alternatives
+from mocapflow.io.meshes import read_mesh
 from mocapflow.records import F64
 from mocapflow_bodies.assemble import Part, assemble, check_size
-from mocapflow_bodies.objfile import read_mesh
 from mocapflow_bodies.skeleton import read_skeleton
 from mocapflow_bodies.weights import heat_weights, read_weights
 

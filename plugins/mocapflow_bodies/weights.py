@@ -12,7 +12,7 @@ from mocapflow_bodies.skeleton import Skeleton
 
 KEPT = 5  # joints a vertex
 LEAST = 0.01  # weights below are dropped
-HEAT = 1.0  # how strongly the nearest bone holds a vertex; 1 lets weights fall within about one segment radius
+HEAT = 2.0  # how strongly the nearest bone holds a vertex; weights fall within about one segment radius
 
 
 def read_weights(path: Path, skeleton: Skeleton, vertices: int) -> F64:

@@ -1,0 +1,145 @@
+"""T-BODY1 and T-GEO3: the chain against chained matrix exponentials, its Jacobian against differences."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mocapflow_bodies.scanned import Scanned
+from scipy.linalg import expm
+
+from mocapflow.data import Pose, PoseBatch
+from mocapflow.geometry import kinematics, twists
+from mocapflow.geometry.joints import angles_from_rotations, decompose, rotations_from_angles
+
+RECORDING = Path(__file__).parents[2] / "examples" / "data" / "skirt_steps"
+
+
+@pytest.fixture(scope="module")
+def body():
+    return Scanned().load(RECORDING)
+
+
+@pytest.fixture
+def pose(body):
+    rng = np.random.default_rng(1)
+    return Pose(root=twists.exp(rng.normal(size=6)), angles=rng.uniform(*body.limits.T))
+
+
+def test_rest_pose_reproduces_the_mesh(body):
+    joints, screws = kinematics.chain(body, Pose(root=np.eye(4), angles=np.zeros(len(body.twists))))
+    np.testing.assert_allclose(kinematics.skin(body, joints), body.vertices, atol=1e-12)
+    np.testing.assert_allclose(screws, body.twists, atol=1e-15)
+
+
+def test_chain_equals_chained_matrix_exponentials(body, pose):
+    joints, _ = kinematics.chain(body, pose)
+    for joint in range(len(body.joint_names)):
+        path, above = [], joint
+        while above >= 0:
+            path, above = [above, *path], body.parents[above]
+        expected = pose.root
+        for member in path:
+            for screw in np.flatnonzero(body.screw_joint == member):
+                wedge = np.zeros((4, 4))
+                wedge[:3, :3], wedge[:3, 3] = twists.hat(body.twists[screw, :3]), body.twists[screw, 3:]
+                expected = expected @ expm(pose.angles[screw] * wedge)
+        np.testing.assert_allclose(joints[joint], expected, atol=1e-12)
+
+
+def test_one_joint_moves_only_its_subtree(body):
+    angles = np.zeros(len(body.twists))
+    angles[body.screw_names.index("knee_l.flexion")] = 1.0
+    joints, _ = kinematics.chain(body, Pose(root=np.eye(4), angles=angles))
+    below = kinematics.descendants(body.parents)[body.joint("knee_l")]
+    assert [n for n, b in zip(body.joint_names, below, strict=True) if b] == ["knee_l", "ankle_l", "toe_l"]
+    moved = np.linalg.norm(kinematics.skin(body, joints) - body.vertices, axis=1)
+    share = np.where(below[body.skin_joint], body.skin_weight, 0.0).sum(axis=1)
+    assert (moved[share == 0] < 1e-12).all() and moved[share > 0.5].min() > 1e-3
+    np.testing.assert_allclose(joints[~below], np.broadcast_to(np.eye(4), joints[~below].shape), atol=1e-12)
+
+
+def test_screws_are_the_derivative_of_the_skin(body, pose):
+    joints, screws = kinematics.chain(body, pose)
+    below = kinematics.descendants(body.parents)
+    step = 1e-6
+    for screw in range(0, len(screws), 5):
+        moves = [replace(pose, angles=pose.angles + s * step * np.eye(len(screws))[screw]) for s in (1, -1)]
+        plus, minus = (kinematics.skin(body, kinematics.chain(body, move)[0]) for move in moves)
+        carried = np.where(below[body.screw_joint[screw]][body.skin_joint], body.skin_weight, 0.0)
+        turned = np.zeros_like(plus)  # each joint's share of a vertex moves with the joint, if it is below
+        for k in range(5):
+            rigid = joints[body.skin_joint[:, k]]
+            at = np.einsum("vab,vb->va", rigid[:, :3, :3], body.vertices) + rigid[:, :3, 3]
+            turned += carried[:, k, None] * (np.cross(screws[screw, :3], at) + screws[screw, 3:])
+        np.testing.assert_allclose((plus - minus) / (2 * step), turned, atol=1e-8)
+
+
+def test_batch_equals_one_by_one(body, pose):
+    poses = PoseBatch(root=np.stack([np.eye(4), pose.root]), angles=np.stack([0 * pose.angles, pose.angles]))
+    np.testing.assert_array_equal(kinematics.chain_batch(body, poses)[1], kinematics.chain(body, pose)[0])
+
+
+def test_morph_changes_the_shape_with_its_angle(body, pose):
+    offset = np.random.default_rng(2).normal(scale=0.01, size=body.vertices.shape)
+    screw = body.screw_names.index("knee_l.flexion")
+    morphing = replace(body, morph_offset=offset, morph_screw=screw, morph_range=(0.2, 1.2))
+    for angle, share in ((0.0, 0.0), (0.2, 0.0), (0.7, 0.5), (1.2, 1.0), (2.0, 1.0)):
+        angles = np.zeros(len(body.twists))
+        angles[screw] = angle
+        joints, _ = kinematics.chain(body, Pose(root=pose.root, angles=angles))
+        expected = kinematics.skin(replace(body, vertices=body.vertices + share * offset), joints)
+        np.testing.assert_allclose(kinematics.skin(morphing, joints, angles), expected, atol=1e-12)
+    with pytest.raises(ValueError, match="pass the angles"):
+        kinematics.skin(morphing, joints)
+
+
+def test_morph_velocity_is_the_rest_of_the_derivative(body):
+    offset = np.random.default_rng(2).normal(scale=0.01, size=body.vertices.shape)
+    screw = body.screw_names.index("knee_l.flexion")
+    morphing = replace(body, morph_offset=offset, morph_screw=screw, morph_range=(1.2, 0.2))
+    angles, step = np.zeros(len(body.twists)), 1e-6
+    angles[screw] = 0.7
+    joints, _ = kinematics.chain(body, Pose(root=np.eye(4), angles=angles))
+    changed = [kinematics.skin(morphing, joints, angles + s * step * np.eye(len(angles))[screw]) for s in (1, -1)]
+    difference = (changed[0] - changed[1]) / (2 * step)
+    np.testing.assert_allclose(kinematics.morph_velocity(morphing, joints, angles), difference, atol=1e-8)
+    assert not kinematics.morph_velocity(morphing, joints, 0 * angles).any()
+
+
+def test_three_screws_reach_any_rotation_exactly(body):
+    rng = np.random.default_rng(8)
+    balls = [n for j, n in enumerate(body.joint_names) if (body.screw_joint == j).sum() == 3]
+    assert {"hip_l", "knee_r", "shoulder_l", "elbow_r", "spine"} <= set(balls)
+    for _ in range(5):
+        turns = {name: rng.uniform(-1.2, 1.2, 3) for name in balls}
+        back = rotations_from_angles(body, angles_from_rotations(body, turns))
+        for name in balls:
+            np.testing.assert_allclose(back[name], turns[name], atol=1e-9)
+
+
+def test_gimbal_lock_still_gives_the_rotation():
+    axes = np.eye(3)
+    rotation = (
+        twists.exp(np.array([0, np.pi / 2, 0, 0, 0, 0.0]))[:3, :3] @ twists.exp(np.array([0, 0, 0.4, 0, 0, 0]))[:3, :3]
+    )
+    a, b, c = decompose(axes, rotation)
+    again = np.eye(3)
+    for axis, angle in zip(axes, (a, b, c), strict=True):
+        again = again @ twists.exp(np.append(angle * axis, np.zeros(3)))[:3, :3]
+    np.testing.assert_allclose(again, rotation, atol=1e-9)
+
+
+def test_fewer_screws_come_as_near_as_they_can():
+    axes = np.array([[1.0, 0, 0], [0, 1.0, 0]])
+    rotation = twists.exp(np.array([0.5, -0.3, 0.2, 0, 0, 0]))[:3, :3]
+    best = decompose(axes, rotation)
+
+    def miss(angles):
+        made = np.eye(3)
+        for axis, angle in zip(axes, angles, strict=True):
+            made = made @ twists.exp(np.append(angle * axis, np.zeros(3)))[:3, :3]
+        return np.linalg.norm(made - rotation)
+
+    for move in np.vstack([np.eye(2), -np.eye(2)]) * 1e-3:
+        assert miss(best) < miss(best + move)

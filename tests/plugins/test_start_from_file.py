@@ -1,0 +1,97 @@
+"""The first pose from a file: the forward kinematics of the recordings' README, and what may be wrong with it."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mocapflow_bodies.scanned import Scanned
+from mocapflow_sequence.start_from_file import StartFromFile
+from scipy.spatial.transform import Rotation
+
+from mocapflow.errors import RecordingError
+from mocapflow.geometry import kinematics
+from mocapflow.geometry.joints import rotations_from_angles
+from mocapflow.recording import open_recording
+from mocapflow.scene import Scene
+
+RECORDING = Path(__file__).parents[2] / "examples" / "data" / "skirt_steps"
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return Scene(cameras=open_recording(RECORDING).cameras, body=Scanned().load(RECORDING))
+
+
+@pytest.fixture
+def recording(tmp_path):
+    shutil.copytree(RECORDING, tmp_path / "recording")
+    return tmp_path / "recording"
+
+
+def readme_kinematics(body, content, turns):
+    """G_j = G_parent R_j, p_j = p_parent + G_parent (rest_j - rest_parent), v = sum w (G_j (v_rest - rest_j) + p_j)."""
+    rotations, positions = [], []
+    for joint, name in enumerate(body.joint_names):
+        parent = body.parents[joint]
+        if parent < 0:
+            rotations.append(Rotation.from_rotvec(content["root_rotation"]).as_matrix())
+            positions.append(np.array(content["root_translation"]))
+        else:
+            own = Rotation.from_rotvec(turns[name]).as_matrix()
+            rotations.append(rotations[parent] @ own)
+            offset = body.positions[joint] - body.positions[parent]
+            positions.append(positions[parent] + rotations[parent] @ offset)
+    vertices = np.zeros_like(body.vertices)
+    for k in range(5):
+        joint = body.skin_joint[:, k]
+        local = body.vertices - body.positions[joint]
+        moved = np.einsum("vab,vb->va", np.array(rotations)[joint], local) + np.array(positions)[joint]
+        vertices += body.skin_weight[:, k, None] * moved
+    return np.array(positions), vertices
+
+
+def test_body_and_pose_reproduce_the_recordings_kinematics(scene):
+    content = json.loads((RECORDING / "init.json").read_text())
+    pose = StartFromFile().run(open_recording(RECORDING), scene).pose
+    turns = rotations_from_angles(scene.body, pose.angles)
+    given = content["joint_rotations"]
+    inexact = {name for name in given if np.abs(np.array(given[name]) - turns[name]).max() > 1e-9}
+    assert inexact <= {"toe_l", "toe_r", "wrist_l", "wrist_r"}  # joints with fewer than three screws
+    positions, vertices = readme_kinematics(scene.body, content, turns)
+    joints, _ = kinematics.chain(scene.body, pose)
+    np.testing.assert_allclose(kinematics.joint_positions(scene.body, joints), positions, atol=1e-9)
+    np.testing.assert_allclose(kinematics.skin(scene.body, joints), vertices, atol=1e-9)
+
+
+def test_a_part_of_the_body_starts_from_the_same_file(scene):
+    legs = Scene(cameras=scene.cameras, body=Scanned(part="legs").load(RECORDING))
+    pose = StartFromFile().run(open_recording(RECORDING), legs).pose
+    whole = StartFromFile().run(open_recording(RECORDING), scene).pose
+    knee = kinematics.joint_positions(legs.body, kinematics.chain(legs.body, pose)[0])[legs.body.joint("knee_r")]
+    other = kinematics.joint_positions(scene.body, kinematics.chain(scene.body, whole)[0])[scene.body.joint("knee_r")]
+    np.testing.assert_allclose(knee, other, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda c: c["joint_rotations"].update(knee=[0, 0, 0]), "no joint 'knee'\n.*did you mean 'knee_"),
+        (lambda c: c.update(root_rotation=[0, float("nan"), 0]), "not a start pose: .*should be three finite numbers"),
+        (lambda c: c["joint_rotations"].update(knee_l=[0, 0]), "should be three finite numbers"),
+        (lambda c: c.pop("root_translation"), "'root_translation' is missing"),
+    ],
+)
+def test_bad_files(recording, scene, change, message):
+    content = json.loads((recording / "init.json").read_text())
+    change(content)
+    (recording / "init.json").write_text(json.dumps(content))
+    with pytest.raises(RecordingError, match=message):
+        StartFromFile().run(open_recording(recording), scene)
+
+
+def test_missing_file(recording, scene):
+    (recording / "init.json").unlink()
+    with pytest.raises(RecordingError, match="the recording has: .*cameras.toml(.|\n)*start_from_keypoints"):
+        StartFromFile().run(open_recording(recording), scene)
