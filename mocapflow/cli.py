@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import shlex
 import sys
+from collections.abc import Callable
 from typing import Any
 
 import typer
@@ -37,11 +38,19 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for command in (running.run, running.plan, running.status, running.demo):
-    app.command()(command)
-for command in (looking.plugins, looking.show, looking.equations, looking.doctor):
-    app.command()(command)
-for command in (results.evaluate, results.export):
+COMMANDS: tuple[Callable[..., None], ...] = (
+    running.run,
+    running.plan,
+    running.status,
+    running.demo,
+    results.evaluate,
+    results.export,
+    looking.plugins,
+    looking.show,
+    looking.equations,
+    looking.doctor,
+)
+for command in COMMANDS:
     app.command()(command)
 app.add_typer(cache.app, name="cache")
 

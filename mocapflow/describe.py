@@ -17,7 +17,7 @@ from mocapflow.components import Component
 
 def describe(cls: type[Component]) -> Iterator[str]:
     """Yield the lines that describe a component class."""
-    yield from inspect.getdoc(cls).splitlines() if cls.__doc__ else ()
+    yield from (inspect.getdoc(cls) or "").splitlines()
     yield ""
     yield "settings:" if cls.model_fields else "no settings"
     meanings = comments(cls)
@@ -66,7 +66,7 @@ def _limit(mark: str) -> str:
 
 
 def _default(field: FieldInfo) -> str:
-    default = field.get_default(call_default_factory=True) if field.default_factory is None or True else None
+    default = field.get_default(call_default_factory=True)
     if default is PydanticUndefined:
         return ", required"
     return f" = {default!r}"

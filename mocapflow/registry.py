@@ -191,11 +191,12 @@ def _import_file(path: Path) -> ModuleType:
 def _check_hooks(plugin: Any) -> None:
     known = {name for name in vars(hookspecs) if name.startswith("mocapflow_")}
     for name, function in inspect.getmembers(plugin, inspect.isroutine):
-        marked = hasattr(function, "mocapflow_impl")
-        if marked and name not in known:
-            close = get_close_matches(name, known, n=1)
+        marked = getattr(function, "mocapflow_impl", None)
+        hook = (marked or {}).get("specname") or name
+        if marked and hook not in known:
+            close = get_close_matches(hook, known, n=1)
             guess = f" — did you mean '{close[0]}'?" if close else ""
-            raise PluginError(f"unknown hook '{name}'{guess}")
+            raise PluginError(f"unknown hook '{hook}'{guess}")
         if name in known and not marked:
             raise PluginError(f"{name} lacks @mocapflow.hookimpl")
 

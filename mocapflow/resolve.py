@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, get_args, get_origin
 
@@ -84,9 +84,11 @@ class Resolver:
             return None
         if base is None:
             return self.file(value, steps) if isinstance(value, str) and Path in _parts(annotation) else value
-        if isinstance(value, list) and not (isinstance(annotation, type) and issubclass(annotation, Component)):
-            return tuple(self.component(base.role, item, (*steps, index)) for index, item in enumerate(value))
-        return self.component(base.role, value, steps)
+        if not _takes_several(annotation):
+            return self.component(base.role, value, steps)
+        if not isinstance(value, list):
+            return (self.component(base.role, value, steps),)
+        return tuple(self.component(base.role, item, (*steps, index)) for index, item in enumerate(value))
 
     def _wrong_setting(self, cls: type[BaseModel], error: ValidationError, steps: Steps) -> MocapflowError:
         first = error.errors(include_url=False)[0]
@@ -127,6 +129,10 @@ def _parts(annotation: Any) -> set[Any]:
 def _component_base(annotation: Any) -> type[Component] | None:
     bases = [part for part in _parts(annotation) if isinstance(part, type) and issubclass(part, Component)]
     return bases[0] if bases else None
+
+
+def _takes_several(annotation: Any) -> bool:
+    return get_origin(annotation) in {tuple, list, Sequence} or any(map(_takes_several, get_args(annotation)))
 
 
 def _model_at(cls: type[BaseModel], location: tuple[str | int, ...]) -> type[BaseModel]:

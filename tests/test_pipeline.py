@@ -1,0 +1,217 @@
+import json
+from pathlib import Path
+
+import pytest
+
+from mocapflow.errors import MocapflowError
+from mocapflow.pipeline import load_pipeline
+from mocapflow.registry import load_registry
+from mocapflow.shipped import shipped
+from mocapflow.wiring import body_source, wire
+from tests.fixtures import small_plugins
+
+TEXT = """\
+recording: clip
+garment: skirt
+stages:
+  start: start
+  track:
+    use: coupled_loop
+    draper: kinematic
+    matchers: [contour_icp, {use: contour_icp, share: 0.5}]
+    steady: {turns: 3}
+  smooth: smooth
+  export: export
+"""
+MEASURES = {"type": "skirt", "waist_height": 1.05, "waist_circumference": 0.75, "hem_circumference": 1.5, "length": 0.7}
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("clip/subject").mkdir(parents=True)
+    Path("clip/subject/garment.json").write_text(json.dumps(MEASURES))
+    Path("skirt.yaml").write_text(TEXT)
+    return tmp_path
+
+
+def load(*changes, **options):
+    return load_pipeline(Path("skirt.yaml"), small_plugins.registry(), changes=changes, **options)
+
+
+def test_names_become_components(folder):
+    pipeline = load()
+    assert pipeline.name == "skirt"
+    assert pipeline.recording == Path("clip")
+    assert pipeline.body == small_plugins.Scanned()
+    assert [named.label for named in pipeline.stages] == ["start", "track", "smooth", "export"]
+    track = pipeline.stages[1].stage
+    assert track.draper == small_plugins.Kinematic()
+    assert [matcher.share for matcher in track.matchers] == [1.0, 0.5]
+    assert load("stages.track.matchers=contour_icp").stages[1].stage.matchers == (small_plugins.Contours(),)
+    assert track.steady.turns == 3
+    assert pipeline.stages[1].where == "skirt.yaml:5:3"
+    assert (pipeline.start, pipeline.stop, pipeline.step, pipeline.scale) == (0, None, 1, 1.0)
+
+
+def test_measures_come_from_the_recording_and_the_file_overrides_them(folder):
+    assert load().garment.length_m == 0.7
+    assert load("garment.length_m=0.9").garment.length_m == 0.9
+    assert load("garment=from_recording").garment == load().garment
+    assert load("garment={use: from_recording, length_m: 0.9}").garment.length_m == 0.9
+    assert load("garment=null").garment is None
+
+
+def test_relative_paths_start_at_the_file_they_stand_in(folder, monkeypatch):
+    Path("elsewhere").mkdir()
+    monkeypatch.chdir("elsewhere")
+    Path("here").mkdir()
+    registry = small_plugins.registry()
+    pipeline = load_pipeline(Path("../skirt.yaml"), registry, changes=["stages.track.file=a.npz"])
+    assert pipeline.recording == Path("../clip")
+    assert pipeline.stages[1].stage.file == Path("a.npz")
+    changed = load_pipeline(Path("../skirt.yaml"), registry, recording=Path("here"), changes=["garment=null"])
+    assert changed.recording == Path("here")
+
+
+def test_frames(folder):
+    pipeline = load("frames={start: 2, stop: 9}")
+    assert (pipeline.start, pipeline.stop, pipeline.step) == (2, 9, 1)
+    pipeline = load("frames={start: 2, stop: 9}", frames=slice(None, 60, 2))
+    assert (pipeline.start, pipeline.stop, pipeline.step) == (0, 60, 2)
+
+
+def test_a_stage_is_left_out_by_null(folder):
+    assert [named.label for named in load("stages.smooth=null").stages] == ["start", "track", "export"]
+
+
+def test_a_plugin_file_named_by_the_pipeline(folder):
+    Path("dress.py").write_text(
+        "from mocapflow import Garment, hookimpl\n"
+        "class Dress(Garment):\n    name = 'dress'\n    length_m: float = 1.2\n    def sew(self, body): ...\n"
+        "@hookimpl\ndef mocapflow_garments():\n    return [Dress]\n"
+    )
+    Path("dress.yaml").write_text("recording: clip\nplugins: [dress.py]\ngarment: dress\nstages: {}\n")
+    assert load_pipeline(Path("dress.yaml")).garment.length_m == 1.2
+    Path("dress.py").write_text("import nothing_like_it\n")
+    with pytest.raises(MocapflowError) as caught:
+        load_pipeline(Path("dress.yaml"))
+    assert str(caught.value) == (
+        "dress.yaml:2:11  plugins.0: plugin 'dress' (dress.py) did not load: "
+        "ModuleNotFoundError: No module named 'nothing_like_it'"
+    )
+
+
+@pytest.mark.parametrize(
+    ("written", "instead", "message"),
+    [
+        ("draper: kinematic", "draper: kinematik",
+         "skirt.yaml:7:5  stages.track.draper: no draper named 'kinematik'\n"
+         "       available: kinematic — did you mean 'kinematic'?"),
+        ("garment: skirt", "garment: {use: skirt, lenght_m: 0.7}",
+         "skirt.yaml:2:23  garment.lenght_m: unknown setting of skirt (hem_circumference_m, length_m, "
+         "waist_circumference_m, waist_height_m)\n       did you mean 'length_m'?"),
+        ("share: 0.5", "share: -1",
+         "skirt.yaml:8:48  stages.track.matchers.1.share: input should be greater than 0, not -1"),
+        ("turns: 3", "turns: many",
+         "skirt.yaml:9:14  stages.track.steady.turns: input should be a valid integer, unable to parse string as an "
+         "integer, not 'many'"),
+        ("turns: 3", "turn: 3",
+         "skirt.yaml:9:14  stages.track.steady.turn: unknown setting of steady (turns)\n       did you mean 'turns'?"),
+        ("    matchers: [contour_icp, {use: contour_icp, share: 0.5}]\n", "",
+         "skirt.yaml:5:3  stages.track: coupled_loop needs matchers"),
+        ("draper: kinematic", "draper: [kinematic]",
+         "skirt.yaml:7:5  stages.track.draper: name a draper, as `name` or as {use: name, setting: value}\n"
+         "       available: kinematic"),
+        ("smooth: smooth", "smooth: {from: 3, use: smooth}",
+         "skirt.yaml:10:12  stages.smooth.from: write {parameter: label of an earlier stage}"),
+        ("recording: clip", "recording: clap",
+         "clap  there is no such folder\n       --recording DIR names another"),
+        ("recording: clip\n", "",
+         "skirt.yaml:1:1  no recording: write `recording: DIR`, or give --recording DIR"),
+        ("recording: clip", "recording: clip\nspeed: 3",
+         "skirt.yaml:2:1  speed: unknown setting of a pipeline (body, frames, garment, mocapflow, plugins, recording, "
+         "scale, stages)"),
+        ("recording: clip", "recording: clip\nframes: {start: 9, stop: 2}",
+         "skirt.yaml:2:1  frames: 9:2 holds no frame"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_told_with_its_line(folder, written, instead, message):
+    Path("skirt.yaml").write_text(TEXT.replace(written, instead))
+    with pytest.raises(MocapflowError) as caught:
+        load()
+    assert str(caught.value) == message
+    assert caught.value.exit_status == 2
+
+
+def test_a_recording_without_measures(folder):
+    Path("clip/subject/garment.json").unlink()
+    with pytest.raises(MocapflowError) as caught:
+        load()
+    file = Path("clip/subject/garment.json")
+    assert str(caught.value) == (
+        "skirt.yaml:2:1  garment: skirt needs waist_height_m, waist_circumference_m, hem_circumference_m, length_m\n"
+        f"       measures come from {file}, which does not exist; a value written here overrides them"
+    )
+    with pytest.raises(MocapflowError, match="clip/subject/garment.json  the pipeline takes the garment from the rec"):
+        load("garment=from_recording")
+
+
+def test_measures_of_another_garment_are_not_used(folder):
+    Path("clip/subject/garment.json").write_text(json.dumps({**MEASURES, "type": "shorts"}))
+    with pytest.raises(MocapflowError, match=r"garment: skirt needs waist_height_m, .*\n.*which describes a shorts"):
+        load()
+
+
+@pytest.mark.parametrize("text", ["{", "[]", '{"length": 3}'])
+def test_measures_that_can_not_be_read(folder, text):
+    Path("clip/subject/garment.json").write_text(text)
+    with pytest.raises(MocapflowError, match="clip/subject/garment.json  not a garment description: "):
+        load()
+
+
+def test_stages_are_wired_by_type(folder):
+    assert wire(load()) == {
+        "start": {"scene": "scene"},
+        "track": {"scene": "scene", "start": "start", "background": None},
+        "smooth": {"track": "track"},
+        "export": {"track": "smooth", "folder": "run folder"},
+    }
+
+
+def test_from_overrides_the_nearest(folder):
+    assert wire(load("stages.export.from={track: track}"))["export"]["track"] == "track"
+
+
+def test_a_stage_that_makes_a_body_replaces_it_for_later_stages(folder):
+    Path("skirt.yaml").write_text(TEXT.replace("  start: start\n", "  start: start\n  fit: fit\n"))
+    pipeline = load()
+    assert body_source(pipeline, "start") is None
+    assert body_source(pipeline, "fit") is None
+    assert body_source(pipeline, "track") == "fit"
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("stages.start=start_late",
+         "--set stages.start=start_late  stage 'start' needs a Background but no earlier stage makes one"),
+        ("stages.export.from={track: start}",
+         "skirt.yaml:11:3  stage 'export' wants its track from 'start', but no earlier 'start' makes one\n"
+         "       available: smooth, track"),
+        ("stages.export.from={trak: track}",
+         "skirt.yaml:11:3  stage 'export' has no input 'trak'\n"
+         "       available: folder, track — did you mean 'track'?"),
+        ("stages.export=untyped", "--set stages.export=untyped  stage 'export': untyped: run needs a type for track"),
+    ],
+)  # fmt: skip
+def test_wiring_that_does_not_work(folder, change, message):
+    with pytest.raises(MocapflowError) as caught:
+        wire(load(change))
+    assert str(caught.value) == message
+
+
+@pytest.mark.parametrize("file", sorted(shipped("pipelines").glob("*.yaml")), ids=lambda file: file.name)
+def test_every_shipped_pipeline_loads_and_is_wired(file):
+    pipeline = load_pipeline(file, load_registry(), recording=shipped("examples", "data", "skirt_steps"))
+    assert wire(pipeline)

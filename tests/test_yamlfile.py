@@ -1,0 +1,126 @@
+import textwrap
+from pathlib import Path
+
+import pytest
+
+from mocapflow.errors import PipelineError
+from mocapflow.yamlfile import read
+
+BASE = """\
+recording: ../clip
+stages:
+  track:
+    use: coupled_loop
+    draper: kinematic
+    matchers: [contour_icp, {use: keypoints, share: 0.5}]
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("base.yaml").write_text(BASE)
+    return tmp_path
+
+
+def write(name, text):
+    Path(name).write_text(textwrap.dedent(text))
+    return Path(name)
+
+
+def test_every_value_knows_its_place(folder):
+    document = read(Path("base.yaml"))
+    assert document.values["stages"]["track"]["matchers"][1] == {"use": "keypoints", "share": 0.5}
+    assert document.place(("recording",)).text == "base.yaml:1:1"
+    assert document.place(("stages", "track", "draper")).text == "base.yaml:5:5"
+    assert document.place(("stages", "track", "matchers", 1, "share")).text == "base.yaml:6:46"
+    assert document.place(("stages", "track", "not", "there")).text == "base.yaml:3:3"
+
+
+def test_a_file_extends_another(folder):
+    Path("variants").mkdir()
+    path = write(
+        "variants/xpbd.yaml",
+        """\
+        extends: ../base.yaml
+        change:
+          stages.track.draper: {use: xpbd, stiffness: 3}
+          stages.track.matchers.0.share: 2
+          recording: ../other
+          stages.smooth: smooth
+        """,
+    )
+    document = read(path)
+    assert document.values == {
+        "recording": "../other",
+        "stages": {
+            "track": {
+                "use": "coupled_loop",
+                "draper": {"use": "xpbd", "stiffness": 3},
+                "matchers": [{"use": "contour_icp", "share": 2}, {"use": "keypoints", "share": 0.5}],
+            },
+            "smooth": "smooth",
+        },
+    }
+    assert document.place(("stages", "track", "draper", "stiffness")).text == "variants/xpbd.yaml:3:36"
+    assert document.place(("recording",)).folder == Path("variants")
+    assert document.place(("stages", "track", "use")).text == "variants/../base.yaml:4:5"
+
+
+def test_changes_of_the_command_line_come_last(folder):
+    document = read(Path("base.yaml"), ["stages.track.draper.gap_mm=1.5", "frames={start: 3}"])
+    assert document.values["stages"]["track"]["draper"] == {"use": "kinematic", "gap_mm": 1.5}
+    assert document.values["frames"] == {"start": 3}
+    assert document.place(("frames", "start")).text == "--set frames={start: 3}"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a: [1", "bad.yaml:1:6  not YAML: expected ',' or ']', but got '<stream end>'"
+         " (while parsing a flow sequence)"),
+        ("a: 1\nb: c: d\n", "bad.yaml:2:5  not YAML: mapping values are not allowed here"),
+        ("a:\n\tb: 1", "bad.yaml:2:1  not YAML: found character '\\t' that cannot start any token"
+         " (while scanning for the next token)"),
+        ("a: 1\na: 2", "bad.yaml:2:1  'a' is written twice"),
+        ("b: {1: 2}", "bad.yaml:1:5  a name should be text, not 1: put it in quotes"),
+        ("- a", "bad.yaml:1:1  the file should hold `name: value` lines"),
+        ("a: \x01", "bad.yaml  not YAML: unacceptable character #x0001: special characters are not allowed"),
+        ("extends: base.yaml\nrecording: x", "bad.yaml:2:1  'recording' has no place in a file that extends another: "
+         "only `extends` and `change` do\n       write it as change: {recording: ...}"),
+        ("extends: middle.yaml",
+         "bad.yaml:1:1  middle.yaml itself extends another file; `extends` goes one level deep"),
+        ("extends: base.yaml\nchange: 3", "bad.yaml:2:1  change: write `path.to.value: new value` lines"),
+        ("extends: base.yaml\nchange:\n  stages.trak.draper: x",
+         "bad.yaml:3:3  there is no 'stages.trak'\n       available: track — did you mean 'track'?"),
+        ("extends: basis.yaml", "basis.yaml  there is no such file\n"
+         "       available: bad.yaml, base.yaml, middle.yaml — did you mean 'base.yaml'?"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_told_with_line_and_column(folder, text, message):
+    write("middle.yaml", "extends: base.yaml")
+    with pytest.raises(PipelineError) as caught:
+        read(write("bad.yaml", text))
+    assert str(caught.value) == message
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("draper", "--set draper  a change is written PATH=VALUE"),
+        ("a=[1", "--set a=[1  not YAML: expected ',' or ']', but got '<stream end>' (while parsing a flow sequence)"),
+        ("stages.track.matchers.7=x", "--set stages.track.matchers.7=x  there is no 'stages.track.matchers.7'\n"
+         "       available: 0, 1"),
+        ("garment.length_m=1", "--set garment.length_m=1  there is no 'garment'\n       available: recording, stages"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_a_change(folder, change, message):
+    with pytest.raises(PipelineError) as caught:
+        read(Path("base.yaml"), [change])
+    assert str(caught.value) == message
+
+
+def test_a_file_that_is_no_text(folder):
+    Path("picture.yaml").write_bytes(b"\xff\xd8\xff")
+    with pytest.raises(PipelineError, match="picture.yaml  is not UTF-8 text"):
+        read(Path("picture.yaml"))
