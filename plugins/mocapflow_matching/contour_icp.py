@@ -36,7 +36,6 @@ class ContourIcp(Matcher):
     later_loss: Loss = "geman_mcclure"
     scale_px: Positive = 2.0
     sigma_px: Positive = 1.0
-    correlation_px: Positive = 15.0  # neighbouring contour errors are alike over this length
     border_px: Annotated[int, Field(ge=1)] = 3
 
     def match(
@@ -83,13 +82,8 @@ class ContourIcp(Matcher):
             pixel=image.pixel[seen] - (model.pixel - model.anchor)[shown],
             direction=direction,
             vertex=model.vertex[shown],
-            weight=robust_weights(distance, loss, self.scale_px) * self.information(),
+            weight=robust_weights(distance, loss, self.scale_px) / self.sigma_px**2,
         )
-
-    def information(self) -> float:
-        """Return what one pair tells, px^-2: less than 1 / sigma^2, for neighbours repeat each other."""
-        directions = 2 if self.direction == "both" else 1
-        return min(self.spacing_px / self.correlation_px, 1.0) / (directions * self.sigma_px**2)
 
 
 def _sorted_by_row(contour: Contour) -> Contour:
