@@ -1,21 +1,16 @@
-"""Which frames of a track were lost, and what the track says about it."""
+"""Which frames of a track were lost: their poses are guesses."""
 
 from __future__ import annotations
-
-import re
 
 import numpy as np
 
 from mocapflow.data import Track
 from mocapflow.records import Bool
 
-NOTE = re.compile(r"^frame (\d+)\b.*\b(lost|bridged)\b")
-
 
 def lost_rows(track: Track) -> Bool:
-    """Return (T,) True where a pose was guessed: no usable view, a note that says so, or no finite covariance."""
-    noted = [int(match[1]) for note in track.notes if (match := NOTE.match(note))]
+    """Return (T,) True where nothing was fitted: the loop made no turn, no view was usable, or nothing is known."""
     blind = ~track.usable.any(axis=1) if track.usable.shape[1] else np.zeros(len(track.frame), bool)
     unknown = ~np.isfinite(track.covariance).all((1, 2))
-    lost: Bool = blind | unknown | np.isin(track.frame, noted)
+    lost: Bool = (track.iterations == 0) | blind | unknown
     return lost

@@ -59,7 +59,9 @@ def test_lost_frame_is_bridged_and_uncertain() -> None:
     wrong[10] += 1.0
     shifted = track.root.copy()
     shifted[10, :3, 3] += 0.5
-    lost = replace(track, angles=wrong, root=shifted, notes=("frame 10: lost, no view usable",))
+    turns = track.iterations.copy()
+    turns[10] = 0  # the loop kept the prediction
+    lost = replace(track, angles=wrong, root=shifted, iterations=turns)
     smoothed = Smooth().run(track=lost)
     assert np.degrees(np.abs(smoothed.angles[10] - track.angles[10])).max() < 1.0
     assert np.abs(smoothed.root[10] - track.root[10]).max() < 1e-3

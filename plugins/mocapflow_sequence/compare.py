@@ -1,0 +1,88 @@
+"""How far one angle curve is from another: the figures of a row of the evaluation."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mocapflow.records import F64
+
+BLOCK = 20  # frames; errors within it hang together, so the bootstrap draws whole blocks
+DRAWS = 1000
+SEED = 0
+NINETY = 1.6449  # standard deviations
+LONGEST_LAG = 15  # frames
+
+
+def figures(ours: F64, truth: F64, sd: F64, frame: F64) -> dict[str, float]:
+    """Return the deviations of ours from the truth over all frames that have both (degrees, frames).
+
+    Args:
+        ours: (T,) deg.
+        truth: (T,) deg.
+        sd: (T,) deg, our own standard deviations.
+        frame: (T,) frame numbers.
+    """
+    both = np.isfinite(ours) & np.isfinite(truth)
+    ours, truth, sd, frame = ours[both], truth[both], sd[both], frame[both]
+    error = ours - truth
+    size, offset = np.abs(error), float(np.mean(error))
+    low, high = rms_interval(error)
+    known = np.isfinite(sd)
+    return {
+        "frames": len(error),
+        "rms_deg": rms(error),
+        "rms_low_deg": low,
+        "rms_high_deg": high,
+        "rms_without_offset_deg": rms(error - offset),
+        "mae_deg": float(np.mean(size)),
+        "offset_deg": offset,
+        "p95_deg": float(np.percentile(size, 95)),
+        "max_deg": float(np.max(size)),
+        "worst_frame": int(frame[np.argmax(size)]),
+        "correlation": correlation(ours, truth),
+        "lag_frames": lag(ours, truth),
+        "coverage_90": float(np.mean(size[known] <= NINETY * sd[known])) if known.any() else np.nan,
+    }
+
+
+def rms(error: F64) -> float:
+    """Return the root of the mean square."""
+    return float(np.sqrt(np.mean(error**2)))
+
+
+def rms_interval(error: F64) -> tuple[float, float]:
+    """Return the 95 % interval of the RMS by a circular block bootstrap with a fixed seed."""
+    count = len(error)
+    block = min(BLOCK, count)
+    starts = np.random.default_rng(SEED).integers(0, count, size=(DRAWS, -(-count // block)))
+    rows = (starts[:, :, None] + np.arange(block)).reshape(DRAWS, -1)[:, :count] % count
+    drawn = np.sqrt(np.mean(error[rows] ** 2, axis=1))
+    low, high = np.percentile(drawn, [2.5, 97.5])
+    return float(low), float(high)
+
+
+def correlation(ours: F64, truth: F64) -> float:
+    """Return Pearson's correlation, NaN where a curve does not move."""
+    a, b = ours - ours.mean(), truth - truth.mean()
+    scale = np.linalg.norm(a) * np.linalg.norm(b)
+    return float(a @ b / scale) if scale > 0 else np.nan
+
+
+def lag(ours: F64, truth: F64) -> float:
+    """Return by how many frames ours comes later than the truth, to a fraction of a frame; NaN where nothing moves.
+
+    It minimises the mean square of the difference without its mean, over the frames that every shift has, and
+    places the minimum by a parabola through the best shift and its neighbours.
+    """
+    reach = min(LONGEST_LAG, (len(ours) - 1) // 3)
+    if reach < 1 or np.ptp(truth) == 0 or np.ptp(ours) == 0:
+        return np.nan
+    middle = truth[reach : len(truth) - reach]
+    shifts = np.arange(-reach, reach + 1)
+    spread = np.array([np.var(ours[reach + s : len(ours) - reach + s] - middle) for s in shifts])
+    best = int(np.clip(np.argmin(spread), 1, len(spread) - 2))
+    before, at, after = spread[best - 1 : best + 2]
+    if at == 0:
+        return float(shifts[best])
+    curvature = before - 2 * at + after
+    return float(shifts[best] + (0.5 * (before - after) / curvature if curvature > 0 else 0.0))

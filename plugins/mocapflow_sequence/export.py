@@ -1,0 +1,76 @@
+"""Stage `export`: the track as files that other programs read."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from mocapflow.components import Stage
+from mocapflow.data import Files, PoseBatch, RunFolder, Track
+from mocapflow.geometry import angles, kinematics
+from mocapflow.io import markers
+from mocapflow.recording import Recording
+from mocapflow.scene import Scene
+from mocapflow_sequence import layout, opensim, runjson, tables
+
+
+class Export(Stage):
+    """Writes results/angles.csv and angles_raw.csv, angles.mot, joints.trc and run.json.
+
+    The csv hold one row per frame: the angles between joint centres in degrees (`geometry.angles`) and their
+    standard deviations; the mot holds signed joint angles by OpenSim's names (`opensim`), the trc joint centres.
+    """
+
+    name: ClassVar[str] = "export"
+    formats: tuple[Literal["csv", "mot", "trc"], ...] = ("csv", "mot", "trc")
+
+    def run(self, track: Track, scene: Scene, recording: Recording, run_folder: RunFolder) -> Files:
+        """Write the files and return their paths."""
+        writers = {"csv": write_angles, "mot": write_motion, "trc": write_joints}
+        paths = [path for format in self.formats for path in writers[format](track, scene, run_folder.path)]
+        content = runjson.summary(track, run_folder, recording.warnings)
+        return Files(paths=(*paths, runjson.write(layout.place(run_folder.path, layout.RUN), content)))
+
+
+def before_smoothing(track: Track) -> Track:
+    """Return the track as the loop left it."""
+    if track.raw_root is None or track.raw_angles is None:
+        return track
+    return replace(track, root=track.raw_root, angles=track.raw_angles)
+
+
+def write_angles(track: Track, scene: Scene, folder: Path) -> list[Path]:
+    """Write angles.csv and angles_raw.csv into a run folder."""
+    return [
+        tables.write_columns(layout.place(folder, part), tables.angle_columns(each, measured(each, scene)))
+        for part, each in ((layout.ANGLES, track), (layout.RAW_ANGLES, before_smoothing(track)))
+    ]
+
+
+def write_motion(track: Track, scene: Scene, folder: Path) -> list[Path]:
+    """Write angles.mot into a run folder."""
+    path = layout.place(folder, layout.MOTION)
+    markers.write_mot(path, opensim.coordinates(scene.body, track.root, track.angles), track.time)
+    return [path]
+
+
+def write_joints(track: Track, scene: Scene, folder: Path) -> list[Path]:
+    """Write joints.trc into a run folder."""
+    path = layout.place(folder, layout.JOINTS)
+    joints = kinematics.chain_batch(scene.body, PoseBatch(root=track.root, angles=track.angles))
+    places = markers.opensim_from_world(kinematics.joint_positions(scene.body, joints))
+    markers.write_trc(path, scene.body.joint_names, places, frame_rate(track), start=float(track.time[0]))
+    return [path]
+
+
+def measured(track: Track, scene: Scene) -> angles.AngleSeries:
+    """Return the angles of a track with their standard deviations."""
+    return angles.measure(scene.body, track.root, track.angles, track.covariance)
+
+
+def frame_rate(track: Track) -> float:
+    """Return the frames per second of a track, 30 where a single frame does not tell."""
+    return float(1 / np.median(np.diff(track.time))) if len(track.time) > 1 else 30.0

@@ -1,0 +1,27 @@
+"""Where everything lies in a run folder; one place to look it up."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+ANGLES = Path("results/angles.csv")
+RAW_ANGLES = Path("results/angles_raw.csv")
+MOTION = Path("results/angles.mot")
+JOINTS = Path("results/joints.trc")
+EVALUATION = Path("results/evaluation.csv")
+PLOT = Path("results/angles.png")
+RUN = Path("run.json")
+REPORT = Path("report.html")
+VIRTUAL = Path("virtual/virtual.mp4")
+
+
+def overlay(camera: str) -> Path:
+    """Return the overlay video of a camera."""
+    return Path("overlay") / f"{camera}.mp4"
+
+
+def place(run_folder: Path, part: Path) -> Path:
+    """Return the path of a part, its folder made."""
+    path = run_folder / part
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return path

@@ -1,0 +1,126 @@
+"""Poses as OpenSim names and signs them (full-body gait models such as gait2392 and Rajagopal 2016).
+
+Ground: x = world y, y = world z (up), z = world x (`mocapflow.io.markers`); pelvis_tilt and pelvis_list are turns
+about the ground's own z and x, so they read as such for a person who faces the ground's x. Segments: x forward, y up, z right. At
+rest the segment of a limb has y along the limb, z across the body (the hinge, at an arm that is bent at rest), so
+0 is a straight, hanging limb. Every joint is the sequence z, x, y; signs are mirrored between the sides:
+
+- pelvis_tilt forward bend negative, pelvis_list, pelvis_rotation; pelvis_tx, ty, tz of the pelvis joint in m (of the
+  root's rest place where a body has no pelvis)
+- hip_flexion, hip_adduction, hip_rotation (inward positive); knee_angle positive in flexion; ankle_angle positive in
+  dorsiflexion
+- lumbar_extension, lumbar_bending, lumbar_rotation of the chest against the pelvis
+- arm_flex, arm_add, arm_rot of the upper arm against the chest; elbow_flex is the three-point angle
+
+Knee and ankle are the turns about the segment's z axis: signed, so a hyperextended knee is negative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from mocapflow.data import Body, PoseBatch
+from mocapflow.geometry import angles, kinematics
+from mocapflow.io import markers
+from mocapflow.records import F64
+
+OPENSIM_FROM_WORLD = markers.opensim_from_world(np.eye(3)).T
+BENT = np.radians(5.0)  # rad; an arm bent at least this much at rest shows the axis of its hinge
+
+
+def coordinates(body: Body, root: F64, poses: F64) -> dict[str, F64]:
+    """Return the coordinates (T,) that a body has, in degrees and m, by OpenSim's names.
+
+    Args:
+        body: the body.
+        root: (T, 4, 4) m, world_from_body.
+        poses: (T, D) rad, its angles.
+    """
+    joints = kinematics.chain_batch(body, PoseBatch(root=root, angles=poses))
+    places = markers.opensim_from_world(kinematics.joint_positions(body, joints))
+    frames = {name: OPENSIM_FROM_WORLD @ joints[:, body.joint(name), :3, :3] @ rest for name, rest in rest_frames(body).items()}
+    pelvis = "pelvis" if "pelvis" in body.joint_names else body.joint_names[0]
+    found: dict[str, F64] = {}
+    _add(found, ("pelvis_tilt", "pelvis_list", "pelvis_rotation"), np.eye(3), frames[pelvis])
+    found |= {f"pelvis_t{axis}": places[:, body.joint(pelvis), k] for k, axis in enumerate("xyz")}
+    for side in ("r", "l"):
+        _add_leg(found, frames, pelvis, side)
+    if "chest" in frames and pelvis != "chest":
+        _add(found, ("lumbar_extension", "lumbar_bending", "lumbar_rotation"), frames[pelvis], frames["chest"])
+    for side in ("r", "l"):
+        _add_arm(found, frames, body, places, side)
+    return found
+
+
+def rest_frames(body: Body) -> Mapping[str, F64]:
+    """Return the segment axes x, y, z of each joint at rest, as columns (3, 3)."""
+    upright = angles.anatomical_axes(body).T
+    frames = dict.fromkeys(body.joint_names, upright)
+    for side in ("l", "r"):
+        legs, arms = [f"{j}_{side}" for j in ("hip", "knee", "ankle")], [f"{j}_{side}" for j in ("shoulder", "elbow", "wrist")]
+        for start, end in zip(legs, legs[1:], strict=False):
+            if {start, end} <= set(body.joint_names):
+                frames[start] = _along(_way(body, end, start), upright[:, 2])
+        if set(arms) <= set(body.joint_names):
+            frames[arms[0]] = _along(_way(body, arms[1], arms[0]), _hinge(body, arms, upright))
+    return frames
+
+
+def decompose(rotation: F64) -> F64:
+    """Return the angles (..., 3) rad of R = Rz(a) Rx(b) Ry(c)."""
+    flexion = np.arctan2(-rotation[..., 0, 1], rotation[..., 1, 1])
+    tilt = np.arcsin(np.clip(rotation[..., 2, 1], -1, 1))
+    return np.stack([flexion, tilt, np.arctan2(-rotation[..., 2, 0], rotation[..., 2, 2])], axis=-1)
+
+
+def _add(found: dict[str, F64], names: tuple[str, ...], parent: F64, child: F64, mirror: float = 1.0) -> None:
+    turns = np.degrees(np.unwrap(decompose(np.swapaxes(parent, -1, -2) @ child), axis=0))
+    for name, sign, turn in zip(names, (1.0, mirror, mirror), turns.T, strict=True):
+        found[name] = sign * turn
+
+
+def _add_leg(found: dict[str, F64], frames: Mapping[str, F64], pelvis: str, side: str) -> None:
+    mirror = 1.0 if side == "r" else -1.0
+    hip, knee, ankle = f"hip_{side}", f"knee_{side}", f"ankle_{side}"
+    if hip in frames and knee in frames:
+        names = (f"hip_flexion_{side}", f"hip_adduction_{side}", f"hip_rotation_{side}")
+        _add(found, names, frames[pelvis], frames[hip], mirror)
+        if ankle in frames:
+            flexion = decompose(np.swapaxes(frames[hip], -1, -2) @ frames[knee])[:, 0]
+            found[f"knee_angle_{side}"] = -np.degrees(np.unwrap(flexion))
+            dorsiflexion = decompose(np.swapaxes(frames[knee], -1, -2) @ frames[ankle])[:, 0]
+            found[f"ankle_angle_{side}"] = np.degrees(np.unwrap(dorsiflexion))
+
+
+def _add_arm(found: dict[str, F64], frames: Mapping[str, F64], body: Body, places: F64, side: str) -> None:
+    arm = [f"{joint}_{side}" for joint in ("shoulder", "elbow", "wrist")]
+    if not set(arm) <= set(frames):
+        return
+    chest = body.joint_names[body.parents[body.joint(arm[0])]]
+    names = (f"arm_flex_{side}", f"arm_add_{side}", f"arm_rot_{side}")
+    _add(found, names, frames[chest], frames[arm[0]], 1.0 if side == "r" else -1.0)
+    found[f"elbow_flex_{side}"] = angles.three_point(places[:, [body.joint(name) for name in arm]])
+
+
+def _way(body: Body, start: str, end: str) -> F64:
+    way: F64 = body.positions[body.joint(end)] - body.positions[body.joint(start)]
+    return way
+
+
+def _hinge(body: Body, arm: list[str], upright: F64) -> F64:
+    """Return the axis about which an elbow bends, pointing right where the arm hangs."""
+    upper, lower = _way(body, arm[0], arm[1]), _way(body, arm[1], arm[2])
+    hinge = np.cross(upper, lower)
+    if np.linalg.norm(hinge) > np.sin(BENT) * np.linalg.norm(upper) * np.linalg.norm(lower):
+        return hinge
+    return np.cross(upright[:, 0], -upper)
+
+
+def _along(up: F64, right: F64) -> F64:
+    """Return axes (3, 3) as columns with y along `up` and z as near to `right` as that allows."""
+    y = up / np.linalg.norm(up)
+    z = right - (right @ y) * y
+    z /= np.linalg.norm(z)
+    return np.column_stack([np.cross(y, z), y, z])

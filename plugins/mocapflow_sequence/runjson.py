@@ -1,0 +1,82 @@
+"""run.json: how a run was made and how it went, frame by frame."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mocapflow.data import RunFolder, Track
+from mocapflow_sequence.lost import lost_rows
+
+FRAME = re.compile(r"^frame (\d+): ?(.*)$")
+
+
+def summary(track: Track, run_folder: RunFolder, warnings: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Return what run.json says: recipe, seconds per step, and per frame iterations, rest, overlap and mishaps."""
+    seconds = track.seconds
+    lost = lost_rows(track)
+    return {
+        "recipe": run_folder.recipe,
+        "warnings": list(warnings),
+        "frames": {
+            "count": len(track.frame),
+            "first": int(track.frame[0]) if len(track.frame) else None,
+            "last": int(track.frame[-1]) if len(track.frame) else None,
+            "not_at_rest": track.frame[~track.steady],
+            "lost": track.frame[lost],
+            "bridged_by": "the neighbouring frames, in `smooth`" if lost.any() and track.raw_root is not None else None,
+        },
+        "cpu_seconds": {
+            "total": float(np.nansum(seconds)),
+            "per_frame_median": float(np.nanmedian(seconds.sum(axis=1))) if len(seconds) else None,
+            "per_step": dict(zip(track.step_names, np.nansum(seconds, axis=0), strict=True)),
+        },
+        "overlap_median": _medians(track),
+        "notes": list(track.notes),
+        "per_frame": [_frame(track, row, bool(lost[row])) for row in range(len(track.frame))],
+    }
+
+
+def write(path: Path, content: Mapping[str, Any]) -> Path:
+    """Write a summary as JSON; numbers that are not finite become null."""
+    path.write_text(json.dumps(_plain(content), indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
+    return path
+
+
+def _frame(track: Track, row: int, lost: bool) -> dict[str, Any]:
+    index = int(track.frame[row])
+    said = [m[2] for note in track.notes if (m := FRAME.match(note)) and int(m[1]) == index]
+    return {
+        "frame": index,
+        "time": round(float(track.time[row]), 6),
+        "iterations": int(track.iterations[row]),
+        "steady": bool(track.steady[row]),
+        "overlap": [round(float(v), 4) for v in track.overlap[row]],
+        "cpu_seconds": round(float(np.nansum(track.seconds[row])), 4),
+        **({"lost": True} if lost else {}),
+        **({"unusable_views": np.flatnonzero(~track.usable[row])} if not track.usable[row].all() else {}),
+        **({"notes": said} if said else {}),
+    }
+
+
+def _medians(track: Track) -> list[float]:
+    return [float(np.median(v[np.isfinite(v)])) if np.isfinite(v).any() else math.nan for v in track.overlap.T]
+
+
+def _plain(value: Any) -> Any:
+    """Return a value made of what JSON knows."""
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, np.ndarray | list | tuple | set | frozenset):
+        return [_plain(v) for v in (value.tolist() if isinstance(value, np.ndarray) else value)]
+    if isinstance(value, np.generic):
+        return _plain(value.item())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if isinstance(value, str | int | bool | None) else str(value)

@@ -1,0 +1,66 @@
+"""Tables of numbers as csv: a header line, then one row per frame."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from mocapflow.data import Track
+from mocapflow.errors import RecordingError
+from mocapflow.geometry.angles import AngleSeries
+from mocapflow.records import F64
+
+
+def angle_columns(track: Track, series: AngleSeries) -> dict[str, F64]:
+    """Return the columns of angles.csv: frame, time, then every angle followed by its standard deviation."""
+    columns = {"frame": track.frame.astype(np.float64), "time": track.time}
+    for column, name in enumerate(series.names):
+        columns[name] = series.value[:, column]
+        columns[f"{name}_sd"] = series.sd[:, column]
+    return columns
+
+
+def write_columns(path: Path, columns: Mapping[str, F64]) -> Path:
+    """Write columns (T,) with four decimals; frames are whole numbers, times have six decimals."""
+    formats = {"frame": "%d", "time": "%.6f"}
+    styles = [formats.get(name, "%.4f") for name in columns]
+    rows = np.column_stack(list(columns.values()))
+    np.savetxt(path, rows, fmt=styles, delimiter=",", header=",".join(columns), comments="")
+    return path
+
+
+def read_columns(path: Path) -> dict[str, F64]:
+    """Read a table of numbers; empty cells are NaN.
+
+    Raises:
+        RecordingError: the file is missing, or a row has other cells than the header or a cell is no number.
+    """
+    if not path.is_file():
+        raise RecordingError("no such table", where=str(path))
+    with path.open(newline="", encoding="utf-8-sig") as file:
+        rows = [row for row in csv.reader(file) if row]
+    if len(rows) < 2:
+        raise RecordingError("the table has no rows", where=str(path))
+    header, width = [name.strip() for name in rows[0]], len(rows[0])
+    values = np.empty((len(rows) - 1, width))
+    for number, row in enumerate(rows[1:]):
+        try:
+            values[number] = [float(cell) if cell.strip() else np.nan for cell in row]
+        except ValueError as error:
+            message = f"a row has {len(row)} cells that do not fit the header's {width} numbers: {error}"
+            raise RecordingError(message, where=f"{path}:{number + 2}") from None
+    return {name: values[:, column].copy() for column, name in enumerate(header)}
+
+
+def write_rows(path: Path, rows: Sequence[Mapping[str, float | str]]) -> Path:
+    """Write one line per mapping, four decimals; the keys of the first are the header."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        if rows:
+            writer.writerow(rows[0])
+        for row in rows:
+            writer.writerow([f"{v:.4f}" if isinstance(v, float) else v for v in row.values()])
+    return path

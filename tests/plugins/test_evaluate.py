@@ -1,0 +1,147 @@
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from mocapflow_sequence import compare, layout, tables
+from mocapflow_sequence.evaluate import Evaluate, evaluate, evaluate_run
+from mocapflow_sequence.references import read_reference
+from results_scene import DEMO, demo_scene, stepping
+
+from mocapflow.data import RunFolder
+from mocapflow.errors import RecordingError
+from mocapflow.geometry import angles
+from mocapflow.io import markers
+
+FRAMES = np.arange(120.0)
+
+
+def row(ours: np.ndarray, truth: np.ndarray) -> dict[str, float]:
+    return compare.figures(ours, truth, np.ones(len(ours)), FRAMES[: len(ours)])
+
+
+def test_identical_curves_deviate_by_nothing() -> None:
+    curve = 20 * np.sin(FRAMES / 7)
+    got = row(curve, curve)
+    for name in ("rms_deg", "mae_deg", "offset_deg", "max_deg", "rms_low_deg", "rms_high_deg"):
+        assert got[name] == 0
+    assert got["correlation"] == pytest.approx(1)
+    assert got["lag_frames"] == 0
+
+
+def test_rms_of_a_known_sinusoid_and_offset() -> None:
+    truth = np.linspace(0, 50, 120)
+    error = 3 * np.sin(2 * np.pi * FRAMES / 40) + 2  # whole periods
+    got = row(truth + error, truth)
+    assert got["rms_deg"] == pytest.approx(np.sqrt(3**2 / 2 + 2**2))
+    assert got["rms_without_offset_deg"] == pytest.approx(3 / np.sqrt(2))
+    assert got["offset_deg"] == pytest.approx(2)
+    assert got["max_deg"] == pytest.approx(5)
+    assert got["worst_frame"] in (10, 50, 90)
+    assert got["rms_low_deg"] < got["rms_deg"] < got["rms_high_deg"]
+
+
+@pytest.mark.parametrize("delay", [-3.4, -0.5, 0.0, 0.3, 2.75])
+@pytest.mark.parametrize("noise", [0.0, 0.5])
+def test_lag_is_recovered_to_a_tenth_of_a_frame(delay: float, noise: float) -> None:
+    def curve(t: np.ndarray) -> np.ndarray:
+        return 30 * np.sin(t / 6) + 10 * np.sin(t / 2.5 + 1)
+
+    wobble = noise * np.random.default_rng(4).normal(size=120)
+    assert compare.lag(curve(FRAMES - delay) + wobble + 5, curve(FRAMES)) == pytest.approx(delay, abs=0.1)
+
+
+def test_lag_of_a_curve_that_does_not_move_is_unknown() -> None:
+    assert np.isnan(compare.lag(np.ones(60), np.arange(60.0)))
+
+
+def test_coverage_counts_our_own_intervals() -> None:
+    truth = np.zeros(120)
+    error = np.random.default_rng(0).normal(size=120)
+    assert row(error, truth)["coverage_90"] == pytest.approx(0.9, abs=0.06)
+    assert row(3 * error, truth)["coverage_90"] < 0.6
+
+
+def test_frames_are_matched_by_number(tmp_path: Path) -> None:
+    tables.write_columns(tmp_path / "t.csv", {"frame": np.array([5.0, 7.0]), "knee_flexion_l": np.array([50.0, 70.0])})
+    ours = {"frame": np.arange(10.0), "time": np.arange(10) / 30, "knee_flexion_l": 10 * np.arange(10.0) + 1}
+    got = evaluate(ours, ours, tmp_path / "t.csv", tmp_path).rows[0]
+    assert (got["frames"], got["rms_deg"]) == (2, 1.0)
+    assert (tmp_path / layout.EVALUATION).read_text().startswith("angle,frames,rms_deg")
+
+
+def run_folder(path: Path) -> RunFolder:
+    return RunFolder(path=path, recipe={})
+
+
+def test_without_reference_there_is_a_note_and_no_error(tmp_path: Path) -> None:
+    scene = demo_scene()
+    recording = SimpleNamespace(folder=tmp_path)
+    got = Evaluate().run(track=stepping(scene.body), scene=scene, recording=recording, run_folder=run_folder(tmp_path))
+    assert (got.rows, got.reference) == ((), "")
+    assert "truth/angles.csv" in got.note
+
+
+def test_demo_truth_is_found(tmp_path: Path) -> None:
+    scene = demo_scene()
+    recording = SimpleNamespace(folder=DEMO)
+    track = stepping(scene.body)
+    got = Evaluate().run(track=track, scene=scene, recording=recording, run_folder=run_folder(tmp_path))
+    assert [r["angle"] for r in got.rows] == [d.name for d in angles.definitions(scene.body.joint_names)]
+    assert all(r["frames"] == len(track.frame) for r in got.rows)
+
+
+def test_a_run_folder_is_evaluated_from_its_files(tmp_path: Path) -> None:
+    truth = DEMO / "truth" / "angles.csv"
+    columns = tables.read_columns(truth)
+    ours = {"frame": columns["frame"], "time": columns["frame"] / 30}
+    ours |= {n: v + 1.5 for n, v in columns.items() if n != "frame"}
+    tables.write_columns(layout.place(tmp_path, layout.ANGLES), ours)
+    got = evaluate_run(tmp_path, truth)
+    assert len(got.rows) == 8
+    assert all(r["rms_deg"] == pytest.approx(1.5, abs=1e-3) for r in got.rows)
+
+
+def test_folder_without_angles_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"no such run folder: it has no results/angles.csv"):
+        evaluate_run(tmp_path, DEMO / "truth" / "angles.csv")
+
+
+def test_motion_file_in_time_is_interpolated(tmp_path: Path) -> None:
+    time = np.arange(0, 2, 0.01)
+    columns = {"knee_angle_r": 30 + 20 * np.sin(5 * time), "pelvis_ty": np.ones_like(time)}
+    markers.write_mot(tmp_path / "m.mot", columns, time)
+    frames = np.arange(80.0)
+    ours = {"frame": frames, "time": frames / 30, "knee_flexion_r": 30 + 20 * np.sin(5 * frames / 30)}
+    got = evaluate(ours, ours, tmp_path / "m.mot", tmp_path).rows
+    assert [r["angle"] for r in got] == ["knee_flexion_r"]
+    assert got[0]["rms_deg"] < 0.01
+    assert got[0]["frames"] == np.sum(frames / 30 <= 1.99)
+
+
+def test_gait2392_knees_are_turned_round(tmp_path: Path) -> None:
+    time = np.arange(10) / 30
+    markers.write_mot(tmp_path / "m.mot", {"knee_angle_l": np.full(10, -40.0)}, time)
+    assert (read_reference(tmp_path / "m.mot")["knee_flexion_l"] == 40).all()
+
+
+@pytest.mark.parametrize("style", ["ours", "Pose2Sim"])
+def test_joint_centres_give_three_point_angles(tmp_path: Path, style: str) -> None:
+    found = np.load(DEMO / "truth" / "joints.npz")
+    names, places = [str(n) for n in found["names"]], found["positions"].astype(np.float64)
+    theirs = {"hip_l": "LHip", "knee_l": "LKnee", "ankle_l": "LAnkle"}
+    shown = names if style == "ours" else [theirs.get(n, n) for n in names]
+    markers.write_trc(tmp_path / "j.trc", shown, markers.opensim_from_world(places), 30.0)
+    truth = tables.read_columns(DEMO / "truth" / "angles.csv")
+    assert np.abs(read_reference(tmp_path / "j.trc")["knee_flexion_l"] - truth["knee_flexion_l"]).max() < 0.01
+
+
+def test_unreadable_references_say_so(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"can't compare with a \.xlsx"):
+        read_reference(tmp_path / "a.xlsx")
+    (tmp_path / "a.csv").write_text("frame,knee_flexion_l\n0,1\n1,x\n")
+    with pytest.raises(RecordingError, match=r"a\.csv:3"):
+        read_reference(tmp_path / "a.csv")
+    (tmp_path / "b.csv").write_text("knee_flexion_l\n0\n1\n")
+    with pytest.raises(RecordingError, match="neither a column frame nor time"):
+        read_reference(tmp_path / "b.csv")
