@@ -45,12 +45,13 @@ def gather(folder: Path, calibration: Path | None = None) -> Parts:
     if calibration is None or (folder / "cameras.toml").exists():
         calibration = find_calibration(folder)
     cameras = read_cameras(calibration)
-    videos = _videos(folder, [camera.name for camera in cameras], calibration)
-    lenses, cut = _fit_sizes(cameras, videos, calibration)
-    length, broken = _agree_on_length(cameras, videos, folder)
-    rate, assumed = _frame_rate(cameras, videos, calibration)
-    keypoints = tuple(_keypoint_folder(folder, camera.name) for camera in cameras)
-    odd = _keypoint_warnings(cameras, keypoints, length)
+    paths = match_videos(folder, [camera.name for camera in cameras], calibration)
+    videos = tuple(open_video(path) for path in paths)
+    lenses, cut = fit_sizes(cameras, videos, calibration)
+    length, broken = agree_on_length(cameras, videos, folder)
+    rate, assumed = common_rate(cameras, videos, calibration)
+    keypoints = tuple(keypoint_folder(folder, camera.name) for camera in cameras)
+    odd = keypoint_warnings(cameras, keypoints, length)
     return Parts(
         lenses=lenses,
         videos=videos,
@@ -78,21 +79,26 @@ def plates(folder: Path, camera: str) -> tuple[Path, ...]:
     return tuple(single[:1] or [p for p in several if p.suffix.lower() in IMAGES])
 
 
-def _videos(folder: Path, names: Sequence[str], calibration: Path) -> tuple[Video, ...]:
+def match_videos(folder: Path, names: Sequence[str], calibration: Path) -> tuple[Path, ...]:
+    """Return the video of each camera.
+
+    Raises:
+        RecordingError: a camera has no video, or a video no camera.
+    """
     paths = video_paths(folder)
     lost, extra = [n for n in names if n not in paths], [n for n in paths if n not in names]
     if lost or extra:
-        what = f"no video of {', '.join(lost)}" if lost else f"no camera of {', '.join(extra)}"
+        what = f"no video of {', '.join(lost)}" if lost else f"no calibration of {', '.join(extra)}"
         raise RecordingError(
             f"missing camera: {what}",
             where=str(folder),
             hint=f"{calibration.name} has: {', '.join(names)}\nvideos/ has: {', '.join(paths) or 'nothing'}\n"
-            "name each video after its camera, or remove the table or the video that is too many",
+            "name each video after its camera, or remove the camera or the video that is too many",
         )
-    return tuple(open_video(paths[name]) for name in names)
+    return tuple(paths[name] for name in names)
 
 
-def _fit_sizes(
+def fit_sizes(
     cameras: Sequence[Camera], videos: Sequence[Video], calibration: Path
 ) -> tuple[tuple[Camera, ...], list[str]]:
     """Return the cameras with the size of their videos; a slightly smaller video was cut at the right and bottom."""
@@ -115,7 +121,7 @@ def _fit_sizes(
     return tuple(lenses), warnings
 
 
-def _agree_on_length(cameras: Sequence[Camera], videos: Sequence[Video], folder: Path) -> tuple[int, list[str]]:
+def agree_on_length(cameras: Sequence[Camera], videos: Sequence[Video], folder: Path) -> tuple[int, list[str]]:
     """Return the common number of frames; a video that breaks off counts with what it declares."""
     lengths = {video.frames for video in videos}
     if len(lengths) == 1:
@@ -137,7 +143,12 @@ def _agree_on_length(cameras: Sequence[Camera], videos: Sequence[Video], folder:
     ]
 
 
-def _frame_rate(cameras: Sequence[Camera], videos: Sequence[Video], calibration: Path) -> tuple[float, list[str]]:
+def common_rate(cameras: Sequence[Camera], videos: Sequence[Video], calibration: Path) -> tuple[float, list[str]]:
+    """Return the frames per second: as [metadata] says, or as the videos do.
+
+    Raises:
+        RecordingError: the videos differ by more than 1 %.
+    """
     rates = {c.name: v.frame_rate for c, v in zip(cameras, videos, strict=True) if v.frame_rate}
     stated = metadata(calibration).get("frame_rate")
     if stated is not None:
@@ -157,12 +168,13 @@ def _frame_rate(cameras: Sequence[Camera], videos: Sequence[Video], calibration:
     return Counter(rates.values()).most_common(1)[0][0], []
 
 
-def _keypoint_folder(folder: Path, camera: str) -> Path | None:
+def keypoint_folder(folder: Path, camera: str) -> Path | None:
+    """Return keypoints/<camera>_json (or keypoints/<camera>) of a recording folder, None where it is missing."""
     places = (folder / "keypoints" / f"{camera}{ending}" for ending in KEYPOINT_ENDINGS)
     return next((place for place in places if place.is_dir()), None)
 
 
-def _keypoint_warnings(cameras: Sequence[Camera], places: Sequence[Path | None], length: int) -> list[str]:
+def keypoint_warnings(cameras: Sequence[Camera], places: Sequence[Path | None], length: int) -> list[str]:
     """Say which keypoint files are not numbers or belong to no frame; only their text is searched."""
     warnings = []
     for camera, place in zip(cameras, places, strict=True):
@@ -173,12 +185,12 @@ def _keypoint_warnings(cameras: Sequence[Camera], places: Sequence[Path | None],
         files = keypoint_files(place)
         if bad := [index for index, file in files.items() if b"nan" in file.read_bytes().lower()]:
             warnings.append(
-                f"{camera.name}: keypoints that are not numbers in {len(bad)} frames, first in {files[bad[0]].name}; "
+                f"{camera.name}: keypoints that are not numbers (frames: {len(bad)}), first in {files[bad[0]].name}; "
                 "these points count as not seen"
             )
         if beyond := [index for index in files if index >= length]:
             warnings.append(
-                f"{camera.name}: keypoints of {len(beyond)} frames after the last frame ({length - 1}) are left out"
+                f"{camera.name}: keypoints beyond the last frame, {length - 1}, are left out (frames: {len(beyond)})"
             )
         if lost := length - len(files) + len(beyond):
             warnings.append(f"{camera.name}: no keypoints of {lost} of {length} frames")

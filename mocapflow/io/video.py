@@ -122,6 +122,16 @@ def _ends_at(path: Path, declared: int, rate: float) -> bool:
         return round(passed) == declared - 1 and not capture.grab()
 
 
+def lost_frames(video: Video) -> list[int]:
+    """Return the numbers of the frames that the file should have and lacks; decodes the whole file."""
+    if video.path.is_dir():
+        there = set(numbered(video.path, IMAGES))
+    else:
+        with _capture(video.path) as capture:
+            there = set(_stamps(capture, video.frame_rate))
+    return sorted(set(range(video.declared)) - there)
+
+
 def _count(path: Path, rate: float) -> int:
     with _capture(path) as capture:
         return max(_stamps(capture, rate), default=-1) + 1

@@ -1,0 +1,120 @@
+"""Examines a recording folder and says everything that is wrong with it, and what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from mocapflow.data import Camera
+from mocapflow.io import folders
+from mocapflow.io.cameras import find_calibration, read_cameras
+from mocapflow.io.findings import Finding, attempt, error, note, warning
+from mocapflow.io.keypoints import keypoint_files, read_keypoints
+from mocapflow.io.lenses import View
+from mocapflow.io.plates import background
+from mocapflow.io.rigs import examine_rig
+from mocapflow.io.subjects import examine_subject
+from mocapflow.io.video import Video, lost_frames, open_video
+
+__all__ = ["Finding", "examine"]
+
+NAMED = 5  # frames named one by one in a finding
+
+
+def examine(folder: Path) -> list[Finding]:
+    """Return everything that is odd about a recording folder, errors first; every video is decoded once.
+
+    Args:
+        folder: the recording; nothing is written there.
+    """
+    folder = Path(folder)
+    findings: list[Finding] = []
+    if not folder.is_dir():
+        return [error("no such recording folder", where=folder)]
+    calibration = attempt(lambda: find_calibration(folder), findings)
+    if calibration is not None:
+        findings += _trial(folder, calibration)
+        if (folder / "static" / "videos").is_dir():
+            static = folder / "static"
+            own = static / "cameras.toml"
+            findings += [
+                replace(f, message=f"static trial: {f.message}")
+                for f in _trial(static, own if own.exists() else calibration, rig=False)
+            ]
+    findings += examine_subject(folder)
+    if not (folder / "subject" / "body.obj").exists() and not (folder / "static").is_dir():
+        findings.append(
+            note(
+                "there is neither subject/body.obj nor a static trial",
+                "a body model has to be fitted to the person; a standing trial with keypoints makes that more exact",
+            )
+        )
+    return sorted(findings, key=lambda finding: ("error", "warning", "note").index(finding.severity))
+
+
+def _trial(folder: Path, calibration: Path, rig: bool = True) -> list[Finding]:
+    """Return what is odd about cameras, videos, keypoints and clean plates of one folder."""
+    findings: list[Finding] = []
+    cameras = attempt(lambda: read_cameras(calibration), findings)
+    if cameras is None:
+        return findings
+    paths = attempt(lambda: folders.match_videos(folder, [c.name for c in cameras], calibration), findings)
+    videos = None if paths is None else [attempt(partial(open_video, path), findings) for path in paths]
+    if videos is None or any(video is None for video in videos):
+        return findings + (list(examine_rig(cameras)) if rig and all(c.size.all() for c in cameras) else [])
+    whole = [video for video in videos if video is not None]
+    fitted = attempt(lambda: folders.fit_sizes(cameras, whole, calibration), findings)
+    agreed = attempt(lambda: folders.agree_on_length(cameras, whole, folder), findings)
+    rate = attempt(lambda: folders.common_rate(cameras, whole, calibration), findings)
+    findings += [warning(text, where=folder) for part in (fitted, agreed, rate) if part is not None for text in part[1]]
+    lenses = cameras if fitted is None else fitted[0]
+    findings += examine_rig(lenses) if rig else []
+    findings += _lost(cameras, whole)
+    length = min(video.frames for video in whole) if agreed is None else agreed[0]
+    findings += _keypoints(folder, cameras, length)
+    if fitted is not None:
+        attempt(lambda: background(folder, [View(lens=lens) for lens in lenses], whole), findings)
+    return findings
+
+
+def _lost(cameras: Sequence[Camera], videos: Sequence[Video]) -> Iterator[Finding]:
+    for camera, video in zip(cameras, videos, strict=True):
+        lost = [index for index in lost_frames(video) if index < video.frames]
+        if lost:
+            yield warning(
+                f"{camera.name}: {_frames(lost)} can't be decoded",
+                "the view is not used in these frames; the others keep their places",
+                video.path,
+            )
+
+
+def _keypoints(folder: Path, cameras: Sequence[Camera], length: int) -> Iterator[Finding]:
+    places = [folders.keypoint_folder(folder, camera.name) for camera in cameras]
+    findings: list[Finding] = [
+        warning(text, where=folder) for text in folders.keypoint_warnings(cameras, places, length)
+    ]
+    for place in places:
+        counts = set()
+        for path in keypoint_files(place).values() if place is not None else ():
+            people = attempt(partial(read_keypoints, path), findings)
+            if people is not None and len(people):
+                counts.add(people.shape[1])
+                if np.nanmax(people[..., 2], initial=0) > 1.5:
+                    findings.append(
+                        error("a confidence above 1", "each keypoint is x, y (px), confidence (0 to 1)", path)
+                    )
+        if len(counts) > 1:
+            findings.append(
+                error(f"people with {' and '.join(map(str, sorted(counts)))} keypoints in one folder", "", place)
+            )
+    yield from findings
+
+
+def _frames(indices: Sequence[int]) -> str:
+    named = ", ".join(str(index) for index in indices[:NAMED])
+    more = f" and {len(indices) - NAMED} more" if len(indices) > NAMED else ""
+    return f"{'frame' if len(indices) == 1 else 'frames'} {named}{more}"

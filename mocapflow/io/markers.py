@@ -1,0 +1,177 @@
+"""Marker and motion files: OpenSim TRC, MOT and STO, and C3D (extra `c3d`).
+
+OpenSim's axes are x forward, y up, z right; the world here is z up. `opensim_from_world` and
+`world_from_opensim` permute cyclically, as Pose2Sim does: OpenSim (x, y, z) = world (y, z, x).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from mocapflow.errors import RecordingError
+from mocapflow.records import F64
+
+METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+SHIFTS = ("_tx", "_ty", "_tz")  # OpenSim's names of coordinates that are lengths, not angles
+
+
+def opensim_from_world(positions: F64) -> F64:
+    """Return positions (..., 3) of a z-up world in OpenSim's y-up axes."""
+    return positions[..., [1, 2, 0]]
+
+
+def world_from_opensim(positions: F64) -> F64:
+    """Return positions (..., 3) in OpenSim's y-up axes in the z-up world."""
+    return positions[..., [2, 0, 1]]
+
+
+def write_trc(path: Path, names: Sequence[str], positions: F64, frame_rate: float, *, start: float = 0.0) -> None:
+    """Write marker positions.
+
+    Args:
+        path: the file.
+        names: K marker names.
+        positions: (T, K, 3) m, in OpenSim's axes; NaN where a marker is not seen.
+        frame_rate: per second.
+        start: time of the first row, s.
+    """
+    count = len(positions)
+    axes = [f"{axis}{k}" for k in range(1, len(names) + 1) for axis in "XYZ"]
+    lines = [
+        f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
+        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
+        f"{frame_rate:g}\t{frame_rate:g}\t{count}\t{len(names)}\tm\t{frame_rate:g}\t1\t{count}",
+        "Frame#\tTime\t" + "\t\t\t".join(names) + "\t\t",
+        "\t\t" + "\t".join(axes),
+        "",
+    ]
+    for row, markers in enumerate(positions):
+        cells = ["" if np.isnan(x) else f"{x:.8f}" for x in markers.ravel()]
+        lines.append("\t".join([str(row + 1), f"{start + row / frame_rate:.8f}", *cells]))
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def read_trc(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
+    """Read marker positions.
+
+    Returns:
+        names (K), positions (T, K, 3) m in the axes of the file (see `world_from_opensim`), time (T,) s and the
+        frame rate; markers that are not seen are NaN.
+
+    Raises:
+        RecordingError: not a TRC file, an unknown unit, or a row of another width.
+    """
+    lines = _text(path).splitlines()
+    if len(lines) < 6 or not lines[0].startswith("PathFileType"):
+        raise RecordingError("not a TRC file: its first word is not PathFileType", where=str(path))
+    header = dict(zip(lines[1].split("\t"), lines[2].split("\t"), strict=False))
+    names = tuple(name for name in (cell.strip() for cell in lines[3].split("\t")[2:]) if name)
+    unit = header.get("Units", "").strip()
+    if unit not in METRES:
+        raise RecordingError(f"unknown unit '{unit}'", where=str(path), hint=f"known: {', '.join(METRES)}")
+    width = 2 + 3 * len(names)
+    rows = [
+        _row(_fitted(line.split("\t"), width), width, f"{path}:{number}")
+        for number, line in enumerate(lines[5:], 6)
+        if line.strip()
+    ]
+    table = np.array(rows).reshape(-1, width)
+    positions = table[:, 2:].reshape(-1, len(names), 3) * METRES[unit]
+    return names, positions, table[:, 1].copy(), float(header["DataRate"])
+
+
+def write_mot(path: Path, columns: Mapping[str, F64], time: F64, in_degrees: bool = True) -> None:
+    """Write coordinates over time, with OpenSim's names and signs.
+
+    Args:
+        path: the file.
+        columns: each (T,); angles in degrees (radians if not `in_degrees`), pelvis_tx, _ty, _tz in m.
+        time: (T,) s.
+        in_degrees: what the header says of the angles.
+    """
+    lines = [
+        path.stem, "version=1", f"nRows={len(time)}", f"nColumns={len(columns) + 1}",
+        f"inDegrees={'yes' if in_degrees else 'no'}", "endheader", "\t".join(["time", *columns]),
+    ]  # fmt: skip
+    table = np.column_stack([time, *columns.values()])
+    lines += ["\t".join(f"{x:.8f}" for x in row) for row in table]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def read_mot(path: Path) -> tuple[dict[str, F64], F64]:
+    """Read a MOT or STO file.
+
+    Returns:
+        The columns by name, each (T,), angles in degrees whatever the file has, and the time (T,) s.
+
+    Raises:
+        RecordingError: the header has no end, there is no column `time`, or a row of another width.
+    """
+    lines = _text(path).splitlines()
+    end = next((i for i, line in enumerate(lines) if line.strip().lower() == "endheader"), None)
+    if end is None or end + 1 >= len(lines):
+        raise RecordingError("not a MOT file: no line says endheader", where=str(path))
+    names = lines[end + 1].split()
+    if "time" not in names:
+        raise RecordingError("no column 'time'", where=f"{path}:{end + 2}", hint=f"the columns are: {', '.join(names)}")
+    rows = [
+        _row(line.split(), len(names), f"{path}:{number}")
+        for number, line in enumerate(lines[end + 2 :], end + 3)
+        if line.strip()
+    ]
+    table = dict(zip(names, np.array(rows).reshape(-1, len(names)).T.copy(), strict=True))
+    time = table.pop("time")
+    if any(line.replace(" ", "").lower() == "indegrees=no" for line in lines[:end]):
+        table = {name: column if name.endswith(SHIFTS) else np.degrees(column) for name, column in table.items()}
+    return table, time
+
+
+def read_c3d(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
+    """Read the markers of a C3D file; the result is that of `read_trc`, in the axes of the laboratory.
+
+    Raises:
+        RecordingError: ezc3d is not installed, the file can't be read, or its unit is unknown.
+    """
+    try:
+        import ezc3d
+    except ImportError as error:
+        raise RecordingError("C3D files need ezc3d", where=str(path), hint="pip install ezc3d") from error
+    try:
+        content = ezc3d.c3d(str(path))
+    except OSError as error:
+        raise RecordingError(f"this C3D file can't be read: {error}", where=str(path)) from error
+    point = content["parameters"]["POINT"]
+    names = tuple(str(name) for name in point["LABELS"]["value"])
+    unit = str(point["UNITS"]["value"][0]).strip()
+    if unit not in METRES:
+        raise RecordingError(f"unknown unit '{unit}'", where=str(path), hint=f"known: {', '.join(METRES)}")
+    rate = float(point["RATE"]["value"][0])
+    positions = np.moveaxis(content["data"]["points"][:3], 0, -1).swapaxes(0, 1)[:, : len(names)] * METRES[unit]
+    return names, positions, np.arange(len(positions)) / rate, rate
+
+
+def _text(path: Path) -> str:
+    if not path.is_file():
+        raise RecordingError("no such file", where=str(path))
+    return path.read_text(encoding="utf-8", errors="replace")
+
+
+def _fitted(cells: Sequence[str], width: int) -> Sequence[str]:
+    """Return the cells of a row of which trailing empty ones may be too many or left out."""
+    kept = len(cells)
+    while kept > width and not cells[kept - 1].strip():
+        kept -= 1
+    return [*cells[:kept], *[""] * (width - kept)]
+
+
+def _row(cells: Sequence[str], width: int, where: str) -> list[float]:
+    """Return the numbers of a row; an empty cell is NaN."""
+    if len(cells) != width:
+        raise RecordingError(f"{len(cells)} columns; expected {width}", where=where)
+    try:
+        return [float(cell) if cell.strip() else np.nan for cell in cells]
+    except ValueError as error:
+        raise RecordingError(str(error), where=where) from None

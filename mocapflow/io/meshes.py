@@ -1,0 +1,69 @@
+"""Triangle meshes from Wavefront OBJ, vertices in the order of the file.
+
+Skin weights are stored per vertex of the file, so the order matters; general mesh readers split vertices at the
+seams of a texture, drop those that no face uses, or sort them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from mocapflow.errors import RecordingError
+from mocapflow.records import F64, I32
+
+
+def read_mesh(path: Path) -> tuple[F64, I32]:
+    """Read vertices (V, 3) and triangles (F, 3) of an OBJ file; larger polygons are cut into fans.
+
+    Raises:
+        RecordingError: the file is missing, holds no mesh, or a face names a vertex that is not there.
+    """
+    if path.suffix.lower() != ".obj":
+        raise RecordingError("only OBJ meshes can be read", where=str(path), hint="export the mesh as Wavefront OBJ")
+    if not path.is_file():
+        raise RecordingError("no such mesh", where=str(path))
+    points: list[Sequence[str]] = []
+    triangles: list[tuple[int, int, int]] = []
+    with path.open(encoding="utf-8", errors="replace") as lines:
+        for number, line in enumerate(lines, 1):
+            kind, *fields = line.split() or [""]
+            if kind == "v":
+                points.append(fields[:3])
+            elif kind == "f":
+                triangles += _fan(fields, len(points), f"{path}:{number}")
+    return _checked(points, triangles, path)
+
+
+def write_mesh(path: Path, vertices: F64, faces: I32) -> None:
+    """Write a triangle mesh as OBJ, in micrometres' precision."""
+    rows = [f"v {x:.6f} {y:.6f} {z:.6f}\n" for x, y, z in vertices]
+    rows += [f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in faces]
+    path.write_text("".join(rows), encoding="utf-8")
+
+
+def _fan(fields: Sequence[str], known: int, where: str) -> list[tuple[int, int, int]]:
+    """Return the triangles of one face; each field is vertex, vertex/texture or vertex/texture/normal."""
+    try:
+        named = [int(field.split("/")[0]) for field in fields]
+    except ValueError:
+        raise RecordingError(f"a face with '{' '.join(fields)}', not vertex numbers", where=where) from None
+    corners = [n - 1 if n > 0 else known + n for n in named]  # negative: counted back from the last vertex
+    return [(corners[0], corners[i], corners[i + 1]) for i in range(1, len(corners) - 1)]
+
+
+def _checked(points: Sequence[Sequence[str]], triangles: Sequence[tuple[int, int, int]], path: Path) -> tuple[F64, I32]:
+    try:
+        vertices = np.array(points, np.float64).reshape(-1, 3)
+    except ValueError as error:
+        raise RecordingError(f"a vertex that is not three numbers: {error}", where=str(path)) from None
+    faces = np.array(triangles, np.int64).reshape(-1, 3)
+    if not len(vertices) or not len(faces):
+        raise RecordingError(f"{len(vertices)} vertices and {len(faces)} faces: no mesh", where=str(path))
+    if not np.isfinite(vertices).all():
+        raise RecordingError("a vertex is not a number", where=str(path))
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise RecordingError(f"a face names a vertex that is not there; the file has {len(vertices)}", where=str(path))
+    return vertices, faces.astype(np.int32)

@@ -1,0 +1,87 @@
+"""Whether a set of cameras makes sense together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from mocapflow.data import Camera
+from mocapflow.geometry.cameras import centre, pinhole, project, undistort
+from mocapflow.io.findings import Finding, note, warning
+from mocapflow.io.findings import error as problem
+from mocapflow.records import F64, Bool
+
+OPPOSED = 165.0  # deg between two viewing directions
+DEPTHS = np.geomspace(0.3, 30.0, 40)  # m, where something to be filmed may stand
+RAYS = 9  # per side of an image
+UPRIGHT = 0.7  # length of the mean "up" of the images from which they agree on a direction
+
+
+def examine_rig(cameras: Sequence[Camera]) -> Iterator[Finding]:
+    """Yield what is odd about a set of cameras of known size."""
+    if len(cameras) < 2:
+        yield warning("there is one camera only", "depth can't be measured from one view; two or more are needed")
+        return
+    yield from _common_view(cameras)
+    yield from _world_up(cameras)
+    for (a, va), (b, vb) in combinations([(camera.name, _forward(camera)) for camera in cameras], 2):
+        angle = np.degrees(np.arccos(np.clip(va @ vb, -1, 1)))
+        if angle > OPPOSED:
+            yield note(
+                f"{a} and {b} face each other ({angle:.0f} degrees)",
+                "they see mirrored silhouettes and add little to each other; place them more than 15 degrees off",
+            )
+
+
+def _common_view(cameras: Sequence[Camera]) -> Iterator[Finding]:
+    seen = [np.stack([_sees(other, _seen_space(camera)) for other in cameras]) for camera in cameras]
+    alone = [c.name for i, (c, s) in enumerate(zip(cameras, seen, strict=True)) if not np.delete(s, i, 0).any()]
+    if alone:
+        yield problem(
+            f"{', '.join(alone)}: no other camera sees anything of what {'they see' if len(alone) > 1 else 'it sees'}",
+            "the calibrations do not belong together: check that rotation is camera-from-world, that translation is\n"
+            "in metres and not the camera's position, and that no camera was moved or exchanged after calibrating",
+        )
+    elif not any(s.all(axis=0).any() for s in seen):
+        yield warning("no point in space is seen by all cameras", "the person has to be where all cameras see")
+
+
+def _seen_space(camera: Camera) -> F64:
+    """Return points (P, 3) m all over what a camera sees."""
+    grid = np.stack(np.meshgrid(*(np.linspace(0, n - 1, RAYS) for n in camera.size)), -1).reshape(-1, 2)
+    rays = np.column_stack([undistort(grid, camera), np.ones(len(grid))]) @ np.linalg.inv(camera.intrinsics).T
+    rotation = camera.camera_from_world[:3, :3]
+    points: F64 = (DEPTHS[:, None, None] * (rays @ rotation)).reshape(-1, 3) + centre(camera)
+    return points
+
+
+def _sees(camera: Camera, points: F64) -> Bool:
+    pixels = project(points, pinhole(camera))
+    with np.errstate(invalid="ignore"):
+        inside = (pixels >= -0.5) & (pixels <= camera.size - 0.5)
+    return inside[:, 0] & inside[:, 1]
+
+
+def _forward(camera: Camera) -> F64:
+    forward: F64 = camera.camera_from_world[2, :3]
+    return forward
+
+
+def _world_up(cameras: Sequence[Camera]) -> Iterator[Finding]:
+    """Say where the images agree on an up that is not z, or where every camera is below the floor."""
+    up = -np.mean([camera.camera_from_world[1, :3] for camera in cameras], axis=0)
+    if np.linalg.norm(up) > UPRIGHT and int(np.argmax(np.abs(up))) != 2:
+        axis = "xyz"[int(np.argmax(np.abs(up)))]
+        yield warning(
+            f"the images' up is the {axis} axis of the world", "the world has to be z up: turn the calibration"
+        )
+    elif np.linalg.norm(up) > UPRIGHT and up[2] < 0:
+        yield warning("the images' up is down in the world", "z has to point up: turn the calibration, or the videos")
+    heights = [centre(camera)[2] for camera in cameras]
+    if max(heights) < 0:
+        yield warning(
+            f"every camera is below the floor (heights {min(heights):.1f} to {max(heights):.1f} m)",
+            "the floor is z = 0 and z points up",
+        )
