@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -175,10 +175,18 @@ class Stage(Component):
     A subclass defines `run(self, **typed_inputs) -> Artifact`. Each parameter receives the result of the nearest
     earlier stage that makes its type; `Scene`, `Recording`, `Checkpoint` and `RunFolder` come from the runner;
     `X | None = None` makes an input optional.
+
+    `extent` says which frames of the recording it sees, and its cache key names: the "first" one of the run, those
+    of the "run", or "all" there are; None: the first for a Start, all for a Background or Body, else the run's.
     """
 
     role: ClassVar[str] = "stage"
+    extent: ClassVar[Literal["first", "run", "all"] | None] = None
     run: ClassVar[Callable[..., Any]]
+
+    def inputs(self, recording: Path) -> Sequence[Path]:
+        """Return files that `run` reads besides the frames: their content is part of the cache key."""
+        return ()
 
 
 def pool(parts: Sequence[tuple[float, Matches]]) -> Matches:

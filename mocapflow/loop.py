@@ -12,6 +12,7 @@ from mocapflow.data import Change, Frame, FrameResult, FrameState, Matches, Past
 from mocapflow.model import ClothedModel
 from mocapflow.records import record
 from mocapflow.scene import Scene
+from mocapflow.timing import Stopwatch
 
 
 @record
@@ -48,16 +49,20 @@ def settle(
 
     Source: Rosenhahn 2008, Fig. 12.14
     """
-    calm, earlier, turn = 0, state, Turn(index=0, cap=steps.steady.max_turns)
+    calm, earlier, turn, watch = 0, state, Turn(index=0, cap=steps.steady.max_turns), Stopwatch()
     for index in range(steps.steady.max_turns):
         turn = Turn(index=index, cap=turn.cap, change=turn.change)
         segmentation = steps.segmenter.segment(frame, state, past, model.scene, turn)
+        watch.lap("segment")
         match = partial(pool_matches, steps.matchers, frame, segmentation, past, model.scene, turn)
         estimate = steps.pose_solver.solve(match, state, model, steps.priors, past, turn)
+        watch.lap("solve")
         cloth = steps.cloth_fitter.fit(frame, segmentation, estimate, model, past, turn)
+        watch.lap("cloth")
         matches = match(model.surface(estimate.pose, cloth))
         new = FrameState(segmentation=segmentation, matches=matches, estimate=estimate, cloth=cloth)
         change, swing = measure_change(state, new, model), measure_change(earlier, new, model)
+        watch.lap("match")
         observe(frame.index, turn, new)
         earlier, state = state, new
         turn = Turn(index=index, cap=turn.cap, change=change)
@@ -66,13 +71,23 @@ def settle(
             break
     assert turn.change is not None
     return FrameResult(
-        state=state, iterations=turn.index + 1, steady=calm >= steps.steady.turns, change=turn.change,
-        overlap=np.full(len(model.scene.cameras), np.nan), oscillating=calm == 0 and turn.index > 1 and steps.steady.holds(swing),
+        state=state,
+        iterations=turn.index + 1,
+        steady=calm >= steps.steady.turns,
+        oscillating=calm == 0 and turn.index > 1 and steps.steady.holds(swing),
+        change=turn.change,
+        overlap=np.full(len(model.scene.cameras), np.nan),
+        seconds=watch.seconds,
     )
 
 
 def pool_matches(
-    matchers: Sequence[Matcher], frame: Frame, segmentation: Segmentation, past: Past, scene: Scene, turn: Turn,
+    matchers: Sequence[Matcher],
+    frame: Frame,
+    segmentation: Segmentation,
+    past: Past,
+    scene: Scene,
+    turn: Turn,
     surface: Surface,
 ) -> Matches:
     """Return the matches of all matchers together, each with its share."""

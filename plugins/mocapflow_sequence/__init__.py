@@ -9,6 +9,7 @@ from mocapflow.hookspecs import hookimpl
 @hookimpl
 def mocapflow_stages() -> list[type[Stage]]:
     """Return the stages of this package."""
+    from mocapflow.track import CoupledLoop
     from mocapflow_sequence.start_from_file import StartFromFile
 
-    return [StartFromFile]
+    return [CoupledLoop, StartFromFile]

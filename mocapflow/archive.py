@@ -1,0 +1,146 @@
+"""Records in zarr groups: arrays with dimension names and units, everything else as attributes.
+
+Any `@record` goes in and comes back: fields are arrays, records, tuples and mappings of these, strings, numbers.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mocapflow.errors import StoreError
+from mocapflow.records import array_fields
+from mocapflow.rows import Corrupted
+
+if TYPE_CHECKING:
+    import zarr
+
+PLAIN = "plain"  # attribute with the fields that are no arrays
+
+
+def save_record(group: zarr.Group, value: Any) -> None:
+    """Write a record into an empty group."""
+    cls, declared = type(value), array_fields(type(value))
+    plain: dict[str, Any] = {}
+    for field in fields(value):
+        inner = getattr(value, field.name)
+        if isinstance(inner, np.ndarray):
+            axes = declared[field.name].axes if field.name in declared else ()
+            unit = declared[field.name].unit if field.name in declared else ""
+            save_array(group, field.name, inner, axis_names(field.name, axes, inner.ndim), unit)
+        elif _is_nested(inner):
+            _save_nested(group.create_group(field.name), inner)
+        else:
+            plain[field.name] = str(inner) if isinstance(inner, Path) else inner
+    group.update_attributes({"record": f"{cls.__module__}:{cls.__qualname__}", PLAIN: plain})
+
+
+def load_record(group: zarr.Group, rows: int | None = None) -> Any:
+    """Return the record in a group; `rows` shortens every array with an axis T.
+
+    Raises:
+        Corrupted: it can't be read back.
+    """
+    try:
+        cls = _record_class(str(group.attrs["record"]))
+        plain = dict(group.attrs[PLAIN])  # type: ignore[call-overload]
+        values: dict[str, Any] = {}
+        for field in fields(cls):
+            if field.name in plain:
+                values[field.name] = _untyped(plain[field.name], str(field.type))
+            elif field.name in array_fields(cls):
+                axes = array_fields(cls)[field.name].axes
+                values[field.name] = _array(group, field.name, rows if axes[:1] == ("T",) else None)
+            elif field.name in group:
+                values[field.name] = _load_nested(group[field.name])
+        return cls(**values)
+    except StoreError:
+        raise
+    except Exception as error:  # zarr, json, zstd and the record's own check each raise their own kind
+        raise Corrupted(f"{group.path or group.store} can't be read back: {type(error).__name__}: {error}") from error
+
+
+def save_array(group: zarr.Group, name: str, values: Any, axes: list[str], unit: str) -> None:
+    """Write one array; long first axes are cut into chunks of 64."""
+    from zarr.codecs import ZstdCodec
+
+    chunks = tuple(max(1, min(64, n) if axes[:1] == ["T"] and not i else n) for i, n in enumerate(values.shape))
+    made = group.create_array(
+        name, shape=values.shape, chunks=chunks or (), dtype=values.dtype, dimension_names=axes,
+        compressors=[ZstdCodec(level=1, checksum=True)], attributes={"unit": unit} if unit else {},
+    )  # fmt: skip
+    if values.size:
+        made[...] = values
+
+
+def axis_names(field: str, axes: tuple[str | int, ...], ndim: int) -> list[str]:
+    """Return dimension names: the declared ones, once each (xarray forbids doubles), made up where there are none."""
+    names: list[str] = []
+    for index in range(ndim):
+        declared = axes[index] if index < len(axes) else index
+        name = declared if isinstance(declared, str) else f"{field}_{index}"
+        names.append(f"{name}_{index}" if name in names else name)
+    return names
+
+
+def _is_nested(value: Any) -> bool:
+    if isinstance(value, Mapping):
+        return any(_is_nested(v) or isinstance(v, np.ndarray) for v in value.values())
+    if isinstance(value, tuple | list):
+        return any(_is_nested(v) or isinstance(v, np.ndarray) for v in value)
+    return is_dataclass(value)
+
+
+def _save_nested(group: zarr.Group, value: Any) -> None:
+    if is_dataclass(value):
+        save_record(group, value)
+        return
+    items = value.items() if isinstance(value, Mapping) else ((str(i), v) for i, v in enumerate(value))
+    order = []
+    for name, inner in items:
+        order.append(name)
+        if isinstance(inner, np.ndarray):  # its axes are its own: equal names would have to have equal lengths
+            save_array(group.create_group(name), "values", inner, axis_names("axis", (), inner.ndim), "")
+        elif inner is not None:
+            _save_nested(group.create_group(name), inner)
+    group.update_attributes({"kind": "mapping" if isinstance(value, Mapping) else "tuple", "order": order})
+
+
+def _load_nested(group: Any) -> Any:
+    if "record" in group.attrs:
+        return load_record(group)
+    values = {name: _load_item(group, name) for name in group.attrs["order"]}
+    return values if group.attrs["kind"] == "mapping" else tuple(values.values())
+
+
+def _load_item(group: Any, name: str) -> Any:
+    if name not in group:
+        return None
+    inner = group[name]
+    return _array(inner, "values", None) if "values" in inner else _load_nested(inner)
+
+
+def _array(group: Any, name: str, rows: int | None) -> Any:
+    if name not in group:
+        return None
+    return np.asarray(group[name][:rows] if rows is not None else group[name][...])
+
+
+def _record_class(name: str) -> type:
+    module, _, qualified = name.partition(":")
+    cls = getattr(importlib.import_module(module), qualified)
+    if not is_dataclass(cls):
+        raise Corrupted(f"{name} is no record")
+    return cls  # type: ignore[return-value]
+
+
+def _untyped(value: Any, declared: str) -> Any:
+    """Return a value as it was before json: tuples for lists, paths for strings."""
+    if isinstance(value, list):
+        return tuple(_untyped(v, "") for v in value)
+    return Path(value) if declared.startswith("Path") and value is not None else value

@@ -1,0 +1,85 @@
+"""Says which component failed, at which frame, and what is saved."""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Iterator
+from pathlib import Path
+from types import FrameType, TracebackType
+from typing import Any
+
+from mocapflow.components import Component, Stage
+from mocapflow.data import Frame, Turn
+from mocapflow.errors import ComponentFailed
+from mocapflow.registry import Registry
+
+
+def failure(error: Exception, stage: Stage, registry: Registry, saved: str, log: Path) -> ComponentFailed:
+    """Return the error for people: the innermost frame of the traceback in a plugin names the culprit.
+
+    Args:
+        error: what was raised.
+        stage: the stage that was running.
+        registry: knows which packages are plugins.
+        saved: what is kept, and how to go on.
+        log: where to write the whole traceback.
+    """
+    calls = list(_calls(error.__traceback__))
+    component = _culprit(calls, registry) or stage
+    role, name = component.role.replace("_", " "), component.name
+    message = f"{role} '{name}' ({registry.origin(type(component))}) failed{_moment(calls)}: {_said(error)}"
+    hints = [saved, _keep(error, log)]
+    return ComponentFailed(message, hint="\n".join(filter(None, hints)))
+
+
+def _calls(trace: TracebackType | None) -> Iterator[FrameType]:
+    while trace is not None:
+        yield trace.tb_frame
+        trace = trace.tb_next
+
+
+def _culprit(calls: list[FrameType], registry: Registry) -> Component | None:
+    """Return the component nearest to the innermost call in plugin code."""
+    known = [(index, call) for index, call in enumerate(calls) if _is_known(call, registry)]
+    for _, call in reversed(known):
+        component: Component = call.f_locals["self"]
+        return component
+    return None
+
+
+def _is_known(call: FrameType, registry: Registry) -> bool:
+    this = call.f_locals.get("self")
+    if not isinstance(this, Component):
+        return False
+    try:
+        registry.origin(type(this))
+    except KeyError:
+        return False
+    return True
+
+
+def _moment(calls: list[FrameType]) -> str:
+    """Return at which frame and iteration it happened, as the loop's own variables say."""
+    found: dict[str, Any] = {}
+    for call in calls:
+        if call.f_globals.get("__name__") in {"mocapflow.loop", "mocapflow.track"}:
+            found |= call.f_locals
+    frame, turn = found.get("frame"), found.get("turn")
+    if not isinstance(frame, Frame):
+        return ""
+    iteration = f", iteration {turn.index + 1}" if isinstance(turn, Turn) else ""
+    return f" at frame {frame.index}{iteration}"
+
+
+def _said(error: Exception) -> str:
+    text = str(error).strip().splitlines()
+    return f"{type(error).__name__}: {text[0]}" if text else type(error).__name__
+
+
+def _keep(error: Exception, log: Path) -> str:
+    try:
+        log.parent.mkdir(parents=True, exist_ok=True)
+        log.write_text("".join(traceback.format_exception(error)), encoding="utf-8")
+    except OSError:
+        return ""
+    return f"traceback: {log}"

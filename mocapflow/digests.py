@@ -1,0 +1,155 @@
+"""Digests of files by content and of code by meaning: what cache keys are made of."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import importlib.util
+import json
+import sys
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from mocapflow.errors import RecordingError
+
+MARK = "blake2b:"  # a digest reads "blake2b:<hex> <name>"; the name is for people and never counts
+
+CORE = ("components", "data", "geometry", "loop", "model", "records", "scene", "track")
+SHARED = ("io", "recording")  # counted where a component imports them
+
+
+def digest(data: bytes | memoryview, name: str = "") -> str:
+    """Return the digest of bytes, labelled for people."""
+    return f"{MARK}{hashlib.blake2b(data, digest_size=16).hexdigest()} {name}".rstrip()
+
+
+def digest_array(values: npt.NDArray[Any]) -> str:
+    """Return the digest of an array: dtype, shape and content."""
+    head = f"{values.dtype.str}{values.shape}".encode()
+    return digest(head + np.ascontiguousarray(values).tobytes())
+
+
+class Digests:
+    """Digests of files and of packages, remembered by path, size and time of change.
+
+    Args:
+        memory: where to remember file digests between runs; None forgets them.
+    """
+
+    def __init__(self, memory: Path | None = None) -> None:
+        self._memory = memory
+        self._files: dict[str, list[Any]] = _read(memory)
+        self._code: dict[Path, tuple[str, frozenset[str]]] = {}
+
+    def file(self, path: Path, name: str = "") -> str:
+        """Return the digest of a file's content, or of all files in a folder with their names."""
+        if path.is_dir():
+            inside = sorted(p for p in path.rglob("*") if p.is_file())
+            return digest("\n".join(f"{p.relative_to(path)} {self._content(p)}" for p in inside).encode(), name)
+        return f"{MARK}{self._content(path)} {name}".rstrip()
+
+    def save(self) -> None:
+        """Remember the file digests for the next run; a folder that can't be written is no matter."""
+        if self._memory is None or self._files == _read(self._memory):
+            return
+        try:
+            part = self._memory.with_suffix(".part")
+            part.write_text(json.dumps(self._files))
+            part.replace(self._memory)
+        except OSError:
+            return
+
+    def package(self, module: str) -> str:
+        """Return the digest of a component's top package with the shared modules and plugins it imports."""
+        found: dict[str, str] = {}
+        open_modules = {_unit(module)}
+        while open_modules:
+            unit = open_modules.pop()
+            files = {name: self._source(path) for name, path in _sources(unit)}
+            found.update({name: code for name, (code, _) in files.items()})
+            wanted = {_unit(name) for _, imports in files.values() for name in imports if _counts(name)}
+            open_modules |= {w for w in wanted if not any(name == w or name.startswith(w + ".") for name in found)}
+        return digest(json.dumps(found, sort_keys=True).encode(), f"code of {_unit(module)}")
+
+    def core(self) -> str:
+        """Return the digest of the framework code that every result depends on."""
+        found = {name: self._source(path)[0] for part in CORE for name, path in _sources(f"mocapflow.{part}")}
+        return digest(json.dumps(found, sort_keys=True).encode(), "code of mocapflow")
+
+    def _content(self, path: Path) -> str:
+        try:
+            stat = path.stat()
+            stamp = [stat.st_size, stat.st_mtime_ns]
+            known = self._files.get(str(path.resolve()))
+            if known is not None and known[:2] == stamp:
+                return str(known[2])
+            with path.open("rb") as file:
+                content = hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
+        except OSError as error:
+            raise RecordingError(f"can't read {path}: {error.strerror}", where=str(path)) from error
+        self._files[str(path.resolve())] = [*stamp, content]
+        return content
+
+    def _source(self, path: Path) -> tuple[str, frozenset[str]]:
+        if path not in self._code:
+            tree = ast.parse(path.read_bytes())
+            names = frozenset(_imports(tree))
+            self._code[path] = hashlib.blake2b(_meaning(tree).encode(), digest_size=16).hexdigest(), names
+        return self._code[path]
+
+
+def _read(memory: Path | None) -> dict[str, list[Any]]:
+    try:
+        known = json.loads(memory.read_text()) if memory else {}
+    except (OSError, ValueError):
+        return {}
+    return known if isinstance(known, dict) else {}
+
+
+def _meaning(tree: ast.Module) -> str:
+    """Return the syntax tree as text, without docstrings: comments, documentation and layout are free."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and ast.get_docstring(
+            node, clean=False
+        ):
+            node.body = node.body[1:]
+    return ast.dump(tree)
+
+
+def _imports(tree: ast.Module) -> Iterator[str]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names if node.module == "mocapflow")
+
+
+def _counts(name: str) -> bool:
+    top, _, rest = name.partition(".")
+    return top.startswith("mocapflow_") or (top == "mocapflow" and rest.partition(".")[0] in SHARED)
+
+
+def _unit(module: str) -> str:
+    """Return what is digested as one: the top package, or one part of mocapflow itself."""
+    parts = module.split(".")
+    return ".".join(parts[:2] if parts[0] == "mocapflow" else parts[:1])
+
+
+def _sources(unit: str) -> Iterable[tuple[str, Path]]:
+    """Yield dotted name and path of every Python file of a module or package."""
+    loaded = sys.modules.get(unit)
+    spec = loaded.__spec__ if loaded is not None else importlib.util.find_spec(unit)
+    if spec is None or spec.origin is None:
+        return
+    origin = Path(spec.origin)
+    if origin.name != "__init__.py":
+        yield unit, origin
+        return
+    for path in sorted(origin.parent.rglob("*.py")):
+        parts = path.relative_to(origin.parent).with_suffix("").parts
+        yield ".".join((unit, *(part for part in parts if part != "__init__"))), path

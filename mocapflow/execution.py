@@ -1,0 +1,215 @@
+"""One run in progress: results are loaded or made when somebody asks for them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+from mocapflow.blame import failure
+from mocapflow.checkpoint import Checkpoint
+from mocapflow.components import Component
+from mocapflow.data import FrameResult, RunFolder
+from mocapflow.errors import ComponentFailed, MocapflowError, PluginError, ShapeError
+from mocapflow.locks import Lock
+from mocapflow.pipeline import Pipeline
+from mocapflow.recipes import Step
+from mocapflow.rows import Corrupted
+from mocapflow.scene import Scene
+from mocapflow.store import Artifact, Report, Store, remove, versions, with_versions
+
+BEAT = 2.0  # s between lines of progress
+
+Value = TypeVar("Value")
+
+
+def is_hit(step: Step, artifact: Artifact) -> bool:
+    """True where an artifact holds all that a stage would make."""
+    return artifact.complete and (not step.chain or artifact.frames >= step.frames)
+
+
+class Execution:
+    """Finishes the stages of a pipeline, each at most once."""
+
+    def __init__(
+        self, pipeline: Pipeline, store: Store, out: Path, steps: Sequence[Step], *, fresh: bool, report: Report
+    ) -> None:
+        self._pipeline, self._store, self._out = pipeline, store, out
+        self._steps = {step.label: step for step in steps}
+        self._fresh, self._report = fresh, report
+        self._results: dict[str, Any] = {}
+        self._scenes: dict[str | None, Scene] = {}
+        self.entries: dict[str, Mapping[str, Any]] = {}  # per finished stage
+
+    def finish(self, step: Step) -> None:
+        """See to it that the result of a stage exists; a cached one is not even read."""
+        if step.label in self.entries:
+            return
+        found = self._find(step)
+        if found is None or self._fresh:
+            self._result(step.label)
+        else:
+            self._entered(step, found)
+
+    def _result(self, label: str) -> Any:
+        """Return the result of a stage, from the store or by running it."""
+        if label not in self._results:
+            step = self._steps[label]
+            found = None if self._fresh else self._find(step)
+            self._results[label] = self._made(step) if found is None else self._loaded(step, found)
+        return self._results[label]
+
+    def _find(self, step: Step) -> Artifact | None:
+        found = self._store.find(step.key) if step.stored else None
+        return found if found is not None and is_hit(step, found) else None
+
+    def _loaded(self, step: Step, found: Artifact) -> Any:
+        try:
+            result = self._store.load(found, step.frames if step.chain else None)
+        except Corrupted as error:
+            self._set_aside(found.path, error)
+            return self._made(step)
+        self._entered(step, found)
+        return result
+
+    def _made(self, step: Step) -> Any:
+        if not step.stored:
+            return self._run(step)
+        with self._store.writer(step.key, f"{step.label}-{step.key[:6]}", self._report) as lock:
+            started = self._started(step)
+            if started is not None and is_hit(step, started):  # another run has made it while this one waited
+                self._entered(step, started)
+                return self._store.load(started, step.frames if step.chain else None)
+            return self._chain(step, started, lock) if step.chain else self._whole(step)
+
+    def _started(self, step: Step) -> Artifact | None:
+        damaged = self._store.damaged(step.key)
+        if damaged is not None:
+            self._set_aside(damaged, Corrupted("its description can't be read"))
+        started = self._store.find(step.key)
+        if started is not None and self._fresh:
+            remove(started.path)
+            return None
+        return started
+
+    def _whole(self, step: Step) -> Any:
+        value = self._run(step)
+        self._store.save(self._store.begin(step.label, step.key, step.recipe), value)
+        return value
+
+    def _chain(self, step: Step, started: Artifact | None, lock: Lock) -> Any:
+        if started is None or not started.frames:
+            return self._run(step, self._checkpoint(step, self._store.begin(step.label, step.key, step.recipe), lock))
+        self._report(f"{step.label}: going on after {started.frames} frames")
+        self._warn_of_versions(step, started)
+        try:
+            return self._run(step, self._checkpoint(step, with_versions(started), lock))
+        except Corrupted as error:
+            self._set_aside(started.path, error)
+            return self._chain(step, None, lock)
+
+    def _checkpoint(self, step: Step, artifact: Artifact, lock: Lock) -> Checkpoint:
+        indices, observers = step.recording.indices, self._pipeline.registry.observers
+        longer = range(indices.start, indices.start + indices.step * max(len(indices), artifact.frames), indices.step)
+        names = [camera.name for camera in step.recording.cameras]
+        progress = Progress(step, self._report)
+
+        def frame_done(frame: int, result: FrameResult) -> None:
+            progress.frame_done(frame, result)
+            observers.frame_done(frame, result)
+
+        return Checkpoint(
+            self._store, artifact, longer, names, lock, wanted=len(indices),
+            iteration_done=observers.iteration_done, frame_done=frame_done,
+        )  # fmt: skip
+
+    def _run(self, step: Step, checkpoint: Checkpoint | None = None) -> Any:
+        inputs = {name: self._input(step, source, checkpoint) for name, source in step.sources.items()}
+        self._report(f"{step.label}: running {step.named.stage.name}")
+        cpu, wall = time.process_time(), time.perf_counter()
+        kept = (lambda: checkpoint.kept) if checkpoint else str
+        value = self._blaming(step.named.stage, lambda: step.named.stage.run(**inputs), kept)
+        self._entered(step, None, time.process_time() - cpu, time.perf_counter() - wall)
+        return value
+
+    def _input(self, step: Step, source: str | None, checkpoint: Checkpoint | None) -> Any:
+        supplied: dict[str | None, Callable[[], Any]] = {
+            None: lambda: None,
+            "scene": lambda: self._scene(step),
+            "recording": lambda: step.recording,
+            "checkpoint": lambda: checkpoint,
+            "run folder": lambda: RunFolder(path=self._out, recipe=self._recipe()),
+        }
+        return supplied[source]() if source in supplied else self._result(str(source))
+
+    def _scene(self, step: Step) -> Scene:
+        """Return the cameras, the body that holds at this place in the pipeline, and the garment sewn to it."""
+        if step.body not in self._scenes:
+            model, garment, folder = self._pipeline.body, self._pipeline.garment, self._pipeline.recording
+            body = self._result(step.body) if step.body else self._blaming(model, lambda: model.load(folder))
+            sewn = self._blaming(garment, lambda: garment.sew(body)) if garment else None
+            self._scenes[step.body] = Scene(cameras=step.recording.cameras, body=body, garment=sewn)
+        return self._scenes[step.body]
+
+    def _blaming(self, component: Component, call: Callable[[], Value], kept: Callable[[], str] = str) -> Value:
+        """Return what a component makes; if it raises, say who it was, what is saved and how to go on."""
+        try:
+            return call()
+        except ComponentFailed:
+            raise
+        except Exception as error:
+            if isinstance(error, MocapflowError) and not isinstance(error, ShapeError | PluginError):
+                raise
+            raise failure(error, component, self._pipeline.registry, kept(), self._out / "failed.log") from error
+
+    def _entered(self, step: Step, found: Artifact | None, cpu: float = 0.0, wall: float = 0.0) -> None:
+        if step.label in self.entries:
+            return
+        if found is not None:
+            self._report(f"{step.label}: from the store")
+            self._warn_of_versions(step, found)
+        entry = {"label": step.label, "key": step.key, "cached": found is not None}
+        self.entries[step.label] = {**entry, "seconds": cpu, "wall_seconds": wall}
+        self._pipeline.registry.observers.stage_done(step.label, step.key, found is not None)
+
+    def _recipe(self) -> dict[str, Any]:
+        pipeline = self._pipeline
+        return {
+            "pipeline": pipeline.name,
+            "recording": str(pipeline.recording),
+            "frames": {"start": pipeline.start, "stop": pipeline.stop, "step": pipeline.step},
+            "scale": pipeline.scale,
+            "versions": versions(),
+            "settings": {label: step.recipe["component"] for label, step in self._steps.items()},
+            "stages": dict(self.entries),
+        }
+
+    def _warn_of_versions(self, step: Step, artifact: Artifact) -> None:
+        now = versions()
+        for last, made in artifact.made_with:
+            other = [f"{name} {was}, now {now.get(name)}" for name, was in made.items() if now.get(name) != was]
+            if other:
+                what = f"frames 0–{last - 1} of {step.label}" if step.chain else step.label
+                self._report(f"warning: {what} were made with {'; '.join(other)}")
+
+    def _set_aside(self, path: Path, error: Corrupted) -> None:
+        aside = self._store.set_aside(path)
+        self._report(f"warning: {path.name} is damaged and made anew: {error.message} (kept as {aside.name})")
+
+
+class Progress:
+    """Tells now and then how far a chain is."""
+
+    def __init__(self, step: Step, report: Report) -> None:
+        self._step, self._report, self._last = step, report, time.monotonic()
+
+    def frame_done(self, frame: int, result: FrameResult) -> None:
+        """Count a frame; tell if the last line is some time ago, or it is the last frame."""
+        indices = self._step.recording.indices
+        if time.monotonic() - self._last < BEAT and frame != indices[-1]:
+            return
+        self._last = time.monotonic()
+        rest = "at rest" if result.steady else "not at rest"
+        done = indices.index(frame) + 1
+        self._report(f"{self._step.label}: {done} of {len(indices)} frames, {rest} after {result.iterations} turns")

@@ -1,0 +1,145 @@
+"""Cache keys: a digest of everything a stage's result depends on, with the readable recipe behind it.
+
+Not in a key: names and order of stages, where to stop (for stages that go on frame by frame), settings marked
+`FREE`, output paths, and where files lie; comments, docstrings and layout of code.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from pydantic import BaseModel
+
+from mocapflow.components import Component
+from mocapflow.digests import MARK, Digests, digest_array
+from mocapflow.errors import PluginError
+
+FORMAT = 1
+Recipe = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Free:
+    """Marks a setting that does not change the result: `keep: Annotated[str, FREE]`."""
+
+
+FREE = Free()
+
+
+class Origins(Protocol):
+    """What keys ask of the registry."""
+
+    def origin(self, cls: type[Component]) -> Any:
+        """Return where a component class comes from: plugin, distribution, version."""
+
+
+def key_of(recipe: Recipe) -> str:
+    """Return the key of a recipe: 32 hexadecimal digits."""
+    text = json.dumps(_unnamed(recipe), sort_keys=True, separators=(",", ":"))
+    return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
+
+
+def component_recipe(component: Component, origins: Origins, digests: Digests) -> dict[str, Any]:
+    """Return role, name, code and all settings of a component, nested components the same way."""
+    cls = type(component)
+    origin = origins.origin(cls)
+    return {
+        "role": component.role,
+        "name": component.name,
+        "distribution": origin.distribution if origin.version else "file",
+        "code": digests.package(cls.__module__),
+        "settings": _settings(component, origins, digests),
+    }
+
+
+def _settings(model: BaseModel, origins: Origins, digests: Digests) -> dict[str, Any]:
+    return {
+        name: _plain(getattr(model, name), f"{type(model).__name__}.{name}", origins, digests)
+        for name, declared in type(model).model_fields.items()
+        if not any(isinstance(mark, Free) for mark in declared.metadata)
+    }
+
+
+def _plain(value: Any, where: str, origins: Origins, digests: Digests) -> Any:  # noqa: PLR0911  one line per kind
+    if value is None or isinstance(value, bool | int | str) and not isinstance(value, Enum):
+        return value
+    if isinstance(value, float):
+        return repr(float(value))  # json has no infinity
+    if isinstance(value, Enum):
+        return value.name
+    if isinstance(value, Path):
+        return digests.file(value, value.name) if value.exists() else f"no file {value.name}"
+    if isinstance(value, Component):
+        return component_recipe(value, origins, digests)
+    if isinstance(value, BaseModel):
+        return _settings(value, origins, digests)
+    if isinstance(value, np.ndarray):
+        return digest_array(value)
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v, where, origins, digests) for k, v in value.items()}
+    if isinstance(value, Sequence):
+        return [_plain(v, where, origins, digests) for v in value]
+    if isinstance(value, set | frozenset):
+        return sorted(json.dumps(_plain(v, where, origins, digests), sort_keys=True) for v in value)
+    raise PluginError(f"setting {where} is a {type(value).__name__}, which has no place in a cache key")
+
+
+def _unnamed(value: Any) -> Any:
+    """Return a recipe with the names dropped from its digests: content counts, not where it lies."""
+    if isinstance(value, str) and value.startswith(MARK):
+        return value.partition(" ")[0]
+    if isinstance(value, Mapping):
+        return {key: _unnamed(v) for key, v in value.items()}
+    return [_unnamed(v) for v in value] if isinstance(value, list | tuple) else value
+
+
+def explain(old: Recipe, new: Recipe) -> str:
+    """Return what changed between two recipes, in words: `draper kinematic → xpbd`."""
+    changes = list(dict.fromkeys(_changes(old, new, "")))
+    more = f" and {len(changes) - 4} more" if len(changes) > 4 else ""
+    return "; ".join(changes[:4]) + more
+
+
+def _changes(old: Any, new: Any, path: str) -> Iterator[str]:
+    if _unnamed(old) == _unnamed(new):
+        return
+    if isinstance(old, Mapping) and isinstance(new, Mapping):
+        if old.get("role") and old.get("name") != new.get("name"):  # another component: its settings are no news
+            yield f"{path or old['role']} {old.get('name')} → {new.get('name')}".strip()
+            return
+        for name in sorted(old.keys() | new.keys()):
+            inner = path if name in {"settings", "component", "inputs"} else f"{path}.{name}".lstrip(".")
+            yield from _changes(old.get(name), new.get(name), inner)
+    elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        for index, (before, after) in enumerate(zip(old, new, strict=True)):
+            yield from _changes(before, after, f"{path}[{index}]")
+    else:
+        yield _change(old, new, path)
+
+
+def _change(old: Any, new: Any, path: str) -> str:
+    name = next((str(v).partition(" ")[2] for v in (new, old) if str(v).startswith(MARK)), None)
+    if name is not None and old is not None and new is not None:
+        return f"{name or path} changed"
+    if path.endswith(".frames") and isinstance(old, int) and isinstance(new, int):
+        return f"{path.removesuffix('.frames')} {'grew' if new > old else 'shrank'} from {old} to {new} frames"
+    if path.endswith(".key"):
+        return f"{path.removesuffix('.key')} was made anew"
+    return f"{path} {_words(old)} → {_words(new)}"
+
+
+def _words(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return str(value.get("name", "…"))
+    if isinstance(value, list):
+        return f"[{', '.join(map(_words, value))}]"
+    if isinstance(value, str) and value.startswith(MARK):
+        return value.partition(" ")[2] or "given"
+    return "none" if value is None else str(value)

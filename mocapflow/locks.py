@@ -1,0 +1,132 @@
+"""One writer per artifact: a lock file with pid, host and heartbeat."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import socket
+import threading
+import time
+import uuid
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from mocapflow.errors import StoreError
+
+BEAT = 5.0  # s between heartbeats
+DEAD = 60.0  # s without a heartbeat after which a writer on another machine counts as gone
+POLL = 0.2  # s between looks at a lock that another run holds
+
+
+class Lock:
+    """A lock that was acquired; `check` before each write notices that another run took it over."""
+
+    def __init__(self, path: Path, said: str) -> None:
+        self._path, self._said = path, said
+        self._done = threading.Event()
+        self._thread = threading.Thread(target=self._beat, name=f"heartbeat of {path.name}", daemon=True)
+        self._thread.start()
+
+    def check(self) -> None:
+        """Raise if the lock is no longer ours.
+
+        Raises:
+            StoreError: another run took it over, because this one gave no sign of life.
+        """
+        if not self._ours():
+            hint = "this run stood still for too long; run the same command to continue from what is saved"
+            raise StoreError(f"another run took over {self._path.stem}", hint=hint)
+
+    def release(self) -> None:
+        """Give the lock back."""
+        self._done.set()
+        self._thread.join()
+        with _guard(self._path.parent):
+            if self._ours():
+                self._path.unlink()
+
+    def _ours(self) -> bool:
+        try:
+            return self._path.read_text() == self._said
+        except OSError:
+            return False
+
+    def _beat(self) -> None:
+        while not self._done.wait(BEAT):
+            if self._ours():  # else `check` tells, before the next write
+                with suppress(OSError):
+                    os.utime(self._path)
+
+
+def acquire(path: Path, name: str, report: Callable[[str], None]) -> Lock:
+    """Wait until nobody else writes, then return the lock; `name` is what people call the thing locked."""
+    told = False
+    said = json.dumps(
+        {"pid": os.getpid(), "host": socket.gethostname(), "born": _born(os.getpid()), "token": uuid.uuid4().hex}
+    )
+    while True:
+        with _guard(path.parent):
+            holder = _holder(path)
+            stale = holder is not None and _stale(path, holder)
+            if holder is None or stale:
+                if stale:
+                    report(f"{name}: taking over from {_who(holder)}, which ended without finishing")
+                    path.unlink(missing_ok=True)
+                path.write_text(said)
+                return Lock(path, said)
+        if not told:
+            report(f"{name}: waiting for {_who(holder)}, which is making it")
+            told = True
+        time.sleep(POLL)
+
+
+@contextmanager
+def _guard(folder: Path) -> Iterator[None]:
+    """Let one process at a time look at the locks and change them."""
+    with (folder / "guard").open("a") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+def _holder(path: Path) -> dict[str, Any] | None:
+    try:
+        holder = json.loads(path.read_text())
+    except FileNotFoundError:
+        return None
+    except ValueError:
+        return {}
+    return holder if isinstance(holder, dict) else {}
+
+
+def _stale(path: Path, holder: dict[str, Any]) -> bool:
+    pid = holder.get("pid")
+    if holder.get("host") == socket.gethostname() and isinstance(pid, int):
+        return not _alive(pid) or _born(pid) != holder.get("born")
+    return time.time() - path.stat().st_mtime > DEAD
+
+
+def _alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    return not _born(pid).startswith("Z")
+
+
+def _born(pid: int) -> str:
+    """Return when a process started, so that a pid used again is not mistaken for its first owner; "" if unknown."""
+    try:
+        state, *rest = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return ""
+    return "Z" if state == "Z" else rest[18]
+
+
+def _who(holder: dict[str, Any] | None) -> str:
+    holder = holder or {}
+    return f"process {holder.get('pid', '?')} on {holder.get('host', '?')}"

@@ -1,0 +1,104 @@
+"""One frame as numbers: which go into its row, and how silhouettes and matches are stored."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import prod
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from mocapflow.data import Frame, FrameResult, Matches, Silhouette
+from mocapflow.records import F32, F64
+
+FINE = 8  # steps per px of a stored silhouette
+UNSEEN = -128  # stored where a view has no silhouette
+MATCH = ("camera", "x px", "y px", "direction x", "direction y", "vertex", "weight px^-2")
+
+Columns = Mapping[str, tuple[int, ...]]  # name -> shape, in the order of the row
+
+
+def columns_of(result: FrameResult, cameras: int) -> Columns:
+    """Return the layout of a row for results of this size."""
+    estimate = result.state.estimate
+    angles = len(estimate.pose.angles)
+    return {
+        "frame": (), "time": (), "root": (4, 4), "angles": (angles,), "cloth_parameters": (len(estimate.parameters),),
+        "iterations": (), "steady": (), "oscillating": (), "surface_change": (), "angle_change": (),
+        "usable": (cameras,), "overlap": (cameras,), "seconds": (len(result.seconds),), "match_count": (),
+        "covariance": (6 + angles, 6 + angles),
+    }  # fmt: skip
+
+
+def row_of(columns: Columns, frame: Frame, result: FrameResult, steps: Sequence[str]) -> F64:
+    """Return all numbers of a frame as one row."""
+    estimate, rank = result.state.estimate, columns["covariance"][0]
+    values: dict[str, Any] = {
+        "frame": frame.index, "time": frame.time, "root": estimate.pose.root, "angles": estimate.pose.angles,
+        "cloth_parameters": result.state.cloth.parameters, "iterations": result.iterations, "steady": result.steady,
+        "oscillating": result.oscillating, "surface_change": result.change.surface,
+        "angle_change": result.change.angles, "usable": frame.usable, "overlap": result.overlap,
+        "seconds": [result.seconds.get(step, 0.0) for step in steps], "match_count": len(result.state.matches.weight),
+        "covariance": estimate.covariance[:rank, :rank],
+    }  # fmt: skip
+    parts = [np.asarray(values[name], float) for name in columns]
+    for part, (name, shape) in zip(parts, columns.items(), strict=True):
+        if part.shape != shape:
+            raise ValueError(f"{name} of frame {frame.index} has shape {part.shape}; the frames before had {shape}")
+    return np.concatenate([part.ravel() for part in parts])
+
+
+def spans(columns: Columns) -> dict[str, slice]:
+    """Return where each column lies in the row."""
+    ends = np.cumsum([prod(shape) for shape in columns.values()]).tolist()
+    return {name: slice(end - prod(columns[name]), end) for name, end in zip(columns, ends, strict=True)}
+
+
+def column(columns: Columns, rows: F64, name: str) -> F64:
+    """Return one column of a row (N,) or of rows (T, N), in its own shape and its own memory."""
+    values = rows[..., spans(columns)[name]]
+    return values.reshape((*rows.shape[:-1], *columns[name])).copy()
+
+
+def quantised(silhouette: Silhouette) -> npt.NDArray[np.int8]:
+    """Return a signed distance in steps of 1/8 px; the mask `distance > 0` stays as it is."""
+    steps = np.rint(silhouette.distance * np.float32(FINE))
+    thin = (silhouette.distance > 0) & (steps < 1)
+    return np.clip(np.where(thin, 1, steps), 1 + UNSEEN, 127).astype(np.int8)
+
+
+def distance_of(steps: npt.NDArray[np.int8]) -> F32:
+    """Return a stored silhouette in px."""
+    return steps.astype(np.float32) / np.float32(FINE)
+
+
+def match_capacity(count: int) -> int:
+    """Return the width of the array that holds `count` matches: a power of two."""
+    return max(64, 1 << (count - 1).bit_length())
+
+
+def match_row(matches: Matches) -> F32:
+    """Return matches as float32 (capacity, 7), padded with zeros."""
+    packed = np.zeros((match_capacity(len(matches.weight)), len(MATCH)), np.float32)
+    parts = [
+        matches.camera[:, None],
+        matches.pixel,
+        matches.direction,
+        matches.vertex[:, None],
+        matches.weight[:, None],
+    ]
+    packed[: len(matches.weight)] = np.concatenate(parts, axis=1)
+    return packed
+
+
+def matches_of(packed: F32, count: int) -> Matches:
+    """Return stored matches."""
+    used = packed[:count].astype(np.float64)
+    return Matches(
+        camera=used[:, 0].astype(np.int16),
+        pixel=used[:, 1:3].copy(),
+        direction=used[:, 3:5].copy(),
+        vertex=used[:, 5].astype(np.int32),
+        weight=used[:, 6].copy(),
+    )

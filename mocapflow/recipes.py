@@ -1,0 +1,130 @@
+"""What every stage of a pipeline would be made from: its recipe, its key, the frames it reads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from mocapflow.components import Component
+from mocapflow.data import Background, Body, Camera, Evaluation, Files, Start
+from mocapflow.digests import Digests, digest_array
+from mocapflow.keys import FORMAT, Recipe, component_recipe, key_of
+from mocapflow.pipeline import NamedStage, Pipeline
+from mocapflow.recording import Recording, open_recording
+from mocapflow.wiring import body_source, makes, wire
+
+SEEN = {Start: "first", Background: "all", Body: "all"}  # the extent of a stage that says none
+
+
+@dataclass(frozen=True)
+class Step:
+    """One stage, ready to be looked up in the store or run."""
+
+    named: NamedStage
+    sources: Mapping[str, str | None]  # parameter -> label of a stage, or who supplies it
+    body: str | None  # the stage whose Body replaces the pipeline's
+    recording: Recording  # as this stage sees it
+    recipe: Recipe
+    key: str
+
+    @property
+    def label(self) -> str:
+        """What the pipeline calls it."""
+        return self.named.label
+
+    @property
+    def chain(self) -> bool:
+        """True where it goes on frame by frame."""
+        return "checkpoint" in self.sources.values()
+
+    @property
+    def frames(self) -> int:
+        """How many frames a chain has to have."""
+        return len(self.recording.indices)
+
+    @property
+    def stored(self) -> bool:
+        """False for a stage that writes files or compares: it always runs."""
+        made = makes(self.named.stage)
+        return not (isinstance(made, type) and issubclass(made, Files | Evaluation))
+
+
+def steps_of(pipeline: Pipeline, digests: Digests) -> list[Step]:
+    """Return the stages of a pipeline in order, each with its recipe and key."""
+    recording = open_recording(
+        pipeline.recording, start=pipeline.start, stop=pipeline.stop, step=pipeline.step, scale=pipeline.scale
+    )
+    wiring, steps, core = wire(pipeline), dict[str, Step](), digests.core()
+    for named in pipeline.stages:
+        sources, body = wiring[named.label], body_source(pipeline, named.label)
+        chain = "checkpoint" in sources.values()
+        part = replace(recording, indices=_extent(named, recording))
+        recipe: dict[str, Any] = {
+            "format": FORMAT,
+            "core": core,
+            "component": component_recipe(named.stage, pipeline.registry, digests),
+            "inputs": {name: _input(steps[label]) if label in steps else None for name, label in sources.items()},
+        }
+        if "recording" in sources.values():
+            recipe["recording"] = _frames(part, pipeline, chain) | _content(part, digests)
+        if "scene" in sources.values():
+            recipe["scene"] = _scene(pipeline, recording, steps.get(body or ""), digests)
+        files = [path for path in named.stage.inputs(recording.folder) if path.exists()]
+        recipe["files"] = [digests.file(path, path.name) for path in files]
+        steps[named.label] = Step(named, sources, body, part, recipe, key_of(recipe))
+    return list(steps.values())
+
+
+def _extent(named: NamedStage, recording: Recording) -> range:
+    made = makes(named.stage)
+    kinds = [extent for cls, extent in SEEN.items() if isinstance(made, type) and issubclass(made, cls)]
+    extent = named.stage.extent or (kinds[0] if kinds else "run")
+    return {"first": recording.indices[:1], "all": range(recording.length), "run": recording.indices}[extent]
+
+
+def _input(step: Step) -> dict[str, Any]:
+    return {"key": step.key} | ({"frames": step.frames} if step.chain else {})
+
+
+def _frames(part: Recording, pipeline: Pipeline, chain: bool) -> dict[str, Any]:
+    """Return which frames are read; where a chain stops is no matter, it can go on."""
+    indices = part.indices
+    stop = {} if chain else {"stop": indices[-1] + 1}
+    return {
+        "start": indices.start,
+        "step": indices.step if len(indices) > 1 or chain else 1,
+        "scale": repr(pipeline.scale),
+        **stop,
+    }
+
+
+def _content(part: Recording, digests: Digests) -> dict[str, Any]:
+    paths = dict(part.content)
+    if (part.folder / "static").is_dir():
+        paths["static"] = part.folder / "static"
+    return {
+        "content": {name: digests.file(path, name) for name, path in sorted(paths.items())},
+        "reader": digests.package("mocapflow.recording"),
+    }
+
+
+def _scene(pipeline: Pipeline, recording: Recording, body: Step | None, digests: Digests) -> dict[str, Any]:
+    garment = pipeline.garment
+    return {
+        "cameras": {camera.name: _camera(camera) for camera in recording.cameras},
+        "body": _input(body) if body else _asset(pipeline.body, pipeline, digests),
+        "garment": None if garment is None else component_recipe(garment, pipeline.registry, digests),
+    }
+
+
+def _asset(component: Component, pipeline: Pipeline, digests: Digests) -> dict[str, Any]:
+    files = pipeline.body.inputs(pipeline.recording)
+    return component_recipe(component, pipeline.registry, digests) | {
+        "files": [digests.file(path, path.name) for path in files if path.exists()]
+    }
+
+
+def _camera(camera: Camera) -> list[str]:
+    parts = (camera.size, camera.intrinsics, camera.distortion, camera.camera_from_world)
+    return [f"{digest_array(part)} {camera.name}" for part in parts] + [f"fisheye {camera.fisheye}"]

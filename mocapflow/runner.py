@@ -1,0 +1,108 @@
+"""Runs a pipeline: what is in the store is taken from there, what is half done goes on, the rest is computed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mocapflow.errors import StoreError
+from mocapflow.execution import Execution, is_hit
+from mocapflow.keys import explain
+from mocapflow.pipeline import Pipeline
+from mocapflow.recipes import Step, steps_of
+from mocapflow.store import Report, Store
+from mocapflow.wiring import SUPPLIED
+
+
+@dataclass(frozen=True)
+class PlanLine:
+    """What a run would do with one stage, and why."""
+
+    label: str
+    action: str  # hit, resume or run
+    key: str
+    why: str
+    sources: Mapping[str, str | None]  # parameter -> the stage it comes from
+
+    def __str__(self) -> str:
+        supplied = set(SUPPLIED.values())
+        wiring = ", ".join(
+            f"{name} ← {source or 'nothing'}"
+            for name, source in self.sources.items()
+            if source not in supplied and source != name
+        )
+        text = f"{self.label:<12}{self.action:<8}{self.key[:4]}…  {self.why}"
+        return f"{text:<64}{f'({wiring})' if wiring else ''}".rstrip()
+
+
+@dataclass(frozen=True)
+class RunSummary:
+    """What a run did; per stage: label, key, cached, seconds of CPU, wall_seconds."""
+
+    out: Path
+    store: Path
+    stages: tuple[Mapping[str, Any], ...]
+
+    def __str__(self) -> str:
+        spent = ["from the store" if s["cached"] else f"{s['seconds']:.1f} s of CPU" for s in self.stages]
+        lines = [f"{s['label']:<12}{text}" for s, text in zip(self.stages, spent, strict=True)]
+        return "\n".join([*lines, f"results: {self.out}"])
+
+
+def plan(pipeline: Pipeline, *, store: Path) -> list[PlanLine]:
+    """Return for each stage whether its result is there, can be continued, or has to be made, and why."""
+    kept = Store(store)
+    lines = [_plan_line(step, kept) for step in steps_of(pipeline, kept.digests)]
+    kept.digests.save()
+    return lines
+
+
+def run(
+    pipeline: Pipeline, *, store: Path, out: Path, fresh: bool = False, report: Report = lambda line: None
+) -> RunSummary:
+    """Run a pipeline and return what was done.
+
+    Args:
+        pipeline: what to run.
+        store: the folder of cached results.
+        out: the run folder.
+        fresh: compute everything anew.
+        report: told lines of progress.
+
+    Raises:
+        ComponentFailed: a component raised; committed frames are kept.
+        StoreError: the store is full or can't be written; committed frames are kept.
+        MocapflowError: the pipeline or an input is wrong.
+    """
+    kept = Store(store)
+    steps = steps_of(pipeline, kept.digests)
+    kept.create()
+    kept.digests.save()
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        hint = "name another with --out"
+        raise StoreError(f"can't write the run folder: {error.strerror}", where=str(out), hint=hint) from error
+    execution = Execution(pipeline, kept, out, steps, fresh=fresh, report=report)
+    for step in steps:
+        execution.finish(step)
+    return RunSummary(out=out, store=store, stages=tuple(execution.entries.values()))
+
+
+def _plan_line(step: Step, store: Store) -> PlanLine:
+    action, why = _outlook(step, store)
+    return PlanLine(step.label, action, step.key, why, step.sources)
+
+
+def _outlook(step: Step, store: Store) -> tuple[str, str]:
+    if not step.stored:
+        return "run", "writes files or compares: always"
+    found = store.find(step.key)
+    if found is not None and is_hit(step, found):
+        return "hit", f"{step.frames} frames" if step.chain else ""
+    if found is not None and found.frames:
+        return "resume", f"{min(found.frames, step.frames)} of {step.frames} frames done"
+    near = store.nearest(step.label, step.recipe, but=step.key)
+    return "run", f"new: {explain(near.recipe, step.recipe)}" if near else "new"

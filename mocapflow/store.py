@@ -1,0 +1,237 @@
+"""Artifacts in a zarr folder: one group per result, named `<stage>-<key>`, with the recipe it was made by.
+
+A group counts as finished only by its attribute `complete`, never by which chunks exist: a missing chunk reads as
+the fill value.
+"""
+
+from __future__ import annotations
+
+import errno
+import importlib.metadata
+import platform
+import shutil
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mocapflow.digests import Digests
+from mocapflow.errors import StoreError
+from mocapflow.keys import Recipe
+from mocapflow.locks import Lock, acquire
+from mocapflow.rows import Corrupted, read_json, write_json
+
+SHORT = 12  # digits of the key in a group's name
+LIBRARIES = ("mocapflow", "numpy", "scipy", "opencv-python-headless", "numba")
+Report = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Artifact:
+    """One group of the store and its attributes."""
+
+    path: Path
+    attributes: Mapping[str, Any]
+
+    @property
+    def key(self) -> str:
+        """The key it was made under."""
+        return str(self.attributes.get("key", ""))
+
+    @property
+    def recipe(self) -> Recipe:
+        """What it was made from."""
+        return dict(self.attributes.get("recipe", {}))
+
+    @property
+    def complete(self) -> bool:
+        """True where it was written to its end."""
+        return bool(self.attributes.get("complete", False))
+
+    @property
+    def frames(self) -> int:
+        """How many frames are committed; 0 for a result that is no chain of frames."""
+        return int(self.attributes.get("frames_done", 0))
+
+    @property
+    def made_with(self) -> list[tuple[int, dict[str, str]]]:
+        """With which versions it was made: (count of frames, versions), earliest first."""
+        earlier = [(int(count), dict(made)) for count, made in self.attributes.get("earlier_versions", [])]
+        return [*earlier, (self.frames, dict(self.attributes.get("versions", {})))]
+
+
+class Store:
+    """A folder of artifacts."""
+
+    def __init__(self, path: Path) -> None:
+        if "://" in str(path) or ":/" in str(path):
+            raise StoreError(f"the store has to be a folder, not {path}", hint="give --store a path on this machine")
+        self.path = path
+        self._state = path / ".state"
+        self.digests = Digests(self._state / "digests.json")
+
+    def create(self) -> None:
+        """Make the folder, if there is none.
+
+        Raises:
+            StoreError: it can't be written.
+        """
+        with writing(self.path):
+            for folder in (self.path, self._state):
+                folder.mkdir(parents=True, exist_ok=True)
+                if not (folder / "zarr.json").exists():  # also the state is a group, so that zarr lists it calmly
+                    write_json(folder / "zarr.json", group_meta({}))
+
+    def artifacts(self) -> list[Artifact]:
+        """Return what is in the store, oldest first; what can't be read is left out."""
+        found = [a for path in self._groups("*") if (a := _open(path)) is not None]
+        return sorted(found, key=lambda a: str(a.attributes.get("created", "")))
+
+    def find(self, key: str) -> Artifact | None:
+        """Return the artifact made under a key, finished or not."""
+        return next((a for p in self._groups(f"*-{key[:SHORT]}") if (a := _open(p)) is not None and a.key == key), None)
+
+    def nearest(self, label: str, recipe: Recipe, but: str) -> Artifact | None:
+        """Return the newest artifact of the same stage with another key, to say what is different now."""
+        name = recipe["component"]["name"]
+        others = [a for a in self.artifacts() if a.key != but]
+        alike = [a for a in others if a.recipe.get("component", {}).get("name") == name]
+        labelled = [a for a in alike if a.path.name.rpartition("-")[0] == label]
+        return next(reversed(labelled or alike), None)
+
+    @contextmanager
+    def writer(self, key: str, name: str, report: Report) -> Iterator[Lock]:
+        """Hold the right to write the artifact of a key; waits for whoever else is writing it."""
+        with writing(self.path):
+            lock = acquire(self._state / f"{key[:SHORT]}.lock", name, report)
+        try:
+            yield lock
+        finally:
+            lock.release()
+
+    def begin(self, label: str, key: str, recipe: Recipe) -> Artifact:
+        """Return a new, unfinished artifact; what stood in its place is removed."""
+        for old in self._groups(f"*-{key[:SHORT]}"):
+            remove(old)
+        path = self.path / f"{label}-{key[:SHORT]}"
+        attributes = {
+            "key": key, "recipe": recipe, "versions": versions(), "complete": False,
+            "created": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
+        }  # fmt: skip
+        with writing(self.path):
+            path.mkdir(parents=True)
+            write_json(path / "zarr.json", group_meta(attributes))
+        return Artifact(path, attributes)
+
+    def save(self, artifact: Artifact, value: Any) -> Artifact:
+        """Write a record into an artifact and finish it.
+
+        Raises:
+            StoreError: the store is full or can't be written.
+        """
+        import zarr
+
+        from mocapflow.archive import save_record
+
+        with writing(self.path):
+            group = zarr.open_group(str(artifact.path), mode="r+")
+            save_record(group, value)
+            group.update_attributes({"complete": True})
+        return reread(artifact)
+
+    def load(self, artifact: Artifact, frames: int | None = None) -> Any:
+        """Return the record of an artifact, or the first `frames` rows of it.
+
+        Raises:
+            Corrupted: it can't be read back.
+        """
+        import zarr
+
+        from mocapflow.archive import load_record
+
+        try:
+            group = zarr.open_group(str(artifact.path), mode="r")
+        except Exception as error:
+            raise Corrupted(f"{artifact.path} can't be opened: {error}") from error
+        return load_record(group, frames)
+
+    def set_aside(self, path: Path) -> Path:
+        """Move a damaged group out of the way and return its new name."""
+        aside = path.with_name(f"damaged-{path.name}-{time.time_ns()}")
+        with writing(self.path):
+            path.rename(aside)
+        return aside
+
+    def damaged(self, key: str) -> Path | None:
+        """Return the group of a key if even its attributes can't be read."""
+        return next((p for p in self._groups(f"*-{key[:SHORT]}") if _open(p) is None), None)
+
+    def _groups(self, pattern: str) -> list[Path]:
+        return sorted(p for p in self.path.glob(pattern) if p.is_dir() and not p.name.startswith((".", "damaged-")))
+
+
+def group_meta(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the metadata of a zarr group."""
+    return {"attributes": attributes, "zarr_format": 3, "node_type": "group"}
+
+
+def reread(artifact: Artifact) -> Artifact:
+    """Return an artifact with its attributes as they are now."""
+    return Artifact(artifact.path, read_json(artifact.path / "zarr.json").get("attributes", {}))
+
+
+def with_versions(artifact: Artifact) -> Artifact:
+    """Return a chain as it is when it goes on under the versions of now; the next commit writes them down."""
+    now, (count, made) = versions(), artifact.made_with[-1]
+    if made == now:
+        return artifact
+    earlier = [*artifact.attributes.get("earlier_versions", []), [count, made]]
+    return Artifact(artifact.path, {**artifact.attributes, "versions": now, "earlier_versions": earlier})
+
+
+def remove(path: Path) -> None:
+    """Remove a group; its attributes go first, so that a half-removed one never looks whole."""
+    with writing(path.parent):
+        (path / "zarr.json").unlink(missing_ok=True)
+        shutil.rmtree(path)
+
+
+def versions() -> dict[str, str]:
+    """Return the versions a result depends on."""
+    found = {"python": platform.python_version()}
+    for library in LIBRARIES:
+        try:
+            found[library] = importlib.metadata.version(library)
+        except importlib.metadata.PackageNotFoundError:
+            found[library] = "not installed"
+    return found
+
+
+@contextmanager
+def writing(where: Path, saved: str = "") -> Iterator[None]:
+    """Turn what the system says about writing into an error for people.
+
+    Args:
+        where: the store.
+        saved: what is kept in spite of the failure.
+    """
+    try:
+        yield
+    except OSError as error:
+        full = error.errno in {errno.ENOSPC, errno.EDQUOT}
+        message = (
+            f"the store {where} is full" if full else f"can't write to the store {where}: {error.strerror or error}"
+        )
+        todo = "free some space" if full else "make it writable"
+        hint = "\n".join(filter(None, [f"{todo}, or name another with --store", saved]))
+        raise StoreError(message, hint=hint) from error
+
+
+def _open(path: Path) -> Artifact | None:
+    try:
+        attributes = read_json(path / "zarr.json").get("attributes")
+    except StoreError:
+        return None
+    return Artifact(path, attributes) if isinstance(attributes, dict) and "key" in attributes else None

@@ -1,0 +1,178 @@
+"""Stage `coupled_loop`: the frames in order, each from what the one before has left."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from mocapflow.checkpoint import Checkpoint
+from mocapflow.components import ClothFitter, Draper, Matcher, PoseSolver, Predictor, Prior, Segmenter, Stage
+from mocapflow.data import (
+    Background,
+    Change,
+    Cloth,
+    Estimate,
+    Frame,
+    FrameResult,
+    FrameState,
+    Past,
+    Pose,
+    Segmentation,
+    Start,
+    Track,
+    Turn,
+    empty_matches,
+)
+from mocapflow.errors import ComponentFailed
+from mocapflow.keys import FREE
+from mocapflow.loop import Steady, Steps, settle
+from mocapflow.model import ClothedModel
+from mocapflow.recording import Recording
+from mocapflow.records import F64
+from mocapflow.scene import Scene
+from mocapflow.timing import Stopwatch
+
+STEPS = ("decode", "predict", "drape", "segment", "solve", "cloth", "match")
+VIEWS = 2  # fewer than these do not fix a pose in space
+UNKNOWN = np.pi**2  # rad^2 and m^2, the variance where nothing was seen
+
+Positive = Annotated[float, Field(gt=0)]
+Count = Annotated[int, Field(ge=1)]
+
+
+class SteadyState(BaseModel):
+    """When the loop counts as at rest."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    surface_mm: Positive = 0.5
+    angle_deg: Positive = 0.1
+    turns: Count = 2  # in a row within both tolerances
+    max_turns: Count = 8
+
+    def limits(self) -> Steady:
+        """Return the same in metres and radians."""
+        angle = float(np.radians(self.angle_deg))
+        return Steady(surface=self.surface_mm / 1000, angle=angle, turns=self.turns, max_turns=self.max_turns)
+
+
+class CoupledLoop(Stage):
+    """Tracks the person through the recording, saved frame by frame.
+
+    Source: Rosenhahn 2008, Fig. 12.14
+    """
+
+    name: ClassVar[str] = "coupled_loop"
+    predictor: Predictor
+    segmenter: Segmenter
+    matchers: Annotated[tuple[Matcher, ...], Field(min_length=1)]
+    pose_solver: PoseSolver
+    draper: Draper | None = None  # needed with a garment
+    cloth_fitter: ClothFitter | None = None  # none: the garment is draped with the parameters it has
+    priors: tuple[Prior, ...] = ()
+    steady: SteadyState = SteadyState()
+    on_unsteady: Annotated[Literal["go_on", "stop"], FREE] = "go_on"
+
+    def run(
+        self,
+        recording: Recording,
+        start: Start,
+        scene: Scene,
+        checkpoint: Checkpoint,
+        background: Background | None = None,
+    ) -> Track:
+        """Return the track; frames that are already saved are not computed again."""
+        model = ClothedModel(scene=scene.with_background(background), draper=self.draper)
+        past, watch = checkpoint.past(), Stopwatch()
+        for frame in recording.frames(since=checkpoint.next_index):
+            watch.lap("decode")
+            state = self.begin(frame, past, start, model, watch)
+            steps = self.steps if seen(frame) else None
+            result = settle(frame, state, past, steps, model, checkpoint.observe) if steps else lost(frame, state)
+            seconds = {step: watch.seconds.get(step, 0.0) + result.seconds.get(step, 0.0) for step in STEPS}
+            past = checkpoint.commit(frame, past, replace(result, seconds=seconds), notes_on(frame, scene))
+            self.complain(frame, result)
+            watch = Stopwatch()
+        return checkpoint.track()
+
+    @property
+    def steps(self) -> Steps:
+        """The components as the loop takes them."""
+        return Steps(
+            predictor=self.predictor,
+            segmenter=self.segmenter,
+            matchers=self.matchers,
+            pose_solver=self.pose_solver,
+            cloth_fitter=self.cloth_fitter or Unfitted(),
+            priors=self.priors,
+            steady=self.steady.limits(),
+        )
+
+    def begin(self, frame: Frame, past: Past, start: Start, model: ClothedModel, watch: Stopwatch) -> FrameState:
+        """Return what is believed of a frame before looking: the predicted pose, clothed."""
+        pose, parameters = start.pose, start.parameters
+        if past.moments:
+            pose = self.predictor.predict(frame, past, model.scene)
+            parameters = past.moments[-1].cloth.parameters
+        watch.lap("predict")
+        cloth = model.drape(pose, parameters, past)
+        watch.lap("drape")
+        return believed(pose, parameters, cloth)
+
+    def complain(self, frame: Frame, result: FrameResult) -> None:
+        """Stop at a frame that did not settle, if that is wanted."""
+        if self.on_unsteady == "stop" and not result.steady and result.iterations:
+            kind = "swings between two states" if result.oscillating else "did not come to rest"
+            moved = (
+                f"{1000 * result.change.surface:.2f} mm and {np.degrees(result.change.angles):.2f}° in the last turn"
+            )
+            hint = (
+                "the frame is saved; on_unsteady: go_on continues after it, steady: {max_turns: …} gives it more turns"
+            )
+            raise ComponentFailed(f"frame {frame.index} {kind} in {result.iterations} turns: {moved}", hint=hint)
+
+
+class Unfitted(ClothFitter):
+    """Leaves the cloth parameters as they are estimated."""
+
+    name: ClassVar[str] = "none"
+
+    def fit(
+        self, frame: Frame, segmentation: Segmentation, estimate: Estimate, model: ClothedModel, past: Past, turn: Turn
+    ) -> Cloth:
+        """Return the garment draped at the estimated pose."""
+        return model.drape(estimate.pose, estimate.parameters, past)
+
+
+def seen(frame: Frame) -> bool:
+    """True where enough views are usable to fix a pose."""
+    return int(frame.usable.sum()) >= min(VIEWS, len(frame.usable))
+
+
+def believed(pose: Pose, parameters: F64, cloth: Cloth) -> FrameState:
+    """Return the state of a frame nobody has looked at."""
+    covariance = UNKNOWN * np.eye(6 + len(pose.angles) + len(parameters))
+    return FrameState(
+        estimate=Estimate(pose=pose, parameters=parameters, covariance=covariance),
+        cloth=cloth,
+        segmentation=Segmentation(silhouettes=()),
+        matches=empty_matches(),
+    )
+
+
+def lost(frame: Frame, state: FrameState) -> FrameResult:
+    """Return the prediction as the result of a frame that too few cameras have seen."""
+    unseen = np.full(len(frame.usable), np.nan)
+    still = Change(surface=0.0, angles=0.0)
+    return FrameResult(state=state, iterations=0, steady=False, oscillating=False, change=still, overlap=unseen)
+
+
+def notes_on(frame: Frame, scene: Scene) -> Sequence[str]:
+    """Return what went wrong with the views of a frame."""
+    reasons = frame.reasons or ("",) * len(frame.usable)
+    views = zip(scene.cameras, frame.usable, reasons, strict=True)
+    notes = [f"{camera.name} not usable: {reason or 'no image'}" for camera, usable, reason in views if not usable]
+    return notes if seen(frame) else [*notes, f"lost, fewer than {VIEWS} views; the prediction is kept"]
