@@ -66,7 +66,7 @@ class Resolver:
     def file(self, value: str, steps: Steps) -> Path:
         """Return a path written in the file; a relative one starts at the folder of the file."""
         path = Path(value).expanduser()
-        return path if path.is_absolute() else self._document.place(steps).folder / path
+        return self._document.place(steps).folder / path
 
     def _name_and_settings(self, role: str, value: Any, steps: Steps) -> tuple[str, dict[str, Any]]:
         if isinstance(value, str):
@@ -83,7 +83,7 @@ class Resolver:
         if value is None:
             return None
         if base is None:
-            return self.file(value, steps) if isinstance(value, str) and Path in _parts(annotation) else value
+            return self.file(value, steps).absolute() if isinstance(value, str) and Path in _parts(annotation) else value
         if not _takes_several(annotation):
             return self.component(base.role, value, steps)
         if not isinstance(value, list):

@@ -69,7 +69,7 @@ def test_relative_paths_start_at_the_file_they_stand_in(folder, monkeypatch):
     registry = small_plugins.registry()
     pipeline = load_pipeline(Path("../skirt.yaml"), registry, changes=["stages.track.file=a.npz"])
     assert pipeline.recording == Path("../clip")
-    assert pipeline.stages[1].stage.file == Path("a.npz")
+    assert pipeline.stages[1].stage.file == Path("a.npz").absolute()
     changed = load_pipeline(Path("../skirt.yaml"), registry, recording=Path("here"), changes=["garment=null"])
     assert changed.recording == Path("here")
 

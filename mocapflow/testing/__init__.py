@@ -1,0 +1,49 @@
+"""What plugin authors test with: a tiny scene, a check of Jacobians, and conformance tests for every role.
+
+    from mocapflow.testing import GarmentConformance
+
+    class TestCape(GarmentConformance):
+        garment = Cape()
+
+Needs pytest for the conformance classes.
+"""
+
+from __future__ import annotations
+
+from mocapflow.testing.conformance import (
+    BodyConformance,
+    ClothFitterConformance,
+    DraperConformance,
+    GarmentConformance,
+    MatcherConformance,
+    PoseSolverConformance,
+    PredictorConformance,
+    PriorConformance,
+    SegmenterConformance,
+    StageConformance,
+)
+from mocapflow.testing.jacobians import check_jacobian
+from mocapflow.testing.same import assert_pure, same
+from mocapflow.testing.scenes import tiny_body, tiny_frame, tiny_garment, tiny_pose, tiny_scene, tiny_state
+
+__all__ = [
+    "BodyConformance",
+    "ClothFitterConformance",
+    "DraperConformance",
+    "GarmentConformance",
+    "MatcherConformance",
+    "PoseSolverConformance",
+    "PredictorConformance",
+    "PriorConformance",
+    "SegmenterConformance",
+    "StageConformance",
+    "assert_pure",
+    "check_jacobian",
+    "same",
+    "tiny_body",
+    "tiny_frame",
+    "tiny_garment",
+    "tiny_pose",
+    "tiny_scene",
+    "tiny_state",
+]

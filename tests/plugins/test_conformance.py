@@ -1,0 +1,58 @@
+"""Every component of every installed plugin, through the conformance tests of its role."""
+
+import pytest
+
+from mocapflow import testing
+from mocapflow.registry import PROVIDERS, load_registry
+from mocapflow.resolve import Resolver
+from mocapflow.shipped import shipped
+from mocapflow.yamlfile import Document, Place
+
+REGISTRY = load_registry()
+CLIP = shipped("examples", "data", "skirt_steps")
+CONFORMANCE = {
+    "predictor": testing.PredictorConformance,
+    "segmenter": testing.SegmenterConformance,
+    "matcher": testing.MatcherConformance,
+    "pose_solver": testing.PoseSolverConformance,
+    "draper": testing.DraperConformance,
+    "cloth_fitter": testing.ClothFitterConformance,
+    "prior": testing.PriorConformance,
+    "garment": testing.GarmentConformance,
+    "body": testing.BodyConformance,
+    "stage": testing.StageConformance,
+}
+NEEDED = {  # what has no default, as a pipeline would write it; measures fit the tiny body
+    ("garment", "skirt"): dict(
+        waist_height_m=1.05, waist_circumference_m=1.05, hem_circumference_m=1.7, length_m=0.6
+    ),
+    ("garment", "shorts"): dict(
+        waist_height_m=1.05, waist_circumference_m=1.05, hip_circumference_m=1.2, leg_opening_circumference_m=0.8,
+        inseam_m=0.3, length_m=0.6,
+    ),
+    ("garment", "cylinder"): dict(),
+    ("stage", "coupled_loop"): dict(
+        predictor="hold", segmenter="levelset", matchers=["contour_icp"], pose_solver="twist_gauss_newton",
+        cloth_fitter="fixed", priors=["joint_limits"],
+    ),
+}  # fmt: skip
+
+
+def component(role, name):
+    document = Document({}, {(): Place("here", CLIP)})
+    return Resolver(document, REGISTRY).component(role, {"use": name, **NEEDED.get((role, name), {})}, ())
+
+
+for _role in PROVIDERS:
+    for _name in REGISTRY.names(_role):
+        _parts = {_role: property(lambda self, role=_role, name=_name: component(role, name)), "recording": CLIP}
+        globals()[f"Test_{_role}_{_name}"] = type(f"Test_{_role}_{_name}", (CONFORMANCE[_role],), _parts)
+
+
+def test_every_plugin_loads():
+    assert [str(failure) for failure in REGISTRY.failures] == []
+
+
+@pytest.mark.parametrize("role", sorted(set(PROVIDERS) - {"stage"}))
+def test_every_role_is_played(role):
+    assert REGISTRY.names(role)
