@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import shlex
 import sys
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -56,6 +57,11 @@ app.add_typer(cache.app, name="cache")
 
 
 def main() -> None:
-    """Run the command line; warnings of the framework go to stderr."""
+    """Run the command line; warnings go to stderr, one line each."""
+    warnings.showwarning = _show_warning
     logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING, stream=sys.stderr)
     app(prog_name="mocapflow")
+
+
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
+    typer.echo(f"warning: {message}", err=True)

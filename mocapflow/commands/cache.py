@@ -2,15 +2,105 @@
 
 from __future__ import annotations
 
+import json
+from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from mocapflow.errors import StoreError, alternatives
+
+if TYPE_CHECKING:
+    from mocapflow.store import Artifact
+
 app = typer.Typer(help="List, explain and prune cached results.", no_args_is_help=True)
-Store = Annotated[Path, typer.Option(help="The store.")]
+Where = Annotated[Path, typer.Option("--store", help="The store.")]
+DEFAULT = Path("runs/store.zarr")
 
 
 @app.command("list")
-def list_(store: Store = Path("runs/store.zarr")) -> None:
-    """List what is in the store."""
+def list_(store: Where = DEFAULT) -> None:
+    """List what is in the store, oldest first."""
+    for artifact in _artifacts(store):
+        done = "complete" if artifact.complete else "unfinished"
+        frames = f"{artifact.frames} frames" if artifact.frames else ""
+        size = f"{_size(artifact.path) / 1e6:.1f} MB"
+        made = str(artifact.attributes.get("created", ""))
+        typer.echo(f"{artifact.path.name:<32} {done:<11} {frames:<12} {size:>10}  {made}")
+
+
+@app.command()
+def explain(
+    name: Annotated[str, typer.Argument(help="A result as `cache list` shows it, or the beginning of its key.")],
+    other: Annotated[str | None, typer.Argument(help="Say how this one was made differently.")] = None,
+    store: Where = DEFAULT,
+) -> None:
+    """Say what a result was made from, or how two differ."""
+    from mocapflow.keys import explain as differences
+
+    one = _find(name, store)
+    if other is None:
+        typer.echo(json.dumps({**one.recipe, "versions": one.attributes.get("versions")}, indent=1, ensure_ascii=False))
+    else:
+        typer.echo(differences(one.recipe, _find(other, store).recipe) or "made from the same")
+
+
+@app.command()
+def prune(
+    store: Where = DEFAULT,
+    days: Annotated[float | None, typer.Option(help="Remove what was made more than this long ago.")] = None,
+    unfinished: Annotated[bool, typer.Option("--unfinished", help="Remove what was not finished.")] = False,
+    everything: Annotated[bool, typer.Option("--all", help="Remove all.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would be removed.")] = False,
+) -> None:
+    """Remove results; damaged ones that were set aside always go."""
+    from mocapflow.store import remove
+
+    going = [artifact for artifact in _artifacts(store) if everything or _goes(artifact, days, unfinished)]
+    for artifact in filter(_in_use, going):
+        typer.echo(f"kept {artifact.path.name}: a run is writing it", err=True)
+    going = [artifact for artifact in going if not _in_use(artifact)]
+    paths = [artifact.path for artifact in going] + sorted(store.glob("damaged-*"))
+    freed = sum(map(_size, paths))
+    for path in paths:
+        typer.echo(f"{'would remove' if dry_run else 'removed'} {path.name}")
+        if not dry_run:
+            remove(path)
+    typer.echo(f"{len(paths)} results, {freed / 1e6:.1f} MB")
+
+
+def _goes(artifact: Artifact, days: float | None, unfinished: bool) -> bool:
+    if unfinished and not artifact.complete:
+        return True
+    if days is None:
+        return False
+    made = datetime.fromisoformat(str(artifact.attributes["created"]))
+    return datetime.now(made.tzinfo) - made > timedelta(days=days)
+
+
+def _in_use(artifact: Artifact) -> bool:
+    from mocapflow.store import SHORT
+
+    return (artifact.path.parent / ".state" / f"{artifact.key[:SHORT]}.lock").exists()
+
+
+def _artifacts(store: Path) -> list[Artifact]:
+    from mocapflow.store import Store
+
+    if not store.is_dir():
+        raise StoreError("there is no store here", where=str(store), hint="--store names another")
+    return Store(store).artifacts()
+
+
+def _find(name: str, store: Path) -> Artifact:
+    artifacts = _artifacts(store)
+    found = [artifact for artifact in artifacts if artifact.path.name == name or artifact.key.startswith(name)]
+    if len(found) != 1:
+        message = f"'{name}' is {'more than one result' if found else 'no result'} of this store"
+        raise StoreError(message, where=str(store), hint=alternatives(name, [a.path.name for a in found or artifacts]))
+    return found[0]
+
+
+def _size(path: Path) -> int:
+    return sum(file.stat().st_size for file in path.rglob("*") if file.is_file())

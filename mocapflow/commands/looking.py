@@ -56,10 +56,10 @@ def doctor(recording: Annotated[Path, typer.Argument(metavar="DIR", help="A reco
     """Check a recording folder and say what to mend."""
     from mocapflow.doctor import examine
 
-    findings = list(examine(recording))
+    findings = examine(recording)
     for finding in findings:
-        typer.echo(finding)
-    if any(getattr(finding, "level", "") == "error" for finding in findings):
-        raise RecordingError("this recording can't be used as it is", where=str(recording))
-    if not findings:
-        typer.echo(f"{recording}: nothing to mend")
+        place = f"{finding.where}  " if finding.where else ""
+        typer.echo("\n       ".join([f"{finding.severity}: {place}{finding.message}", *finding.hint.splitlines()]))
+    if any(finding.severity == "error" for finding in findings):
+        raise typer.Exit(RecordingError.exit_status)
+    typer.echo(f"{recording}: {'can be used' if findings else 'nothing to mend'}")

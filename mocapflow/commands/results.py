@@ -7,22 +7,49 @@ from typing import Annotated
 
 import typer
 
-from mocapflow.errors import PipelineError
+from mocapflow.commands.again import recall
+from mocapflow.errors import RecordingError
 
 Run = Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")]
+Truth = Annotated[Path | None, typer.Option(help="Angles to compare with.  [default: those of the recording]")]
+Format = Annotated[list[str], typer.Option("--format", help="csv, mot or trc; repeatable.")]
 
 
-def evaluate(
-    run: Run,
-    truth: Annotated[Path | None, typer.Option(help="What to compare with. [default: that of the recording]")] = None,
-) -> None:
+def evaluate(run: Run, truth: Truth = None) -> None:
     """Compare the joint angles of a run with known ones."""
-    raise PipelineError("not there yet", where=str(run))
+    reference = truth or recall(run).load().recording / "truth" / "angles.csv"
+    if not reference.is_file():
+        hint = "name a file of known angles with --truth"
+        raise RecordingError("there is nothing to compare with", where=str(reference), hint=hint)
+    from mocapflow_sequence.evaluate import evaluate_run
+
+    evaluation = evaluate_run(run, reference)
+    if not evaluation.rows:
+        raise RecordingError(evaluation.note, where=str(reference))
+    typer.echo(f"compared with {evaluation.reference}")
+    typer.echo(table([dict(row) for row in evaluation.rows]))
 
 
-def export(
-    run: Run,
-    format_: Annotated[str, typer.Option("--format", help="csv, mot, trc")] = "csv",
-) -> None:
-    """Write the track of a run in another format."""
-    raise PipelineError("not there yet", where=str(run))
+def export(run: Run, format_: Format) -> None:
+    """Write the track of a run in other formats, into the run folder."""
+    from mocapflow.commands.running import execute
+    from mocapflow.data import Evaluation, Files
+    from mocapflow.wiring import makes
+
+    invocation = recall(run)
+    writers = [named for named in invocation.load().stages if issubclass(makes(named.stage), Files | Evaluation)]
+    silent = [f"stages.{named.label}=null" for named in writers]
+    wanted = f"stages.export={{use: export, formats: [{', '.join(format_)}]}}"
+    typer.echo(execute(invocation.changed(*silent, wanted), run, fresh=False))
+
+
+def table(rows: list[dict[str, object]]) -> str:
+    """Return rows as text in columns."""
+    names = list(rows[0])
+    cells = [names, *([_cell(row[name]) for name in names] for row in rows)]
+    widths = [max(len(line[k]) for line in cells) for k in range(len(names))]
+    return "\n".join("  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True)) for line in cells)
+
+
+def _cell(value: object) -> str:
+    return f"{value:.2f}" if isinstance(value, float) else str(value)

@@ -21,14 +21,13 @@ def same(one: Any, other: Any) -> bool:
     if type(one) is not type(other):
         return False
     if dataclasses.is_dataclass(one):
-        return all(same(getattr(one, f.name), getattr(other, f.name)) for f in dataclasses.fields(one))
+        fields = [field.name for field in dataclasses.fields(one)]
+        return all(same(getattr(one, name), getattr(other, name)) for name in fields)
     if isinstance(one, Mapping):
         return one.keys() == other.keys() and all(same(value, other[key]) for key, value in one.items())
     if isinstance(one, Sequence) and not isinstance(one, str | bytes):
         return len(one) == len(other) and all(map(same, one, other))
-    if isinstance(one, float):
-        return same(np.array(one), np.array(other))
-    return bool(one == other)
+    return same(np.array(one), np.array(other)) if isinstance(one, float) else bool(one == other)
 
 
 def assert_pure(function: Callable[..., Any], *arguments: Any) -> Any:

@@ -1,0 +1,76 @@
+"""What a run folder remembers of its command, so that `status` and `export` can come back to it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mocapflow.errors import PipelineError, StoreError
+
+if TYPE_CHECKING:
+    from mocapflow.pipeline import Pipeline
+
+FILE = "command.json"
+
+
+@dataclass(frozen=True)
+class Invocation:
+    """The arguments of a run; paths are absolute."""
+
+    pipeline: str
+    recording: str | None
+    changes: tuple[str, ...]
+    frames: str | None
+    store: str
+
+    def load(self) -> Pipeline:
+        """Return the pipeline."""
+        from mocapflow.pipeline import load_pipeline
+
+        recording = Path(self.recording) if self.recording else None
+        frames = parse_frames(self.frames)
+        return load_pipeline(Path(self.pipeline), recording=recording, changes=self.changes, frames=frames)
+
+    def changed(self, *changes: str) -> Invocation:
+        """Return the same with more changes on top."""
+        return replace(self, changes=(*self.changes, *changes))
+
+
+def remember(invocation: Invocation, out: Path) -> None:
+    """Write an invocation into its run folder."""
+    absolute = replace(
+        invocation,
+        pipeline=str(Path(invocation.pipeline).absolute()),
+        recording=invocation.recording and str(Path(invocation.recording).absolute()),
+        store=str(Path(invocation.store).absolute()),
+    )
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        (out / FILE).write_text(json.dumps(asdict(absolute), indent=1) + "\n", encoding="utf-8")
+    except OSError as error:
+        hint = "name another with --out"
+        raise StoreError(f"can't write the run folder: {error.strerror}", where=str(out), hint=hint) from None
+
+
+def recall(out: Path) -> Invocation:
+    """Return the invocation a run folder was made by."""
+    try:
+        said = json.loads((out / FILE).read_text(encoding="utf-8"))
+        return Invocation(**{**said, "changes": tuple(said["changes"])})
+    except FileNotFoundError:
+        hint = f"a run folder is what `mocapflow run` writes; it holds {FILE}"
+        raise PipelineError("this is no run folder", where=str(out), hint=hint) from None
+    except (ValueError, TypeError, KeyError):
+        raise PipelineError("this file is damaged", where=str(out / FILE), hint="run the pipeline again") from None
+
+
+def parse_frames(text: str | None) -> slice | None:
+    """Return the frames of `A:B` or `A:B:STEP`."""
+    if text is None:
+        return None
+    parts = text.split(":")
+    if len(parts) not in {2, 3} or not all(part.isdecimal() or not part for part in parts):
+        raise PipelineError("frames are written A:B or A:B:STEP; either end may be left out", where=f"--frames {text}")
+    return slice(*(int(part) if part else None for part in parts))
