@@ -1,1 +1,16 @@
-"""Built-in plugin."""
+"""Segmenters: the chapter's level set, the difference to the empty scene, and grabCut for comparison."""
+
+from __future__ import annotations
+
+from mocapflow.components import Segmenter
+from mocapflow.hookspecs import hookimpl
+
+
+@hookimpl
+def mocapflow_segmenters() -> list[type[Segmenter]]:
+    """Return the segmenters of this package."""
+    from mocapflow_levelset.background import BackgroundDifference
+    from mocapflow_levelset.grabcut import GrabCut
+    from mocapflow_levelset.levelset import LevelSet
+
+    return [LevelSet, BackgroundDifference, GrabCut]

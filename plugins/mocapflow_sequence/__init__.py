@@ -10,6 +10,7 @@ from mocapflow.hookspecs import hookimpl
 def mocapflow_stages() -> list[type[Stage]]:
     """Return the stages of this package."""
     from mocapflow.track import CoupledLoop
+    from mocapflow_sequence.background import EmptyScene
     from mocapflow_sequence.start_from_file import StartFromFile
 
-    return [CoupledLoop, StartFromFile]
+    return [EmptyScene, CoupledLoop, StartFromFile]

@@ -1,0 +1,132 @@
+"""The simple segmenter: what differs from the empty scene and is not its shadow is the person."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from mocapflow.components import Segmenter
+from mocapflow.data import Background, Frame, FrameState, Past, Segmentation, Silhouette, Turn
+from mocapflow.errors import RecordingError
+from mocapflow.geometry.silhouettes import model_distance
+from mocapflow.records import F32, U8, Bool
+from mocapflow.scene import Scene
+from mocapflow_levelset.channels import ChannelName, features
+from mocapflow_levelset.evolve import Rhythm, Weights
+from mocapflow_levelset.masks import counted
+from mocapflow_levelset.plates import Shadow, first_lab, log_density, plate_from
+from mocapflow_levelset.redistance import redistance
+from mocapflow_levelset.statistics import Window
+from mocapflow_levelset.view import Level, Method, View, find
+
+PERSON = "person"
+CHANNELS: tuple[ChannelName, ...] = ("lab",)
+
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
+Count = Annotated[int, Field(ge=0)]
+
+
+class BackgroundDifference(Segmenter):
+    """Difference to the empty scene: a neutral, limited darkening is a shadow, any other change the person.
+
+    The boundary is then refined to sub-pixels by a few level-set steps, the person's colours against the plate.
+    """
+
+    name: ClassVar[str] = "background"
+
+    spread_floor: Positive = 0.012  # smallest standard deviation of the empty scene, share of the range
+    shadow_share: Annotated[float, Field(ge=0, lt=1)] = 0.2  # of the background; 0: shadows count as the person
+    darkest_shadow: Annotated[float, Field(gt=0, lt=1)] = 0.5  # factor of L + 16, a and b in the deepest shadow
+    shadow_chroma: Positive = 0.005  # how far a shadow may be off the plate's chromaticity, share of the range
+    smooth_px: Positive = 1.0  # of the evidence before it is cut
+    hole_px: Count = 120  # holes up to this area are filled, in square px
+    reach_px: NonNegative = 60.0  # parts further from the projected model than this are someone else; 0: keep all
+    smallest_part: Annotated[float, Field(ge=0, le=1)] = 0.01  # of the largest part's area; smaller parts are noise
+    refine_steps: Count = 6
+    length_weight: NonNegative = 0.5
+    band_px: Annotated[float, Field(ge=8)] = 12.0
+
+    def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
+        """Return the person's silhouette in each usable view.
+
+        Raises:
+            RecordingError: the scene's background is not known.
+        """
+        if scene.background is None:
+            raise RecordingError(
+                "the segmenter 'background' needs the empty scene, and none is known",
+                hint="put the stage 'background' before 'track', or choose the segmenter 'levelset'",
+            )
+        surface = scene.surface(state.estimate.pose, state.cloth)
+        silhouettes = []
+        for c, camera in enumerate(scene.cameras):
+            if not frame.usable[c]:
+                continue
+            model = model_distance(surface, camera, self.band_px)
+            distance = self.find(frame.images[c], model, scene.background, c)
+            silhouettes.append(Silhouette(camera=c, layer=PERSON, distance=distance))
+        return Segmentation(silhouettes=tuple(silhouettes))
+
+    def find(self, image: U8, model: F32, background: Background, camera: int) -> F32:
+        """Return the signed distance (H, W) px to the person's outline in one image.
+
+        Args:
+            image: (H, W, 3) BGR.
+            model: (H, W) px, signed distance to the projected model's outline; only tells the person from others.
+            background: the empty scene.
+            camera: which of its views.
+        """
+        plate = background.mean[camera], background.spread[camera]
+        start = self._start(image, model, plate)
+        if not self.refine_steps:
+            return redistance(start, self.band_px)
+        view = View(image, np.clip(start, -self.band_px, self.band_px), start, counted(start.shape, 0), plate)
+        levels = [Level(1, Rhythm(self.refine_steps, 3, 3))]
+        return find(view, levels, self._method(), self.band_px).level
+
+    def _start(self, image: U8, model: F32, plate: tuple[F32, F32]) -> F32:
+        """Return a level set (H, W), not a distance: positive where the image is unlike the plate."""
+        import cv2
+
+        empty = plate_from(plate[0], plate[1], CHANNELS, self.spread_floor)
+        calm = cv2.GaussianBlur(image, (0, 0), self.smooth_px)
+        density = log_density(features(np.asarray(calm, np.uint8), CHANNELS), empty, self._shadow())
+        change = cv2.GaussianBlur(np.clip(-density, -6, 6), (0, 0), self.smooth_px)
+        kept = self._person(change > 0, model)
+        return np.where(kept, np.maximum(change, 0.1), np.minimum(change, -0.1)).astype(np.float32)
+
+    def _person(self, changed: Bool, model: F32) -> Bool:
+        """Return the changed parts that are large and near the model, their small holes filled."""
+        import cv2
+
+        filled = cv2.morphologyEx(changed.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8))
+        count, label, stats, _ = cv2.connectedComponentsWithStats(filled, connectivity=4)
+        area = stats[:, cv2.CC_STAT_AREA].astype(float)
+        area[0] = 0
+        if self.reach_px and (model > 0).any():
+            away = cv2.distanceTransform((model <= 0).astype(np.uint8), cv2.DIST_L2, 3)
+            near = np.unique(label[away <= self.reach_px])
+            area[np.setdiff1d(np.arange(count), near)] = 0
+        person = (area >= max(self.smallest_part * area.max(), 1))[label]
+        count, label, stats, _ = cv2.connectedComponentsWithStats((~person).astype(np.uint8), connectivity=8)
+        small = stats[:, cv2.CC_STAT_AREA] <= self.hole_px
+        small[0] = False
+        kept: Bool = person | small[label]
+        return kept
+
+    def _shadow(self) -> Shadow:
+        return Shadow(self.shadow_share, self.darkest_shadow, self.shadow_chroma, -6.0, first_lab(CHANNELS))
+
+    def _method(self) -> Method:
+        return Method(
+            channels=CHANNELS,
+            median_px=0,
+            window=Window(12.0, 4, 0.02),
+            weights=Weights(1.5, self.length_weight, 0.0, 6.0, 1.0, self.band_px),
+            shadow=self._shadow(),
+            spread_floor=self.spread_floor,
+            margin_px=40,
+        )

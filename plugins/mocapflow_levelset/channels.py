@@ -1,0 +1,62 @@
+"""Feature channels of an image: grey, CIELAB and texture, each scaled to [0, 1] and treated as independent."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+
+from mocapflow.records import F32, U8
+
+ChannelName = Literal["grey", "lab", "texture"]
+TEXTURE_SCALE_PX = 2.0  # smoothing of the structure tensor
+
+
+def features(image: U8, channels: Sequence[ChannelName], median_px: int = 0) -> F32:
+    """Return the channels of a BGR image (H, W, 3) as (C, H, W) in [0, 1].
+
+    Args:
+        image: (H, W, 3) BGR grey levels.
+        channels: which channels, in order; lab gives three, texture gives three.
+        median_px: odd width in px of a median filter applied first, against pixels of no meaning; 0 for none.
+    """
+    import cv2
+
+    if median_px > 1:
+        image = _median(image, median_px)
+    parts: list[F32] = []
+    for name in channels:
+        if name == "grey":
+            parts.append(_scaled(np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)[..., None]))
+        elif name == "lab":
+            parts.append(_scaled(np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2LAB), np.uint8)))
+        else:
+            parts.append(_texture(image))
+    return np.concatenate(parts) if len(parts) > 1 else parts[0]
+
+
+def _scaled(planes: U8) -> F32:
+    """Return interleaved grey levels (H, W, C) as separate planes (C, H, W) in [0, 1]."""
+    return np.multiply(planes.transpose(2, 0, 1), np.float32(1 / 255), dtype=np.float32, order="C")
+
+
+def _median(image: U8, width: int) -> U8:
+    import cv2
+
+    return np.asarray(cv2.medianBlur(np.ascontiguousarray(image), width), np.uint8)
+
+
+def _texture(image: U8) -> F32:
+    """Return the square root of the smoothed structure tensor, summed over colour: |Ix|, |Iy| and signed Ix Iy."""
+    import cv2
+
+    colour = image.astype(np.float32) / np.float32(255)
+    dx, dy = cv2.Sobel(colour, cv2.CV_32F, 1, 0, scale=0.125), cv2.Sobel(colour, cv2.CV_32F, 0, 1, scale=0.125)
+    tensor = np.stack([(dx * dx).sum(axis=2), (dy * dy).sum(axis=2), (dx * dy).sum(axis=2)])
+    smooth = np.stack([cv2.GaussianBlur(entry, (0, 0), TEXTURE_SCALE_PX) for entry in tensor])
+    # roots make the entries amplitudes, so that they are comparable with grey levels; 2 fills the range
+    roots = np.sign(smooth) * np.sqrt(np.abs(smooth)) * 2
+    roots[2] = 0.5 + 0.5 * roots[2]
+    texture: F32 = np.clip(roots, 0, 1).astype(np.float32)
+    return texture

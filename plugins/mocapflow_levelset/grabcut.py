@@ -1,0 +1,72 @@
+"""cv2.grabCut as a segmenter: the usual alternative, for comparison."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from mocapflow.components import Segmenter
+from mocapflow.data import Frame, FrameState, Past, Segmentation, Silhouette, Turn
+from mocapflow.geometry.silhouettes import model_distance
+from mocapflow.records import F32, U8
+from mocapflow.scene import Scene
+from mocapflow_levelset import crops
+from mocapflow_levelset.redistance import redistance
+
+PERSON = "person"
+
+
+class GrabCut(Segmenter):
+    """Colour mixtures and a graph cut; certain outside and inside a band around the projected model.
+
+    Its contour is that of a mask, so it is only good to about half a pixel.
+    """
+
+    name: ClassVar[str] = "grabcut"
+
+    iterations: Annotated[int, Field(gt=0)] = 2
+    unsure_px: Annotated[float, Field(gt=0)] = 15.0  # half width of the band that is left to the cut
+    margin_px: Annotated[int, Field(gt=0)] = 60  # of the crop around the model
+    band_px: Annotated[float, Field(ge=8)] = 12.0
+
+    def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
+        """Return the person's silhouette in each usable view."""
+        surface = scene.surface(state.estimate.pose, state.cloth)
+        reach = max(self.band_px, self.unsure_px + 1)
+        silhouettes = []
+        for c, camera in enumerate(scene.cameras):
+            if not frame.usable[c]:
+                continue
+            distance = self.find(frame.images[c], model_distance(surface, camera, reach))
+            silhouettes.append(Silhouette(camera=c, layer=PERSON, distance=distance))
+        return Segmentation(silhouettes=tuple(silhouettes))
+
+    def find(self, image: U8, model: F32) -> F32:
+        """Return the signed distance (H, W) px to the person's outline, from the model's signed distance (H, W)."""
+        import cv2
+
+        distance = np.full(model.shape, -self.band_px, np.float32)
+        crop = crops.around(model, self.margin_px, 1)
+        if crop is None:
+            return distance
+        near = crop.of(model)
+        labels = np.where(near > 0, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
+        labels[near > self.unsure_px] = cv2.GC_FGD
+        labels[near < -self.unsure_px] = cv2.GC_BGD
+        if self._decidable(labels):
+            mixtures = np.zeros((1, 65)), np.zeros((1, 65))
+            cv2.setRNGSeed(0)  # the mixtures start from random clusters; a run must repeat exactly
+            picture = np.ascontiguousarray(crop.of_grey_levels(image))
+            cv2.grabCut(picture, labels, None, *mixtures, self.iterations, cv2.GC_INIT_WITH_MASK)  # type: ignore[call-overload]
+        person = (labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)
+        crop.of(distance)[:] = redistance(np.where(person, np.float32(1), np.float32(-1)), self.band_px)
+        return distance
+
+    def _decidable(self, labels: U8) -> bool:
+        """True where both regions have pixels to learn colours from."""
+        import cv2
+
+        inside = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
+        return bool(inside.any() and not inside.all())

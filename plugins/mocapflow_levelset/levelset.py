@@ -1,0 +1,121 @@
+"""The chapter's segmenter: a level set that maximises the posterior of two regions and keeps near the model."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+from pydantic import Field
+
+from mocapflow.components import Segmenter
+from mocapflow.data import Frame, FrameState, Past, Segmentation, Silhouette, Turn
+from mocapflow.geometry.silhouettes import model_distance
+from mocapflow.records import F32
+from mocapflow.scene import Scene
+from mocapflow_levelset.channels import ChannelName
+from mocapflow_levelset.evolve import Rhythm, Weights
+from mocapflow_levelset.masks import counted, without_cut
+from mocapflow_levelset.plates import Shadow, first_lab
+from mocapflow_levelset.statistics import Window
+from mocapflow_levelset.view import Level, Method, View, find
+
+Count = Annotated[int, Field(gt=0)]
+NonNegativeCount = Annotated[int, Field(ge=0)]
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
+Share = Annotated[float, Field(ge=0, lt=1)]
+
+PERSON = "person"
+
+
+class LevelSet(Segmenter):
+    """Region-based level set (12.1) with the projected model as shape prior (12.9), descended by (12.10).
+
+    The chapter's own settings: `use_background: false`, `coarse_steps: 0`, `cell_px: 1`, `steps: 50`,
+    `statistics_every: 1`; `shape_weight: 0` uncouples it from the model.
+    """
+
+    name: ClassVar[str] = "levelset"
+
+    channels: tuple[ChannelName, ...] = Field(("lab",), min_length=1)  # independent, their likelihoods add
+    rho_px: Positive = 12.0  # Gaussian window of the local statistics; inf: one Gaussian per region
+    cell_px: Count = 4  # the statistics are summed over cells of this size
+    variance_floor: Positive = 0.02  # smallest standard deviation, share of a channel's range
+    sigma_px: Positive = 1.5  # width of the smooth step
+    length_weight: NonNegative = 0.5  # nu
+    shape_weight: NonNegative = 0.05  # lambda: 0.05 clean, 0.1 with occlusion, 0.1-0.3 in heavy noise, 0 uncoupled
+    ratio_clip: Positive = 6.0  # bound on log p1/p2
+    time_step: Positive = 1.0
+    coarse_factor: Count = 4
+    coarse_steps: NonNegativeCount = 8  # on the first turn, at 1 / coarse_factor of the size
+    steps: Count = 12  # on the first turn
+    later_steps: Count = 5  # on later turns, from the last turn's contour
+    statistics_every: Count = 3  # steps
+    redistance_every: Count = 3  # steps
+    band_px: Annotated[float, Field(ge=8)] = 12.0
+    median_px: NonNegativeCount = 0  # median filter against pixels of no meaning, e.g. 9; 0: none
+    border_px: NonNegativeCount = 3  # left out at the image's border
+    margin_px: Count = 40  # of the crop around the start contour
+    use_background: bool = True  # take the outside's density from the empty scene, where it is known
+    spread_floor: Positive = 0.012  # smallest standard deviation of the empty scene, share of the range
+    shadow_share: Share = 0.2  # of the background; 0: shadows count as changes
+    darkest_shadow: Annotated[float, Field(gt=0, lt=1)] = 0.5  # factor of L + 16, a and b in the deepest shadow
+    shadow_chroma: Positive = 0.005  # how far a shadow may be off the plate's chromaticity, share of the range
+    stranger: float = -6.0  # log density below which no region calls a pixel more unlikely
+
+    def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
+        """Return the person's silhouette in each usable view.
+
+        The first turn starts from the projected model, later turns from the last turn's silhouettes.
+
+        Source: Rosenhahn 2008, Eq. (12.1), (12.9) and (12.10)
+        """
+        surface = scene.surface(state.estimate.pose, state.cloth)
+        last = {s.camera: s.distance for s in state.segmentation.silhouettes if s.layer == PERSON}
+        silhouettes: list[Silhouette] = []
+        energies: dict[str, float] = {}
+        for c, camera in enumerate(scene.cameras):
+            if not frame.usable[c]:
+                continue
+            model = model_distance(surface, camera, self.band_px)
+            warm = turn.index > 0 and c in last
+            view = View(
+                image=frame.images[c],
+                start=last[c] if warm else model,
+                prior=model,
+                counted=without_cut(counted(model.shape, self.border_px), model, scene.body, surface, camera),
+                plate=self._plate(scene, c),
+            )
+            found = find(view, self._levels(warm), self._method(), self.band_px)
+            silhouettes.append(Silhouette(camera=c, layer=PERSON, distance=found.level))
+            terms = {"data": found.data, "length": found.length, "shape": found.shape}
+            energies |= {f"{camera.name}.{term}": value for term, value in terms.items()}
+        return Segmentation(silhouettes=tuple(silhouettes), energies=energies)
+
+    def _plate(self, scene: Scene, camera: int) -> tuple[F32, F32] | None:
+        if scene.background is None or not self.use_background:
+            return None
+        return scene.background.mean[camera], scene.background.spread[camera]
+
+    def _levels(self, warm: bool) -> list[Level]:
+        fine = Level(1, self._rhythm(self.later_steps if warm else self.steps))
+        if warm or not self.coarse_steps or self.coarse_factor == 1:
+            return [fine]
+        return [Level(self.coarse_factor, self._rhythm(self.coarse_steps)), fine]
+
+    def _rhythm(self, steps: int) -> Rhythm:
+        return Rhythm(steps, self.statistics_every, self.redistance_every)
+
+    def _method(self) -> Method:
+        return Method(
+            channels=self.channels,
+            median_px=self.median_px,
+            window=Window(self.rho_px, self.cell_px, self.variance_floor),
+            weights=Weights(
+                self.sigma_px, self.length_weight, self.shape_weight, self.ratio_clip, self.time_step, self.band_px
+            ),
+            shadow=Shadow(
+                self.shadow_share, self.darkest_shadow, self.shadow_chroma, self.stranger, first_lab(self.channels)
+            ),
+            spread_floor=self.spread_floor,
+            margin_px=self.margin_px,
+        )

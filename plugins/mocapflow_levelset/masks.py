@@ -1,0 +1,44 @@
+"""Which pixels count: not the border of the image, and not what continues beyond the model's cut edge."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mocapflow.data import Body, Camera, Surface
+from mocapflow.geometry.cameras import project
+from mocapflow.records import F32
+
+RIM_TOLERANCE_PX = 1.5  # a pixel whose distances to rim and outline agree this well lies beyond the rim
+
+
+def counted(shape: tuple[int, int], border_px: int) -> F32:
+    """Return 1 for the pixels of an image (H, W) that count and 0 for its border."""
+    weight = np.zeros(shape, np.float32)
+    weight[border_px : shape[0] - border_px, border_px : shape[1] - border_px] = 1
+    return weight
+
+
+def without_cut(weight: F32, model: F32, body: Body, surface: Surface, camera: Camera) -> F32:
+    """Return the weight (H, W) with 0 where the nearest part of the model's outline is its cut edge.
+
+    There the person goes on although the model ends, so the image must not pull at the contour.
+
+    Args:
+        weight: (H, W) 1 where a pixel counts.
+        model: (H, W) signed distance to the model's outline, positive inside.
+        body: knows which vertices lie on the rim.
+        surface: the posed mesh, body vertices first.
+        camera: the view, without distortion.
+    """
+    import cv2
+
+    if not body.cut.any():
+        return weight
+    pixels = project(surface.vertices[: len(body.vertices)][body.cut], camera)
+    hull = cv2.convexHull(pixels[np.isfinite(pixels).all(axis=1)].astype(np.float32))
+    off_rim = np.ones(weight.shape, np.uint8)
+    cv2.fillConvexPoly(off_rim, np.rint(hull).astype(np.int32), 0)
+    to_rim = cv2.distanceTransform(off_rim, cv2.DIST_L2, 5)
+    to_model = cv2.distanceTransform((model <= 0).astype(np.uint8), cv2.DIST_L2, 5)
+    depth = np.where(model > 0, np.abs(model), to_model)
+    return np.where(to_rim <= depth + RIM_TOLERANCE_PX, np.float32(0), weight)

@@ -1,0 +1,165 @@
+"""Local Gaussian statistics of two regions: every pixel has its own mean and variance per channel and region.
+
+Sums are taken over square cells, smoothed with the Gaussian window on the grid of cells, and interpolated where a
+pixel needs them. With cells of one pixel this is the windowed statistic of the chapter exactly.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from mocapflow.records import F32
+
+STEP_RANGE = 4.5  # sigmas beyond which the smooth step counts as 0 or 1
+STEP_BINS = 512
+FAINT = 1e-3  # share of the window below which a region takes its global statistics
+TRUNCATE = 3.0  # sigmas of the Gaussian window
+
+
+class Window(NamedTuple):
+    """How local the statistics are."""
+
+    rho_px: float  # standard deviation of the Gaussian window; inf: one Gaussian per region
+    cell_px: int  # edge of the cells the sums are taken over
+    floor: float  # smallest standard deviation, as a share of the channel's range
+
+
+def step_table(sigma_px: float) -> F32:
+    """Return the smooth step sampled from -STEP_RANGE to STEP_RANGE sigmas, for interpolation in kernels."""
+    from scipy.special import erf
+
+    scaled = np.linspace(-STEP_RANGE, STEP_RANGE, STEP_BINS + 1)
+    table = 0.5 * (1 + erf(scaled / np.sqrt(2)))
+    table[0], table[-1] = 0, 1
+    result: F32 = table.astype(np.float32)
+    return result
+
+
+def totals(features: F32, weight: F32, cell_px: int) -> F32:
+    """Return sums of weight, weight F and weight F^2 per cell, (h, w, 1 + 2 C), from features (C, H, W)."""
+    sums: F32 = _totals(features, weight, cell_px)
+    return sums
+
+
+def local_gaussians(features: F32, weight: F32, level: F32, sums: F32, window: Window, sigma_px: float) -> F32:
+    """Return the Gaussians of both regions per cell, (h, w, 2, 1 + 2 C): log norm, means, 1 / (2 variance).
+
+    Region 0 is the inside of the level set, weighted with the smooth step; region 1 is the outside.
+
+    Args:
+        features: (C, H, W) in [0, 1].
+        weight: (H, W) 1 where a pixel counts, 0 where it is masked.
+        level: (H, W) px, a signed distance (clipped is fine), positive inside.
+        sums: what `totals` returned for these features.
+        window: how local.
+        sigma_px: width of the smooth step.
+
+    Source: Rosenhahn 2008, section 12.2.1 (local Gaussian region model)
+    """
+    inside = _inside_sums(features, weight, level, sums, window.cell_px, step_table(sigma_px), sigma_px)
+    both = np.concatenate([inside, sums - inside], axis=2)
+    everywhere = both.reshape(-1, both.shape[2]).sum(axis=0, dtype=np.float64).astype(np.float32)
+    smooth = _smooth(both, window)
+    scale, floor = np.float32(1 / window.cell_px**2), np.float32(window.floor**2)
+    gaussians: F32 = _gaussians(smooth, everywhere, scale, floor)
+    return gaussians
+
+
+def _smooth(sums: F32, window: Window) -> F32:
+    """Return the sums seen through the Gaussian window (h, w, K); nothing lies beyond the border."""
+    import cv2
+
+    if not np.isfinite(window.rho_px):
+        return np.zeros_like(sums)  # no local weight: the global statistics take over
+    sigma = window.rho_px / window.cell_px
+    radius = int(np.ceil(TRUNCATE * sigma))
+    kernel = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
+    kernel = (kernel / kernel.sum()).astype(np.float32)
+    padded = np.pad(sums, ((1, 1), (1, 1), (0, 0)))  # replicating this rim continues with zeros
+    smooth = cv2.sepFilter2D(padded, cv2.CV_32F, kernel, kernel, borderType=cv2.BORDER_REPLICATE)
+    return np.ascontiguousarray(smooth[1:-1, 1:-1])
+
+
+@numba.njit(cache=True)
+def _totals(features, weight, cell):  # type: ignore[no-untyped-def]
+    channels, height, width = features.shape
+    rows, columns = (height + cell - 1) // cell, (width + cell - 1) // cell
+    sums = np.zeros((rows, columns, 1 + 2 * channels), np.float32)
+    for y in range(height):
+        row = sums[y // cell]
+        for x in range(width):
+            row[x // cell, 0] += weight[y, x]
+        for c in range(channels):
+            line = features[c, y]
+            for x in range(width):
+                value = weight[y, x] * line[x]
+                row[x // cell, 1 + c] += value
+                row[x // cell, 1 + channels + c] += value * line[x]
+    return sums
+
+
+@numba.njit(cache=True)
+def _inside_sums(features, weight, level, sums, cell, table, sigma):  # type: ignore[no-untyped-def]
+    """Return the sums weighted with the smooth step; only cells near the contour are visited pixel by pixel."""
+    channels, height, width = features.shape
+    rows, columns = sums.shape[:2]
+    out = np.empty_like(sums)
+    reach = STEP_RANGE * sigma
+    clear = reach + 0.7072 * (cell - 1)  # a cell whose centre is this far from the contour is all in or all out
+    bins = np.float32(STEP_BINS / (2 * reach))
+    for i in range(rows):
+        for j in range(columns):
+            middle = level[min(i * cell + cell // 2, height - 1), min(j * cell + cell // 2, width - 1)]
+            if middle <= -clear - 0.7072:
+                out[i, j, :] = 0
+                continue
+            if middle >= clear + 0.7072:
+                out[i, j, :] = sums[i, j, :]
+                continue
+            out[i, j, :] = 0
+            for y in range(i * cell, min((i + 1) * cell, height)):
+                for x in range(j * cell, min((j + 1) * cell, width)):
+                    place = (min(max(level[y, x], -reach), reach) + reach) * bins
+                    k = min(int(place), STEP_BINS - 1)
+                    step = table[k] + (np.float32(place) - np.float32(k)) * (table[k + 1] - table[k])
+                    step *= weight[y, x]
+                    out[i, j, 0] += step
+                    for c in range(channels):
+                        value = features[c, y, x]
+                        out[i, j, 1 + c] += step * value
+                        out[i, j, 1 + channels + c] += step * value * value
+    return out
+
+
+@numba.njit(cache=True)
+def _gaussians(smooth, everywhere, scale, floor):  # type: ignore[no-untyped-def]
+    """Return log norm, means and 1 / (2 variance) of both regions, blended to global where the window is empty."""
+    rows, columns, twice = smooth.shape
+    entries = twice // 2
+    channels = (entries - 1) // 2
+    out = np.empty((rows, columns, 2, entries), np.float32)
+    for region in range(2):
+        at = region * entries
+        whole = max(everywhere[at], np.float32(1e-6))
+        for i in range(rows):
+            for j in range(columns):
+                share = smooth[i, j, at] * scale
+                trust = share / (share + np.float32(FAINT))
+                inverse = scale / max(share, np.float32(1e-12))
+                product = np.float32(1)
+                for c in range(channels):
+                    first, second = 1 + c, 1 + channels + c
+                    far_mean = everywhere[at + first] / whole
+                    far_variance = everywhere[at + second] / whole - far_mean * far_mean
+                    mean = smooth[i, j, at + first] * inverse
+                    variance = smooth[i, j, at + second] * inverse - mean * mean
+                    mean = trust * mean + (1 - trust) * far_mean
+                    variance = max(trust * variance + (1 - trust) * far_variance, floor)
+                    out[i, j, region, first] = mean
+                    out[i, j, region, second] = np.float32(0.5) / variance
+                    product *= np.float32(2 * np.pi) * variance
+                out[i, j, region, 0] = np.float32(-0.5) * np.log(product)
+    return out

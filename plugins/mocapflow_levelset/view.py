@@ -1,0 +1,107 @@
+"""One view: from a start contour to the silhouette, coarse to fine, within a crop."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from mocapflow.records import F32, U8
+from mocapflow_levelset import crops
+from mocapflow_levelset.channels import ChannelName, features
+from mocapflow_levelset.crops import Crop
+from mocapflow_levelset.evolve import Evidence, Rhythm, Settled, Weights, settle
+from mocapflow_levelset.plates import Shadow, plate_from
+from mocapflow_levelset.redistance import redistance
+from mocapflow_levelset.statistics import Window
+
+
+class View(NamedTuple):
+    """What is given of one view."""
+
+    image: U8  # (H, W, 3) BGR
+    start: F32  # (H, W) px, signed distance to the start contour, positive inside
+    prior: F32  # (H, W) px, signed distance to the model's outline
+    counted: F32  # (H, W) 1 where a pixel counts
+    plate: tuple[F32, F32] | None = None  # mean and spread of the empty scene (H, W, 3)
+
+
+class Level(NamedTuple):
+    """One resolution: the image shrunk by a factor, and how long to stay there."""
+
+    factor: int
+    rhythm: Rhythm
+
+
+class Method(NamedTuple):
+    """How to find a silhouette."""
+
+    channels: Sequence[ChannelName]
+    median_px: int
+    window: Window
+    weights: Weights
+    shadow: Shadow
+    spread_floor: float
+    margin_px: int
+
+
+def find(view: View, levels: Sequence[Level], method: Method, band_px: float) -> Settled:
+    """Return the silhouette of one view (H, W) and its energies; everything outside without a start contour."""
+    multiple = max(level.factor for level in levels)
+    crop = crops.around(view.start, method.margin_px, multiple)
+    outside = np.full(view.start.shape, -band_px, np.float32)
+    if crop is None:
+        return Settled(outside, 0.0, 0.0, 0.0)
+    part = _cut(view, crop)
+    level = part.start
+    for resolution in levels:
+        settled = _settle_at(part._replace(start=level), resolution, method)
+        level = settled.level
+    crop.of(outside)[:] = redistance(level, band_px)
+    return settled._replace(level=outside)
+
+
+def _cut(view: View, crop: Crop) -> View:
+    plate = None if view.plate is None else (crop.of(view.plate[0]), crop.of(view.plate[1]))
+    return View(
+        image=crop.of_grey_levels(view.image),
+        start=np.ascontiguousarray(crop.of(view.start)),
+        prior=np.ascontiguousarray(crop.of(view.prior)),
+        counted=np.ascontiguousarray(crop.of(view.counted)),
+        plate=plate,
+    )
+
+
+def _settle_at(view: View, level: Level, method: Method) -> Settled:
+    """Return the descent at one resolution, its level set back on the full grid."""
+    factor = level.factor
+    if factor > 1:
+        view = _shrunk(view, factor)
+    plate = None
+    if view.plate is not None:
+        plate = plate_from(view.plate[0], view.plate[1], method.channels, method.spread_floor)
+    evidence = Evidence(
+        features(np.ascontiguousarray(view.image), method.channels, method.median_px),
+        view.counted,
+        plate,
+        method.shadow,
+    )
+    window = method.window._replace(
+        rho_px=method.window.rho_px / factor, cell_px=max(method.window.cell_px // factor, 1)
+    )
+    settled = settle(view.start, view.prior, evidence, window, method.weights, level.rhythm)
+    return settled if factor == 1 else settled._replace(level=crops.enlarge(settled.level, factor))
+
+
+def _shrunk(view: View, factor: int) -> View:
+    plate = view.plate
+    if plate is not None:
+        plate = (crops.shrink_values(plate[0], factor), crops.shrink_values(plate[1], factor))
+    return View(
+        image=crops.shrink(view.image, factor),
+        start=crops.shrink_values(view.start, factor) / np.float32(factor),
+        prior=crops.shrink_values(view.prior, factor) / np.float32(factor),
+        counted=(crops.shrink_values(view.counted, factor) > 0.5).astype(np.float32),
+        plate=plate,
+    )
