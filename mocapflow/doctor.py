@@ -7,22 +7,17 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-
 from mocapflow.data import Camera
 from mocapflow.io import folders
 from mocapflow.io.cameras import find_calibration, read_cameras
 from mocapflow.io.findings import Finding, attempt, error, note, warning
-from mocapflow.io.keypoints import keypoint_files, read_keypoints
 from mocapflow.io.lenses import View
 from mocapflow.io.plates import background
 from mocapflow.io.rigs import examine_rig
 from mocapflow.io.subjects import examine_subject
-from mocapflow.io.video import Video, lost_frames, open_video
+from mocapflow.io.video import Video, lost_frames, name_frames, open_video
 
 __all__ = ["Finding", "examine"]
-
-NAMED = 5  # frames named one by one in a finding
 
 
 def examine(folder: Path) -> list[Finding]:
@@ -75,7 +70,8 @@ def _trial(folder: Path, calibration: Path, rig: bool = True) -> list[Finding]:
     findings += examine_rig(lenses) if rig else []
     findings += _lost(cameras, whole)
     length = min(video.frames for video in whole) if agreed is None else agreed[0]
-    findings += _keypoints(folder, cameras, length)
+    places = [folders.keypoint_folder(folder, camera.name) for camera in cameras]
+    findings += [warning(text, where=folder) for text in folders.keypoint_warnings(cameras, places, length)]
     if fitted is not None:
         attempt(lambda: background(folder, [View(lens=lens) for lens in lenses], whole), findings)
     return findings
@@ -86,35 +82,7 @@ def _lost(cameras: Sequence[Camera], videos: Sequence[Video]) -> Iterator[Findin
         lost = [index for index in lost_frames(video) if index < video.frames]
         if lost:
             yield warning(
-                f"{camera.name}: {_frames(lost)} can't be decoded",
+                f"{camera.name}: {name_frames(lost)} can't be decoded",
                 "the view is not used in these frames; the others keep their places",
                 video.path,
             )
-
-
-def _keypoints(folder: Path, cameras: Sequence[Camera], length: int) -> Iterator[Finding]:
-    places = [folders.keypoint_folder(folder, camera.name) for camera in cameras]
-    findings: list[Finding] = [
-        warning(text, where=folder) for text in folders.keypoint_warnings(cameras, places, length)
-    ]
-    for place in places:
-        counts = set()
-        for path in keypoint_files(place).values() if place is not None else ():
-            people = attempt(partial(read_keypoints, path), findings)
-            if people is not None and len(people):
-                counts.add(people.shape[1])
-                if np.nanmax(people[..., 2], initial=0) > 1.5:
-                    findings.append(
-                        error("a confidence above 1", "each keypoint is x, y (px), confidence (0 to 1)", path)
-                    )
-        if len(counts) > 1:
-            findings.append(
-                error(f"people with {' and '.join(map(str, sorted(counts)))} keypoints in one folder", "", place)
-            )
-    yield from findings
-
-
-def _frames(indices: Sequence[int]) -> str:
-    named = ", ".join(str(index) for index in indices[:NAMED])
-    more = f" and {len(indices) - NAMED} more" if len(indices) > NAMED else ""
-    return f"{'frame' if len(indices) == 1 else 'frames'} {named}{more}"

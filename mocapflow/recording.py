@@ -11,11 +11,12 @@ import numpy as np
 from mocapflow.data import Background, Camera, Frame
 from mocapflow.errors import RecordingError
 from mocapflow.io import folders
-from mocapflow.io.keypoints import keypoint_files, read_keypoints, unseen
+from mocapflow.io.cameras import calibration_files
+from mocapflow.io.keypoints import keypoint_files, people_at
 from mocapflow.io.lenses import View
 from mocapflow.io.plates import background
 from mocapflow.io.video import Video, read_frames
-from mocapflow.records import F64, U8, record
+from mocapflow.records import record
 
 
 @record
@@ -44,13 +45,8 @@ class Recording:
 
     def frames(self, since: int | None = None) -> Iterator[Frame]:
         """Yield the frames in order, from the first one whose number is at least `since`."""
-        indices = (
-            self.indices if since is None else self.indices[len(range(self.indices.start, since, self.indices.step)) :]
-        )
-        pictures = [read_frames(video, indices) for video in self.videos]
-        files = [None if folder is None else keypoint_files(folder) for folder in self.keypoint_folders]
-        for index, row in zip(indices, zip(*pictures, strict=True), strict=True):
-            yield self._frame(index, row, files)
+        done = 0 if since is None else len(range(self.indices.start, since, self.indices.step))
+        return self._read(self.indices[done:])
 
     def frame(self, index: int) -> Frame:
         """Return one frame by its number in the videos; it decodes all before it.
@@ -62,9 +58,7 @@ class Recording:
             raise RecordingError(
                 f"no frame {index}: the videos have frames 0 to {self.length - 1}", where=str(self.folder)
             )
-        pictures = [next(read_frames(video, range(index, index + 1))) for video in self.videos]
-        files = [None if folder is None else keypoint_files(folder) for folder in self.keypoint_folders]
-        return self._frame(index, pictures, files)
+        return next(self._read(range(index, index + 1)))
 
     def background(self) -> Background | None:
         """Return the empty scene from the clean plates, or None where there are none."""
@@ -79,7 +73,7 @@ class Recording:
     @cached_property
     def content(self) -> Mapping[str, Path]:
         """Every file and folder that `frames` and `background` read, by its name within the recording."""
-        paths = [self.calibration, *(video.path for video in self.videos)]
+        paths = [*calibration_files(self.calibration), *(video.path for video in self.videos)]
         paths += [folder for folder in self.keypoint_folders if folder is not None]
         paths += [plate for view in self.views for plate in folders.plates(self.folder, view.lens.name)]
         return {
@@ -87,31 +81,20 @@ class Recording:
             for path in paths
         }
 
-    def _frame(
-        self,
-        index: int,
-        pictures: tuple[tuple[U8 | None, str], ...] | list[tuple[U8 | None, str]],
-        files: list[dict[int, Path] | None],
-    ) -> Frame:
-        images = tuple(
-            np.zeros((view.camera.size[1], view.camera.size[0], 3), np.uint8) if image is None else view.image(image)
-            for view, (image, _) in zip(self.views, pictures, strict=True)
-        )
-        usable = np.array([image is not None for image, _ in pictures])
-        reasons = () if usable.all() else tuple(reason for _, reason in pictures)
-        keypoints = (
-            None
-            if all(f is None for f in files)
-            else tuple(view.points(_detections(f, index)) for view, f in zip(self.views, files, strict=True))
-        )
-        return Frame(
-            index=index,
-            time=index / self.frame_rate,
-            images=images,
-            usable=usable,
-            reasons=reasons,
-            keypoints=keypoints,
-        )
+    def _read(self, indices: range) -> Iterator[Frame]:
+        files = [None if folder is None else keypoint_files(folder) for folder in self.keypoint_folders]
+        pictures = zip(*(read_frames(video, indices) for video in self.videos), strict=True)
+        for index, row in zip(indices, pictures, strict=True):
+            usable = np.array([image is not None for image, _ in row])
+            people = tuple(view.points(people_at(f, index)) for view, f in zip(self.views, files, strict=True))
+            yield Frame(
+                index=index,
+                time=index / self.frame_rate,
+                images=tuple(view.image(image) for view, (image, _) in zip(self.views, row, strict=True)),
+                usable=usable,
+                reasons=() if usable.all() else tuple(reason for _, reason in row),
+                keypoints=people if any(self.keypoint_folders) else None,
+            )
 
 
 def open_recording(
@@ -137,6 +120,8 @@ def open_recording(
         RecordingError: a part is missing, can't be read, or contradicts another.
     """
     folder = Path(folder)
+    if not 0 < scale <= 1:
+        raise RecordingError(f"the scale is {scale:g}; expected more than 0 and at most 1")
     parts = folders.gather(folder, calibration)
     indices = range(start, parts.length if stop is None else stop, step)
     if not indices or start < 0 or indices[-1] >= parts.length:
@@ -156,9 +141,3 @@ def open_recording(
         length=parts.length,
         warnings=parts.warnings,
     )
-
-
-def _detections(files: dict[int, Path] | None, index: int) -> F64:
-    if files is None or index not in files:
-        return np.empty((0, 0, 3))
-    return unseen(read_keypoints(files[index]))

@@ -15,6 +15,7 @@ from mocapflow.geometry import twists
 from mocapflow.records import F64
 
 FARTHEST = 100.0  # m; a camera further from the origin is one calibrated in millimetres
+YAML = (".yml", ".yaml")
 FIELDS = ("size", "matrix", "distortions", "rotation", "translation")
 
 
@@ -37,7 +38,7 @@ def read_cameras(path: Path) -> tuple[Camera, ...]:
         raise RecordingError("no such calibration file", where=str(path))
     if path.suffix == ".toml":
         cameras = _from_toml(path)
-    elif path.suffix in (".yml", ".yaml"):
+    elif path.suffix in YAML:
         cameras = opencv.cameras(path.parent)
     else:
         cameras = qualisys.cameras(path)
@@ -65,6 +66,11 @@ def find_calibration(folder: Path) -> Path:
         hint="put the calibration there as cameras.toml (Pose2Sim or anipose),\n"
         "as one Qualisys *.qca.txt, or as intri.yml and extri.yml (EasyMocap)",
     )
+
+
+def calibration_files(path: Path) -> tuple[Path, ...]:
+    """Return the files that `read_cameras` reads for a path: EasyMocap calibrations are a pair."""
+    return (path.with_name("intri.yml"), path.with_name("extri.yml")) if path.suffix in YAML else (path,)
 
 
 def write_cameras(path: Path, cameras: Sequence[Camera]) -> None:

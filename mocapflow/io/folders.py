@@ -12,7 +12,7 @@ import numpy as np
 from mocapflow.data import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.io.cameras import find_calibration, metadata, read_cameras
-from mocapflow.io.keypoints import keypoint_files
+from mocapflow.io.keypoints import odd_keypoints
 from mocapflow.io.video import IMAGES, VIDEOS, Video, open_video
 from mocapflow.records import record
 
@@ -175,23 +175,13 @@ def keypoint_folder(folder: Path, camera: str) -> Path | None:
 
 
 def keypoint_warnings(cameras: Sequence[Camera], places: Sequence[Path | None], length: int) -> list[str]:
-    """Say which keypoint files are not numbers or belong to no frame; only their text is searched."""
-    warnings = []
-    for camera, place in zip(cameras, places, strict=True):
-        if place is None:
-            if any(places):
-                warnings.append(f"{camera.name}: no keypoints, though other cameras have them")
-            continue
-        files = keypoint_files(place)
-        if bad := [index for index, file in files.items() if b"nan" in file.read_bytes().lower()]:
-            warnings.append(
-                f"{camera.name}: keypoints that are not numbers (frames: {len(bad)}), first in {files[bad[0]].name}; "
-                "these points count as not seen"
-            )
-        if beyond := [index for index in files if index >= length]:
-            warnings.append(
-                f"{camera.name}: keypoints beyond the last frame, {length - 1}, are left out (frames: {len(beyond)})"
-            )
-        if lost := length - len(files) + len(beyond):
-            warnings.append(f"{camera.name}: no keypoints of {lost} of {length} frames")
-    return warnings
+    """Say what is odd about the keypoints of all cameras; nothing where none has any."""
+    if not any(places):
+        return []
+    rows = [
+        odd_keypoints(camera.name, place, length)
+        if place
+        else [f"{camera.name}: no keypoints, though others have them"]
+        for camera, place in zip(cameras, places, strict=True)
+    ]
+    return [text for row in rows for text in row]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from mocapflow.errors import RecordingError
-from mocapflow.io.video import numbered
+from mocapflow.io.video import name_frames, numbered
 from mocapflow.records import F64
 
 
@@ -37,7 +38,41 @@ def read_keypoints(path: Path) -> F64:
         ) from error
 
 
-def unseen(keypoints: F64) -> F64:
-    """Return keypoints where every point with a number missing is at (0, 0) with confidence 0."""
-    lost = ~np.isfinite(keypoints).all(axis=-1, keepdims=True)
-    return np.where(lost, 0.0, keypoints)
+def people_at(files: Mapping[int, Path] | None, index: int) -> F64:
+    """Return the people (N, K, 3) of a frame; nobody where its file is missing or can't be read (see `odd_keypoints`).
+
+    A point with a number missing is at (0, 0) with confidence 0.
+    """
+    if files is None or index not in files:
+        return np.empty((0, 0, 3))
+    try:
+        people = read_keypoints(files[index])
+    except RecordingError:
+        return np.empty((0, 0, 3))
+    lost = ~np.isfinite(people).all(axis=-1, keepdims=True)
+    return np.where(lost, 0.0, people)
+
+
+def odd_keypoints(camera: str, folder: Path, length: int) -> list[str]:
+    """Say what is odd about the keypoints of a camera with `length` frames; every file is read (60 us each)."""
+    files = keypoint_files(folder)
+    broken, gaps, counts = [], [], set()
+    for index, path in files.items():
+        try:
+            people = read_keypoints(path)
+        except RecordingError:
+            broken.append(index)
+            continue
+        counts |= {people.shape[1]} if len(people) else set()
+        gaps += [index] if not np.isfinite(people).all() else []
+    beyond, missing = [i for i in files if i >= length], [i for i in range(length) if i not in files]
+    faults = (
+        (broken, "can't be read: nobody is seen there"),
+        (gaps, "are not all numbers (NaN): these points count as not seen"),
+        (beyond, f"lie after the last frame, {length - 1}: they are left out"),
+        (missing, "are missing: nobody is seen there"),
+    )
+    odd = [f"{camera}: keypoints of {name_frames(indices)} {what}" for indices, what in faults if indices]
+    if len(counts) > 1:
+        odd.append(f"{camera}: people with {' and with '.join(map(str, sorted(counts)))} keypoints in one folder")
+    return odd

@@ -27,11 +27,13 @@ class View:
         """The pinhole camera of `image`'s results."""
         return pinhole(scaled(self.lens, self.scale))
 
-    def image(self, image: U8) -> U8:
-        """Return an image (H, W, 3) of the lens, resized and undistorted."""
+    def image(self, image: U8 | None) -> U8:
+        """Return an image (H, W, 3) of the lens resized and undistorted; a black one where it is lost."""
         import cv2
 
         width, height = (int(n) for n in self.camera.size)
+        if image is None:
+            return np.zeros((height, width, 3), np.uint8)
         if image.shape[:2] != (height, width):
             image = np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
         if self._maps is None:

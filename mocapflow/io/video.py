@@ -1,14 +1,15 @@
 """The one video decoder: frames exactly in order, a placeholder with a reason where one is lost.
 
-The number of a frame comes from its time stamp, so a frame that the file has lost leaves a gap and does not
-shift the rest. Decoding always starts at the first frame: seeking lands on the wrong picture in some files, and
-a resumed run must see the same pixels.
+The number of a frame comes from its time stamp, so a frame that the file lacks, or that can't be decoded, leaves
+a gap and does not shift the rest. All stamps are read once, without decoding, when a video is opened. Decoding
+always starts at the first frame: seeking lands on the wrong picture in some files, and a resumed run must see
+the same pixels.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from mocapflow.errors import RecordingError
-from mocapflow.records import U8, record
+from mocapflow.records import F64, I32, U8, array, record
 
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 VIDEOS = (".mp4", ".avi", ".mov", ".mkv", ".m4v", ".webm", ".mpg")
@@ -29,42 +30,47 @@ class Video:
     path: Path
     width: int  # px
     height: int  # px
-    frame_rate: float  # per second; 0 where the file does not say
-    frames: int  # up to the last one that can be decoded
-    declared: int  # as the file says; more than `frames` where it breaks off
+    frame_rate: float  # per second; 0 where nothing says it
+    declared: int  # frames, as the file says; more than `frames` where it breaks off
+    stamps: F64 = array("N", unit="ms, time of each frame in the file, ascending; counted for images")
+    numbers: I32 = array("N", unit="frame number of each stamp")
 
     @property
-    def black(self) -> U8:
-        """A placeholder image (H, W, 3)."""
-        return np.zeros((self.height, self.width, 3), np.uint8)
+    def frames(self) -> int:
+        """Frames up to the last one in the file, gaps included."""
+        return int(self.numbers[-1]) + 1 if len(self.numbers) else 0
 
 
 def open_video(path: Path) -> Video:
-    """Open a video file or a folder of images and count its frames.
-
-    The count that the file declares is believed where the last frame stands in its place, which decodes no more
-    than the end of the file; otherwise every frame is decoded once.
+    """Open a video file or a folder of images; only the first picture is decoded.
 
     Raises:
         RecordingError: nothing in it can be decoded.
     """
     if path.is_dir():
         return _open_folder(path)
-    import cv2
-
+    declared, rate, stamps = _read_stamps(path)
     with _capture(path) as capture:
-        rate, declared = capture.get(cv2.CAP_PROP_FPS), int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
-        readable, image = capture.read()
-    if not readable:
+        first = next((image for _ in _grabs(capture) if (image := capture.retrieve()[1]) is not None), None)
+    if first is None or not len(stamps):
         raise RecordingError(
             "this video can't be decoded",
             where=str(path),
             hint="the file is cut off, damaged or no video; copy it again from the camera",
         )
-    rate = rate if np.isfinite(rate) and 0 < rate < 1e5 else 0.0
-    frames = declared if _ends_at(path, declared, rate) else _count(path, rate)
-    height, width = image.shape[:2]
-    return Video(path=path, width=width, height=height, frame_rate=rate, frames=frames, declared=max(declared, frames))
+    numbers = _number(stamps)
+    if numbers[-1] >= len(numbers):  # with gaps the declared rate is the average
+        rate = 1000 * float(numbers[-1]) / float(stamps[-1] - stamps[0])
+    height, width = first.shape[:2]
+    return Video(
+        path=path,
+        width=width,
+        height=height,
+        frame_rate=rate,
+        declared=max(declared, int(numbers[-1]) + 1),
+        stamps=stamps,
+        numbers=numbers,
+    )
 
 
 def read_frames(video: Video, indices: range) -> Iterator[tuple[U8 | None, str]]:
@@ -78,70 +84,85 @@ def read_frames(video: Video, indices: range) -> Iterator[tuple[U8 | None, str]]
             yield image, reason
 
 
-def _file_pictures(video: Video, indices: range) -> Iterator[tuple[U8 | None, str]]:
-    with _capture(video.path) as capture:
-        stamps = _stamps(capture, video.frame_rate)
-        current = next(stamps, None)
-        for index in indices:
-            while current is not None and current < index:
-                current = next(stamps, None)
-            if current == index:
-                decoded, image = capture.retrieve()
-                yield (image, "") if decoded else (None, "the frame could not be decoded")
-            elif current is None:
-                yield None, f"the video breaks off after frame {video.frames - 1}"
-            else:
-                yield None, "the frame is missing in the video: its time stamps jump"
-
-
-def _stamps(capture: Any, rate: float) -> Iterator[int]:
-    """Yield the number of each frame as it is decoded; a gap in time is a gap in the numbers."""
-    import cv2
-
-    index, last = -1, 0.0
-    while capture.grab():
-        now = capture.get(cv2.CAP_PROP_POS_MSEC) / 1000 * rate  # frames
-        index += max(1, round(now - last)) if index >= 0 else 1
-        last = now
-        yield index
-
-
-def _ends_at(path: Path, declared: int, rate: float) -> bool:
-    """True where the last declared frame is there, in its place, and no other follows."""
-    import cv2
-
-    if declared < 1 or not rate:
-        return False
-    with _capture(path) as capture:
-        capture.grab()
-        first = capture.get(cv2.CAP_PROP_POS_MSEC)
-        capture.set(cv2.CAP_PROP_POS_FRAMES, declared - 1)
-        if declared > 1 and not capture.grab():
-            return False
-        passed = (capture.get(cv2.CAP_PROP_POS_MSEC) - first) / 1000 * rate
-        return round(passed) == declared - 1 and not capture.grab()
-
-
 def lost_frames(video: Video) -> list[int]:
     """Return the numbers of the frames that the file should have and lacks; decodes the whole file."""
     if video.path.is_dir():
         there = set(numbered(video.path, IMAGES))
     else:
         with _capture(video.path) as capture:
-            there = set(_stamps(capture, video.frame_rate))
+            there = set(_decoded(capture, video))
     return sorted(set(range(video.declared)) - there)
 
 
-def _count(path: Path, rate: float) -> int:
-    with _capture(path) as capture:
-        return max(_stamps(capture, rate), default=-1) + 1
+def _file_pictures(video: Video, indices: range) -> Iterator[tuple[U8 | None, str]]:
+    with _capture(video.path) as capture:
+        decoded = _decoded(capture, video)
+        current = next(decoded, None)
+        for index in indices:
+            while current is not None and current < index:
+                current = next(decoded, None)
+            done, image = capture.retrieve() if current == index else (False, None)
+            yield (image, "") if done else (None, _why(video, index))
+
+
+def _why(video: Video, index: int) -> str:
+    if index >= video.frames:
+        return f"the video breaks off after frame {video.frames - 1}"
+    if index not in video.numbers:
+        return "the frame is missing in the video: its time stamps jump"
+    return "the frame can't be decoded"
+
+
+def _decoded(capture: Any, video: Video) -> Iterator[int]:
+    """Yield the number of each frame as it is decoded."""
+    import cv2
+
+    by_count = video.stamps[0] == video.stamps[-1]
+    for count, _ in enumerate(_grabs(capture)):
+        now = capture.get(cv2.CAP_PROP_POS_MSEC)
+        if count == 0 and now != video.stamps[0] and video.path.suffix.lower() == ".avi":
+            by_count = True  # AVI keeps no times of display: with reordered frames only their order is known
+        yield int(video.numbers[count if by_count else np.abs(video.stamps - now).argmin()])
+
+
+def _grabs(capture: Any) -> Iterator[None]:
+    """Advance frame by frame to the end; a damaged one counts as a failed attempt and is passed over."""
+    import cv2
+
+    patience = max(1000, int(capture.get(cv2.CAP_PROP_FRAME_COUNT)))  # failed attempts at the end cost nothing
+    failed = 0
+    while failed < patience:
+        if capture.grab():
+            failed = 0
+            yield
+        else:
+            failed += 1
+
+
+def _read_stamps(path: Path) -> tuple[int, float, F64]:
+    """Return the declared number of frames, the frame rate, and the sorted stamps (N,) ms; nothing is decoded."""
+    import cv2
+
+    with _capture(path, cv2.CAP_PROP_FORMAT, -1) as capture:
+        declared, rate = capture.get(cv2.CAP_PROP_FRAME_COUNT), capture.get(cv2.CAP_PROP_FPS)
+        stamps = np.sort([capture.get(cv2.CAP_PROP_POS_MSEC) for _ in _grabs(capture)])
+    rate = rate if np.isfinite(rate) and 0 < rate < 1e5 else 0.0
+    return max(0, int(declared)), rate, stamps[stamps >= 0] if len(stamps) else np.empty(0)
+
+
+def _number(stamps: F64) -> I32:
+    """Return the frame number of each stamp: a gap of k periods is k - 1 lost frames."""
+    gaps = np.diff(stamps)
+    period = np.median(gaps) if len(gaps) else 0.0
+    steps = np.maximum(1, np.round(gaps / period)) if period > 0 else np.ones(len(gaps))
+    return np.concatenate([[0], np.cumsum(steps)]).astype(np.int32)
 
 
 @contextmanager
-def _capture(path: Path) -> Iterator[Any]:
+def _capture(path: Path, *options: int) -> Iterator[Any]:
     import cv2
 
-    capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG, [cv2.CAP_PROP_N_THREADS, 1])
+    capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG, [cv2.CAP_PROP_N_THREADS, 1, *options])
     try:
         yield capture
     finally:
@@ -158,6 +179,13 @@ def numbered(folder: Path, suffixes: tuple[str, ...]) -> dict[int, Path]:
     return found
 
 
+def name_frames(indices: Sequence[int], named: int = 5) -> str:
+    """Return e.g. `frames 3, 4, 9 and 20 more`."""
+    first = ", ".join(str(index) for index in indices[:named])
+    more = f" and {len(indices) - named} more" if len(indices) > named else ""
+    return f"{'frame' if len(indices) == 1 else 'frames'} {first}{more}"
+
+
 def _open_folder(path: Path) -> Video:
     import cv2
 
@@ -169,8 +197,17 @@ def _open_folder(path: Path) -> Video:
             where=str(path),
             hint="images are named by frame: 000000.png, 000001.png",
         )
-    count, (height, width) = max(files) + 1, image.shape[:2]
-    return Video(path=path, width=width, height=height, frame_rate=0.0, frames=count, declared=count)
+    height, width = image.shape[:2]
+    numbers = np.array(sorted(files), np.int32)
+    return Video(
+        path=path,
+        width=width,
+        height=height,
+        frame_rate=0.0,
+        declared=max(files) + 1,
+        stamps=np.arange(len(numbers), dtype=np.float64),
+        numbers=numbers,
+    )
 
 
 def _folder_pictures(video: Video, indices: range) -> Iterator[tuple[U8 | None, str]]:
