@@ -22,6 +22,7 @@ import numpy as np
 from mocapflow.records import F32, F64, I16, I32, U8, Bool, array, record
 
 BODY, CLOTH, LANDMARK = 0, 1, 2  # values of Surface.layer
+BORDER = 3  # px along the image border where a silhouette is cut, not occluding
 
 
 @record
@@ -181,6 +182,13 @@ class Silhouette:
     camera: int
     layer: str  # person, garment or skin
     distance: F32 = array("H", "W", unit="px")
+
+    @cached_property
+    def zero_level(self) -> tuple[F64, F64]:
+        """The image contour: pixels (K, 2) sorted by row, and unit normals (K, 2) out of the silhouette."""
+        from mocapflow.geometry.contours import zero_crossings  # compiled code, loaded where it is used
+
+        return zero_crossings(self.distance, BORDER)
 
 
 @record

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from mocapflow.components import Matcher, pool
-from mocapflow.data import Camera, Contour, Frame, Matches, Past, Segmentation, Surface, Turn, empty_matches
+from mocapflow.data import Camera, Contour, Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn, empty_matches
+from mocapflow.geometry.contours import nearest_compatible
 from mocapflow.geometry.silhouettes import occluding_contour
 from mocapflow.records import F64, I32
 from mocapflow.scene import Scene
-from mocapflow_matching.contours import ImageContour, image_contour, nearest_compatible
 from mocapflow_matching.robust import Loss, robust_weights
 
 Positive = Annotated[float, Field(gt=0)]
+
+
+class ImageContour(NamedTuple):
+    """Points of the image contour: pixels (K, 2) sorted by row, and unit normals (K, 2) outward."""
+
+    pixel: F64
+    normal: F64
 
 
 class ContourIcp(Matcher):
@@ -36,22 +43,26 @@ class ContourIcp(Matcher):
     later_loss: Loss = "geman_mcclure"
     scale_px: Positive = 2.0
     sigma_px: Positive = 1.0
-    border_px: Annotated[int, Field(ge=1)] = 3
+
+    @property
+    def stride(self) -> int:
+        """How many zero crossings to go on for the spacing: there are 4/pi of them per pixel of contour."""
+        return max(round(self.spacing_px * 4 / np.pi), 1)
 
     def match(
         self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn
     ) -> Matches:
         """Return pairs of contour points; see the class."""
         parts = [
-            (1.0, self.match_view(silhouette.camera, scene.cameras[silhouette.camera], image, surface, turn))
+            (1.0, self.match_view(scene.cameras[silhouette.camera], silhouette, surface, turn))
             for silhouette in segmentation.silhouettes
             if silhouette.layer == "person"
-            and len((image := image_contour(silhouette.distance, self.spacing_px, self.border_px)).pixel)
         ]
         return pool(parts) if parts else empty_matches()
 
-    def match_view(self, index: int, camera: Camera, image: ImageContour, surface: Surface, turn: Turn) -> Matches:
+    def match_view(self, camera: Camera, silhouette: Silhouette, surface: Surface, turn: Turn) -> Matches:
         """Return the pairs of one view."""
+        image = ImageContour(*(rows[:: self.stride] for rows in silhouette.zero_level))
         model = _sorted_by_row(occluding_contour(surface, camera, self.spacing_px))
         reach = self.first_reach_px if turn.index == 0 else self.later_reach_px
         cosine = float(np.cos(np.radians(self.normal_angle_deg)))
@@ -64,7 +75,7 @@ class ContourIcp(Matcher):
             found = nearest_compatible(model.pixel, model.normal, image.pixel, image.normal, reach, cosine)
             seeing, showing = found[found >= 0], np.flatnonzero(found >= 0).astype(np.int32)
         pairs = np.concatenate([seen, seeing]), np.concatenate([shown, showing])
-        return self.weigh(index, image, model, *pairs, turn)
+        return self.weigh(silhouette.camera, image, model, *pairs, turn)
 
     def weigh(self, index: int, image: ImageContour, model: Contour, seen: I32, shown: I32, turn: Turn) -> Matches:
         """Return pairs of image points `seen` (M,) and model points `shown` (M,) with their weights."""
@@ -89,6 +100,8 @@ class ContourIcp(Matcher):
 def _sorted_by_row(contour: Contour) -> Contour:
     order: F64 = np.argsort(contour.pixel[:, 1], kind="stable")
     return Contour(
-        vertex=contour.vertex[order], anchor=contour.anchor[order], pixel=contour.pixel[order],
+        vertex=contour.vertex[order],
+        anchor=contour.anchor[order],
+        pixel=contour.pixel[order],
         normal=contour.normal[order],
     )

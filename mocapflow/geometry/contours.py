@@ -5,26 +5,23 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from mocapflow.records import F32, F64, array, record
+from mocapflow.records import F32, F64
 
 
-@record
-class ImageContour:
-    """Points on the zero level of a signed distance, all components and holes included, sorted by row."""
+def zero_crossings(distance: F32, border_px: int) -> tuple[F64, F64]:
+    """Return where a signed distance crosses zero between neighbouring pixels, all components and holes included.
 
-    pixel: F64 = array("K", 2, unit="px")
-    normal: F64 = array("K", 2, unit="1, unit, out of the silhouette")
+    Args:
+        distance: (H, W) px, positive inside.
+        border_px: crossings nearer to the image border are left out: there a silhouette is cut, not occluding.
 
-
-def image_contour(distance: F32, spacing_px: float, border_px: int) -> ImageContour:
-    """Return the zero crossings of a signed distance (H, W) px, thinned to about one every `spacing_px`.
-
-    Crossings nearer than `border_px` to the image border are left out: there a silhouette is cut, not occluding.
+    Returns:
+        pixels (K, 2) in the order of their rows, and unit normals (K, 2) that point out of the silhouette; about
+        4/pi of them per pixel of contour.
     """
-    pixel, normal = _crossings(distance, max(border_px, 1))
-    stride = max(round(spacing_px * 4 / np.pi), 1)  # a contour crosses 4/pi grid lines per pixel of its length
-    order = stride * np.argsort(pixel[::stride, 1], kind="stable")
-    return ImageContour(pixel=pixel[order], normal=normal[order])
+    pixel, normal = _crossings(distance, border_px)
+    order = np.argsort(pixel[:, 1], kind="stable")
+    return pixel[order], normal[order]
 
 
 @numba.njit(cache=True)
