@@ -44,7 +44,7 @@ def skin(body: Body, joints: F64, angles: F64 | None = None) -> F64:
         joints: (J, 4, 4) m, world_from_rest of each joint.
         angles: (D,) rad; needed only by a body whose shape changes with an angle.
     """
-    rest = body.vertices if body.morph_offset is None else _morphed(body, angles)
+    rest = rest_shape(body, angles)
     posed = np.empty_like(rest)
     _skin(rest, body.skin_joint, body.skin_weight, joints, posed)
     return posed
@@ -65,12 +65,17 @@ def morph_velocity(body: Body, joints: F64, angles: F64) -> F64:
     return velocity
 
 
-def _morphed(body: Body, angles: F64 | None) -> F64:
-    if angles is None or body.morph_offset is None:
+def rest_shape(body: Body, angles: F64 | None) -> F64:
+    """Return the vertices at rest (V, 3) m of the shape that the body has at joint angles (D,) rad."""
+    if body.morph_offset is None:
+        return body.vertices
+    if angles is None:
         raise ValueError("the shape of this body changes with an angle: pass the angles to skin()")
     start, stop = body.morph_range
     share = np.clip((angles[body.morph_screw] - start) / (stop - start), 0.0, 1.0)
-    return np.asarray(body.vertices + share * body.morph_offset)
+    shape: F64 = body.vertices + share * body.morph_offset
+    shape.flags.writeable = False  # like the vertices of a body: compiled code tells the two apart
+    return shape
 
 
 def joint_positions(body: Body, joints: F64) -> F64:

@@ -9,7 +9,7 @@ import numpy as np
 
 from mocapflow.components import Prior
 from mocapflow.data import Cloth, Past, Pose, Residual
-from mocapflow.geometry import kinematics, twists
+from mocapflow.geometry import twists
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow_twist import normal_equations
@@ -85,8 +85,7 @@ class Problem(NamedTuple):
     def energies(self, guess: Guess) -> Mapping[str, float]:
         """Return each term of the energy at a guess."""
         body = self.model.scene.body
-        joints, _ = kinematics.chain(body, guess.pose)
-        data = normal_equations.body_energy(self.data.body, body, joints)
+        data = normal_equations.body_energy(self.data.body, body, guess.pose)
         if len(self.data.cloth.vertex):
             error, _ = normal_equations.point_errors(self.data.cloth, guess.cloth.vertices[self.data.cloth.vertex])
             data += 0.5 * float(self.data.cloth.weight @ error**2)
@@ -106,9 +105,7 @@ class Problem(NamedTuple):
         return Quadratic(self._data_equations(guess, velocity), self._prior_equations(guess))
 
     def _data_equations(self, guess: Guess, velocity: F64 | None) -> Equations:
-        body = self.model.scene.body
-        joints, screws = kinematics.chain(body, guess.pose)
-        skin = normal_equations.body_equations(self.data.body, body, joints, screws, guess.centre)
+        skin = normal_equations.body_equations(self.data.body, self.model.scene.body, guess.pose)
         hessian, gradient = np.zeros((self.unknowns, self.unknowns)), np.zeros(self.unknowns)
         moved = len(skin.gradient)
         hessian[:moved, :moved], gradient[:moved] = skin.hessian, skin.gradient

@@ -113,14 +113,13 @@ class TwistGaussNewton(PoseSolver):
         angles = len(guess.pose.angles)
         ranges = parameter_ranges(problem.model) if problem.unknowns > 6 + angles else np.empty(0)
         lever = solve.levers(angles, ranges)
-        energy = sum(problem.energies(guess).values())
         for _ in range(TRIALS):
             increment = solve.step(equations, lever, damping)
             increment = solve.capped(increment, angles, np.radians(self.cap_deg), self.cap_mm / 1000)
-            if solve.gain(equations, increment) <= LEAST_GAIN * energy:
+            if solve.gain(equations, increment) <= LEAST_GAIN * equations.energy:
                 return guess, damping
             trial = motion.moved(guess, solve.about_origin(guess.centre, len(increment)) @ increment)
-            if sum(problem.energies(trial).values()) <= energy:
+            if sum(problem.energies(trial).values()) <= equations.energy:
                 return trial, max(self.damping, LOWERED * damping)
             damping = max(RAISED * damping, 1e-6)
         return guess, damping

@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
+from mocapflow_bodies.scanned import Scanned
 from mocapflow_priors.joint_limits import JointLimits
 from mocapflow_priors.rest_pose import RestPose
 from mocapflow_twist.solver import TwistGaussNewton
 from twist_fixtures import exact_matches, make_pose, make_scene, make_state
 
-from mocapflow.data import Past, Pose, Turn, empty_matches
-from mocapflow.geometry import twists
+from mocapflow.components import Prior
+from mocapflow.data import Matches, Past, Pose, Turn, empty_matches
+from mocapflow.geometry import kinematics, twists
 from mocapflow.model import ClothedModel
+from mocapflow.scene import Scene
 
 FREE = {"root_damping_m": 1e6, "root_damping_deg": 1e8, "angle_damping_deg": 1e8, "damping": 1e-12}
 EXACT = {**FREE, "stop_surface_mm": 0.0, "stop_angle_deg": 0.0, "cap_deg": 60.0, "cap_mm": 500.0, "correlation_px": 0.0}
 TURN = Turn(index=0, cap=8)
+DEMO = Path(__file__).parents[2] / "examples" / "data" / "skirt_steps"
+HIDDEN = [9, 10, 11]  # the screws of joints 6 and 7
+
+
+def solve(solver: TwistGaussNewton, scene: Scene, start: Pose, matches: Matches, priors: list[Prior] | None = None):
+    return solver.solve(lambda _: matches, make_state(start), ClothedModel(scene=scene), priors or [], Past(), TURN)
 
 
 def start_from(truth: Pose, seed: int) -> Pose:
@@ -25,12 +37,20 @@ def start_from(truth: Pose, seed: int) -> Pose:
     root = twists.exp(np.concatenate([axis / np.linalg.norm(axis) * rng.uniform(0.2, 0.5), np.zeros(3)]))
     root[:3, :3] = root[:3, :3] @ truth.root[:3, :3]
     root[:3, 3] = truth.root[:3, 3] + shift / np.linalg.norm(shift) * rng.uniform(0.04, 0.06)
-    return Pose(root=root, angles=truth.angles + rng.choice([-1, 1], 12) * rng.uniform(0.2, 0.3, 12))
+    count = len(truth.angles)
+    return Pose(root=root, angles=truth.angles + rng.choice([-1, 1], count) * rng.uniform(0.2, 0.3, count))
 
 
 def largest_error_deg(pose: Pose, truth: Pose) -> float:
     turn = twists.log(pose.root @ twists.inverse(truth.root))[:3]
     return float(np.degrees(max(np.linalg.norm(turn), np.abs(pose.angles - truth.angles).max())))
+
+
+def visible_vertices(scene: Scene) -> np.ndarray:
+    """Vertices that do not move with the hidden limb."""
+    below = kinematics.descendants(scene.body.parents)[6]
+    moves = (below[scene.body.skin_joint] & (scene.body.skin_weight > 0)).any(axis=1)
+    return np.flatnonzero(~moves)
 
 
 @pytest.mark.parametrize("residual", ["image", "line"])
@@ -39,6 +59,85 @@ def test_exact_matches_give_the_pose_within_seven_iterations(residual: str, seed
     scene, truth = make_scene(), make_pose(seed)
     matches = exact_matches(scene, truth, np.arange(0, 300, 9), directed=False)
     solver = TwistGaussNewton(iterations=7, residual=residual, **EXACT)
-    start = make_state(start_from(truth, seed))
-    estimate = solver.solve(lambda surface: matches, start, ClothedModel(scene=scene), [], Past(), TURN)
-    assert largest_error_deg(estimate.pose, truth) < 1e-8
+    assert largest_error_deg(solve(solver, scene, start_from(truth, seed), matches).pose, truth) < 1e-8
+
+
+def test_matches_that_count_along_a_direction_only_give_the_pose_too() -> None:
+    scene, truth = make_scene(), make_pose(1)
+    matches = exact_matches(scene, truth, np.arange(0, 300, 3), directed=True)
+    assert largest_error_deg(solve(TwistGaussNewton(**EXACT), scene, start_from(truth, 1), matches).pose, truth) < 1e-8
+
+
+def test_the_chapters_literal_settings_reach_the_pose() -> None:
+    scene, truth = make_scene(), make_pose(1)
+    matches = exact_matches(scene, truth, np.arange(0, 300, 9), directed=False)
+    literal = TwistGaussNewton(residual="line", steps_per_match=4, **{**FREE, "damping": 1e-4})
+    assert largest_error_deg(solve(literal, scene, start_from(truth, 1), matches).pose, truth) < 0.01
+
+
+def test_the_scanned_person_is_found_again() -> None:
+    body = Scanned().load(DEMO)
+    scene = replace(make_scene(), body=body)
+    rng = np.random.default_rng(0)
+    bend = np.where(np.isfinite(body.rest_spread), 0.02, 0.2)
+    truth = Pose(root=make_pose(0).root, angles=rng.normal(size=len(body.twists)) * bend)
+    start = Pose(root=twists.exp(np.full(6, 0.02)) @ truth.root, angles=truth.angles + rng.normal(size=len(bend)) * 0.1)
+    matches = exact_matches(scene, truth, rng.choice(len(body.vertices), 500, replace=False), directed=True)
+    assert largest_error_deg(solve(TwistGaussNewton(**EXACT), scene, start, matches).pose, truth) < 1e-8
+
+
+def test_a_hidden_limb_stays_and_is_unsure() -> None:
+    scene, truth = make_scene(), make_pose(2)
+    matches = exact_matches(scene, truth, visible_vertices(scene), directed=True)
+    start = Pose(root=truth.root, angles=truth.angles + 0.1)
+    estimate = solve(TwistGaussNewton(), scene, start, matches)
+    seen = np.setdiff1d(np.arange(12), HIDDEN)
+    assert np.allclose(estimate.pose.angles[HIDDEN], start.angles[HIDDEN], atol=1e-9)
+    assert np.degrees(np.abs(estimate.pose.angles - truth.angles)[seen]).max() < 0.05
+    sd = np.degrees(np.sqrt(np.diag(estimate.covariance)))[6:]
+    assert sd[HIDDEN] == pytest.approx(60.0, rel=1e-6) and sd[seen].max() < 2
+
+
+def test_a_hidden_limb_goes_where_a_prior_puts_it() -> None:
+    scene, truth = make_scene(), make_pose(2)
+    matches = exact_matches(scene, truth, visible_vertices(scene), directed=True)
+    estimate = solve(TwistGaussNewton(), scene, truth, matches, [RestPose()])
+    stiff = [d for d in HIDDEN if np.isfinite(scene.body.rest_spread[d])]
+    assert np.abs(estimate.pose.angles[stiff]).max() < 0.01
+    assert np.sqrt(np.diag(estimate.covariance))[6:][stiff] == pytest.approx(scene.body.rest_spread[stiff], rel=0.02)
+
+
+def test_without_matches_the_prediction_stays_with_the_priors_covariance() -> None:
+    scene, start = make_scene(), make_pose(4)
+    nothing = replace(exact_matches(scene, start, np.arange(9), True), weight=np.zeros(36))
+    for matches in (empty_matches(), nothing):
+        estimate = solve(TwistGaussNewton(), scene, start, matches, [JointLimits(), RestPose()])
+        assert np.array_equal(estimate.pose.root, start.root) and np.array_equal(estimate.pose.angles, start.angles)
+        sd = np.sqrt(np.diag(estimate.covariance))
+        free = np.isinf(scene.body.rest_spread) & (np.abs(start.angles) < 1)
+        assert np.degrees(sd[6:][free]) == pytest.approx(60.0)
+        assert np.isfinite(estimate.covariance).all() and estimate.energies["data"] == 0
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_solve_never_ends_worse_than_it_began(seed: int) -> None:
+    scene, truth = make_scene(), make_pose(seed)
+    rng = np.random.default_rng(seed)
+    matches = exact_matches(scene, truth, np.arange(0, 300, 11), directed=bool(seed % 2))
+    wrong = replace(matches, pixel=matches.pixel + rng.normal(size=matches.pixel.shape) * rng.choice([1, 200]))
+    start, priors = make_pose(seed + 100, angle=0.9), [JointLimits(), RestPose()]
+    energies = [
+        sum(solve(TwistGaussNewton(iterations=n), scene, start, wrong, priors).energies.values()) for n in (1, 2, 4, 8)
+    ]
+    still = TwistGaussNewton(iterations=1, cap_deg=1e-9, cap_mm=1e-9)
+    energies.insert(0, sum(solve(still, scene, start, wrong, priors).energies.values()))
+    assert np.all(np.diff(energies) <= 1e-9 * energies[0])
+
+
+def test_a_step_is_capped() -> None:
+    scene, truth = make_scene(), make_pose(0)
+    matches = exact_matches(scene, truth, np.arange(0, 300, 9), directed=False)
+    start = start_from(truth, 0)
+    pose = solve(TwistGaussNewton(iterations=1, cap_deg=2.0, cap_mm=5.0), scene, start, matches).pose
+    assert np.degrees(np.abs(pose.angles - start.angles)).max() <= 2.0 + 1e-9
+    assert np.linalg.norm(pose.root[:3, 3] - start.root[:3, 3]) <= 0.005 + 1e-9
