@@ -8,7 +8,19 @@ import numpy as np
 from pydantic import Field
 
 from mocapflow.components import Matcher, pool
-from mocapflow.data import Camera, Contour, Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn, empty_matches
+from mocapflow.data import (
+    CLOTH,
+    Camera,
+    Contour,
+    Frame,
+    Matches,
+    Past,
+    Segmentation,
+    Silhouette,
+    Surface,
+    Turn,
+    empty_matches,
+)
 from mocapflow.geometry.contours import nearest_compatible
 from mocapflow.geometry.silhouettes import occluding_contour
 from mocapflow.records import F64, I32
@@ -41,8 +53,9 @@ class ContourIcp(Matcher):
     normal_angle_deg: Annotated[float, Field(gt=0, le=180)] = 60.0
     first_loss: Loss = "huber"
     later_loss: Loss = "geman_mcclure"
-    scale_px: Positive = 2.0
+    scale: Positive = 2.0  # standard deviations at which the loss begins to give way
     sigma_px: Positive = 1.0
+    cloth_sigma_px: Positive = 6.0  # free cloth is never where a draper lays it: its outline must not turn a knee
 
     @property
     def stride(self) -> int:
@@ -75,9 +88,11 @@ class ContourIcp(Matcher):
             found = nearest_compatible(model.pixel, model.normal, image.pixel, image.normal, reach, cosine)
             seeing, showing = found[found >= 0], np.flatnonzero(found >= 0).astype(np.int32)
         pairs = np.concatenate([seen, seeing]), np.concatenate([shown, showing])
-        return self.weigh(silhouette.camera, image, model, *pairs, turn)
+        return self.weigh(silhouette.camera, image, model, *pairs, surface, turn)
 
-    def weigh(self, index: int, image: ImageContour, model: Contour, seen: I32, shown: I32, turn: Turn) -> Matches:
+    def weigh(
+        self, index: int, image: ImageContour, model: Contour, seen: I32, shown: I32, surface: Surface, turn: Turn
+    ) -> Matches:
         """Return pairs of image points `seen` (M,) and model points `shown` (M,) with their weights."""
         offset = model.pixel[shown] - image.pixel[seen]
         if self.residual == "normal":
@@ -87,13 +102,14 @@ class ContourIcp(Matcher):
             direction = np.zeros_like(offset)
             distance = np.linalg.norm(offset, axis=1)
         loss = self.first_loss if turn.index == 0 else self.later_loss
+        sigma = np.where(surface.layer[model.vertex[shown]] == CLOTH, self.cloth_sigma_px, self.sigma_px)
         return Matches(
             camera=np.full(len(seen), index, np.int16),
             # a model point lies between vertices: moving the target by as much makes the vertex stand for it
             pixel=image.pixel[seen] - (model.pixel - model.anchor)[shown],
             direction=direction,
             vertex=model.vertex[shown],
-            weight=robust_weights(distance, loss, self.scale_px) / self.sigma_px**2,
+            weight=robust_weights(distance / sigma, loss, self.scale) / sigma**2,
         )
 
 
