@@ -1,0 +1,170 @@
+"""What holds for the code as a whole: who imports whom, public names, equations, hooks, light start-up."""
+
+import ast
+import re
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import mocapflow
+from mocapflow import hookspecs
+from mocapflow.equations import definitions, table
+
+ROOT = Path(mocapflow.__file__).parent
+PLUGINS = ROOT.parent / "plugins"
+LAYERS = (  # a module imports only from its own layer or an earlier one; `io` and `geometry` are folders
+    "errors",
+    "records",
+    "data",
+    "geometry",
+    "scene",
+    "io",
+    "recording",
+    "doctor",
+    "components",
+    "model",
+    "timing",
+    "loop",
+    "hookspecs",
+    "observers",
+    "registry",
+    "digests",
+    "keys",
+    "rows",
+    "packing",
+    "archive",
+    "locks",
+    "store",
+    "sealing",
+    "checkpoint",
+    "track",
+    "yamlfile",
+    "resolve",
+    "pipeline",
+    "wiring",
+    "recipes",
+    "blame",
+    "execution",
+    "runner",
+    "testing",
+    "shipped",
+    "equations",
+    "describe",
+    "commands",
+    "cli",
+)
+LATE = {("components", "model"), ("data", "geometry")}  # inside a method, for a default everyone shares
+HEAVY = {"open3d", "numba", "cv2", "zarr", "matplotlib"}
+CITATION = re.compile(r"Source: Rosenhahn 2008, (.+)$", re.MULTILINE)
+
+
+def sources(*folders):
+    return sorted(path for folder in folders for path in folder.rglob("*.py"))
+
+
+def layer(path):
+    return path.relative_to(ROOT).parts[0].removesuffix(".py")
+
+
+def imported(tree):
+    """Yield what a module imports, in functions too, but not what it imports for types only."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
+            node.body = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            inner = [f"mocapflow.{alias.name}" for alias in node.names]
+            yield from inner if node.module == "mocapflow" else [node.module]
+
+
+@pytest.mark.parametrize("path", sources(ROOT), ids=lambda path: str(path.relative_to(ROOT)))
+def test_a_module_imports_only_from_earlier_layers(path):
+    if path == ROOT / "__init__.py":
+        return
+    own = layer(path)
+    for name in imported(ast.parse(path.read_text())):
+        first, _, rest = name.partition(".")
+        target = rest.split(".")[0]
+        if first == "mocapflow" and (own, target) not in LATE:
+            assert target in LAYERS[: LAYERS.index(own) + 1], f"{path.name} imports {name}"
+        assert not first.startswith("mocapflow_") or own == "commands", f"{path.name} imports a plugin"
+
+
+def test_public_names():
+    static = {
+        alias.name
+        for node in ast.walk(ast.parse((ROOT / "__init__.py").read_text()))
+        if isinstance(node, ast.ImportFrom) and str(node.module).startswith("mocapflow.")
+        for alias in node.names
+    }
+    homes = {name for names in mocapflow._HOMES.values() for name in names.split()}
+    assert static == homes == set(mocapflow.__all__)
+    for name in mocapflow.__all__:
+        assert getattr(mocapflow, name) is not None
+    with pytest.raises(AttributeError, match="module 'mocapflow' has no attribute 'Drapper'"):
+        _ = mocapflow.Drapper
+
+
+def cited(docstring):
+    """Return the equations a docstring cites: `Eq. (12.1), (12.10); Fig. 12.14` → 12.1, 12.10, Fig. 12.14."""
+    found = set()
+    for text in CITATION.findall(docstring or ""):
+        found |= set(re.findall(r"\((12\.\d+)\)", text))
+        found |= {f"Fig. {number}" for number in re.findall(r"Fig\. (12\.\d+)", text)}
+    return found
+
+
+def citations():
+    for path in sources(ROOT, PLUGINS):
+        root = ROOT.parent if path.is_relative_to(ROOT) else PLUGINS
+        module = ".".join(path.relative_to(root).with_suffix("").parts).removesuffix(".__init__")
+        for name, node in definitions(ast.parse(path.read_text())):
+            for number in cited(ast.get_docstring(node)):
+                yield number, f"{module}.{name}"
+
+
+def test_every_citation_has_its_row_and_every_row_its_citation():
+    rows = {(number.strip(), row.function) for row in table() for number in row.number.split(",")}
+    assert rows == set(citations())
+
+
+@pytest.mark.parametrize("row", table(), ids=lambda row: row.function)
+def test_a_row_of_the_equations_names_a_function_and_a_test(row):
+    assert re.search(r"\.py:\d+ ", row.place()), f"{row.function} is not there"
+    assert (ROOT.parent / row.test).is_file(), f"{row.test} is not there"
+
+
+def test_every_hook_is_tested():
+    hooks = [name for name in vars(hookspecs) if name.startswith("mocapflow_")]
+    tests = "".join(path.read_text() for path in sources(ROOT.parent / "tests") if path != Path(__file__))
+    providers = "".join(path.read_text() for path in PLUGINS.glob("*/__init__.py"))
+    for hook in hooks:
+        assert hook in (tests if hook.endswith("_done") else providers), f"{hook} is used nowhere"
+
+
+def test_help_is_quick_and_light():
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    show = "import sys; from mocapflow import cli; sys.argv = ['mocapflow', '--help']\n"
+    show += "try: cli.main()\nfinally: print('modules:', *sys.modules)"
+    done = subprocess.run([sys.executable, "-c", show], capture_output=True, text=True, check=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    assert "run " in done.stdout
+    loaded = {name.partition(".")[0] for name in done.stdout.partition("modules:")[2].split()}
+    assert not loaded & HEAVY
+    assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 0.5
+
+
+def test_importing_mocapflow_is_light():
+    show = "import sys, mocapflow; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", show], capture_output=True, text=True, check=True).stdout.split()
+    assert not {"numpy", "pydantic", "typer", *HEAVY} & set(loaded)
+
+
+@pytest.mark.parametrize("path", sources(ROOT, PLUGINS), ids=lambda path: path.name)
+def test_every_module_says_what_it_is(path):
+    assert ast.get_docstring(ast.parse(path.read_text()))

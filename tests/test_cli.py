@@ -1,0 +1,157 @@
+import json
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from mocapflow import cli, runner
+from mocapflow.commands.progress import reporter
+from mocapflow.shipped import shipped
+
+CLIP = shipped("examples", "data", "skirt_steps")
+
+
+@pytest.fixture
+def call(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("start.yaml").write_text(f"recording: {CLIP}\nstages:\n  start: start_from_file\n")
+
+    def invoke(*words):
+        monkeypatch.setattr(sys, "argv", ["mocapflow", *words])
+        return CliRunner().invoke(cli.app, words, prog_name="mocapflow")
+
+    return invoke
+
+
+def test_a_run_is_made_once_and_then_found(call):
+    first = call("run", "start.yaml")
+    assert first.exit_code == 0, first.output
+    assert "results: runs/start" in first.stdout
+    assert "start: running start_from_file" in first.stderr
+    assert "start: from the store" in call("run", "start.yaml").stderr
+    assert "start: running" in call("run", "start.yaml", "--fresh").stderr
+    assert " hit " in call("plan", "start.yaml").stdout
+    assert " hit " in call("status", "runs/start").stdout
+    assert " run " in call("plan", "start.yaml", "--store", "elsewhere.zarr").stdout
+
+
+def test_the_store(call):
+    call("run", "start.yaml", "--out", "first/run")
+    assert Path("first/store.zarr").is_dir()
+    store = ("--store", "first/store.zarr")
+    listed = call("cache", "list", *store).stdout
+    name = listed.split()[0]
+    assert name.startswith("start-")
+    assert "complete" in listed
+    explained = json.loads(call("cache", "explain", name, *store).stdout)
+    assert explained["component"]["name"] == "start_from_file"
+    assert call("cache", "explain", name, name, *store).stdout == "made from the same\n"
+    assert f"would remove {name}" in call("cache", "prune", "--all", "--dry-run", *store).stdout
+    assert "0 results" in call("cache", "prune", "--days", "1", *store).stdout
+    assert f"removed {name}" in call("cache", "prune", "--all", *store).stdout
+    assert call("cache", "list", *store).stdout == ""
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("run", "stert.yaml"), "error: stert.yaml  there is no such file\n"
+         "       available: start.yaml — did you mean 'start.yaml'?\n"),
+        (("run", "start.yaml", "--set", "stages.start.tilt=3"),
+         "error: --set stages.start.tilt=3  stages.start.tilt: unknown setting of start_from_file (clip)\n"),
+        (("plan", "start.yaml", "--frames", "3"),
+         "error: --frames 3  frames are written A:B or A:B:STEP; either end may be left out\n"),
+        (("plan", "start.yaml", "--recording", "nowhere"),
+         "error: nowhere  there is no such folder\n       --recording DIR names another\n"),
+        (("status", "nowhere"), "error: nowhere  this is no run folder\n"
+         "       a run folder is what `mocapflow run` writes; it holds command.json\n"),
+        (("evaluate", "nowhere"), "error: nowhere  this is no run folder\n"
+         "       a run folder is what `mocapflow run` writes; it holds command.json\n"),
+    ],
+)  # fmt: skip
+def test_what_the_user_can_mend_ends_with_2(call, words, message):
+    result = call(*words)
+    assert result.stderr.replace("(clip)", "(clip)").startswith(message.split(" (")[0])
+    assert result.exit_code == 2
+    assert result.stdout == ""
+
+
+def test_a_store_that_is_not_there_ends_with_1(call):
+    result = call("cache", "list")
+    assert result.stderr == "error: runs/store.zarr  there is no store here\n       --store names another\n"
+    assert result.exit_code == 1
+
+
+def test_an_interrupt_ends_with_130_and_says_how_to_go_on(call, monkeypatch):
+    def stopped(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(runner, "run", stopped)
+    result = call("run", "start.yaml", "--set", "frames={start: 1}")
+    assert result.exit_code == 130
+    assert result.stderr == (
+        "\ninterrupted; finished frames are saved. To go on: mocapflow run start.yaml --set 'frames={start: 1}'\n"
+    )
+
+
+def test_a_bug_shows_its_traceback(call, monkeypatch):
+    def broken(*_, **__):
+        raise ZeroDivisionError("ours")
+
+    monkeypatch.setattr(runner, "run", broken)
+    assert isinstance(call("run", "start.yaml").exception, ZeroDivisionError)
+
+
+def test_plugins(call):
+    result = call("plugins")
+    assert "priors  (mocapflow 0.1.0)\n  predictor:    constant_velocity, hold" in result.stdout
+    assert result.stderr == ""
+
+
+def test_show(call):
+    shown = call("show", "prior", "joint_limits").stdout
+    assert shown.startswith("prior joint_limits, from plugin 'priors' (mocapflow 0.1.0)\nA soft wall at the limits")
+    assert "  sd_deg     float (> 0) = 2.0  # standard deviation of an angle beyond its limits\n" in shown
+    missing = call("show", "prior", "joint_limit")
+    assert missing.exit_code == 2
+    assert missing.stderr.startswith("error: no prior named 'joint_limit'\n       available: joint_limits, ")
+    assert missing.stderr.endswith("did you mean 'joint_limits'?\n")
+
+
+def test_equations(call):
+    shown = call("equations", "12.8").stdout
+    assert shown.split()[:3] == ["12.8", "kinematic", "chain"]
+    assert "geometry/kinematics.py:" in shown
+
+
+def test_doctor(call):
+    good = call("doctor", str(CLIP))
+    assert (good.exit_code, good.stdout) == (0, f"{CLIP}: nothing to mend\n")
+    bad = call("doctor", "nowhere")
+    assert (bad.exit_code, bad.stdout) == (2, "error: nowhere  no such recording folder\n")
+
+
+def test_progress_is_plain_lines_unless_on_a_terminal(capsys):
+    class Terminal:
+        written = ""
+
+        def isatty(self):
+            return True
+
+        def write(self, text):
+            self.written += text
+
+        def flush(self):
+            pass
+
+    show = reporter()
+    show("track: 3 of 6 frames, at rest after 2 turns")
+    assert capsys.readouterr().err == "track: 3 of 6 frames, at rest after 2 turns\n"
+    terminal = Terminal()
+    show = reporter(terminal)
+    show("track: 3 of 6 frames, at rest after 2 turns")
+    show("smooth: running")
+    assert terminal.written == (
+        f"\r\x1b[Ktrack: {'█' * 15}{'·' * 15} 3 of 6 frames, at rest after 2 turns\nsmooth: running\n"
+    )
