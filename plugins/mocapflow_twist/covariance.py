@@ -7,7 +7,7 @@ import numpy as np
 from mocapflow.data import Matches
 from mocapflow.records import F64
 
-CELLS = 2**16  # cells along an image axis before their numbers repeat
+CELLS = 128  # cells along an image axis before their numbers repeat: two far parts of a contour may share one
 PRIOR_FREEDOM = 10.0  # residuals' worth of trust in the stated weights: keeps the scale sane when few are left
 
 
@@ -16,17 +16,21 @@ def effective_share(matches: Matches, correlation_px: float) -> F64:
 
     Errors along a contour are correlated over `correlation_px`. With matches of weight w in square cells of that
     size, a view holds (sum w)^2 / sum over cells (sum of w in the cell)^2 independent measurements: all of them
-    where they lie apart, the contour's length over the cell's where they lie dense.
+    where they lie apart, the contour's length over the cell's (to 20 %) where they lie dense. The mean of two grids,
+    half a cell apart, makes it independent of where the contour lies.
     """
     share = np.ones(len(matches.camera))
     used = matches.weight > 0
     if correlation_px <= 0 or not used.any():
         return share
-    cell = np.floor(matches.pixel[used] / correlation_px).astype(np.int64) % CELLS
     camera, weight = matches.camera[used].astype(np.int64), matches.weight[used]
-    keys, where = np.unique((camera * CELLS + cell[:, 1]) * CELLS + cell[:, 0], return_inverse=True)
-    clustered = np.bincount(keys // CELLS**2, np.bincount(where, weight) ** 2)
-    alone = np.bincount(camera, weight**2)
+    views = int(camera.max()) + 1
+    clustered = np.zeros(views)
+    for shift in (0.0, 0.5):
+        x, y = np.floor(matches.pixel[used] / correlation_px + [shift, 0.0]).astype(np.int64).T % CELLS
+        in_cell = np.bincount((camera * CELLS + y) * CELLS + x, weight, views * CELLS**2)
+        clustered += 0.5 * np.sum(in_cell.reshape(views, -1) ** 2, axis=1)
+    alone = np.bincount(camera, weight**2, views)
     share[used] = (alone / np.where(clustered > 0, clustered, 1.0))[camera]
     return share
 

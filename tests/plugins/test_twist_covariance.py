@@ -32,12 +32,10 @@ def contour(start: tuple[float, float], end: tuple[float, float], spacing: float
 @pytest.mark.parametrize("angle_deg", [0, 20, 45, 90])
 @pytest.mark.parametrize("spacing", [0.5, 2.0])
 def test_a_dense_contour_holds_its_length_over_the_correlation(angle_deg: float, spacing: float) -> None:
-    """On average over where it lies; at the worst, a diagonal from corner to corner of the cells, 30 % less."""
     along = 600 * np.array([np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))])
-    starts = np.random.default_rng(0).uniform(0, 15, (40, 2))
-    counts = [effective_share(contour(tuple(s), tuple(s + along), spacing), 15.0).sum() for s in starts]
-    assert np.mean(counts) == pytest.approx(40, rel=0.1)
-    assert min(counts) > 0.69 * 40 and max(counts) < 1.3 * 40
+    for start in np.random.default_rng(0).uniform(0, 15, (40, 2)):
+        line = contour(tuple(start), tuple(start + along), spacing)
+        assert effective_share(line, 15.0).sum() == pytest.approx(40, rel=0.2)
 
 
 def test_matches_far_apart_count_whole() -> None:

@@ -1,0 +1,57 @@
+"""Predictors go on as before, over the time that really passed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mocapflow_priors.constant_velocity import ConstantVelocity
+from mocapflow_priors.hold import Hold
+from test_priors import make_past
+from twist_fixtures import make_pose, make_scene
+
+from mocapflow.data import NO_CLOTH, Frame, Moment, Past
+from mocapflow.model import moved
+from mocapflow.testing import PredictorConformance
+
+STEP = np.concatenate([[0.1, 0.2, -0.3, 0.01, 0.03, 0.02], np.full(12, 0.05)])
+FIRST = make_pose(0)
+SECOND = moved(FIRST, STEP)
+
+
+class TestHoldConforms(PredictorConformance):
+    predictor = Hold()
+
+
+class TestConstantVelocityConforms(PredictorConformance):
+    predictor = ConstantVelocity()
+
+
+def frame(time: float) -> Frame:
+    return Frame(index=2, time=time, images=(), usable=np.empty(0, bool))
+
+
+def test_hold_keeps_the_last_pose() -> None:
+    assert Hold().predict(frame(2 / 30), make_past(FIRST, SECOND), make_scene()) is SECOND
+
+
+@pytest.mark.parametrize("steps", [1.0, 3.0])
+def test_constant_velocity_repeats_the_motion_as_often_as_frames_passed(steps: float) -> None:
+    guess = ConstantVelocity().predict(frame((1 + steps) / 30), make_past(FIRST, SECOND), make_scene())
+    truth = SECOND
+    for _ in range(int(steps)):
+        truth = moved(truth, STEP)
+    assert np.allclose(guess.root, truth.root, atol=1e-12) and np.allclose(guess.angles, truth.angles)
+
+
+def test_a_share_of_the_velocity_can_be_kept_and_a_long_gap_is_bounded() -> None:
+    past, scene = make_past(FIRST, SECOND), make_scene()
+    half = ConstantVelocity(kept=0.5).predict(frame(2 / 30), past, scene)
+    assert np.allclose(half.angles, SECOND.angles + 0.025)
+    far = ConstantVelocity(longest_steps=4).predict(frame(10.0), past, scene)
+    assert np.allclose(far.angles, SECOND.angles + 0.2)
+
+
+def test_one_frame_or_equal_times_give_the_last_pose() -> None:
+    one = Past(moments=(Moment(time=0.0, pose=FIRST, cloth=NO_CLOTH),))
+    assert ConstantVelocity().predict(frame(1 / 30), one, make_scene()) is FIRST
+    assert ConstantVelocity().predict(frame(1 / 30), make_past(FIRST, SECOND, 0.0), make_scene()) is SECOND

@@ -1,0 +1,147 @@
+"""Points on cloth pull on pose and cloth parameters through the draper's velocities."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+from mocapflow_twist.constraint import image_rows
+from mocapflow_twist.normal_equations import dense_equations
+from mocapflow_twist.solver import TwistGaussNewton
+from test_twist_solver import EXACT, TURN
+from twist_fixtures import exact_matches, make_pose, make_scene, make_state
+
+from mocapflow.components import Draper, pool
+from mocapflow.data import Estimate, FrameState, GarmentMesh, Matches, Past, Pose, PoseBatch, Surface
+from mocapflow.geometry import cameras, twists
+from mocapflow.model import ClothedModel, moved
+from mocapflow.records import F64, I32
+from mocapflow.scene import Scene
+
+COUNT = 40
+SHAPE = np.random.default_rng(7).normal(size=(COUNT, 3)) * 0.2
+BY_ANGLE = np.random.default_rng(8).normal(size=(COUNT, 3, 12)) * 0.05
+BY_PARAMETER = np.random.default_rng(9).normal(size=(COUNT, 3, 2)) * 0.1
+
+
+class LinearDraper(Draper):
+    """Cloth that is linear in angles and parameters, carried along with the root."""
+
+    name: ClassVar[str] = "linear"
+
+    def drape(self, poses: PoseBatch, parameters: F64, past: Past, scene: Scene) -> F64:
+        local = SHAPE + np.einsum("vad,bd->bva", BY_ANGLE, poses.angles)
+        local = local + np.einsum("vaq,bq->bva", BY_PARAMETER, parameters)
+        return np.einsum("bxa,bva->bvx", poses.root[:, :3, :3], local) + poses.root[:, None, :3, 3]
+
+    def velocity(self, pose: Pose, parameters: F64, vertices: I32, past: Past, scene: Scene) -> F64:
+        poses = PoseBatch(root=pose.root[None].copy(), angles=pose.angles[None].copy())
+        points = self.drape(poses, parameters[None], past, scene)[0][vertices]
+        inner = np.concatenate([BY_ANGLE, BY_PARAMETER], axis=2)[vertices]
+        shift = np.tile(np.eye(3), (len(vertices), 1, 1))
+        return np.concatenate([-twists.hat(points), shift, pose.root[:3, :3] @ inner], axis=2)
+
+
+def garment() -> GarmentMesh:
+    index = np.arange(COUNT, dtype=np.int32)
+    return GarmentMesh(
+        name="sheet", vertices=SHAPE.copy(), faces=index[None, :3].copy(), strands=index[None].copy(),
+        rings=np.empty((0, 2), np.int32), ring_length=np.empty(0), carried_by=np.zeros(COUNT, np.int32),
+        pinned=np.empty(0, np.int32), pinned_to=np.empty(0, np.int32), parameter_names=("lean", "swell"),
+        parameter_bounds=np.array([[-1.0, 1.0], [0.0, 0.5]]),
+    )  # fmt: skip
+
+
+MODEL = ClothedModel(scene=replace(make_scene(), garment=garment()), draper=LinearDraper())
+
+
+def make_matches(pose: Pose, parameters: F64, vertices: np.ndarray) -> Matches:
+    """Exact matches of a few body vertices and of cloth vertices."""
+    cloth = MODEL.drape(pose, parameters, Past())
+    count = len(vertices) * len(MODEL.scene.cameras)
+    on_cloth = Matches(
+        camera=np.repeat(np.arange(4, dtype=np.int16), len(vertices)),
+        pixel=np.concatenate([cameras.project(cloth.vertices[vertices], c) for c in MODEL.scene.cameras]),
+        direction=np.zeros((count, 2)),
+        vertex=np.tile(vertices + 300, 4).astype(np.int32),
+        weight=np.ones(count),
+    )
+    return pool([(1.0, on_cloth), (1.0 + 1e-12, exact_matches(MODEL.scene, pose, np.arange(0, 300, 30), False))])
+
+
+def clothed_state(pose: Pose, parameters: F64) -> FrameState:
+    return replace(make_state(pose), cloth=MODEL.drape(pose, parameters, Past()))
+
+
+def solve(matches: Matches, state: FrameState, **settings: Any) -> Estimate:
+    solver = TwistGaussNewton(**{**EXACT, "cloth_damping": 1e6, **settings})
+    return solver.solve(lambda _: matches, state, MODEL, [], Past(), TURN)
+
+
+def test_cloth_columns_are_the_numeric_derivatives() -> None:
+    pose, parameters, every = make_pose(0), np.array([0.2, 0.3]), np.arange(COUNT)
+    rows = image_rows(make_matches(make_pose(1), parameters, every), MODEL.scene.cameras)
+    rows = rows.part(rows.vertex >= 300, rows.weight, 300)
+
+    def energy_and_slope(increment: F64) -> tuple[float, F64]:
+        there, q = moved(pose, increment[:18]), parameters + increment[18:]
+        cloth = MODEL.drape(there, q, Past())
+        velocity = MODEL.velocity(there, cloth, rows.vertex, Past())
+        equations = dense_equations(rows, cloth.vertices[rows.vertex], velocity)
+        return equations.energy, equations.gradient
+
+    step = 1e-5
+    numeric = [(energy_and_slope(step * c)[0] - energy_and_slope(-step * c)[0]) / (2 * step) for c in np.eye(20)]
+    slope = energy_and_slope(np.zeros(20))[1]
+    assert np.abs(slope - numeric).max() < 1e-7 * np.abs(slope).max()
+
+
+@pytest.mark.parametrize("redrape", ["every", "once"])
+@pytest.mark.parametrize("cloth_jacobian", ["every", "once"])
+def test_pose_and_cloth_parameters_are_found_together(redrape: str, cloth_jacobian: str) -> None:
+    """Cloth moved linearly from the start is only right near it; draped anew it is exact."""
+    truth, wanted = make_pose(0), np.array([0.2, 0.3])
+    start = moved(truth, np.random.default_rng(0).normal(size=18) * 0.01)
+    matches = make_matches(truth, wanted, np.arange(COUNT))
+    estimate = solve(
+        matches, clothed_state(start, np.array([0.1, 0.2])), cloth_unknowns=True, redrape=redrape,
+        cloth_jacobian=cloth_jacobian, iterations=30,
+    )  # fmt: skip
+    near = 1e-7 if redrape == "every" else 5e-3
+    assert np.abs(estimate.pose.angles - truth.angles).max() < near
+    assert estimate.parameters == pytest.approx(wanted, abs=near)
+    assert estimate.covariance.shape == (20, 20)
+
+
+def test_by_default_the_cloth_parameters_are_given() -> None:
+    truth, given = make_pose(0), np.array([0.2, 0.3])
+    start = moved(truth, np.random.default_rng(0).normal(size=18) * 0.05)
+    estimate = solve(make_matches(truth, given, np.arange(COUNT)), clothed_state(start, given), iterations=20)
+    assert np.abs(estimate.pose.angles - truth.angles).max() < 1e-8
+    assert np.array_equal(estimate.parameters, given) and estimate.covariance.shape == (18, 18)
+
+
+def test_cloth_parameters_stay_within_their_bounds() -> None:
+    truth, beyond = make_pose(0), np.array([0.2, 0.8])
+    matches = make_matches(truth, beyond, np.arange(COUNT))
+    state = clothed_state(truth, np.array([0.2, 0.4]))
+    before = TwistGaussNewton(iterations=1, cap_deg=1e-9, cap_mm=1e-9, cloth_unknowns=True)
+    unmoved = before.solve(lambda _: matches, state, MODEL, [], Past(), TURN)
+    estimate = solve(matches, state, cloth_unknowns=True, iterations=20)
+    assert estimate.parameters[1] == pytest.approx(0.5)
+    assert estimate.energies["data"] < unmoved.energies["data"]
+
+
+def test_the_garment_is_draped_anew_at_each_pose_it_is_matched_at() -> None:
+    truth, given = make_pose(0), np.array([0.2, 0.3])
+    matches, seen = make_matches(truth, given, np.arange(0)), []
+
+    def match(surface: Surface) -> Matches:
+        seen.append(surface)
+        return matches
+
+    TwistGaussNewton(iterations=3).solve(match, clothed_state(make_pose(1), given), MODEL, [], Past(), TURN)
+    local = [np.linalg.inv(s.joints[0]) @ np.column_stack([s.vertices[300:], np.ones(COUNT)]).T for s in seen]
+    assert len(seen) > 1 and np.ptp([shape[0, 0] for shape in local]) > 1e-6
