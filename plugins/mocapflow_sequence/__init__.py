@@ -11,6 +11,12 @@ def mocapflow_stages() -> list[type[Stage]]:
     """Return the stages of this package."""
     from mocapflow.track import CoupledLoop
     from mocapflow_sequence.background import EmptyScene
+    from mocapflow_sequence.evaluate import Evaluate
+    from mocapflow_sequence.export import Export
+    from mocapflow_sequence.overlay import Overlay
+    from mocapflow_sequence.report import Report
+    from mocapflow_sequence.smooth import Smooth
     from mocapflow_sequence.start_from_file import StartFromFile
+    from mocapflow_sequence.virtual import Virtual
 
-    return [EmptyScene, CoupledLoop, StartFromFile]
+    return [EmptyScene, CoupledLoop, StartFromFile, Evaluate, Export, Overlay, Report, Smooth, Virtual]

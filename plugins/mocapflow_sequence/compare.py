@@ -10,7 +10,7 @@ BLOCK = 20  # frames; errors within it hang together, so the bootstrap draws who
 DRAWS = 1000
 SEED = 0
 NINETY = 1.6449  # standard deviations
-LONGEST_LAG = 15  # frames
+LONGEST_LAG = 6  # frames; more would leave too little of a short take to compare
 
 
 def figures(ours: F64, truth: F64, sd: F64, frame: F64) -> dict[str, float]:
@@ -69,7 +69,7 @@ def correlation(ours: F64, truth: F64) -> float:
 
 
 def lag(ours: F64, truth: F64) -> float:
-    """Return by how many frames ours comes later than the truth, to a fraction of a frame; NaN where nothing moves.
+    """Return by how many frames ours comes later than the truth, to a fraction of a frame; NaN where none fits best.
 
     It minimises the mean square of the difference without its mean, over the frames that every shift has, and
     places the minimum by a parabola through the best shift and its neighbours.
@@ -80,9 +80,10 @@ def lag(ours: F64, truth: F64) -> float:
     middle = truth[reach : len(truth) - reach]
     shifts = np.arange(-reach, reach + 1)
     spread = np.array([np.var(ours[reach + s : len(ours) - reach + s] - middle) for s in shifts])
-    best = int(np.clip(np.argmin(spread), 1, len(spread) - 2))
-    before, at, after = spread[best - 1 : best + 2]
-    if at == 0:
+    best = int(np.argmin(spread))
+    if spread[best] == 0:
         return float(shifts[best])
-    curvature = before - 2 * at + after
-    return float(shifts[best] + (0.5 * (before - after) / curvature if curvature > 0 else 0.0))
+    if best in (0, len(spread) - 1):
+        return np.nan
+    before, at, after = spread[best - 1 : best + 2]
+    return float(shifts[best] + 0.5 * (before - after) / (before - 2 * at + after))

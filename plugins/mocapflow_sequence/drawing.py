@@ -75,7 +75,9 @@ class Video:
 
         if self._writer is None:
             size = (image.shape[1], image.shape[0])
-            self._writer = cv2.VideoWriter(str(self._path), cv2.VideoWriter_fourcc(*self._codec), self._frame_rate, size)
+            self._writer = cv2.VideoWriter(
+                str(self._path), cv2.VideoWriter.fourcc(*self._codec), self._frame_rate, size
+            )
             if not self._writer.isOpened():
                 hint = "is the folder writable? this build of OpenCV may lack the codec: mp4v is always there"
                 raise StoreError(f"can't write a video with codec {self._codec}", where=str(self._path), hint=hint)

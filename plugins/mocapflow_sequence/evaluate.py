@@ -18,6 +18,8 @@ from mocapflow_sequence import compare, layout, tables
 from mocapflow_sequence.export import before_smoothing, measured
 from mocapflow_sequence.references import read_reference
 
+SLACK = 0.001  # s
+
 
 class Evaluate(Stage):
     """Compares with truth/angles.csv of the recording, or with another file; without either it says so.
@@ -34,7 +36,9 @@ class Evaluate(Stage):
         """Return the evaluation of the track."""
         path = recording.folder / (self.reference or "truth/angles.csv")
         if self.reference is None and not path.is_file():
-            return Evaluation(reference="", rows=(), note="the recording has no truth/angles.csv, and no reference is set")
+            return Evaluation(
+                reference="", rows=(), note="the recording has no truth/angles.csv, and no reference is set"
+            )
         ours = tables.angle_columns(track, measured(track, scene))
         raw = tables.angle_columns(track, measured(before_smoothing(track), scene))
         return evaluate(ours, raw, path, run_folder.path)
@@ -57,7 +61,7 @@ def evaluate(ours: Mapping[str, F64], raw: Mapping[str, F64], truth: Path, folde
     """Compare tables of angles (smoothed and raw) with a reference file; writes results/evaluation.csv."""
     reference = at_our_frames(read_reference(truth), ours)
     shared = [name for name in ours if name in reference and name not in ("frame", "time")]
-    rows = []
+    rows: list[Mapping[str, float | str]] = []
     for name in shared:
         if not np.isfinite(reference[name]).any():
             continue
@@ -74,7 +78,9 @@ def at_our_frames(reference: Mapping[str, F64], ours: Mapping[str, F64]) -> dict
     """Return the reference at our frames: by number, or interpolated in time; NaN where it has nothing."""
     if "frame" not in reference:
         time = reference["time"]
-        return {n: np.interp(ours["time"], time, v, left=np.nan, right=np.nan) for n, v in reference.items()}
+        near = np.clip(ours["time"], time[0], time[-1])  # times are rounded, so the ends get a little slack
+        far = np.abs(near - ours["time"]) > SLACK
+        return {name: np.where(far, np.nan, np.interp(near, time, values)) for name, values in reference.items()}
     rows = {int(frame): row for row, frame in enumerate(reference["frame"])}
     row = np.array([rows.get(int(frame), -1) for frame in ours["frame"]])
     return {name: np.where(row >= 0, values[row], np.nan) for name, values in reference.items()}

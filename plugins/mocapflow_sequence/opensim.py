@@ -1,9 +1,10 @@
 """Poses as OpenSim names and signs them (full-body gait models such as gait2392 and Rajagopal 2016).
 
 Ground: x = world y, y = world z (up), z = world x (`mocapflow.io.markers`); pelvis_tilt and pelvis_list are turns
-about the ground's own z and x, so they read as such for a person who faces the ground's x. Segments: x forward, y up, z right. At
-rest the segment of a limb has y along the limb, z across the body (the hinge, at an arm that is bent at rest), so
-0 is a straight, hanging limb. Every joint is the sequence z, x, y; signs are mirrored between the sides:
+about the ground's own z and x, so they read as such for a person who faces the ground's x. Segments: x forward,
+y up, z right. At rest the segment of a limb has y along the limb and z across the body (at an arm that is bent at
+rest, along its hinge), so 0 is a straight, hanging limb. Every joint is the sequence z, x, y; signs are mirrored
+between the sides:
 
 - pelvis_tilt forward bend negative, pelvis_list, pelvis_rotation; pelvis_tx, ty, tz of the pelvis joint in m (of the
   root's rest place where a body has no pelvis)
@@ -40,7 +41,10 @@ def coordinates(body: Body, root: F64, poses: F64) -> dict[str, F64]:
     """
     joints = kinematics.chain_batch(body, PoseBatch(root=root, angles=poses))
     places = markers.opensim_from_world(kinematics.joint_positions(body, joints))
-    frames = {name: OPENSIM_FROM_WORLD @ joints[:, body.joint(name), :3, :3] @ rest for name, rest in rest_frames(body).items()}
+    frames = {
+        name: OPENSIM_FROM_WORLD @ joints[:, body.joint(name), :3, :3] @ rest
+        for name, rest in rest_frames(body).items()
+    }
     pelvis = "pelvis" if "pelvis" in body.joint_names else body.joint_names[0]
     found: dict[str, F64] = {}
     _add(found, ("pelvis_tilt", "pelvis_list", "pelvis_rotation"), np.eye(3), frames[pelvis])
@@ -59,7 +63,10 @@ def rest_frames(body: Body) -> Mapping[str, F64]:
     upright = angles.anatomical_axes(body).T
     frames = dict.fromkeys(body.joint_names, upright)
     for side in ("l", "r"):
-        legs, arms = [f"{j}_{side}" for j in ("hip", "knee", "ankle")], [f"{j}_{side}" for j in ("shoulder", "elbow", "wrist")]
+        legs, arms = (
+            [f"{j}_{side}" for j in ("hip", "knee", "ankle")],
+            [f"{j}_{side}" for j in ("shoulder", "elbow", "wrist")],
+        )
         for start, end in zip(legs, legs[1:], strict=False):
             if {start, end} <= set(body.joint_names):
                 frames[start] = _along(_way(body, end, start), upright[:, 2])

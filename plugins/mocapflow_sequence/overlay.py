@@ -56,9 +56,10 @@ class Painter:
         """Return the image of a view, enlarged if small, with the model drawn on it."""
         import cv2
 
-        camera, image = self._cameras[view], np.asarray(frame.images[view])
+        camera, image = self._cameras[view], np.array(frame.images[view])
         factor = -(-LEAST_HEIGHT // image.shape[0])
-        image = cv2.resize(image, None, fx=factor, fy=factor, interpolation=cv2.INTER_CUBIC) if factor > 1 else image.copy()
+        if factor > 1:
+            image = np.asarray(cv2.resize(image, None, fx=factor, fy=factor, interpolation=cv2.INTER_CUBIC), np.uint8)
         self._draw(image, track, row, cameras.scaled(camera, factor))
         drawing.label(image, f"{camera.name}  frame {frame.index}")
         for line, text in enumerate(_remarks(frame, track, row, view)):
@@ -80,7 +81,9 @@ class Painter:
 
 def _cloth_surface(vertices: F64, faces: I32, edges: I32, body: Surface) -> Surface:
     layer = np.full(len(vertices), CLOTH, np.uint8)
-    return Surface(vertices=vertices.copy(), faces=faces, edges=edges, layer=layer, joints=body.joints, screws=body.screws)
+    return Surface(
+        vertices=vertices.copy(), faces=faces, edges=edges, layer=layer, joints=body.joints, screws=body.screws
+    )
 
 
 def _remarks(frame: Frame, track: Track, row: int, view: int) -> list[str]:

@@ -13,7 +13,15 @@ from mocapflow.records import F64
 from mocapflow_sequence import tables
 
 MOTION = {"knee_angle": "knee_flexion", "hip_flexion": "hip_flexion", "ankle_angle": "ankle", "elbow_flex": "elbow"}
-MARKERS = {"Hip": "hip", "Knee": "knee", "Ankle": "ankle", "BigToe": "toe", "Shoulder": "shoulder", "Elbow": "elbow", "Wrist": "wrist"}
+MARKERS = {
+    "Hip": "hip",
+    "Knee": "knee",
+    "Ankle": "ankle",
+    "BigToe": "toe",
+    "Shoulder": "shoulder",
+    "Elbow": "elbow",
+    "Wrist": "wrist",
+}
 
 
 def read_reference(path: Path) -> dict[str, F64]:
@@ -28,7 +36,11 @@ def read_reference(path: Path) -> dict[str, F64]:
     """
     readers = {".csv": tables.read_columns, ".mot": _motion, ".sto": _motion, ".trc": _joint_centres}
     if path.suffix.lower() not in readers:
-        raise RecordingError(f"can't compare with a {path.suffix or 'file without ending'}", where=str(path), hint="use .csv, .mot or .trc")
+        raise RecordingError(
+            f"can't compare with a {path.suffix or 'file without ending'}",
+            where=str(path),
+            hint="use .csv, .mot or .trc",
+        )
     if not path.is_file():
         raise RecordingError("no such reference", where=str(path))
     curves = readers[path.suffix.lower()](path)
@@ -39,7 +51,7 @@ def read_reference(path: Path) -> dict[str, F64]:
 
 def _motion(path: Path) -> dict[str, F64]:
     columns, time = markers.read_mot(path)
-    curves = {"time": time}
+    curves = {"time": from_zero(time)}
     for theirs, ours in MOTION.items():
         for side in ("l", "r"):
             if f"{theirs}_{side}" in columns:
@@ -54,9 +66,15 @@ def _joint_centres(path: Path) -> dict[str, F64]:
     theirs, positions, time, _ = markers.read_trc(path)
     known = {f"{s.upper()}{name}": f"{ours}_{s}" for name, ours in MARKERS.items() for s in ("l", "r")}
     names = tuple(known.get(name, name) for name in theirs)
-    curves = {"time": time}
+    curves = {"time": from_zero(time)}
     for wish in angles.definitions(names):
         if len(wish.points) == 3:
             points = positions[:, [names.index(p) for p in wish.points]]
             curves[wish.name] = angles.three_point(points) + wish.offset
     return curves
+
+
+def from_zero(time: F64) -> F64:
+    """Return times (T,) s whose first video frame is at 0: some programs (Pose2Sim) put it at one sample."""
+    step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    return time - step if step > 0 and abs(time[0] - step) < 0.01 * step else time

@@ -44,15 +44,18 @@ def read_columns(path: Path) -> dict[str, F64]:
         rows = [row for row in csv.reader(file) if row]
     if len(rows) < 2:
         raise RecordingError("the table has no rows", where=str(path))
-    header, width = [name.strip() for name in rows[0]], len(rows[0])
-    values = np.empty((len(rows) - 1, width))
-    for number, row in enumerate(rows[1:]):
-        try:
-            values[number] = [float(cell) if cell.strip() else np.nan for cell in row]
-        except ValueError as error:
-            message = f"a row has {len(row)} cells that do not fit the header's {width} numbers: {error}"
-            raise RecordingError(message, where=f"{path}:{number + 2}") from None
+    header = [name.strip() for name in rows[0]]
+    values = np.array([_numbers(row, len(header), f"{path}:{number}") for number, row in enumerate(rows[1:], 2)])
     return {name: values[:, column].copy() for column, name in enumerate(header)}
+
+
+def _numbers(row: Sequence[str], width: int, where: str) -> list[float]:
+    if len(row) != width:
+        raise RecordingError(f"a row has {len(row)} cells; the header has {width}", where=where)
+    try:
+        return [float(cell) if cell.strip() else np.nan for cell in row]
+    except ValueError as error:
+        raise RecordingError(f"not a number: {error}", where=where) from None
 
 
 def write_rows(path: Path, rows: Sequence[Mapping[str, float | str]]) -> Path:

@@ -4,10 +4,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mocapflow.data import Body
+from mocapflow.data import Body, Pose
 from mocapflow.geometry import angles, twists
 from mocapflow.model import moved
-from mocapflow.data import Pose
 
 DEMO = Path(__file__).parents[2] / "examples" / "data"
 

@@ -30,10 +30,11 @@ def ball_body(names: tuple[str, ...] = (), folder: Path = DEMO) -> Body:
     triangles = [(f[0], f[k], f[k + 1]) for f in faces for k in range(1, len(f) - 1)]
     weights = np.load(folder / "subject" / "weights.npz")
     full = np.zeros((len(vertices), len(kept)))
-    for column, name in enumerate(weights["names"]):
-        while str(name) not in order:
-            name = next(e["parent"] for e in entries if e["name"] == name)
-        full[:, order.index(str(name))] += weights["weights"][:, column]
+    parent_of = {e["name"]: e["parent"] for e in entries}
+    for column, joint in enumerate(str(name) for name in weights["names"]):
+        while joint not in order:
+            joint = parent_of[joint]  # noqa: PLW2901  the skin of a joint that is left out follows its parent
+        full[:, order.index(joint)] += weights["weights"][:, column]
     if len(kept) < 5:
         full = np.pad(full, ((0, 0), (0, 5 - len(kept))))
     skin = np.argsort(-full, axis=1)[:, :5]
@@ -41,7 +42,8 @@ def ball_body(names: tuple[str, ...] = (), folder: Path = DEMO) -> Body:
     return Body(
         vertices=vertices, faces=np.array(triangles, np.int32), joint_names=tuple(order), parents=parents,
         positions=positions, screw_names=tuple(f"{order[j]}.{'xyz'[k % 3]}" for k, j in enumerate(moving)),
-        twists=twists.screw(np.tile(np.eye(3), (count // 3, 1)), positions[moving]), screw_joint=moving.astype(np.int32),
+        twists=twists.screw(np.tile(np.eye(3), (count // 3, 1)), positions[moving]),
+        screw_joint=moving.astype(np.int32),
         limits=np.tile([-3.0, 3.0], (count, 1)), rest_spread=np.full(count, np.inf),
         skin_joint=skin.astype(np.int32), skin_weight=weight / weight.sum(1, keepdims=True),
         cut=np.zeros(len(vertices), bool),
@@ -69,8 +71,11 @@ def cameras(folder: Path = DEMO) -> tuple[Camera, ...]:
         pose[:3, 3] = table["translation"]
         made.append(
             Camera(
-                name=table["name"], size=np.array(table["size"], np.int32), intrinsics=np.array(table["matrix"]),
-                distortion=np.zeros(5), camera_from_world=pose,
+                name=table["name"],
+                size=np.array(table["size"], np.int32),
+                intrinsics=np.array(table["matrix"]),
+                distortion=np.zeros(5),
+                camera_from_world=pose,
             )  # fmt: skip
         )
     return tuple(made)
@@ -100,7 +105,9 @@ def demo_scene(clothed: bool = False) -> Scene:
     return Scene(cameras=cameras(), body=body, garment=tube(body) if clothed else None)
 
 
-def make_track(root: np.ndarray, angles: np.ndarray, sd: float = 0.01, views: int = 4, cloth: int = 0, fps: float = 30.0) -> Track:
+def make_track(
+    root: np.ndarray, angles: np.ndarray, sd: float = 0.01, views: int = 4, cloth: int = 0, fps: float = 30.0
+) -> Track:
     """Return a track of poses (T, 4, 4) and (T, D) with one standard deviation for everything."""
     count, size = len(root), 6 + angles.shape[1]
     return Track(

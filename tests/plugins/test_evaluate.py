@@ -119,6 +119,15 @@ def test_motion_file_in_time_is_interpolated(tmp_path: Path) -> None:
     assert got[0]["frames"] == np.sum(frames / 30 <= 1.99)
 
 
+def test_times_that_count_from_one_sample_start_at_zero(tmp_path: Path) -> None:
+    time = np.arange(1, 51) / 60
+    curve = 30 + 20 * np.sin(np.arange(50) / 5)
+    markers.write_mot(tmp_path / "m.mot", {"knee_angle_r": curve}, time)
+    ours = {"frame": np.arange(50.0), "time": np.arange(50) / 60, "knee_flexion_r": curve}
+    got = evaluate(ours, ours, tmp_path / "m.mot", tmp_path).rows[0]
+    assert (got["frames"], round(float(got["rms_deg"]), 3)) == (50, 0)
+
+
 def test_gait2392_knees_are_turned_round(tmp_path: Path) -> None:
     time = np.arange(10) / 30
     markers.write_mot(tmp_path / "m.mot", {"knee_angle_l": np.full(10, -40.0)}, time)

@@ -10,7 +10,7 @@ from mocapflow.geometry import angles, twists
 
 
 def turned(body: Body, **turns_deg: float) -> dict[str, np.ndarray]:
-    """Coordinates after turns about axes of the rest pose at joints, e.g. hip_r_x=30; `root_z` turns the person in the world."""
+    """Coordinates after turns about axes of the rest pose, e.g. hip_r_x=30; `root_z` turns the person in the world."""
     pose = np.zeros(len(body.twists))
     root = facing = np.diag([-1.0, -1.0, 1.0, 1.0])  # towards world y, which is OpenSim's x
     for name, degrees in turns_deg.items():

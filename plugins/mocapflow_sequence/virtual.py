@@ -1,0 +1,42 @@
+"""Stage `virtual`: body, garment and stick model in a virtual room, without any display."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field
+
+from mocapflow.components import Stage
+from mocapflow.data import NO_CLOTH, Files, RunFolder, Track
+from mocapflow.scene import Scene
+from mocapflow_sequence import drawing, layout
+from mocapflow_sequence.export import frame_rate
+from mocapflow_sequence.room import Room
+
+
+class Virtual(Stage):
+    """Writes virtual/virtual.mp4: floor, cameras, the shaded body in its see-through garment, a stick model beside.
+
+    `every` takes every so many frames; the video keeps the speed of the recording.
+    """
+
+    name: ClassVar[str] = "virtual"
+    width_px: Annotated[int, Field(ge=64, multiple_of=2)] = 640
+    height_px: Annotated[int, Field(ge=64, multiple_of=2)] = 480
+    every: Annotated[int, Field(ge=1)] = 1
+    codec: Literal["mp4v", "vp09"] = "mp4v"
+
+    def run(self, track: Track, scene: Scene, run_folder: RunFolder) -> Files:
+        """Write the video and return its path."""
+        if not len(track.frame):
+            return Files(paths=())
+        path = layout.place(run_folder.path, layout.VIRTUAL)
+        bare = replace(scene, garment=None)
+        room = Room(scene, track, (self.width_px, self.height_px))
+        with drawing.videos([path], frame_rate(track) / self.every, self.codec) as (video,):
+            for row in range(0, len(track.frame), self.every):
+                image = room.picture(bare.surface(track.pose(row), NO_CLOTH), track.cloth[row])
+                drawing.label(image, f"frame {track.frame[row]}   {track.time[row]:.2f} s")
+                video.write(image)
+        return Files(paths=(path,))

@@ -1,0 +1,137 @@
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mocapflow_sequence import layout, runjson, tables
+from mocapflow_sequence.export import Export
+from mocapflow_sequence.smooth import Smooth
+from results_scene import DEMO, ball_body, cameras, demo_scene, stepping
+
+from mocapflow.data import Files, RunFolder, Track
+from mocapflow.geometry import kinematics
+from mocapflow.io import markers
+from mocapflow.recording import Recording, open_recording
+from mocapflow.scene import Scene
+
+COLUMNS = [f"{n}_{s}" for n in ("knee_flexion", "hip_flexion", "ankle", "elbow") for s in "lr"]
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return demo_scene()
+
+
+@pytest.fixture(scope="module")
+def recording() -> Recording:
+    return open_recording(DEMO)
+
+
+def exported(track: Track, scene: Scene, recording: Recording, folder: Path, **settings: object) -> Files:
+    recipe = {
+        "pipeline": Path("skirt.yaml"),
+        "versions": {"numpy": np.__version__},
+        "stages": [{"seconds": np.float64(1.5)}],
+    }
+    run_folder = RunFolder(path=folder, recipe=recipe)
+    return Export(**settings).run(track=track, scene=scene, recording=recording, run_folder=run_folder)
+
+
+@pytest.fixture(scope="module")
+def folder(scene: Scene, recording: Recording, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("run")
+    track = stepping(scene.body)
+    shaken = replace(track, angles=track.angles + 0.02 * np.random.default_rng(0).normal(size=track.angles.shape))
+    exported(Smooth().run(track=shaken), scene, recording, path)
+    return path
+
+
+def test_angles_have_the_columns_of_the_truth_each_with_its_deviation(folder: Path) -> None:
+    header = (folder / layout.ANGLES).read_text().splitlines()[0].split(",")
+    assert [c for c in header if not c.endswith("_sd")] == ["frame", "time", *COLUMNS]
+    assert {c for c in header if c.endswith("_sd")} == {f"{c}_sd" for c in COLUMNS}
+    columns = tables.read_columns(folder / layout.ANGLES)
+    assert (columns["frame"] == np.arange(40)).all()
+    assert all(np.isfinite(v).all() for v in columns.values())
+
+
+def test_raw_angles_are_those_before_smoothing(folder: Path) -> None:
+    smooth, raw = (tables.read_columns(folder / part) for part in (layout.ANGLES, layout.RAW_ANGLES))
+    assert list(smooth) == list(raw)
+    jitter = [np.abs(np.diff(t["knee_flexion_l"], 2)).mean() for t in (smooth, raw)]
+    assert jitter[0] < jitter[1]
+
+
+def test_without_smoothing_both_tables_are_the_same(scene: Scene, recording: Recording, tmp_path: Path) -> None:
+    exported(stepping(scene.body, 5), scene, recording, tmp_path, formats=("csv",))
+    assert (tmp_path / layout.ANGLES).read_bytes() == (tmp_path / layout.RAW_ANGLES).read_bytes()
+    assert not (tmp_path / layout.MOTION).exists()
+
+
+def test_motion_file_reads_back_with_opensim_names(folder: Path) -> None:
+    columns, time = markers.read_mot(folder / layout.MOTION)
+    wanted = {
+        "pelvis_tilt",
+        "pelvis_ty",
+        "hip_flexion_r",
+        "hip_adduction_l",
+        "hip_rotation_r",
+        "knee_angle_r",
+        "ankle_angle_l",
+    }
+    assert wanted | {"elbow_flex_r", "arm_flex_l", "lumbar_extension"} <= set(columns)
+    assert np.allclose(time, np.arange(40) / 30, atol=1e-6)
+    assert columns["knee_angle_l"].max() > 25
+    assert 0.7 < columns["pelvis_ty"].mean() < 1.1
+
+
+def test_joint_centres_read_back_in_the_world(scene: Scene, recording: Recording, tmp_path: Path) -> None:
+    track = stepping(scene.body, 5)
+    exported(track, scene, recording, tmp_path)
+    names, places, _, rate = markers.read_trc(tmp_path / layout.JOINTS)
+    joints, _ = kinematics.chain(scene.body, track.pose(3))
+    assert names == scene.body.joint_names
+    assert rate == pytest.approx(30)
+    here = markers.world_from_opensim(places[3])
+    assert np.abs(here - kinematics.joint_positions(scene.body, joints)).max() < 1e-6
+
+
+def test_run_json_says_how_it_was_made_and_how_it_went(scene: Scene, recording: Recording, tmp_path: Path) -> None:
+    track = stepping(scene.body, 6)
+    turns, steady, usable = track.iterations.copy(), track.steady.copy(), track.usable.copy()
+    turns[3], steady[2:4], usable[3, 1:] = 0, False, False
+    overlap = track.overlap.copy()
+    overlap[3] = np.nan
+    note = "frame 3: seen by too few cameras; the prediction is kept"
+    broken = replace(
+        track, iterations=turns, steady=steady, usable=usable, overlap=overlap, notes=("frame 3: cam02 black", note)
+    )
+    exported(Smooth().run(track=broken), scene, recording, tmp_path)
+    got = json.loads((tmp_path / layout.RUN).read_text())
+    assert got["recipe"]["versions"] == {"numpy": np.__version__}
+    assert got["frames"]["lost"] == [3]
+    assert "neighbouring" in got["frames"]["bridged_by"]
+    assert got["frames"]["not_at_rest"] == [2, 3]
+    assert got["cpu_seconds"]["per_step"] == pytest.approx({"segment": 0.06, "solve": 0.06})
+    assert [f["iterations"] for f in got["per_frame"]] == [3, 3, 3, 0, 3, 3]
+    assert got["per_frame"][3]["overlap"] == [None] * 4
+    assert got["per_frame"][3]["unusable_views"] == [1, 2, 3]
+    assert got["per_frame"][3]["notes"] == ["cam02 black", "seen by too few cameras; the prediction is kept"]
+
+
+def test_plain_makes_json_of_what_a_recipe_may_hold() -> None:
+    odd = {"path": Path("a/b"), 1: (np.int32(2), np.nan), "array": np.eye(2), "none": None}
+    assert runjson.plain(odd) == {"path": "a/b", "1": [2, None], "array": [[1.0, 0.0], [0.0, 1.0]], "none": None}
+
+
+def test_legs_alone_export(recording: Recording, tmp_path: Path) -> None:
+    body = ball_body(("pelvis", "hip_l", "knee_l", "ankle_l", "toe_l", "hip_r", "knee_r", "ankle_r", "toe_r"))
+    exported(stepping(body, 4), Scene(cameras=cameras(), body=body), recording, tmp_path)
+    assert list(tables.read_columns(tmp_path / layout.ANGLES))[2::2] == COLUMNS[:6]
+
+
+def test_table_with_a_missing_cell_says_where(tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text("frame,knee_flexion_l\n0,1.5\n1\n")
+    with pytest.raises(Exception, match=r"t\.csv:3  a row has 1 cells"):
+        tables.read_columns(tmp_path / "t.csv")

@@ -1,0 +1,150 @@
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import cv2
+import numpy as np
+import pytest
+from mocapflow_sequence import drawing, layout, raster
+from mocapflow_sequence.evaluate import Evaluate
+from mocapflow_sequence.overlay import Overlay, Painter
+from mocapflow_sequence.report import Report, chosen_rows
+from mocapflow_sequence.smooth import Smooth
+from mocapflow_sequence.virtual import Virtual
+from results_scene import DEMO, demo_scene, stepping
+
+from mocapflow.data import Evaluation, RunFolder, Track
+from mocapflow.errors import StoreError
+from mocapflow.geometry import cameras
+from mocapflow.recording import Recording, open_recording
+from mocapflow.scene import Scene
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return demo_scene(clothed=True)
+
+
+@pytest.fixture(scope="module")
+def track(scene: Scene) -> Track:
+    assert scene.garment is not None
+    bare = stepping(scene.body, 4)
+    garment = scene.garment.vertices
+    return replace(bare, cloth=np.stack([garment @ root[:3, :3].T + root[:3, 3] for root in bare.root]))
+
+
+@pytest.fixture(scope="module")
+def recording() -> Recording:
+    return open_recording(DEMO, stop=4)
+
+
+def read_back(path: Path) -> np.ndarray:
+    video, frames = cv2.VideoCapture(str(path)), []
+    while (read := video.read())[0]:
+        frames.append(read[1])
+    return np.array(frames)
+
+
+def near(image: np.ndarray, colour: drawing.Colour) -> int:
+    return int((np.abs(image.astype(int) - colour).max(-1) < 40).sum())
+
+
+def test_overlay_shows_outline_garment_and_skeleton(
+    scene: Scene, track: Track, recording: Recording, tmp_path: Path
+) -> None:
+    files = Overlay().run(track=track, scene=scene, recording=recording, run_folder=RunFolder(path=tmp_path, recipe={}))
+    assert [p.relative_to(tmp_path) for p in files.paths] == [layout.overlay(f"cam0{k}") for k in (1, 2, 3, 4)]
+    assert all(read_back(path).shape == (4, 800, 640, 3) for path in files.paths)  # small images are enlarged
+    frame = next(recording.frames())
+    for view in range(4):  # before compression, which blurs thin coloured lines
+        image = Painter(scene).paint(frame, track, 0, view)
+        for colour in (drawing.BODY, drawing.CLOTH, drawing.BONE):
+            assert near(image, colour) > 200
+
+
+def test_overlay_of_a_lost_view_says_so(scene: Scene, track: Track, recording: Recording, tmp_path: Path) -> None:
+    def frames() -> list[object]:
+        lost = np.array([True, False, True, True])
+        return [replace(f, usable=lost, reasons=("", "black", "", "")) for f in recording.frames()]
+
+    run_folder = RunFolder(path=tmp_path, recipe={})
+    fake = SimpleNamespace(frames=frames)
+    shown = [
+        read_back(Overlay().run(track=track, scene=scene, recording=source, run_folder=run_folder).paths[1])[0][:80]
+        for source in (recording, fake)
+    ]
+    assert np.abs(shown[0].astype(int) - shown[1]).max() > 100
+
+
+def test_virtual_room_moves_with_the_person(scene: Scene, track: Track, tmp_path: Path) -> None:
+    run_folder = RunFolder(path=tmp_path, recipe={})
+    (path,) = Virtual(width_px=320, height_px=240).run(track=track, scene=scene, run_folder=run_folder).paths
+    video = read_back(path)
+    assert video.shape == (4, 240, 320, 3)
+    assert np.abs(video[0].astype(int) - video[3]).max() > 60
+    (every,) = Virtual(width_px=320, height_px=240, every=3).run(track=track, scene=scene, run_folder=run_folder).paths
+    assert len(read_back(every)) == 2
+
+
+def test_rasteriser_draws_where_the_camera_projects() -> None:
+    view = raster.look_at(np.array([3.0, -2.0, 1.5]), np.array([0.0, 0.0, 1.0]), (320, 240), 40.0)
+    canvas = raster.Canvas(np.zeros((240, 320, 3), np.float32), view)
+    corners = np.array([[0.1, 0.2, 1.1], [0.13, 0.2, 1.1], [0.1, 0.2, 1.13], [0.1, 0.23, 1.1]])
+    canvas.draw(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32), np.ones((4, 3), np.float32))
+    drawn = np.argwhere(canvas.picture[..., 0] > 0).mean(0)[::-1]
+    assert np.abs(drawn - cameras.project(corners, view).mean(0)).max() < 2
+
+
+def test_nearest_triangle_is_seen_and_a_veil_shines_through() -> None:
+    view = raster.look_at(np.array([0.0, -3.0, 0.0]), np.zeros(3), (64, 64), 40.0)
+    square, faces = (
+        np.array([[-1.0, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]]),
+        np.array([[0, 1, 2], [0, 2, 3]], np.int32),
+    )
+    white, grey = np.ones((4, 3), np.float32), np.full((4, 3), 0.5, np.float32)
+    canvas = raster.Canvas(np.zeros((64, 64, 3), np.float32), view)
+    canvas.draw(square, faces, white)
+    canvas.draw(square + [0, 1.0, 0], faces, grey)  # behind
+    assert canvas.picture[32, 32, 0] == pytest.approx(1)
+    canvas.veil(square - [0, 1.0, 0], faces, grey, 0.4)  # before
+    assert canvas.picture[32, 32, 0] == pytest.approx(0.4 * 0.5 + 0.6)
+
+
+def test_report_holds_everything(scene: Scene, track: Track, recording: Recording, tmp_path: Path) -> None:
+    run_folder = RunFolder(path=tmp_path, recipe={"pipeline": "<skirt>", "versions": {"numpy": "2"}})
+    noted = Smooth().run(track=replace(track, notes=("frame 2: cam02 black",)))
+    evaluation = Evaluate().run(track=noted, scene=scene, recording=recording, run_folder=run_folder)
+    files = Report().run(track=noted, scene=scene, recording=recording, run_folder=run_folder, evaluation=evaluation)
+    page = (tmp_path / layout.REPORT).read_text()
+    assert set(files.paths) == {tmp_path / layout.REPORT, tmp_path / layout.PLOT}
+    for text in ("knee_flexion_l", "frame 2: cam02 black", "&lt;skirt&gt;", "best: frame", "worst: frame", "segment"):
+        assert text in page
+    assert page.count("data:image/jpeg;base64") == 3
+    assert page.count("data:image/png;base64") == 1
+    assert "http" not in page and 'src="/' not in page
+
+
+def test_report_without_reference(scene: Scene, track: Track, recording: Recording, tmp_path: Path) -> None:
+    run_folder = RunFolder(path=tmp_path, recipe={})
+    nothing = Evaluation(reference="", rows=(), note="the recording has no truth/angles.csv")
+    Report().run(track=track, scene=scene, recording=recording, run_folder=run_folder, evaluation=nothing)
+    assert "no truth/angles.csv" in (tmp_path / layout.REPORT).read_text()
+    Report().run(track=track, scene=scene, recording=recording, run_folder=run_folder)
+    assert "Deviation" not in (tmp_path / layout.REPORT).read_text()
+
+
+def test_shown_frames_are_best_median_and_worst(track: Track) -> None:
+    overlap = np.array([[0.5, 0.7], [0.9, np.nan], [0.8, 0.8], [np.nan, np.nan]])
+    assert chosen_rows(replace(track, overlap=overlap, usable=np.ones((4, 2), bool))) == {
+        "best": 1,
+        "median": 2,
+        "worst": 0,
+    }
+    unknown = replace(track, overlap=np.full((4, 4), np.nan))
+    assert chosen_rows(unknown) == {"first": 0, "middle": 2, "last": 3}
+
+
+def test_unwritable_video_is_an_error_for_people(tmp_path: Path) -> None:
+    video = drawing.Video(tmp_path / "no" / "folder.mp4", 30.0, "mp4v")
+    with pytest.raises(StoreError, match="can't write a video with codec mp4v"):
+        video.write(np.zeros((64, 64, 3), np.uint8))
