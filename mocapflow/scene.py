@@ -43,6 +43,21 @@ class Scene:
         cloth = 0 if self.garment is None else len(self.garment.vertices)
         return np.repeat(np.array([BODY, CLOTH], np.uint8), [len(self.body.vertices), cloth])
 
+    @cached_property
+    def _bare_edges(self) -> I32:
+        return meshes.edges(self.body.faces)
+
+    def bare(self, surface: Surface) -> Surface:
+        """Return the body of a surface without its cloth."""
+        count = len(self.body.vertices)
+        return replace(
+            surface,
+            vertices=surface.vertices[:count],
+            faces=self.body.faces,
+            edges=self._bare_edges,
+            layer=surface.layer[:count],
+        )
+
     def surface(self, pose: Pose, cloth: Cloth) -> Surface:
         """Return body and garment posed in the world."""
         joints, screws = kinematics.chain(self.body, pose)

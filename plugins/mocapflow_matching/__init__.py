@@ -9,6 +9,7 @@ from mocapflow.hookspecs import hookimpl
 @hookimpl
 def mocapflow_matchers() -> list[type[Matcher]]:
     """Return the built-in matchers."""
+    from mocapflow_matching.containment import Containment
     from mocapflow_matching.contour_icp import ContourIcp
 
-    return [ContourIcp]
+    return [ContourIcp, Containment]

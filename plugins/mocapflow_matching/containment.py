@@ -1,0 +1,73 @@
+"""Matcher `containment`: what the cloth hides stays inside the clothed silhouette."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from mocapflow.components import Matcher, pool
+from mocapflow.data import CLOTH, Camera, Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn, empty_matches
+from mocapflow.geometry.contours import nearest_compatible
+from mocapflow.geometry.silhouettes import occluding_contour
+from mocapflow.records import F64
+from mocapflow.scene import Scene
+from mocapflow_matching.robust import robust_weights
+
+Positive = Annotated[float, Field(gt=0)]
+ANY_DIRECTION = -1.0  # least cosine between normals
+
+
+class Containment(Matcher):
+    """Pairs points of the bare body's contour that stick out of the image silhouette with the image contour.
+
+    One-sided: a limb inside the silhouette is left alone, so nothing pulls it to the cloth. Without a garment there
+    is nothing hidden and no pair.
+    """
+
+    name: ClassVar[str] = "containment"
+    spacing_px: Positive = 6.0
+    reach_px: Positive = 60.0
+    margin_px: float = 0.0  # how far inside the silhouette the skin has to stay
+    sigma_px: Positive = 1.0
+    scale: Positive = 3.0  # standard deviations beyond which a pair pulls no harder (Huber)
+
+    def match(
+        self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn
+    ) -> Matches:
+        """Return the pairs of every view; see the class."""
+        if not (surface.layer == CLOTH).any():
+            return empty_matches()
+        bare = scene.bare(surface)
+        people = [s for s in segmentation.silhouettes if s.layer == "person"]
+        parts = [(1.0, self.match_view(scene.cameras[s.camera], s, bare)) for s in people]
+        return pool(parts) if parts else empty_matches()
+
+    def match_view(self, camera: Camera, silhouette: Silhouette, bare: Surface) -> Matches:
+        """Return the pairs of one view."""
+        model = occluding_contour(bare, camera, self.spacing_px)
+        outside = inside_px(silhouette, model.pixel) < self.margin_px
+        pixel, normal = silhouette.zero_level
+        found = nearest_compatible(
+            model.pixel[outside], model.normal[outside], pixel, normal, self.reach_px, ANY_DIRECTION
+        )
+        out, target = np.flatnonzero(outside)[found >= 0], found[found >= 0]
+        direction = normal[target]
+        goal = pixel[target] - self.margin_px * direction
+        distance = np.abs(np.sum((model.pixel[out] - goal) * direction, axis=1))
+        return Matches(
+            camera=np.full(len(out), silhouette.camera, np.int16),
+            pixel=goal - (model.pixel - model.anchor)[out],
+            direction=direction,
+            vertex=model.vertex[out],
+            weight=robust_weights(distance / self.sigma_px, "huber", self.scale) / self.sigma_px**2,
+        )
+
+
+def inside_px(silhouette: Silhouette, pixels: F64) -> F64:
+    """Return the signed distance (K,) px at the pixels nearest to (K, 2); it is smooth, so half a pixel matters little."""
+    height, width = silhouette.distance.shape
+    column = np.clip(np.round(pixels[:, 0]).astype(int), 0, width - 1)
+    row = np.clip(np.round(pixels[:, 1]).astype(int), 0, height - 1)
+    return silhouette.distance[row, column].astype(np.float64)
