@@ -25,7 +25,8 @@ PLAIN = "plain"  # attribute with the fields that are no arrays
 
 def save_record(group: zarr.Group, value: Any) -> None:
     """Write a record into an empty group."""
-    cls, declared = type(value), array_fields(type(value))
+    cls: type = type(value)
+    declared = array_fields(cls)
     plain: dict[str, Any] = {}
     for field in fields(value):
         inner = getattr(value, field.name)
@@ -48,7 +49,8 @@ def load_record(group: zarr.Group, rows: int | None = None) -> Any:
     """
     try:
         cls = _record_class(str(group.attrs["record"]))
-        plain = dict(group.attrs[PLAIN])  # type: ignore[call-overload]
+        attributes: Any = group.attrs.asdict()
+        plain = dict(attributes[PLAIN])
         values: dict[str, Any] = {}
         for field in fields(cls):
             if field.name in plain:

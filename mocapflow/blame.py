@@ -8,18 +8,18 @@ from pathlib import Path
 from types import FrameType, TracebackType
 from typing import Any
 
-from mocapflow.components import Component, Stage
+from mocapflow.components import Component
 from mocapflow.data import Frame, Turn
 from mocapflow.errors import ComponentFailed
 from mocapflow.registry import Registry
 
 
-def failure(error: Exception, stage: Stage, registry: Registry, saved: str, log: Path) -> ComponentFailed:
+def failure(error: Exception, stage: Component, registry: Registry, saved: str, log: Path) -> ComponentFailed:
     """Return the error for people: the innermost frame of the traceback in a plugin names the culprit.
 
     Args:
         error: what was raised.
-        stage: the stage that was running.
+        stage: what was running.
         registry: knows which packages are plugins.
         saved: what is kept, and how to go on.
         log: where to write the whole traceback.

@@ -72,7 +72,8 @@ class Checkpoint:
         self._store, self._path, self._lock = store, artifact.path, lock
         self._indices, self._cameras = indices, tuple(cameras)
         self._attributes: dict[str, Any] = dict(artifact.attributes)
-        self._wanted = wanted
+        self._wanted, self._cap = wanted, 0
+        self._turns: list[Pose] | None = None  # of the frame at hand
         self._iteration_done, self._frame_done = iteration_done, frame_done
         self._arrays: dict[str, Rows] = {}
 
@@ -100,8 +101,14 @@ class Checkpoint:
         moments = tuple(self._moment(self._row(row), self._cloth(row)) for row in rows)
         return Past(moments=moments, appearance=self._appearance(self.done - 1) if rows else {})
 
+    def keep_turns(self, cap: int) -> None:
+        """Keep the pose of every turn as `trace`, at most `cap` a frame; frames that are done have none."""
+        self._turns, self._cap = [], cap
+
     def observe(self, frame: int, turn: Turn, state: FrameState) -> None:
         """Tell onlookers about one turn of the loop."""
+        if self._turns is not None:
+            self._turns.append(state.estimate.pose)
         self._iteration_done(frame, turn.index, state)
 
     def commit(self, frame: Frame, past: Past, result: FrameResult, notes: Sequence[str] = ()) -> Past:
@@ -125,9 +132,10 @@ class Checkpoint:
                 )
             self._write_seen(row, state.segmentation.silhouettes, state.matches)
             self._write_appearance(row, appearance)
-            self._note(frame.index, notes)
-            self._attributes |= {"frames_done": row + 1, "complete": False}
-            write_json(self._path / "zarr.json", group_meta(self._attributes))
+            self._write_trace(row)
+            news = {"notes": self._notes(frame.index, notes), "frames_done": row + 1, "complete": False}
+            write_json(self._path / "zarr.json", group_meta(self._attributes | news))
+        self._attributes |= news
         self._frame_done(frame.index, result)
         return past.after(self._moment(numbers, _copy(state.cloth.vertices)), appearance)
 
@@ -206,9 +214,9 @@ class Checkpoint:
     def _cloth(self, row: int) -> F64:
         return self._open("cloth").read(row) if self._attributes["cloth_vertices"] else _copy(NO_CLOTH.vertices)
 
-    def _note(self, index: int, notes: Sequence[str]) -> None:
-        """Add notes; one that goes on from the frame before is lengthened, so that they stay few."""
-        told: list[list[Any]] = self._attributes.setdefault("notes", [])
+    def _notes(self, index: int, notes: Sequence[str]) -> list[list[Any]]:
+        """Return all notes; one that goes on from the frame before is lengthened, so that they stay few."""
+        told: list[list[Any]] = [[*note] for note in self._attributes.get("notes", [])]
         before = self._indices[self.done - 1] if self.done else None
         for note in notes:
             same = next((old for old in told if old[1] == before and old[2] == note), None)
@@ -216,6 +224,16 @@ class Checkpoint:
                 same[1] = index
             else:
                 told.append([index, index, note])
+        return told
+
+    def _write_trace(self, row: int) -> None:
+        if self._turns is None:
+            return
+        turns = np.full((self._cap, 16 + self._columns["angles"][0]), np.nan)
+        for turn, pose in enumerate(self._turns):
+            turns[turn] = np.concatenate([pose.root.ravel(), pose.angles])
+        self._rows("trace", turns, np.nan, "turn", "root_and_angles").write(row, turns)
+        self._turns.clear()
 
     def _rows(self, name: str, like: npt.NDArray[Any], fill: float, *axes: str, **attributes: Any) -> Rows:
         """Return the array that holds rows like this one, made on first use."""

@@ -6,8 +6,10 @@ import ast
 import hashlib
 import importlib.util
 import json
+import os
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +22,7 @@ MARK = "blake2b:"  # a digest reads "blake2b:<hex> <name>"; the name is for peop
 
 CORE = ("components", "data", "geometry", "loop", "model", "records", "scene", "track")
 SHARED = ("io", "recording")  # counted where a component imports them
+PYTHON = f" {sys.version_info.major}.{sys.version_info.minor}"  # another minor version writes syntax trees otherwise
 
 
 def digest(data: bytes | memoryview, name: str = "") -> str:
@@ -37,13 +40,12 @@ class Digests:
     """Digests of files and of packages, remembered by path, size and time of change.
 
     Args:
-        memory: where to remember file digests between runs; None forgets them.
+        memory: where to remember them between runs; None forgets them.
     """
 
     def __init__(self, memory: Path | None = None) -> None:
         self._memory = memory
-        self._files: dict[str, list[Any]] = _read(memory)
-        self._code: dict[Path, tuple[str, frozenset[str]]] = {}
+        self._known: dict[str, list[Any]] = _read(memory)  # path -> stamp, then what was found
 
     def file(self, path: Path, name: str = "") -> str:
         """Return the digest of a file's content, or of all files in a folder with their names."""
@@ -53,15 +55,13 @@ class Digests:
         return f"{MARK}{self._content(path)} {name}".rstrip()
 
     def save(self) -> None:
-        """Remember the file digests for the next run; a folder that can't be written is no matter."""
-        if self._memory is None or self._files == _read(self._memory):
+        """Remember the digests for the next run; a folder that can't be written is no matter."""
+        if self._memory is None or self._known == _read(self._memory):
             return
-        try:
-            part = self._memory.with_suffix(".part")
-            part.write_text(json.dumps(self._files))
+        with suppress(OSError):
+            part = self._memory.with_suffix(f".{os.getpid()}.part")
+            part.write_text(json.dumps(self._known))
             part.replace(self._memory)
-        except OSError:
-            return
 
     def package(self, module: str) -> str:
         """Return the digest of a component's top package with the shared modules and plugins it imports."""
@@ -81,25 +81,31 @@ class Digests:
         return digest(json.dumps(found, sort_keys=True).encode(), "code of mocapflow")
 
     def _content(self, path: Path) -> str:
-        try:
-            stat = path.stat()
-            stamp = [stat.st_size, stat.st_mtime_ns]
-            known = self._files.get(str(path.resolve()))
-            if known is not None and known[:2] == stamp:
-                return str(known[2])
+        def read() -> list[str]:
             with path.open("rb") as file:
-                content = hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
+                return [hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).hexdigest()]
+
+        try:
+            return str(self._remembered(path, "", read)[0])
         except OSError as error:
             raise RecordingError(f"can't read {path}: {error.strerror}", where=str(path)) from error
-        self._files[str(path.resolve())] = [*stamp, content]
-        return content
 
-    def _source(self, path: Path) -> tuple[str, frozenset[str]]:
-        if path not in self._code:
+    def _source(self, path: Path) -> tuple[str, list[str]]:
+        def read() -> list[Any]:
             tree = ast.parse(path.read_bytes())
-            names = frozenset(_imports(tree))
-            self._code[path] = hashlib.blake2b(_meaning(tree).encode(), digest_size=16).hexdigest(), names
-        return self._code[path]
+            imports = sorted(set(_imports(tree)))  # before `_meaning`, which cuts the tree
+            return [hashlib.blake2b(_meaning(tree).encode(), digest_size=16).hexdigest(), imports]
+
+        code, imports = self._remembered(path, PYTHON, read)
+        return code, imports
+
+    def _remembered(self, path: Path, kind: str, read: Callable[[], list[Any]]) -> list[Any]:
+        stat, name = path.stat(), f"{path.resolve()}{kind}"
+        stamp = [stat.st_size, stat.st_mtime_ns]
+        known = self._known.get(name)
+        if known is None or known[:2] != stamp:
+            known = self._known[name] = [*stamp, *read()]
+        return known[2:]
 
 
 def _read(memory: Path | None) -> dict[str, list[Any]]:

@@ -81,14 +81,9 @@ def match_capacity(count: int) -> int:
 def match_row(matches: Matches) -> F32:
     """Return matches as float32 (capacity, 7), padded with zeros."""
     packed = np.zeros((match_capacity(len(matches.weight)), len(MATCH)), np.float32)
-    parts = [
-        matches.camera[:, None],
-        matches.pixel,
-        matches.direction,
-        matches.vertex[:, None],
-        matches.weight[:, None],
-    ]
-    packed[: len(matches.weight)] = np.concatenate(parts, axis=1)
+    used = packed[: len(matches.weight)]
+    used[:, 0], used[:, 5], used[:, 6] = matches.camera, matches.vertex, matches.weight
+    used[:, 1:3], used[:, 3:5] = matches.pixel, matches.direction
     return packed
 
 

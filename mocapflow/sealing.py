@@ -51,7 +51,7 @@ def told(notes: Sequence[tuple[int, int, str]], indices: Sequence[int]) -> list[
 
 def _array(group: zarr.Group, name: str, shape: tuple[int, ...], rows: int) -> Any:
     if name in group:
-        made = group[name]
+        made: Any = group[name]
         if made.shape[0] != rows:
             made.resize((rows, *shape))
         return made

@@ -74,6 +74,7 @@ class CoupledLoop(Stage):
     cloth_fitter: ClothFitter | None = None  # none: the garment is draped with the parameters it has
     priors: tuple[Prior, ...] = ()
     steady: SteadyState = SteadyState()
+    keep: Annotated[Literal["final", "trace"], FREE] = "final"  # trace: also the pose of every turn
     on_unsteady: Annotated[Literal["go_on", "stop"], FREE] = "go_on"
 
     def run(
@@ -86,6 +87,8 @@ class CoupledLoop(Stage):
     ) -> Track:
         """Return the track; frames that are already saved are not computed again."""
         model = ClothedModel(scene=scene.with_background(background), draper=self.draper)
+        if self.keep == "trace":
+            checkpoint.keep_turns(self.steady.max_turns)
         past, watch = checkpoint.past(), Stopwatch()
         for frame in recording.frames(since=checkpoint.next_index):
             watch.lap("decode")

@@ -1,0 +1,268 @@
+"""A table of edits, each of which must or must not change a key; and what a miss says about its reason."""
+
+import os
+import shutil
+import sys
+
+import numpy as np
+import pytest
+
+from mocapflow import digests
+from mocapflow.digests import Digests
+from mocapflow.keys import explain, key_of
+from mocapflow.recipes import steps_of
+from tests.fixtures.stores import PLUGIN, STAGES, load, write_pipeline, write_recording
+
+SHARED = Digests()  # reads each source file once; every test has files of its own
+TRACK = ("background", "start", "track", "smooth", "export")
+
+
+@pytest.fixture
+def clip(tmp_path):
+    return write_recording(tmp_path / "clip", frames=4)
+
+
+def keys(folder, recording, *changes, stages=None, garment="tiny_garment", frames=None, **more):
+    path = write_pipeline(folder, recording, stages=stages, garment=garment, **more)
+    return {step.label: step.key for step in steps_of(load(path, *changes, frames=frames), SHARED)}
+
+
+def changed(before, after):
+    return {label for label in before if before[label] != after[label]}
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ("stages.track.segmenter={use: tiny_segmenter, sigma_px: 3}", {"track", "smooth", "export"}),
+        ("stages.track.segmenter={use: tiny_segmenter, sigma_px: 2.0}", set()),  # its default
+        ("stages.track.segmenter={use: tiny_segmenter, sigma_px: 2}", set()),  # the same number
+        ("stages.track.steady.max_turns=5", {"track", "smooth", "export"}),
+        ("stages.track.draper=other_draper", {"track", "smooth", "export"}),
+        ("stages.track.priors=[{use: tiny_prior, weight: 2}]", {"track", "smooth", "export"}),
+        ("stages.track.priors=[]", {"track", "smooth", "export"}),
+        ("stages.track.matchers=[{use: tiny_matcher, share: 0.5}]", {"track", "smooth", "export"}),
+        ("stages.track.keep=trace", set()),
+        ("stages.track.on_unsteady=stop", set()),
+        ("stages.smooth.width=5", {"smooth", "export"}),
+        ("stages.start.angle_rad=0.1", {"start", "track", "smooth", "export"}),
+        ("garment.length_m=0.6", {"start", "track", "smooth", "export"}),
+        ("body.size_m=1.1", {"start", "track", "smooth", "export"}),
+        ("scale=0.5", {"background", "start", "track", "smooth", "export"}),
+    ],
+)
+def test_settings(tmp_path, clip, change, expected):
+    stages = STAGES | {"smooth": {"use": "tiny_smooth"}, "start": {"use": "tiny_start"}}
+    wordy = {"garment": {"use": "tiny_garment"}, "body": {"use": "tiny_body"}}
+    before = keys(tmp_path, clip, stages=stages, **wordy)
+    assert changed(before, keys(tmp_path, clip, change, stages=stages, **wordy)) == expected
+
+
+def test_stop_is_only_in_the_key_of_what_reads_the_whole_sequence(tmp_path, clip):
+    assert changed(keys(tmp_path, clip), keys(tmp_path, clip, frames=3)) == {"smooth", "export"}
+
+
+def test_start_and_step_are_in_the_key(tmp_path, clip):
+    before = keys(tmp_path, clip)
+    path = write_pipeline(tmp_path, clip, frames={"start": 0})
+    for change, expected in [
+        ("frames.start=1", {"start", "track", "smooth", "export"}),
+        ("frames.step=2", {"track", "smooth", "export"}),
+    ]:
+        after = {step.label: step.key for step in steps_of(load(path, change), SHARED)}
+        assert changed(before, after) == expected
+
+
+def test_names_and_order_of_stages_and_files_do_not_count(tmp_path, clip):
+    before = keys(tmp_path, clip)
+    renamed = {"room": "tiny_background", "first": "tiny_start", "loop": STAGES["track"], "smooth": "tiny_smooth"}
+    assert set(keys(tmp_path, clip, stages=renamed).values()) == set(before.values()) - {before["export"]}
+    swapped = {name: STAGES[name] for name in ("start", "background", "track", "smooth", "export")}
+    assert keys(tmp_path, clip, stages=swapped) == before
+    elsewhere = shutil.copytree(clip, tmp_path / "elsewhere" / "moved")
+    assert keys(tmp_path, elsewhere) == before
+
+
+def test_an_added_stage_changes_what_reads_it(tmp_path, clip):
+    before = keys(tmp_path, clip)
+    stages = {"start": "tiny_start", "grow": "tiny_grow", "track": STAGES["track"], "background": "tiny_background"}
+    after = keys(tmp_path, clip, stages=stages)
+    assert after["start"] == before["start"]  # it comes before the other body
+    assert after["track"] != before["track"]
+    without = {k: v for k, v in STAGES.items() if k != "background"}
+    assert changed(keys(tmp_path, clip, stages=without), before) == {"track", "smooth", "export"}
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("videos/cam01/000003.png", set(TRACK)),
+        ("cameras.toml", set(TRACK)),
+        ("subject.txt", {"start", "track", "smooth", "export"}),
+        ("init.json", set()),
+        ("truth/angles.csv", set()),
+        ("reference/angles.csv", set()),
+        ("README.md", set()),
+        ("static/videos/cam01.mp4", {"background", "start", "track"}),
+    ],
+)
+def test_content_of_files(tmp_path, clip, name, expected):
+    before = keys(tmp_path, clip)
+    path = clip / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if path.suffix == ".png":
+        shutil.copy(clip / "videos/cam01/000002.png", path)
+    elif path.name == "cameras.toml":
+        path.write_text(path.read_text().replace("20.0", "21.0"))
+    else:
+        path.write_text("other")
+    after = changed(before, keys(tmp_path, clip))
+    assert after >= expected
+    assert bool(after) == bool(expected)
+
+
+def test_a_touched_file_is_the_same(tmp_path, clip):
+    before = keys(tmp_path, clip)
+    os.utime(clip / "subject.txt")
+    assert keys(tmp_path, clip) == before
+
+
+CODE = '''
+"""A module."""
+import math
+
+def f(x):
+    """Return x."""
+    return x + 1  # one more
+
+class A:
+    """A class."""
+    def g(self):
+        """Do it."""
+'''
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "same"),
+    [
+        ("# one more", "# one more than x", True),
+        ("Return x.", "Return x and so on.", True),
+        ('"""A module."""', "", True),
+        ("x + 1", "x+1", True),
+        ("x + 1", "(x +\n 1)", True),
+        ("x + 1", "x + 2", False),
+        ("x + 1", "1 + x", False),
+        ("def f(x)", "def f(x=0)", False),
+        ("import math", "import cmath", False),
+        ("class A:", "class B:", False),
+    ],
+)
+def test_code_by_meaning(tmp_path, monkeypatch, old, new, same):
+    found = []
+    for index, text in enumerate([CODE, CODE.replace(old, new)]):
+        folder = tmp_path / str(index) / "mocapflow_sample"
+        folder.mkdir(parents=True)
+        (folder / "__init__.py").write_text("")
+        (folder / "inner.py").write_text(text)
+        monkeypatch.syspath_prepend(folder.parent)
+        found.append(Digests().package("mocapflow_sample.inner"))
+        sys.modules.pop("mocapflow_sample", None)
+    assert (found[0] == found[1]) is same
+
+
+def test_code_that_a_plugin_imports_counts(tmp_path, monkeypatch):
+    def made(value):
+        for name, text in {
+            "mocapflow_upper": "from mocapflow_lower import f\nfrom mocapflow.io import cameras",
+            "mocapflow_lower": f"def f():\n    return {value}",
+        }.items():
+            (tmp_path / name).mkdir(exist_ok=True)
+            (tmp_path / name / "__init__.py").write_text(text)
+        return Digests().package("mocapflow_upper")
+
+    monkeypatch.syspath_prepend(tmp_path)
+    assert made(1) == made(1) != made(2)
+    before = made(1)
+    monkeypatch.setattr(digests, "_meaning", lambda tree: "")  # everything else is alike: mocapflow.io counted too
+    assert made(1) != before
+
+
+def test_the_core_covers_what_every_result_depends_on(monkeypatch):
+    read = []
+    meaning = Digests._source
+    monkeypatch.setattr(Digests, "_source", lambda self, path: (read.append(path.stem), meaning(self, path))[1])
+    Digests().core()
+    assert {"twists", "kinematics", "scene", "model", "loop", "track", "data", "components"} <= set(read)
+    assert not {"cli", "store", "runner", "keys", "registry", "checkpoint"} & set(read)
+
+
+def test_an_edited_plugin_file_changes_the_keys_of_its_components(tmp_path, clip):
+    path = write_pipeline(tmp_path, clip)
+    copy = tmp_path / "plugin.py"
+    found = []
+    for old, new in [("", ""), ("Halves the way", "Goes some way"), ("0.1 * np.sin", "0.2 * np.sin")]:
+        copy.write_text(PLUGIN.read_text().replace(old, new) if old else PLUGIN.read_text())
+        sys.modules.pop("_", None)
+        path.write_text(path.read_text().replace(str(PLUGIN), str(copy)))
+        found.append({step.label: step.key for step in steps_of(load(path), Digests())})
+    assert found[0] == found[1]
+    assert changed(found[0], found[2]) == set(TRACK)  # one file, one digest
+
+
+def test_explanations_name_the_change():
+    component = {"role": "stage", "name": "coupled_loop", "settings": {"steady": {"turns": 2}, "draper": None}}
+    draper = {"role": "draper", "name": "kinematic", "settings": {"gap_mm": "2.0"}, "code": "blake2b:12 code of x"}
+    old = {
+        "component": component | {"settings": component["settings"] | {"draper": draper}},
+        "inputs": {"start": {"key": "1"}},
+    }
+
+    def new(**settings):
+        return old | {"component": component | {"settings": old["component"]["settings"] | settings}}
+
+    assert explain(old, new(draper=draper | {"name": "xpbd"})) == "draper kinematic → xpbd"
+    assert explain(old, new(draper=draper | {"settings": {"gap_mm": "3.0"}})) == "draper.gap_mm 2.0 → 3.0"
+    assert explain(old, new(draper=draper | {"code": "blake2b:13 code of x"})) == "code of x changed"
+    assert explain(old, new(draper=None)) == "draper kinematic → none"
+    assert explain(old, new(steady={"turns": 3})) == "steady.turns 2 → 3"
+    assert explain(old, old | {"inputs": {"start": {"key": "2"}}}) == "start was made anew"
+    assert explain({"frames": 200}, {"frames": 400}) == "frames 200 → 400"
+    grown = explain({"inputs": {"track": {"frames": 200}}}, {"inputs": {"track": {"frames": 400}}})
+    assert grown == "track grew from 200 to 400 frames"
+    assert explain(old, old) == ""
+
+
+def test_names_in_digests_are_for_people_only():
+    assert key_of({"file": "blake2b:12 body.obj"}) == key_of({"file": "blake2b:12 other.obj"})
+    assert key_of({"file": "blake2b:12 body.obj"}) != key_of({"file": "blake2b:13 body.obj"})
+
+
+def test_file_digests_are_remembered_until_the_file_changes(tmp_path, monkeypatch):
+    file, memory = tmp_path / "video.mp4", tmp_path / "memory.json"
+    file.write_text("one")
+    kept = Digests(memory)
+    first = kept.file(file)
+    kept.save()
+    opened = []
+    real = digests.hashlib.file_digest
+    monkeypatch.setattr(digests.hashlib, "file_digest", lambda *a: (opened.append(a), real(*a))[1])
+    assert Digests(memory).file(file) == first
+    assert not opened
+    file.write_text("two")
+    os.utime(file, ns=(1, 1))
+    assert Digests(memory).file(file) != first
+    assert opened
+
+
+def test_arrays_count_by_dtype_shape_and_content():
+    values = np.arange(6.0)
+    assert digests.digest_array(values) == digests.digest_array(values.copy())
+    assert len({digests.digest_array(v) for v in (values, values.reshape(2, 3), values.astype("f4"), values + 1)}) == 4
+
+
+def test_digesting_the_code_is_quick():
+    import time
+
+    start = time.process_time()
+    Digests().core()
+    assert time.process_time() - start < 1.0  # a plan must not wait for it

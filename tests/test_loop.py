@@ -1,0 +1,93 @@
+"""The loop with stub steps: it converges, it oscillates, it runs into its cap."""
+
+import numpy as np
+import pytest
+from mocapflow.components import PoseSolver, Predictor
+from mocapflow.data import Camera, Estimate, Frame, Past, Pose
+from mocapflow.geometry.kinematics import chain, skin
+from mocapflow.loop import Steady, Steps, settle
+from mocapflow.model import ClothedModel
+from mocapflow.scene import Scene
+from mocapflow.track import Unfitted, believed
+from tests.fixtures.tiny_plugin import TinyMatcher, TinySegmenter, tiny_body
+
+
+class Towards(PoseSolver):
+    """Goes a share of the way to zero: 1 arrives at once, 2 swings for ever, 0.01 creeps."""
+
+    name = "towards"
+    share: float
+
+    def solve(self, match, state, model, priors, past, turn):
+        pose = state.estimate.pose
+        match(model.surface(pose, state.cloth))
+        moved = Pose(root=pose.root, angles=pose.angles * (1 - self.share))
+        return Estimate(pose=moved, parameters=state.estimate.parameters, covariance=np.eye(8))
+
+
+class Nothing(Predictor):
+    name = "nothing"
+
+    def predict(self, frame, past, scene):
+        raise AssertionError
+
+
+@pytest.fixture
+def frame():
+    image = np.zeros((16, 24, 3), np.uint8)
+    return Frame(index=5, time=0.1, images=(image, image), usable=np.ones(2, bool))
+
+
+def go(frame, share, observe=lambda *_: None, max_turns=8):
+    camera = Camera(
+        name="cam01", size=np.array([24, 16], np.int32), intrinsics=np.eye(3), distortion=np.zeros(5),
+        camera_from_world=np.eye(4),
+    )  # fmt: skip
+    model = ClothedModel(scene=Scene(cameras=(camera, camera), body=tiny_body(1.0)))
+    steps = Steps(
+        predictor=Nothing(), segmenter=TinySegmenter(), matchers=(TinyMatcher(),), pose_solver=Towards(share=share),
+        cloth_fitter=Unfitted(), priors=(),
+        steady=Steady(surface=0.0005, angle=float(np.radians(0.1)), turns=2, max_turns=max_turns),
+    )  # fmt: skip
+    pose = Pose(root=np.eye(4), angles=np.array([0.3, -0.4]))
+    start = believed(pose, np.empty(0), model.drape(pose, np.empty(0), Past()))
+    return settle(frame, start, Past(), steps, model, observe)
+
+
+def test_converges_and_stops_after_the_wanted_number_of_calm_turns(frame):
+    result = go(frame, 1.0)
+    assert (result.steady, result.oscillating, result.iterations) == (True, False, 3)  # arrives, then two calm turns
+    assert result.change.surface == 0 and result.change.angles == 0
+    assert np.allclose(result.state.estimate.pose.angles, 0)
+
+
+def test_a_swing_between_two_states_is_told_from_creeping(frame):
+    swinging, creeping = go(frame, 2.0), go(frame, 0.05)
+    assert (swinging.steady, swinging.oscillating, swinging.iterations) == (False, True, 8)
+    assert swinging.change.angles == pytest.approx(0.8)
+    assert (creeping.steady, creeping.oscillating, creeping.iterations) == (False, False, 8)
+
+
+def test_the_cap_holds(frame):
+    assert go(frame, 0.05, max_turns=3).iterations == 3
+
+
+def test_onlookers_see_every_turn_in_order(frame):
+    seen = []
+    result = go(frame, 1.0, lambda index, turn, state: seen.append((index, turn.index, turn.cap, state)))
+    assert [s[:3] for s in seen] == [(5, 0, 8), (5, 1, 8), (5, 2, 8)]
+    assert seen[-1][3] is result.state
+
+
+def test_the_change_is_the_largest_move_of_the_surface(frame):
+    result = go(frame, 0.05, max_turns=1)
+    moved = [
+        skin(tiny_body(1.0), chain(tiny_body(1.0), Pose(root=np.eye(4), angles=share * np.array([0.3, -0.4])))[0])
+        for share in (1.0, 0.95)
+    ]
+    assert result.change.angles == pytest.approx(0.05 * 0.4)
+    assert result.change.surface == pytest.approx(np.linalg.norm(moved[1] - moved[0], axis=1).max())
+
+
+def test_cpu_seconds_of_every_step_are_measured(frame):
+    assert set(go(frame, 1.0).seconds) == {"segment", "solve", "cloth", "match"}

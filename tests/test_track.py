@@ -1,0 +1,214 @@
+"""The track, saved frame by frame: resumed it is bitwise what it is uninterrupted."""
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mocapflow.errors import ComponentFailed
+from mocapflow.store import Store
+from tests.fixtures.stores import STAGES, load, run_tiny, same, the_track, write_pipeline, write_recording
+
+KILLS = Path(__file__).parent / "fixtures" / "kills.py"
+
+
+@pytest.fixture
+def path(tmp_path):
+    return write_pipeline(tmp_path, write_recording(tmp_path / "clip"))
+
+
+def test_a_track_has_every_frame_and_says_how_it_went(tmp_path, path):
+    run_tiny(path, tmp_path)
+    track = the_track(tmp_path)
+    assert track.frame.tolist() == list(range(12))
+    assert track.cloth.shape == (12, 4, 3)
+    assert track.cloth_parameters.shape == (12, 1)
+    assert track.covariance.shape == (12, 8, 8)
+    assert track.step_names == ("decode", "predict", "drape", "segment", "solve", "cloth", "match")
+    assert track.seconds.shape == (12, 7)
+    assert (track.seconds.sum(axis=1) > 0).all()
+    assert set(track.iterations) <= {2, 3, 4}
+    assert track.notes == ()
+
+
+def test_twenty_deaths_in_the_middle_of_writes_change_nothing(tmp_path, path):
+    run_tiny(path, tmp_path / "whole")
+    (tmp_path / "broken").mkdir()
+    command = [sys.executable, str(KILLS), str(path), str(tmp_path / "broken"), "1"]
+    said = subprocess.run(command, capture_output=True, text=True, check=True, cwd=KILLS.parents[2])
+    saved = json.loads(said.stdout.splitlines()[-1])
+    assert len(saved) >= 20
+    assert sorted(saved) == saved  # nothing was lost
+    assert len(set(saved)) > 5
+    assert same(the_track(tmp_path / "whole"), the_track(tmp_path / "broken"))
+    results = [json.loads((tmp_path / kind / "out" / "results.json").read_text()) for kind in ("whole", "broken")]
+    assert results[0]["angles"] == results[1]["angles"]
+
+
+@pytest.mark.long
+def test_twenty_real_kills_change_nothing(tmp_path):
+    path = write_pipeline(tmp_path, write_recording(tmp_path / "clip", frames=200))
+    run_tiny(path, tmp_path / "whole")
+    (tmp_path / "broken").mkdir()
+    code = "import sys; from pathlib import Path; from tests.fixtures.stores import run_tiny; run_tiny(Path(sys.argv[1]), Path(sys.argv[2]))"
+    environment = os.environ | {"TINY_SLOW": "0.02"}
+    dice, killed, frames = random.Random(2), 0, []
+    while killed < 20:
+        command = [sys.executable, "-c", code, str(path), str(tmp_path / "broken")]
+        running = subprocess.Popen(command, cwd=KILLS.parents[2], env=environment, stderr=subprocess.DEVNULL)
+        store = Store(tmp_path / "broken" / "store.zarr")
+        before = frames[-1] if frames else 0
+        while running.poll() is None and count(store) <= before:  # let it get to work, then strike at any moment
+            time.sleep(0.01)
+        time.sleep(dice.uniform(0, 0.3))
+        running.send_signal(signal.SIGKILL)
+        killed += running.wait() == -signal.SIGKILL
+        frames.append(count(store))
+        assert frames[-1] >= before
+    run_tiny(path, tmp_path / "broken")
+    assert len(set(frames)) >= 15, frames
+    assert same(the_track(tmp_path / "whole"), the_track(tmp_path / "broken"))
+
+
+def count(store):
+    return max((a.frames for a in store.artifacts() if a.path.name.startswith("track-")), default=0)
+
+
+def test_growing_stop_continues(tmp_path, path):
+    run_tiny(path, tmp_path / "whole")
+    for frames in (1, 2, 5, 12):
+        _, lines = run_tiny(path, tmp_path / "grown", frames=frames)
+        assert len(the_track(tmp_path / "grown").frame) == frames
+    assert "track: going on after 5 frames" in lines
+    assert same(the_track(tmp_path / "whole"), the_track(tmp_path / "grown"))
+
+
+def test_a_smaller_stop_reads_the_first_frames(tmp_path, path):
+    run_tiny(path, tmp_path)
+    summary, _ = run_tiny(path, tmp_path, frames=5)
+    assert next(s for s in summary.stages if s["label"] == "track")["cached"]
+    assert len(json.loads((tmp_path / "out" / "results.json").read_text())["angles"]) == 5
+
+
+def test_a_smaller_stop_than_what_is_half_done(tmp_path, path, monkeypatch):
+    monkeypatch.setenv("TINY_RAISE_AT", "8")
+    with pytest.raises(ComponentFailed):
+        run_tiny(path, tmp_path)
+    run_tiny(path, tmp_path, frames=5)
+    assert len(json.loads((tmp_path / "out" / "results.json").read_text())["angles"]) == 5
+    monkeypatch.delenv("TINY_RAISE_AT")
+    run_tiny(path, tmp_path)
+    run_tiny(path, tmp_path / "whole")
+    assert same(the_track(tmp_path / "whole"), the_track(tmp_path))
+
+
+def test_a_component_that_raises_is_named_and_the_run_goes_on_there(tmp_path, path, monkeypatch):
+    monkeypatch.setenv("TINY_RAISE_AT", "7")
+    with pytest.raises(ComponentFailed) as raised:
+        run_tiny(path, tmp_path)
+    log = tmp_path / "out" / "failed.log"
+    assert str(raised.value) == (
+        f"segmenter 'tiny_segmenter' ({origin(path)}) failed at frame 7, iteration 1: "
+        "FloatingPointError: spring force overflow\n"
+        "       frames 0–6 are saved; run the same command to continue at 7\n"
+        f"       traceback: {log}"
+    )
+    assert raised.value.exit_status == 1
+    assert "spring force overflow" in log.read_text()
+    monkeypatch.delenv("TINY_RAISE_AT")
+    _, lines = run_tiny(path, tmp_path)
+    assert "track: going on after 7 frames" in lines
+    run_tiny(path, tmp_path / "whole")
+    assert same(the_track(tmp_path / "whole"), the_track(tmp_path))
+
+
+def origin(path):
+    pipeline = load(path)
+    track = next(named.stage for named in pipeline.stages if named.label == "track")
+    return pipeline.registry.origin(type(track.segmenter))
+
+
+def test_lost_frames_keep_the_prediction_and_say_so(tmp_path):
+    clip = write_recording(tmp_path / "clip", frames=9, cameras=3)
+    for camera, frame in [("cam01", 3), ("cam01", 4), ("cam02", 4), ("cam01", 5), ("cam02", 5), ("cam03", 5)]:
+        (clip / "videos" / camera / f"{frame:06}.png").write_bytes(b"")
+    path = write_pipeline(tmp_path, clip)
+    run_tiny(path, tmp_path)
+    track = the_track(tmp_path)
+    assert len(track.frame) == 9
+    assert track.usable[3:6].tolist() == [[False, True, True], [False, False, True], [False, False, False]]
+    assert (track.iterations == 0).tolist() == [False] * 4 + [True, True] + [False] * 3
+    assert np.allclose(track.root[4], track.root[3] @ np.linalg.inv(track.root[2]) @ track.root[3])  # the prediction
+    assert [note for note in track.notes if "lost" in note] == [
+        "frame 4: lost, fewer than 2 views; the prediction is kept",
+        "frame 5: lost, fewer than 2 views; the prediction is kept",
+    ]
+    assert sum(note.startswith("frame 3: cam01 not usable: ") for note in track.notes) == 1
+    run_tiny(path, tmp_path / "two", frames=5)  # resumed between lost frames
+    run_tiny(path, tmp_path / "two")
+    assert same(track, the_track(tmp_path / "two"))
+
+
+def test_without_a_garment_there_is_no_cloth(tmp_path):
+    stages = STAGES | {"track": STAGES["track"] | {"draper": None}}
+    path = write_pipeline(tmp_path, write_recording(tmp_path / "clip"), garment=None, stages=stages)
+    run_tiny(path, tmp_path, frames=5)
+    run_tiny(path, tmp_path)
+    assert the_track(tmp_path).cloth.shape == (12, 0, 3)
+    run_tiny(path, tmp_path / "whole")
+    assert same(the_track(tmp_path / "whole"), the_track(tmp_path))
+
+
+def test_on_unsteady_stop(tmp_path, path):
+    with pytest.raises(
+        ComponentFailed, match=r"frame \d+ did not come to rest in 2 turns: .* mm and .*° in the last turn"
+    ):
+        run_tiny(path, tmp_path, "stages.track.on_unsteady=stop", "stages.track.steady.max_turns=2")
+
+
+def test_keep_trace_keeps_every_turn(tmp_path, path):
+    import zarr
+
+    run_tiny(path, tmp_path, "stages.track.keep=trace")
+    (found,) = (tmp_path / "store.zarr").glob("track-*")
+    turns = zarr.open_group(str(found), mode="r")["trace"][...]
+    track = the_track(tmp_path)
+    assert turns.shape == (12, 4, 18)
+    assert (np.isfinite(turns).all(axis=2).sum(axis=1) == track.iterations).all()
+    last = turns[np.arange(12), track.iterations - 1]
+    assert np.array_equal(last[:, 16:], track.angles)
+    assert same(track, the_track(tmp_path))
+
+
+@pytest.mark.long
+def test_memory_does_not_grow_with_the_number_of_frames(tmp_path):
+    peaks = []
+    for frames in (300, 3000):
+        folder = tmp_path / str(frames)
+        path = write_pipeline(tmp_path, write_recording(folder / "clip", frames=frames), stages=SHORT)
+        pipeline = load(path)
+        loop = next(named.stage for named in pipeline.stages if named.label == "track")
+        seen = []
+        pipeline.registry.observers.frame_done = lambda index, result, seen=seen: seen.append(
+            tracemalloc.get_traced_memory()[0]
+        )
+        tracemalloc.start()
+        from mocapflow.runner import run
+
+        run(pipeline, store=folder / "store.zarr", out=folder / "out")
+        tracemalloc.stop()
+        assert loop.name == "coupled_loop"
+        peaks.append((np.median(seen[50:100]), np.median(seen[-50:])))
+    growth = peaks[1][1] - peaks[1][0]
+    assert growth < 200_000, peaks  # bytes, over 2900 frames: less than 70 a frame
+
+
+SHORT = {name: STAGES[name] for name in ("start", "track")}
