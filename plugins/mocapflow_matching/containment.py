@@ -66,7 +66,7 @@ class Containment(Matcher):
 
 
 def inside_px(silhouette: Silhouette, pixels: F64) -> F64:
-    """Return the signed distance (K,) px at the pixels nearest to (K, 2); it is smooth, so half a pixel matters little."""
+    """Return the signed distance (K,) px at the pixels nearest to (K, 2), a smooth field."""
     height, width = silhouette.distance.shape
     column = np.clip(np.round(pixels[:, 0]).astype(int), 0, width - 1)
     row = np.clip(np.round(pixels[:, 1]).astype(int), 0, height - 1)
