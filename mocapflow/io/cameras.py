@@ -44,8 +44,11 @@ def read_cameras(path: Path) -> tuple[Camera, ...]:
         cameras = qualisys.cameras(path)
     if not cameras:
         raise RecordingError("the file holds no camera", where=str(path))
+    names = [camera.name for camera in cameras]
     for camera in cameras:
         _check(camera, path)
+        if names.count(camera.name) > 1:
+            raise _bad(camera.name, path, "is there more than once")
     return cameras
 
 

@@ -13,7 +13,7 @@ from mocapflow.data import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.io.cameras import find_calibration, metadata, read_cameras
 from mocapflow.io.keypoints import odd_keypoints
-from mocapflow.io.video import IMAGES, VIDEOS, Video, open_video
+from mocapflow.io.video import IMAGES, VIDEOS, Video, name_frames, open_video
 from mocapflow.records import record
 
 CUT = 0.02  # share of the width or height that a video may lack against its calibration
@@ -49,6 +49,7 @@ def gather(folder: Path, calibration: Path | None = None) -> Parts:
     videos = tuple(open_video(path) for path in paths)
     lenses, cut = fit_sizes(cameras, videos, calibration)
     length, broken = agree_on_length(cameras, videos, folder)
+    gaps = gap_warnings(cameras, videos)
     rate, assumed = common_rate(cameras, videos, calibration)
     keypoints = tuple(keypoint_folder(folder, camera.name) for camera in cameras)
     odd = keypoint_warnings(cameras, keypoints, length)
@@ -59,7 +60,7 @@ def gather(folder: Path, calibration: Path | None = None) -> Parts:
         calibration=calibration,
         frame_rate=rate,
         length=length,
-        warnings=(*cut, *broken, *assumed, *odd),
+        warnings=(*cut, *broken, *gaps, *assumed, *odd),
     )
 
 
@@ -140,6 +141,15 @@ def agree_on_length(cameras: Sequence[Camera], videos: Sequence[Video], folder: 
         f"{camera.name}: the video breaks off after frame {video.frames - 1} of {length}; it is not used from there on"
         for camera, video, cut in zip(cameras, videos, broken, strict=True)
         if cut
+    ]
+
+
+def gap_warnings(cameras: Sequence[Camera], videos: Sequence[Video]) -> list[str]:
+    """Say which frames within each video are not there."""
+    return [
+        f"{camera.name}: {name_frames(lost)} missing in the video; the view is not used there"
+        for camera, video in zip(cameras, videos, strict=True)
+        if (lost := sorted(set(range(video.frames)) - set(video.numbers.tolist())))
     ]
 
 

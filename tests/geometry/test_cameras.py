@@ -1,0 +1,77 @@
+"""T-CAM: projection and its inverse to 1e-9 px, lens distortion there and back to 0.01 px."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from mocapflow.geometry import cameras, lines
+from tests.fixtures.recordings import look_at
+
+LENSES = {
+    "mild": ((-0.0462, 0.14, 0.0006, 0.0007), False),
+    "strong": ((-0.28, 0.09, 0.001, -0.0008, -0.012), False),
+    "fisheye": ((-0.02, 0.01, -0.005, 0.001), True),
+}
+
+
+def camera(distortion=(), fisheye=False):
+    made = look_at("a", np.array([3.0, -2.0, 1.7]), size=(1088, 1920), focal=1680.0, distortion=distortion)
+    return replace(made, fisheye=fisheye)
+
+
+def pixels(seed=0, count=500):
+    return np.random.default_rng(seed).uniform([0, 0], [1087, 1919], size=(count, 2))
+
+
+def test_projecting_a_point_of_a_ray_gives_its_pixel():
+    wanted, view = pixels(), camera()
+    rays = lines.through(wanted, view)
+    depth = np.random.default_rng(1).uniform(0.5, 20, size=(len(wanted), 1))
+    points = cameras.centre(view) + depth * rays[:, :3]
+    assert np.abs(cameras.project(points, view) - wanted).max() < 1e-9
+
+
+def test_points_behind_the_camera_have_no_pixel():
+    view = camera()
+    behind = cameras.centre(view) - view.camera_from_world[2, :3]
+    assert np.isnan(cameras.project(behind[None], view)).all()
+
+
+@pytest.mark.parametrize("lens", LENSES)
+def test_distortion_there_and_back(lens):
+    view, seen = camera(*LENSES[lens]), pixels()
+    assert np.abs(cameras.distort(cameras.undistort(seen, view), view) - seen).max() < 0.01
+
+
+@pytest.mark.parametrize("lens", ["mild", "strong"])
+def test_undistorted_projection_equals_opencv(lens):
+    view = camera(*LENSES[lens])
+    points = np.random.default_rng(2).normal(size=(300, 3)) * 0.4 + [0, 0, 1]
+    rotation, _ = cv2.Rodrigues(view.camera_from_world[:3, :3])
+    seen, _ = cv2.projectPoints(points, rotation, view.camera_from_world[:3, 3], view.intrinsics, view.distortion)
+    assert np.abs(cameras.undistort(seen[:, 0], view) - cameras.project(points, view)).max() < 0.01
+
+
+def test_a_camera_without_distortion_returns_the_pixels():
+    np.testing.assert_array_equal(cameras.undistort(pixels(), camera()), pixels())
+    assert cameras.undistort(np.empty((0, 2)), camera(*LENSES["mild"])).shape == (0, 2)
+
+
+@pytest.mark.parametrize("factor", [0.5, 0.25, 0.3])
+def test_scaled_camera_keeps_pixel_centres_on_integers(factor):
+    view = camera()
+    small = cameras.scaled(view, factor)
+    corners = np.array([[-0.5, -0.5], [1087.5, 1919.5], [1087.5, -0.5]])  # outer corners stay outer corners
+    points = cameras.centre(view) + 3 * lines.through(corners, view)[:, :3]
+    wanted = np.array([[0, 0], small.size, [small.size[0], 0]]) - 0.5
+    assert np.abs(cameras.project(points, small) - wanted).max() < 1e-9
+
+
+def test_pinhole_only_drops_the_distortion():
+    view = camera(*LENSES["fisheye"])
+    plain = cameras.pinhole(view)
+    assert not plain.distortion.any()
+    assert not plain.fisheye
+    np.testing.assert_array_equal(plain.intrinsics, view.intrinsics)

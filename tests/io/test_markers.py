@@ -1,0 +1,140 @@
+"""Marker and motion files there and back, and what is said of bad ones."""
+
+import numpy as np
+import pytest
+
+from mocapflow.errors import RecordingError
+from mocapflow.io.markers import (
+    opensim_from_world,
+    read_c3d,
+    read_mot,
+    read_trc,
+    world_from_opensim,
+    write_mot,
+    write_trc,
+)
+
+
+def positions(frames=7, markers=3):
+    return np.random.default_rng(0).normal(size=(frames, markers, 3))
+
+
+def test_trc_there_and_back(tmp_path):
+    path, points = tmp_path / "joints.trc", positions()
+    points[2, 1] = np.nan
+    points[6, 2] = np.nan  # the last cells of the last row
+    write_trc(path, ["hip_l", "knee_l", "ankle_l"], points, 30.0, start=0.5)
+    names, read, time, rate = read_trc(path)
+    assert names == ("hip_l", "knee_l", "ankle_l")
+    assert rate == 30
+    np.testing.assert_allclose(read, points, atol=1e-8)
+    np.testing.assert_allclose(time, 0.5 + np.arange(7) / 30, atol=1e-8)
+
+
+def test_trc_header_is_opensim_s(tmp_path):
+    write_trc(tmp_path / "a.trc", ["p", "q"], positions(5, 2), 60.0)
+    lines = (tmp_path / "a.trc").read_text().splitlines()
+    assert lines[0] == "PathFileType\t4\t(X/Y/Z)\ta.trc"
+    assert lines[2] == "60\t60\t5\t2\tm\t60\t1\t5"
+    assert lines[3].split("\t") == ["Frame#", "Time", "p", "", "", "q", "", ""]
+    assert lines[4].split("\t") == ["", "", "X1", "Y1", "Z1", "X2", "Y2", "Z2"]
+    assert lines[6].startswith("1\t0.00000000\t")
+
+
+def test_trc_in_mm(tmp_path):
+    path = tmp_path / "a.trc"
+    write_trc(path, ["p"], positions(2, 1) * 1000, 60.0)
+    path.write_text(path.read_text().replace("\tm\t", "\tmm\t"))
+    np.testing.assert_allclose(read_trc(path)[1], positions(2, 1), atol=1e-8)
+
+
+def test_axes():
+    points = positions()
+    assert opensim_from_world(np.array([0, 0, 1.0])).tolist() == [0, 1, 0]  # up
+    np.testing.assert_array_equal(world_from_opensim(opensim_from_world(points)), points)
+    turn = opensim_from_world(np.eye(3))
+    assert np.linalg.det(turn) == pytest.approx(1)  # no mirror
+
+
+def test_mot_there_and_back(tmp_path):
+    path, time = tmp_path / "angles.mot", np.arange(4) / 30
+    columns = {"knee_angle_l": np.array([1.5, -2, 3, 4]), "pelvis_tx": np.array([0.1, 0.2, 0.3, 0.4])}
+    write_mot(path, columns, time)
+    read, when = read_mot(path)
+    assert list(read) == list(columns)
+    np.testing.assert_allclose(when, time, atol=1e-8)
+    for name, column in columns.items():
+        np.testing.assert_allclose(read[name], column, atol=1e-8)
+    assert path.read_text().splitlines()[:6] == [
+        "angles", "version=1", "nRows=4", "nColumns=3", "inDegrees=yes", "endheader",
+    ]  # fmt: skip
+
+
+def test_mot_in_radians_is_read_in_degrees(tmp_path):
+    columns = {"knee_angle_l": np.full(3, np.pi / 2), "pelvis_ty": np.full(3, 0.9)}
+    write_mot(tmp_path / "a.sto", columns, np.arange(3) / 10, in_degrees=False)
+    read, time = read_mot(tmp_path / "a.sto")
+    np.testing.assert_allclose(read["knee_angle_l"], 90, atol=1e-6)
+    np.testing.assert_allclose(read["pelvis_ty"], 0.9)
+    np.testing.assert_allclose(time, [0, 0.1, 0.2])
+
+
+def test_bad_trc(tmp_path):
+    path = tmp_path / "a.trc"
+    with pytest.raises(RecordingError, match="no such file"):
+        read_trc(path)
+    path.write_text("frame,x\n")
+    with pytest.raises(RecordingError, match="not a TRC file: its first word is not PathFileType"):
+        read_trc(path)
+    write_trc(path, ["p", "q"], positions(5, 2), 60.0)
+    good = path.read_text()
+    path.write_text(good.replace("\tm\t", "\tfurlong\t"))
+    with pytest.raises(RecordingError, match="unknown unit 'furlong'\n       known: m, cm, mm"):
+        read_trc(path)
+    path.write_text(good.rstrip() + "\t1.0\n")
+    with pytest.raises(RecordingError, match=r"a\.trc:11  9 columns; expected 8"):
+        read_trc(path)
+    path.write_text(good.replace("\n2\t", "\ntwo\t"))
+    with pytest.raises(RecordingError, match=r"a\.trc:8  could not convert string to float: 'two'"):
+        read_trc(path)
+
+
+def test_bad_mot(tmp_path):
+    path = tmp_path / "a.mot"
+    write_mot(path, {"x": np.arange(3.0)}, np.arange(3.0))
+    good = path.read_text()
+    path.write_text(good.replace("endheader", ""))
+    with pytest.raises(RecordingError, match="not a MOT file: no line says endheader"):
+        read_mot(path)
+    path.write_text(good.replace("time\t", "when\t"))
+    with pytest.raises(RecordingError, match=r"a\.mot:7  no column 'time'\n       the columns are: when, x"):
+        read_mot(path)
+    path.write_text(good + "3.0\n")
+    with pytest.raises(RecordingError, match=r"a\.mot:11  1 columns; expected 2"):
+        read_mot(path)
+
+
+def test_c3d(tmp_path):
+    ezc3d = pytest.importorskip("ezc3d")
+    made, path, points = ezc3d.c3d(), tmp_path / "a.c3d", positions(5, 2)
+    made["parameters"]["POINT"]["LABELS"]["value"] = ["hip", "knee"]
+    made["parameters"]["POINT"]["RATE"]["value"] = [100]
+    made["parameters"]["POINT"]["UNITS"]["value"] = ["mm"]
+    stacked = np.ones((4, 2, 5))
+    stacked[:3] = np.moveaxis(points, -1, 0).swapaxes(1, 2) * 1000
+    made["data"]["points"] = stacked
+    made.write(str(path))
+    names, read, time, rate = read_c3d(path)
+    assert names == ("hip", "knee")
+    assert rate == 100
+    np.testing.assert_allclose(read, points, atol=1e-6)
+    np.testing.assert_allclose(time, np.arange(5) / 100)
+    path.write_bytes(b"nothing")
+    with pytest.raises(RecordingError, match="this C3D file can't be read"):
+        read_c3d(path)
+
+
+def test_c3d_without_ezc3d(tmp_path, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "ezc3d", None)
+    with pytest.raises(RecordingError, match="C3D files need ezc3d\n       pip install ezc3d"):
+        read_c3d(tmp_path / "a.c3d")

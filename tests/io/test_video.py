@@ -1,0 +1,129 @@
+"""Frames in order, and gaps that stay gaps."""
+
+import cv2
+import numpy as np
+import pytest
+
+from mocapflow.errors import RecordingError
+from mocapflow.io.video import _number, lost_frames, name_frames, open_video, read_frames
+from tests.fixtures.recordings import number_of, picture, write_video
+
+FRAMES = 20
+
+
+def numbers(video, indices=None):
+    indices = range(video.frames) if indices is None else indices
+    return [None if image is None else number_of(image) for image, _ in read_frames(video, indices)]
+
+
+def chunks(content):
+    """Return where the frames of an AVI lie: (offset, length) of each 00dc chunk."""
+    found, at = [], content.find(b"movi") + 4
+    while content[at : at + 4] == b"00dc":
+        length = int.from_bytes(content[at + 4 : at + 8], "little")
+        found.append((at + 8, length))
+        at += 8 + length + length % 2
+    return found
+
+
+@pytest.mark.parametrize(("ending", "codec"), [("mp4", "mp4v"), ("avi", "MJPG"), ("avi", "XVID"), ("mkv", "mp4v")])
+def test_frames_are_in_order_and_counted(tmp_path, ending, codec):
+    video = open_video(write_video(tmp_path / f"a.{ending}", FRAMES, codec=codec))
+    assert (video.width, video.height, video.frames, video.declared) == (64, 48, FRAMES, FRAMES)
+    assert video.frame_rate == pytest.approx(25, rel=1e-3)
+    assert numbers(video) == list(range(FRAMES))
+    assert lost_frames(video) == []
+
+
+@pytest.mark.parametrize("indices", [range(7, 12), range(19, 20), range(2, 20, 5), range(0)])
+def test_reading_a_part_gives_the_same_pixels(tmp_path, indices):
+    video = open_video(write_video(tmp_path / "a.mp4", FRAMES))
+    whole = [image for image, _ in read_frames(video, range(FRAMES))]
+    part = [image for image, _ in read_frames(video, indices)]
+    assert len(part) == len(indices)
+    for index, image in zip(indices, part, strict=True):
+        np.testing.assert_array_equal(image, whole[index])
+
+
+def test_a_damaged_frame_leaves_a_gap(tmp_path):
+    path = write_video(tmp_path / "a.avi", FRAMES, codec="MJPG")
+    content = bytearray(path.read_bytes())
+    offset, length = chunks(content)[8]
+    content[offset : offset + length] = bytes(length)
+    path.write_bytes(content)
+    video = open_video(path)
+    rows = list(read_frames(video, range(FRAMES)))
+    assert [i for i, (image, _) in enumerate(rows) if image is None] == [8]
+    assert rows[8] == (None, "the frame can't be decoded")
+    assert [number_of(image) for image, _ in rows if image is not None] == [i for i in range(FRAMES) if i != 8]
+    assert lost_frames(video) == [8]
+
+
+def test_a_truncated_video_has_placeholders_to_the_end(tmp_path):
+    path = write_video(tmp_path / "a.avi", FRAMES, codec="MJPG")
+    content = path.read_bytes()
+    path.write_bytes(content[: chunks(content)[12][0] + 4])
+    video = open_video(path)
+    assert video.declared == FRAMES
+    rows = list(read_frames(video, range(FRAMES)))
+    assert [number_of(image) for image, _ in rows[:12]] == list(range(12))
+    assert {image is None for image, _ in rows[13:]} == {True}
+    assert rows[-1][1] == f"the video breaks off after frame {video.frames - 1}"
+    assert lost_frames(video) == list(range(12, FRAMES))
+
+
+def test_a_truncated_mp4_can_not_be_decoded(tmp_path):
+    path = write_video(tmp_path / "a.mp4", FRAMES)
+    path.write_bytes(path.read_bytes()[:2000])
+    with pytest.raises(
+        RecordingError, match=r"a\.mp4  this video can't be decoded\n       the file is cut off, damaged"
+    ):
+        open_video(path)
+
+
+def test_gaps_in_the_time_stamps_are_lost_frames():
+    period = 1000 / 30
+    stamps = np.delete(np.arange(30) * period, [10, 11, 20])
+    assert _number(stamps).tolist() == np.delete(np.arange(30), [10, 11, 20]).tolist()
+    jitter = np.random.default_rng(0).uniform(-0.2, 0.2, 30) * period
+    assert _number(np.arange(30) * period + jitter).tolist() == list(range(30))
+    assert _number(np.round(np.arange(3000) * period)).tolist() == list(range(3000))  # times in whole ms
+    assert _number(np.zeros(4)).tolist() == [0, 1, 2, 3]
+    assert _number(np.zeros(1)).tolist() == [0]
+
+
+def test_frames_of_another_size_are_lost(tmp_path):
+    for number in range(4):
+        size = (64, 48) if number != 2 else (32, 24)
+        cv2.imwrite(str(tmp_path / f"{number:06d}.png"), picture(number, size))
+    rows = list(read_frames(open_video(tmp_path), range(4)))
+    assert rows[2] == (None, "the frame is 32 x 24, the others 64 x 48")
+    assert [number_of(rows[i][0]) for i in (0, 1, 3)] == [0, 1, 3]
+
+
+def test_a_folder_of_images(tmp_path):
+    for number in (0, 1, 3, 4):
+        cv2.imwrite(str(tmp_path / f"{number:06d}.png"), picture(number))
+    (tmp_path / "000004.png").write_bytes(b"no image")
+    (tmp_path / "notes.txt").write_text("12")
+    video = open_video(tmp_path)
+    assert (video.frames, video.frame_rate) == (5, 0.0)
+    assert numbers(video) == [0, 1, None, 3, None]
+    assert [reason for _, reason in read_frames(video, range(2, 5))] == [
+        "there is no image of this frame", "", "000004.png can't be read",
+    ]  # fmt: skip
+    assert lost_frames(video) == [2]
+
+
+def test_what_is_no_video(tmp_path):
+    (tmp_path / "a.mp4").write_text("hello")
+    with pytest.raises(RecordingError, match="this video can't be decoded"):
+        open_video(tmp_path / "a.mp4")
+    (tmp_path / "cam01").mkdir()
+    with pytest.raises(RecordingError, match=r"no image in this folder can be read\n.*000000\.png"):
+        open_video(tmp_path / "cam01")
+
+
+def test_naming_frames():
+    assert name_frames([3]) == "frame 3"
+    assert name_frames(list(range(2, 9))) == "frames 2, 3, 4, 5, 6 and 2 more"
