@@ -53,7 +53,7 @@ def rms(error: F64) -> float:
 def rms_interval(error: F64) -> tuple[float, float]:
     """Return the 95 % interval of the RMS by a circular block bootstrap with a fixed seed."""
     count = len(error)
-    block = min(BLOCK, count)
+    block = min(BLOCK, -(-count // 4))  # of a short take at least four blocks
     starts = np.random.default_rng(SEED).integers(0, count, size=(DRAWS, -(-count // block)))
     rows = (starts[:, :, None] + np.arange(block)).reshape(DRAWS, -1)[:, :count] % count
     drawn = np.sqrt(np.mean(error[rows] ** 2, axis=1))

@@ -106,7 +106,7 @@ def chosen_rows(track: Track) -> dict[str, int]:
 
 def _overlaps(track: Track, row: int) -> str:
     known = [f"{value:.3f}" if np.isfinite(value) else "unseen" for value in track.overlap[row]]
-    return "overlap per view " + ", ".join(known)
+    return "overlap per view " + ", ".join(known) if np.isfinite(track.overlap[row]).any() else "overlap unknown"
 
 
 def _deviations(evaluation: Evaluation | None) -> str:
