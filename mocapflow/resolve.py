@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, get_args, get_origin
@@ -65,8 +66,7 @@ class Resolver:
 
     def file(self, value: str, steps: Steps) -> Path:
         """Return a path written in the file; a relative one starts at the folder of the file."""
-        path = Path(value).expanduser()
-        return self._document.place(steps).folder / path
+        return Path(os.path.normpath(self._document.place(steps).folder / Path(value).expanduser()))
 
     def _name_and_settings(self, role: str, value: Any, steps: Steps) -> tuple[str, dict[str, Any]]:
         if isinstance(value, str):
@@ -83,7 +83,9 @@ class Resolver:
         if value is None:
             return None
         if base is None:
-            return self.file(value, steps).absolute() if isinstance(value, str) and Path in _parts(annotation) else value
+            return (
+                self.file(value, steps).absolute() if isinstance(value, str) and Path in _parts(annotation) else value
+            )
         if not _takes_several(annotation):
             return self.component(base.role, value, steps)
         if not isinstance(value, list):

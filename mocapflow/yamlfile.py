@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -122,7 +123,7 @@ def _extended(child: Document, path: Path) -> Document:
             f"'{name}' has no place in a file that extends another: only `extends` and `change` do",
             where=child.place((name,)).text, hint=f"write it as change: {{{name}: ...}}",
         )  # fmt: skip
-    base = _read_file(path.parent / str(child.values["extends"]))
+    base = _read_file(Path(os.path.normpath(path.parent / str(child.values["extends"]))))
     if "extends" in base.values:
         message = f"{child.values['extends']} itself extends another file; `extends` goes one level deep"
         raise PipelineError(message, where=child.place(("extends",)).text)

@@ -64,7 +64,7 @@ def test_a_file_extends_another(folder):
     }
     assert document.place(("stages", "track", "draper", "stiffness")).text == "variants/xpbd.yaml:3:36"
     assert document.place(("recording",)).folder == Path("variants")
-    assert document.place(("stages", "track", "use")).text == "variants/../base.yaml:4:5"
+    assert document.place(("stages", "track", "use")).text == "base.yaml:4:5"
 
 
 def test_changes_of_the_command_line_come_last(folder):

@@ -13,6 +13,7 @@ from mocapflow.errors import RecordingError
 Run = Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")]
 Truth = Annotated[Path | None, typer.Option(help="Angles to compare with.  [default: those of the recording]")]
 Format = Annotated[list[str], typer.Option("--format", help="csv, mot or trc; repeatable.")]
+COLUMNS = ("angle", "frames", "rms_deg", "mae_deg", "offset_deg", "max_deg", "worst_frame")
 
 
 def evaluate(run: Run, truth: Truth = None) -> None:
@@ -27,7 +28,8 @@ def evaluate(run: Run, truth: Truth = None) -> None:
     if not evaluation.rows:
         raise RecordingError(evaluation.note, where=str(reference))
     typer.echo(f"compared with {evaluation.reference}")
-    typer.echo(table([dict(row) for row in evaluation.rows]))
+    typer.echo(table([{name: row[name] for name in COLUMNS} for row in evaluation.rows]))
+    typer.echo("all figures: results/evaluation.csv in the run folder")
 
 
 def export(run: Run, format_: Format) -> None:
