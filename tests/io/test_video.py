@@ -6,7 +6,7 @@ import pytest
 
 from mocapflow.errors import RecordingError
 from mocapflow.io.video import _number, lost_frames, name_frames, open_video, read_frames
-from tests.fixtures.recordings import number_of, picture, write_video
+from tests.fixtures.recordings import avi_frames, number_of, picture, write_video
 
 FRAMES = 20
 
@@ -14,16 +14,6 @@ FRAMES = 20
 def numbers(video, indices=None):
     indices = range(video.frames) if indices is None else indices
     return [None if image is None else number_of(image) for image, _ in read_frames(video, indices)]
-
-
-def chunks(content):
-    """Return where the frames of an AVI lie: (offset, length) of each 00dc chunk."""
-    found, at = [], content.find(b"movi") + 4
-    while content[at : at + 4] == b"00dc":
-        length = int.from_bytes(content[at + 4 : at + 8], "little")
-        found.append((at + 8, length))
-        at += 8 + length + length % 2
-    return found
 
 
 @pytest.mark.parametrize(("ending", "codec"), [("mp4", "mp4v"), ("avi", "MJPG"), ("avi", "XVID"), ("mkv", "mp4v")])
@@ -48,7 +38,7 @@ def test_reading_a_part_gives_the_same_pixels(tmp_path, indices):
 def test_a_damaged_frame_leaves_a_gap(tmp_path):
     path = write_video(tmp_path / "a.avi", FRAMES, codec="MJPG")
     content = bytearray(path.read_bytes())
-    offset, length = chunks(content)[8]
+    offset, length = avi_frames(content)[8]
     content[offset : offset + length] = bytes(length)
     path.write_bytes(content)
     video = open_video(path)
@@ -62,7 +52,7 @@ def test_a_damaged_frame_leaves_a_gap(tmp_path):
 def test_a_truncated_video_has_placeholders_to_the_end(tmp_path):
     path = write_video(tmp_path / "a.avi", FRAMES, codec="MJPG")
     content = path.read_bytes()
-    path.write_bytes(content[: chunks(content)[12][0] + 4])
+    path.write_bytes(content[: avi_frames(content)[12][0] + 4])
     video = open_video(path)
     assert video.declared == FRAMES
     rows = list(read_frames(video, range(FRAMES)))

@@ -1,0 +1,256 @@
+"""Recording folders: what a run sees of them, and what is said of bad ones."""
+
+import json
+import shutil
+import tracemalloc
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from mocapflow.errors import RecordingError
+from mocapflow.io.cameras import write_cameras
+from mocapflow.recording import open_recording
+from tests.fixtures.recordings import NAMES, avi_frames, number_of, picture, ring, write_recording, write_video
+
+DEMO = Path(__file__).parents[1] / "examples" / "data" / "skirt_steps"
+
+
+def refused(folder, **settings):
+    """Return the whole text of the error that opening a folder raises."""
+    with pytest.raises(RecordingError) as caught:
+        open_recording(folder, **settings)
+    return str(caught.value)
+
+
+def write_keypoints(folder, frames, change=None):
+    for name in NAMES:
+        place = folder / "keypoints" / f"{name}_json"
+        place.mkdir(parents=True)
+        for frame in range(frames):
+            points = np.array([[10.0 + frame, 20, 0.9], [0, 0, 0], [30, 40, 0.5]])
+            if change is not None:
+                change(name, frame, points)
+            people = [{"pose_keypoints_2d": points.ravel().tolist()}]
+            (place / f"{name}.{frame:04d}.json").write_text(json.dumps({"people": people}))
+
+
+def test_frames_of_all_cameras_in_order(tmp_path):
+    recording = open_recording(write_recording(tmp_path, frames=10))
+    assert (recording.frame_rate, recording.indices, recording.length) == (25.0, range(10), 10)
+    assert recording.warnings == ()
+    frames = list(recording.frames())
+    assert [frame.index for frame in frames] == list(range(10))
+    assert [frame.time for frame in frames] == [i / 25 for i in range(10)]
+    assert [[number_of(image) for image in frame.images] for frame in frames] == [[i] * 3 for i in range(10)]
+    assert all(frame.usable.all() and frame.reasons == () and frame.keypoints is None for frame in frames)
+
+
+def test_a_part_and_going_on_in_it(tmp_path):
+    recording = open_recording(write_recording(tmp_path, frames=20), start=2, stop=18, step=3)
+    assert [frame.index for frame in recording.frames()] == [2, 5, 8, 11, 14, 17]
+    assert [frame.index for frame in recording.frames(since=8)] == [8, 11, 14, 17]
+    assert [frame.index for frame in recording.frames(since=9)] == [11, 14, 17]
+    assert [frame.index for frame in recording.frames(since=0)] == [2, 5, 8, 11, 14, 17]
+    assert list(recording.frames(since=18)) == []
+    assert number_of(recording.frame(7).images[1]) == 7
+    whole = {frame.index: frame.images for frame in recording.frames()}
+    for frame in recording.frames(since=11):  # resumed: the same pixels
+        for one, other in zip(frame.images, whole[frame.index], strict=True):
+            np.testing.assert_array_equal(one, other)
+
+
+def test_the_demo_is_whole():
+    recording = open_recording(DEMO)
+    assert (recording.frame_rate, recording.length, recording.warnings) == (30.0, 60, ())
+    assert [camera.size.tolist() for camera in recording.cameras] == [[320, 400]] * 4
+    assert recording.background() is not None
+    assert recording.static() is None
+    assert sorted(recording.content) == sorted(
+        [
+            "cameras.toml",
+            *(f"videos/cam0{i}.mp4" for i in range(1, 5)),
+            *(f"background/cam0{i}.png" for i in range(1, 5)),
+        ]
+    )
+
+
+def test_nothing_of_truth_and_reference_is_content(tmp_path):
+    shutil.copytree(DEMO, tmp_path / "a")
+    shutil.rmtree(tmp_path / "a" / "truth")
+    assert list(open_recording(tmp_path / "a").content) == list(open_recording(DEMO).content)
+
+
+def test_scaled_and_undistorted(tmp_path):
+    recording = open_recording(write_recording(tmp_path, frames=2, cameras=ring(distortion=(-0.1, 0.02))), scale=0.5)
+    assert [camera.size.tolist() for camera in recording.cameras] == [[32, 24]] * 3
+    assert not any(camera.distortion.any() for camera in recording.cameras)
+    assert recording.lenses[0].distortion[0] == -0.1
+    assert recording.frame(1).images[0].shape == (24, 32, 3)
+
+
+def test_keypoints_come_with_the_frames(tmp_path):
+    write_keypoints(write_recording(tmp_path, frames=3), 3)
+    recording = open_recording(tmp_path)
+    assert recording.warnings == ()
+    frame = recording.frame(2)
+    np.testing.assert_allclose(frame.keypoints[1], [[[12, 20, 0.9], [0, 0, 0], [30, 40, 0.5]]])
+    assert "keypoints/cam02_json" in recording.content
+
+
+def test_nan_in_keypoints_is_said_and_not_seen(tmp_path):
+    def change(name, frame, points):
+        if name == "cam02" and frame == 1:
+            points[0, 0] = np.nan
+
+    write_keypoints(write_recording(tmp_path, frames=3), 3, change)
+    recording = open_recording(tmp_path)
+    assert recording.warnings == (
+        "cam02: keypoints of frame 1 are not all numbers (NaN): these points count as not seen",
+    )
+    np.testing.assert_array_equal(recording.frame(1).keypoints[1][0, 0], [0, 0, 0])
+
+
+def test_static_trial_shares_the_calibration(tmp_path):
+    write_recording(tmp_path, frames=3)
+    write_recording(tmp_path / "static", frames=2)
+    (tmp_path / "static" / "cameras.toml").unlink()
+    static = open_recording(tmp_path, scale=0.5).static()
+    assert static.length == 2
+    assert [camera.size.tolist() for camera in static.cameras] == [[32, 24]] * 3
+
+
+def test_missing_camera(tmp_path):
+    write_recording(tmp_path)
+    (tmp_path / "videos" / "cam02.mp4").rename(tmp_path / "videos" / "side.mp4")
+    assert refused(tmp_path) == (
+        f"{tmp_path}  missing camera: no video of cam02\n"
+        "       cameras.toml has: cam01, cam02, cam03\n"
+        "       videos/ has: cam01, cam03, side\n"
+        "       name each video after its camera, or remove the camera or the video that is too many"
+    )
+    write_cameras(tmp_path / "cameras.toml", [camera for camera in ring() if camera.name != "cam02"])
+    assert "missing camera: no calibration of side\n" in refused(tmp_path)
+
+
+def test_unequal_lengths(tmp_path):
+    write_recording(tmp_path, frames=10, lengths={"cam03": 8})
+    assert refused(tmp_path) == (
+        f"{tmp_path / 'videos'}  the videos differ in length\n"
+        "       cam01: 10 frames, cam02: 10 frames, cam03: 8 frames\n"
+        "       cut them to the same moments: frame i must be the same instant in every video"
+    )
+
+
+def test_truncated_video(tmp_path):
+    write_recording(tmp_path, frames=20, ending="avi", codec="MJPG")
+    path = tmp_path / "videos" / "cam02.avi"
+    content = path.read_bytes()
+    path.write_bytes(content[: avi_frames(content)[11][0] + 4])
+    recording = open_recording(tmp_path)
+    last = recording.videos[1].frames - 1
+    assert last in (10, 11)
+    assert recording.length == 20
+    assert recording.warnings == (
+        f"cam02: the video breaks off after frame {last} of 20; it is not used from there on",
+    )
+    frames = list(recording.frames())
+    assert [number_of(frame.images[0]) for frame in frames] == list(range(20))
+    usable = [bool(frame.usable[1]) for frame in frames]
+    assert usable[:last] == [True] * last  # the last one is cut in the middle
+    assert usable[last + 1 :] == [False] * (19 - last)
+    assert frames[-1].reasons == ("", f"the video breaks off after frame {last}", "")
+    assert not frames[-1].images[1].any()
+    assert frames[-1].images[1].shape == (48, 64, 3)
+
+
+def test_unreadable_video(tmp_path):
+    write_recording(tmp_path)
+    (tmp_path / "videos" / "cam02.mp4").write_bytes(b"hello")
+    assert refused(tmp_path).startswith(f"{tmp_path / 'videos' / 'cam02.mp4'}  this video can't be decoded\n")
+
+
+def test_calibration_in_mm(tmp_path):
+    write_recording(tmp_path)
+    cameras = [replace(c, camera_from_world=c.camera_from_world * [[1, 1, 1, 1000]]) for c in ring()]
+    write_cameras(tmp_path / "cameras.toml", cameras)
+    assert refused(tmp_path) == (
+        f"{tmp_path / 'cameras.toml'}  camera 'cam01' stands 4272 m from the origin: the calibration is in mm\n"
+        "       lengths are in metres: divide every translation by 1000"
+    )
+
+
+@pytest.mark.parametrize("size", [(100, 48), (64, 40), (60, 48), (66, 48)])
+def test_image_size_against_calibration(tmp_path, size):
+    write_recording(tmp_path)
+    write_video(tmp_path / "videos" / "cam02.mp4", 10, size)
+    assert refused(tmp_path) == (
+        f"{tmp_path / 'cameras.toml'}  camera 'cam02': the video is {size[0]} x {size[1]} px, the calibration 64 x 48\n"
+        "       calibrate at the size of the video, or scale size and matrix of the calibration to it"
+    )
+
+
+def test_slightly_smaller_images_were_cut(tmp_path):
+    write_recording(tmp_path, frames=2, cameras=ring(size=(272, 480)))
+    write_video(tmp_path / "videos" / "cam02.mp4", 2, (268, 480))
+    recording = open_recording(tmp_path)
+    assert recording.warnings == (
+        "cam02: the video is 268 x 480 px, the calibration 272 x 480: taken as cut at the right and bottom",
+    )
+    assert recording.cameras[1].size.tolist() == [268, 480]
+    np.testing.assert_array_equal(recording.cameras[1].intrinsics, ring(size=(272, 480))[1].intrinsics)
+    assert recording.frame(0).images[1].shape == (480, 268, 3)
+
+
+def test_folders_of_images(tmp_path):
+    write_cameras(tmp_path / "cameras.toml", ring())
+    for name in NAMES:
+        (tmp_path / "videos" / name).mkdir(parents=True)
+        for number in range(4):
+            if (name, number) != ("cam02", 1):
+                cv2.imwrite(str(tmp_path / "videos" / name / f"{number:06d}.png"), picture(number))
+    recording = open_recording(tmp_path)
+    assert recording.frame_rate == 30
+    assert recording.warnings == (
+        "cam02: frame 1 missing in the video; the view is not used there",
+        "nothing says the frame rate: 30 frames per second assumed; write frame_rate under [metadata] in cameras.toml",
+    )
+    frame = recording.frame(1)
+    assert frame.usable.tolist() == [True, False, True]
+    assert frame.reasons == ("", "there is no image of this frame", "")
+    with (tmp_path / "cameras.toml").open("a") as file:
+        file.write("\n[metadata]\nframe_rate = 60\n")
+    assert open_recording(tmp_path).frame_rate == 60
+
+
+def test_different_frame_rates(tmp_path):
+    write_recording(tmp_path, frames=4)
+    write_video(tmp_path / "videos" / "cam02.mp4", 4, rate=50.0)
+    assert "the videos differ in frame rate\n       cam01: 25 per second, cam02: 50 per second" in refused(tmp_path)
+
+
+@pytest.mark.parametrize("part", [{"start": 10}, {"stop": 11}, {"start": 5, "stop": 5}, {"start": -1}])
+def test_frames_that_are_not_there(tmp_path, part):
+    assert refused(write_recording(tmp_path), **part).endswith("it has 10 frames: 0:10")
+
+
+def test_wrong_arguments(tmp_path):
+    assert refused(tmp_path / "nowhere").endswith("nowhere  no such recording folder")
+    write_recording(tmp_path)
+    assert refused(tmp_path, scale=2).startswith("the scale is 2; expected")
+    with pytest.raises(RecordingError, match="no frame 10: the videos have frames 0 to 9"):
+        open_recording(tmp_path).frame(10)
+
+
+def test_memory_does_not_grow_with_the_number_of_frames(tmp_path):
+    peaks = []
+    for frames in (30, 300):
+        folder = write_recording(tmp_path / str(frames), frames=frames, ending="avi", codec="MJPG")
+        recording = open_recording(folder)
+        tracemalloc.start()
+        assert sum(1 for _ in recording.frames()) == frames
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < peaks[0] + 2e5  # ten times the frames: 270 x 3 views x 9 kB would be 7 MB
