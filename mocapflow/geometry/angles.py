@@ -12,7 +12,7 @@ import numpy as np
 
 from mocapflow.data import Body, Pose
 from mocapflow.geometry import kinematics, twists
-from mocapflow.records import F64, array, record
+from mocapflow.records import F64, Bool, array, record
 
 
 class Definition(NamedTuple):
@@ -80,42 +80,55 @@ def measure(body: Body, root: F64, angles: F64, covariance: F64 | None = None) -
     value, sd = np.empty((len(root), len(wanted))), np.full((len(root), len(wanted)), np.nan)
     axes = anatomical_axes(body)
     below = kinematics.descendants(body.parents)[body.screw_joint]  # (D, J)
+    indices = [[body.joint(name) for name in wish.points] for wish in wanted]
     for row in range(len(root)):
         joints, screws = kinematics.chain(body, Pose(root=root[row].copy(), angles=angles[row].copy()))
         places = kinematics.joint_positions(body, joints)
-        for column, wish in enumerate(wanted):
-            value[row, column], gradient = _angle(body, wish, places, joints, axes, screws, below)
+        moves = _velocities(places, screws, below)
+        for column, (wish, index) in enumerate(zip(wanted, indices, strict=True)):
+            if len(index) == 3:
+                value[row, column] = three_point(places[index]) + wish.offset
+                gradient = _three_point_gradient(places[index], moves[index])
+            else:
+                pelvis = int(body.parents[index[0]])
+                turn = np.hstack([np.eye(3), np.zeros((3, 3)), np.where(below[:, pelvis], screws[:, :3].T, 0.0)])
+                seen_from = axes[:2] @ joints[pelvis, :3, :3].T  # the pelvis' forward and up, in the world
+                value[row, column], gradient = _flexion(places[index], moves[index], seen_from, turn)
             if covariance is not None:
                 variance = gradient @ covariance[row] @ gradient
                 sd[row, column] = np.degrees(np.sqrt(max(variance, 0.0)))
     return AngleSeries(names=tuple(d.name for d in wanted), value=value, sd=sd)
 
 
-def _angle(
-    body: Body, wish: Definition, places: F64, joints: F64, axes: F64, screws: F64, below: F64
-) -> tuple[float, F64]:
-    """Return one angle (degrees) and its gradient (6 + D,) in rad per unit of increment."""
-    index = [body.joint(name) for name in wish.points]
-    moves = [_velocity(places[j], screws, below[:, j]) for j in index]
-    if len(index) == 3:
-        a, b = places[index[1]] - places[index[0]], places[index[2]] - places[index[1]]
-        by_a, by_b = _angle_between(a, b)
-        gradient = by_a @ (moves[1] - moves[0]) + by_b @ (moves[2] - moves[1])
-        return float(three_point(places[index])) + wish.offset, gradient
-    pelvis = int(body.parents[index[0]])
-    rotation = joints[pelvis, :3, :3]
-    thigh = places[index[1]] - places[index[0]]
-    forward, down = axes[0] @ rotation.T @ thigh, -axes[1] @ rotation.T @ thigh
-    turn = np.concatenate([np.eye(3), np.zeros((3, 3)), np.where(below[:, pelvis], screws[:, :3].T, 0.0)], axis=1)
+def _velocities(places: F64, screws: F64, below: Bool) -> F64:
+    """Return how each joint centre moves with an increment: (J, 3, 6 + D)."""
+    count = len(places)
+    by_screws = (np.cross(screws[None, :, :3], places[:, None]) + screws[None, :, 3:]) * below.T[:, :, None]
+    identity = np.broadcast_to(np.eye(3), (count, 3, 3))
+    return np.concatenate([-twists.hat(places), identity, np.swapaxes(by_screws, 1, 2)], axis=2)
+
+
+def _three_point_gradient(places: F64, moves: F64) -> F64:
+    """Return the gradient (6 + D,) of a three-point angle in rad."""
+    by_a, by_b = _angle_between(places[1] - places[0], places[2] - places[1])
+    gradient: F64 = by_a @ (moves[1] - moves[0]) + by_b @ (moves[2] - moves[1])
+    return gradient
+
+
+def _flexion(places: F64, moves: F64, pelvis: F64, turn: F64) -> tuple[float, F64]:
+    """Return the hip flexion (degrees) and its gradient (6 + D,) in rad.
+
+    Args:
+        places: (2, 3) m, hip and knee.
+        moves: (2, 3, 6 + D), how they move.
+        pelvis: (2, 3), its forward and up in the world.
+        turn: (3, 6 + D), how it turns.
+    """
+    thigh = places[1] - places[0]
+    forward, up = pelvis @ thigh
     relative = moves[1] - moves[0] + twists.hat(thigh) @ turn  # how the thigh moves as seen from the pelvis
-    gradient = (down * axes[0] + forward * axes[1]) @ rotation.T @ relative / (forward**2 + down**2)
-    return float(np.degrees(np.arctan2(forward, down))), gradient
-
-
-def _velocity(point: F64, screws: F64, moved: F64) -> F64:
-    """Return how a joint centre moves with an increment: (3, 6 + D)."""
-    by_screws = np.where(moved, (np.cross(screws[:, :3], point) + screws[:, 3:]).T, 0.0)
-    return np.concatenate([-twists.hat(point), np.eye(3), by_screws], axis=1)
+    gradient = (-up * pelvis[0] + forward * pelvis[1]) @ relative / (forward**2 + up**2)
+    return float(np.degrees(np.arctan2(forward, -up))), gradient
 
 
 def _angle_between(a: F64, b: F64) -> tuple[F64, F64]:
