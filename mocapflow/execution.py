@@ -164,7 +164,7 @@ class Execution:
             raise failure(error, component, self._pipeline.registry, kept(), self._out / "failed.log") from error
 
     def _entered(self, step: Step, found: Artifact | None, cpu: float = 0.0, wall: float = 0.0) -> None:
-        if step.label in self.entries:
+        if found is not None and step.label in self.entries:
             return
         if found is not None:
             self._report(f"{step.label}: from the store")

@@ -17,6 +17,7 @@ from mocapflow.errors import ComponentFailed
 from mocapflow.store import Store
 from tests.fixtures.stores import STAGES, load, run_tiny, same, the_track, write_pipeline, write_recording
 
+SHORT = {name: STAGES[name] for name in ("start", "track")}
 KILLS = Path(__file__).parent / "fixtures" / "kills.py"
 
 
@@ -39,7 +40,8 @@ def test_a_track_has_every_frame_and_says_how_it_went(tmp_path, path):
     assert track.notes == ()
 
 
-def test_twenty_deaths_in_the_middle_of_writes_change_nothing(tmp_path, path):
+def test_twenty_deaths_in_the_middle_of_writes_change_nothing(tmp_path):
+    path = write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=SHORT)
     run_tiny(path, tmp_path / "whole")
     (tmp_path / "broken").mkdir()
     command = [sys.executable, str(KILLS), str(path), str(tmp_path / "broken"), "1"]
@@ -49,8 +51,6 @@ def test_twenty_deaths_in_the_middle_of_writes_change_nothing(tmp_path, path):
     assert sorted(saved) == saved  # nothing was lost
     assert len(set(saved)) > 5
     assert same(the_track(tmp_path / "whole"), the_track(tmp_path / "broken"))
-    results = [json.loads((tmp_path / kind / "out" / "results.json").read_text()) for kind in ("whole", "broken")]
-    assert results[0]["angles"] == results[1]["angles"]
 
 
 @pytest.mark.long
@@ -209,6 +209,3 @@ def test_memory_does_not_grow_with_the_number_of_frames(tmp_path):
         peaks.append((np.median(seen[50:100]), np.median(seen[-50:])))
     growth = peaks[1][1] - peaks[1][0]
     assert growth < 200_000, peaks  # bytes, over 2900 frames: less than 70 a frame
-
-
-SHORT = {name: STAGES[name] for name in ("start", "track")}

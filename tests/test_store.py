@@ -1,0 +1,371 @@
+"""Artifacts: what goes in comes back, for us and for others; locks; damage; a full disk."""
+
+import errno
+import json
+import os
+import socket
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import zarr
+
+from mocapflow import locks, rows
+from mocapflow.checkpoint import Checkpoint
+from mocapflow.data import Background, Frame, Past, Pose, Silhouette, Start
+from mocapflow.errors import ComponentFailed, StoreError
+from mocapflow.packing import FINE, distance_of, match_row, matches_of, quantised
+from mocapflow.rows import Corrupted, Rows
+from mocapflow.store import Store
+from tests.fixtures.stores import run_tiny, same, the_track, write_pipeline, write_recording
+from tests.fixtures.tiny_plugin import TinyMatcher, tiny_body
+
+RECIPE = {"component": {"name": "some"}}
+
+
+@pytest.fixture
+def store(tmp_path):
+    made = Store(tmp_path / "store.zarr")
+    made.create()
+    return made
+
+
+@pytest.fixture
+def path(tmp_path):
+    return write_pipeline(tmp_path, write_recording(tmp_path / "clip"))
+
+
+def put(store, value, key="1" * 32):
+    return store.save(store.begin("some", key, RECIPE), value)
+
+
+def equal(one, other):
+    assert type(one) is type(other)
+    if isinstance(one, np.ndarray):
+        assert one.dtype == other.dtype
+        assert one.shape == other.shape
+        assert one.tobytes() == other.tobytes()
+    elif isinstance(one, tuple):
+        assert len(one) == len(other)
+        for a, b in zip(one, other, strict=True):
+            equal(a, b)
+    elif isinstance(one, dict):
+        assert list(one) == list(other)
+        equal(tuple(one.values()), tuple(other.values()))
+    elif hasattr(one, "__dataclass_fields__"):
+        for name in one.__dataclass_fields__:
+            equal(getattr(one, name), getattr(other, name))
+    else:
+        assert one == other
+
+
+VALUES = {
+    "start": Start(pose=Pose(root=np.eye(4), angles=np.array([0.1, np.nan])), parameters=np.empty(0)),
+    "background": Background(
+        mean=(np.ones((2, 3, 3), "f4"), np.zeros((4, 5, 3), "f4")), spread=(np.ones((1, 1, 3), "f4"),)
+    ),
+    "body": tiny_body(1.0),
+    "mapping": Past(moments=(), appearance={"a/b": np.ones(3), "c": np.ones((2, 2))}),
+}
+
+
+@pytest.mark.parametrize("kind", VALUES)
+def test_records_come_back_as_they_were(store, kind):
+    value = VALUES[kind]
+    made = put(store, value)
+    assert made.complete
+    equal(value, store.load(made))
+
+
+def test_arrays_say_their_axes_and_units(store):
+    group = zarr.open_group(str(put(store, tiny_body(1.0)).path), mode="r")
+    assert group["twists"].metadata.dimension_names == ("D", "twists_1")
+    assert group["vertices"].attrs["unit"] == "m, at rest"
+
+
+def test_a_track_is_read_by_xarray(tmp_path, path):
+    xarray = pytest.importorskip("xarray")
+    run_tiny(path, tmp_path)
+    (folder,) = (tmp_path / "store.zarr").glob("track-*")
+    data = xarray.open_zarr(str(folder), consolidated=False, zarr_format=3)
+    assert dict(data.sizes) | {"T": 12, "D": 2, "W": 4, "Q": 1, "C": 2, "K": 7} == dict(data.sizes)
+    assert data["angles"].attrs["unit"] == "rad"
+    assert np.array_equal(data["angles"].values, the_track(tmp_path).angles)
+
+
+def test_a_track_has_named_arrays_whose_equal_axes_are_equally_long(tmp_path, path):
+    run_tiny(path, tmp_path, frames=7)
+    run_tiny(path, tmp_path)
+    (folder,) = (tmp_path / "store.zarr").glob("track-*")
+    group, lengths = zarr.open_group(str(folder), mode="r"), {}
+    for name, array in group.arrays():
+        names = array.metadata.dimension_names
+        assert len(set(names)) == len(names), name
+        for axis, length in zip(names, array.shape, strict=True):
+            assert lengths.setdefault(axis, length) == length, (name, axis)
+    assert {"root", "angles", "covariance", "cloth", "usable", "seconds"} <= set(group.array_keys())
+    assert group["cloth"].chunks == (1, 4, 3)
+    assert group["silhouettes/person/cam01"].metadata.dimension_names == ("T", "y", "x")
+    assert group["silhouettes/person/cam01"].attrs["unit"] == "1/8 px"
+
+
+def test_zarr_lists_the_store_without_complaint(tmp_path, path):
+    run_tiny(path, tmp_path)
+    names = {name.partition("-")[0] for name, _ in zarr.open_group(str(tmp_path / "store.zarr"), mode="r").members()}
+    assert names == {"background", "start", "track", "smooth", ".state"}
+
+
+def test_rows_are_plain_zarr(tmp_path):
+    made = Rows.create(tmp_path / "a", (4, 3, 2), "float64", np.nan, ("T", "x", "y"), {"unit": "m"})
+    values = np.random.default_rng(0).normal(size=(3, 2))
+    made.write(2, values)
+    read = zarr.open_array(str(tmp_path / "a"), mode="r")
+    assert np.array_equal(read[2], values)
+    assert np.isnan(read[1]).all()
+    assert np.isnan(made.read(1)).all()
+    zarr.open_array(str(tmp_path / "a"), mode="r+")[1] = 2 * values
+    assert np.array_equal(Rows(tmp_path / "a").read(1), 2 * values)
+    made.resize(6)
+    assert zarr.open_array(str(tmp_path / "a"), mode="r").shape == (6, 3, 2)
+
+
+@pytest.mark.parametrize("damage", [lambda data: data[:-3], lambda data: b"", lambda data: data[:9] + b"?" + data[10:]])
+def test_a_damaged_row_is_noticed(tmp_path, damage):
+    made = Rows.create(tmp_path / "a", (2, 500), "float64", np.nan, ("T", "x"), {})
+    made.write(0, np.arange(500.0))
+    file = tmp_path / "a" / "c" / "0" / "0"
+    file.write_bytes(damage(file.read_bytes()))
+    with pytest.raises(Corrupted, match="row 0 of .* is damaged"):
+        made.read(0)
+
+
+def test_silhouettes_keep_their_mask_and_an_eighth_of_a_pixel():
+    distance = np.random.default_rng(1).uniform(-20, 20, (64, 80)).astype(np.float32)
+    distance[0, :4] = [0.01, -0.01, 0.0, 0.06]
+    back = distance_of(quantised(Silhouette(camera=0, layer="person", distance=distance)))
+    assert np.array_equal(back > 0, distance > 0)
+    near = np.abs(distance) < 15
+    assert np.abs(back - distance)[near].max() <= 1 / FINE
+
+
+def test_matches_come_back(tmp_path):
+    frame = Frame(index=3, time=0.0, images=(), usable=np.zeros(0, bool))
+    surface = type("S", (), {"vertices": np.zeros((5, 3))})
+    matches = TinyMatcher().match(frame, None, surface, None, None, None)
+    back = matches_of(match_row(matches), len(matches.weight))
+    for name in ("camera", "pixel", "direction", "vertex", "weight"):
+        assert np.array_equal(getattr(back, name), getattr(matches, name))
+
+
+def test_what_was_seen_can_be_read_back(tmp_path, path):
+    run_tiny(path, tmp_path)
+    store = Store(tmp_path / "store.zarr")
+    (found,) = [a for a in store.artifacts() if a.path.name.startswith("track-")]
+    silhouettes, matches = Checkpoint(store, found, range(12), ["cam01", "cam02"]).seen(6)
+    assert [(s.camera, s.layer, s.distance.shape) for s in silhouettes] == [
+        (0, "person", (16, 24)),
+        (1, "person", (16, 24)),
+    ]
+    assert len(matches.weight) == 100
+
+
+def test_an_unfinished_result_is_none(store):
+    store.begin("some", "1" * 32, RECIPE)
+    assert not store.find("1" * 32).complete
+    put(store, VALUES["start"])  # takes its place
+    assert len(store.artifacts()) == 1
+
+
+def test_a_store_elsewhere_on_the_net_is_refused():
+    with pytest.raises(StoreError, match="has to be a folder"):
+        Store(Path("s3://bucket/store"))
+
+
+# ---- damage
+
+
+def damage_zarr_json(group):
+    (group / "zarr.json").write_text('{"attributes": {"key": ')
+
+
+def damage_array_json(group):
+    (group / "angles" / "zarr.json").write_text("{")
+
+
+def damage_chunk(group):
+    file = group / "angles" / "c" / "0" / "0"
+    file.write_bytes(file.read_bytes()[:-5])
+
+
+def remove_array(group):
+    (group / "root").rename(group.parent.parent / "gone")
+
+
+@pytest.mark.parametrize("damage", [damage_zarr_json, damage_array_json, damage_chunk, remove_array])
+def test_a_damaged_group_is_set_aside_and_made_anew(tmp_path, path, damage):
+    run_tiny(path, tmp_path)
+    whole = the_track(tmp_path)
+    (group,) = (tmp_path / "store.zarr").glob("track-*")
+    (smooth,) = (tmp_path / "store.zarr").glob("smooth-*")
+    smooth.rename(tmp_path / "smooth")  # so that somebody wants to read the track
+    damage(group)
+    _, lines = run_tiny(path, tmp_path)
+    (warning,) = [line for line in lines if line.startswith("warning")]
+    assert warning.startswith(f"warning: {group.name} is damaged and made anew: ")
+    assert len(list((tmp_path / "store.zarr").glob(f"damaged-{group.name}-*"))) == 1
+    assert same(whole, the_track(tmp_path))
+
+
+def test_a_damaged_frame_of_a_half_done_track_is_noticed(tmp_path, path):
+    run_tiny(path, tmp_path / "whole")
+    run_tiny(path, tmp_path, frames=6)
+    (group,) = (tmp_path / "store.zarr").glob("track-*")
+    file = group / "live" / "rows" / "c" / "5" / "0"
+    file.unlink()  # reads as the fill value
+    _, lines = run_tiny(path, tmp_path)
+    assert any("is damaged and made anew: frame 5 is missing" in line for line in lines)
+    assert same(the_track(tmp_path / "whole"), the_track(tmp_path))
+
+
+# ---- a store that can't be written
+
+
+def test_a_full_store_says_so_and_keeps_the_frames(tmp_path, path, monkeypatch):
+    real, left = Rows.write, [23]
+
+    def write(self, row, values):
+        left[0] -= 1
+        if left[0] < 0:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        real(self, row, values)
+
+    monkeypatch.setattr(rows.Rows, "write", write)
+    with pytest.raises(StoreError) as raised:
+        run_tiny(path, tmp_path)
+    store = tmp_path / "store.zarr"
+    assert str(raised.value) == (
+        f"the store {store} is full\n       free some space, or name another with --store\n"
+        "       frames 0–2 are saved; run the same command to continue at 3"
+    )
+    assert raised.value.exit_status == 1
+    monkeypatch.undo()
+    _, lines = run_tiny(path, tmp_path)
+    assert "track: going on after 3 frames" in lines
+    run_tiny(path, tmp_path / "whole")
+    assert same(the_track(tmp_path / "whole"), the_track(tmp_path))
+
+
+def test_an_unwritable_store_says_so(tmp_path, path, monkeypatch):
+    def refuse(self, *args, **kwargs):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    monkeypatch.setattr(Path, "mkdir", refuse)
+    with pytest.raises(StoreError) as raised:
+        run_tiny(path, tmp_path)
+    assert str(raised.value) == (
+        f"can't write to the store {tmp_path / 'store.zarr'}: Permission denied\n"
+        "       make it writable, or name another with --store"
+    )
+
+
+def test_a_file_in_the_place_of_the_store(tmp_path, path):
+    (tmp_path / "store.zarr").write_text("")
+    with pytest.raises(StoreError, match="can't write to the store"):
+        run_tiny(path, tmp_path)
+
+
+# ---- locks
+
+
+def test_two_runs_at_once_share_the_work(tmp_path, path, monkeypatch):
+    monkeypatch.setenv("TINY_SLOW", "0.01")
+    said, failed = {}, []
+
+    def go(name):
+        try:
+            (tmp_path / name).mkdir()
+            (tmp_path / name / "store.zarr").symlink_to(tmp_path / "store.zarr")
+            said[name] = run_tiny(path, tmp_path / name)
+        except BaseException as error:
+            failed.append(error)
+
+    (tmp_path / "store.zarr").mkdir()
+    threads = [threading.Thread(target=go, args=(name,)) for name in ("one", "two")]
+    for thread in threads:
+        thread.start()
+        time.sleep(0.2)
+    for thread in threads:
+        thread.join()
+    assert not failed
+    cached = [[s["cached"] for s in summary.stages if s["label"] == "track"] for summary, _ in said.values()]
+    assert sorted(cached) == [[False], [True]]
+    waited = [line for _, lines in said.values() for line in lines if "waiting for process" in line]
+    assert waited
+    assert f"process {os.getpid()} on {socket.gethostname()}, which is making it" in waited[0]
+    assert same(the_track(tmp_path / "one"), the_track(tmp_path / "two"))
+    assert not list((tmp_path / "store.zarr" / ".state").glob("*.lock"))
+
+
+@pytest.mark.parametrize(
+    ("holder", "age", "stale"),
+    [
+        ({"pid": 2**22 + 1, "host": socket.gethostname()}, 0, True),  # no such process
+        ({"pid": os.getpid(), "host": socket.gethostname(), "born": "1"}, 0, True),  # the number is used again
+        ({"pid": os.getpid(), "host": socket.gethostname(), "born": locks._born(os.getpid())}, 1e6, False),
+        ({"pid": 1, "host": "elsewhere"}, 0, False),
+        ({"pid": 1, "host": "elsewhere"}, 1e6, True),  # no heartbeat
+        (None, 1e6, True),  # half written
+    ],
+)
+def test_stale_locks_are_taken_over_with_a_message(tmp_path, monkeypatch, holder, age, stale):
+    path, lines = tmp_path / "x.lock", []
+    path.write_text("{" if holder is None else json.dumps(holder))
+    os.utime(path, (time.time() - age,) * 2)
+    monkeypatch.setattr(locks.time, "sleep", lambda _: path.unlink())  # the other one has finished
+    locks.acquire(path, "track-12", lines.append).release()
+    assert ("taking over" if stale else "waiting for") in lines[0]
+    assert len(lines) == 1
+    assert not path.exists()
+
+
+def test_a_lock_that_was_taken_over_is_noticed_before_the_next_write(tmp_path):
+    lock = locks.acquire(tmp_path / "x.lock", "track-12", print)
+    lock.check()
+    (tmp_path / "x.lock").write_text("another")
+    with pytest.raises(StoreError, match="another run took over"):
+        lock.check()
+    lock.release()
+    assert (tmp_path / "x.lock").exists()  # it is not ours
+
+
+def test_the_heartbeat_keeps_a_lock_fresh(tmp_path, monkeypatch):
+    monkeypatch.setattr(locks, "BEAT", 0.01)
+    lock = locks.acquire(tmp_path / "x.lock", "track-12", print)
+    os.utime(tmp_path / "x.lock", (1, 1))
+    until = time.monotonic() + 5
+    while (tmp_path / "x.lock").stat().st_mtime < 2 and time.monotonic() < until:
+        time.sleep(0.01)
+    lock.release()
+    assert not (tmp_path / "x.lock").exists()
+
+
+def test_a_failed_run_gives_its_lock_back(tmp_path, path, monkeypatch):
+    monkeypatch.setenv("TINY_RAISE_AT", "2")
+    with pytest.raises(ComponentFailed):
+        run_tiny(path, tmp_path)
+    assert not list((tmp_path / "store.zarr" / ".state").glob("*.lock"))
+
+
+def test_other_versions_are_told(tmp_path, path, monkeypatch):
+    from mocapflow import execution, store
+
+    real = store.versions()
+    run_tiny(path, tmp_path, frames=5)
+    for module in (store, execution):
+        monkeypatch.setattr(module, "versions", lambda: real | {"numpy": "9.9"})
+    _, lines = run_tiny(path, tmp_path)
+    assert f"warning: frames 0–4 of track were made with numpy {real['numpy']}, now 9.9" in lines
+    _, again = run_tiny(path, tmp_path)  # all done: the mixture is still told
+    assert f"warning: frames 0–4 of track were made with numpy {real['numpy']}, now 9.9" in again
