@@ -14,7 +14,8 @@ from mocapflow.io.findings import error as problem
 from mocapflow.records import F64, Bool
 
 OPPOSED = 165.0  # deg between two viewing directions
-DEPTHS = np.geomspace(0.3, 30.0, 40)  # m, where something to be filmed may stand
+NEAREST, FARTHEST = 0.3, 30.0  # m from a camera, where something to be filmed may stand
+DEPTHS = np.geomspace(NEAREST, FARTHEST, 40)  # m
 RAYS = 9  # per side of an image
 UPRIGHT = 0.7  # length of the mean "up" of the images from which they agree on a direction
 
@@ -61,7 +62,8 @@ def _sees(camera: Camera, points: F64) -> Bool:
     pixels = project(points, pinhole(camera))
     with np.errstate(invalid="ignore"):
         inside = (pixels >= -0.5) & (pixels <= camera.size - 0.5)
-    return inside[:, 0] & inside[:, 1]
+    near = np.linalg.norm(points - centre(camera), axis=1) < FARTHEST
+    return inside[:, 0] & inside[:, 1] & near
 
 
 def _forward(camera: Camera) -> F64:

@@ -1,0 +1,298 @@
+"""The doctor finds each fault, says what to do, and finds nothing on a good recording."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from mocapflow.doctor import examine
+from mocapflow.geometry import twists
+from mocapflow.io.cameras import write_cameras
+from mocapflow.io.meshes import write_mesh
+from tests.fixtures.recordings import avi_frames, look_at, ring, write_recording, write_video
+
+DEMO = Path(__file__).parents[1] / "examples" / "data"
+
+
+CHAIN = {"pelvis": None, "hip_l": "pelvis", "knee_l": "hip_l", "ankle_l": "knee_l"}
+SHORTS = dict(
+    type="shorts", waist_height=1.0, waist_circumference=0.9, hip_circumference=1.1, leg_opening_circumference=0.6,
+    inseam=0.25, length=0.48,
+)  # fmt: skip
+
+
+@pytest.fixture
+def good(tmp_path):
+    """A good recording of a person who is a box, to be damaged."""
+    subject = write_recording(tmp_path, frames=3) / "subject"
+    subject.mkdir()
+    corners = np.array([[x, y, z] for x in (-0.2, 0.2) for y in (-0.1, 0.1) for z in (0.0, 1.8)])
+    faces = np.array([[a, b, c] for a in range(6) for b, c in [(a + 1, a + 2)]], np.int32)
+    write_mesh(subject / "body.obj", corners, faces)
+    joints = [
+        {"name": name, "parent": parent, "position": [0.05, 0, 1 - 0.3 * k]}
+        for k, (name, parent) in enumerate(CHAIN.items())
+    ]
+    (subject / "skeleton.json").write_text(json.dumps({"joints": joints}))
+    np.savez(subject / "weights.npz", weights=np.full((8, 4), 0.25), names=list(CHAIN))
+    (subject / "garment.json").write_text(json.dumps(SHORTS))
+    pose = {"root_rotation": [0, 0, 0.1], "root_translation": [0, 0, 1], "joint_rotations": {"knee_l": [0.1, 0, 0]}}
+    (tmp_path / "init.json").write_text(json.dumps(pose))
+    for camera in ring():
+        (tmp_path / "background").mkdir(exist_ok=True)
+        cv2.imwrite(str(tmp_path / "background" / f"{camera.name}.png"), np.zeros((48, 64, 3), np.uint8))
+    return tmp_path
+
+
+def messages(folder, severity):
+    return [finding.message for finding in examine(folder) if finding.severity == severity]
+
+
+def errors(folder):
+    return messages(folder, "error")
+
+
+def edit(path, change):
+    content = json.loads(path.read_text())
+    change(content)
+    path.write_text(json.dumps(content))
+
+
+@pytest.mark.parametrize("clip", ["skirt_steps", "shorts_steps"])
+def test_the_demo_is_healthy(clip):
+    assert [f for f in examine(DEMO / clip) if f.severity != "note"] == []
+
+
+def test_a_good_recording_is_healthy(good):
+    assert examine(good) == []
+
+
+def test_several_faults_are_found_at_once_errors_first(good):
+    (good / "subject" / "skeleton.json").unlink()
+    (good / "videos" / "cam02.mp4").write_bytes(b"hello")
+    edit(good / "subject" / "garment.json", lambda g: g.update(inseem=g.pop("inseam")))
+    found = examine(good)
+    assert [f.severity for f in found] == sorted((f.severity for f in found), key=["error", "warning", "note"].index)
+    assert {f.message for f in found} >= {
+        "mesh without skeleton: there is body.obj, but no skeleton.json",
+        "this video can't be decoded",
+        "unknown measure 'inseem' of shorts",
+        "the shorts lacks 'inseam'",
+    }
+    assert all(f.hint for f in found if f.severity == "error")
+
+
+def test_nothing_there(tmp_path):
+    assert errors(tmp_path / "nowhere") == ["no such recording folder"]
+    assert errors(tmp_path) == ["no calibration file"]
+
+
+def test_mesh_without_skeleton(good):
+    (good / "subject" / "skeleton.json").unlink()
+    (finding,) = [f for f in examine(good) if f.severity == "error"]
+    assert finding.message == "mesh without skeleton: there is body.obj, but no skeleton.json"
+    assert finding.hint.startswith('add {"joints": [{"name", "parent", "position": [x, y, z]}]}')
+    assert finding.where == str(good / "subject")
+
+
+def test_lengths_in_mm(good):
+    def grow(content):
+        for joint in content["joints"]:
+            joint["position"] = [1000 * x for x in joint["position"]]
+
+    edit(good / "subject" / "skeleton.json", grow)
+    edit(good / "subject" / "garment.json", lambda g: g.update(length=483))
+    edit(good / "init.json", lambda pose: pose.update(root_translation=[0, 100, 900]))
+    found = errors(good)
+    assert any(m.startswith("the skeleton is 900 m tall: it looks like millimetres") for m in found)
+    assert "'length' is 483" in found
+    assert "the pelvis is 906 m from the origin: it looks like mm" in found
+
+
+def test_calibration_in_mm(tmp_path):
+    write_recording(tmp_path, frames=2)
+    cameras = [replace(c, camera_from_world=c.camera_from_world * [[1, 1, 1, 1000]]) for c in ring()]
+    write_cameras(tmp_path / "cameras.toml", cameras)
+    (finding,) = [f for f in examine(tmp_path) if f.severity == "error"]
+    assert finding.message == "camera 'cam01' stands 4272 m from the origin: the calibration is in mm"
+    assert finding.hint == "lengths are in metres: divide every translation by 1000"
+
+
+def test_cameras_that_see_nothing_in_common(tmp_path):
+    cameras = list(ring())
+    cameras[1] = look_at("cam02", np.array([30.0, 30, 1.5]), target=(60, 60, 1.0))
+    write_recording(tmp_path, frames=2, cameras=cameras)
+    assert errors(tmp_path) == ["cam02: no other camera sees anything of what it sees"]
+
+
+def test_no_point_seen_by_all(tmp_path):
+    places = ((0, 0), (2.5, 0), (5, 0), (7.5, 0))
+    cameras = [
+        look_at(f"cam0{i}", np.array([x, -1.0, 1]), target=(x, 2, 1), focal=400.0) for i, (x, _) in enumerate(places)
+    ]
+    write_recording(tmp_path, frames=2, cameras=[cameras[0], cameras[1], cameras[3]])
+    assert errors(tmp_path) + messages(tmp_path, "warning")
+    near = [
+        look_at(f"cam0{i}", np.array([x, -4.0, 1]), target=(x, 2, 1), focal=60.0) for i, (x, _) in enumerate(places)
+    ]
+    write_recording(tmp_path / "wide", frames=2, cameras=near)
+    assert not errors(tmp_path / "wide")
+
+
+def test_one_camera(tmp_path):
+    write_recording(tmp_path, frames=2, cameras=ring(names=("cam01",)))
+    assert messages(tmp_path, "warning") == ["there is one camera only"]
+
+
+def turned(camera, rotation):
+    """Return the camera in a world whose axes are turned."""
+    motion = np.eye(4)
+    motion[:3, :3] = rotation
+    return replace(camera, camera_from_world=camera.camera_from_world @ motion.T)
+
+
+def test_world_that_is_not_z_up(tmp_path):
+    lie = twists.exp(np.array([-np.pi / 2, 0, 0, 0, 0, 0]))[:3, :3]  # z becomes y
+    write_recording(tmp_path / "y", frames=2, cameras=[turned(c, lie) for c in ring()])
+    assert "the images' up is the y axis of the world" in messages(tmp_path / "y", "warning")
+    over = twists.exp(np.array([np.pi, 0, 0, 0, 0, 0]))[:3, :3]
+    write_recording(tmp_path / "down", frames=2, cameras=[turned(c, over) for c in ring()])
+    assert messages(tmp_path / "down", "warning") == [
+        "the images' up is down in the world",
+        "every camera is below the floor (heights -1.5 to -1.5 m)",
+    ]
+
+
+def test_cameras_that_face_each_other(tmp_path):
+    pair = [look_at(n, np.array([x, 0.1, 1.5]), target=(0, 0, 1.5)) for n, x in (("cam01", 4.0), ("cam02", -4.0))]
+    write_recording(tmp_path, frames=2, cameras=pair)
+    assert any(m.startswith("cam01 and cam02 face each other (17") for m in messages(tmp_path, "note"))
+
+
+def test_missing_camera_and_unequal_lengths_and_sizes(tmp_path):
+    write_recording(tmp_path / "a", frames=2)
+    (tmp_path / "a" / "videos" / "cam02.mp4").unlink()
+    assert errors(tmp_path / "a") == ["missing camera: no video of cam02"]
+    write_recording(tmp_path / "b", frames=6, lengths={"cam03": 4})
+    write_video(tmp_path / "b" / "videos" / "cam01.mp4", 6, (100, 48))
+    assert errors(tmp_path / "b") == [
+        "camera 'cam01': the video is 100 x 48 px, the calibration 64 x 48",
+        "the videos differ in length",
+    ]
+
+
+def test_lost_frames_are_named(tmp_path):
+    write_recording(tmp_path, frames=20, ending="avi", codec="MJPG")
+    path = tmp_path / "videos" / "cam02.avi"
+    content = bytearray(path.read_bytes())
+    offset, length = avi_frames(content)[8]
+    content[offset : offset + length] = bytes(length)
+    path.write_bytes(content)
+    assert messages(tmp_path, "warning") == ["cam02: frame 8 can't be decoded"]
+    assert errors(tmp_path) == []
+
+
+def test_a_video_that_breaks_off(tmp_path):
+    write_recording(tmp_path, frames=20, ending="avi", codec="MJPG")
+    path = tmp_path / "videos" / "cam02.avi"
+    content = path.read_bytes()
+    path.write_bytes(content[: avi_frames(content)[11][0]])
+    assert any(m.startswith("cam02: the video breaks off after frame 1") for m in messages(tmp_path, "warning"))
+
+
+def test_bad_clean_plate(good):
+    cv2.imwrite(str(good / "background" / "cam01.png"), np.zeros((40, 32, 3), np.uint8))
+    assert errors(good) == ["this clean plate is 32 x 40 px, the video 64 x 48"]
+
+
+def test_keypoints_with_nan(tmp_path):
+    write_recording(tmp_path, frames=2)
+    for name in ("cam01", "cam02"):
+        place = tmp_path / "keypoints" / f"{name}_json"
+        place.mkdir(parents=True)
+        for frame in range(2):
+            x = float("nan") if (name, frame) == ("cam02", 1) else 1.0
+            people = [{"pose_keypoints_2d": [x, 2.0, 0.5]}]
+            (place / f"a.{frame}.json").write_text(json.dumps({"people": people}))
+    assert messages(tmp_path, "warning") == [
+        "cam02: keypoints of frame 1 are not all numbers (NaN): these points count as not seen",
+        "cam03: no keypoints, though others have them",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("change", "message", "hint"),
+    [
+        (lambda g: g.update(type="cape"), "the garment type is 'cape'", "built in: skirt, shorts"),
+        (lambda g: g.update(hem=1), "unknown measure 'hem' of shorts", "available: hip_circumference"),
+        (lambda g: g.pop("inseam"), "the shorts lacks 'inseam'", "needed, in m: waist_height"),
+        (lambda g: g.update(length="long"), "'length' is 'long'", "expected metres, between 0 and 3"),
+    ],
+)
+def test_garment(good, change, message, hint):
+    edit(good / "subject" / "garment.json", change)
+    (finding,) = [f for f in examine(good) if f.message == message]
+    assert finding.hint.startswith(hint)
+    assert finding.where.endswith("garment.json")
+
+
+@pytest.mark.parametrize(
+    ("change", "message", "hint"),
+    [
+        (lambda p: p["joint_rotations"].update(kne_l=[0, 0, 0]),
+         "rotation of 'kne_l', which is no joint of the skeleton", "did you mean 'knee_l'?"),
+        (lambda p: p.update(root_rotation=[0, 1]), "'root_rotation' is [0, 1]", "expected three numbers"),
+        (lambda p: p.pop("root_translation"), "'root_translation' is missing", "needed: root_rotation"),
+        (lambda p: p.update(rotation=[0, 0, 0]), "unknown key 'rotation'", "did you mean 'root_rotation'?"),
+    ],
+)  # fmt: skip
+def test_first_pose(good, change, message, hint):
+    edit(good / "init.json", change)
+    (finding,) = [f for f in examine(good) if f.severity == "error"]
+    assert finding.message == message
+    assert hint in finding.hint
+
+
+def test_skeleton_and_weights_against_the_mesh(good):
+    def move(content):
+        content["joints"][0]["position"] = [2.0, 0, 1.0]
+
+    edit(good / "subject" / "skeleton.json", move)
+    assert errors(good) == ["1 of 4 joints lie outside the mesh"]
+    edit(good / "subject" / "skeleton.json", lambda s: s["joints"][1].update(parent="pelvs"))
+    (finding,) = [f for f in examine(good) if f.severity == "error"]
+    assert finding.message == "joint 'hip_l' hangs on 'pelvs', which is no joint"
+    assert "did you mean 'pelvis'?" in finding.hint
+
+
+def test_weights_of_another_mesh(good):
+    path = good / "subject" / "weights.npz"
+    with np.load(path) as content:
+        weights, names = content["weights"], content["names"]
+    np.savez(path, weights=weights[1:], names=names)
+    assert errors(good)[0].startswith(
+        f"the weights have the shape {weights[1:].shape}; expected ({len(weights)} vertices"
+    )
+    np.savez(path, weights=weights, names=[*names[:-1], "tail"])
+    assert errors(good) == ["weights for 'tail', which is no joint of the skeleton"]
+    path.write_bytes(b"nothing")
+    assert errors(good)[0].startswith("no skin weights: ")
+
+
+def test_not_json(good):
+    (good / "init.json").write_text("{")
+    (good / "subject" / "garment.json").write_text("[]")
+    (good / "subject" / "skeleton.json").write_text('{"joints": [{}]}')
+    found = errors(good)
+    assert found[0] == "not a skeleton: KeyError('name')"
+    assert found[1] == "expected {...} at the top"
+    assert found[2].startswith("not JSON: ")
+
+
+def test_the_static_trial_is_examined_too(tmp_path):
+    write_recording(tmp_path, frames=3)
+    write_recording(tmp_path / "static", frames=3, lengths={"cam02": 2})
+    assert errors(tmp_path) == ["static trial: the videos differ in length"]
