@@ -10,5 +10,6 @@ from mocapflow.hookspecs import hookimpl
 def mocapflow_bodies() -> list[type[BodyModel]]:
     """Return the bodies of this package."""
     from mocapflow_bodies.scanned import Scanned
+    from mocapflow_bodies.template import Template
 
-    return [Scanned]
+    return [Scanned, Template]

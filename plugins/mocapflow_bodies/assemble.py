@@ -9,9 +9,9 @@ import numpy as np
 from mocapflow.data import Body
 from mocapflow.errors import RecordingError
 from mocapflow.geometry.meshes import edges
+from mocapflow.geometry.skeleton import Skeleton
 from mocapflow.records import F64, I32, Bool
 from mocapflow_bodies.joints import base, screws
-from mocapflow_bodies.skeleton import Skeleton
 from mocapflow_bodies.weights import strongest
 
 Part = Literal["full", "legs", "arms"]

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from mocapflow.geometry.skeleton import Skeleton, body_directions
 from mocapflow.records import F64
-from mocapflow_bodies.skeleton import Skeleton, body_directions
 
 FORWARD, LEFT, UP = np.eye(3)  # in (forward, left, up)
 

@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from mocapflow.geometry import twists
+from mocapflow.geometry.skeleton import Skeleton
 from mocapflow.records import F64, I32
 from mocapflow_bodies.axes import joint_axes, rest_bend
-from mocapflow_bodies.skeleton import Skeleton
 
 FREE = math.inf
 

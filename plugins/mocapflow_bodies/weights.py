@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from mocapflow.errors import RecordingError
+from mocapflow.geometry.skeleton import Skeleton
 from mocapflow.records import F64, I32
-from mocapflow_bodies.skeleton import Skeleton
 
 KEPT = 5  # joints a vertex
 LEAST = 0.01  # weights below are dropped

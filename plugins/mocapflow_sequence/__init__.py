@@ -13,10 +13,24 @@ def mocapflow_stages() -> list[type[Stage]]:
     from mocapflow_sequence.background import EmptyScene
     from mocapflow_sequence.evaluate import Evaluate
     from mocapflow_sequence.export import Export
+    from mocapflow_sequence.fit_subject import FitSubject
     from mocapflow_sequence.overlay import Overlay
     from mocapflow_sequence.report import Report
     from mocapflow_sequence.smooth import Smooth
     from mocapflow_sequence.start_from_file import StartFromFile
+    from mocapflow_sequence.start_from_keypoints import StartFromKeypoints
     from mocapflow_sequence.virtual import Virtual
 
-    return [EmptyScene, CoupledLoop, StartFromFile, Evaluate, Export, Overlay, Report, Smooth, Virtual]
+    return [
+        EmptyScene,
+        CoupledLoop,
+        StartFromFile,
+        StartFromKeypoints,
+        FitSubject,
+        Evaluate,
+        Export,
+        Overlay,
+        Report,
+        Smooth,
+        Virtual,
+    ]

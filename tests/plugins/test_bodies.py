@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from mocapflow_bodies.joints import TABLE, screws, table_row
 from mocapflow_bodies.scanned import Morph, Scanned
-from mocapflow_bodies.skeleton import Skeleton, read_skeleton
+from mocapflow_bodies.skeleton import read_skeleton
 
 from mocapflow.data import Pose
 from mocapflow.errors import PipelineError, RecordingError
 from mocapflow.geometry import kinematics, twists
 from mocapflow.geometry.joints import angles_from_rotations
+from mocapflow.geometry.skeleton import Skeleton
 
 RECORDINGS = Path(__file__).parents[2] / "examples" / "data"
 

@@ -1,0 +1,65 @@
+"""The person's keypoints of a frame, found among all detections and triangulated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mocapflow.errors import RecordingError
+from mocapflow.io.keypoints import keypoint_files, people_at
+from mocapflow.recording import Recording
+from mocapflow.records import F64
+from mocapflow_sequence.keypoint_fit import Seen
+from mocapflow_sequence.keypoint_layouts import LAYOUTS, Layout, layout_of
+from mocapflow_sequence.person import Person, find_person
+
+LEAST_POINTS = 8  # triangulated keypoints that make a usable frame
+
+
+def need_keypoints(recording: Recording) -> None:
+    """Check that at least two cameras have keypoints.
+
+    Raises:
+        RecordingError: they have not.
+    """
+    if sum(folder is not None for folder in recording.keypoint_folders) >= 2:
+        return
+    there = ", ".join(sorted(path.name for path in recording.folder.iterdir()))
+    raise RecordingError(
+        "there are no 2D keypoints of two cameras or more", where=str(recording.folder / "keypoints"),
+        hint=f"expected keypoints/cam01_json/*.json as OpenPose writes them; the recording has: {there}\n"
+        "with a pose of the first frame in init.json, use the stage start_from_file",
+    )  # fmt: skip
+
+
+def people(recording: Recording, index: int) -> tuple[F64, ...]:
+    """Return all detections of a frame, per camera (N, K, 3) px, px, confidence, undistorted; no image is decoded."""
+    return tuple(
+        view.points(people_at(None if folder is None else keypoint_files(folder), index))
+        for view, folder in zip(recording.views, recording.keypoint_folders, strict=True)
+    )
+
+
+def person_at(recording: Recording, index: int) -> Person | None:
+    """Return the person in a frame; None where too few keypoints can be triangulated."""
+    person = find_person(people(recording, index), recording.cameras)
+    found = 0 if person is None else np.isfinite(person.points.position).all(axis=1).sum()
+    return person if found >= LEAST_POINTS else None
+
+
+def layout(recording: Recording, indices: Sequence[int], wanted: Layout | None) -> tuple[str, ...]:
+    """Return the names of the keypoints, in the order of the files."""
+    detections = [points for index in indices for view in people(recording, index) for points in view]
+    return LAYOUTS[wanted or layout_of(detections)]
+
+
+def seen(person: Person, names: Sequence[str], wanted: Sequence[str]) -> Seen:
+    """Return a person's keypoints (named `names`) in the order of the landmarks `wanted`."""
+    row = np.array([names.index(name) if name in names else -1 for name in wanted])
+    known = row >= 0
+    return Seen(
+        position=np.where(known[:, None], person.points.position[row], np.nan),
+        pixels=person.pixels[:, row],
+        confidence=np.where(known, person.confidence[:, row], 0.0),
+    )

@@ -1,0 +1,75 @@
+"""Bodies of other proportions: segments stretched along and across, the mesh with them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from mocapflow.data import Body
+from mocapflow.geometry import twists
+from mocapflow.geometry.skeleton import body_directions, skeleton_of
+from mocapflow.records import F64
+
+# What can be stretched; `stature` multiplies all, `girth` what lies across the limbs and the depth of the trunk.
+PROPORTIONS = (
+    "stature", "girth", "trunk", "shoulder_width", "hip_width", "head",
+    "thigh", "shank", "foot", "upper_arm", "forearm",
+)  # fmt: skip
+LIMBS = {"hip": "thigh", "knee": "shank", "shoulder": "upper_arm", "elbow": "forearm"}
+WHOLE = {"neck": "head", "head": "head", "ankle": "foot", "toe": "foot", "wrist": "forearm"}
+
+
+def scaled(body: Body, factors: Mapping[str, float]) -> Body:
+    """Return a body of other proportions.
+
+    Args:
+        body: at rest.
+        factors: by the names in PROPORTIONS, 1 where left out; left and right alike.
+
+    Joint j stretches what it carries by A_j about itself, so child joints move by A_parent, and a vertex moves to
+    sum_j w_j (p'_j + A_j (v - p_j)): smooth where the weights are. Axes keep their directions.
+    """
+    stretch = _stretches(body, factors)
+    positions = body.positions.copy()
+    for joint in range(len(positions)):
+        parent = int(body.parents[joint])
+        if parent >= 0:
+            positions[joint] = positions[parent] + stretch[parent] @ (body.positions[joint] - body.positions[parent])
+    vertices = np.zeros_like(body.vertices)
+    for k in range(body.skin_joint.shape[1]):
+        joint = body.skin_joint[:, k]
+        moved = positions[joint] + np.einsum("vab,vb->va", stretch[joint], body.vertices - body.positions[joint])
+        vertices += body.skin_weight[:, k, None] * moved
+    offset = body.morph_offset
+    if offset is not None:
+        offset = np.einsum("vk,vkab,vb->va", body.skin_weight, stretch[body.skin_joint], offset)
+    return replace(
+        body, vertices=vertices, positions=positions, morph_offset=offset,
+        twists=twists.screw(body.twists[:, :3], positions[body.screw_joint]),
+    )  # fmt: skip
+
+
+def _stretches(body: Body, factors: Mapping[str, float]) -> F64:
+    """Return the stretch (J, 3, 3) of what each joint carries."""
+    unknown = set(factors) - set(PROPORTIONS)
+    if unknown:
+        raise ValueError(f"unknown proportions {sorted(unknown)}; there are {PROPORTIONS}")
+    by = {name: factors.get(name, 1.0) for name in PROPORTIONS}
+    skeleton = skeleton_of(body)
+    directions = body_directions(skeleton)
+    stretch = np.empty((len(body.parents), 3, 3))
+    for joint, name in enumerate(body.joint_names):
+        base = name.removesuffix("_l").removesuffix("_r")
+        if base in LIMBS:
+            bone = skeleton.bone(joint)
+            along = np.outer(bone, bone) / (bone @ bone)
+            stretch[joint] = by[LIMBS[base]] * along + by["girth"] * (np.eye(3) - along)
+        elif base in WHOLE:
+            stretch[joint] = by[WHOLE[base]] * np.eye(3)
+        else:
+            hips, shoulders = by["hip_width"], by["shoulder_width"]
+            width = {"pelvis": hips, "chest": shoulders}.get(base, (hips + shoulders) / 2)
+            stretch[joint] = directions.T @ np.diag([by["girth"], width, by["trunk"]]) @ directions
+    return by["stature"] * stretch

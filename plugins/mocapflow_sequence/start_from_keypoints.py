@@ -1,0 +1,48 @@
+"""Stage `start_from_keypoints`: the first pose from 2D keypoints of the first usable frame."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from mocapflow.components import Stage
+from mocapflow.data import Start
+from mocapflow.errors import RecordingError
+from mocapflow.recording import Recording
+from mocapflow.scene import Scene
+from mocapflow_sequence.detections import layout, need_keypoints, person_at, seen
+from mocapflow_sequence.keypoint_fit import fit
+from mocapflow_sequence.keypoint_layouts import Layout
+from mocapflow_sequence.landmarks import landmarks
+from mocapflow_sequence.start_from_file import calm
+
+
+class StartFromKeypoints(Stage):
+    """Finds the person whose detections reproject best, and the pose of the body that explains them.
+
+    Only the first frame is used; where keypoints of fewer than two cameras agree, the next one.
+    """
+
+    name: ClassVar[str] = "start_from_keypoints"
+    layout: Layout | None = None  # order of the keypoints; None: told by their number
+    search_frames: int = 10  # how far to look for a usable frame
+
+    def run(self, recording: Recording, scene: Scene) -> Start:
+        """Return the pose of the first usable frame; the cloth starts without forces.
+
+        Raises:
+            RecordingError: there are no keypoints, or no frame in which two cameras see the same person.
+        """
+        need_keypoints(recording)
+        names = landmarks(scene.body).names
+        for index in recording.indices[: self.search_frames]:
+            person = person_at(recording, index)
+            if person is not None:
+                points = seen(person, layout(recording, [index], self.layout), names)
+                _, (pose,) = fit(scene.body, [points], scene.cameras)
+                return Start(pose=pose, parameters=calm(scene.garment))
+        first, last = recording.indices[0], recording.indices[: self.search_frames][-1]
+        raise RecordingError(
+            f"in frames {first} to {last} no two cameras see the same person",
+            where=str(recording.folder / "keypoints"),
+            hint="check that keypoints and cameras belong together (`mocapflow doctor`), or write init.json",
+        )
