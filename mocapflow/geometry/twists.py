@@ -5,6 +5,8 @@ Every function takes arrays with any leading axes. Source of the closed forms: M
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from mocapflow.records import F64
@@ -23,10 +25,11 @@ def hat(vector: F64) -> F64:
 
     Source: Rosenhahn 2008, Eq. (12.4)
     """
-    x, y, z = np.moveaxis(vector, -1, 0)
-    zero = np.zeros_like(x)
-    rows = [np.stack(row, -1) for row in ((zero, -z, y), (z, zero, -x), (-y, x, zero))]
-    return np.stack(rows, -2)
+    matrix = np.zeros((*vector.shape, 3))
+    x, y, z = vector[..., 0], vector[..., 1], vector[..., 2]
+    matrix[..., 0, 1], matrix[..., 0, 2], matrix[..., 1, 2] = -z, y, -x
+    matrix[..., 1, 0], matrix[..., 2, 0], matrix[..., 2, 1] = z, -y, x
+    return matrix
 
 
 def _coefficients(angle: F64) -> tuple[F64, F64, F64]:
@@ -71,11 +74,27 @@ def log_rotation(rotation: F64) -> F64:
     Returns:
         (..., 3) rad, of norm at most pi.
     """
-    from scipy.spatial.transform import Rotation  # a heavy import; only some commands need it
-
     flat = np.asarray(rotation).reshape(-1, 3, 3)
-    vectors: F64 = Rotation.from_matrix(flat).as_rotvec()
-    return vectors.reshape(*rotation.shape[:-2], 3)
+    return np.array([_rotation_vector(one.tolist()) for one in flat]).reshape(rotation.shape[:-1])
+
+
+def _rotation_vector(r: list[list[float]]) -> list[float]:
+    """Return the rotation vector of one rotation through its quaternion, started from its largest component."""
+    trace = r[0][0] + r[1][1] + r[2][2]
+    i = max(range(3), key=lambda k: r[k][k])
+    j, k = (i + 1) % 3, (i + 2) % 3
+    vector = [r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1]]  # 4 w times the vector part
+    if trace >= r[i][i]:
+        w = 1.0 + trace  # 4 w^2
+    else:
+        w = vector[i]  # all times 4 times component i
+        vector[i] = 1.0 + r[i][i] - r[j][j] - r[k][k]
+        vector[j], vector[k] = r[i][j] + r[j][i], r[i][k] + r[k][i]
+    sine = math.hypot(*vector)
+    if sine == 0.0:
+        return vector
+    half = math.atan2(sine, abs(w)) * math.copysign(2.0, w) / sine
+    return [half * component for component in vector]
 
 
 def log(motion: F64) -> F64:

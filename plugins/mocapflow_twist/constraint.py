@@ -54,13 +54,16 @@ def image_rows(matches: Matches, cameras: Sequence[Camera]) -> Rows:
     direction = matches.direction[match].copy()
     direction[: len(free)][free] = [1.0, 0.0]
     direction[len(free) :] = [0.0, 1.0]
-    projections = np.stack([pinhole.projection(camera) for camera in cameras])[matches.camera[match]]
     offset = np.sum(direction * matches.pixel[match], axis=1, keepdims=True)
-    divisor = projections[:, 2]
-    plane = direction[:, :1] * projections[:, 0] + direction[:, 1:] * projections[:, 1] - offset * divisor
+    plane, divisor = np.empty((len(match), 4)), np.empty((len(match), 4))
+    for index, camera in enumerate(cameras):
+        seen = matches.camera[match] == index
+        matrix = pinhole.projection(camera)
+        divisor[seen] = matrix[2]
+        plane[seen] = direction[seen] @ matrix[:2] - offset[seen] * matrix[2]
     return Rows(
         plane=plane,
-        divisor=np.ascontiguousarray(divisor),
+        divisor=divisor,
         vertex=matches.vertex[match],
         weight=matches.weight[match],
         match=match.astype(np.int32),

@@ -27,8 +27,10 @@ def effective_share(matches: Matches, correlation_px: float) -> F64:
     views = int(camera.max()) + 1
     clustered = np.zeros(views)
     for shift in (0.0, 0.5):
-        x, y = np.floor(matches.pixel[used] / correlation_px + [shift, 0.0]).astype(np.int64).T % CELLS
-        in_cell = np.bincount((camera * CELLS + y) * CELLS + x, weight, views * CELLS**2)
+        cell = np.floor(matches.pixel[used] / correlation_px + [shift, 0.0]).astype(np.int64)
+        x, y = (cell - cell.min(axis=0)).T % CELLS
+        columns, cells = x.max() + 1, (x.max() + 1) * (y.max() + 1)
+        in_cell = np.bincount(camera * cells + y * columns + x, weight, views * cells)
         clustered += 0.5 * np.sum(in_cell.reshape(views, -1) ** 2, axis=1)
     alone = np.bincount(camera, weight**2, views)
     share[used] = (alone / np.where(clustered > 0, clustered, 1.0))[camera]

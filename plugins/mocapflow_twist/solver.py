@@ -126,7 +126,8 @@ class TwistGaussNewton(PoseSolver):
 
     def _settled(self, before: Guess, after: Guess, old: Surface, new: Surface) -> bool:
         angles = np.abs(after.pose.angles - before.pose.angles).max(initial=0.0)
-        surface = np.sqrt(np.sum((new.vertices - old.vertices) ** 2, axis=1).max())
+        way = new.vertices - old.vertices
+        surface = np.sqrt(np.einsum("va,va->v", way, way).max())
         return bool(angles <= np.radians(self.stop_angle_deg) and surface <= self.stop_surface_mm / 1000)
 
     def _estimate(self, problem: Problem, guess: Guess, motion: ClothMotion) -> Estimate:
