@@ -39,6 +39,8 @@ def makes(stage: Stage) -> Any:
 
 
 def _wire_stage(named: NamedStage, earlier: Sequence[NamedStage]) -> dict[str, str | None]:
+    if named.label in SUPPLIED.values():
+        raise PipelineError(f"no stage can be called '{named.label}': inputs have that name", where=named.where)
     hints = {name: hint for name, hint in _told(named, _hints, named.stage).items() if name != "return"}
     for parameter in named.wiring:
         if parameter not in hints:

@@ -211,6 +211,12 @@ def test_wiring_that_does_not_work(folder, change, message):
     assert str(caught.value) == message
 
 
+def test_a_stage_is_not_called_like_an_input(folder):
+    Path("skirt.yaml").write_text(TEXT.replace("  start: start", "  scene: start"))
+    with pytest.raises(MocapflowError, match="skirt.yaml:4:3  no stage can be called 'scene': inputs have that name"):
+        wire(load())
+
+
 @pytest.mark.parametrize("file", sorted(shipped("pipelines").glob("*.yaml")), ids=lambda file: file.name)
 def test_every_shipped_pipeline_loads_and_is_wired(file):
     pipeline = load_pipeline(file, load_registry(), recording=shipped("examples", "data", "skirt_steps"))

@@ -244,12 +244,12 @@ class MatcherConformance(Conformance):
     role = "matcher"
     matcher: Matcher
 
-    def matches(self, lost: int | None = None) -> tuple[Matches, Scene, Surface]:
-        """Return matches of a slightly wrong surface."""
-        scene = scenes.tiny_scene()
+    def matches(self, clothed: bool, lost: int | None = None) -> tuple[Matches, Scene, Surface]:
+        """Return matches of a slightly wrong surface, one view lost or none."""
+        scene = scenes.tiny_scene(clothed=clothed)
         pose = scenes.tiny_pose(scene, 4)
         believed = moved(pose, np.full(6 + len(pose.angles), 0.01))
-        surface = scene.surface(believed, NO_CLOTH)
+        surface = scene.surface(believed, scenes.tiny_cloth(scene, believed))
         frame, segmentation = scenes.tiny_frame(scene, pose), scenes.tiny_segmentation(scene, pose)
         if lost is not None:
             frame = scenes.without_view(frame, lost)
@@ -257,10 +257,10 @@ class MatcherConformance(Conformance):
         past = scenes.tiny_past(scene, believed)
         return assert_pure(self.matcher.match, frame, segmentation, surface, past, scene, TURN), scene, surface
 
-    def test_matches_point_at_something(self) -> None:
+    @pytest.mark.parametrize("clothed", [False, True])
+    def test_matches_point_at_something(self, clothed: bool) -> None:
         """Cameras, pixels and vertices exist, weights are not negative, directions are unit or zero."""
-        matches, scene, surface = self.matches()
-        assert len(matches.vertex) >= 20
+        matches, scene, surface = self.matches(clothed)
         assert ((matches.camera >= 0) & (matches.camera < len(scene.cameras))).all()
         assert ((matches.vertex >= 0) & (matches.vertex < len(surface.vertices))).all()
         assert np.isfinite(matches.pixel).all()
@@ -268,9 +268,10 @@ class MatcherConformance(Conformance):
         length = np.linalg.norm(matches.direction, axis=1)
         assert (np.isclose(length, 1, atol=1e-6) | (length == 0)).all()
 
-    def test_a_lost_view_has_no_matches(self) -> None:
+    @pytest.mark.parametrize("clothed", [False, True])
+    def test_a_lost_view_has_no_matches(self, clothed: bool) -> None:
         """A view without a silhouette gives no matches."""
-        matches, _, _ = self.matches(lost=1)
+        matches, _, _ = self.matches(clothed, lost=1)
         assert 1 not in matches.camera
 
 
