@@ -1,0 +1,170 @@
+"""Runs and plans: what is taken from the store, what goes on, what is made, and why."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mocapflow.errors import ComponentFailed, StoreError
+from mocapflow.hookspecs import hookimpl
+from mocapflow.runner import plan, run
+from tests.fixtures.stores import STAGES, actions, load, run_tiny, write_pipeline, write_recording
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture
+def path(tmp_path):
+    return write_pipeline(tmp_path, write_recording(tmp_path / "clip"))
+
+
+def outlook(path, folder, *changes, frames=None):
+    lines = plan(load(path, *changes, frames=frames), store=folder / "store.zarr")
+    return {line.label: (line.action, line.why) for line in lines}
+
+
+def test_a_plan_says_what_a_run_does(tmp_path, path):
+    always = ("run", "writes files or compares: always")
+    new = ("run", "new")
+    assert outlook(path, tmp_path) == {
+        "background": new, "start": new, "track": new, "smooth": new, "export": always,
+    }  # fmt: skip
+    assert not (tmp_path / "store.zarr").exists()  # a plan writes nothing
+    run_tiny(path, tmp_path, frames=5)
+    assert outlook(path, tmp_path, frames=5)["track"] == ("hit", "5 frames")
+    assert outlook(path, tmp_path) == {
+        "background": ("hit", ""),
+        "start": ("hit", ""),
+        "track": ("resume", "5 of 12 frames done"),
+        "smooth": ("run", "new: track grew from 5 to 12 frames"),
+        "export": always,
+    }
+    changed = outlook(path, tmp_path, "stages.track.draper=other_draper", frames=5)
+    assert changed["track"] == ("run", "new: draper tiny_draper → other_draper")
+    assert changed["smooth"] == ("run", "new: track was made anew")
+
+
+def test_a_plan_line_for_people(tmp_path, path):
+    lines = [str(line) for line in plan(load(path), store=tmp_path / "store.zarr")]
+    assert [line.split()[:2] for line in lines[:2]] == [["background", "run"], ["start", "run"]]
+    assert lines[4].endswith("(track ← smooth)")
+
+
+def test_a_plan_explains_edited_files(tmp_path, path):
+    run_tiny(path, tmp_path)
+    (tmp_path / "clip" / "subject.txt").write_text("another")
+    assert outlook(path, tmp_path)["start"] == ("run", "new: subject.txt changed")
+    assert outlook(path, tmp_path)["background"] == ("hit", "")
+
+
+def test_variants_share_what_comes_before(tmp_path, path):
+    first, _ = run_tiny(path, tmp_path)
+    assert set(actions(first).values()) == {"run"}
+    second, lines = run_tiny(path, tmp_path, "stages.track.draper=other_draper")
+    assert actions(second) == {"background": "hit", "start": "hit", "track": "run", "smooth": "run", "export": "run"}
+    assert "background: from the store" in lines
+    third, _ = run_tiny(path, tmp_path)
+    assert actions(third) == {"background": "hit", "start": "hit", "track": "hit", "smooth": "hit", "export": "run"}
+
+
+def test_fresh_makes_everything_anew(tmp_path, path):
+    run_tiny(path, tmp_path)
+    again, _ = run_tiny(path, tmp_path, fresh=True)
+    assert set(actions(again).values()) == {"run"}
+    assert len([p for p in (tmp_path / "store.zarr").iterdir() if p.name.startswith("track")]) == 1
+
+
+def test_later_stages_know_how_the_earlier_ones_were_made(tmp_path, path):
+    run_tiny(path, tmp_path)
+    run_tiny(path, tmp_path)
+    recipe = json.loads((tmp_path / "out" / "results.json").read_text())["recipe"]
+    assert list(recipe["stages"]) == ["background", "start", "track", "smooth"]
+    assert recipe["stages"]["track"]["cached"] is True
+    assert set(recipe["stages"]["track"]) == {"label", "key", "cached", "seconds", "wall_seconds"}
+    assert recipe["versions"]["numpy"] == np.__version__
+    assert recipe["settings"]["track"]["settings"]["segmenter"]["settings"]["sigma_px"] == "2.0"
+
+
+def test_a_body_made_by_a_stage_replaces_the_body_of_later_ones(tmp_path):
+    body = {"use": "tiny_body", "size_m": 1.5}
+    stages = {"start": "tiny_start", "grow": "tiny_grow", "track": STAGES["track"], "export": "tiny_export"}
+    path = write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=stages, body=body)
+    run_tiny(path, tmp_path)
+    assert json.loads((tmp_path / "out" / "results.json").read_text())["body"] == pytest.approx(3.0)
+    summary, _ = run_tiny(path, tmp_path)
+    assert actions(summary)["grow"] == "hit"
+    assert json.loads((tmp_path / "out" / "results.json").read_text())["body"] == pytest.approx(3.0)
+
+
+def test_evaluations_always_run_and_are_not_stored(tmp_path):
+    stages = {k: STAGES[k] for k in ("start", "track")} | {"evaluate": "tiny_evaluate"}
+    path = write_pipeline(tmp_path, write_recording(tmp_path / "clip", frames=3), stages=stages)
+    for _ in range(2):
+        assert actions(run_tiny(path, tmp_path)[0])["evaluate"] == "run"
+    assert not list((tmp_path / "store.zarr").glob("evaluate-*"))
+
+
+def test_observers_are_told(tmp_path, path):
+    told = []
+
+    class Onlooker:
+        @hookimpl
+        def mocapflow_iteration_done(self, frame, iteration):
+            told.append(("turn", frame, iteration))
+
+        @hookimpl
+        def mocapflow_frame_done(self, frame, result):
+            told.append(("frame", frame))
+
+        @hookimpl
+        def mocapflow_stage_done(self, stage, cached):
+            told.append(("stage", stage, cached))
+
+    pipeline = load(path, frames=2)
+    pipeline.registry._manager.register(Onlooker())
+    run(pipeline, store=tmp_path / "store.zarr", out=tmp_path / "out")
+    assert told[:2] == [("stage", "background", False), ("stage", "start", False)]
+    assert [t for t in told if t[0] == "frame"] == [("frame", 0), ("frame", 1)]
+    assert told.index(("turn", 0, 1)) < told.index(("frame", 0)) < told.index(("turn", 1, 0))
+    assert told[-1] == ("stage", "export", False)
+
+
+def test_a_body_that_raises_is_named(tmp_path, path, monkeypatch):
+    pipeline = load(path)
+
+    def load_body(self, recording):
+        raise ValueError("no such joint\nmore")
+
+    monkeypatch.setattr(type(pipeline.body), "load", load_body)
+    with pytest.raises(
+        ComponentFailed, match=r"^body 'tiny_body' \(plugin 'tiny_plugin' .*\) failed: ValueError: no such joint"
+    ):
+        run(pipeline, store=tmp_path / "store.zarr", out=tmp_path / "out")
+
+
+def test_a_run_folder_that_cannot_be_made(tmp_path, path):
+    (tmp_path / "out").write_text("")
+    with pytest.raises(StoreError, match="can't write the run folder"):
+        run_tiny(path, tmp_path)
+
+
+def test_results_do_not_depend_on_truth_and_reference(tmp_path, path):
+    run_tiny(path, tmp_path)
+    for name in ("truth", "reference"):
+        (tmp_path / "clip" / name).mkdir()
+        (tmp_path / "clip" / name / "angles.csv").write_text("frame\n")
+    summary, _ = run_tiny(path, tmp_path)
+    assert actions(summary)["track"] == "hit"
+
+
+def test_two_processes_on_one_store(tmp_path, path, monkeypatch):
+    monkeypatch.setenv("TINY_SLOW", "0.02")
+    code = "import sys; from pathlib import Path; from tests.fixtures.stores import run_tiny; print(*run_tiny(Path(sys.argv[1]), Path(sys.argv[2]))[1], sep=chr(10))"
+    command = [sys.executable, "-c", code, str(path), str(tmp_path)]
+    running = [subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    said = [process.communicate()[0] for process in running]
+    assert [process.returncode for process in running] == [0, 0]
+    assert sorted("track: running coupled_loop" in lines for lines in said) == [False, True]
