@@ -7,8 +7,6 @@ with B_ij the sum of f_i f_j^T over all rows: nothing per row depends on the num
 
 Node 0 stands for the root, node j + 1 for joint j; the first six screws are the unit twists of the root. Everything
 is about the root's position, so that turning and shifting hardly mix.
-
-Source: Rosenhahn 2008, Eq. (12.8)
 """
 
 from __future__ import annotations
@@ -36,6 +34,8 @@ def body_equations(rows: Rows, body: Body, pose: Pose) -> Equations:
     """Return the normal equations of rows on body vertices for an increment (6 + D,) about the root.
 
     A shape that changes with an angle is taken as it is at `pose`: its own small part in the motion is left out.
+
+    Source: Rosenhahn 2008, Eq. (12.8)
     """
     joints, screws = kinematics.chain(body, pose)
     rest, centre = kinematics.rest_shape(body, pose.angles), pose.root[:3, 3].copy()

@@ -60,10 +60,7 @@ class TwistGaussNewton(PoseSolver):
         past: Past,
         turn: Turn,
     ) -> Estimate:
-        """Return the pose that explains the matches best, with its covariance.
-
-        Source: Rosenhahn 2008, Eq. (12.8)
-        """
+        """Return the pose that explains the matches best, with its covariance."""
         guess = Guess(state.estimate.pose, state.cloth)
         motion = ClothMotion(model, past, self.cloth_unknowns, self.redrape == "every", self.cloth_jacobian == "once")
         anchor = Anchor(guess, self._precision(model, guess))
