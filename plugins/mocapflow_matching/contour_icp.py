@@ -40,14 +40,16 @@ class ImageContour(NamedTuple):
 class ContourIcp(Matcher):
     """Forward pairs (image contour to nearest model contour) and backward pairs, in every view.
 
-    All components of the contours take part, holes too. The first turn of the loop uses the loss `first_loss`,
-    later turns `later_loss`: a redescending loss helps only once the pose is nearly right.
+    All components of the contours take part, holes too. While the surface still moves by more than `calm_mm` a turn,
+    the reach is wide and the loss `first_loss`; then narrow and `later_loss`: a redescending loss helps only once the
+    pose is nearly right, before that it gives up the limb that is furthest off.
     """
 
     name = "contour_icp"
     direction: Literal["both", "forward", "backward"] = "both"
     residual: Literal["normal", "point"] = "normal"  # let points slide along the contour, or not (the chapter)
     spacing_px: Positive = 4.0
+    calm_mm: Positive = 15.0
     first_reach_px: Positive = 40.0
     later_reach_px: Positive = 10.0
     normal_angle_deg: Annotated[float, Field(gt=0, le=180)] = 60.0
@@ -73,11 +75,14 @@ class ContourIcp(Matcher):
         ]
         return pool(parts) if parts else empty_matches()
 
+    def _calm(self, turn: Turn) -> bool:
+        return turn.change is not None and turn.change.surface <= self.calm_mm / 1000
+
     def match_view(self, camera: Camera, silhouette: Silhouette, surface: Surface, turn: Turn) -> Matches:
         """Return the pairs of one view."""
         image = ImageContour(*(rows[:: self.stride] for rows in silhouette.zero_level))
         model = _sorted_by_row(occluding_contour(surface, camera, self.spacing_px))
-        reach = self.first_reach_px if turn.index == 0 else self.later_reach_px
+        reach = self.later_reach_px if self._calm(turn) else self.first_reach_px
         cosine = float(np.cos(np.radians(self.normal_angle_deg)))
         nothing = np.empty(0, np.int32)
         seen, shown, seeing, showing = nothing, nothing, nothing, nothing
@@ -101,7 +106,7 @@ class ContourIcp(Matcher):
         else:
             direction = np.zeros_like(offset)
             distance = np.linalg.norm(offset, axis=1)
-        loss = self.first_loss if turn.index == 0 else self.later_loss
+        loss = self.later_loss if self._calm(turn) else self.first_loss
         sigma = np.where(surface.layer[model.vertex[shown]] == CLOTH, self.cloth_sigma_px, self.sigma_px)
         return Matches(
             camera=np.full(len(seen), index, np.int16),
