@@ -39,8 +39,8 @@ def scaled(body: Body, factors: Mapping[str, float]) -> Body:
             positions[joint] = positions[parent] + stretch[parent] @ (body.positions[joint] - body.positions[parent])
     vertices = np.zeros_like(body.vertices)
     for k in range(body.skin_joint.shape[1]):
-        joint = body.skin_joint[:, k]
-        moved = positions[joint] + np.einsum("vab,vb->va", stretch[joint], body.vertices - body.positions[joint])
+        own = body.skin_joint[:, k]
+        moved = positions[own] + np.einsum("vab,vb->va", stretch[own], body.vertices - body.positions[own])
         vertices += body.skin_weight[:, k, None] * moved
     offset = body.morph_offset
     if offset is not None:

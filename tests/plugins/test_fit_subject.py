@@ -1,0 +1,113 @@
+"""Scaling a body: what each proportion does, and that keypoints give the proportions back."""
+
+import logging
+
+import numpy as np
+import pytest
+from keypoint_recording import DEMO, copy_demo, write
+from mocapflow_bodies.template import Template
+from mocapflow_sequence.fit_subject import FitSubject
+from mocapflow_sequence.proportions import PROPORTIONS, scaled
+from mocapflow_sequence.start_from_file import read_pose
+
+from mocapflow.data import Pose
+from mocapflow.recording import open_recording
+from mocapflow.scene import Scene
+
+LIMBS = (("hip_l", "knee_l"), ("knee_r", "ankle_r"), ("shoulder_r", "elbow_r"), ("elbow_l", "wrist_l"))
+
+
+@pytest.fixture(scope="module")
+def body():
+    return Template().load(DEMO)
+
+
+@pytest.fixture(scope="module")
+def cameras():
+    return open_recording(DEMO).cameras
+
+
+def length(body, a, b):
+    return np.linalg.norm(body.positions[body.joint(a)] - body.positions[body.joint(b)])
+
+
+def poses(body, count):
+    first, rng = read_pose(DEMO / "init.json", body), np.random.default_rng(4)
+    spread = np.where(np.isfinite(body.rest_spread), body.rest_spread, 0.4) * 0.4
+    turns = rng.normal(size=(count, len(spread))) * spread
+    return [Pose(root=first.root, angles=np.clip(first.angles + turn, *body.limits.T)) for turn in turns]
+
+
+def test_template_is_a_person():
+    woman, man = Template(shape=0.0).load(DEMO), Template(shape=1.0).load(DEMO)
+    assert [round(float(np.ptp(b.vertices[:, 2])), 2) for b in (woman, man)] == [1.68, 1.76]
+    np.testing.assert_allclose(np.ptp(Template(height_m=1.9).load(DEMO).vertices[:, 2]), 1.9, atol=1e-9)
+    assert Template(part="legs").load(DEMO).cut.any()
+    assert all(path.is_file() and path.stat().st_size < 1.5e6 for path in Template().inputs(DEMO))
+
+
+def test_no_change_without_factors(body):
+    same = scaled(body, {})
+    np.testing.assert_allclose(same.vertices, body.vertices, atol=1e-12)
+    np.testing.assert_allclose(same.twists, body.twists, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "ends"),
+    [("thigh", ("hip_l", "knee_l")), ("shank", ("knee_r", "ankle_r")), ("upper_arm", ("shoulder_l", "elbow_l")),
+     ("forearm", ("elbow_r", "wrist_r")), ("hip_width", ("hip_l", "hip_r")),
+     ("shoulder_width", ("shoulder_l", "shoulder_r")),
+     ("foot", ("ankle_l", "toe_l")), ("stature", ("pelvis", "toe_r")), ("head", ("neck", "head"))],
+)  # fmt: skip
+def test_a_proportion_stretches_its_own_bones(body, name, ends):
+    longer = scaled(body, {name: 1.1})
+    assert length(longer, *ends) == pytest.approx(1.1 * length(body, *ends), rel=1e-9)
+    if name != "stature":
+        others = {"thigh": "knee_l", "shank": "hip_l", "hip_width": "knee_l"}.get(name, "hip_l")
+        child = {"knee_l": "ankle_l", "hip_l": "knee_l"}[others]
+        assert length(longer, others, child) == pytest.approx(length(body, others, child), rel=1e-9)
+    normals = [
+        np.cross(*np.moveaxis(b.vertices[b.faces[:, 1:]] - b.vertices[b.faces[:, :1]], 1, 0)) for b in (body, longer)
+    ]
+    area = np.linalg.norm(normals[0], axis=1)
+    assert (np.sum(normals[0] * normals[1], axis=1) > 0)[area > 1e-7].mean() > 0.999  # no face turns over
+
+
+def test_girth_leaves_the_bones(body):
+    slim = scaled(body, {"girth": 0.8})
+    for ends in LIMBS:
+        assert length(slim, *ends) == pytest.approx(length(body, *ends), rel=1e-9)
+    thigh = (body.skin_joint[:, 0] == body.joint("hip_l")) & (body.skin_weight[:, 0] > 0.99)
+    widths = [np.ptp(b.vertices[thigh, 0]) for b in (body, slim)]
+    assert 0.75 < widths[1] / widths[0] < 0.9
+
+
+def test_unknown_proportions(body):
+    with pytest.raises(ValueError, match="unknown proportions"):
+        scaled(body, {"tigh": 1.0})
+    assert "girth" in PROPORTIONS
+
+
+def test_lengths_come_back_from_keypoints(body, cameras, tmp_path):
+    person = scaled(body, {"stature": 1.06, "thigh": 1.05, "shank": 0.97, "upper_arm": 1.04, "trunk": 0.97})
+    folder = copy_demo(tmp_path / "recording")
+    write(folder, person, poses(person, 6), cameras, noise_px=0.3)
+    recording = open_recording(folder, stop=6)
+    fitted = FitSubject(frames=6).run(recording, Scene(cameras=cameras, body=body))
+    for ends in LIMBS:
+        before, after = (abs(length(b, *ends) - length(person, *ends)) for b in (body, fitted))
+        assert after < 0.012 and after < 0.7 * before, ends  # m; the prior draws towards average proportions
+
+
+def test_a_standing_trial_of_somebody_else_is_left_out(body, cameras, tmp_path, caplog):
+    folder = copy_demo(tmp_path / "recording")
+    write(folder, body, poses(body, 3), cameras, noise_px=0.2)
+    copy_demo(folder / "static")
+    write(folder / "static", scaled(body, {"stature": 1.2}), poses(body, 2), cameras, noise_px=0.2, bystander=())
+    scene = Scene(cameras=cameras, body=body)
+    with caplog.at_level(logging.WARNING, "mocapflow"):
+        alone = FitSubject(frames=3).run(open_recording(folder, stop=3), scene)
+    assert "static/ is left out: its limbs differ by" in caplog.text
+    assert length(alone, "hip_l", "knee_l") == pytest.approx(length(body, "hip_l", "knee_l"), rel=0.03)
+    told = FitSubject(frames=3, trial="static").run(open_recording(folder, stop=3), scene)
+    assert length(told, "hip_l", "knee_l") == pytest.approx(1.2 * length(body, "hip_l", "knee_l"), rel=0.05)

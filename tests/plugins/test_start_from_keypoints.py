@@ -1,0 +1,147 @@
+"""The first pose from keypoints: layouts, triangulation, choice of the person, inverse kinematics."""
+
+import json
+
+import numpy as np
+import pytest
+from keypoint_recording import DEMO, NAMES, bystander_of, copy_demo, keypoints, write
+from mocapflow_bodies.template import Template
+from mocapflow_sequence.keypoint_fit import _points
+from mocapflow_sequence.keypoint_layouts import LAYOUTS, layout_of
+from mocapflow_sequence.landmarks import landmarks
+from mocapflow_sequence.person import find_person
+from mocapflow_sequence.start_from_file import read_pose
+from mocapflow_sequence.start_from_keypoints import StartFromKeypoints
+from mocapflow_sequence.triangulate import triangulate
+
+from mocapflow.data import Pose
+from mocapflow.errors import RecordingError
+from mocapflow.geometry import kinematics, twists
+from mocapflow.geometry.cameras import project
+from mocapflow.model import moved
+from mocapflow.recording import open_recording
+from mocapflow.scene import Scene
+
+
+@pytest.fixture(scope="module")
+def body():
+    return Template(shape=0.0).load(DEMO)
+
+
+@pytest.fixture(scope="module")
+def cameras():
+    return open_recording(DEMO).cameras
+
+
+@pytest.fixture(scope="module")
+def pose(body):
+    return read_pose(DEMO / "init.json", body)
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory, body, pose, cameras):
+    folder = copy_demo(tmp_path_factory.mktemp("keypoints") / "recording")
+    write(folder, body, [pose], cameras)
+    return open_recording(folder)
+
+
+def test_layouts_name_each_point_once():
+    assert {name: len(points) for name, points in LAYOUTS.items()} == {
+        "body_25": 25, "body_25b": 25, "halpe_26": 26, "coco_17": 17,
+    }  # fmt: skip
+    assert all(len(set(points)) == len(points) for points in LAYOUTS.values())
+
+
+def test_body_25_and_25b_are_told_apart(body, pose, cameras):
+    b = keypoints(body, pose, cameras[0], np.random.default_rng(0), 1.0)
+    by_name = dict(zip(NAMES, b, strict=True))
+    by_name["hip_mid"] = (by_name["hip_l"] + by_name["hip_r"]) / 2
+    other = np.array([by_name[name] for name in LAYOUTS["body_25"]])
+    assert layout_of([b]) == "body_25b" and layout_of([other]) == "body_25"
+    assert layout_of([b[:17]]) == "coco_17"
+    with pytest.raises(RecordingError, match="18 keypoints: the layout of the keypoints is not known"):
+        layout_of([b[:18]])
+
+
+def test_triangulation_is_exact_and_outvotes_a_camera(cameras):
+    points = np.random.default_rng(1).uniform((-0.5, -0.5, 0.2), (0.5, 0.5, 1.7), (12, 3))
+    pixels, seen = np.stack([project(points, camera) for camera in cameras]), np.ones((4, 12))
+    np.testing.assert_allclose(triangulate(pixels, seen, cameras).position, points, atol=1e-9)
+    pixels[2] += (60.0, -40.0)
+    found = triangulate(pixels, seen, cameras, scale_px=2.0)
+    assert np.linalg.norm(found.position - points, axis=1).max() < 0.002
+    assert np.median(found.error[2]) > 50
+    seen[1:, 3] = 0.0
+    assert np.isnan(triangulate(pixels, seen, cameras).position[3]).all()
+
+
+def test_the_person_is_who_reprojects_best(body, pose, cameras):
+    rng = np.random.default_rng(2)
+    detections = [[keypoints(body, pose, camera, rng, 1.0)] for camera in cameras]
+    for c in (0, 1, 3):
+        detections[c].insert(c % 2, keypoints(body, bystander_of(pose), cameras[c], rng, 1.0, 0.7))
+    detections[2][0][4] = (5.0, 5.0, 0.9)  # one gross error
+    person = find_person([np.array(people) for people in detections], cameras)
+    assert person.chosen == (1, 0, 0, 0)
+    assert find_person([np.array(detections[0]), *(np.empty((0, 0, 3)),) * 3], cameras) is None
+
+
+def test_landmarks_lie_where_their_names_say(body):
+    marks = landmarks(body)
+    at = dict(zip(marks.names, marks.body.vertices, strict=True))
+    assert at["big_toe_l"][1] < at["ankle_l"][1] - 0.1 and at["heel_l"][1] > at["ankle_l"][1]
+    assert at["small_toe_l"][0] > at["big_toe_l"][0] + 0.03 and at["big_toe_l"][2] < 0.06
+    assert at["nose"][1] < at["ear_l"][1] - 0.05 and at["ear_l"][0] > 0.06 > -0.06 > at["ear_r"][0]
+    assert at["head_top"][2] > body.vertices[:, 2].max() - 1e-9
+    for name in ("big_toe", "heel", "small_toe", "hip"):
+        np.testing.assert_allclose(at[f"{name}_r"], at[f"{name}_l"] * (-1, 1, 1), atol=0.005)
+
+
+def test_derivatives_of_landmarks(body, pose):
+    marks, spreads = landmarks(body), {"stature": 0.1, "thigh": 0.1, "trunk": 0.1}
+    logs = np.array([0.05, -0.02, 0.03])
+    points, moves = _points(marks, pose, logs, spreads)
+    rng, step = np.random.default_rng(3), 1e-6
+    for _ in range(5):
+        shift = rng.normal(size=moves.shape[2])
+        ends = [
+            _points(marks, moved(pose, s * step * shift[3:]), logs + s * step * shift[:3], spreads)[0] for s in (1, -1)
+        ]
+        np.testing.assert_allclose((ends[0] - ends[1]) / (2 * step), moves @ shift, atol=1e-6)
+    assert np.isfinite(points).all()
+
+
+def test_start_finds_the_pose(body, pose, recording):
+    start = StartFromKeypoints().run(recording, Scene(cameras=recording.cameras, body=body))
+    joints = [kinematics.joint_positions(body, kinematics.chain(body, p)[0]) for p in (pose, start.pose)]
+    error = np.linalg.norm(joints[0] - joints[1], axis=1)
+    assert np.median(error) < 0.01 and error.max() < 0.04  # m; one pixel is 12 mm
+    knees = [body.screw_names.index(f"knee_{side}.flexion") for side in "lr"]
+    assert np.degrees(np.abs(start.pose.angles - pose.angles)[knees]).max() < 4
+    assert (start.pose.angles > body.limits[:, 0] - 0.02).all() and (start.pose.angles < body.limits[:, 1] + 0.02).all()
+
+
+def test_a_turned_person_is_found_too(body, pose, cameras, tmp_path):
+    turned = twists.exp(np.array([0, 0, 2.5, 0, 0, 0])) @ pose.root
+    folder = copy_demo(tmp_path / "recording")
+    write(folder, body, [Pose(root=turned, angles=pose.angles)], cameras, bystander=())
+    start = StartFromKeypoints().run(open_recording(folder), Scene(cameras=cameras, body=body))
+    facing = np.degrees(np.linalg.norm(twists.log_rotation(start.pose.root[:3, :3].T @ turned[:3, :3])))
+    assert facing < 8
+
+
+def test_frames_without_people_are_passed_over(body, pose, recording, tmp_path):
+    folder = copy_demo(tmp_path / "recording")
+    write(folder, body, [pose, pose], recording.cameras)
+    for path in folder.glob("keypoints/*/*.0000.json"):
+        path.write_text(json.dumps({"people": []}))
+    scene = Scene(cameras=recording.cameras, body=body)
+    start = StartFromKeypoints().run(open_recording(folder), scene)
+    assert np.linalg.norm(start.pose.root[:3, 3] - pose.root[:3, 3]) < 0.1
+    with pytest.raises(RecordingError, match="in frames 0 to 0 no two cameras see the same person"):
+        StartFromKeypoints(search_frames=1).run(open_recording(folder), scene)
+
+
+def test_no_keypoints(body, cameras):
+    with pytest.raises(RecordingError, match="no 2D keypoints(.|\n)*the recording has: .*videos(.|\n)*start_from_file"):
+        StartFromKeypoints().run(open_recording(DEMO), Scene(cameras=cameras, body=body))
