@@ -59,7 +59,7 @@ app.add_typer(cache.app, name="cache")
 def main() -> None:
     """Run the command line; warnings go to stderr, one line each."""
     warnings.showwarning = _show_warning
-    logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING, stream=sys.stderr)
+    logging.basicConfig(format="warning: %(message)s", level=logging.WARNING, stream=sys.stderr)
     app(prog_name="mocapflow")
 
 

@@ -6,7 +6,9 @@ import inspect
 import io
 import re
 import tokenize
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -48,25 +50,33 @@ def comments(cls: type[BaseModel]) -> dict[str, str]:
 
 
 def _type(field: FieldInfo) -> str:
-    annotation = field.annotation
-    text = (
-        annotation.__name__ if isinstance(annotation, type) and not hasattr(annotation, "__args__") else str(annotation)
-    )
-    text = re.sub(r"\b[a-z_]\w*(\.[a-z_]\w*)*\.(?=[A-Z])", "", text)
-    limits = [str(mark) for mark in field.metadata]
-    return f"{text} ({', '.join(map(_limit, limits))})" if limits else text
+    return _written(field.annotation) + _limits(field.metadata)
 
 
-def _limit(mark: str) -> str:
-    signs = {"Gt(gt=": "> ", "Ge(ge=": "≥ ", "Lt(lt=": "< ", "Le(le=": "≤ "}
-    for written, sign in signs.items():
-        if mark.startswith(written):
-            return sign + mark[len(written) : -1]
-    return mark
+def _written(annotation: Any) -> str:
+    """Return a type as people read it: limits in words, choices without ceremony."""
+    origin, parts = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        inner = [mark for part in parts[1:] for mark in getattr(part, "metadata", [part])]
+        return _written(parts[0]) + _limits(inner)
+    if origin is Literal:
+        return " | ".join(map(repr, parts))
+    if origin in {Union, UnionType}:
+        return " | ".join("none" if part is NoneType else _written(part) for part in parts)
+    if parts:
+        return f"{origin.__name__} of {', '.join(_written(part) for part in parts if part is not Ellipsis)}"
+    return str(getattr(annotation, "__name__", annotation))
+
+
+def _limits(metadata: Iterable[Any]) -> str:
+    """Return the limits among the marks of a setting; `>= 0` as `(≥ 0)`."""
+    signs = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤", "min_length": "at least", "multiple_of": "multiple of"}
+    said = [f"{sign} {getattr(mark, name)}" for mark in metadata for name, sign in signs.items() if hasattr(mark, name)]
+    return f" ({', '.join(said)})" if said else ""
 
 
 def _default(field: FieldInfo) -> str:
     default = field.get_default(call_default_factory=True)
     if default is PydanticUndefined:
         return ", required"
-    return f" = {default!r}"
+    return f" = {'none' if default is None else repr(default)}"
