@@ -13,20 +13,24 @@ from mocapflow.errors import RecordingError
 from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.records import F32, U8, Bool
 from mocapflow.scene import Scene
-from mocapflow_levelset.channels import ChannelName, features
+from mocapflow_levelset.channels import ChannelName
+from mocapflow_levelset.evidence import calmed
 from mocapflow_levelset.evolve import Rhythm, Weights
 from mocapflow_levelset.masks import counted
-from mocapflow_levelset.plates import Shadow, first_lab, log_density, plate_from
+from mocapflow_levelset.plates import Shadow, density_of
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.statistics import Window
 from mocapflow_levelset.view import Level, Method, View, find
 
 PERSON = "person"
+INNER_BAND_PX = 7.0  # while the contour moves
 CHANNELS: tuple[ChannelName, ...] = ("lab",)
 
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
 Count = Annotated[int, Field(ge=0)]
+
+STRIDE = 2
 
 
 class BackgroundDifference(Segmenter):
@@ -45,7 +49,7 @@ class BackgroundDifference(Segmenter):
     hole_px: Count = 120  # holes up to this area are filled, in square px
     reach_px: NonNegative = 60.0  # parts further from the projected model than this are someone else; 0: keep all
     smallest_part: Annotated[float, Field(ge=0, le=1)] = 0.01  # of the largest part's area; smaller parts are noise
-    refine_steps: Count = 6
+    refine_steps: Count = 4  # against the plate, then as many with local statistics on both sides
     length_weight: NonNegative = 0.5
     band_px: Annotated[float, Field(ge=8)] = 12.0
 
@@ -84,16 +88,17 @@ class BackgroundDifference(Segmenter):
         if not self.refine_steps:
             return redistance(start, self.band_px)
         view = View(image, np.clip(start, -self.band_px, self.band_px), start, counted(start.shape, 0), plate)
-        levels = [Level(1, Rhythm(self.refine_steps, 3, 3))]
+        against_plate = Level(1, Rhythm(self.refine_steps, 3, 3), Window(12.0, 8, 0.02))
+        levels = [against_plate, against_plate._replace(use_plate=False)]
         return find(view, levels, self._method(), self.band_px).level
 
     def _start(self, image: U8, model: F32, plate: tuple[F32, F32]) -> F32:
         """Return a level set (H, W), not a distance: positive where the image is unlike the plate."""
         import cv2
 
-        empty = plate_from(plate[0], plate[1], CHANNELS, self.spread_floor)
-        calm = cv2.GaussianBlur(image, (0, 0), self.smooth_px)
-        density = log_density(features(np.asarray(calm, np.uint8), CHANNELS), empty, self._shadow())
+        calm = calmed(image, self.smooth_px).reshape(-1, 3)
+        mean, spread = plate[0].reshape(-1, 3), plate[1].reshape(-1, 3)
+        density = density_of(calm, mean, spread, CHANNELS, self._shadow()).reshape(model.shape)
         change = cv2.GaussianBlur(np.clip(-density, -6, 6), (0, 0), self.smooth_px)
         kept = self._person(change > 0, model)
         return np.where(kept, np.maximum(change, 0.1), np.minimum(change, -0.1)).astype(np.float32)
@@ -118,15 +123,16 @@ class BackgroundDifference(Segmenter):
         return kept
 
     def _shadow(self) -> Shadow:
-        return Shadow(self.shadow_share, self.darkest_shadow, self.shadow_chroma, -6.0, first_lab(CHANNELS))
+        return Shadow(self.spread_floor, self.shadow_share, self.darkest_shadow, self.shadow_chroma, -6.0)
 
     def _method(self) -> Method:
         return Method(
             channels=CHANNELS,
             median_px=0,
-            window=Window(12.0, 4, 0.02),
-            weights=Weights(1.5, self.length_weight, 0.0, 6.0, 1.0, self.band_px),
+            weights=Weights(1.5, self.length_weight, 0.0, 6.0, 1.0, INNER_BAND_PX),
             shadow=self._shadow(),
-            spread_floor=self.spread_floor,
+            calm_px=self.smooth_px,
+            decorrelate=False,
+            stride=STRIDE,
             margin_px=40,
         )

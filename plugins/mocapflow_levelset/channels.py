@@ -11,6 +11,7 @@ from mocapflow.records import F32, U8
 
 ChannelName = Literal["grey", "lab", "texture"]
 TEXTURE_SCALE_PX = 2.0  # smoothing of the structure tensor
+LAG_PX = 4  # distance of the pixels whose differences tell how channels vary together
 
 
 def features(image: U8, channels: Sequence[ChannelName], median_px: int = 0) -> F32:
@@ -34,6 +35,17 @@ def features(image: U8, channels: Sequence[ChannelName], median_px: int = 0) -> 
         else:
             parts.append(_texture(image))
     return np.concatenate(parts) if len(parts) > 1 else parts[0]
+
+
+def decorrelation(planes: F32) -> F32:
+    """Return a rotation (C, C) that makes channels (C, H, W) independent within a texture.
+
+    Its rows are the principal axes of the differences between pixels a little apart, which a slow drift of
+    colour over the image and the few pixels at its edges hardly enter.
+    """
+    apart = (planes[:, :, LAG_PX:] - planes[:, :, :-LAG_PX]).reshape(len(planes), -1)
+    _, axes = np.linalg.eigh(apart @ apart.T)
+    return np.ascontiguousarray(axes.T, np.float32)
 
 
 def _scaled(planes: U8) -> F32:

@@ -31,11 +31,13 @@ def around(level: F32, margin_px: int, multiple: int) -> Crop | None:
 
     None where nothing is inside.
     """
-    rows, columns = np.flatnonzero(level.max(axis=1) > 0), np.flatnonzero(level.max(axis=0) > 0)
-    if rows.size == 0:
+    import cv2
+
+    x, y, width, height = cv2.boundingRect((level > 0).view(np.uint8))
+    if not width:
         return None
-    top, bottom = _widen(int(rows[0]), int(rows[-1]) + 1, level.shape[0], margin_px, multiple)
-    left, right = _widen(int(columns[0]), int(columns[-1]) + 1, level.shape[1], margin_px, multiple)
+    top, bottom = _widen(y, y + height, level.shape[0], margin_px, multiple)
+    left, right = _widen(x, x + width, level.shape[1], margin_px, multiple)
     return Crop(top, bottom, left, right)
 
 

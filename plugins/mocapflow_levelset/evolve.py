@@ -8,20 +8,13 @@ import numba
 import numpy as np
 
 from mocapflow.records import F32, I32
-from mocapflow_levelset.plates import Plate, Shadow, plate_density
+from mocapflow_levelset.evidence import Evidence
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.statistics import STEP_BINS, STEP_RANGE, Window, local_gaussians, step_table, totals
 
 FRONT = 3.5  # sigmas: beyond, the slope of the smooth step is below 0.3 % of its peak
 
-
-class Evidence(NamedTuple):
-    """What an image says, on one grid."""
-
-    features: F32  # (C, H, W) in [0, 1]
-    weight: F32  # (H, W) 1 where a pixel counts, 0 where it is masked
-    plate: Plate | None = None  # the empty scene, where it is known
-    shadow: Shadow | None = None
+BLOCK = 8  # pixels in a vector; runs are made of whole blocks
 
 
 class Weights(NamedTuple):
@@ -65,51 +58,49 @@ def settle(level: F32, prior: F32, evidence: Evidence, window: Window, weights: 
 
     Source: Rosenhahn 2008, Eq. (12.10)
     """
-    sums = totals(evidence.features, evidence.weight, window.cell_px)
+    stride = evidence.stride
+    weight = np.ascontiguousarray(evidence.weight[::stride, ::stride])
+    grid = Window(window.rho_px / stride, max(window.cell_px // stride, 1), window.floor)
+    first = (grid.cell_px - 1) * stride // 2
+    reach = FRONT * weights.sigma_px / stride + 3 * grid.cell_px
+    sums = totals(evidence.sparse, weight, grid.cell_px)
     level = redistance(level, weights.band_px)
-    prior = np.clip(prior, -weights.band_px, weights.band_px)
     ratio, change = np.zeros_like(level), np.empty_like(level)
-    runs = near(level, prior, weights)
+    runs = near(level, prior, weights, first)
     for step in range(rhythm.steps):
         if step and step % rhythm.redistance_every == 0:
             level = redistance(level, weights.band_px)
         if step % rhythm.statistics_every == 0:
-            gaussians = local_gaussians(evidence.features, evidence.weight, level, sums, window, weights.sigma_px)
-            runs = near(level, prior, weights)
-            log_ratio(runs, evidence, gaussians, window.cell_px, weights.clip, ratio)
+            sparse = np.ascontiguousarray(level[::stride, ::stride]) / np.float32(stride)
+            gaussians = local_gaussians(evidence.sparse, weight, sparse, sums, grid, weights.sigma_px / stride, reach)
+            runs = near(level, prior, weights, first)
+            log_ratio(runs, evidence, gaussians, grid.cell_px * stride, stride, weights.clip, ratio)
         advance(level, ratio, prior, runs, change, weights)
-    level = redistance(level, weights.band_px)
     table = step_table(weights.sigma_px)
-    data, length, shape = _terms(level, ratio, prior, table, np.float32(weights.sigma_px))
+    data, length, shape = _terms(
+        level, ratio, prior, runs, table, np.float32(weights.sigma_px), np.float32(weights.band_px)
+    )
     return Settled(level, float(data), weights.length * float(length), weights.shape * float(shape))
 
 
-def near(level: F32, prior: F32, weights: Weights) -> I32:
+def near(level: F32, prior: F32, weights: Weights, first: int = 0) -> I32:
     """Return the runs of pixels that may change, rows of (y, first x, last x + 1)."""
-    reach = FRONT * weights.sigma_px + 2
-    runs: I32 = _runs(level, prior, np.float32(reach), np.float32(weights.band_px - 1e-3), weights.shape > 0)
+    reach = FRONT * weights.sigma_px
+    band = np.float32(weights.band_px - 1e-3)
+    runs: I32 = _runs(level, prior, np.float32(reach), band, weights.shape > 0, BLOCK, first)
     return runs
 
 
-def log_ratio(runs: I32, evidence: Evidence, gaussians: F32, cell_px: int, clip: float, out: F32) -> None:
-    """Write log p1 - log p2, clipped, into `out` (H, W) along the runs; masked pixels get 0."""
-    plate, shadow = evidence.plate, evidence.shadow
-    if plate is None or shadow is None:
-        _log_ratio(runs, evidence.features, evidence.weight, gaussians, cell_px, np.float32(clip), out)
-        return
-    constants = tuple(np.float32(value) for value in shadow)
-    _log_ratio_plate(
-        runs,
-        evidence.features,
-        evidence.weight,
-        plate.features,
-        plate.spread,
-        constants,
-        gaussians,
-        cell_px,
-        np.float32(clip),
-        out,
-    )
+def log_ratio(runs: I32, evidence: Evidence, gaussians: F32, cell_px: int, stride: int, clip: float, out: F32) -> None:
+    """Write log p1 - log p2, clipped, into `out` (H, W) along the runs; masked pixels get 0.
+
+    Outside, the empty scene speaks where it is known, else the local statistics.
+    """
+    values = evidence.along(runs)
+    known = evidence.outside is not None
+    outside = evidence.outside(runs) if evidence.outside is not None else np.empty(0, np.float32)
+    first = np.float32((cell_px // stride - 1) * stride / 2)  # centre of the first cell's pixels
+    _log_ratio(runs, values, evidence.weight, outside, known, gaussians, cell_px, first, np.float32(clip), out)
 
 
 def advance(level: F32, ratio: F32, prior: F32, runs: I32, change: F32, weights: Weights) -> None:
@@ -124,139 +115,158 @@ def advance(level: F32, ratio: F32, prior: F32, runs: I32, change: F32, weights:
         np.float32(weights.length),
         np.float32(weights.shape),
         np.float32(weights.step),
+        np.float32(weights.band_px),
     )
 
 
-@numba.njit(cache=True)
-def _runs(level, prior, reach, band, shape):  # type: ignore[no-untyped-def]
+@numba.njit(cache=True, error_model="numpy")
+def _runs(level, prior, reach, band, shape, block, first):  # type: ignore[no-untyped-def]
+    """Return runs made of whole blocks of pixels, the blocks of a row starting at `first`, modulo a block."""
     height, width = level.shape
-    runs = np.empty((height * (width // 2 + 1), 3), np.int32)
+    runs = np.empty((height * (width // (2 * block) + 2), 3), np.int32)
     count = 0
     for y in range(height):
+        here, wanted = level[y], prior[y]
         start = -1
-        for x in range(width):
-            moves = abs(level[y, x]) < reach or (shape and (abs(level[y, x]) < band or abs(prior[y, x]) < band))
+        left = min(first - block, 0)
+        while left < width:
+            a, b = max(left, 0), min(left + block, width)
+            moves = False
+            for x in range(a, b):
+                moves |= abs(here[x]) < reach
+            if shape and not moves:
+                for x in range(a, b):
+                    moves |= abs(here[x]) < band or abs(wanted[x]) < band
             if moves and start < 0:
-                start = x
+                start = a
             elif not moves and start >= 0:
-                runs[count, 0], runs[count, 1], runs[count, 2] = y, start, x
+                runs[count, 0], runs[count, 1], runs[count, 2] = y, start, a
                 count += 1
                 start = -1
+            left += block
         if start >= 0:
             runs[count, 0], runs[count, 1], runs[count, 2] = y, start, width
             count += 1
     return runs[:count].copy()
 
 
-@numba.njit(cache=True)
-def _log_ratio(runs, features, weight, gaussians, cell, clip, out):  # type: ignore[no-untyped-def]
-    entries = gaussians.shape[3]
-    inside, outside = np.empty(entries, np.float32), np.empty(entries, np.float32)
-    for n in range(len(runs)):
-        y = runs[n, 0]
-        for x in range(runs[n, 1], runs[n, 2]):
-            _interpolate(gaussians, cell, y, x, 0, inside)
-            _interpolate(gaussians, cell, y, x, 1, outside)
-            ratio = _log_gaussian(features, y, x, inside) - _log_gaussian(features, y, x, outside)
-            out[y, x] = weight[y, x] * min(max(ratio, -clip), clip)
-
-
-@numba.njit(cache=True)
-def _log_ratio_plate(  # type: ignore[no-untyped-def]
-    runs, features, weight, plate, spread, shadow, gaussians, cell, clip, out
-):
-    inside = np.empty(gaussians.shape[3], np.float32)
-    for n in range(len(runs)):
-        y = runs[n, 0]
-        image, empty = features[:, y], plate[:, y]
-        for x in range(runs[n, 1], runs[n, 2]):
-            _interpolate(gaussians, cell, y, x, 0, inside)
-            person = max(_log_gaussian(features, y, x, inside), shadow[3])
-            ratio = person - plate_density(image, empty, spread[y, x], shadow, x)
-            out[y, x] = weight[y, x] * min(max(ratio, -clip), clip)
-
-
-@numba.njit(cache=True)
-def _interpolate(gaussians, cell, y, x, region, out):  # type: ignore[no-untyped-def]
-    """Write a region's Gaussian at a pixel into `out`: bilinear between the centres of the cells."""
+@numba.njit(cache=True, error_model="numpy")
+def _log_ratio(runs, values, weight, outside, known, gaussians, cell, first, clip, out):  # type: ignore[no-untyped-def]
+    """Add the log densities channel by channel along stretches between two cell centres."""
     rows, columns, _, entries = gaussians.shape
-    scale, shift, zero, one = np.float32(1 / cell), np.float32((cell - 1) / 2), np.float32(0), np.float32(1)
-    v = min(max((np.float32(y) - shift) * scale, zero), np.float32(rows - 1))
-    u = min(max((np.float32(x) - shift) * scale, zero), np.float32(columns - 1))
-    i, j = int(v), int(u)
-    below, right = min(i + 1, rows - 1), min(j + 1, columns - 1)
-    fy, fx = v - np.float32(i), u - np.float32(j)
-    w00, w01, w10, w11 = (one - fy) * (one - fx), (one - fy) * fx, fy * (one - fx), fy * fx
-    a, b = gaussians[i, j, region], gaussians[i, right, region]
-    c, d = gaussians[below, j, region], gaussians[below, right, region]
-    for k in range(entries):
-        out[k] = w00 * a[k] + w01 * b[k] + w10 * c[k] + w11 * d[k]
+    zero, scale = np.float32(0), np.float32(1 / cell)
+    inside, beyond = np.empty(weight.shape[1], np.float32), np.empty(weight.shape[1], np.float32)
+    n = 0
+    for r in range(len(runs)):
+        y, x, end = runs[r, 0], runs[r, 1], runs[r, 2]
+        v = min(max((np.float32(y) - first) * scale, zero), np.float32(rows - 1))
+        i = int(v)
+        below, fy = min(i + 1, rows - 1), v - np.float32(i)
+        while x < end:
+            j = int(np.floor((np.float32(x) - first) * scale))
+            stop = min(max(int(np.ceil(first + np.float32(j + 1) * np.float32(cell))), x + 1), end)
+            j0, j1 = min(max(j, 0), columns - 1), min(max(j + 1, 0), columns - 1)
+            start = (np.float32(x) - first) * scale - np.float32(j)
+            _stretch(
+                gaussians[i, :, 0], gaussians[below, :, 0], fy, j0, j1, start, scale, values, n, inside[: stop - x]
+            )
+            if known:
+                for k in range(stop - x):
+                    inside[k] = max(inside[k], -clip)
+                    beyond[k] = outside[n + k]
+            else:
+                _stretch(
+                    gaussians[i, :, 1], gaussians[below, :, 1], fy, j0, j1, start, scale, values, n, beyond[: stop - x]
+                )
+            counts, ratio = weight[y, x:stop], out[y, x:stop]
+            for k in range(ratio.size):
+                ratio[k] = counts[k] * min(max(inside[k] - beyond[k], -clip), clip)
+            n += stop - x
+            x = stop
 
 
-@numba.njit(cache=True)
-def _log_gaussian(features, y, x, gaussian):  # type: ignore[no-untyped-def]
-    channels = features.shape[0]
-    total = gaussian[0]
+@numba.njit(cache=True, error_model="numpy")
+def _stretch(upper, lower, fy, j0, j1, start, scale, values, n, out):  # type: ignore[no-untyped-def]
+    """Write the log density of pixels n, n + 1, … under a Gaussian interpolated between the cells j0 and j1."""
+    channels = values.shape[0]
+    a, b = upper[j0, 0] + fy * (lower[j0, 0] - upper[j0, 0]), upper[j1, 0] + fy * (lower[j1, 0] - upper[j1, 0])
+    slope = (b - a) * scale
+    level = a + start * (b - a)
+    for k in range(out.size):
+        out[k] = level + np.float32(np.int32(k)) * slope
     for c in range(channels):
-        off = features[c, y, x] - gaussian[1 + c]
-        total -= off * off * gaussian[1 + channels + c]
-    return total
+        m, s = 1 + c, 1 + channels + c
+        a, b = upper[j0, m] + fy * (lower[j0, m] - upper[j0, m]), upper[j1, m] + fy * (lower[j1, m] - upper[j1, m])
+        mean, mean_slope = a + start * (b - a), (b - a) * scale
+        a, b = upper[j0, s] + fy * (lower[j0, s] - upper[j0, s]), upper[j1, s] + fy * (lower[j1, s] - upper[j1, s])
+        sharp, sharp_slope = a + start * (b - a), (b - a) * scale
+        line = values[c, n : n + out.size]
+        for k in range(out.size):
+            along = np.float32(np.int32(k))
+            off = line[k] - (mean + along * mean_slope)
+            out[k] -= off * off * (sharp + along * sharp_slope)
 
 
-@numba.njit(cache=True)
-def _advance(level, ratio, prior, runs, change, sigma, nu, shape, tau):  # type: ignore[no-untyped-def]
+@numba.njit(cache=True, error_model="numpy")
+def _advance(level, ratio, prior, runs, change, sigma, nu, shape, tau, band):  # type: ignore[no-untyped-def]
     height, width = level.shape
     one, two, half, quarter = np.float32(1), np.float32(2), np.float32(0.5), np.float32(0.25)
+    tiny = np.float32(1e-6)
     peak = tau / (np.float32(np.sqrt(2 * np.pi)) * sigma)
     narrow = half / (sigma * sigma)
-    blend = one / (one + 2 * tau * shape)
+    blend = one / (one + two * tau * shape)
     pull = one - blend
     for n in range(len(runs)):
-        y, first, last = runs[n, 0], runs[n, 1], runs[n, 2]
-        up, here, down = level[max(y - 1, 0)], level[y], level[min(y + 1, height - 1)]
-        pushed, wanted, out = ratio[y], prior[y], change[y]
-        for x in range(max(first, 1), min(last, width - 1)):
-            centre = here[x]
-            dx, dy = half * (here[x + 1] - here[x - 1]), half * (down[x] - up[x])
-            dxx = here[x + 1] - two * centre + here[x - 1]
-            dyy = down[x] - two * centre + up[x]
-            dxy = quarter * (down[x + 1] - down[x - 1] - up[x + 1] + up[x - 1])
-            square = dx * dx + dy * dy + np.float32(1e-6)
+        y, x0, x1 = runs[n, 0], max(runs[n, 1], 1), min(runs[n, 2], width - 1)
+        above, below = max(y - 1, 0), min(y + 1, height - 1)
+        # one slice per neighbour: an index k + 1 might wrap around for all the compiler knows, and would not vectorise
+        here, west, east = level[y, x0:x1], level[y, x0 - 1 : x1 - 1], level[y, x0 + 1 : x1 + 1]
+        north, south = level[above, x0:x1], level[below, x0:x1]
+        north_west, north_east = level[above, x0 - 1 : x1 - 1], level[above, x0 + 1 : x1 + 1]
+        south_west, south_east = level[below, x0 - 1 : x1 - 1], level[below, x0 + 1 : x1 + 1]
+        pushed, wanted, out = ratio[y, x0:x1], prior[y, x0:x1], change[y, x0:x1]
+        for k in range(out.size):
+            centre = here[k]
+            dx, dy = half * (east[k] - west[k]), half * (south[k] - north[k])
+            dxx = east[k] - two * centre + west[k]
+            dyy = south[k] - two * centre + north[k]
+            dxy = quarter * (south_east[k] - south_west[k] - north_east[k] + north_west[k])
+            square = dx * dx + dy * dy + tiny
             bend = (dxx * dy * dy - two * dx * dy * dxy + dyy * dx * dx) / (square * np.sqrt(square))
             bend = bend if bend > -one else -one
             bend = bend if bend < one else one
             slope = peak * _decay(centre * centre * narrow)
-            out[x] = (centre + slope * (pushed[x] + nu * bend)) * blend + pull * wanted[x]
-        if first == 0:
-            out[0] = here[0]
-        if last == width:
-            out[width - 1] = here[width - 1]
+            goal = wanted[k] if wanted[k] > -band else -band
+            goal = goal if goal < band else band
+            out[k] = (centre + slope * (pushed[k] + nu * bend)) * blend + pull * goal
     for n in range(len(runs)):
-        y, first, last = runs[n, 0], runs[n, 1], runs[n, 2]
-        level[y, first:last] = change[y, first:last]
+        y, x0, x1 = runs[n, 0], max(runs[n, 1], 1), min(runs[n, 2], width - 1)
+        level[y, x0:x1] = change[y, x0:x1]
 
 
-@numba.njit(cache=True)
-def _terms(level, ratio, prior, table, sigma):  # type: ignore[no-untyped-def]
-    """Return data, length and shape terms without their weights; the length is that of forward differences of H."""
+@numba.njit(cache=True, error_model="numpy")
+def _terms(level, ratio, prior, runs, table, sigma, band):  # type: ignore[no-untyped-def]
+    """Return data, length and shape terms without their weights, summed along the runs."""
     height, width = level.shape
     data, length, shape = 0.0, 0.0, 0.0
-    step = np.empty((2, width), np.float32)
     reach = np.float32(STEP_RANGE) * sigma
-    bins = np.float32(STEP_BINS) / (2 * reach)
-    for y in range(height):
-        here, before = step[y % 2], step[(y + 1) % 2]
-        for x in range(width):
-            here[x] = table[int((min(max(level[y, x], -reach), reach) + reach) * bins)]
-            off = level[y, x] - prior[y, x]
+    bins = np.float32(STEP_BINS / 2) / reach
+    for n in range(len(runs)):
+        y, x0, x1 = runs[n]
+        below = min(y + 1, height - 1)
+        for x in range(x0, x1):
+            right = min(x + 1, width - 1)
+            step = table[int((min(max(level[y, x], -reach), reach) + reach) * bins)]
+            dx = table[int((min(max(level[y, right], -reach), reach) + reach) * bins)] - step
+            dy = table[int((min(max(level[below, x], -reach), reach) + reach) * bins)] - step
+            off = level[y, x] - min(max(prior[y, x], -band), band)
             shape += off * off
-            data -= here[x] * ratio[y, x]
-            if x and y:
-                length += np.sqrt((here[x] - here[x - 1]) ** 2 + (here[x] - before[x]) ** 2)
+            data -= step * ratio[y, x]
+            length += np.sqrt(dx * dx + dy * dy)
     return data, length, shape
 
 
-@numba.njit(cache=True, inline="always")
+@numba.njit(cache=True, inline="always", error_model="numpy")
 def _decay(x):  # type: ignore[no-untyped-def]
     """Return exp(-x) for x >= 0, to 2e-5 of its value up to x = 8, from eight factors exp(-x / 8); it vectorises."""
     z = x * np.float32(0.125)

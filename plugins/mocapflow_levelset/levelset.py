@@ -14,7 +14,7 @@ from mocapflow.scene import Scene
 from mocapflow_levelset.channels import ChannelName
 from mocapflow_levelset.evolve import Rhythm, Weights
 from mocapflow_levelset.masks import counted, without_cut
-from mocapflow_levelset.plates import Shadow, first_lab
+from mocapflow_levelset.plates import Shadow
 from mocapflow_levelset.statistics import Window
 from mocapflow_levelset.view import Level, Method, View, find
 
@@ -25,6 +25,7 @@ NonNegative = Annotated[float, Field(ge=0)]
 Share = Annotated[float, Field(ge=0, lt=1)]
 
 PERSON = "person"
+INNER_BAND_PX = 7.0  # while the contour moves
 
 
 class LevelSet(Segmenter):
@@ -37,18 +38,22 @@ class LevelSet(Segmenter):
     name: ClassVar[str] = "levelset"
 
     channels: tuple[ChannelName, ...] = Field(("lab",), min_length=1)  # independent, their likelihoods add
+    decorrelate: bool = True  # turn the channels to the image's principal axes, where no empty scene is known
     rho_px: Positive = 12.0  # Gaussian window of the local statistics; inf: one Gaussian per region
-    cell_px: Count = 4  # the statistics are summed over cells of this size
+    cell_px: Count = 8  # the statistics are summed over cells of this size
+    stride_px: Count = 2  # and taken from every so many-th pixel; 1: from all
     variance_floor: Positive = 0.02  # smallest standard deviation, share of a channel's range
     sigma_px: Positive = 1.5  # width of the smooth step
-    length_weight: NonNegative = 0.5  # nu
+    length_weight: NonNegative = 0.9  # nu; explicit steps are stable below 0.94
     shape_weight: NonNegative = 0.05  # lambda: 0.05 clean, 0.1 with occlusion, 0.1-0.3 in heavy noise, 0 uncoupled
     ratio_clip: Positive = 6.0  # bound on log p1/p2
     time_step: Positive = 1.0
     coarse_factor: Count = 4
-    coarse_steps: NonNegativeCount = 8  # on the first turn, at 1 / coarse_factor of the size
-    steps: Count = 12  # on the first turn
+    coarse_steps: NonNegativeCount = 9  # on the first turn, at 1 / coarse_factor of the size
+    coarse_rho_px: Positive = 32.0  # window there, in px of the full image: a poor start needs a wide one
+    steps: Count = 9  # on the first turn
     later_steps: Count = 5  # on later turns, from the last turn's contour
+    local_steps: NonNegativeCount = 4  # after those against the empty scene, with local statistics on both sides
     statistics_every: Count = 3  # steps
     redistance_every: Count = 3  # steps
     band_px: Annotated[float, Field(ge=8)] = 12.0
@@ -57,6 +62,7 @@ class LevelSet(Segmenter):
     margin_px: Count = 40  # of the crop around the start contour
     use_background: bool = True  # take the outside's density from the empty scene, where it is known
     spread_floor: Positive = 0.012  # smallest standard deviation of the empty scene, share of the range
+    calm_px: NonNegative = 1.0  # smoothing of the image before it is compared with the empty scene
     shadow_share: Share = 0.2  # of the background; 0: shadows count as changes
     darkest_shadow: Annotated[float, Field(gt=0, lt=1)] = 0.5  # factor of L + 16, a and b in the deepest shadow
     shadow_chroma: Positive = 0.005  # how far a shadow may be off the plate's chromaticity, share of the range
@@ -85,7 +91,7 @@ class LevelSet(Segmenter):
                 counted=without_cut(counted(model.shape, self.border_px), model, scene.body, surface, camera),
                 plate=self._plate(scene, c),
             )
-            found = find(view, self._levels(warm), self._method(), self.band_px)
+            found = find(view, self._levels(warm, view.plate is not None), self._method(), self.band_px)
             silhouettes.append(Silhouette(camera=c, layer=PERSON, distance=found.level))
             terms = {"data": found.data, "length": found.length, "shape": found.shape}
             energies |= {f"{camera.name}.{term}": value for term, value in terms.items()}
@@ -96,11 +102,23 @@ class LevelSet(Segmenter):
             return None
         return scene.background.mean[camera], scene.background.spread[camera]
 
-    def _levels(self, warm: bool) -> list[Level]:
-        fine = Level(1, self._rhythm(self.later_steps if warm else self.steps))
+    def _levels(self, warm: bool, known: bool) -> list[Level]:
+        steps = self.later_steps if warm else self.steps
+        fine = Level(1, self._rhythm(steps), Window(self.rho_px, self.cell_px, self.variance_floor))
+        levels = [fine, *self._exact(fine, known)]
         if warm or not self.coarse_steps or self.coarse_factor == 1:
-            return [fine]
-        return [Level(self.coarse_factor, self._rhythm(self.coarse_steps)), fine]
+            return levels
+        wide = Window(self.coarse_rho_px, self.cell_px, self.variance_floor)
+        return [Level(self.coarse_factor, self._rhythm(self.coarse_steps), wide), *levels]
+
+    def _exact(self, fine: Level, known: bool) -> list[Level]:
+        """Return the last steps after the plate: it tells the sides apart, the local statistics where they meet.
+
+        A pixel on the edge mixes both colours, so the plate's narrow density takes it for the person.
+        """
+        if not known or not self.local_steps:
+            return []
+        return [fine._replace(rhythm=self._rhythm(self.local_steps), use_plate=False)]
 
     def _rhythm(self, steps: int) -> Rhythm:
         return Rhythm(steps, self.statistics_every, self.redistance_every)
@@ -109,13 +127,12 @@ class LevelSet(Segmenter):
         return Method(
             channels=self.channels,
             median_px=self.median_px,
-            window=Window(self.rho_px, self.cell_px, self.variance_floor),
             weights=Weights(
-                self.sigma_px, self.length_weight, self.shape_weight, self.ratio_clip, self.time_step, self.band_px
+                self.sigma_px, self.length_weight, self.shape_weight, self.ratio_clip, self.time_step, INNER_BAND_PX
             ),
-            shadow=Shadow(
-                self.shadow_share, self.darkest_shadow, self.shadow_chroma, self.stranger, first_lab(self.channels)
-            ),
-            spread_floor=self.spread_floor,
+            shadow=Shadow(self.spread_floor, self.shadow_share, self.darkest_shadow, self.shadow_chroma, self.stranger),
+            calm_px=self.calm_px,
+            decorrelate=self.decorrelate,
+            stride=self.stride_px,
             margin_px=self.margin_px,
         )

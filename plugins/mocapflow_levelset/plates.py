@@ -13,97 +13,94 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from mocapflow.records import F32
+from mocapflow.records import F32, U8
 from mocapflow_levelset.channels import ChannelName, features
 
 BLACK = (-16 / 100, 128 / 255, 128 / 255)  # where the rays start, in lab channels scaled to [0, 1]
 BENDING = 0.05  # how far a shadow may be off the ray, as a share of the colour's distance from grey
-
-
-class Plate(NamedTuple):
-    """The empty scene on the grid of an image."""
-
-    features: F32  # (C, H, W) in [0, 1], the mean
-    spread: F32  # (H, W) standard deviation of every channel, in units of the channels
+LOG_ROOT = np.float32(-0.5 * np.log(2 * np.pi))
 
 
 class Shadow(NamedTuple):
-    """What counts as background in a shadow, and how surprising a pixel may be."""
+    """What counts as background, lit or in a shadow."""
 
+    floor: float  # smallest standard deviation of the empty scene, share of a channel's range
     share: float  # prior share of shadow on the background; 0 switches the suppression off
     darkest: float  # smallest factor k of (L + 16, a, b)
-    chroma: float  # standard deviation of the distance to the ray, as a share of the range
-    log_stranger: float  # log density below which neither region calls a pixel more unlikely
-    lab: int  # index of the first lab channel, -1 without
+    chroma: float  # standard deviation of the distance to the ray, share of a channel's range
+    stranger: float  # log density below which nothing is called more unlikely
 
 
-def plate_from(mean: F32, spread: F32, channels: Sequence[ChannelName], floor: float) -> Plate:
-    """Return the plate of one view from its mean and spread, both (H, W, 3) grey levels.
+def density_of(pixels: U8, mean: F32, spread: F32, channels: Sequence[ChannelName], shadow: Shadow) -> F32:
+    """Return the log density (N,) of pixels under the empty scene.
 
-    The spread in each channel is taken as the root mean square over the colours, at least `floor` of the range.
+    The spread in each channel is taken as the root mean square over the colours.
+
+    Args:
+        pixels: (N, 3) BGR.
+        mean: (N, 3) grey levels of the empty scene there.
+        spread: (N, 3) grey levels, standard deviation.
+        channels: in which they are compared.
+        shadow: what counts as background.
     """
-    grey = np.clip(np.rint(mean), 0, 255).astype(np.uint8)
-    levels = np.sqrt(np.einsum("ijk,ijk->ij", spread, spread) / 3)
-    return Plate(features(grey, channels), np.maximum(levels / 255, floor).astype(np.float32))
-
-
-def first_lab(channels: Sequence[ChannelName]) -> int:
-    """Return the index of the first lab plane among the feature planes, -1 without."""
-    widths = {"grey": 1, "lab": 3, "texture": 3}
-    if "lab" not in channels:
-        return -1
-    return sum(widths[name] for name in channels[: list(channels).index("lab")])
-
-
-def log_density(image: F32, plate: Plate, shadow: Shadow) -> F32:
-    """Return the log density (H, W) of each pixel's features (C, H, W) under the plate, lit or shadowed."""
-    out = np.empty(image.shape[1:], np.float32)
-    for y in range(image.shape[1]):
-        _log_density_row(image[:, y], plate.features[:, y], plate.spread[y], tuple(map(np.float32, shadow)), out[y])
+    values = features(pixels[None], channels)[:, 0]
+    plate = features(np.clip(np.rint(mean), 0, 255).astype(np.uint8)[None], channels)[:, 0]
+    constants = tuple(np.float32(value) for value in shadow)
+    out = np.empty(values.shape[1], np.float32)
+    _densities(values, plate, spread, constants, first_lab(channels), out)
     return out
 
 
-@numba.njit(cache=True)
-def _log_density_row(image, plate, spread, shadow, out):  # type: ignore[no-untyped-def]
-    for x in range(out.size):
-        out[x] = plate_density(image, plate, spread[x], shadow, x)
+def first_lab(channels: Sequence[ChannelName]) -> int:
+    """Return the index of the first lab plane among the feature planes, -1 without: then no shadow is known."""
+    widths = {"grey": 1, "lab": 3, "texture": 3}
+    return sum(widths[name] for name in channels[: list(channels).index("lab")]) if "lab" in channels else -1
 
 
-@numba.njit(cache=True)
-def plate_density(image, plate, spread, shadow, x):  # type: ignore[no-untyped-def]
-    """Return the log density of pixel x of a row (C, W) under the plate, lit or shadowed."""
-    share, darkest, chroma, stranger, lab = shadow
-    first, two = int(lab), np.float32(2)
-    inverse = np.float32(0.5) / (spread * spread)
-    norm = np.float32(-0.9189385) - np.log(spread)
-    others, lit = np.float32(0), np.float32(0)
-    for c in range(image.shape[0]):
-        off = image[c, x] - plate[c, x]
-        if 0 <= first <= c < first + 3:
-            lit += norm - off * off * inverse
-        else:
-            others += norm - off * off * inverse
-    if first < 0 or share <= 0:
-        return max(lit + others, stranger)
-    light, green, blue = (
-        plate[first, x] - np.float32(BLACK[0]),
-        plate[first + 1, x] - np.float32(BLACK[1]),
-        plate[first + 2, x] - np.float32(BLACK[2]),
+@numba.njit(cache=True, error_model="numpy")
+def _densities(values, plate, spread, shadow, lab, out):  # type: ignore[no-untyped-def]
+    floor, _, _, _, stranger = shadow
+    channels = values.shape[0]
+    scale = np.float32(1 / 255**2 / 3)
+    for n in range(out.size):
+        s = spread[n]
+        variance = max((s[0] * s[0] + s[1] * s[1] + s[2] * s[2]) * scale, floor * floor)
+        inverse = np.float32(0.5) / variance
+        norm = LOG_ROOT - np.float32(0.5) * np.log(variance)
+        lit, others = np.float32(0), np.float32(0)
+        for c in range(channels):
+            off = values[c, n] - plate[c, n]
+            term = norm - off * off * inverse
+            lit += term
+            if lab < 0 or not lab <= c < lab + 3:
+                others += term
+        if lab >= 0:
+            lit = max(lit, others + _in_shadow(values, plate, n, lab, inverse, shadow))
+        out[n] = max(lit, stranger)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _in_shadow(values, plate, n, lab, inverse, shadow):  # type: ignore[no-untyped-def]
+    """Return the log density of a shadowed plate: uniform along the ray down to the darkest, Gaussian across."""
+    _, share, darkest, chroma, stranger = shadow
+    if share <= 0:
+        return stranger
+    l0, a0, b0 = (
+        plate[lab, n] - np.float32(BLACK[0]),
+        plate[lab + 1, n] - np.float32(BLACK[1]),
+        plate[lab + 2, n] - np.float32(BLACK[2]),
     )
-    here, a, b = (
-        image[first, x] - np.float32(BLACK[0]),
-        image[first + 1, x] - np.float32(BLACK[1]),
-        image[first + 2, x] - np.float32(BLACK[2]),
+    l1, a1, b1 = (
+        values[lab, n] - np.float32(BLACK[0]),
+        values[lab + 1, n] - np.float32(BLACK[1]),
+        values[lab + 2, n] - np.float32(BLACK[2]),
     )
-    square = light * light + green * green + blue * blue
-    k = (here * light + a * green + b * blue) / square
-    bound = min(max(k, darkest), np.float32(1))
-    over = k - bound
-    r0, r1, r2 = here - k * light, a - k * green, b - k * blue
+    square = l0 * l0 + a0 * a0 + b0 * b0
+    k = (l1 * l0 + a1 * a0 + b1 * b0) / square
+    beyond = k - min(max(k, darkest), np.float32(1))
+    r0, r1, r2 = l1 - k * l0, a1 - k * a0, b1 - k * b0
     # the stronger a colour, the more the colours of lamp and room bend its ray
-    across = chroma * chroma + np.float32(BENDING * BENDING) * (green * green + blue * blue)
-    off_ray = (r0 * r0 + r1 * r1 + r2 * r2) / across + over * over * square * two * inverse
-    # uniform along the ray between the darkest shadow and full light, Gaussian across it
-    along = np.log(share / ((np.float32(1) - darkest) * np.sqrt(square)))
-    dark = along + two * np.float32(-0.9189385) - np.log(across) - np.float32(0.5) * off_ray
-    return max(max(lit, dark) + others, stranger)
+    across = chroma * chroma + np.float32(BENDING * BENDING) * (a0 * a0 + b0 * b0)
+    off = np.float32(0.5) * (r0 * r0 + r1 * r1 + r2 * r2) / across + beyond * beyond * square * inverse
+    flat = np.log(share / ((np.float32(1) - darkest) * np.sqrt(square)))
+    return flat + LOG_ROOT + LOG_ROOT - np.log(across) - off

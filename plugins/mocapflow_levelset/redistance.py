@@ -11,6 +11,8 @@ import numpy as np
 
 from mocapflow.records import F32
 
+LANES = 8  # pixels in a vector
+
 
 def redistance(level: F32, band_px: float) -> F32:
     """Return the signed distance (H, W) px to the zero contour of `level`, same sign, clipped to the band.
@@ -23,7 +25,7 @@ def redistance(level: F32, band_px: float) -> F32:
     return distance
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _redistance(level, band, out):  # type: ignore[no-untyped-def]
     """Fill `out` with signed distances: stamp squared distances first, then root and sign."""
     height, width = level.shape
@@ -48,7 +50,7 @@ def _redistance(level, band, out):  # type: ignore[no-untyped-def]
     return out
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _crossings(a, b, c, d, x, y, points):  # type: ignore[no-untyped-def]
     """Write the contour's crossings of a cell's edges (clockwise from the top left corner), paired as segments."""
     one = np.float32(1)
@@ -74,11 +76,13 @@ def _crossings(a, b, c, d, x, y, points):  # type: ignore[no-untyped-def]
     return count
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _stamp(out, points, i, j, x, y, reach):  # type: ignore[no-untyped-def]
     """Lower the squared distances around cell (x, y) to those of the segment from point i to point j."""
     height, width = out.shape
-    left, right = max(x - reach, 0), min(x + reach + 2, width)
+    # whole vectors of pixels: a remainder would cost as much as another vector
+    left = max(x - reach, 0)
+    right = min(left + (2 * reach + 2 + LANES - 1) // LANES * LANES, width)
     ax, ay = points[i, 0] - np.float32(left), points[i, 1]
     dx, dy = points[j, 0] - points[i, 0], points[j, 1] - ay
     inverse = np.float32(1) / max(dx * dx + dy * dy, np.float32(1e-12))

@@ -23,7 +23,7 @@ class Window(NamedTuple):
     """How local the statistics are."""
 
     rho_px: float  # standard deviation of the Gaussian window; inf: one Gaussian per region
-    cell_px: int  # edge of the cells the sums are taken over
+    cell_px: int  # edge of the cells the sums are taken over, a multiple of the stride of the features
     floor: float  # smallest standard deviation, as a share of the channel's range
 
 
@@ -44,7 +44,9 @@ def totals(features: F32, weight: F32, cell_px: int) -> F32:
     return sums
 
 
-def local_gaussians(features: F32, weight: F32, level: F32, sums: F32, window: Window, sigma_px: float) -> F32:
+def local_gaussians(
+    features: F32, weight: F32, level: F32, sums: F32, window: Window, sigma_px: float, reach_px: float = np.inf
+) -> F32:
     """Return the Gaussians of both regions per cell, (h, w, 2, 1 + 2 C): log norm, means, 1 / (2 variance).
 
     Region 0 is the inside of the level set, weighted with the smooth step; region 1 is the outside.
@@ -56,15 +58,16 @@ def local_gaussians(features: F32, weight: F32, level: F32, sums: F32, window: W
         sums: what `totals` returned for these features.
         window: how local.
         sigma_px: width of the smooth step.
+        reach_px: cells whose centre is further from the contour are left zero.
 
     Source: Rosenhahn 2008, section 12.2.1 (local Gaussian region model)
     """
-    inside = _inside_sums(features, weight, level, sums, window.cell_px, step_table(sigma_px), sigma_px)
+    inside = _inside_sums(features, weight, level, sums, window.cell_px, step_table(sigma_px), np.float32(sigma_px))
     both = np.concatenate([inside, sums - inside], axis=2)
     everywhere = both.reshape(-1, both.shape[2]).sum(axis=0, dtype=np.float64).astype(np.float32)
     smooth = _smooth(both, window)
     scale, floor = np.float32(1 / window.cell_px**2), np.float32(window.floor**2)
-    gaussians: F32 = _gaussians(smooth, everywhere, scale, floor)
+    gaussians: F32 = _gaussians(smooth, everywhere, level, window.cell_px, np.float32(reach_px), scale, floor)
     return gaussians
 
 
@@ -83,7 +86,7 @@ def _smooth(sums: F32, window: Window) -> F32:
     return np.ascontiguousarray(smooth[1:-1, 1:-1])
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _totals(features, weight, cell):  # type: ignore[no-untyped-def]
     channels, height, width = features.shape
     rows, columns = (height + cell - 1) // cell, (width + cell - 1) // cell
@@ -101,65 +104,75 @@ def _totals(features, weight, cell):  # type: ignore[no-untyped-def]
     return sums
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _inside_sums(features, weight, level, sums, cell, table, sigma):  # type: ignore[no-untyped-def]
-    """Return the sums weighted with the smooth step; only cells near the contour are visited pixel by pixel."""
+    """Return the sums weighted with the smooth step.
+
+    A cell starts as all in or all out, by its middle; only pixels that differ from that are visited.
+    """
     channels, height, width = features.shape
     rows, columns = sums.shape[:2]
     out = np.empty_like(sums)
-    reach = STEP_RANGE * sigma
-    clear = reach + 0.7072 * (cell - 1)  # a cell whose centre is this far from the contour is all in or all out
-    bins = np.float32(STEP_BINS / (2 * reach))
+    reach = np.float32(STEP_RANGE) * sigma
+    bins = np.float32(STEP_BINS / 2) / reach
+    most = np.float32(STEP_BINS - 1)
     for i in range(rows):
         for j in range(columns):
-            middle = level[min(i * cell + cell // 2, height - 1), min(j * cell + cell // 2, width - 1)]
-            if middle <= -clear - 0.7072:
-                out[i, j, :] = 0
-                continue
-            if middle >= clear + 0.7072:
-                out[i, j, :] = sums[i, j, :]
-                continue
-            out[i, j, :] = 0
+            middle = level[min(i * cell + cell // 2, height - 1), min(j * cell + cell // 2, width - 1)] > 0
+            usual = np.float32(middle)
+            for k in range(out.shape[2]):
+                out[i, j, k] = usual * sums[i, j, k]
             for y in range(i * cell, min((i + 1) * cell, height)):
                 for x in range(j * cell, min((j + 1) * cell, width)):
-                    place = (min(max(level[y, x], -reach), reach) + reach) * bins
-                    k = min(int(place), STEP_BINS - 1)
-                    step = table[k] + (np.float32(place) - np.float32(k)) * (table[k + 1] - table[k])
-                    step *= weight[y, x]
-                    out[i, j, 0] += step
+                    distance = level[y, x]
+                    if (distance >= reach and middle) or (distance <= -reach and not middle):
+                        continue
+                    place = min(max((distance + reach) * bins, np.float32(0)), most)
+                    k = int(place)
+                    step = table[k] + (place - np.float32(k)) * (table[k + 1] - table[k])
+                    extra = (step - usual) * weight[y, x]
+                    out[i, j, 0] += extra
                     for c in range(channels):
                         value = features[c, y, x]
-                        out[i, j, 1 + c] += step * value
-                        out[i, j, 1 + channels + c] += step * value * value
+                        out[i, j, 1 + c] += extra * value
+                        out[i, j, 1 + channels + c] += extra * value * value
     return out
 
 
-@numba.njit(cache=True)
-def _gaussians(smooth, everywhere, scale, floor):  # type: ignore[no-untyped-def]
-    """Return log norm, means and 1 / (2 variance) of both regions, blended to global where the window is empty."""
+@numba.njit(cache=True, error_model="numpy")
+def _gaussians(smooth, everywhere, level, cell, reach, scale, floor):  # type: ignore[no-untyped-def]
+    """Return log norm, means and 1 / (2 variance) of both regions, blended to global where the window is empty.
+
+    Cells further than `reach` from the contour are left undefined.
+    """
     rows, columns, twice = smooth.shape
+    height, width = level.shape
     entries = twice // 2
     channels = (entries - 1) // 2
-    out = np.empty((rows, columns, 2, entries), np.float32)
-    for region in range(2):
-        at = region * entries
-        whole = max(everywhere[at], np.float32(1e-6))
-        for i in range(rows):
-            for j in range(columns):
+    out = np.zeros((rows, columns, 2, entries), np.float32)
+    one, two_pi = np.float32(1), np.float32(2 * np.pi)
+    for i in range(rows):
+        for j in range(columns):
+            middle = level[min(i * cell + cell // 2, height - 1), min(j * cell + cell // 2, width - 1)]
+            if abs(middle) > reach:
+                continue
+            for region in range(2):
+                at = region * entries
+                whole = max(everywhere[at], np.float32(1e-6))
                 share = smooth[i, j, at] * scale
                 trust = share / (share + np.float32(FAINT))
                 inverse = scale / max(share, np.float32(1e-12))
-                product = np.float32(1)
+                product = one
                 for c in range(channels):
                     first, second = 1 + c, 1 + channels + c
                     far_mean = everywhere[at + first] / whole
                     far_variance = everywhere[at + second] / whole - far_mean * far_mean
                     mean = smooth[i, j, at + first] * inverse
                     variance = smooth[i, j, at + second] * inverse - mean * mean
-                    mean = trust * mean + (1 - trust) * far_mean
-                    variance = max(trust * variance + (1 - trust) * far_variance, floor)
+                    mean = trust * mean + (one - trust) * far_mean
+                    variance = max(trust * variance + (one - trust) * far_variance, floor)
                     out[i, j, region, first] = mean
                     out[i, j, region, second] = np.float32(0.5) / variance
-                    product *= np.float32(2 * np.pi) * variance
+                    product *= two_pi * variance
                 out[i, j, region, 0] = np.float32(-0.5) * np.log(product)
     return out

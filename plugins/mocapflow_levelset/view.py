@@ -9,10 +9,11 @@ import numpy as np
 
 from mocapflow.records import F32, U8
 from mocapflow_levelset import crops
-from mocapflow_levelset.channels import ChannelName, features
+from mocapflow_levelset.channels import ChannelName
 from mocapflow_levelset.crops import Crop
-from mocapflow_levelset.evolve import Evidence, Rhythm, Settled, Weights, settle
-from mocapflow_levelset.plates import Shadow, plate_from
+from mocapflow_levelset.evidence import from_image
+from mocapflow_levelset.evolve import Rhythm, Settled, Weights, settle
+from mocapflow_levelset.plates import Shadow
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.statistics import Window
 
@@ -32,6 +33,8 @@ class Level(NamedTuple):
 
     factor: int
     rhythm: Rhythm
+    window: Window  # in px of the full image
+    use_plate: bool = True  # False: local statistics on both sides even where the empty scene is known
 
 
 class Method(NamedTuple):
@@ -39,10 +42,11 @@ class Method(NamedTuple):
 
     channels: Sequence[ChannelName]
     median_px: int
-    window: Window
     weights: Weights
     shadow: Shadow
-    spread_floor: float
+    decorrelate: bool
+    calm_px: float  # smoothing of the image before it is compared with the empty scene
+    stride: int  # of the pixels the statistics are taken from
     margin_px: int
 
 
@@ -76,20 +80,25 @@ def _cut(view: View, crop: Crop) -> View:
 def _settle_at(view: View, level: Level, method: Method) -> Settled:
     """Return the descent at one resolution, its level set back on the full grid."""
     factor = level.factor
+    if not level.use_plate:
+        view = view._replace(plate=None)
     if factor > 1:
         view = _shrunk(view, factor)
-    plate = None
-    if view.plate is not None:
-        plate = plate_from(view.plate[0], view.plate[1], method.channels, method.spread_floor)
-    evidence = Evidence(
-        features(np.ascontiguousarray(view.image), method.channels, method.median_px),
+    stride = method.stride if factor == 1 else 1
+    image = np.ascontiguousarray(view.image)
+    evidence = from_image(
+        image,
         view.counted,
-        plate,
+        method.channels,
+        method.median_px,
+        stride,
+        view.plate,
         method.shadow,
+        method.decorrelate,
+        method.calm_px / factor,
     )
-    window = method.window._replace(
-        rho_px=method.window.rho_px / factor, cell_px=max(method.window.cell_px // factor, 1)
-    )
+    full = level.window
+    window = Window(full.rho_px / factor, max(full.cell_px // factor, 1), full.floor)
     settled = settle(view.start, view.prior, evidence, window, method.weights, level.rhythm)
     return settled if factor == 1 else settled._replace(level=crops.enlarge(settled.level, factor))
 

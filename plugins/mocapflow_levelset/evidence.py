@@ -1,0 +1,118 @@
+"""What an image says: features for the statistics on a sparse grid, features along runs for the contour."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, TypeVar
+
+import numba
+import numpy as np
+
+from mocapflow.records import F32, I32, U8
+from mocapflow_levelset.channels import LAG_PX, ChannelName, decorrelation, features
+from mocapflow_levelset.plates import Shadow, density_of
+
+POINTWISE = ("grey", "lab")  # channels that depend on one pixel only
+
+
+class Evidence(NamedTuple):
+    """An image as the descent sees it."""
+
+    sparse: F32  # (C, h, w) in [0, 1], every `stride`-th pixel, for the statistics
+    weight: F32  # (H, W) 1 where a pixel counts, 0 where it is masked
+    stride: int
+    along: Callable[[I32], F32]  # features (C, N) of the N pixels of some runs
+    outside: Callable[[I32], F32] | None = None  # log density (N,) of these pixels in the empty scene
+
+
+def from_features(planes: F32, weight: F32) -> Evidence:
+    """Return the evidence of features (C, H, W) that are already there."""
+    return Evidence(planes, weight, 1, lambda runs: gather_planes(planes, runs))
+
+
+def from_image(
+    image: U8,
+    weight: F32,
+    channels: Sequence[ChannelName],
+    median_px: int,
+    stride: int,
+    plate: tuple[F32, F32] | None,
+    shadow: Shadow,
+    decorrelate: bool,
+    calm_px: float = 0.0,
+) -> Evidence:
+    """Return the evidence of a BGR image (H, W, 3), and of the empty scene's mean and spread if they are known.
+
+    Channels that depend on one pixel only are computed for the pixels that need them. Decorrelated, the channels
+    are turned to the image's own principal axes, so that treating them as independent is right; the empty scene's
+    density needs them as they are, so where it is known they stay.
+    """
+    if all(name in POINTWISE for name in channels) and median_px <= 1:
+        sparse = features(np.ascontiguousarray(image[::stride, ::stride]), channels)
+
+        def along(runs: I32) -> F32:
+            return features(gather(image, runs)[None], channels)[:, 0]
+    else:
+        planes = features(np.ascontiguousarray(image), channels, median_px)
+        sparse = np.ascontiguousarray(planes[:, ::stride, ::stride])
+
+        def along(runs: I32) -> F32:
+            return gather_planes(planes, runs)
+
+    if plate is not None:
+        mean, spread = plate
+        calm = calmed(image, calm_px)
+
+        def outside(runs: I32) -> F32:
+            return density_of(gather(calm, runs), gather(mean, runs), gather(spread, runs), channels, shadow)
+
+        return Evidence(sparse, weight, stride, along, outside)
+    if decorrelate and len(sparse) > 1 and sparse.shape[2] > LAG_PX:
+        axes = decorrelation(sparse)
+        turned = np.einsum("ij,jyx->iyx", axes, sparse)
+        return Evidence(turned, weight, stride, lambda runs: np.ascontiguousarray(axes @ along(runs)))
+    return Evidence(sparse, weight, stride, along)
+
+
+def calmed(image: U8, smooth_px: float) -> U8:
+    """Return an image (H, W, 3) less its noise, so that the colour of a shadow can be told from that of the plate."""
+    import cv2
+
+    return np.asarray(cv2.GaussianBlur(image, (0, 0), smooth_px), np.uint8) if smooth_px > 0.3 else image
+
+
+Pixels = TypeVar("Pixels", U8, F32)
+
+
+def gather(image: Pixels, runs: I32) -> Pixels:
+    """Return the pixels (N, 3) of an image (H, W, 3) along runs, rows of (y, first x, last x + 1)."""
+    pixels: Pixels = _gather(image, runs, np.empty((int((runs[:, 2] - runs[:, 1]).sum()), 3), image.dtype))
+    return pixels
+
+
+def gather_planes(planes: F32, runs: I32) -> F32:
+    """Return the pixels (C, N) of planes (C, H, W) along runs."""
+    pixels: F32 = _gather_planes(planes, runs, int((runs[:, 2] - runs[:, 1]).sum()))
+    return pixels
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _gather(image, runs, out):  # type: ignore[no-untyped-def]
+    n = 0
+    for y, first, last in runs:
+        for x in range(first, last):
+            out[n, 0], out[n, 1], out[n, 2] = image[y, x, 0], image[y, x, 1], image[y, x, 2]
+            n += 1
+    return out
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _gather_planes(planes, runs, total):  # type: ignore[no-untyped-def]
+    out = np.empty((planes.shape[0], total), np.float32)
+    for c in range(planes.shape[0]):
+        n = 0
+        for k in range(len(runs)):
+            y, first, last = runs[k, 0], runs[k, 1], runs[k, 2]
+            out[c, n : n + last - first] = planes[c, y, first:last]
+            n += last - first
+    return out
