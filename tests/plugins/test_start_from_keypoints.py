@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from keypoint_recording import DEMO, NAMES, bystander_of, copy_demo, keypoints, write
 from mocapflow_bodies.template import Template
-from mocapflow_sequence.keypoint_fit import _points
 from mocapflow_sequence.keypoint_layouts import LAYOUTS, layout_of
 from mocapflow_sequence.landmarks import landmarks
 from mocapflow_sequence.person import find_person
+from mocapflow_sequence.pose_fit import velocities
 from mocapflow_sequence.start_from_file import read_pose
 from mocapflow_sequence.start_from_keypoints import StartFromKeypoints
 from mocapflow_sequence.triangulate import triangulate
@@ -100,12 +100,13 @@ def test_landmarks_lie_where_their_names_say(body):
 def test_derivatives_of_landmarks(body, pose):
     marks, spreads = landmarks(body), {"stature": 0.1, "thigh": 0.1, "trunk": 0.1}
     logs = np.array([0.05, -0.02, 0.03])
-    points, moves = _points(marks, pose, logs, spreads)
+    points, moves = velocities(marks.body, pose, logs, spreads)
     rng, step = np.random.default_rng(3), 1e-6
     for _ in range(5):
         shift = rng.normal(size=moves.shape[2])
         ends = [
-            _points(marks, moved(pose, s * step * shift[3:]), logs + s * step * shift[:3], spreads)[0] for s in (1, -1)
+            velocities(marks.body, moved(pose, s * step * shift[3:]), logs + s * step * shift[:3], spreads)[0]
+            for s in (1, -1)
         ]
         np.testing.assert_allclose((ends[0] - ends[1]) / (2 * step), moves @ shift, atol=1e-6)
     assert np.isfinite(points).all()
