@@ -43,7 +43,6 @@ def make_task(rigid: bool) -> Task:
     body = thirty_angles(Scanned().load(DEMO), rigid)
     views = read_cameras(DEMO)
     root = np.eye(4)
-    root[:3, 3] = [0, 0, 0.95]
     truth = Pose(root=root, angles=rng.normal(size=ANGLES) * 0.2)
     per_view = ROWS // len(views)
     vertex = np.concatenate([np.sort(rng.choice(len(body.vertices), per_view, replace=False)) for _ in views])

@@ -37,6 +37,7 @@ class TwistGaussNewton(PoseSolver):
     residual: Literal["image", "line"] = "image"  # pixels, or distance to projection rays in space
     line_sigma_mm: Positive = 3.0  # standard deviation of every distance to a ray
     damping: Annotated[float, Field(ge=0)] = 1e-4  # share of the mean diagonal; ten times more after a worse step
+    damping_growth: Annotated[float, Field(ge=1)] = 1.0  # factor at each turn of the loop: matches that jitter settle
     cap_deg: Positive = 10.0  # a step, each angle
     cap_mm: Positive = 100.0  # a step, the root
     correlation_px: Annotated[float, Field(ge=0)] = 15.0  # length over which contour errors agree; 0: independent
@@ -64,7 +65,7 @@ class TwistGaussNewton(PoseSolver):
         guess = Guess(state.estimate.pose, state.cloth)
         motion = ClothMotion(model, past, self.cloth_unknowns, self.redrape == "every", self.cloth_jacobian == "once")
         anchor = Anchor(guess, self._precision(model, guess))
-        surface, damping = model.surface(guess.pose, guess.cloth), self.damping
+        surface, damping = model.surface(guess.pose, guess.cloth), self._least_damping(turn)
         for _ in range(self.iterations):
             problem = Problem(model, self._data(match(surface), model), priors, past, anchor)
             if problem.data.measurements == 0:
@@ -72,6 +73,7 @@ class TwistGaussNewton(PoseSolver):
             before, old = guess, surface
             for _ in range(self.steps_per_match):
                 guess, damping = self._descend(problem, guess, motion, damping)
+                damping = max(damping, self._least_damping(turn))
             surface = model.surface(guess.pose, guess.cloth)
             if self._settled(before, guess, old, surface):
                 break
@@ -93,6 +95,9 @@ class TwistGaussNewton(PoseSolver):
             cloth=rows.part(used & (rows.vertex >= body), weight, body),
             measurements=components * float(share[rows.match[used]].sum()),
         )
+
+    def _least_damping(self, turn: Turn) -> float:
+        return self.damping * self.damping_growth**turn.index
 
     def _precision(self, model: ClothedModel, guess: Guess) -> F64:
         """Return one over the variance of the damping of every unknown."""
@@ -117,7 +122,7 @@ class TwistGaussNewton(PoseSolver):
                 return guess, damping
             trial = motion.moved(guess, solve.about_origin(guess.centre, len(increment)) @ increment)
             if sum(problem.energies(trial).values()) <= equations.energy:
-                return trial, max(self.damping, LOWERED * damping)
+                return trial, LOWERED * damping
             damping = max(RAISED * damping, 1e-6)
         return guess, damping
 

@@ -141,3 +141,15 @@ def test_a_step_is_capped() -> None:
     pose = solve(TwistGaussNewton(iterations=1, cap_deg=2.0, cap_mm=5.0), scene, start, matches).pose
     assert np.degrees(np.abs(pose.angles - start.angles)).max() <= 2.0 + 1e-9
     assert np.linalg.norm(pose.root[:3, 3] - start.root[:3, 3]) <= 0.005 + 1e-9
+
+
+def test_growing_damping_shortens_the_steps_of_later_turns() -> None:
+    scene, truth = make_scene(), make_pose(0)
+    matches, start = exact_matches(scene, truth, np.arange(0, 300, 9), directed=False), start_from(truth, 0)
+    solver = TwistGaussNewton(iterations=1, damping=0.1, damping_growth=10.0, cap_deg=90.0, cap_mm=1000.0)
+    moves = []
+    for index in range(3):
+        turn = Turn(index=index, cap=8)
+        pose = solver.solve(lambda _: matches, make_state(start), ClothedModel(scene=scene), [], Past(), turn).pose
+        moves.append(np.linalg.norm(pose.angles - start.angles))
+    assert moves[0] > 1.5 * moves[1] > 3 * moves[2]
