@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +10,8 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from mocapflow.components import BodyModel, Garment, Stage
-from mocapflow.errors import MocapflowError, PipelineError, RecordingError, UnknownComponent
+from mocapflow.errors import PipelineError, RecordingError
+from mocapflow.measures import garment_of
 from mocapflow.registry import Registry, load_registry
 from mocapflow.resolve import Resolver
 from mocapflow.yamlfile import read
@@ -27,7 +27,7 @@ class Frames(Strict):
     """The part of the recording to work on: `start` up to, without, `stop`."""
 
     start: Annotated[int, Field(ge=0)] = 0
-    stop: Annotated[int, Field(ge=1)] | None = None
+    stop: Annotated[int, Field(ge=0)] | None = None
     step: Annotated[int, Field(ge=1)] = 1
 
 
@@ -108,7 +108,7 @@ def load_pipeline(
         path=Path(path),
         recording=recording,
         body=resolver.component("body", said.body, ("body",)),
-        garment=_garment(said.garment, recording, resolver),
+        garment=garment_of(said.garment, recording, resolver),
         stages=tuple(_stage(label, value, resolver) for label, value in said.stages.items() if value is not None),
         registry=resolver.registry,
         start=part.start,
@@ -148,46 +148,3 @@ def _stage(label: str, value: Any, resolver: Resolver) -> NamedStage:
             raise resolver.located(PipelineError(message), (*steps, "from"))
     stage = resolver.component("stage", value, steps)
     return NamedStage(label, stage, wiring, resolver.place(steps))
-
-
-def _garment(value: Any, recording: Path, resolver: Resolver) -> Garment | None:
-    """Return the garment, its measures from the recording where the file gives none."""
-    if value is None:
-        return None
-    file = recording / "subject" / "garment.json"
-    kind, measures = _measures(file)
-    named = value.get("use") if isinstance(value, dict) else value
-    if named == "from_recording":
-        if kind is None:
-            raise _no_garment(file)
-        named, value = kind, {**value, "use": kind} if isinstance(value, dict) else kind
-    if named != kind:
-        measures = {}
-    try:
-        garment: Garment = resolver.component("garment", value, ("garment",), measures)
-        return garment
-    except MocapflowError as error:
-        if isinstance(error, UnknownComponent) or error.where != resolver.place(("garment",)):
-            raise
-        source = f"describes a {kind}" if kind else "does not exist"
-        note = f"measures come from {file}, which {source}; a value written here overrides them"
-        raise type(error)(error.message, where=error.where, hint="\n".join(filter(None, [error.hint, note]))) from None
-
-
-def _no_garment(file: Path) -> RecordingError:
-    hint = 'write {"type": "skirt", ...} with tape measures in metres there, or name the garment in the pipeline'
-    return RecordingError(
-        "the pipeline takes the garment from the recording, which names none", where=str(file), hint=hint
-    )
-
-
-def _measures(path: Path) -> tuple[str | None, dict[str, Any]]:
-    """Return the garment's type and its settings from a recording's tape measures."""
-    if not path.exists():
-        return None, {}
-    try:
-        said = json.loads(path.read_text(encoding="utf-8"))
-        return str(said["type"]), {f"{key}_m": value for key, value in said.items() if key != "type"}
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        hint = 'write {"type": "skirt", "waist_height": 1.05, ...}, in metres'
-        raise RecordingError(f"not a garment description: {error!r}", where=str(path), hint=hint) from None

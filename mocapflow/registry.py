@@ -6,17 +6,12 @@ asked for, so that a command pays only for the components it uses.
 
 from __future__ import annotations
 
-import hashlib
-import importlib.util
-import inspect
-import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from types import ModuleType, TracebackType
+from types import TracebackType
 from typing import Any
 
 import pluggy
@@ -25,6 +20,7 @@ from mocapflow import components, hookspecs
 from mocapflow.components import Component
 from mocapflow.errors import MocapflowError, PluginError, UnknownComponent, alternatives
 from mocapflow.observers import Observers
+from mocapflow.vetting import check_hooks, checked, import_file
 
 GROUP = "mocapflow"  # entry point group, and the distribution of the built-in plugins
 PROVIDERS: Mapping[str, tuple[str, type[Component]]] = {
@@ -129,7 +125,7 @@ class Registry:
         """Load and register one plugin; remember its failure and go on."""
         try:
             plugin = load()
-            _check_hooks(plugin)
+            check_hooks(plugin)
             self._manager.register(plugin, name=f"{origin.distribution}:{origin.plugin}")
             self._plugins[origin] = plugin
         except (Exception, SystemExit) as error:  # a foreign module may raise anything; it must not stop the others
@@ -148,8 +144,11 @@ class Registry:
 
     def _call_provider(self, role: str, origin: Origin, plugin: Any) -> None:
         hook, base = PROVIDERS[role]
+        providers = [
+            impl.function for impl in getattr(self._manager.hook, hook).get_hookimpls() if impl.plugin is plugin
+        ]
         try:
-            classes = [_checked(cls, base, hook) for cls in getattr(plugin, hook, tuple)()]
+            classes = [checked(cls, base, hook) for provide in providers for cls in provide()]
         except Exception as error:
             self._failures.append(Failure(origin, error, role))
             return
@@ -165,54 +164,12 @@ def load_registry(local_files: Iterable[Path] = ()) -> Registry:
         version = entry.dist.version if entry.dist else ""
         registry.add(Origin(entry.name, _distribution(entry), version), entry.load)
     for path in local_files:
-        registry.add(Origin(path.stem, str(path)), partial(_import_file, path))
+        registry.add(Origin(path.stem, str(path)), partial(import_file, path))
     return registry
 
 
 def _distribution(entry: EntryPoint) -> str:
     return entry.dist.name if entry.dist else ""
-
-
-def _import_file(path: Path) -> ModuleType:
-    name = f"mocapflow_file_{path.stem}_{hashlib.blake2b(str(path.resolve()).encode(), digest_size=4).hexdigest()}"
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise PluginError(f"{path} is not a Python file")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # pydantic and typing look annotations up there
-    try:
-        spec.loader.exec_module(module)
-    except BaseException:
-        del sys.modules[name]
-        raise
-    return module
-
-
-def _check_hooks(plugin: Any) -> None:
-    known = {name for name in vars(hookspecs) if name.startswith("mocapflow_")}
-    for name, function in inspect.getmembers(plugin, inspect.isroutine):
-        marked = getattr(function, "mocapflow_impl", None)
-        hook = (marked or {}).get("specname") or name
-        if marked and hook not in known:
-            close = get_close_matches(hook, known, n=1)
-            guess = f" — did you mean '{close[0]}'?" if close else ""
-            raise PluginError(f"unknown hook '{hook}'{guess}")
-        if name in known and not marked:
-            raise PluginError(f"{name} lacks @mocapflow.hookimpl")
-
-
-def _checked(cls: Any, base: type[Component], hook: str) -> type[Component]:
-    label = getattr(cls, "__name__", repr(cls))
-    if not (isinstance(cls, type) and issubclass(cls, base)):
-        raise PluginError(f"{hook} returned {label}, which is not a {base.__name__}")
-    if not isinstance(getattr(cls, "name", None), str):
-        raise PluginError(f'{base.__name__} {label} has no name: write `name = "..."` in the class')
-    missing = sorted(getattr(cls, "__abstractmethods__", ())) or (
-        [] if hasattr(cls, "run") or base.role != "stage" else ["run"]
-    )
-    if missing:
-        raise PluginError(f"{base.__name__} {label} does not define {', '.join(missing)}")
-    return cls
 
 
 def _package(plugin: Any) -> str:

@@ -79,6 +79,8 @@ def test_frames(folder):
     assert (pipeline.start, pipeline.stop, pipeline.step) == (2, 9, 1)
     pipeline = load("frames={start: 2, stop: 9}", frames=slice(None, 60, 2))
     assert (pipeline.start, pipeline.stop, pipeline.step) == (0, 60, 2)
+    with pytest.raises(MocapflowError, match="skirt.yaml:1:1  frames: 0:0 holds no frame"):
+        load(frames=slice(0, 0))
 
 
 def test_a_stage_is_left_out_by_null(folder):

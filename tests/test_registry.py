@@ -140,6 +140,14 @@ def test_a_plugin_file(tmp_path):
     assert str(registry.origin(dress)) == f"plugin 'my_dress' ({file})"
 
 
+def test_a_hook_under_another_name():
+    def dresses():
+        return [broken_plugins.Cape]
+
+    plugin = SimpleNamespace(dresses=hookimpl(specname="mocapflow_garments")(dresses))
+    assert registry_of((OURS, lambda: plugin)).names("garment") == ("cape",)
+
+
 def test_the_culprit_is_the_innermost_plugin(tmp_path):
     file = tmp_path / "bad_draper.py"
     file.write_text("def fail():\n    import json\n    json.loads('{')\n")

@@ -1,0 +1,63 @@
+"""The garment of a pipeline, its tape measures from the recording where the file gives none."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from mocapflow.components import Garment
+from mocapflow.errors import MocapflowError, RecordingError, UnknownComponent
+from mocapflow.resolve import Resolver
+
+
+def garment_of(value: Any, recording: Path, resolver: Resolver) -> Garment | None:
+    """Return the garment that a pipeline names, None without one.
+
+    Args:
+        value: what the file says: a name, `from_recording`, or {use: name, setting: value}.
+        recording: the folder whose subject/garment.json holds the measures.
+        resolver: of the file.
+
+    Raises:
+        MocapflowError: a measure is missing or wrong, or the recording names no garment.
+    """
+    if value is None:
+        return None
+    file = recording / "subject" / "garment.json"
+    kind, measures = _measures(file)
+    named = value.get("use") if isinstance(value, dict) else value
+    if named == "from_recording":
+        if kind is None:
+            raise _no_garment(file)
+        named, value = kind, {**value, "use": kind} if isinstance(value, dict) else kind
+    if named != kind:
+        measures = {}
+    try:
+        garment: Garment = resolver.component("garment", value, ("garment",), measures)
+        return garment
+    except MocapflowError as error:
+        if isinstance(error, UnknownComponent) or error.where != resolver.place(("garment",)):
+            raise
+        source = f"describes a {kind}" if kind else "does not exist"
+        note = f"measures come from {file}, which {source}; a value written here overrides them"
+        raise type(error)(error.message, where=error.where, hint="\n".join(filter(None, [error.hint, note]))) from None
+
+
+def _no_garment(file: Path) -> RecordingError:
+    hint = 'write {"type": "skirt", ...} with tape measures in metres there, or name the garment in the pipeline'
+    return RecordingError(
+        "the pipeline takes the garment from the recording, which names none", where=str(file), hint=hint
+    )
+
+
+def _measures(path: Path) -> tuple[str | None, dict[str, Any]]:
+    """Return the garment's type and its settings from a recording's tape measures."""
+    if not path.exists():
+        return None, {}
+    try:
+        said = json.loads(path.read_text(encoding="utf-8"))
+        return str(said["type"]), {f"{key}_m": value for key, value in said.items() if key != "type"}
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        hint = 'write {"type": "skirt", "waist_height": 1.05, ...}, in metres'
+        raise RecordingError(f"not a garment description: {error!r}", where=str(path), hint=hint) from None

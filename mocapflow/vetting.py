@@ -1,0 +1,69 @@
+"""What a plugin has to be: importable, with known hooks, providing classes that can play their role."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import inspect
+import sys
+from difflib import get_close_matches
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from mocapflow import hookspecs
+from mocapflow.components import Component, Stage
+from mocapflow.errors import PluginError
+
+
+def import_file(path: Path) -> ModuleType:
+    """Import a plugin from a Python file, each file under a name of its own."""
+    name = f"mocapflow_file_{path.stem}_{hashlib.blake2b(str(path.resolve()).encode(), digest_size=4).hexdigest()}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise PluginError(f"{path} is not a Python file")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # pydantic and typing look annotations up there
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[name]
+        raise
+    return module
+
+
+def check_hooks(plugin: Any) -> None:
+    """Check that a plugin's hooks exist and are marked as such.
+
+    Raises:
+        PluginError: a hook is unknown, or a function that has the name of one is not marked.
+    """
+    known = {name for name in vars(hookspecs) if name.startswith("mocapflow_")}
+    for name, function in inspect.getmembers(plugin, inspect.isroutine):
+        marked = getattr(function, "mocapflow_impl", None)
+        hook = (marked or {}).get("specname") or name
+        if marked and hook not in known:
+            close = get_close_matches(hook, known, n=1)
+            guess = f" — did you mean '{close[0]}'?" if close else ""
+            raise PluginError(f"unknown hook '{hook}'{guess}")
+        if name in known and not marked:
+            raise PluginError(f"{name} lacks @mocapflow.hookimpl")
+
+
+def checked(cls: Any, base: type[Component], hook: str) -> type[Component]:
+    """Return a class that a hook provides, if it can play the role `base`.
+
+    Raises:
+        PluginError: it has another base, no name, or lacks a method.
+    """
+    label = getattr(cls, "__name__", repr(cls))
+    if not (isinstance(cls, type) and issubclass(cls, base)):
+        raise PluginError(f"{hook} returned {label}, which is not a {base.__name__}")
+    if not isinstance(getattr(cls, "name", None), str):
+        raise PluginError(f'{base.__name__} {label} has no name: write `name = "..."` in the class')
+    missing = set(getattr(cls, "__abstractmethods__", ()))
+    if base is Stage and not hasattr(cls, "run"):
+        missing.add("run")
+    if missing:
+        raise PluginError(f"{base.__name__} {label} does not define {', '.join(sorted(missing))}")
+    return cls
