@@ -9,6 +9,7 @@ arrays of `Track`. A frame counts once `frames_done` says so, which is written l
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -166,7 +167,7 @@ class Checkpoint:
                 found.append(Silhouette(camera=camera_index, layer=layer, distance=packing.distance_of(steps)))
         return tuple(found), packing.matches_of(packed, count)
 
-    @property
+    @cached_property
     def _columns(self) -> packing.Columns:
         return {name: tuple(shape) for name, shape in self._attributes["columns"]}
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from math import prod
 from typing import Any
 
+import numba
 import numpy as np
 import numpy.typing as npt
 
@@ -63,9 +64,19 @@ def column(columns: Columns, rows: F64, name: str) -> F64:
 
 def quantised(silhouette: Silhouette) -> npt.NDArray[np.int8]:
     """Return a signed distance in steps of 1/8 px; the mask `distance > 0` stays as it is."""
-    steps = np.rint(silhouette.distance * np.float32(FINE))
-    thin = (silhouette.distance > 0) & (steps < 1)
-    return np.clip(np.where(thin, 1, steps), 1 + UNSEEN, 127).astype(np.int8)
+    steps = np.empty(silhouette.distance.shape, np.int8)
+    _quantise(silhouette.distance, steps)
+    return steps
+
+
+@numba.njit(cache=True)
+def _quantise(distance, steps):  # type: ignore[no-untyped-def]
+    fine, half, most = np.float32(FINE), np.float32(0.5), np.float32(127)
+    for row in range(distance.shape[0]):
+        for column in range(distance.shape[1]):
+            value = min(max(distance[row, column] * fine, -most), most)
+            nearest = np.int32(np.floor(value + half))
+            steps[row, column] = nearest + np.int32((value > 0) & (nearest < 1))  # without branches it vectorises
 
 
 def distance_of(steps: npt.NDArray[np.int8]) -> F32:

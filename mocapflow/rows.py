@@ -38,7 +38,7 @@ class Rows:
             raise Corrupted(f"{path} is no array of frames: {error!r}") from error
         self._path, self._meta = path, meta
         self._zstd = Zstd(level=LEVEL, checksum=True)
-        self._inner = "/".join("0" for _ in self.shape[1:])
+        self._inner = ".0" * len(self.shape[1:])
 
     @classmethod
     def create(
@@ -52,8 +52,8 @@ class Rows:
             str(path), shape=tuple(shape), chunks=(1, *shape[1:]), dtype=dtype, fill_value=fill,
             compressors=[ZstdCodec(level=LEVEL, checksum=True)], dimension_names=list(axes), attributes=attributes,
             overwrite=True,
+            chunk_key_encoding={"name": "default", "separator": "."},  # files side by side: no folder per frame
         )  # fmt: skip
-        (path / "c").mkdir(exist_ok=True)
         return cls(path)
 
     def resize(self, frames: int) -> None:
@@ -67,12 +67,7 @@ class Rows:
         """Write one row."""
         assert values.shape == self.shape[1:], (values.shape, self.shape)
         data = self._zstd.encode(np.ascontiguousarray(values, self._dtype))
-        file = self._file(row)
-        try:
-            file.write_bytes(data)
-        except FileNotFoundError:
-            file.parent.mkdir(parents=True, exist_ok=True)
-            file.write_bytes(data)
+        self._file(row).write_bytes(data)
 
     def read(self, row: int) -> npt.NDArray[Any]:
         """Return one row, freshly allocated."""
@@ -86,7 +81,7 @@ class Rows:
         return values
 
     def _file(self, row: int) -> Path:
-        return self._path / "c" / str(row) / self._inner
+        return self._path / f"c.{row}{self._inner}"
 
 
 def read_json(path: Path) -> dict[str, Any]:

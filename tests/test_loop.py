@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from mocapflow.components import PoseSolver, Predictor
 from mocapflow.data import Camera, Estimate, Frame, Past, Pose
 from mocapflow.geometry.kinematics import chain, skin

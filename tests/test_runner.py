@@ -162,8 +162,7 @@ def test_results_do_not_depend_on_truth_and_reference(tmp_path, path):
 
 def test_two_processes_on_one_store(tmp_path, path, monkeypatch):
     monkeypatch.setenv("TINY_SLOW", "0.02")
-    code = "import sys; from pathlib import Path; from tests.fixtures.stores import run_tiny; print(*run_tiny(Path(sys.argv[1]), Path(sys.argv[2]))[1], sep=chr(10))"
-    command = [sys.executable, "-c", code, str(path), str(tmp_path)]
+    command = [sys.executable, str(ROOT / "tests" / "fixtures" / "stores.py"), str(path), str(tmp_path)]
     running = [subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) for _ in range(2)]
     said = [process.communicate()[0] for process in running]
     assert [process.returncode for process in running] == [0, 0]

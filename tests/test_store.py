@@ -135,7 +135,7 @@ def test_rows_are_plain_zarr(tmp_path):
 def test_a_damaged_row_is_noticed(tmp_path, damage):
     made = Rows.create(tmp_path / "a", (2, 500), "float64", np.nan, ("T", "x"), {})
     made.write(0, np.arange(500.0))
-    file = tmp_path / "a" / "c" / "0" / "0"
+    file = tmp_path / "a" / "c.0.0"
     file.write_bytes(damage(file.read_bytes()))
     with pytest.raises(Corrupted, match="row 0 of .* is damaged"):
         made.read(0)
@@ -222,7 +222,7 @@ def test_a_damaged_frame_of_a_half_done_track_is_noticed(tmp_path, path):
     run_tiny(path, tmp_path / "whole")
     run_tiny(path, tmp_path, frames=6)
     (group,) = (tmp_path / "store.zarr").glob("track-*")
-    file = group / "live" / "rows" / "c" / "5" / "0"
+    file = group / "live" / "rows" / "c.5.0"
     file.unlink()  # reads as the fill value
     _, lines = run_tiny(path, tmp_path)
     assert any("is damaged and made anew: frame 5 is missing" in line for line in lines)

@@ -58,11 +58,10 @@ def test_twenty_real_kills_change_nothing(tmp_path):
     path = write_pipeline(tmp_path, write_recording(tmp_path / "clip", frames=200))
     run_tiny(path, tmp_path / "whole")
     (tmp_path / "broken").mkdir()
-    code = "import sys; from pathlib import Path; from tests.fixtures.stores import run_tiny; run_tiny(Path(sys.argv[1]), Path(sys.argv[2]))"
     environment = os.environ | {"TINY_SLOW": "0.02"}
     dice, killed, frames = random.Random(2), 0, []
     while killed < 20:
-        command = [sys.executable, "-c", code, str(path), str(tmp_path / "broken")]
+        command = [sys.executable, str(KILLS.with_name("stores.py")), str(path), str(tmp_path / "broken")]
         running = subprocess.Popen(command, cwd=KILLS.parents[2], env=environment, stderr=subprocess.DEVNULL)
         store = Store(tmp_path / "broken" / "store.zarr")
         before = frames[-1] if frames else 0
