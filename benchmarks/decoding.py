@@ -8,7 +8,6 @@ plain `cv2.VideoCapture.read` of the same files in the same run.
 
 from __future__ import annotations
 
-import resource
 import subprocess
 import sys
 import tempfile
@@ -82,7 +81,7 @@ def compare(name: str, folder: Path) -> None:
 
 def speed(recordings: Sequence[Path], frames: int = 60) -> None:
     """Print the cost of both sizes, with and without a lens, and of the recordings given."""
-    print(f"{'ms of one core per frame and view':34}{'cv2 read':>10}{'frames':>10}{'at half size':>12}{'open':>8}")
+    print(f"{'ms of one core per frame and view':34}{'cv2 read':>10}{'frames':>10}{'half size':>12}{'open':>8}")
     for name, size in SIZES.items():
         for lens, distortion in (("no lens", np.zeros(5)), ("lens", LENS)):
             with tempfile.TemporaryDirectory() as place:
@@ -106,7 +105,8 @@ if __name__ == "__main__":
     cv2.setNumThreads(1)
     if sys.argv[1:2] == ["--peak"]:
         walk(Path(sys.argv[2]))
-        print(round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024))
+        status = Path("/proc/self/status").read_text()  # getrusage would count what the parent held before exec
+        print(round(int(status.split("VmHWM:")[1].split()[0]) / 1024))
     else:
         speed([Path(folder) for folder in sys.argv[1:]])
         memory()
