@@ -9,6 +9,7 @@ from mocapflow.hookspecs import hookimpl
 @hookimpl
 def mocapflow_garments() -> list[type[Garment]]:
     """Return the garments of this package."""
+    from mocapflow_garments.shorts import Shorts
     from mocapflow_garments.skirt import Skirt
 
-    return [Skirt]
+    return [Shorts, Skirt]

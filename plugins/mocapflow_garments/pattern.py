@@ -10,8 +10,10 @@ import numpy as np
 from mocapflow.data import Body
 from mocapflow.errors import MocapflowError
 from mocapflow.records import F64, I32
+from mocapflow_garments import sections
 
 EASE = 0.002  # m, the least room between waistband and skin
+LARGEST_ROOM = 0.08  # m between waistband and skin: more can't hold a garment up
 HARMONICS: tuple[tuple[str, ...], ...] = (
     ("flare_rad",),
     ("wind_cos_rad", "wind_sin_rad"),
@@ -78,3 +80,70 @@ def main_joint(body: Body, vertices: I32) -> int:
     weight = np.zeros(len(body.parents))
     np.add.at(weight, body.skin_joint[vertices], body.skin_weight[vertices])
     return int(weight.argmax())
+
+
+def even_links(rows: F64, link: float) -> F64:
+    """Return rows (strands, rows, 3) moved so that each particle lies one link from the one above it."""
+    even = rows.copy()
+    for row in range(1, rows.shape[1]):
+        bar = rows[:, row] - even[:, row - 1]
+        even[:, row] = even[:, row - 1] + link * bar / np.linalg.norm(bar, axis=1, keepdims=True)
+    return even
+
+
+def waistband(garment: str, body: Body, height: float, around: float) -> tuple[F64, float]:
+    """Return the torso's outline (N, 2) m at a height and how far outside it a band of a given length lies.
+
+    Raises:
+        GarmentError: there is no body at that height, or the band is far too wide to stay up.
+    """
+    found = sections.sections(body, sections.level(height))
+    outlines = [sections.outline(points) for points in found]
+    if not outlines:
+        raise GarmentError(
+            f"{garment}: there is no body at waist_height_m = {height:.2f}",
+            hint=f"the rest body ends at {body.vertices[:, 2].max():.2f} m; the height is metres above the floor",
+        )
+    torso = max(outlines, key=sections.perimeter)
+    tape = sections.perimeter(torso)
+    away = (around - tape) / (2 * math.pi)
+    if away > LARGEST_ROOM:
+        raise GarmentError(
+            f"{garment}: a waist of {around:.2f} m can't stay up on a body of {tape:.2f} m there",
+            hint="check waist_circumference_m and waist_height_m",
+        )
+    if away < EASE:
+        wider = tape + 2 * math.pi * EASE
+        repaired(garment, f"waist_circumference_m {around:.3f} lies inside the body; widened to {wider:.3f}")
+        away = EASE
+    return torso, away
+
+
+def hip_rings(body: Body, height: float, rows: F64, around: F64, away: float) -> F64:
+    """Return lengths around (rows,) m that are nowhere tighter than the hips, down to where the legs part.
+
+    Args:
+        body: the body at rest.
+        height: m, of the waist.
+        rows: m, how far below the waist each row lies.
+        around: m, wanted length of each row.
+        away: m, room between band and skin.
+    """
+    around = around.copy()
+    for row, below in enumerate(rows):
+        found = sections.sections(body, sections.level(height - below))
+        outlines = [sections.outline(points) for points in found]
+        middle = [closed for closed in outlines if _holds_middle(closed, outlines)]
+        if not middle:  # the legs have parted
+            break
+        around[row] = max(around[row], sections.perimeter(middle[0]) + 2 * math.pi * away)
+    return np.maximum.accumulate(around)
+
+
+def _holds_middle(closed: F64, outlines: list[F64]) -> bool:
+    """Return True for the outline around the middle of all, e.g. the torso between the arms."""
+    corners = np.concatenate(outlines)
+    middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
+    edge = np.roll(closed, -1, axis=0) - closed
+    to = middle - closed
+    return bool(np.all(edge[:, 0] * to[:, 1] - edge[:, 1] * to[:, 0] >= 0))

@@ -30,9 +30,10 @@ class Plane:
         return lifted
 
 
-def level(height: float) -> Plane:
-    """Return the horizontal plane at a height in m."""
-    return Plane(point=np.array([0.0, 0.0, height]), across=np.eye(3)[:2].copy())
+def level(height: float, towards: float = 0.0) -> Plane:
+    """Return the horizontal plane at a height in m; its first axis points `towards` rad from x."""
+    c, s = np.cos(towards), np.sin(towards)
+    return Plane(point=np.array([0.0, 0.0, height]), across=np.array([[c, s, 0.0], [-s, c, 0.0]]))
 
 
 def sections(body: Body, plane: Plane) -> list[F64]:
@@ -66,17 +67,18 @@ def perimeter(closed: F64) -> float:
     return float(np.linalg.norm(closed - np.roll(closed, 1, axis=0), axis=1).sum())
 
 
-def band(closed: F64, away: float, count: int) -> tuple[F64, F64]:
+def band(closed: F64, away: float, count: int, first: float = 0.0) -> tuple[F64, F64]:
     """Return `count` points evenly along a convex outline moved outwards by `away` m, and where each one faces.
 
-    The first point faces the first axis of the plane. The directions turn evenly along the band: so spread the
-    strands of a cloth that is cut wider at the other end by the same amount everywhere.
+    The band begins where it faces the first axis of the plane; the first point lies `first` spacings on. The
+    directions turn evenly along the band: so spread the strands of a cloth that is cut wider at the other end by
+    the same amount everywhere.
     """
     angles = 2 * np.pi * np.arange(4096) / 4096
     facing = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     support = closed[np.argmax(closed @ facing.T, axis=0)] + away * facing
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(support, axis=0, append=support[:1]), axis=1))])
-    at = np.linspace(0.0, along[-1], count, endpoint=False)
+    at = along[-1] * (np.arange(count) + first) / count
     ring = np.stack([np.interp(at, along, np.append(support[:, k], support[0, k])) for k in range(2)], axis=1)
-    turns = 2 * np.pi * np.arange(count) / count
+    turns = 2 * np.pi * (np.arange(count) + first) / count
     return ring, np.stack([np.cos(turns), np.sin(turns)], axis=1)

@@ -1,0 +1,140 @@
+"""Shorts: strands from the waist down each leg's outside, and from the crotch seam down its inside."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from mocapflow.components import Garment
+from mocapflow.data import Body, GarmentMesh
+from mocapflow.records import F64, I32
+from mocapflow_garments import pattern, sections
+
+OUTER = 0.75  # share of a leg's strands that begin at the waist; the others begin at the crotch seam
+CROTCH = 1.2  # a leg's length around at the crotch over half the hip's: the seam adds what reaches between the legs
+
+
+class Shorts(Garment):
+    """Shorts sewn from six tape measures: two tubes joined at the hip, each carried by its thigh."""
+
+    name: ClassVar[str] = "shorts"
+    waist_height_m: float  # upper edge above the floor, rest pose
+    waist_circumference_m: float
+    hip_circumference_m: float
+    leg_opening_circumference_m: float
+    inseam_m: float
+    length_m: float  # along the cloth, outside of the leg
+    strands: Annotated[int, Field(ge=8, multiple_of=4)] = 32  # of each leg
+    rings: Annotated[int, Field(ge=6)] = 20
+    force_orders: tuple[Literal[0, 1, 2], ...] = (0, 1, 2)  # harmonics of the tail angle; 1 alone is a wind
+
+    def sew(self, body: Body) -> GarmentMesh:
+        """Return the shorts on the rest body."""
+        self._check()
+        link = self.length_m / (self.rings - 1)
+        crotch = min(max(round((self.length_m - self.inseam_m) / link), 1), self.rings - 2)  # row
+        outer, inner, around = self._place(body, link, crotch)
+        vertices = np.concatenate([outer.reshape(-1, 3), inner.reshape(-1, 3)])
+        long = np.arange(outer.shape[0] * self.rings, dtype=np.int32).reshape(-1, self.rings)
+        short = long.size + np.arange(inner.shape[0] * inner.shape[1], dtype=np.int32).reshape(inner.shape[:2])
+        legs = self._legs(long, short, crotch)
+        rings, ring_length = _rings(long, legs, crotch, around)
+        strands = np.full((len(long) + len(short), self.rings), -1, np.int32)
+        strands[: len(long)] = long
+        strands[len(long) :, : short.shape[1]] = short
+        pinned = strands[:, 0].copy()
+        pinned_to = pattern.nearest_skin(body, vertices[pinned])
+        names, bounds = pattern.parameters(self.force_orders)
+        faces = [pattern.grid_faces(long[:, : crotch + 1]), *(pattern.grid_faces(leg) for leg in legs)]
+        return GarmentMesh(
+            name=self.name,
+            vertices=vertices,
+            faces=np.concatenate(faces),
+            strands=strands,
+            rings=rings,
+            ring_length=ring_length,
+            carried_by=self._carried_by(body, vertices, legs, pinned_to[: len(long)]),
+            pinned=pinned,
+            pinned_to=pinned_to,
+            parameter_names=names,
+            parameter_bounds=bounds,
+        )
+
+    def _check(self) -> None:
+        tapes = ("waist_height_m", "waist_circumference_m", "hip_circumference_m", "leg_opening_circumference_m")
+        measures = {tape: getattr(self, tape) for tape in (*tapes, "inseam_m", "length_m")}
+        pattern.check_measures(self.name, measures)
+        if self.inseam_m >= self.length_m:
+            raise pattern.GarmentError(
+                f"shorts: the inseam ({self.inseam_m:.2f} m) is as long as the outside ({self.length_m:.2f} m)",
+                hint="length_m runs from the waist's upper edge to the leg opening, inseam_m from the crotch",
+            )
+        if self.length_m > self.waist_height_m:
+            raise pattern.GarmentError(
+                f"shorts: the legs would end {self.length_m - self.waist_height_m:.2f} m below the floor",
+                hint="shorten length_m or raise waist_height_m, the upper edge above the floor",
+            )
+
+    def _place(self, body: Body, link: float, crotch: int) -> tuple[F64, F64, F64]:
+        """Return outer strands (2 K, rings, 3), inner strands and the length around of each row's rings (rings,)."""
+        torso, away = pattern.waistband(self.name, body, self.waist_height_m, self.waist_circumference_m)
+        front = sections.level(self.waist_height_m, -math.pi / 2)
+        turned = sections.outline(torso @ sections.level(0.0).across[:, :2] @ front.across[:, :2].T)
+        count = round(OUTER * self.strands)
+        waist, facing = sections.band(turned, away, 2 * count, 0.5)
+        down = np.linspace(0.0, link * crotch, crotch + 1)
+        straight = np.linspace(sections.perimeter(waist), self.hip_circumference_m, crotch + 1)
+        hips = pattern.hip_rings(body, self.waist_height_m, down, straight, away)
+        top = max(CROTCH * hips[-1] / 2, self.leg_opening_circumference_m)
+        leg = np.linspace(top, self.leg_opening_circumference_m, self.rings - crotch)
+        flat = waist[:, None] + ((hips[:-1] - hips[0]) / (2 * math.pi))[None, :, None] * facing[:, None]
+        upper = front.lift(flat) - down[:-1, None] * [0.0, 0.0, 1.0]
+        heights = self.waist_height_m - np.linspace(link * crotch, self.length_m, self.rings - crotch)
+        tubes = [self._tube(body, side, heights, leg) for side in (1.0, -1.0)]
+        lower = np.concatenate([tube[:count] for tube in tubes])
+        outer = pattern.even_links(np.concatenate([upper, lower], axis=1), link)
+        inner = pattern.even_links(np.concatenate([tube[count:] for tube in tubes]), link)
+        return outer, inner, np.concatenate([hips[:-1], leg])
+
+    def _tube(self, body: Body, side: float, heights: F64, around: F64) -> F64:
+        """Return the rings (strands, rows, 3) of the leg on one side; strands run on from the waist's."""
+        start = math.radians(-135.0 if side > 0 else 45.0)
+        rows = []
+        for height, length in zip(heights, around, strict=True):
+            plane = sections.level(height, start)
+            outlines = [sections.outline(points) for points in sections.sections(body, plane)]
+            legs = [o for o in outlines if side * plane.lift(o)[:, 0].mean() > 0.02 and sections.perimeter(o) > 0.2]
+            if not legs:
+                raise pattern.GarmentError(
+                    f"shorts: the legs have not parted yet at {height:.2f} m, where the crotch should be",
+                    hint="waist_height_m - (length_m - inseam_m) must lie below the body's crotch",
+                )
+            closed = min(legs, key=lambda o: abs(plane.lift(o)[:, 0].mean()))
+            away = max((length - sections.perimeter(closed)) / (2 * math.pi), pattern.EASE)
+            rows.append(plane.lift(sections.band(closed, away, self.strands, 0.5)[0]))
+        return np.stack(rows, axis=1)
+
+    def _legs(self, long: I32, short: I32, crotch: int) -> list[I32]:
+        """Return the vertices (strands, rows) of each leg's tube, round the leg."""
+        pairs = zip(np.split(long[:, crotch:], 2), np.split(short, 2), strict=True)
+        return [np.concatenate([outer, inner]) for outer, inner in pairs]
+
+    def _carried_by(self, body: Body, vertices: F64, legs: list[I32], waist_skin: I32) -> I32:
+        carried = np.full(len(vertices), pattern.main_joint(body, waist_skin), np.int32)
+        for leg in legs:
+            carried[leg] = pattern.main_joint(body, pattern.nearest_skin(body, vertices[leg[:, leg.shape[1] // 2]]))
+        return carried
+
+
+def _rings(long: I32, legs: list[I32], crotch: int, around: F64) -> tuple[I32, F64]:
+    """Return links (E, 2) around hips and legs and their lengths (E,)."""
+    rings, lengths = [], []
+    for row, length in enumerate(around):
+        loops = [long[:, row]] if row < crotch else [leg[:, row - crotch] for leg in legs]
+        for loop in loops:
+            rings.append(np.stack([loop, np.roll(loop, -1)], axis=1))
+            lengths.append(np.full(len(loop), length / len(loop)))
+    return np.concatenate(rings), np.concatenate(lengths)
