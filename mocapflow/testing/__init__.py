@@ -10,11 +10,14 @@ Needs pytest for the conformance classes.
 
 from __future__ import annotations
 
-from mocapflow.testing.conformance import (
-    BodyConformance,
+from mocapflow.testing.assets import BodyConformance, DraperConformance, GarmentConformance
+from mocapflow.testing.bodies import tiny_body, tiny_garment
+from mocapflow.testing.jacobians import check_jacobian
+from mocapflow.testing.pictures import tiny_frame, tiny_segmentation, tiny_state
+from mocapflow.testing.same import assert_pure, same
+from mocapflow.testing.scenes import tiny_cloth, tiny_past, tiny_pose, tiny_scene
+from mocapflow.testing.steps import (
     ClothFitterConformance,
-    DraperConformance,
-    GarmentConformance,
     MatcherConformance,
     PoseSolverConformance,
     PredictorConformance,
@@ -22,9 +25,6 @@ from mocapflow.testing.conformance import (
     SegmenterConformance,
     StageConformance,
 )
-from mocapflow.testing.jacobians import check_jacobian
-from mocapflow.testing.same import assert_pure, same
-from mocapflow.testing.scenes import tiny_body, tiny_frame, tiny_garment, tiny_pose, tiny_scene, tiny_state
 
 __all__ = [
     "BodyConformance",
@@ -41,9 +41,12 @@ __all__ = [
     "check_jacobian",
     "same",
     "tiny_body",
+    "tiny_cloth",
     "tiny_frame",
     "tiny_garment",
+    "tiny_past",
     "tiny_pose",
     "tiny_scene",
+    "tiny_segmentation",
     "tiny_state",
 ]

@@ -1,0 +1,119 @@
+"""The tools that test plugins find what is wrong."""
+
+import numpy as np
+import pytest
+
+from mocapflow.components import Garment, Prior
+from mocapflow.data import Residual, Turn
+from mocapflow.geometry.meshes import edges
+from mocapflow.testing import (
+    GarmentConformance,
+    PriorConformance,
+    assert_pure,
+    check_jacobian,
+    same,
+    tiny_body,
+    tiny_frame,
+    tiny_garment,
+    tiny_pose,
+    tiny_scene,
+)
+
+
+def test_a_wrong_jacobian_is_found():
+    def residual(x, factor=1.0):
+        return np.sin(x), factor * np.diag(np.cos(x))
+
+    check_jacobian(residual, np.array([0.3, -1.2]))
+    with pytest.raises(AssertionError, match=r"Jacobian \[0, 0\] is 1.91.*, differences say 0.955"):
+        check_jacobian(lambda x: residual(x, 2.0), np.array([0.3, -1.2]))
+    with pytest.raises(AssertionError, match="the Jacobian has shape"):
+        check_jacobian(lambda x: (np.sin(x), np.zeros((1, 2))), np.zeros(2))
+
+
+def test_same():
+    nan = np.array([np.nan])
+    assert same({"a": (nan, 1, float("nan"))}, {"a": (nan.copy(), 1, float("nan"))})
+    assert not same(np.zeros(2), np.zeros(2, np.float32))
+    assert not same(np.zeros(2), np.zeros(3))
+    assert not same(Turn(index=0, cap=8), Turn(index=1, cap=8))
+    assert not same([1], (1,))
+
+
+def test_impure_steps_are_found():
+    calls = []
+
+    def counting(x):
+        calls.append(x)
+        return float(len(calls))
+
+    def changing(x):
+        x += 1
+        return 0
+
+    with pytest.raises(AssertionError, match="two different results"):
+        assert_pure(counting, np.zeros(2))
+    with pytest.raises(AssertionError, match="argument 0 was changed"):
+        assert_pure(changing, np.zeros(2))
+
+
+def test_the_tiny_scene():
+    scene = tiny_scene(clothed=True)
+    assert 500 < len(scene.body.vertices) < 700
+    assert (edges(scene.body.faces)[:, 3] >= 0).all()  # watertight
+    a, b, c = np.moveaxis(scene.body.vertices[scene.body.faces], 1, 0)
+    assert 0.04 < (a * np.cross(b, c)).sum() / 6 < 0.06  # faces outwards
+    frame = tiny_frame(scene, tiny_pose(scene))
+    assert [image.shape for image in frame.images] == [(240, 320, 3)] * 4
+
+
+class TestTube(GarmentConformance):
+    class Tube(Garment):
+        """The tube of cloth of the tiny scene."""
+
+        name = "tube"
+
+        def sew(self, body):
+            return tiny_garment(body)
+
+    garment = Tube()
+
+
+def test_conformance_finds_a_garment_that_is_sewn_wrong():
+    class Torn(Garment):
+        name = "torn"
+
+        def sew(self, body):
+            mesh = tiny_garment(body)
+            faces = mesh.faces.copy()
+            faces[0, 0] = faces[0, 1]
+            return type(mesh)(**{**vars(mesh), "faces": faces})
+
+    tests = GarmentConformance()
+    tests.garment = Torn()
+    with pytest.raises(AssertionError, match="a face has no area"):
+        tests.test_faces_are_not_degenerate()
+    with pytest.raises(AssertionError, match="say in a docstring what it does"):
+        tests.test_it_plays_its_role()
+
+
+def test_conformance_finds_a_prior_with_a_wrong_energy():
+    class Doubled(Prior):
+        """Pulls the angles to zero and counts it twice."""
+
+        name = "doubled"
+
+        def residual(self, pose, past, scene):
+            jacobian = np.pad(np.eye(len(pose.angles)), ((0, 0), (6, 0)))
+            return Residual(error=pose.angles.copy(), jacobian=jacobian, energy=float(pose.angles @ pose.angles))
+
+    tests = PriorConformance()
+    tests.prior = Doubled()
+    with pytest.raises(AssertionError, match="Not equal to tolerance"):
+        tests.test_its_jacobian_is_its_derivative(1, 0.1)
+
+
+def test_the_tiny_garment_hangs_on_the_tiny_body():
+    body = tiny_body()
+    mesh = tiny_garment(body)
+    assert np.linalg.norm(mesh.vertices[mesh.pinned] - body.vertices[mesh.pinned_to], axis=1).max() < 0.06
