@@ -63,7 +63,8 @@ def _sees(camera: Camera, points: F64) -> Bool:
     with np.errstate(invalid="ignore"):
         inside = (pixels >= -0.5) & (pixels <= camera.size - 0.5)
     near = np.linalg.norm(points - centre(camera), axis=1) < FARTHEST
-    return inside[:, 0] & inside[:, 1] & near
+    seen: Bool = inside[:, 0] & inside[:, 1] & near
+    return seen
 
 
 def _forward(camera: Camera) -> F64:

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mocapflow.errors import RecordingError
+from mocapflow.io.stamps import grabs, number_frames, open_capture, read_stamps
 from mocapflow.records import F64, I32, U8, array, record
 
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
@@ -49,16 +49,16 @@ def open_video(path: Path) -> Video:
     """
     if path.is_dir():
         return _open_folder(path)
-    declared, rate, stamps = _read_stamps(path)
-    with _capture(path) as capture:
-        first = next((image for _ in _grabs(capture) if (image := capture.retrieve()[1]) is not None), None)
+    declared, rate, stamps = read_stamps(path)
+    with open_capture(path) as capture:
+        first = next((image for _ in grabs(capture) if (image := capture.retrieve()[1]) is not None), None)
     if first is None or not len(stamps):
         raise RecordingError(
             "this video can't be decoded",
             where=str(path),
             hint="the file is cut off, damaged or no video; copy it again from the camera",
         )
-    numbers = _number(stamps)
+    numbers = number_frames(stamps)
     if numbers[-1] >= len(numbers):  # with gaps the declared rate is the average
         rate = 1000 * float(numbers[-1]) / float(stamps[-1] - stamps[0])
     height, width = first.shape[:2]
@@ -89,13 +89,13 @@ def lost_frames(video: Video) -> list[int]:
     if video.path.is_dir():
         there = set(numbered(video.path, IMAGES))
     else:
-        with _capture(video.path) as capture:
+        with open_capture(video.path) as capture:
             there = set(_decoded(capture, video))
     return sorted(set(range(video.declared)) - there)
 
 
 def _file_pictures(video: Video, indices: range) -> Iterator[tuple[U8 | None, str]]:
-    with _capture(video.path) as capture:
+    with open_capture(video.path) as capture:
         decoded = _decoded(capture, video)
         current = next(decoded, None)
         for index in indices:
@@ -118,55 +118,11 @@ def _decoded(capture: Any, video: Video) -> Iterator[int]:
     import cv2
 
     by_count = video.stamps[0] == video.stamps[-1]
-    for count, _ in enumerate(_grabs(capture)):
+    for count, _ in enumerate(grabs(capture)):
         now = capture.get(cv2.CAP_PROP_POS_MSEC)
         if count == 0 and now != video.stamps[0] and video.path.suffix.lower() == ".avi":
             by_count = True  # AVI keeps no times of display: with reordered frames only their order is known
         yield int(video.numbers[count if by_count else np.abs(video.stamps - now).argmin()])
-
-
-def _grabs(capture: Any) -> Iterator[None]:
-    """Advance frame by frame to the end; a damaged one counts as a failed attempt and is passed over."""
-    import cv2
-
-    patience = max(1000, int(capture.get(cv2.CAP_PROP_FRAME_COUNT)))  # failed attempts at the end cost nothing
-    failed = 0
-    while failed < patience:
-        if capture.grab():
-            failed = 0
-            yield
-        else:
-            failed += 1
-
-
-def _read_stamps(path: Path) -> tuple[int, float, F64]:
-    """Return the declared number of frames, the frame rate, and the sorted stamps (N,) ms; nothing is decoded."""
-    import cv2
-
-    with _capture(path, cv2.CAP_PROP_FORMAT, -1) as capture:
-        declared, rate = capture.get(cv2.CAP_PROP_FRAME_COUNT), capture.get(cv2.CAP_PROP_FPS)
-        stamps = np.sort([capture.get(cv2.CAP_PROP_POS_MSEC) for _ in _grabs(capture)])
-    rate = rate if np.isfinite(rate) and 0 < rate < 1e5 else 0.0
-    return max(0, int(declared)), rate, stamps[stamps >= 0] if len(stamps) else np.empty(0)
-
-
-def _number(stamps: F64) -> I32:
-    """Return the frame number of each stamp: a gap of k periods is k - 1 lost frames."""
-    gaps = np.diff(stamps)
-    period = np.median(gaps) if len(gaps) else 0.0
-    steps = np.maximum(1, np.round(gaps / period)) if period > 0 else np.ones(len(gaps))
-    return np.concatenate([[0], np.cumsum(steps)]).astype(np.int32)
-
-
-@contextmanager
-def _capture(path: Path, *options: int) -> Iterator[Any]:
-    import cv2
-
-    capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG, [cv2.CAP_PROP_N_THREADS, 1, *options])
-    try:
-        yield capture
-    finally:
-        capture.release()
 
 
 def numbered(folder: Path, suffixes: tuple[str, ...]) -> dict[int, Path]:

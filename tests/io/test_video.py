@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from mocapflow.errors import RecordingError
-from mocapflow.io.video import _number, lost_frames, name_frames, open_video, read_frames
+from mocapflow.io.stamps import number_frames
+from mocapflow.io.video import lost_frames, name_frames, open_video, read_frames
 from tests.fixtures.recordings import avi_frames, number_of, picture, write_video
 
 FRAMES = 20
@@ -74,12 +75,12 @@ def test_a_truncated_mp4_can_not_be_decoded(tmp_path):
 def test_gaps_in_the_time_stamps_are_lost_frames():
     period = 1000 / 30
     stamps = np.delete(np.arange(30) * period, [10, 11, 20])
-    assert _number(stamps).tolist() == np.delete(np.arange(30), [10, 11, 20]).tolist()
+    assert number_frames(stamps).tolist() == np.delete(np.arange(30), [10, 11, 20]).tolist()
     jitter = np.random.default_rng(0).uniform(-0.2, 0.2, 30) * period
-    assert _number(np.arange(30) * period + jitter).tolist() == list(range(30))
-    assert _number(np.round(np.arange(3000) * period)).tolist() == list(range(3000))  # times in whole ms
-    assert _number(np.zeros(4)).tolist() == [0, 1, 2, 3]
-    assert _number(np.zeros(1)).tolist() == [0]
+    assert number_frames(np.arange(30) * period + jitter).tolist() == list(range(30))
+    assert number_frames(np.round(np.arange(3000) * period)).tolist() == list(range(3000))  # times in whole ms
+    assert number_frames(np.zeros(4)).tolist() == [0, 1, 2, 3]
+    assert number_frames(np.zeros(1)).tolist() == [0]
 
 
 def test_frames_of_another_size_are_lost(tmp_path):

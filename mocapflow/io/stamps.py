@@ -1,0 +1,57 @@
+"""Time stamps of the frames of a video file, read without decoding it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mocapflow.records import F64, I32
+
+
+@contextmanager
+def open_capture(path: Path, *options: int) -> Iterator[Any]:
+    """Open a video file with one thread; options are pairs of cv2.CAP_PROP_* and value."""
+    import cv2
+
+    capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG, [cv2.CAP_PROP_N_THREADS, 1, *options])
+    try:
+        yield capture
+    finally:
+        capture.release()
+
+
+def grabs(capture: Any) -> Iterator[None]:
+    """Advance frame by frame to the end; a damaged one counts as a failed attempt and is passed over."""
+    import cv2
+
+    patience = max(1000, int(capture.get(cv2.CAP_PROP_FRAME_COUNT)))  # failed attempts at the end cost nothing
+    failed = 0
+    while failed < patience:
+        if capture.grab():
+            failed = 0
+            yield
+        else:
+            failed += 1
+
+
+def read_stamps(path: Path) -> tuple[int, float, F64]:
+    """Return the declared number of frames, the frame rate, and the sorted stamps (N,) ms; nothing is decoded."""
+    import cv2
+
+    with open_capture(path, cv2.CAP_PROP_FORMAT, -1) as capture:
+        declared, rate = capture.get(cv2.CAP_PROP_FRAME_COUNT), capture.get(cv2.CAP_PROP_FPS)
+        stamps = np.sort([capture.get(cv2.CAP_PROP_POS_MSEC) for _ in grabs(capture)])
+    rate = rate if np.isfinite(rate) and 0 < rate < 1e5 else 0.0
+    return max(0, int(declared)), rate, stamps[stamps >= 0] if len(stamps) else np.empty(0)
+
+
+def number_frames(stamps: F64) -> I32:
+    """Return the frame number of each stamp: a gap of k periods is k - 1 lost frames."""
+    gaps = np.diff(stamps)
+    period = np.median(gaps) if len(gaps) else 0.0
+    steps = np.maximum(1, np.round(gaps / period)) if period > 0 else np.ones(len(gaps))
+    return np.concatenate([[0], np.cumsum(steps)]).astype(np.int32)
