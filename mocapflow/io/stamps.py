@@ -28,7 +28,8 @@ def grabs(capture: Any) -> Iterator[None]:
     """Advance frame by frame to the end; a damaged one counts as a failed attempt and is passed over."""
     import cv2
 
-    patience = max(1000, int(capture.get(cv2.CAP_PROP_FRAME_COUNT)))  # failed attempts at the end cost nothing
+    declared = capture.get(cv2.CAP_PROP_FRAME_COUNT)  # anything at all, in a damaged file
+    patience = int(np.clip(np.nan_to_num(declared), 1000, 1_000_000))  # failed attempts at the end cost nothing
     failed = 0
     while failed < patience:
         if capture.grab():
