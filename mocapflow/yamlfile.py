@@ -139,29 +139,37 @@ def _extended(child: Document, path: Path) -> Document:
 
 def _changed(document: Document, target: str, new: Document) -> Document:
     """Return the document with the value at a dotted path replaced."""
-    *inner, last = target.split(".")
-    steps: Steps = ()
+    parts = target.split(".")
     values = holder = _copy(document.values)
-    for part in [*inner, last]:
-        where = new.place(()).text
-        key: str | int = int(part) if isinstance(holder, list) and part.isdecimal() else part
-        if isinstance(holder, list):
-            known: Iterable[str] = map(str, range(len(holder)))
-            missing = key not in range(len(holder))
-        elif isinstance(holder, dict):
-            known, missing = holder, key not in holder and len(steps) < len(inner)
-        else:
-            known, missing = (), True
-        if missing:
-            raise PipelineError(f"there is no '{dotted((*steps, part))}'", where=where, hint=alternatives(part, known))
+    steps: Steps = ()
+    for part in parts:
+        if steps:
+            holder = _opened(holder, steps[-1])
+        key = int(part) if isinstance(holder, list) and part.isdecimal() else part
+        if not _may_hold(holder, key, last=len(steps) == len(parts) - 1):
+            known = (
+                holder if isinstance(holder, dict) else map(str, range(len(holder) if isinstance(holder, list) else 0))
+            )
+            hint = alternatives(part, known)
+            raise PipelineError(f"there is no '{dotted((*steps, part))}'", where=new.place(()).text, hint=hint)
         steps = (*steps, key)
-        if len(steps) <= len(inner):
-            if isinstance(holder[key], str):  # a bare name, about to be given settings
-                holder[key] = {"use": holder[key]}
-            holder = holder[key]
     holder[steps[-1]] = new.values
     kept = {at: place for at, place in document.places.items() if at[: len(steps)] != steps}
     return Document(values, {**kept, **{(*steps, *at): place for at, place in new.places.items()}})
+
+
+def _opened(holder: Any, key: str | int) -> Any:
+    """Return the value of a key, to be written into: a bare name gets settings, a group left out is made."""
+    value = holder.get(key, {}) if isinstance(holder, dict) else holder[key]
+    holder[key] = {"use": value} if isinstance(value, str) else value
+    return holder[key]
+
+
+def _may_hold(holder: Any, key: str | int, last: bool) -> bool:
+    """True where a path can go on at a key: it is there, or may be new as a setting of a component."""
+    if isinstance(holder, list):
+        return isinstance(key, int) and key < len(holder)
+    return isinstance(holder, dict) and (key in holder or last or "use" in holder)
 
 
 def _copy(value: Any) -> Any:

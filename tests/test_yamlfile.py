@@ -71,6 +71,8 @@ def test_changes_of_the_command_line_come_last(folder):
     document = read(Path("base.yaml"), ["stages.track.draper.gap_mm=1.5", "frames={start: 3}"])
     assert document.values["stages"]["track"]["draper"] == {"use": "kinematic", "gap_mm": 1.5}
     assert document.values["frames"] == {"start": 3}
+    steady = read(Path("base.yaml"), ["stages.track.steady.turns=3"]).values["stages"]["track"]["steady"]
+    assert steady == {"turns": 3}  # settings that the file leaves out
     assert document.place(("frames", "start")).text == "--set frames={start: 3}"
 
 
