@@ -42,7 +42,7 @@ class LevelSet(Segmenter):
     rho_px: Positive = 12.0  # Gaussian window of the local statistics; inf: one Gaussian per region
     cell_px: Count = 8  # the statistics are summed over cells of this size
     stride_px: Count = 2  # and taken from every so many-th pixel; 1: from all
-    variance_floor: Positive = 0.02  # smallest standard deviation, share of a channel's range
+    variance_floor: Positive = 0.03  # smallest standard deviation inside and outside, share of a channel's range
     sigma_px: Positive = 1.5  # width of the smooth step
     length_weight: NonNegative = 0.9  # nu; explicit steps are stable below 0.94
     shape_weight: NonNegative = 0.05  # lambda: 0.05 clean, 0.1 with occlusion, 0.1-0.3 in heavy noise, 0 uncoupled

@@ -1,0 +1,138 @@
+"""The segmenters levelset and grabcut as components."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from levelset_scenes import ellipse
+
+from mocapflow.data import Past, Turn
+from mocapflow.geometry.silhouettes import model_distance
+from mocapflow.model import moved
+from mocapflow.testing import pictures, scenes
+from mocapflow_levelset.grabcut import GrabCut
+from mocapflow_levelset.levelset import LevelSet
+from mocapflow_levelset.masks import counted, without_cut
+from mocapflow_levelset.redistance import redistance
+from mocapflow_levelset.view import View, find
+
+FIRST, LATER = Turn(index=0, cap=8), Turn(index=1, cap=8)
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return scenes.tiny_scene()
+
+
+@pytest.fixture(scope="module")
+def pose(scene):
+    return scenes.tiny_pose(scene, 3, 0.1)
+
+
+def believed(pose):
+    return moved(pose, np.full(6 + len(pose.angles), 0.01))
+
+
+def overlaps(found, scene, pose):
+    masks = pictures.tiny_masks(scene, pose)
+    inside = [s.distance > 0 for s in found.silhouettes]
+    return [(a & b).sum() / (a | b).sum() for a, b in zip(inside, masks, strict=True)]
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_it_corrects_the_predicted_outline(scene, pose, known):
+    frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, believed(pose))
+    segmenter = LevelSet(use_background=known, shape_weight=0.01)
+    found = segmenter.segment(frame, state, Past(), scene, FIRST)
+    surface = scene.surface(state.estimate.pose, state.cloth)
+    model = [model_distance(surface, camera, 12.0) > 0 for camera in scene.cameras]
+    before = [(a & b).sum() / (a | b).sum() for a, b in zip(model, pictures.tiny_masks(scene, pose), strict=True)]
+    after = overlaps(found, scene, pose)
+    assert min(after) > 0.93
+    assert np.mean(after) > np.mean(before) + 0.03
+
+
+def test_later_turns_start_from_the_last_silhouettes(scene, pose):
+    """A warm start with few steps stays at the solution although the model is off."""
+    frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, believed(pose))
+    segmenter = LevelSet(shape_weight=0.01)
+    first = segmenter.segment(frame, state, Past(), scene, FIRST)
+    second = segmenter.segment(frame, replace(state, segmentation=first), Past(), scene, LATER)
+    assert np.mean(overlaps(second, scene, pose)) > np.mean(overlaps(first, scene, pose)) - 0.01
+
+
+def test_energies_are_named_by_view_and_term(scene, pose):
+    frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, pose)
+    energies = LevelSet().segment(frame, state, Past(), scene, FIRST).energies
+    assert {"cam01.data", "cam01.length", "cam01.shape", "cam04.data"} <= set(energies)
+    assert np.isfinite(list(energies.values())).all()
+    assert energies["cam01.length"] > 0 and energies["cam01.data"] < 0
+
+
+def test_a_person_outside_a_view_gives_an_empty_silhouette(scene, pose):
+    away = moved(pose, np.concatenate([[0, 0, 0, 0, 0, 40.0], np.zeros(len(pose.angles))]))
+    frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, away, pose)
+    for segmenter in (LevelSet(), GrabCut()):
+        found = segmenter.segment(frame, state, Past(), scene, FIRST)
+        assert all((s.distance == -12).all() for s in found.silhouettes)
+
+
+def test_the_contour_is_sub_pixel():
+    """A disc drawn with soft edges at a place between pixels is found to 0.15 px in the mean."""
+    rows, columns = np.mgrid[:160, :160]
+    exact = (40.3 - np.hypot(columns - 80.4, rows - 79.7)).astype(np.float32)
+    alpha = np.clip(exact / 1.6 + 0.5, 0, 1)[..., None]
+    noise = np.random.default_rng(0).normal(0, 3, (160, 160, 3))
+    image = np.clip(alpha * [60, 90, 150] + (1 - alpha) * [140, 130, 120] + noise, 0, 255).astype(np.uint8)
+    empty = np.full((160, 160, 3), (140, 130, 120), np.float32)
+    start = redistance(np.roll(exact, 4, axis=1), 12.0)
+    view = View(image, start, start, counted(start.shape, 3), (empty, np.full_like(empty, 3)))
+    for plate in (view.plate, None):
+        segmenter = LevelSet(shape_weight=0.0)
+        levels, method = segmenter._levels(False, plate is not None), segmenter._method()
+        found = find(view._replace(plate=plate), levels, method, 12.0).level
+        at = np.abs(found) < 0.7
+        assert abs((found - exact)[at].mean()) < 0.15
+        assert np.abs((found - exact)[at]).mean() < 0.35
+
+
+def test_the_literal_chapter_runs(scene, pose):
+    frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, believed(pose))
+    literal = LevelSet(
+        channels=("grey",), use_background=False, decorrelate=False, coarse_steps=0, cell_px=1, stride_px=1, steps=20,
+        statistics_every=1, redistance_every=5, length_weight=0.5, variance_floor=0.02,
+    )  # fmt: skip
+    assert min(overlaps(literal.segment(frame, state, Past(), scene, FIRST), scene, pose)) > 0.85
+
+
+def test_beyond_a_cut_nothing_counts(scene, pose):
+    """Pixels nearest to the rim of a partial body are masked; those at its sides are not."""
+    surface = scene.surface(pose, scenes.tiny_cloth(scene, pose))
+    camera = scene.cameras[0]
+    model = model_distance(surface, camera, 12.0)
+    top = surface.vertices[:, 2] > np.quantile(surface.vertices[:, 2], 0.98)
+    partial = replace(scene.body, cut=top[: len(scene.body.vertices)])
+    weight = without_cut(counted(model.shape, 3), model, partial, surface, camera)
+    first_row = np.flatnonzero((model > 0).any(axis=1))[0]
+    column = int(np.median(np.flatnonzero(model[first_row] > 0)))
+    assert weight[max(first_row - 6, 3), column] == 0
+    below = np.flatnonzero((model > 0).any(axis=1))[-1]
+    assert weight[(first_row + below) // 2].sum() > 0.9 * (weight.shape[1] - 6)
+    assert (without_cut(counted(model.shape, 3), model, scene.body, surface, camera) > 0).sum() == 234 * 314
+
+
+def test_grabcut_repeats_exactly(scene, pose):
+    frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, believed(pose))
+    one, two = (GrabCut().segment(frame, state, Past(), scene, FIRST) for _ in range(2))
+    for a, b in zip(one.silhouettes, two.silhouettes, strict=True):
+        np.testing.assert_array_equal(a.distance, b.distance)
+    assert min(overlaps(one, scene, pose)) > 0.8
+
+
+def test_the_start_may_touch_the_image_border():
+    start = ellipse(x=10, y=20)
+    image = np.random.default_rng(0).integers(0, 256, (160, 160, 3), dtype=np.uint8)
+    segmenter = LevelSet()
+    view = View(image, start, start, counted(start.shape, 3))
+    found = find(view, segmenter._levels(False, False), segmenter._method(), 12.0)
+    assert np.isfinite(found.level).all() and found.level.shape == start.shape
