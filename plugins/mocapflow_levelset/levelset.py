@@ -72,8 +72,6 @@ class LevelSet(Segmenter):
         """Return the person's silhouette in each usable view.
 
         The first turn starts from the projected model, later turns from the last turn's silhouettes.
-
-        Source: Rosenhahn 2008, Eq. (12.1), (12.9) and (12.10)
         """
         surface = scene.surface(state.estimate.pose, state.cloth)
         last = {s.camera: s.distance for s in state.segmentation.silhouettes if s.layer == PERSON}

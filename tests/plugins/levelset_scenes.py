@@ -1,7 +1,6 @@
 """Synthetic pictures with a known outline for the tests of the segmenters."""
 
 import numpy as np
-
 from mocapflow_levelset.evidence import from_features
 from mocapflow_levelset.evolve import Rhythm, Weights, settle
 from mocapflow_levelset.redistance import redistance

@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
+from mocapflow_levelset.background import BackgroundDifference
+from mocapflow_sequence.background import EmptyScene, temporal_median
 
 from mocapflow.data import Background, Past, Turn
 from mocapflow.errors import RecordingError
 from mocapflow.recording import open_recording
 from mocapflow.shipped import shipped
 from mocapflow.testing import pictures, scenes
-from mocapflow_levelset.background import BackgroundDifference
-from mocapflow_sequence.background import EmptyScene, temporal_median
 
 FIRST = Turn(index=0, cap=8)
 SHAPE = (200, 240)

@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from levelset_scenes import ellipse
-
-from mocapflow.data import Past, Turn
-from mocapflow.geometry.silhouettes import model_distance
-from mocapflow.model import moved
-from mocapflow.testing import pictures, scenes
 from mocapflow_levelset.grabcut import GrabCut
 from mocapflow_levelset.levelset import LevelSet
 from mocapflow_levelset.masks import counted, without_cut
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.view import View, find
+
+from mocapflow.data import Past, Turn
+from mocapflow.geometry.silhouettes import model_distance
+from mocapflow.model import moved
+from mocapflow.testing import pictures, scenes
 
 FIRST, LATER = Turn(index=0, cap=8), Turn(index=1, cap=8)
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 from levelset_scenes import ellipse
-
 from mocapflow_levelset.energy import curvature, delta, descent, energy, heaviside, length
 from mocapflow_levelset.evolve import Weights, advance, near
 from mocapflow_levelset.redistance import redistance
@@ -42,6 +41,7 @@ def test_descent_of_data_and_shape_is_the_negative_gradient():
     level, prior = circle(7.0, 22, 11, 10), circle(8.0, 22, 12, 10)
     inside, outside = rng.normal(size=(2, 22, 22))
     for shape_weight in (0.0, 0.05):
+
         def total(moved, shape_weight=shape_weight):
             return sum(energy(moved, inside, outside, prior, SIGMA, 0.0, shape_weight))
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from mocapflow_levelset.redistance import redistance
 
 

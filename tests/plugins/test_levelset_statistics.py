@@ -2,7 +2,6 @@
 
 import numpy as np
 from levelset_scenes import ellipse, ramp_scene
-
 from mocapflow_levelset.channels import features
 from mocapflow_levelset.energy import heaviside
 from mocapflow_levelset.evidence import from_features
