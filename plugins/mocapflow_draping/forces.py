@@ -15,29 +15,46 @@ from mocapflow.errors import PluginError, alternatives
 from mocapflow.records import F64
 
 HARMONICS = {"flare": 0, "wind": 1, "two": 2}
+STEEPEST = np.radians(80.0)  # a tail tilted further would rise above its support
 MEANING = re.compile(r"(?P<force>flare|wind|two)(_(?P<part>cos|sin))?_rad")
 
 
-def tail_angles(garment: GarmentMesh, parameters: F64, azimuth: F64) -> F64:
-    """Return the tail angle (B, N) rad of each strand for parameters (B, Q); positive stands out from the body.
+def tilts(garment: GarmentMesh, parameters: F64, azimuth: F64) -> tuple[F64, F64]:
+    """Return how far each tail is tilted (B, N) rad, outwards and to its left, for parameters (B, Q).
+
+    A ring of cloth does not stretch, so what bulges out at one azimuth comes from the sides: a term cos(n a) outwards
+    goes with -sin(n a) / n sideways. At n = 1 every strand then tilts the same way: a wind.
 
     Raises:
         PluginError: the garment declares a parameter this draper has no meaning for.
     """
-    angles = np.zeros((len(parameters), len(azimuth)))
+    out = np.zeros((len(parameters), len(azimuth)))
+    aside = np.zeros_like(out)
     for column, name in enumerate(garment.parameter_names):
         if name == "thickness_m":
             continue
-        found = MEANING.fullmatch(name)
-        if found is None:
-            known = ["thickness_m", "flare_rad", "wind_cos_rad", "wind_sin_rad", "two_cos_rad", "two_sin_rad"]
-            raise PluginError(
-                f"garment {garment.name} has a parameter '{name}' that draper kinematic does not know",
-                hint=alternatives(name, known),
-            )
-        wave = np.sin if found["part"] == "sin" else np.cos
-        angles += parameters[:, column, None] * wave(HARMONICS[found["force"]] * azimuth)
-    return angles
+        order, part = _meaning(garment, name)
+        amount = parameters[:, column, None]
+        if order == 0:
+            out += amount
+        elif part == "cos":
+            out += amount * np.cos(order * azimuth)
+            aside -= amount * np.sin(order * azimuth) / order
+        else:
+            out += amount * np.sin(order * azimuth)
+            aside += amount * np.cos(order * azimuth) / order
+    return np.clip(out, -STEEPEST, STEEPEST), np.clip(aside, -STEEPEST, STEEPEST)
+
+
+def _meaning(garment: GarmentMesh, name: str) -> tuple[int, str]:
+    found = MEANING.fullmatch(name)
+    if found is None:
+        known = ["thickness_m", "flare_rad", "wind_cos_rad", "wind_sin_rad", "two_cos_rad", "two_sin_rad"]
+        raise PluginError(
+            f"garment {garment.name} has a parameter '{name}' that draper kinematic does not know",
+            hint=alternatives(name, known),
+        )
+    return HARMONICS[found["force"]], found["part"] or "cos"
 
 
 def thickness(garment: GarmentMesh, parameters: F64) -> F64:

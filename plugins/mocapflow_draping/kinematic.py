@@ -16,8 +16,11 @@ from mocapflow.geometry.kinematics import chain_batch
 from mocapflow.records import F64, record
 from mocapflow.scene import Scene
 from mocapflow_draping.fields import BodyFields, build_fields, part_transforms, touchable_joints
-from mocapflow_draping.forces import tail_angles, thickness
-from mocapflow_draping.strands import Strands, roots_and_facing, strands_of
+from mocapflow_draping.forces import thickness, tilts
+from mocapflow_draping.frames import hanging, riding
+from mocapflow_draping.strands import Strands, roots, strands_of
+
+Bodies = tuple[F64, F64, F64]
 
 
 @record
@@ -36,9 +39,13 @@ class Kinematic(Draper):
     """
 
     name: ClassVar[str] = "kinematic"
-    skin_m: Annotated[float, Field(ge=0)] = 0.004  # room between skin and cloth of no thickness
+    skin_m: Annotated[float, Field(ge=0)] = 0.005  # room between skin and cloth of no thickness
     voxel_m: Annotated[float, Field(gt=0)] = 0.010
     start_deg: Annotated[float, Field(gt=0, lt=180)] = 95.0  # how far out from straight down a strand begins to fall
+    sweeps: Annotated[int, Field(ge=0)] = 10  # of the rings, per row; 0 leaves them as they fell
+    longest: Annotated[float, Field(ge=1)] = 1.0  # of a ring link, over its rest length
+    stiff: Annotated[float, Field(ge=0, le=1)] = 0.3  # how much a ring resists being shortened
+    straight: Annotated[float, Field(ge=0, le=1)] = 0.1  # how much a ring resists sharp folds
     _fittings: WeakKeyDictionary[GarmentMesh, Fitting] = PrivateAttr(default_factory=WeakKeyDictionary)
 
     def drape(self, poses: PoseBatch, parameters: F64, past: Past, scene: Scene) -> F64:
@@ -49,12 +56,17 @@ class Kinematic(Draper):
         fitting = self._fitting(garment, scene.body)
         strands = fitting.strands
         chain = chain_batch(scene.body, poses)
-        roots, facing = roots_and_facing(strands, chain)
-        stop = tail_angles(garment, parameters, strands.azimuth)
+        bodies = part_transforms(fitting.fields, chain)
         skin = self.skin_m + thickness(garment, parameters) / 2
-        draped = self._swing(fitting, chain, roots, facing, stop, skin)
+        out, aside = tilts(garment, parameters, strands.azimuth)
+        if strands.rides.any():
+            grid = riding(strands, chain, out, aside)
+        else:
+            grid = self._fall(fitting, chain, out, aside, skin, bodies)
+        if self.sweeps:
+            self._close(fitting, grid, skin, bodies)
         vertices = np.empty((len(chain), len(garment.vertices), 3))
-        vertices[:, strands.vertex] = draped
+        vertices[:, strands.vertex[strands.own]] = grid[:, strands.own]
         return vertices
 
     def _fitting(self, garment: GarmentMesh, body: Body) -> Fitting:
@@ -66,15 +78,25 @@ class Kinematic(Draper):
             self._fittings[garment] = known
         return known
 
-    def _swing(self, fitting: Fitting, chain: F64, roots: F64, facing: F64, stop: F64, skin: F64) -> F64:
+    def _fall(self, fitting: Fitting, chain: F64, out: F64, aside: F64, skin: F64, bodies: Bodies) -> F64:
         from mocapflow_draping.swing import swing_batch
 
-        strands, fields = fitting.strands, fitting.fields
-        out = np.empty((*roots.shape[:2], strands.vertex.shape[1], 3))
-        support = np.empty(roots.shape[:2], np.int32)
-        start = math.radians(self.start_deg)
+        strands = fitting.strands
+        facing, down = hanging(strands, chain, out, aside)
+        grid = np.empty((*out.shape, strands.vertex.shape[1], 3))
+        support = np.empty(out.shape, np.int32)
+        start = np.full(out.shape, math.radians(self.start_deg))
         swing_batch(
-            roots, facing, stop, start, skin, strands.links, strands.counts,
-            part_transforms(fields, chain), fields.solid, out, support,
+            roots(strands, chain), facing, down, start, skin, strands.links, strands.first, strands.last,
+            bodies, fitting.fields.solid, grid, support,
         )  # fmt: skip
-        return out
+        return grid
+
+    def _close(self, fitting: Fitting, grid: F64, skin: F64, bodies: Bodies) -> None:
+        from mocapflow_draping.rings import close_batch
+
+        strands = fitting.strands
+        close_batch(
+            grid, strands.links, strands.first, strands.last, strands.beside, strands.ring_length, skin,
+            self.longest, self.stiff, self.straight, self.sweeps, bodies, fitting.fields.solid,
+        )  # fmt: skip

@@ -2,28 +2,47 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from mocapflow.data import Body, GarmentMesh
 from mocapflow.errors import PluginError
-from mocapflow.records import F64, I32, array, record
+from mocapflow.records import F64, I32, Bool, array, record
 
 
 @record
 class Strands:
-    """N strands of up to L particles, padded; what carries their upper ends, and the links around them."""
+    """N strands over L rows; what carries their upper ends, and the links around them.
 
-    vertex: I32 = array("N", "L", unit="cloth vertex, the last one repeated as padding")
-    counts: I32 = array("N", unit="particles")
+    Ring links join particles of one row, so a strand that begins at a seam has its first particle in the row of
+    that seam; rows without a particle repeat the nearest one of the strand.
+    """
+
+    vertex: I32 = array("N", "L", unit="cloth vertex")
+    first: I32 = array("N", unit="row of the pinned particle")
+    last: I32 = array("N", unit="row of the last particle")
     links: F64 = array("N", "K", unit="m, lengths of the K = L - 1 bars")
-    root: F64 = array("N", 3, unit="m, the pinned end at rest")
+    rest: F64 = array("N", "L", 3, unit="m, particles at rest")
     root_joint: I32 = array("N", 5, unit="joint index")
     root_weight: F64 = array("N", 5, unit="1")
     facing: F64 = array("N", 3, unit="1, horizontal unit direction in which the strand stands out, at rest")
     azimuth: F64 = array("N", unit="rad, of facing")
     carrier: I32 = array("N", unit="joint that turns the strand before it falls")
+    rides: Bool = array("N", unit="True where another joint than the pinned end's carries the strand along")
+    tail: Bool = array("N", "L", unit="True for particles that move with `carrier`")
+    skin_joint: I32 = array("N", "L", 5, unit="joint index, of the skin nearest at rest")
+    skin_weight: F64 = array("N", "L", 5, unit="1")
     beside: I32 = array("N", "L", unit="strand linked on its left-hand side in this row, or -1")
     ring_length: F64 = array("N", "L", unit="m, of that link")
+
+    @cached_property
+    def own(self) -> Bool:
+        """(N, L), True where a strand has a particle of its own."""
+        return _own(self.first, self.last, self.vertex.shape[1])
 
 
 def strands_of(garment: GarmentMesh, body: Body) -> Strands:
@@ -32,73 +51,143 @@ def strands_of(garment: GarmentMesh, body: Body) -> Strands:
     Raises:
         PluginError: a strand does not begin at a pinned vertex or has a link without length.
     """
-    used = garment.strands >= 0
-    counts = used.sum(axis=1).astype(np.int32)
-    vertex = np.where(used, garment.strands, np.take_along_axis(garment.strands, counts[:, None] - 1, axis=1))
+    vertex, first, last = _rows(garment)
     rows = garment.vertices[vertex]
     links = np.linalg.norm(np.diff(rows, axis=1), axis=2)
-    if (links[used[:, 1:]] <= 0).any():
-        strand = int(np.argwhere((links <= 0) & used[:, 1:])[0, 0])
+    own = _own(first, last, vertex.shape[1])
+    if (links[own[:, 1:] & own[:, :-1]] <= 0).any():
+        strand = int(np.argwhere((links <= 0) & own[:, 1:] & own[:, :-1])[0, 0])
         raise PluginError(
             f"garment {garment.name}: strand {strand} has a link of zero length",
             hint="each vertex of a strand must lie below the one before it",
         )
-    pin = {int(v): int(skin) for v, skin in zip(garment.pinned, garment.pinned_to, strict=True)}
-    loose = [int(v) for v in vertex[:, 0] if int(v) not in pin]
-    if loose:
-        raise PluginError(
-            f"garment {garment.name}: the strand of vertex {loose[0]} hangs from nothing",
-            hint="the first vertex of every strand must be in `pinned`",
-        )
-    skin = np.array([pin[int(v)] for v in vertex[:, 0]])
-    facing = _facing(rows, counts)
-    beside, ring_length = _beside(garment, vertex, used)
+    skin = _pinned_skin(garment, vertex[:, 0])
+    beside, ring_length = _beside(garment, vertex, own)
+    carrier = garment.carried_by[vertex[:, -1]]
+    rides = carrier != _main_joint(body, skin)
+    facing = np.where(rides[:, None], _from_middle(rows, beside), _along(rows))
+    under = cKDTree(body.vertices).query(rows)[1]
     return Strands(
-        vertex=vertex.astype(np.int32),
-        counts=counts,
+        vertex=vertex,
+        first=first,
+        last=last,
         links=links,
-        root=rows[:, 0].copy(),
+        rest=rows,
         root_joint=body.skin_joint[skin],
         root_weight=body.skin_weight[skin],
         facing=facing,
         azimuth=np.arctan2(facing[:, 1], facing[:, 0]),
-        carrier=garment.carried_by[vertex[:, -1]],
+        carrier=carrier,
+        rides=rides,
+        tail=garment.carried_by[vertex] == carrier[:, None],
+        skin_joint=body.skin_joint[under],
+        skin_weight=body.skin_weight[under],
         beside=beside,
         ring_length=ring_length,
     )
 
 
-def roots_and_facing(strands: Strands, chain: F64) -> tuple[F64, F64]:
-    """Return where strands are pinned (B, N, 3) m and where they face (B, N, 2), at posed joints (B, J, 4, 4)."""
-    held = np.einsum("nk,bnkij->bnij", strands.root_weight, chain[:, strands.root_joint])
-    roots = np.einsum("bnij,nj->bni", held[..., :3, :3], strands.root) + held[..., :3, 3]
-    facing = np.einsum("bnij,nj->bni", chain[:, strands.carrier, :3, :3], strands.facing)[..., :2]
-    length = np.linalg.norm(facing, axis=-1, keepdims=True)
-    return roots, facing / np.maximum(length, 1e-9)
-
-
-def _facing(rows: F64, counts: I32) -> F64:
-    """Return the horizontal directions (N, 3) in which strands stand out: along the cloth, or from its middle."""
-    ends = rows[np.arange(len(rows)), counts - 1]
-    out = (ends - rows[:, 0]) * [1.0, 1.0, 0.0]
-    straight = np.linalg.norm(out, axis=1) < 1e-6 * np.ptp(rows[..., 2])
-    middle = (rows[:, 0] - rows[:, 0].mean(axis=0)) * [1.0, 1.0, 0.0]
-    out = np.where(straight[:, None], middle, out)
-    facing: F64 = out / np.linalg.norm(out, axis=1, keepdims=True)
-    return facing
-
-
-def _beside(garment: GarmentMesh, vertex: I32, used: np.ndarray) -> tuple[I32, F64]:
-    """Return for each particle the strand it is linked to within its row, and the length of that link."""
-    strand, row = np.full((2, len(garment.vertices)), -1)
-    strand[vertex[used]], row[vertex[used]] = np.nonzero(used)
+def _rows(garment: GarmentMesh) -> tuple[I32, I32, I32]:
+    """Return vertices by strand and row (N, L), and each strand's first and last row (N,)."""
+    used = garment.strands >= 0
+    counts = used.sum(axis=1)
+    strand, place = np.full((2, len(garment.vertices)), -1)
+    strand[garment.strands[used]], place[garment.strands[used]] = np.nonzero(used)
     a, b = garment.rings.T
-    if (row[a] != row[b]).any():
-        bad = int(np.flatnonzero(row[a] != row[b])[0])
+    first = _levels(strand[a], strand[b], place[a] - place[b], len(counts))
+    bad = np.flatnonzero(first[strand[a]] + place[a] != first[strand[b]] + place[b])
+    if len(bad):
         raise PluginError(
-            f"garment {garment.name}: ring link {bad} joins rows {row[a[bad]]} and {row[b[bad]]}",
+            f"garment {garment.name}: ring link {bad[0]} joins vertices {a[bad[0]]} and {b[bad[0]]} of two rows",
             hint="a ring link joins two strands at the same row",
         )
+    last = first + counts - 1
+    at = np.clip(np.arange(last.max() + 1) - first[:, None], 0, counts[:, None] - 1)
+    vertex = np.take_along_axis(garment.strands, at, axis=1)
+    return vertex.astype(np.int32), first.astype(np.int32), last.astype(np.int32)
+
+
+def _levels(a: I32, b: I32, step: I32, count: int) -> I32:
+    """Return first[...] of `count` strands such that first[b] - first[a] = step for linked strands."""
+    level, known = np.zeros(count, np.int32), np.zeros(count, bool)
+    for root in range(count):
+        before = known.copy()
+        known[root] = True
+        while True:
+            ahead, behind = known[a] & ~known[b], known[b] & ~known[a]
+            if not ahead.any() and not behind.any():
+                break
+            level[b[ahead]], known[b[ahead]] = (level[a] + step)[ahead], True
+            level[a[behind]], known[a[behind]] = (level[b] - step)[behind], True
+        new = known & ~before
+        level[new] -= level[new].min(initial=0)
+    return level
+
+
+def _own(first: I32, last: I32, rows: int) -> Bool:
+    row = np.arange(rows)
+    own: Bool = (row >= first[:, None]) & (row <= last[:, None])
+    return own
+
+
+def _pinned_skin(garment: GarmentMesh, roots: I32) -> I32:
+    pin = {int(v): int(skin) for v, skin in zip(garment.pinned, garment.pinned_to, strict=True)}
+    loose = [int(v) for v in roots if int(v) not in pin]
+    if loose:
+        raise PluginError(
+            f"garment {garment.name}: the strand of vertex {loose[0]} hangs from nothing",
+            hint="the first vertex of every strand must be in `pinned`",
+        )
+    return np.array([pin[int(v)] for v in roots], np.int32)
+
+
+def carried(strands: Strands, chain: F64) -> F64:
+    """Return all particles (B, N, L, 3) m moved with the skin nearest to them, at posed joints (B, J, 4, 4)."""
+    moved = np.einsum("nlk,bnlkij->bnlij", strands.skin_weight, chain[:, strands.skin_joint, :3])
+    rest: F64 = np.einsum("bnlij,nlj->bnli", moved[..., :3], strands.rest) + moved[..., 3]
+    return rest
+
+
+def roots(strands: Strands, chain: F64) -> F64:
+    """Return where strands are pinned (B, N, 3) m, at posed joints (B, J, 4, 4)."""
+    held = np.einsum("nk,bnkij->bnij", strands.root_weight, chain[:, strands.root_joint, :3])
+    pinned: F64 = np.einsum("bnij,nj->bni", held[..., :3], strands.rest[:, 0]) + held[..., 3]
+    return pinned
+
+
+def _main_joint(body: Body, skin: I32) -> I32:
+    """Return the joint (N,) that moves most of the skin a strand is pinned to, one for the whole of its ring."""
+    weight = np.zeros(len(body.parents))
+    np.add.at(weight, body.skin_joint[skin], body.skin_weight[skin])
+    return np.full(len(skin), weight.argmax(), np.int32)
+
+
+def _along(rows: F64) -> F64:
+    """Return the horizontal directions (N, 3) in which strands stand out, or of their roots where they do not."""
+    out = (rows[:, -1] - rows[:, 0]) * [1.0, 1.0, 0.0]
+    straight = np.linalg.norm(out, axis=1) < 1e-6 * np.ptp(rows[..., 2])
+    out = np.where(straight[:, None], (rows[:, 0] - rows[:, 0].mean(axis=0)) * [1.0, 1.0, 0.0], out)
+    along: F64 = out / np.linalg.norm(out, axis=1, keepdims=True)
+    return along
+
+
+def _from_middle(rows: F64, beside: I32) -> F64:
+    """Return the horizontal directions (N, 3) from the middle of each strand's last ring."""
+    count = len(rows)
+    linked = beside[:, -1] >= 0
+    graph = coo_matrix((np.ones(linked.sum()), (np.flatnonzero(linked), beside[linked, -1])), shape=(count, count))
+    _, ring = connected_components(graph, directed=False)
+    middle = np.stack([np.bincount(ring, rows[:, -1, a]) / np.bincount(ring) for a in range(3)], axis=1)
+    out = (rows[:, -1] - middle[ring]) * [1.0, 1.0, 0.0]
+    away: F64 = out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
+    return away
+
+
+def _beside(garment: GarmentMesh, vertex: I32, own: Bool) -> tuple[I32, F64]:
+    """Return for each particle the strand it is linked to within its row, and the length of that link."""
+    strand, row = np.full((2, len(garment.vertices)), -1)
+    strand[vertex[own]], row[vertex[own]] = np.nonzero(own)
+    a, b = garment.rings.T
     beside, length = np.full(vertex.shape, -1, np.int32), np.zeros(vertex.shape)
     beside[strand[a], row[a]] = strand[b]
     length[strand[a], row[a]] = garment.ring_length

@@ -18,17 +18,18 @@ TOUCH = 2e-4  # m, nearer than this to the contact distance counts as touching
 
 
 @numba.njit(cache=True)
-def swing_batch(roots, facing, stop, start, skin, links, counts, bodies, solid, out, support):  # type: ignore[no-untyped-def]
+def swing_batch(roots, facing, down, start, skin, links, first, last, bodies, solid, out, support):  # type: ignore[no-untyped-def]
     """Drape N strands of up to L particles on B posed bodies.
 
     Args:
         roots: (B, N, 3) m, where each strand is pinned.
-        facing: (B, N, 2), the horizontal unit direction in which each strand stands before it falls.
-        stop: (B, N) rad, the tail angle at which a strand comes to rest: 0 hangs straight down, positive outwards.
-        start: rad, the tail angle before the fall.
+        facing: (B, N, 3), unit direction in which each strand stands out, perpendicular to its `down`.
+        down: (B, N, 3), unit direction in which each strand comes to hang: gravity, tilted by forces.
+        start: (B, N) rad, how far from `down` each strand stands before it falls.
         skin: (B,) m, contact distance.
         links: (N, L - 1) m, lengths of the bars.
-        counts: (N,) number of particles of each strand.
+        first: (N,) row of the first particle of each strand.
+        last: (N,) row of the last one.
         bodies: rest_from_world (B, P, 3, 4), stretch (B, P) and ball centres (B, P, 3) of the parts.
         solid: radius, origin, shape, offset, values and 1/voxel of the parts.
         out: (B, N, L, 3) m, written.
@@ -39,31 +40,31 @@ def swing_batch(roots, facing, stop, start, skin, links, counts, bodies, solid, 
     for b in range(len(roots)):
         for n in range(roots.shape[1]):
             support[b, n] = _swing(
-                roots[b, n], facing[b, n], stop[b, n], start, skin[b], links[n], counts[n],
+                roots[b, n], facing[b, n], down[b, n], start[b, n], skin[b], links[n], first[n], last[n],
                 maps[b], stretch[b], centres[b], solid, out[b, n], reach, room,
             )  # fmt: skip
 
 
 @numba.njit(cache=True)
-def _swing(root, facing, stop, start, skin, links, count, maps, stretch, centres, solid, out, reach, room):  # type: ignore[no-untyped-def]
+def _swing(root, facing, down, start, skin, links, first, last, maps, stretch, centres, solid, out, reach, room):  # type: ignore[no-untyped-def]
     radius, origin, shape, offset, values, scale = solid
-    out[0] = root
-    pivot, angle = 0, start
-    while pivot < count - 1:
+    out[first] = root
+    pivot, angle = first, start
+    while pivot < last:
         x, y, z = out[pivot, 0], out[pivot, 1], out[pivot, 2]
         arm = 0.0
-        for k in range(pivot + 1, count):
+        for k in range(pivot + 1, last + 1):
             arm += links[k - 1]
             reach[k], room[k] = arm, 0.0
         touched = -1
         while touched < 0:
-            across, down = math.sin(angle), math.cos(angle)
-            turn = angle - stop
-            for k in range(pivot + 1, count):  # measure only where the room left could end the turn
+            bx, by, bz = _bar(facing, down, angle)
+            turn = angle
+            for k in range(pivot + 1, last + 1):  # measure only where the room left could end the turn
                 if room[k] < reach[k] * turn:
                     r = reach[k]
                     room[k] = body_distance(
-                        x + r * across * facing[0], y + r * across * facing[1], z - r * down,
+                        x + r * bx, y + r * by, z + r * bz,
                         maps, stretch, centres, radius, origin, shape, offset, values, scale,
                     ) - skin  # fmt: skip
                     if room[k] < TOUCH:
@@ -73,15 +74,22 @@ def _swing(root, facing, stop, start, skin, links, count, maps, stretch, centres
             if touched >= 0 or turn <= 0.0:
                 break
             angle -= turn
-            for k in range(pivot + 1, count):
+            for k in range(pivot + 1, last + 1):
                 room[k] -= reach[k] * turn
-        last = touched if touched >= 0 else count - 1
-        across, down = math.sin(angle), math.cos(angle)
-        for k in range(pivot + 1, last + 1):
-            out[k, 0] = x + reach[k] * across * facing[0]
-            out[k, 1] = y + reach[k] * across * facing[1]
-            out[k, 2] = z - reach[k] * down
+        end = touched if touched >= 0 else last
+        bx, by, bz = _bar(facing, down, angle)
+        for k in range(pivot + 1, end + 1):
+            out[k, 0] = x + reach[k] * bx
+            out[k, 1] = y + reach[k] * by
+            out[k, 2] = z + reach[k] * bz
         if touched < 0:
             return pivot
         pivot = touched
     return pivot
+
+
+@numba.njit(cache=True)
+def _bar(facing, down, angle):  # type: ignore[no-untyped-def]
+    """Return the direction of a tail that stands `angle` out from its `down`."""
+    s, c = math.sin(angle), math.cos(angle)
+    return s * facing[0] + c * down[0], s * facing[1] + c * down[1], s * facing[2] + c * down[2]

@@ -39,7 +39,8 @@ class Shorts(Garment):
         outer, inner, around = self._place(body, link, crotch)
         vertices = np.concatenate([outer.reshape(-1, 3), inner.reshape(-1, 3)])
         long = np.arange(outer.shape[0] * self.rings, dtype=np.int32).reshape(-1, self.rings)
-        short = long.size + np.arange(inner.shape[0] * inner.shape[1], dtype=np.int32).reshape(inner.shape[:2])
+        inside = inner.shape[0] * inner.shape[1]
+        short = np.arange(long.size, long.size + inside, dtype=np.int32).reshape(-1, inner.shape[1])
         legs = self._legs(long, short, crotch)
         rings, ring_length = _rings(long, legs, crotch, around)
         strands = np.full((len(long) + len(short), self.rings), -1, np.int32)
