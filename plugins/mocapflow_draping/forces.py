@@ -57,6 +57,25 @@ def _meaning(garment: GarmentMesh, name: str) -> tuple[int, str]:
     return HARMONICS[found["force"]], found["part"] or "cos"
 
 
+def wind(garment: GarmentMesh, parameters: F64, turn: F64) -> tuple[F64, F64]:
+    """Return the chapter's force: horizontal unit direction (B, 3) in the world and amount (B,) rad.
+
+    Args:
+        garment: the garment; only its order 1 parameters are read.
+        parameters: (B, Q).
+        turn: (B, 3, 3), world_from_rest rotation of what carries the garment.
+    """
+    names = garment.parameter_names
+    parts = [
+        parameters[:, names.index(name)] if name in names else np.zeros(len(parameters))
+        for name in ("wind_cos_rad", "wind_sin_rad")
+    ]
+    force = np.einsum("bij,bj->bi", turn[:, :, :2], np.stack(parts, axis=1))
+    force[:, 2] = 0.0
+    amount = np.hypot(parts[0], parts[1])
+    return force / np.maximum(np.linalg.norm(force, axis=1, keepdims=True), 1e-12), amount
+
+
 def thickness(garment: GarmentMesh, parameters: F64) -> F64:
     """Return the cloth's thickness (B,) m; zero where the garment has no such parameter."""
     if "thickness_m" not in garment.parameter_names:

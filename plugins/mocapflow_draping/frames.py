@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mocapflow.records import F64
-from mocapflow_draping.strands import Strands, carried
+from mocapflow_draping.strands import Strands, carried, roots
 
 DOWN = np.array([0.0, 0.0, -1.0])
 
@@ -26,11 +26,15 @@ def hanging(strands: Strands, chain: F64, out: F64, aside: F64) -> tuple[F64, F6
 
 
 def tilted(down: F64, facing: F64, out: F64, aside: F64) -> F64:
-    """Return unit directions (..., 3): `down` tilted towards `facing` by `out` and to its left by `aside` rad."""
+    """Return unit directions (..., 3): `down` turned towards `facing` by `out` and to its left by `aside` rad.
+
+    Both together are one turn, towards one direction: a wind turns every strand by the same angle.
+    """
     left = np.cross(facing, down)
-    tilt = down + np.tan(out)[..., None] * facing + np.tan(aside)[..., None] * left
-    unit: F64 = tilt / np.maximum(np.linalg.norm(tilt, axis=-1, keepdims=True), 1e-9)
-    return unit
+    amount = np.hypot(out, aside)[..., None]
+    sideways = out[..., None] * facing + aside[..., None] * left
+    turned: F64 = np.cos(amount) * down + np.sinc(amount / np.pi) * sideways
+    return turned
 
 
 def perpendicular(facing: F64, down: F64) -> tuple[F64, F64]:
@@ -56,3 +60,15 @@ def riding(strands: Strands, chain: F64, out: F64, aside: F64) -> F64:
     bars = tilted(bars, facing, out[:, :, None] * tail, aside[:, :, None] * tail)
     moved[:, :, 1:] = moved[:, :, :1] + np.cumsum(bars * strands.links[..., None], axis=2)
     return moved
+
+
+def standing(strands: Strands, chain: F64) -> F64:
+    """Return strands (B, N, L, 3) m before they fall: level, or where a limb has carried them."""
+    level = np.zeros_like(strands.facing[:, 0])
+    facing, _ = hanging(strands, chain, np.broadcast_to(level, (len(chain), len(level))), level)
+    reach = np.concatenate([np.zeros((len(level), 1)), np.cumsum(strands.links, axis=1)], axis=1)
+    grid = roots(strands, chain)[:, :, None] + reach[..., None] * facing[:, :, None]
+    if strands.rides.any():
+        ride = riding(strands, chain, np.zeros(facing.shape[:2]), np.zeros(facing.shape[:2]))
+        grid = np.where(strands.rides[:, None, None], ride, grid)
+    return grid

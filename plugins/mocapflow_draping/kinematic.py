@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Literal
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -16,9 +16,11 @@ from mocapflow.geometry.kinematics import chain_batch
 from mocapflow.records import F64, record
 from mocapflow.scene import Scene
 from mocapflow_draping.fields import BodyFields, build_fields, part_transforms, touchable_joints
-from mocapflow_draping.forces import thickness, tilts
-from mocapflow_draping.frames import hanging, riding
+from mocapflow_draping.forces import thickness, tilts, wind
+from mocapflow_draping.frames import hanging, riding, standing
 from mocapflow_draping.strands import Strands, roots, strands_of
+
+LOWER = 0.002  # m, step of a cloth that nothing holds
 
 Bodies = tuple[F64, F64, F64]
 
@@ -42,6 +44,11 @@ class Kinematic(Draper):
     skin_m: Annotated[float, Field(ge=0)] = 0.005  # room between skin and cloth of no thickness
     voxel_m: Annotated[float, Field(gt=0)] = 0.010
     start_deg: Annotated[float, Field(gt=0, lt=180)] = 95.0  # how far out from straight down a strand begins to fall
+    rule: Literal["contact", "literal"] = "contact"  # from contact to contact, or step by step as printed
+    step_deg: Annotated[float, Field(gt=0)] = 2.0  # literal: of one iteration
+    iterations: Annotated[int, Field(ge=1)] = 50  # literal
+    limited: bool = False  # literal: stop at straight down instead of swinging about it
+    pivot: Literal["strand", "space"] = "strand"  # literal: where the nearest fixed point is looked for
     sweeps: Annotated[int, Field(ge=0)] = 10  # of the rings, per row; 0 leaves them as they fell
     longest: Annotated[float, Field(ge=1)] = 1.0  # of a ring link, over its rest length
     stiff: Annotated[float, Field(ge=0, le=1)] = 0.3  # how much a ring resists being shortened
@@ -59,7 +66,9 @@ class Kinematic(Draper):
         bodies = part_transforms(fitting.fields, chain)
         skin = self.skin_m + thickness(garment, parameters) / 2
         out, aside = tilts(garment, parameters, strands.azimuth)
-        if strands.rides.any():
+        if self.rule == "literal":
+            grid = self._step(fitting, chain, parameters, garment, skin, bodies)
+        elif strands.rides.any():
             grid = riding(strands, chain, out, aside)
         else:
             grid = self._fall(fitting, chain, out, aside, skin, bodies)
@@ -90,6 +99,24 @@ class Kinematic(Draper):
             roots(strands, chain), facing, down, start, skin, strands.links, strands.first, strands.last,
             bodies, fitting.fields.solid, grid, support,
         )  # fmt: skip
+        return grid
+
+    def _step(
+        self, fitting: Fitting, chain: F64, parameters: F64, garment: GarmentMesh, skin: F64, bodies: Bodies
+    ) -> F64:
+        from mocapflow_draping.literal import blow_batch, settle_batch
+
+        strands, solid = fitting.strands, fitting.fields.solid
+        grid = standing(strands, chain)
+        fixed = np.zeros(grid.shape[:3], bool)
+        fixed[:, np.arange(len(strands.first)), strands.first] = True
+        step, in_space = math.radians(self.step_deg), self.pivot == "space"
+        settle_batch(
+            grid, fixed, strands.first, strands.last, skin, step, self.iterations, self.limited, in_space,
+            LOWER, bodies, solid,
+        )  # fmt: skip
+        force, amount = wind(garment, parameters, chain[:, strands.carrier[0], :3, :3])
+        blow_batch(grid, fixed, strands.first, strands.last, skin, force, amount, bodies, solid)
         return grid
 
     def _close(self, fitting: Fitting, grid: F64, skin: F64, bodies: Bodies) -> None:
