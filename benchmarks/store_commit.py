@@ -168,7 +168,7 @@ def result_of(silhouettes, dice):  # type: ignore[no-untyped-def]
         matches=matches,
     )
     return FrameResult(
-        state=state, iterations=3, steady=True, oscillating=False, change=Change(surface=0.0, angles=0.0),
+        state=state, iterations=3, steady=True, oscillating=False, change=Change(surface=0.0, body=0.0, angles=0.0),
         overlap=np.ones(4), seconds=dict.fromkeys(STEPS, 0.001),
     )  # fmt: skip
 

@@ -249,6 +249,7 @@ class Change:
     """How far one turn moved the solution."""
 
     surface: float  # m, largest move of a surface vertex
+    body: float  # m, largest move of a body vertex: cloth may swing while the body rests
     angles: float  # rad, largest change of a joint angle
 
 

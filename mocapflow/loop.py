@@ -9,8 +9,9 @@ import numpy as np
 
 from mocapflow.components import ClothFitter, Matcher, Observe, PoseSolver, Predictor, Prior, Segmenter, pool
 from mocapflow.data import Change, Frame, FrameResult, FrameState, Matches, Past, Segmentation, Surface, Turn
+from mocapflow.geometry import silhouettes
 from mocapflow.model import ClothedModel
-from mocapflow.records import record
+from mocapflow.records import F64, record
 from mocapflow.scene import Scene
 from mocapflow.timing import Stopwatch
 
@@ -76,7 +77,7 @@ def settle(
         steady=calm >= steps.steady.turns,
         oscillating=calm == 0 and turn.index > 1 and steps.steady.holds(swing),
         change=turn.change,
-        overlap=np.full(len(model.scene.cameras), np.nan),
+        overlap=overlaps(state, model),
         seconds=watch.seconds,
     )
 
@@ -98,5 +99,22 @@ def measure_change(old: FrameState, new: FrameState, model: ClothedModel) -> Cha
     """Return how far the surface and the joint angles moved between two states."""
     before = model.surface(old.estimate.pose, old.cloth).vertices
     after = model.surface(new.estimate.pose, new.cloth).vertices
+    moved = np.sqrt(np.sum((after - before) ** 2, axis=1))
     angles = np.abs(new.estimate.pose.angles - old.estimate.pose.angles)
-    return Change(surface=float(np.linalg.norm(after - before, axis=1).max()), angles=float(angles.max(initial=0)))
+    return Change(
+        surface=float(moved.max()),
+        body=float(moved[: len(model.scene.body.vertices)].max()),
+        angles=float(angles.max(initial=0)),
+    )
+
+
+def overlaps(state: FrameState, model: ClothedModel) -> F64:
+    """Return intersection over union of the model's silhouette and the person's in each view; NaN where unseen."""
+    surface = model.surface(state.estimate.pose, state.cloth)
+    overlap = np.full(len(model.scene.cameras), np.nan)
+    for silhouette in state.segmentation.silhouettes:
+        if silhouette.layer == "person":
+            camera = model.scene.cameras[silhouette.camera]
+            covered = silhouettes.mask(silhouettes.outline(surface, camera), camera)
+            overlap[silhouette.camera] = silhouettes.intersection_over_union(covered, silhouette.distance > 0)
+    return overlap

@@ -68,6 +68,7 @@ class CoupledLoop(Stage):
     name: ClassVar[str] = "coupled_loop"
     predictor: Predictor
     segmenter: Segmenter
+    first_segmenter: Segmenter | None = None  # settles the first frame beforehand: one that needs no good pose
     matchers: Annotated[tuple[Matcher, ...], Field(min_length=1)]
     pose_solver: PoseSolver
     draper: Draper | None = None  # needed with a garment
@@ -123,7 +124,16 @@ class CoupledLoop(Stage):
         watch.lap("predict")
         cloth = model.drape(pose, parameters, past)
         watch.lap("drape")
-        return believed(pose, parameters, cloth)
+        state = believed(pose, parameters, cloth)
+        return state if past.moments else self.approach(frame, state, past, model)
+
+    def approach(self, frame: Frame, state: FrameState, past: Past, model: ClothedModel) -> FrameState:
+        """Return the first frame's state moved near the person by the first segmenter, if there is one."""
+        if self.first_segmenter is None or not seen(frame):
+            return state
+        steps = replace(self.steps, segmenter=self.first_segmenter)
+        near = settle(frame, state, past, steps, model, lambda *_: None).state
+        return believed(near.estimate.pose, near.cloth.parameters, near.cloth)
 
     def complain(self, frame: Frame, result: FrameResult) -> None:
         """Stop at a frame that did not settle, if that is wanted."""
@@ -169,7 +179,7 @@ def believed(pose: Pose, parameters: F64, cloth: Cloth) -> FrameState:
 def lost(frame: Frame, state: FrameState) -> FrameResult:
     """Return the prediction as the result of a frame that too few cameras have seen."""
     unseen = np.full(len(frame.usable), np.nan)
-    still = Change(surface=0.0, angles=0.0)
+    still = Change(surface=0.0, body=0.0, angles=0.0)
     return FrameResult(state=state, iterations=0, steady=False, oscillating=False, change=still, overlap=unseen)
 
 

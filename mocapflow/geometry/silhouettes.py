@@ -65,6 +65,12 @@ def mask(boundary: Outline, camera: Camera) -> Bool:
     return full
 
 
+def intersection_over_union(one: Bool, other: Bool) -> float:
+    """Return how well two masks (H, W) agree, 0 to 1; NaN where both are empty."""
+    union = np.count_nonzero(one | other)
+    return np.count_nonzero(one & other) / union if union else float("nan")
+
+
 def signed_distance(boundary: Outline, camera: Camera, band_px: float) -> F32:
     """Return the distance (H, W) to the boundary in px, exact to the segment, positive inside, clipped to the band."""
     distance = np.full((camera.size[1], camera.size[0]), -band_px, np.float32)

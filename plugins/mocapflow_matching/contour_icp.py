@@ -40,7 +40,7 @@ class ImageContour(NamedTuple):
 class ContourIcp(Matcher):
     """Forward pairs (image contour to nearest model contour) and backward pairs, in every view.
 
-    All components of the contours take part, holes too. While the surface still moves by more than `calm_mm` a turn,
+    All components of the contours take part, holes too. While the body still moves by more than `calm_mm` a turn,
     the reach is wide and the loss `first_loss`; then narrow and `later_loss`: a redescending loss helps only once the
     pose is nearly right, before that it gives up the limb that is furthest off.
     """
@@ -76,7 +76,7 @@ class ContourIcp(Matcher):
         return pool(parts) if parts else empty_matches()
 
     def _calm(self, turn: Turn) -> bool:
-        return turn.change is not None and turn.change.surface <= self.calm_mm / 1000
+        return turn.change is not None and turn.change.body <= self.calm_mm / 1000
 
     def match_view(self, camera: Camera, silhouette: Silhouette, surface: Surface, turn: Turn) -> Matches:
         """Return the pairs of one view."""
