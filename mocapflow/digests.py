@@ -46,6 +46,7 @@ class Digests:
     def __init__(self, memory: Path | None = None) -> None:
         self._memory = memory
         self._known: dict[str, list[Any]] = _read(memory)  # path -> stamp, then what was found
+        self._packages: dict[str, str] = {}
 
     def file(self, path: Path, name: str = "") -> str:
         """Return the digest of a file's content, or of all files in a folder with their names."""
@@ -65,15 +66,21 @@ class Digests:
 
     def package(self, module: str) -> str:
         """Return the digest of a component's top package with the shared modules and plugins it imports."""
+        unit = _unit(module)
+        if unit not in self._packages:
+            self._packages[unit] = self._package(unit)
+        return self._packages[unit]
+
+    def _package(self, first: str) -> str:
         found: dict[str, str] = {}
-        open_modules = {_unit(module)}
+        open_modules = {first}
         while open_modules:
             unit = open_modules.pop()
             files = {name: self._source(path) for name, path in _sources(unit)}
             found.update({name: code for name, (code, _) in files.items()})
             wanted = {_unit(name) for _, imports in files.values() for name in imports if _counts(name)}
             open_modules |= {w for w in wanted if not any(name == w or name.startswith(w + ".") for name in found)}
-        return digest(json.dumps(found, sort_keys=True).encode(), f"code of {_unit(module)}")
+        return digest(json.dumps(found, sort_keys=True).encode(), f"code of {first}")
 
     def core(self) -> str:
         """Return the digest of the framework code that every result depends on."""

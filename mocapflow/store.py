@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -198,7 +199,8 @@ def remove(path: Path) -> None:
         shutil.rmtree(path)
 
 
-def versions() -> dict[str, str]:
+@cache
+def versions() -> Mapping[str, str]:
     """Return the versions a result depends on."""
     found = {"python": platform.python_version()}
     for library in LIBRARIES:
