@@ -11,6 +11,7 @@ def mocapflow_stages() -> list[type[Stage]]:
     """Return the stages of this package."""
     from mocapflow.track import CoupledLoop
     from mocapflow_sequence.background import EmptyScene
+    from mocapflow_sequence.calibrate_limbs import CalibrateLimbs
     from mocapflow_sequence.evaluate import Evaluate
     from mocapflow_sequence.export import Export
     from mocapflow_sequence.fit_subject import FitSubject
@@ -27,6 +28,7 @@ def mocapflow_stages() -> list[type[Stage]]:
         StartFromFile,
         StartFromKeypoints,
         FitSubject,
+        CalibrateLimbs,
         Evaluate,
         Export,
         Overlay,

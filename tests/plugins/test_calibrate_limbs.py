@@ -1,0 +1,97 @@
+"""Limb lengths from silhouettes: exact masks give them back; the derivatives of contour pairs."""
+
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from keypoint_recording import DEMO, copy_demo, write
+from mocapflow_bodies.template import Template
+from mocapflow_matching.contour_icp import ContourIcp
+from mocapflow_sequence.calibrate_limbs import CalibrateLimbs
+from mocapflow_sequence.pose_fit import velocities
+from mocapflow_sequence.proportions import scaled
+from mocapflow_sequence.start_from_file import read_pose
+
+from mocapflow.components import Segmenter
+from mocapflow.data import NO_CLOTH, Pose, Segmentation, Silhouette
+from mocapflow.errors import RecordingError
+from mocapflow.geometry.silhouettes import model_distance
+from mocapflow.model import moved
+from mocapflow.recording import open_recording
+from mocapflow.scene import Scene
+
+WRONG = {"thigh": 1.03, "shank": 0.97}  # 12 mm each
+
+
+@pytest.fixture(scope="module")
+def body():
+    return Template().load(DEMO)
+
+
+@pytest.fixture(scope="module")
+def poses(body):
+    first, rng = read_pose(DEMO / "init.json", body), np.random.default_rng(5)
+    spread = np.where(np.isfinite(body.rest_spread), body.rest_spread, 0.5) * 0.4
+    turns = [rng.normal(size=len(spread)) * spread for _ in range(3)]
+    return [Pose(root=first.root, angles=np.clip(first.angles + turn, *body.limits.T)) for turn in turns]
+
+
+def masks_of(body, poses):
+    """Return a segmenter that knows the truth."""
+
+    class Known(Segmenter):
+        name: ClassVar[str] = "known"
+
+        def segment(self, frame, state, past, scene, turn):
+            surface = Scene(cameras=scene.cameras, body=body).surface(poses[frame.index], NO_CLOTH)
+            distances = [model_distance(surface, camera, 12.0) for camera in scene.cameras]
+            return Segmentation(
+                silhouettes=tuple(Silhouette(camera=c, layer="person", distance=d) for c, d in enumerate(distances))
+            )
+
+    return Known()
+
+
+def length(body, a, b):
+    return np.linalg.norm(body.positions[body.joint(a)] - body.positions[body.joint(b)])
+
+
+def test_exact_silhouettes_give_the_lengths_back(body, poses, tmp_path):
+    folder = copy_demo(tmp_path / "recording")
+    cameras = open_recording(folder).cameras
+    write(folder, body, poses, cameras, noise_px=0.5)
+    stage = CalibrateLimbs(
+        segmenter=masks_of(body, poses), matchers=(ContourIcp(spacing_px=2.0),),
+        proportions=("thigh", "shank", "girth"), frames=3, passes=1, rounds=5,
+    )  # fmt: skip
+    start = Scene(cameras=cameras, body=scaled(body, WRONG))
+    fitted = stage.run(open_recording(folder, stop=3), start)
+    for ends in (("hip_l", "knee_l"), ("knee_r", "ankle_r")):
+        assert abs(length(fitted, *ends) - length(body, *ends)) < 0.003  # m; a pixel is 12 mm
+
+
+def test_velocities_of_skin(body, poses):
+    some = np.arange(0, len(body.vertices), 331)
+    part = replace(
+        body, vertices=body.vertices[some], faces=np.empty((0, 3), np.int32), skin_joint=body.skin_joint[some],
+        skin_weight=body.skin_weight[some], cut=body.cut[some],
+    )  # fmt: skip
+    spreads, logs, step = {"girth": 0.1, "shank": 0.1}, np.array([0.02, -0.03]), 1e-6
+    _, moves = velocities(part, poses[0], logs, spreads)
+    for shift in np.random.default_rng(6).normal(size=(4, moves.shape[2])):
+        ends = [
+            velocities(part, moved(poses[0], s * shift[2:]), logs + s * shift[:2], spreads)[0] for s in (step, -step)
+        ]
+        np.testing.assert_allclose((ends[0] - ends[1]) / (2 * step), moves @ shift, atol=1e-6)
+
+
+def test_what_may_be_wrong(body, poses):
+    scene = Scene(cameras=open_recording(DEMO).cameras, body=body)
+    known = masks_of(body, poses)
+    with pytest.raises(RecordingError, match="no proportion 'tigh'\n.*thigh"):
+        CalibrateLimbs(segmenter=known, matchers=(ContourIcp(),), proportions=("tigh",)).run(
+            open_recording(DEMO), scene
+        )
+    with pytest.raises(RecordingError, match="no 2D keypoints"):
+        CalibrateLimbs(segmenter=known, matchers=(ContourIcp(),)).run(open_recording(DEMO), scene)
