@@ -40,8 +40,8 @@ class LevelSet(Segmenter):
     channels: tuple[ChannelName, ...] = Field(("lab",), min_length=1)  # independent, their likelihoods add
     decorrelate: bool = True  # turn the channels to the image's principal axes, where no empty scene is known
     rho_px: Positive = 12.0  # Gaussian window of the local statistics; inf: one Gaussian per region
-    cell_px: Count = 8  # the statistics are summed over cells of this size
-    stride_px: Count = 2  # and taken from every so many-th pixel; 1: from all
+    cell_px: Count = 9  # the statistics are summed over cells of this size
+    stride_px: Count = 3  # and taken from every so many-th pixel; 1: from all
     variance_floor: Positive = 0.03  # smallest standard deviation inside and outside, share of a channel's range
     sigma_px: Positive = 1.5  # width of the smooth step
     length_weight: NonNegative = 0.9  # nu; explicit steps are stable below 0.94
@@ -51,9 +51,9 @@ class LevelSet(Segmenter):
     coarse_factor: Count = 4
     coarse_steps: NonNegativeCount = 9  # on the first turn, at 1 / coarse_factor of the size
     coarse_rho_px: Positive = 32.0  # window there, in px of the full image: a poor start needs a wide one
-    steps: Count = 9  # on the first turn
-    later_steps: Count = 5  # on later turns, from the last turn's contour
-    local_steps: NonNegativeCount = 4  # after those against the empty scene, with local statistics on both sides
+    steps: Count = 6  # on the first turn
+    later_steps: Count = 3  # on later turns, from the last turn's contour
+    local_steps: NonNegativeCount = 3  # after those against the empty scene, with local statistics on both sides
     statistics_every: Count = 3  # steps
     redistance_every: Count = 3  # steps
     band_px: Annotated[float, Field(ge=8)] = 12.0
@@ -106,7 +106,7 @@ class LevelSet(Segmenter):
         levels = [fine, *self._exact(fine, known)]
         if warm or not self.coarse_steps or self.coarse_factor == 1:
             return levels
-        wide = Window(self.coarse_rho_px, self.cell_px, self.variance_floor)
+        wide = Window(self.coarse_rho_px, 2 * self.cell_px, self.variance_floor)
         return [Level(self.coarse_factor, self._rhythm(self.coarse_steps), wide), *levels]
 
     def _exact(self, fine: Level, known: bool) -> list[Level]:
