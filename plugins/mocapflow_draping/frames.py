@@ -64,11 +64,10 @@ def riding(strands: Strands, chain: F64, out: F64, aside: F64) -> F64:
 
 def standing(strands: Strands, chain: F64) -> F64:
     """Return strands (B, N, L, 3) m before they fall: level, or where a limb has carried them."""
-    level = np.zeros_like(strands.facing[:, 0])
-    facing, _ = hanging(strands, chain, np.broadcast_to(level, (len(chain), len(level))), level)
-    reach = np.concatenate([np.zeros((len(level), 1)), np.cumsum(strands.links, axis=1)], axis=1)
-    grid = roots(strands, chain)[:, :, None] + reach[..., None] * facing[:, :, None]
-    if strands.rides.any():
-        ride = riding(strands, chain, np.zeros(facing.shape[:2]), np.zeros(facing.shape[:2]))
-        grid = np.where(strands.rides[:, None, None], ride, grid)
+    still = np.zeros((len(chain), len(strands.facing)))
+    if strands.rides:
+        return riding(strands, chain, still, still)
+    facing, _ = hanging(strands, chain, still, still)
+    reach = np.concatenate([np.zeros((len(strands.links), 1)), np.cumsum(strands.links, axis=1)], axis=1)
+    grid: F64 = roots(strands, chain)[:, :, None] + reach[..., None] * facing[:, :, None]
     return grid

@@ -37,7 +37,7 @@ class Fitting:
 class Kinematic(Draper):
     """Lays a garment by geometry alone: no mass, no time, no history.
 
-    Source: Rosenhahn 2008, section 12.3.1
+    Source: Rosenhahn 2008, section 12.3
     """
 
     name: ClassVar[str] = "kinematic"
@@ -68,7 +68,7 @@ class Kinematic(Draper):
         out, aside = tilts(garment, parameters, strands.azimuth)
         if self.rule == "literal":
             grid = self._step(fitting, chain, parameters, garment, skin, bodies)
-        elif strands.rides.any():
+        elif strands.rides:
             grid = riding(strands, chain, out, aside)
         else:
             grid = self._fall(fitting, chain, out, aside, skin, bodies)

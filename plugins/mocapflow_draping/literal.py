@@ -31,7 +31,7 @@ def settle_batch(grid, fixed, first, last, skin, step, iterations, limited, in_s
         bodies: rest_from_world (B, P, 3, 4), stretch (B, P) and ball centres (B, P, 3) of the parts.
         solid: radius, origin, shape, offset, values and 1/voxel of the parts.
 
-    Source: Rosenhahn 2008, section 12.3.1
+    Source: Rosenhahn 2008, section 12.3
     """
     maps, stretch, centres = bodies
     for b in range(len(grid)):
@@ -105,7 +105,7 @@ def _nearest(grid, fixed, n, k, first, last, in_space):  # type: ignore[no-untyp
 def blow_batch(grid, fixed, first, last, skin, force, amount, bodies, solid):  # type: ignore[no-untyped-def]
     """Turn the free tails of B draped grids towards forces (B, 3) by `amount` (B,) rad, until they touch, in place.
 
-    Source: Rosenhahn 2008, section 12.3.3
+    Source: Rosenhahn 2008, section 12.3
     """
     maps, stretch, centres = bodies
     trial = np.empty((grid.shape[2], 3))

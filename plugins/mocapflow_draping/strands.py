@@ -32,12 +32,12 @@ class Strands:
     facing: F64 = array("N", 3, unit="1, horizontal unit direction in which the strand stands out, at rest")
     azimuth: F64 = array("N", unit="rad, of facing")
     carrier: I32 = array("N", unit="joint that turns the strand before it falls")
-    rides: Bool = array("N", unit="True where another joint than the pinned end's carries the strand along")
     tail: Bool = array("N", "L", unit="True for particles that move with `carrier`")
     skin_joint: I32 = array("N", "L", 5, unit="joint index, of the skin nearest at rest")
     skin_weight: F64 = array("N", "L", 5, unit="1")
     beside: I32 = array("N", "L", unit="strand linked on its left-hand side in this row, or -1")
     ring_length: F64 = array("N", "L", unit="m, of that link")
+    rides: bool  # most strands lie on the limb that carries them, as trouser legs do; else they hang free, as skirts do
 
     @cached_property
     def own(self) -> Bool:
@@ -64,9 +64,9 @@ def strands_of(garment: GarmentMesh, body: Body) -> Strands:
     skin = _pinned_skin(garment, vertex[:, 0])
     beside, ring_length = _beside(garment, vertex, own)
     carrier = garment.carried_by[vertex[:, -1]]
-    rides = carrier != _main_joint(body, skin)
-    facing = np.where(rides[:, None], _from_middle(rows, beside), _along(rows))
-    under = cKDTree(body.vertices).query(rows)[1]
+    under = np.asarray(cKDTree(body.vertices).query(rows)[1], np.int32)
+    rides = bool(np.mean(_main_joint(body, under[:, -1]) == carrier) > 0.5)
+    facing = _from_middle(rows, beside) if rides else _along(rows)
     return Strands(
         vertex=vertex,
         first=first,
@@ -156,10 +156,9 @@ def roots(strands: Strands, chain: F64) -> F64:
 
 
 def _main_joint(body: Body, skin: I32) -> I32:
-    """Return the joint (N,) that moves most of the skin a strand is pinned to, one for the whole of its ring."""
-    weight = np.zeros(len(body.parents))
-    np.add.at(weight, body.skin_joint[skin], body.skin_weight[skin])
-    return np.full(len(skin), weight.argmax(), np.int32)
+    """Return the joint (N,) that moves most of each body vertex."""
+    joint: I32 = body.skin_joint[skin, body.skin_weight[skin].argmax(axis=1)]
+    return joint
 
 
 def _along(rows: F64) -> F64:

@@ -9,7 +9,8 @@ from mocapflow.hookspecs import hookimpl
 @hookimpl
 def mocapflow_garments() -> list[type[Garment]]:
     """Return the garments of this package."""
+    from mocapflow_garments.cylinder import Cylinder
     from mocapflow_garments.shorts import Shorts
     from mocapflow_garments.skirt import Skirt
 
-    return [Shorts, Skirt]
+    return [Cylinder, Shorts, Skirt]

@@ -13,6 +13,7 @@ from mocapflow.records import F64, I32
 from mocapflow_garments import sections
 
 EASE = 0.002  # m, the least room between waistband and skin
+MEANT = 1.3  # a measure that is further below the body's own is a mistake
 LARGEST_ROOM = 0.08  # m between waistband and skin: more can't hold a garment up
 HARMONICS: tuple[tuple[str, ...], ...] = (
     ("flare_rad",),
@@ -48,7 +49,7 @@ def check_measures(garment: str, measures: dict[str, float]) -> None:
 
 def repaired(garment: str, what: str) -> None:
     """Record that a measure was changed."""
-    warnings.warn(f"{garment}: {what}", GarmentRepaired, stacklevel=3)
+    warnings.warn(f"{garment}: {what}", GarmentRepaired, stacklevel=5)
 
 
 def parameters(orders: tuple[int, ...]) -> tuple[tuple[str, ...], F64]:
@@ -91,6 +92,24 @@ def even_links(rows: F64, link: float) -> F64:
     return even
 
 
+def room(garment: str, measure: str, around: float, tape: float) -> float:
+    """Return how far a band lies outside a body that measures `tape` m there; a band inside is pushed out.
+
+    Raises:
+        GarmentError: the band is so much too tight that it can't be meant for that place.
+    """
+    if around * MEANT < tape:
+        raise GarmentError(
+            f"{garment}: {measure} is {around:.2f} m, but the body measures {tape:.2f} m there",
+            hint="check the place and the measure, and that the body is this person's",
+        )
+    away = (around - tape) / (2 * math.pi)
+    if away < EASE:
+        wider = tape + 2 * math.pi * EASE
+        repaired(garment, f"{measure} {around:.3f} lies inside the body; widened to {wider:.3f}")
+    return max(away, EASE)
+
+
 def waistband(garment: str, body: Body, height: float, around: float) -> tuple[F64, float]:
     """Return the torso's outline (N, 2) m at a height and how far outside it a band of a given length lies.
 
@@ -112,11 +131,7 @@ def waistband(garment: str, body: Body, height: float, around: float) -> tuple[F
             f"{garment}: a waist of {around:.2f} m can't stay up on a body of {tape:.2f} m there",
             hint="check waist_circumference_m and waist_height_m",
         )
-    if away < EASE:
-        wider = tape + 2 * math.pi * EASE
-        repaired(garment, f"waist_circumference_m {around:.3f} lies inside the body; widened to {wider:.3f}")
-        away = EASE
-    return torso, away
+    return torso, room(garment, "waist_circumference_m", around, tape)
 
 
 def hip_rings(body: Body, height: float, rows: F64, around: F64, away: float) -> F64:

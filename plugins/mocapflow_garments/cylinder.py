@@ -1,0 +1,90 @@
+"""A tube of cloth on any limb: a sleeve, a trouser leg, a sock."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from mocapflow.components import Garment
+from mocapflow.data import Body, GarmentMesh
+from mocapflow.errors import alternatives
+from mocapflow.records import F64
+from mocapflow_garments import pattern, sections
+
+
+class Cylinder(Garment):
+    """A tube pinned around a limb at its upper end, running along the limb; it may reach over the next joint."""
+
+    name: ClassVar[str] = "cylinder"
+    joint: str = "hip_l"  # the joint at the upper end of the limb
+    start: Annotated[float, Field(ge=0, le=1)] = 0.3  # where the tube is pinned, as a share of the limb from the joint
+    upper_circumference_m: float = 0.60
+    lower_circumference_m: float = 0.55
+    length_m: float = 0.40  # along the cloth
+    strands: Annotated[int, Field(ge=8)] = 32
+    rings: Annotated[int, Field(ge=3)] = 16
+    force_orders: tuple[Literal[0, 1, 2], ...] = (0, 1)
+
+    def sew(self, body: Body) -> GarmentMesh:
+        """Return the tube on the rest body."""
+        tapes = ("upper_circumference_m", "lower_circumference_m", "length_m")
+        pattern.check_measures(self.name, {tape: getattr(self, tape) for tape in tapes})
+        around = np.linspace(self.upper_circumference_m, self.lower_circumference_m, self.rings)
+        upper, away = self._upper(body)
+        flat, facing = sections.band(upper[1], away, self.strands)
+        out = (around - around[0]) / (2 * math.pi)
+        link = self.length_m / (self.rings - 1)
+        along = np.linspace(0.0, self.length_m, self.rings)
+        rows = upper[0].lift(flat[:, None] + out[None, :, None] * facing[:, None])
+        rows = pattern.even_links(rows + along[:, None] * upper[0].normal, link)
+        grid = np.arange(self.strands * self.rings, dtype=np.int32).reshape(self.strands, self.rings)
+        vertices = rows.reshape(-1, 3)
+        skin = pattern.nearest_skin(body, vertices)
+        names, bounds = pattern.parameters(self.force_orders)
+        main = [pattern.main_joint(body, skin[grid[:, row]]) for row in range(self.rings)]
+        return GarmentMesh(
+            name=self.name,
+            vertices=vertices,
+            faces=pattern.grid_faces(grid)[:, ::-1].copy(),
+            strands=grid,
+            rings=np.stack([grid.T, np.roll(grid, -1, axis=0).T], axis=-1).reshape(-1, 2),
+            ring_length=np.repeat(around / self.strands, self.strands),
+            carried_by=np.tile(np.array(main, np.int32), self.strands),
+            pinned=grid[:, 0].copy(),
+            pinned_to=skin[grid[:, 0]],
+            parameter_names=names,
+            parameter_bounds=bounds,
+        )
+
+    def _upper(self, body: Body) -> tuple[tuple[sections.Plane, F64], float]:
+        """Return the plane across the limb with the limb's outline in it, and the tube's distance from it."""
+        if self.joint not in body.joint_names:
+            raise pattern.GarmentError(
+                f"cylinder: the body has no joint '{self.joint}'", hint=alternatives(self.joint, body.joint_names)
+            )
+        joint = body.joint(self.joint)
+        below = np.flatnonzero(body.parents == joint)
+        if not len(below):
+            raise pattern.GarmentError(
+                f"cylinder: nothing follows joint '{self.joint}'", hint="name the joint at the upper end of a limb"
+            )
+        limb = body.positions[below[0]] - body.positions[joint]
+        plane = _across(body.positions[joint] + self.start * limb, limb)
+        outlines = [sections.outline(points) for points in sections.sections(body, plane)]
+        if not outlines:
+            raise pattern.GarmentError(f"cylinder: there is no body around '{self.joint}'", hint="change `start`")
+        limb_outline = min(outlines, key=lambda closed: float(np.linalg.norm(closed.mean(axis=0))))
+        tape = sections.perimeter(limb_outline)
+        away = pattern.room(self.name, "upper_circumference_m", self.upper_circumference_m, tape)
+        return (plane, limb_outline), away
+
+
+def _across(point: F64, limb: F64) -> sections.Plane:
+    """Return the plane across a limb at a point; its normal points down the limb."""
+    normal = limb / np.linalg.norm(limb)
+    first = np.cross(np.eye(3)[np.abs(normal).argmin()], normal)
+    first /= np.linalg.norm(first)
+    return sections.Plane(point=point, across=np.stack([first, np.cross(normal, first)]))
