@@ -78,6 +78,7 @@ class Digests:
             unit = open_modules.pop()
             files = {name: self._source(path) for name, path in _sources(unit)}
             found.update({name: code for name, (code, _) in files.items()})
+            found.update({f"{unit}/{name}": self._content(path) for name, path in _data(unit)})
             wanted = {_unit(name) for _, imports in files.values() for name in imports if _counts(name)}
             open_modules |= {w for w in wanted if not any(name == w or name.startswith(w + ".") for name in found)}
         return digest(json.dumps(found, sort_keys=True).encode(), f"code of {first}")
@@ -153,13 +154,27 @@ def _unit(module: str) -> str:
     return ".".join(parts[:2] if parts[0] == "mocapflow" else parts[:1])
 
 
-def _sources(unit: str) -> Iterable[tuple[str, Path]]:
-    """Yield dotted name and path of every Python file of a module or package."""
+def _data(unit: str) -> Iterable[tuple[str, Path]]:
+    """Yield the files of a plugin package that are no code, such as a template body."""
+    origin = _origin(unit)
+    if origin is None or origin.name != "__init__.py" or unit.startswith("mocapflow."):
+        return
+    for path in sorted(origin.parent.rglob("*")):
+        if path.is_file() and path.suffix != ".py" and "__pycache__" not in path.parts:
+            yield path.relative_to(origin.parent).as_posix(), path
+
+
+def _origin(unit: str) -> Path | None:
     loaded = sys.modules.get(unit)
     spec = loaded.__spec__ if loaded is not None else importlib.util.find_spec(unit)
-    if spec is None or spec.origin is None:
+    return None if spec is None or spec.origin is None else Path(spec.origin)
+
+
+def _sources(unit: str) -> Iterable[tuple[str, Path]]:
+    """Yield dotted name and path of every Python file of a module or package."""
+    origin = _origin(unit)
+    if origin is None:
         return
-    origin = Path(spec.origin)
     if origin.name != "__init__.py":
         yield unit, origin
         return

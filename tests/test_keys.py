@@ -187,6 +187,18 @@ def test_code_that_a_plugin_imports_counts(tmp_path, monkeypatch):
     assert made(1) != before
 
 
+def test_package_data_counts(tmp_path, monkeypatch):
+    folder = tmp_path / "mocapflow_withdata"
+    (folder / "__pycache__").mkdir(parents=True)
+    (folder / "__init__.py").write_text("")
+    monkeypatch.syspath_prepend(tmp_path)
+    found = []
+    for name, text in [("body.obj", "v 0"), ("__pycache__/x.nbi", "1"), ("body.obj", "v 1 0")]:
+        (folder / name).write_text(text)
+        found.append(Digests().package("mocapflow_withdata"))
+    assert found[0] == found[1] != found[2]
+
+
 def test_the_core_covers_what_every_result_depends_on(monkeypatch):
     read = []
     meaning = Digests._source
