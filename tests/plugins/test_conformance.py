@@ -30,17 +30,24 @@ NEEDED = {  # what has no default, as a pipeline would write it; measures fit th
         waist_height_m=1.05, waist_circumference_m=1.05, hip_circumference_m=1.2, leg_opening_circumference_m=0.8,
         inseam_m=0.3, length_m=0.6,
     ),
-    ("garment", "cylinder"): dict(),
-    ("stage", "coupled_loop"): dict(
-        predictor="hold", segmenter="levelset", matchers=["contour_icp"], pose_solver="twist_gauss_newton",
-        cloth_fitter="fixed", priors=["joint_limits"],
-    ),
 }  # fmt: skip
+PARTS = {  # for settings that are components themselves
+    "Predictor": "hold",
+    "Segmenter": "levelset",
+    "Matcher": "contour_icp",
+    "PoseSolver": "twist_gauss_newton",
+    "ClothFitter": "fixed",
+    "Prior": "joint_limits",
+}
 
 
 def component(role, name):
-    document = Document({}, {(): Place("here", CLIP)})
-    return Resolver(document, REGISTRY).component(role, {"use": name, **NEEDED.get((role, name), {})}, ())
+    """The component with its default settings, as a pipeline file would build it."""
+    fields = REGISTRY.get(role, name).model_fields.items()
+    required = [(setting, str(field.annotation)) for setting, field in fields if field.is_required()]
+    parts = {setting: part for setting, kind in required for base, part in PARTS.items() if f".{base}" in kind}
+    given = {"use": name, **parts, **NEEDED.get((role, name), {})}
+    return Resolver(Document({}, {(): Place("here", CLIP)}), REGISTRY).component(role, given, ())
 
 
 for _role in PROVIDERS:
