@@ -21,7 +21,7 @@ from mocapflow.components import Component
 from mocapflow.digests import MARK, Digests, digest_array
 from mocapflow.errors import PluginError
 
-FORMAT = 1
+FORMAT = 2  # of recipes and groups: another number makes everything anew
 Recipe = Mapping[str, Any]
 
 

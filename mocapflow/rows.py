@@ -42,18 +42,21 @@ class Rows:
 
     @classmethod
     def create(
-        cls, path: Path, shape: Sequence[int], dtype: str, fill: float, axes: Sequence[str], attributes: dict[str, Any]
+        cls,
+        path: Path,
+        shape: Sequence[int],
+        dtype: str,
+        fill: float,
+        axes: Sequence[str],
+        attributes: dict[str, Any],
+        block: int = 1,
     ) -> Rows:
-        """Return a new array; an older one in its place is replaced."""
-        import zarr
-        from zarr.codecs import ZstdCodec
-
-        zarr.create_array(
-            str(path), shape=tuple(shape), chunks=(1, *shape[1:]), dtype=dtype, fill_value=fill,
-            compressors=[ZstdCodec(level=LEVEL, checksum=True)], dimension_names=list(axes), attributes=attributes,
-            overwrite=True,
-            chunk_key_encoding={"name": "default", "separator": "."},  # files side by side: no folder per frame
-        )  # fmt: skip
+        """Return a new array with `block` rows to a chunk; an older one in its place is replaced."""
+        path.mkdir(exist_ok=True)
+        for old in path.glob("c.*"):
+            old.unlink()
+        chunk = [block, *(max(1, n) for n in shape[1:])]
+        write_json(path / "zarr.json", array_meta(shape, chunk, np.dtype(dtype), fill, axes, attributes))
         return cls(path)
 
     def resize(self, frames: int) -> None:
@@ -64,10 +67,19 @@ class Rows:
             write_json(self._path / "zarr.json", self._meta)
 
     def write(self, row: int, values: npt.NDArray[Any]) -> None:
-        """Write one row."""
-        assert values.shape == self.shape[1:], (values.shape, self.shape)
-        data = self._zstd.encode(np.ascontiguousarray(values, self._dtype))
-        self._file(row).write_bytes(data)
+        """Write one row of an array with one row to a chunk."""
+        self.write_block(row, values[None])
+
+    def write_block(self, block: int, values: npt.NDArray[Any]) -> None:
+        """Write a chunk: as many rows as it has, or fewer at the end of the array."""
+        assert values.shape[1:] == self.shape[1:] and len(values) <= self._chunk[0], (values.shape, self._chunk)
+        if not values.size:
+            return
+        whole = np.ascontiguousarray(values, self._dtype)
+        if len(values) < self._chunk[0]:  # zarr keeps whole chunks
+            whole = np.full(self._chunk, self._fill, self._dtype)
+            whole[: len(values)] = values
+        self._file(block).write_bytes(self._zstd.encode(whole))
 
     def read(self, row: int) -> npt.NDArray[Any]:
         """Return one row, freshly allocated."""
@@ -82,6 +94,28 @@ class Rows:
 
     def _file(self, row: int) -> Path:
         return self._path / f"c.{row}{self._inner}"
+
+
+def array_meta(
+    shape: Sequence[int],
+    chunk: Sequence[int],
+    dtype: np.dtype[Any],
+    fill: float,
+    axes: Sequence[str],
+    attributes: dict[str, Any],
+) -> dict[str, Any]:
+    """Return the metadata of a zarr v3 array; the files of its chunks lie side by side, without folders."""
+    value: Any = "NaN" if np.isnan(fill) else bool(fill) if dtype.kind == "b" else int(fill)
+    return {
+        "zarr_format": 3, "node_type": "array", "shape": list(shape), "data_type": dtype.name, "fill_value": value,
+        "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": list(chunk)}},
+        "chunk_key_encoding": {"name": "default", "configuration": {"separator": "."}},
+        "codecs": [
+            {"name": "bytes", "configuration": {"endian": "little"}} if dtype.itemsize > 1 else {"name": "bytes"},
+            {"name": "zstd", "configuration": {"level": LEVEL, "checksum": True}},
+        ],
+        "dimension_names": list(axes), "attributes": attributes, "storage_transformers": [],
+    }  # fmt: skip
 
 
 def read_json(path: Path) -> dict[str, Any]:

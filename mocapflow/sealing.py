@@ -7,8 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import zarr
-from zarr.codecs import ZstdCodec
 
 from mocapflow.archive import PLAIN, axis_names
 from mocapflow.data import Track
@@ -25,17 +23,16 @@ def seal(
 ) -> dict[str, Any]:
     """Write every column of the rows as an array of its own and return the attributes of the sealed group."""
     sealed = int(attributes.get("sealed", 0))
-    group = zarr.open_group(str(path), mode="r+")
-    arrays = {name: _array(group, name, shape, len(indices)) for name, shape in columns.items()}
-    for first in range(sealed - sealed % BLOCK, len(indices), BLOCK):
-        block = np.stack([rows.read(row) for row in range(first, min(first + BLOCK, len(indices)))])
-        if not np.array_equal(column(columns, block, "frame"), indices[first : first + BLOCK]):
+    arrays = {name: _array(path, name, shape, len(indices), sealed) for name, shape in columns.items()}
+    for block in range(sealed // BLOCK, -(-len(indices) // BLOCK)):
+        part = indices[block * BLOCK : (block + 1) * BLOCK]
+        values = np.stack([rows.read(block * BLOCK + row) for row in range(len(part))])
+        if not np.array_equal(column(columns, values, "frame"), part):
             raise Corrupted(f"frames are missing in {path}")
         for name, array in arrays.items():
-            if array.size:
-                array[first : first + len(block)] = column(columns, block, name).astype(array.dtype)
+            array.write_block(block, column(columns, values, name))
     if not attributes["cloth_vertices"]:
-        _array(group, "cloth", (0, 3), len(indices))
+        _array(path, "cloth", (0, 3), len(indices), sealed)
     plain = {"step_names": attributes["step_names"], "notes": told(attributes.get("notes", []), indices)}
     record = {"record": f"{Track.__module__}:{Track.__qualname__}", PLAIN: plain}
     attributes = {**attributes, **record, "sealed": len(indices), "complete": True}
@@ -49,16 +46,14 @@ def told(notes: Sequence[tuple[int, int, str]], indices: Sequence[int]) -> list[
     return [f"frame {index}: {note}" for index, note in sorted(spread, key=lambda told: told[0])]
 
 
-def _array(group: zarr.Group, name: str, shape: tuple[int, ...], rows: int) -> Any:
-    if name in group:
-        made: Any = group[name]
-        if made.shape[0] != rows:
-            made.resize((rows, *shape))
+def _array(path: Path, name: str, shape: tuple[int, ...], rows: int, sealed: int) -> Rows:
+    """Return the array of a column, made at the first sealing and lengthened at later ones."""
+    if sealed:
+        made = Rows(path / name)
+        made.resize(rows)
         return made
     declared = array_fields(Track).get(name)
     axes = axis_names(name, declared.axes if declared else ("T",), 1 + len(shape))
     dtype = declared.dtype if declared and declared.dtype else np.dtype(float)
-    return group.create_array(
-        name, shape=(rows, *shape), chunks=(BLOCK, *(max(1, n) for n in shape)), dtype=dtype, dimension_names=axes,
-        compressors=[ZstdCodec(level=1, checksum=True)], attributes={"unit": declared.unit} if declared else {},
-    )  # fmt: skip
+    unit = {"unit": declared.unit} if declared else {}
+    return Rows.create(path / name, (rows, *shape), dtype.name, 0, axes, unit, BLOCK)

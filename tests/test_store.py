@@ -195,7 +195,7 @@ def damage_array_json(group):
 
 
 def damage_chunk(group):
-    file = group / "angles" / "c" / "0" / "0"
+    file = group / "angles" / "c.0.0"
     file.write_bytes(file.read_bytes()[:-5])
 
 
