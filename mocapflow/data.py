@@ -46,6 +46,13 @@ class Flow:
 
 
 @record
+class Rig:
+    """The pinhole cameras of a scene, where a stage has corrected them."""
+
+    cameras: tuple[Camera, ...]
+
+
+@record
 class Frame:
     """One moment, seen by every camera."""
 

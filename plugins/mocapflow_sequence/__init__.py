@@ -10,6 +10,7 @@ from mocapflow.hookspecs import hookimpl
 def mocapflow_stages() -> list[type[Stage]]:
     """Return the stages of this package."""
     from mocapflow.track import CoupledLoop
+    from mocapflow_sequence.align_cameras import AlignCameras
     from mocapflow_sequence.background import EmptyScene
     from mocapflow_sequence.calibrate_limbs import CalibrateLimbs
     from mocapflow_sequence.evaluate import Evaluate
@@ -27,6 +28,7 @@ def mocapflow_stages() -> list[type[Stage]]:
         CoupledLoop,
         StartFromFile,
         StartFromKeypoints,
+        AlignCameras,
         FitSubject,
         CalibrateLimbs,
         Evaluate,

@@ -18,7 +18,7 @@ from mocapflow.loop import pool_matches
 from mocapflow.recording import Recording
 from mocapflow.scene import Scene
 from mocapflow.track import believed
-from mocapflow_sequence.detections import layout, need_keypoints, person_at, seen
+from mocapflow_sequence.detections import layout, persons, seen, spread
 from mocapflow_sequence.keypoint_fit import fit
 from mocapflow_sequence.landmarks import landmarks
 from mocapflow_sequence.proportions import PROPORTIONS, scaled
@@ -87,13 +87,7 @@ class CalibrateLimbs(Stage):
         return [int(track.frame[r]) for r in rows], [track.pose(int(r)) for r in rows], clothes
 
     def _from_keypoints(self, recording: Recording, scene: Scene) -> tuple[list[int], list[Pose], list[Cloth]]:
-        need_keypoints(recording)
-        rows = np.unique(np.linspace(0, len(recording.indices) - 1, self.frames).round().astype(int))
-        people = {recording.indices[r]: person_at(recording, recording.indices[r]) for r in rows}
-        found = {index: person for index, person in people.items() if person is not None}
-        if not found:
-            where = str(recording.folder / "keypoints")
-            raise RecordingError("in no frame two cameras see the same person", where=where)
+        found = persons(recording, spread(recording.indices, self.frames), scene.cameras)
         names, order = landmarks(scene.body).names, layout(recording, list(found), None)
         _, poses = fit(scene.body, [seen(person, order, names) for person in found.values()], scene.cameras)
         bare = Cloth(vertices=np.empty((0, 3)), parameters=np.empty(0))

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from mocapflow.data import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.io.keypoints import keypoint_files, people_at
 from mocapflow.recording import Recording
@@ -41,11 +42,32 @@ def people(recording: Recording, index: int) -> tuple[F64, ...]:
     )
 
 
-def person_at(recording: Recording, index: int) -> Person | None:
+def person_at(recording: Recording, index: int, cameras: Sequence[Camera]) -> Person | None:
     """Return the person in a frame; None where too few keypoints can be triangulated."""
-    person = find_person(people(recording, index), recording.cameras)
+    person = find_person(people(recording, index), cameras)
     found = 0 if person is None else np.isfinite(person.points.position).all(axis=1).sum()
     return person if found >= LEAST_POINTS else None
+
+
+def spread(indices: range, count: int) -> list[int]:
+    """Return `count` frames spread evenly, or all of them if there are fewer."""
+    rows = np.unique(np.linspace(0, len(indices) - 1, count).round().astype(int))
+    return [indices[row] for row in rows]
+
+
+def persons(recording: Recording, indices: Sequence[int], cameras: Sequence[Camera]) -> dict[int, Person]:
+    """Return the person in each frame where there is one.
+
+    Raises:
+        RecordingError: there are no keypoints, or nobody is found in any frame.
+    """
+    need_keypoints(recording)
+    found = {index: person for index in indices if (person := person_at(recording, index, cameras)) is not None}
+    if not found:
+        hint = "check that keypoints and cameras belong together (`mocapflow doctor`)"
+        where = str(recording.folder / "keypoints")
+        raise RecordingError("in no frame two cameras see the same person", where=where, hint=hint)
+    return found
 
 
 def layout(recording: Recording, indices: Sequence[int], wanted: Layout | None) -> tuple[str, ...]:

@@ -10,12 +10,12 @@ import numpy as np
 from pydantic import Field
 
 from mocapflow.components import Stage
-from mocapflow.data import Body
+from mocapflow.data import Body, Camera
 from mocapflow.errors import RecordingError
 from mocapflow.recording import Recording
 from mocapflow.records import F64
 from mocapflow.scene import Scene
-from mocapflow_sequence.detections import layout, need_keypoints, person_at, seen
+from mocapflow_sequence.detections import layout, persons, seen, spread
 from mocapflow_sequence.keypoint_fit import Seen, fit
 from mocapflow_sequence.keypoint_layouts import Layout
 from mocapflow_sequence.landmarks import landmarks
@@ -57,8 +57,8 @@ class FitSubject(Stage):
             raise RecordingError(
                 "there is no standing trial", where=str(recording.folder / "static"), hint="use trial: auto"
             )
-        moving = [] if self.trial == "static" else self._seen(recording, names, self.frames)
-        standing = self._seen(static, names, 4) if static is not None and _has_keypoints(static) else []
+        moving = [] if self.trial == "static" else self._seen(recording, names, self.frames, scene.cameras)
+        standing = self._seen(static, names, 4, scene.cameras) if static is not None and _has_keypoints(static) else []
         if moving and standing and (difference := unlike(moving, standing, names)) > DIFFERENT:
             LOG.warning(
                 "static/ is left out: its limbs differ by %.0f %% from those in the recording", 100 * difference
@@ -68,17 +68,10 @@ class FitSubject(Stage):
         LOG.info("proportions: %s", ", ".join(f"{name} {factor:.3f}" for name, factor in factors.items()))
         return scaled(scene.body, factors)
 
-    def _seen(self, recording: Recording, names: Sequence[str], count: int) -> list[Seen]:
-        need_keypoints(recording)
-        rows = np.unique(np.linspace(0, len(recording.indices) - 1, count).round().astype(int))
-        indices = [recording.indices[row] for row in rows]
-        people = [person for index in indices if (person := person_at(recording, index)) is not None]
-        if not people:
-            hint = "check that keypoints and cameras belong together (`mocapflow doctor`)"
-            where = str(recording.folder / "keypoints")
-            raise RecordingError("in no frame two cameras see the same person", where=where, hint=hint)
-        order = layout(recording, indices, self.layout)
-        return [seen(person, order, names) for person in people]
+    def _seen(self, recording: Recording, names: Sequence[str], count: int, cameras: Sequence[Camera]) -> list[Seen]:
+        found = persons(recording, spread(recording.indices, count), cameras)
+        order = layout(recording, list(found), self.layout)
+        return [seen(person, order, names) for person in found.values()]
 
 
 def unlike(first: Sequence[Seen], second: Sequence[Seen], names: Sequence[str]) -> float:

@@ -35,7 +35,7 @@ class StartFromKeypoints(Stage):
         need_keypoints(recording)
         names = landmarks(scene.body).names
         for index in recording.indices[: self.search_frames]:
-            person = person_at(recording, index)
+            person = person_at(recording, index, scene.cameras)
             if person is not None:
                 points = seen(person, layout(recording, [index], self.layout), names)
                 _, (pose,) = fit(scene.body, [points], scene.cameras)

@@ -63,10 +63,10 @@ def test_exact_silhouettes_give_the_lengths_back(body, poses, tmp_path):
     write(folder, body, poses, cameras, noise_px=0.5)
     stage = CalibrateLimbs(
         segmenter=masks_of(body, poses), matchers=(ContourIcp(spacing_px=2.0),),
-        proportions=("thigh", "shank", "girth"), frames=3, passes=1, rounds=5,
+        proportions=("thigh", "shank", "girth"), frames=2, passes=1, rounds=5,
     )  # fmt: skip
     start = Scene(cameras=cameras, body=scaled(body, WRONG))
-    fitted = stage.run(open_recording(folder, stop=3), start)
+    fitted = stage.run(open_recording(folder, stop=2), start)
     for ends in (("hip_l", "knee_l"), ("knee_r", "ankle_r")):
         assert abs(length(fitted, *ends) - length(body, *ends)) < 0.003  # m; a pixel is 12 mm
 

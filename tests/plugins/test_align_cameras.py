@@ -1,0 +1,62 @@
+"""Cameras knocked since their calibration: found and turned back; good cameras are left alone."""
+
+import logging
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from keypoint_recording import DEMO, copy_demo, write
+from mocapflow_bodies.template import Template
+from mocapflow_sequence.align_cameras import AlignCameras, shift_px, turn
+from mocapflow_sequence.start_from_file import read_pose
+
+from mocapflow.data import Pose
+from mocapflow.geometry import twists
+from mocapflow.recording import open_recording
+
+
+def walking(body, count):
+    """Return poses that wander through the room."""
+    first, rng = read_pose(DEMO / "init.json", body), np.random.default_rng(7)
+    shifts = np.column_stack([rng.uniform(-0.3, 0.3, (count, 2)), np.zeros(count)])
+    turns = [twists.exp(np.append(np.zeros(3), shift)) for shift in shifts]
+    return [Pose(root=motion @ first.root, angles=first.angles * rng.uniform(-1, 1)) for motion in turns]
+
+
+@pytest.fixture(scope="module")
+def body():
+    return Template().load(DEMO)
+
+
+def aligned(folder, body, cameras, least_px):
+    write(folder, body, walking(body, 8), cameras, noise_px=0.7, bystander=())
+    return AlignCameras(frames=8, sigma_px=1.0, least_px=least_px).run(open_recording(folder, stop=8)).cameras
+
+
+def test_good_cameras_are_left_as_they_are(body, tmp_path):
+    folder = copy_demo(tmp_path / "recording")
+    cameras = open_recording(folder).cameras
+    found = aligned(folder, body, cameras, 1.0)
+    assert all(np.array_equal(a.camera_from_world, b.camera_from_world) for a, b in zip(found, cameras, strict=True))
+
+
+def test_a_knocked_camera_is_turned_back(body, tmp_path, caplog):
+    folder = copy_demo(tmp_path / "recording")
+    cameras = open_recording(folder).cameras
+    knock = np.zeros((4, 3))
+    knock[1] = np.radians([0.3, 0.8, 0.2])
+    with caplog.at_level(logging.WARNING, "mocapflow"):
+        found = aligned(folder, body, turn(cameras, knock), 1.0)  # what the cameras see, against what the file says
+    truth = turn(cameras, knock)
+    before, after = shift_px(cameras[1], truth[1]), shift_px(found[1], truth[1])
+    assert before > 4 and after < 0.35 * before
+    assert "cameras have turned since their calibration" in caplog.text
+
+
+def test_shift_is_that_of_the_image(body):
+    camera = open_recording(DEMO).cameras[0]
+    angle = np.radians(0.5)
+    (other,) = turn([camera], np.array([[0.0, angle, 0.0]]))
+    assert shift_px(camera, other) == pytest.approx(camera.intrinsics[0, 0] * np.tan(angle), rel=1e-6)
+    same = replace(camera, camera_from_world=camera.camera_from_world.copy())
+    assert shift_px(camera, same) == 0
