@@ -84,7 +84,8 @@ def shifted(truth: F32, pixels: int) -> F32:
 
 def levelset(task: Task, start: F32, known: bool = False) -> Bool:
     segmenter = LevelSet(shape_weight=0.0)
-    plate = (task.empty, np.full_like(task.empty, 4.0)) if known else None
+    floor = np.zeros((HEIGHT, WIDTH), np.float32)
+    plate = (task.empty, np.full_like(task.empty, 4.0), floor) if known else None
     view = View(task.image, start, start, counted(start.shape, segmenter.border_px), plate)
     return find(view, segmenter._levels(False, known), segmenter._method(), BAND_PX).level > 0
 

@@ -19,6 +19,7 @@ from mocapflow_levelset.evolve import Rhythm, Weights
 from mocapflow_levelset.masks import counted
 from mocapflow_levelset.plates import Shadow, density_of
 from mocapflow_levelset.redistance import redistance
+from mocapflow_levelset.shadows import floor_around
 from mocapflow_levelset.statistics import Window
 from mocapflow_levelset.view import Level, Method, View, find
 
@@ -43,6 +44,7 @@ class BackgroundDifference(Segmenter):
 
     spread_floor: Positive = 0.012  # smallest standard deviation of the empty scene, share of the range
     shadow_share: Annotated[float, Field(ge=0, lt=1)] = 0.2  # of the background; 0: shadows count as the person
+    shadow_reach_m: Positive = 2.0  # shadows fall on the floor within this distance of the person
     darkest_shadow: Annotated[float, Field(gt=0, lt=1)] = 0.5  # factor of L + 16, a and b in the deepest shadow
     shadow_chroma: Positive = 0.005  # how far a shadow may be off the plate's chromaticity, share of the range
     smooth_px: Positive = 1.0  # of the evidence before it is cut
@@ -70,20 +72,22 @@ class BackgroundDifference(Segmenter):
             if not frame.usable[c]:
                 continue
             model = model_distance(surface, camera, self.band_px)
-            distance = self.find(frame.images[c], model, scene.background, c)
+            floor = floor_around(surface, camera, self.shadow_reach_m)
+            distance = self.find(frame.images[c], model, floor, scene.background, c)
             silhouettes.append(Silhouette(camera=c, layer=PERSON, distance=distance))
         return Segmentation(silhouettes=tuple(silhouettes))
 
-    def find(self, image: U8, model: F32, background: Background, camera: int) -> F32:
+    def find(self, image: U8, model: F32, floor: F32, background: Background, camera: int) -> F32:
         """Return the signed distance (H, W) px to the person's outline in one image.
 
         Args:
             image: (H, W, 3) BGR.
             model: (H, W) px, signed distance to the projected model's outline; only tells the person from others.
+            floor: (H, W) 1 where a shadow may fall.
             background: the empty scene.
             camera: which of its views.
         """
-        plate = background.mean[camera], background.spread[camera]
+        plate = background.mean[camera], background.spread[camera], floor
         start = self._start(image, model, plate)
         if not self.refine_steps:
             return redistance(start, self.band_px)
@@ -92,13 +96,13 @@ class BackgroundDifference(Segmenter):
         levels = [against_plate, against_plate._replace(use_plate=False)]
         return find(view, levels, self._method(), self.band_px).level
 
-    def _start(self, image: U8, model: F32, plate: tuple[F32, F32]) -> F32:
+    def _start(self, image: U8, model: F32, plate: tuple[F32, F32, F32]) -> F32:
         """Return a level set (H, W), not a distance: positive where the image is unlike the plate."""
         import cv2
 
         calm = calmed(image, self.smooth_px).reshape(-1, 3)
-        mean, spread = plate[0].reshape(-1, 3), plate[1].reshape(-1, 3)
-        density = density_of(calm, mean, spread, CHANNELS, self._shadow()).reshape(model.shape)
+        mean, spread, floor = plate[0].reshape(-1, 3), plate[1].reshape(-1, 3), plate[2].ravel()
+        density = density_of(calm, mean, spread, floor, CHANNELS, self._shadow()).reshape(model.shape)
         change = cv2.GaussianBlur(np.clip(-density, -6, 6), (0, 0), self.smooth_px)
         kept = self._person(change > 0, model)
         return np.where(kept, np.maximum(change, 0.1), np.minimum(change, -0.1)).astype(np.float32)
@@ -117,7 +121,9 @@ class BackgroundDifference(Segmenter):
             area[np.setdiff1d(np.arange(count), near)] = 0
         person = (area >= max(self.smallest_part * area.max(), 1))[label]
         count, label, stats, _ = cv2.connectedComponentsWithStats((~person).astype(np.uint8), connectivity=8)
-        small = stats[:, cv2.CC_STAT_AREA] <= self.hole_px
+        whole = stats[:, cv2.CC_STAT_AREA]
+        within = np.bincount(label.ravel(), weights=(model > 0).ravel(), minlength=count)
+        small = (whole <= self.hole_px) | (within > 0.8 * whole)  # the model says where the body has no hole
         small[0] = False
         kept: Bool = person | small[label]
         return kept

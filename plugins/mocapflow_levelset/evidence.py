@@ -36,12 +36,14 @@ def from_image(
     channels: Sequence[ChannelName],
     median_px: int,
     stride: int,
-    plate: tuple[F32, F32] | None,
+    plate: tuple[F32, F32, F32] | None,
     shadow: Shadow,
     decorrelate: bool,
     calm_px: float = 0.0,
 ) -> Evidence:
-    """Return the evidence of a BGR image (H, W, 3), and of the empty scene's mean and spread if they are known.
+    """Return the evidence of a BGR image (H, W, 3), and of the empty scene if it is known.
+
+    The empty scene is its mean, its spread (H, W, 3) and where a shadow may fall (H, W).
 
     Channels that depend on one pixel only are computed for the pixels that need them. Decorrelated, the channels
     are turned to the image's own principal axes, so that treating them as independent is right; the empty scene's
@@ -60,11 +62,18 @@ def from_image(
             return gather_planes(planes, runs)
 
     if plate is not None:
-        mean, spread = plate
+        mean, spread, floor = plate
         calm = calmed(image, calm_px)
 
         def outside(runs: I32) -> F32:
-            return density_of(gather(calm, runs), gather(mean, runs), gather(spread, runs), channels, shadow)
+            return density_of(
+                gather(calm, runs),
+                gather(mean, runs),
+                gather(spread, runs),
+                gather_planes(floor[None], runs)[0],
+                channels,
+                shadow,
+            )
 
         return Evidence(sparse, weight, stride, along, outside)
     if decorrelate and len(sparse) > 1 and sparse.shape[2] > LAG_PX:

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 from pydantic import Field
 
 from mocapflow.components import Segmenter
-from mocapflow.data import Frame, FrameState, Past, Segmentation, Silhouette, Turn
+from mocapflow.data import Frame, FrameState, Past, Segmentation, Silhouette, Surface, Turn
 from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.records import F32
 from mocapflow.scene import Scene
@@ -15,6 +15,7 @@ from mocapflow_levelset.channels import ChannelName
 from mocapflow_levelset.evolve import Rhythm, Weights
 from mocapflow_levelset.masks import counted, without_cut
 from mocapflow_levelset.plates import Shadow
+from mocapflow_levelset.shadows import floor_around
 from mocapflow_levelset.statistics import Window
 from mocapflow_levelset.view import Level, Method, View, find
 
@@ -63,7 +64,8 @@ class LevelSet(Segmenter):
     use_background: bool = True  # take the outside's density from the empty scene, where it is known
     spread_floor: Positive = 0.012  # smallest standard deviation of the empty scene, share of the range
     calm_px: NonNegative = 1.0  # smoothing of the image before it is compared with the empty scene
-    shadow_share: Share = 0.2  # of the background; 0: shadows count as changes
+    shadow_share: Share = 0.5  # of the background; 0: shadows count as changes
+    shadow_reach_m: Positive = 2.0  # shadows fall on the floor within this distance of the person
     darkest_shadow: Annotated[float, Field(gt=0, lt=1)] = 0.5  # factor of L + 16, a and b in the deepest shadow
     shadow_chroma: Positive = 0.005  # how far a shadow may be off the plate's chromaticity, share of the range
     stranger: float = -6.0  # log density below which no region calls a pixel more unlikely
@@ -87,7 +89,7 @@ class LevelSet(Segmenter):
                 start=last[c] if warm else model,
                 prior=model,
                 counted=without_cut(counted(model.shape, self.border_px), model, scene.body, surface, camera),
-                plate=self._plate(scene, c),
+                plate=self._plate(scene, surface, c),
             )
             found = find(view, self._levels(warm, view.plate is not None), self._method(), self.band_px)
             silhouettes.append(Silhouette(camera=c, layer=PERSON, distance=found.level))
@@ -95,10 +97,11 @@ class LevelSet(Segmenter):
             energies |= {f"{camera.name}.{term}": value for term, value in terms.items()}
         return Segmentation(silhouettes=tuple(silhouettes), energies=energies)
 
-    def _plate(self, scene: Scene, camera: int) -> tuple[F32, F32] | None:
+    def _plate(self, scene: Scene, surface: Surface, camera: int) -> tuple[F32, F32, F32] | None:
         if scene.background is None or not self.use_background:
             return None
-        return scene.background.mean[camera], scene.background.spread[camera]
+        floor = floor_around(surface, scene.cameras[camera], self.shadow_reach_m)
+        return scene.background.mean[camera], scene.background.spread[camera], floor
 
     def _levels(self, warm: bool, known: bool) -> list[Level]:
         steps = self.later_steps if warm else self.steps

@@ -31,7 +31,7 @@ class Shadow(NamedTuple):
     stranger: float  # log density below which nothing is called more unlikely
 
 
-def density_of(pixels: U8, mean: F32, spread: F32, channels: Sequence[ChannelName], shadow: Shadow) -> F32:
+def density_of(pixels: U8, mean: F32, spread: F32, floor: F32, channels: Sequence[ChannelName], shadow: Shadow) -> F32:
     """Return the log density (N,) of pixels under the empty scene.
 
     The spread in each channel is taken as the root mean square over the colours.
@@ -40,6 +40,7 @@ def density_of(pixels: U8, mean: F32, spread: F32, channels: Sequence[ChannelNam
         pixels: (N, 3) BGR.
         mean: (N, 3) grey levels of the empty scene there.
         spread: (N, 3) grey levels, standard deviation.
+        floor: (N,) 1 where a shadow may fall, 0 elsewhere.
         channels: in which they are compared.
         shadow: what counts as background.
     """
@@ -47,7 +48,7 @@ def density_of(pixels: U8, mean: F32, spread: F32, channels: Sequence[ChannelNam
     plate = features(np.clip(np.rint(mean), 0, 255).astype(np.uint8)[None], channels)[:, 0]
     constants = tuple(np.float32(value) for value in shadow)
     out = np.empty(values.shape[1], np.float32)
-    _densities(values, plate, spread, constants, first_lab(channels), out)
+    _densities(values, plate, spread, floor, constants, first_lab(channels), out)
     return out
 
 
@@ -58,7 +59,7 @@ def first_lab(channels: Sequence[ChannelName]) -> int:
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _densities(values, plate, spread, shadow, lab, out):  # type: ignore[no-untyped-def]
+def _densities(values, plate, spread, may_fall, shadow, lab, out):  # type: ignore[no-untyped-def]
     floor, _, _, _, stranger = shadow
     channels = values.shape[0]
     scale = np.float32(1 / 255**2 / 3)
@@ -74,7 +75,7 @@ def _densities(values, plate, spread, shadow, lab, out):  # type: ignore[no-unty
             lit += term
             if lab < 0 or not lab <= c < lab + 3:
                 others += term
-        if lab >= 0:
+        if lab >= 0 and may_fall[n] > 0:
             lit = max(lit, others + _in_shadow(values, plate, n, lab, inverse, shadow))
         out[n] = max(lit, stranger)
 

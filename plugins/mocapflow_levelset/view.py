@@ -25,7 +25,7 @@ class View(NamedTuple):
     start: F32  # (H, W) px, signed distance to the start contour, positive inside
     prior: F32  # (H, W) px, signed distance to the model's outline
     counted: F32  # (H, W) 1 where a pixel counts
-    plate: tuple[F32, F32] | None = None  # mean and spread of the empty scene (H, W, 3)
+    plate: tuple[F32, F32, F32] | None = None  # the empty scene: mean, spread (H, W, 3), where shadows may fall (H, W)
 
 
 class Level(NamedTuple):
@@ -67,7 +67,10 @@ def find(view: View, levels: Sequence[Level], method: Method, band_px: float) ->
 
 
 def _cut(view: View, crop: Crop) -> View:
-    plate = None if view.plate is None else (crop.of(view.plate[0]), crop.of(view.plate[1]))
+    plate = None
+    if view.plate is not None:
+        mean, spread, floor = view.plate
+        plate = crop.of(mean), crop.of(spread), crop.of(floor)
     return View(
         image=crop.of_grey_levels(view.image),
         start=np.ascontiguousarray(crop.of(view.start)),
@@ -106,7 +109,12 @@ def _settle_at(view: View, level: Level, method: Method) -> Settled:
 def _shrunk(view: View, factor: int) -> View:
     plate = view.plate
     if plate is not None:
-        plate = (crops.shrink_values(plate[0], factor), crops.shrink_values(plate[1], factor))
+        mean, spread, floor = plate
+        plate = (
+            crops.shrink_values(mean, factor),
+            crops.shrink_values(spread, factor),
+            (crops.shrink_values(floor, factor) > 0.5).astype(np.float32),
+        )
     return View(
         image=crops.shrink(view.image, factor),
         start=crops.shrink_values(view.start, factor) / np.float32(factor),

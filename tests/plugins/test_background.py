@@ -3,16 +3,19 @@
 import numpy as np
 import pytest
 from mocapflow_levelset.background import BackgroundDifference
+from mocapflow_levelset.shadows import floor_around
 from mocapflow_sequence.background import EmptyScene, temporal_median
 
 from mocapflow.data import Background, Past, Turn
 from mocapflow.errors import RecordingError
+from mocapflow.geometry.cameras import project
 from mocapflow.recording import open_recording
 from mocapflow.shipped import shipped
 from mocapflow.testing import pictures, scenes
 
 FIRST = Turn(index=0, cap=8)
 SHAPE = (200, 240)
+FLOOR = np.ones(SHAPE, np.float32)
 
 
 def room():
@@ -56,19 +59,19 @@ def model():
 
 @pytest.mark.parametrize("factor", [1.0, 0.6, 0.3])
 def test_a_shadow_is_not_the_person(factor):
-    distance = BackgroundDifference().find(picture(factor), model(), known(), 0)
+    distance = BackgroundDifference().find(picture(factor), model(), FLOOR, known(), 0)
     truth = person() > 0
     inside = distance > 0
     assert (inside & truth).sum() / (inside | truth).sum() > 0.97
 
 
 def test_without_suppression_a_shadow_is_a_change():
-    distance = BackgroundDifference(shadow_share=0.0).find(picture(0.3), model(), known(), 0)
+    distance = BackgroundDifference(shadow_share=0.0).find(picture(0.3), model(), FLOOR, known(), 0)
     assert distance[160, 170] > 0
 
 
 def test_the_boundary_is_sub_pixel():
-    distance = BackgroundDifference().find(picture(1.0), model(), known(), 0)
+    distance = BackgroundDifference().find(picture(1.0), model(), FLOOR, known(), 0)
     rows, columns = np.nonzero(np.abs(distance) < 0.7)
     from mocapflow_levelset.redistance import redistance
 
@@ -81,8 +84,8 @@ def test_the_boundary_is_sub_pixel():
 def test_someone_far_from_the_model_is_left_out():
     image = picture(1.0)
     image[20:60, 200:230] = (40, 200, 40)
-    assert BackgroundDifference(reach_px=40).find(image, model(), known(), 0)[40, 215] < 0
-    assert BackgroundDifference(reach_px=0).find(image, model(), known(), 0)[40, 215] > 0
+    assert BackgroundDifference(reach_px=40).find(image, model(), FLOOR, known(), 0)[40, 215] < 0
+    assert BackgroundDifference(reach_px=0).find(image, model(), FLOOR, known(), 0)[40, 215] > 0
 
 
 def test_without_a_background_it_says_what_to_do():
@@ -123,3 +126,26 @@ def test_wanted_plates_that_are_missing_are_an_error(tmp_path):
         copy(clip / part, tmp_path / part)
     with pytest.raises(RecordingError, match="no clean plates"):
         EmptyScene(source="plates").run(open_recording(tmp_path))
+
+
+def test_darker_clothes_of_the_rooms_colour_are_no_shadow_off_the_floor():
+    """The same picture of a coat of the wall's chromaticity: a shadow if it may be one, else the person."""
+    alpha = np.clip(person() / 1.5 + 0.5, 0, 1)[..., None]
+    clean = alpha * 255 * (0.5 * (room() / 255) ** 2.2) ** (1 / 2.2) + (1 - alpha) * room()
+    image = np.clip(clean + np.random.default_rng(0).normal(0, 3, clean.shape), 0, 255).astype(np.uint8)
+    nowhere = np.full(SHAPE, -12, np.float32)  # no model that could fill the hole
+    off_floor = BackgroundDifference().find(image, nowhere, np.zeros(SHAPE, np.float32), known(), 0)
+    assert ((off_floor > 0) == (person() > 0)).mean() > 0.98
+    assert (BackgroundDifference().find(image, nowhere, FLOOR, known(), 0) > 0).mean() < 0.05
+
+
+def test_shadows_may_fall_around_the_feet_only():
+    scene = scenes.tiny_scene()
+    pose = scenes.tiny_pose(scene)
+    surface = scene.surface(pose, scenes.tiny_cloth(scene, pose))
+    for camera in scene.cameras:
+        floor = floor_around(surface, camera, 1.0)
+        feet = surface.vertices[surface.vertices[:, 2].argmin()]
+        column, row = np.clip(np.rint(project(feet[None], camera)[0]).astype(int), 0, [319, 239])
+        assert floor[row, column] == 1
+        assert floor[:100].sum() == 0
