@@ -73,8 +73,8 @@ def in_images(points: F64, seen: Seen, spread: F64, cameras: Sequence[Camera]) -
 def _first_root(marks: Landmarks, seen: Seen) -> F64:
     """Return the rigid motion of the trunk at rest on to its triangulated landmarks (Kabsch)."""
     known = np.isfinite(seen.position).all(axis=1)
-    trunk = known & np.array([name.startswith(("hip", "shoulder", "neck")) for name in marks.names])
-    use = trunk if trunk.sum() >= 3 else known
+    hips, top = (known & np.array([n.startswith(part) for n in marks.names]) for part in ("hip", ("shoulder", "neck")))
+    use = hips | top if hips.any() and top.sum() >= 2 else known  # three points in a line say nothing of the tilt
     rest, found = marks.body.vertices[use], seen.position[use]
     middle, centre = rest.mean(axis=0), found.mean(axis=0)
     u, _, vt = np.linalg.svd((found - centre).T @ (rest - middle))
