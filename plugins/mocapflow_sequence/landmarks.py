@@ -12,12 +12,12 @@ from mocapflow.data import Body
 from mocapflow.geometry.skeleton import body_directions, skeleton_of
 from mocapflow.records import F64, I32
 
-# Estimators mark what they see, not joint centres. Fixed offsets, found by laying fitted bodies over images:
-# shoulders and hips are marked above their centres, as shares of the way from the hips to the neck;
-RAISED = {"shoulder": 0.055, "hip": 0.04}
+# Estimators mark what they see, not joint centres. Fixed offsets, from bodies fitted to silhouettes of real footage:
+# shoulders are marked above their centres, as a share of the way from the hips to the neck (hips are not, within 1 cm);
+RAISED = {"shoulder": 0.055}
 # ankles before the centre, as a share of the shank; heel and toes inside the outline, as a share of the foot.
 BEFORE_JOINT = {"ankle": 0.06}
-HEEL_INSIDE, TOE_INSIDE = 0.04, 0.09
+HEEL_INSIDE, TOE_INSIDE = 0.07, 0.13
 # Expected error of a keypoint against its place on the body, m; joints under clothes or muscle are marked less well.
 SPREAD_M = {"hip": 0.03, "shoulder": 0.03, "neck": 0.03, "head_top": 0.03, "nose": 0.03, "ear": 0.03}
 SPREAD_ELSEWHERE_M = 0.02
