@@ -12,8 +12,9 @@ def mocapflow_priors() -> list[type[Prior]]:
     from mocapflow_priors.joint_limits import JointLimits
     from mocapflow_priors.rest_pose import RestPose
     from mocapflow_priors.smooth_motion import SmoothMotion
+    from mocapflow_priors.spine_coupling import SpineCoupling
 
-    return [JointLimits, RestPose, SmoothMotion]
+    return [JointLimits, RestPose, SmoothMotion, SpineCoupling]
 
 
 @hookimpl

@@ -9,6 +9,7 @@ import pytest
 from mocapflow_priors.joint_limits import JointLimits
 from mocapflow_priors.rest_pose import RestPose
 from mocapflow_priors.smooth_motion import SmoothMotion
+from mocapflow_priors.spine_coupling import SpineCoupling
 from twist_fixtures import make_pose, make_scene
 
 from mocapflow.components import Prior
@@ -32,6 +33,10 @@ class TestRestPoseConforms(PriorConformance):
 
 class TestSmoothMotionConforms(PriorConformance):
     prior = SmoothMotion()
+
+
+class TestSpineCouplingConforms(PriorConformance):
+    prior = SpineCoupling()
 
 
 @pytest.mark.parametrize("prior", [JointLimits(), RestPose(), SmoothMotion()])
@@ -96,3 +101,12 @@ def test_a_half_turn_between_pose_and_expectation_is_finite() -> None:
     scene, pose = make_scene(), make_pose(0)
     turned = Pose(root=pose.root @ twists.exp(np.array([0, 0, np.pi, 0, 0, 0])), angles=pose.angles)
     assert np.isfinite(SmoothMotion().residual(turned, make_past(pose, pose), scene).jacobian).all()
+
+
+def test_the_spine_bends_like_the_chest() -> None:
+    scene, pose = make_scene(), make_pose(0)
+    body = replace(scene.body, screw_names=("spine.flexion", "chest.flexion", *scene.body.screw_names[2:]))
+    residual = SpineCoupling(sd_deg=4).residual(pose, Past(), replace(scene, body=body))
+    assert residual.error == pytest.approx((pose.angles[0] - pose.angles[1]) / np.radians(4))
+    assert np.flatnonzero(residual.jacobian[0]).tolist() == [6, 7]
+    assert not len(SpineCoupling().residual(pose, Past(), scene).error)

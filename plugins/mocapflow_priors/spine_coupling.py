@@ -1,0 +1,41 @@
+"""The trunk bends as one: what is seen of the back tells where the hidden pelvis is."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from mocapflow.components import Prior
+from mocapflow.data import Body, Past, Pose, Residual
+from mocapflow.scene import Scene
+from mocapflow_priors.rows import whitened
+
+
+class SpineCoupling(Prior):
+    """Holds the angles of two joints of the trunk together, each with its namesake.
+
+    The vertebrae share a bend; with clothes over the hips, the visible upper part of it says how the pelvis tilts.
+    A body that lacks one of the joints has no such row.
+    """
+
+    name: ClassVar[str] = "spine_coupling"
+    lower: str = "spine"
+    upper: str = "chest"
+    sd_deg: Annotated[float, Field(gt=0)] = 4.0
+
+    def residual(self, pose: Pose, past: Past, scene: Scene) -> Residual:
+        """Return one row for each pair of angles of the same name."""
+        pairs = self.pairs(scene.body)
+        jacobian = np.zeros((len(pairs), 6 + len(pose.angles)))
+        sharpness = 1.0 / np.radians(self.sd_deg)
+        for row, (below, above) in enumerate(pairs):
+            jacobian[row, 6 + below], jacobian[row, 6 + above] = sharpness, -sharpness
+        return whitened(jacobian[:, 6:] @ pose.angles, jacobian)
+
+    def pairs(self, body: Body) -> list[tuple[int, int]]:
+        """Return the screws of the lower and of the upper joint that have the same name, e.g. flexion."""
+        number = {name: index for index, name in enumerate(body.screw_names)}
+        namesakes = [(name, f"{self.upper}.{name.partition('.')[2]}") for name in body.screw_names]
+        return [(number[a], number[b]) for a, b in namesakes if a.startswith(f"{self.lower}.") and b in number]
