@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from mocapflow.components import Matcher, Segmenter, Stage
-from mocapflow.data import Background, Body, Change, Cloth, Frame, Matches, Past, Pose, Segmentation, Track, Turn
+from mocapflow.data import Background, Body, Cloth, Frame, Matches, Past, Pose, Segmentation, Track, Turn
 from mocapflow.errors import RecordingError
 from mocapflow.loop import pool_matches
 from mocapflow.recording import Recording
@@ -21,11 +21,11 @@ from mocapflow.track import believed
 from mocapflow_sequence.detections import layout, persons, seen, spread
 from mocapflow_sequence.keypoint_fit import fit
 from mocapflow_sequence.landmarks import landmarks
+from mocapflow_sequence.pose_fit import Solution
 from mocapflow_sequence.proportions import PROPORTIONS, scaled
 from mocapflow_sequence.silhouette_fit import refine
 
 LOG = logging.getLogger("mocapflow")
-FAR = Change(surface=1.0, body=1.0, angles=1.0)  # poses of keypoints may be far off: matchers look far
 Positive = Annotated[float, Field(gt=0)]
 
 
@@ -39,17 +39,8 @@ class CalibrateLimbs(Stage):
     name: ClassVar[str] = "calibrate_limbs"
     segmenter: Segmenter
     matchers: Annotated[tuple[Matcher, ...], Field(min_length=1)]
-    proportions: tuple[str, ...] = (
-        "girth",
-        "trunk",
-        "shoulder_width",
-        "thigh",
-        "shank",
-        "foot",
-        "upper_arm",
-        "forearm",
-    )
-    spread: Positive = 0.05  # standard deviation of a log proportion about the body's
+    proportions: tuple[str, ...] = ("girth", "thigh", "shank", "foot", "upper_arm", "forearm")
+    spread: Positive = 0.03  # standard deviation of a log proportion about the body's
     frames: Annotated[int, Field(ge=1)] = 10  # spread over the recording
     passes: Annotated[int, Field(ge=1)] = 2  # times that the images are segmented
     rounds: Annotated[int, Field(ge=1)] = 6  # matchings a pass
@@ -68,16 +59,16 @@ class CalibrateLimbs(Stage):
             raise RecordingError(f"calibrate_limbs: no proportion '{min(unknown)}'", hint=hint)
         scene = scene.with_background(background)
         indices, poses, clothes = self._from_track(track) if track else self._from_keypoints(recording, scene)
-        spreads, total = dict.fromkeys(self.proportions, self.spread), np.ones(len(self.proportions))
+        spreads, body = dict.fromkeys(self.proportions, self.spread), scene.body
+        solution = Solution(np.zeros(len(spreads)), tuple(poses))
         for turn in range(self.passes):
-            views = self._segmented(recording, scene, indices, poses, clothes, turn)
+            scene = replace(scene, body=scaled(body, solution.factors(spreads)))
+            views = self._segmented(recording, scene, indices, solution.poses, clothes)
             matchers = [partial(self._match, scene, *view, Turn(index=turn, cap=self.passes)) for view in views]
-            solution = refine(scene.body, matchers, poses, scene.cameras, spreads, self.independent, self.rounds)
-            poses, total = list(solution.poses), total * np.exp(solution.logs)
-            scene = replace(scene, body=scaled(scene.body, solution.factors(spreads)))
-        said = ", ".join(f"{name} {factor:.3f}" for name, factor in zip(self.proportions, total, strict=True))
-        LOG.info("proportions: %s", said)
-        return scene.body
+            solution = refine(body, matchers, solution, scene.cameras, spreads, self.independent, self.rounds)
+        factors = solution.factors(spreads)
+        LOG.info("proportions: %s", ", ".join(f"{name} {factor:.3f}" for name, factor in factors.items()))
+        return scaled(body, factors)
 
     def _from_track(self, track: Track) -> tuple[list[int], list[Pose], list[Cloth]]:
         good = np.flatnonzero(track.usable.all(axis=1) & track.steady)
@@ -95,7 +86,7 @@ class CalibrateLimbs(Stage):
 
     def _segmented(
         self, recording: Recording, scene: Scene, indices: Sequence[int], poses: Sequence[Pose],
-        clothes: Sequence[Cloth], turn: int,
+        clothes: Sequence[Cloth],
     ) -> list[tuple[Frame, Segmentation, Cloth]]:  # fmt: skip
         """Return the silhouettes of the chosen frames; the images are let go at once."""
         views = []

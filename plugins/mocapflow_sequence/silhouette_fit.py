@@ -20,7 +20,7 @@ Match = Callable[[Body, Pose], Matches]  # pairs of one moment for a body in a p
 
 
 def refine(
-    body: Body, matchers: Sequence[Match], poses: Sequence[Pose], cameras: Sequence[Camera], spreads: Spreads,
+    body: Body, matchers: Sequence[Match], solution: Solution, cameras: Sequence[Camera], spreads: Spreads,
     independent: float, rounds: int,
 ) -> Solution:  # fmt: skip
     """Return log proportions and poses with which the contours of the body meet those in the images.
@@ -28,13 +28,12 @@ def refine(
     Args:
         body: before scaling.
         matchers: per moment, how contours are paired.
-        poses: per moment, where to start.
+        solution: where to start.
         cameras: pinhole cameras.
         spreads: the proportions to fit, with the standard deviation of their logarithm about zero.
         independent: share of the pairs that count, as the errors of neighbouring contour points agree.
         rounds: times that contours are paired anew.
     """
-    solution = Solution(np.zeros(len(spreads)), tuple(poses))
     for _ in range(rounds):
         now = scaled(body, solution.factors(spreads))
         pairs = [match(now, pose) for match, pose in zip(matchers, solution.poses, strict=True)]
