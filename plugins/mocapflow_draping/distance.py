@@ -7,65 +7,61 @@ import math
 import numba
 
 
-@numba.njit(cache=True, inline="always")
-def _cell(x, n):  # type: ignore[no-untyped-def]
-    """Return the voxel left of x, clamped so that it has a right neighbour."""
-    i = int(x)
-    return min(max(i, 0), n - 2)
+@numba.njit(cache=True, error_model="numpy")
+def part_distance(x, y, z, p, maps, stretch, solid, least):  # type: ignore[no-untyped-def]
+    """Return a lower bound of the distance to part p, exact near it; `maps` lead from the world to its voxels.
+
+    A part whose box is farther than `least` is not read: that bound is returned.
+    """
+    _, shape, offset, values, scale, margin = solid
+    u = maps[p, 0, 0] * x + maps[p, 0, 1] * y + maps[p, 0, 2] * z + maps[p, 0, 3]
+    v = maps[p, 1, 0] * x + maps[p, 1, 1] * y + maps[p, 1, 2] * z + maps[p, 1, 3]
+    w = maps[p, 2, 0] * x + maps[p, 2, 1] * y + maps[p, 2, 2] * z + maps[p, 2, 3]
+    nx, ny, nz = shape[p, 0], shape[p, 1], shape[p, 2]
+    pad = margin * scale  # the part itself begins this many voxels inside its grid
+    du = max(pad - u, u - (nx - 1 - pad), 0.0)
+    dv = max(pad - v, v - (ny - 1 - pad), 0.0)
+    dw = max(pad - w, w - (nz - 1 - pad), 0.0)
+    box = math.sqrt(du * du + dv * dv + dw * dw) * stretch[p] / scale
+    if u < 0.0 or v < 0.0 or w < 0.0 or u >= nx - 1 or v >= ny - 1 or w >= nz - 1 or (box > 0.0 and box >= least):
+        return box
+    i, j, k = int(u), int(v), int(w)
+    a, b, c = u - i, v - j, w - k
+    one, row, plane = numba.uint64(1), numba.uint64(nz), numba.uint64(ny * nz)  # unsigned: no check for wrap-around
+    at = numba.uint64(offset[p] + (i * ny + j) * nz + k)
+    to = at + plane
+    v00 = values[at] + c * (values[at + one] - values[at])
+    v01 = values[at + row] + c * (values[at + row + one] - values[at + row])
+    v10 = values[to] + c * (values[to + one] - values[to])
+    v11 = values[to + row] + c * (values[to + row + one] - values[to + row])
+    v00 += b * (v01 - v00)
+    v10 += b * (v11 - v10)
+    return (v00 + a * (v10 - v00)) * stretch[p]
 
 
 @numba.njit(cache=True)
-def part_distance(x, y, z, m, stretch, origin, shape, offset, values, scale):  # type: ignore[no-untyped-def]
-    """Return a lower bound of the distance to one part, exact near it; `m` is its rest_from_world (3, 4)."""
-    u = (m[0, 0] * x + m[0, 1] * y + m[0, 2] * z + m[0, 3] - origin[0]) * scale
-    v = (m[1, 0] * x + m[1, 1] * y + m[1, 2] * z + m[1, 3] - origin[1]) * scale
-    w = (m[2, 0] * x + m[2, 1] * y + m[2, 2] * z + m[2, 3] - origin[2]) * scale
-    nx, ny, nz = shape[0], shape[1], shape[2]
-    cu, cv, cw = min(max(u, 0.0), nx - 1.0), min(max(v, 0.0), ny - 1.0), min(max(w, 0.0), nz - 1.0)
-    i, j, k = _cell(cu, nx), _cell(cv, ny), _cell(cw, nz)
-    a, b, c = cu - i, cv - j, cw - k
-    at = offset + (i * ny + j) * nz + k
-    row, plane = nz, ny * nz
-    v00 = values[at] * (1.0 - c) + values[at + 1] * c
-    v01 = values[at + row] * (1.0 - c) + values[at + row + 1] * c
-    v10 = values[at + plane] * (1.0 - c) + values[at + plane + 1] * c
-    v11 = values[at + plane + row] * (1.0 - c) + values[at + plane + row + 1] * c
-    d = (v00 * (1.0 - b) + v01 * b) * (1.0 - a) + (v10 * (1.0 - b) + v11 * b) * a
-    outside = math.sqrt((u - cu) ** 2 + (v - cv) ** 2 + (w - cw) ** 2) / scale
-    if outside > 0.0:
-        d = max(outside, d - outside)
-    return d * stretch
+def body_distance(x, y, z, maps, stretch, centres, solid, near):  # type: ignore[no-untyped-def]
+    """Return the least distance over all parts and the part it is to; `near` is the part to try first.
 
-
-@numba.njit(cache=True)
-def body_distance(x, y, z, maps, stretch, centres, radius, origin, shape, offset, values, scale):  # type: ignore[no-untyped-def]
-    """Return the least distance over all parts; parts whose ball is farther than the least so far are skipped."""
-    least = 1e9
+    Parts whose ball is farther than the least so far are skipped.
+    """
+    radius = solid[0]
+    least = part_distance(x, y, z, near, maps, stretch, solid, 1e9)
+    nearest = near
     for p in range(len(radius)):
         dx, dy, dz = x - centres[p, 0], y - centres[p, 1], z - centres[p, 2]
         reach = least + radius[p]
-        if reach <= 0.0 or dx * dx + dy * dy + dz * dz > reach * reach:
+        if p == near or reach <= 0.0 or dx * dx + dy * dy + dz * dz > reach * reach:
             continue
-        d = part_distance(x, y, z, maps[p], stretch[p], origin[p], shape[p], offset[p], values, scale)
-        least = min(least, d)
-    return least
+        d = part_distance(x, y, z, p, maps, stretch, solid, least)
+        if d < least:
+            least, nearest = d, p
+    return least, nearest
 
 
 @numba.njit(cache=True)
-def body_distances(points, out, maps, stretch, centres, radius, origin, shape, offset, values, scale):  # type: ignore[no-untyped-def]
+def body_distances(points, out, maps, stretch, centres, solid):  # type: ignore[no-untyped-def]
     """Write the distances (N,) of points (N, 3) to one posed body."""
+    near = 0
     for n in range(len(points)):
-        out[n] = body_distance(
-            points[n, 0],
-            points[n, 1],
-            points[n, 2],
-            maps,
-            stretch,
-            centres,
-            radius,
-            origin,
-            shape,
-            offset,
-            values,
-            scale,
-        )
+        out[n], near = body_distance(points[n, 0], points[n, 1], points[n, 2], maps, stretch, centres, solid, near)

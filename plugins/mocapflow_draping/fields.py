@@ -14,7 +14,7 @@ from mocapflow.data import Body, GarmentMesh
 from mocapflow.geometry.kinematics import descendants
 from mocapflow.records import F32, F64, I32, Bool, array, record
 
-MARGIN = 0.06  # m around a part in which its field is stored; farther out the distance to the box is used
+MARGIN = 0.06  # m around a part in which its field is stored; farther out the distance to its box is used
 OVERLAP = 1.5  # voxels by which neighbouring parts overlap
 
 
@@ -32,9 +32,9 @@ class BodyFields:
     voxel: float  # m
 
     @property
-    def solid(self) -> tuple[F64, F32, I32, I32, F32, float]:
+    def solid(self) -> tuple[F64, I32, I32, F32, float, float]:
         """The arrays a kernel reads, in its order."""
-        return self.radius, self.origin, self.shape, self.offset, self.values, 1.0 / self.voxel
+        return self.radius, self.shape, self.offset, self.values, 1.0 / self.voxel, MARGIN
 
 
 def build_fields(body: Body, joints: I32, voxel: float) -> BodyFields:
@@ -75,14 +75,15 @@ def part_transforms(fields: BodyFields, chain: F64) -> tuple[F64, F64, F64]:
     """Return how to reach the fields at posed joints (B, J, 4, 4).
 
     Returns:
-        rest_from_world (B, P, 3, 4), the least stretch of each part's transform (B, P), and the centres of the balls
-        around the parts in the world (B, P, 3).
+        voxel_from_world (B, P, 3, 4), the least stretch of each part's transform (B, P), and the centres of the
+        balls around the parts in the world (B, P, 3).
     """
     posed = 0.5 * (chain[:, fields.joints[:, 0]] + chain[:, fields.joints[:, 1]])
     stretch = np.linalg.svd(posed[..., :3, :3], compute_uv=False)[..., -1].clip(1e-3)
     inverse = np.linalg.inv(posed)[..., :3, :]
     centres = np.einsum("bpij,pj->bpi", posed[..., :3, :3], fields.centre) + posed[..., :3, 3]
-    return np.ascontiguousarray(inverse), stretch, centres
+    inverse[..., 3] -= fields.origin
+    return np.ascontiguousarray(inverse / fields.voxel), stretch, centres
 
 
 def touchable_joints(body: Body, garment: GarmentMesh) -> I32:

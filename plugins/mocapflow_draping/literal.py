@@ -28,8 +28,8 @@ def settle_batch(grid, fixed, first, last, skin, step, iterations, limited, in_s
         limited: True: never beyond straight down; False: it swings back in the next turn, as printed.
         in_space: True: the nearest fixed point anywhere; False: along the strand.
         lower: m, how far all particles sink at a time while none is fixed.
-        bodies: rest_from_world (B, P, 3, 4), stretch (B, P) and ball centres (B, P, 3) of the parts.
-        solid: radius, origin, shape, offset, values and 1/voxel of the parts.
+        bodies: voxel_from_world (B, P, 3, 4), stretch (B, P) and ball centres (B, P, 3) of the parts.
+        solid: radius, shape, offset, values, 1/voxel and margin of the parts.
 
     Source: Rosenhahn 2008, section 12.3
     """
@@ -48,14 +48,11 @@ FLOOR = -10.0  # m: what falls past everything stops here
 
 @numba.njit(cache=True)
 def _touch(grid, fixed, first, last, skin, maps, stretch, centres, solid):  # type: ignore[no-untyped-def]
-    radius, origin, shape, offset, values, scale = solid
     for n in range(grid.shape[0]):
         for k in range(first[n], last[n] + 1):
             if not fixed[n, k]:
                 p = grid[n, k]
-                d = body_distance(
-                    p[0], p[1], p[2], maps, stretch, centres, radius, origin, shape, offset, values, scale
-                )
+                d = body_distance(p[0], p[1], p[2], maps, stretch, centres, solid, 0)[0]
                 fixed[n, k] = d < skin
 
 
@@ -145,7 +142,6 @@ def blow_batch(grid, fixed, first, last, skin, force, amount, bodies, solid):  #
 @numba.njit(cache=True)
 def _blown(strand, pivot, last, force, angle, skin, maps, stretch, centres, solid, trial):  # type: ignore[no-untyped-def]
     """Write the tail turned towards the force and return True if it stays clear of the body or leaves it."""
-    radius, origin, shape, offset, values, scale = solid
     x = strand[pivot]
     d = strand[last] - x
     axis = np.array(
@@ -164,13 +160,9 @@ def _blown(strand, pivot, last, force, angle, skin, maps, stretch, centres, soli
         trial[k, 0] = x[0] + c * q[0] + s * (axis[1] * q[2] - axis[2] * q[1]) + along * axis[0]
         trial[k, 1] = x[1] + c * q[1] + s * (axis[2] * q[0] - axis[0] * q[2]) + along * axis[1]
         trial[k, 2] = x[2] + c * q[2] + s * (axis[0] * q[1] - axis[1] * q[0]) + along * axis[2]
-        d1 = body_distance(
-            trial[k, 0], trial[k, 1], trial[k, 2], maps, stretch, centres, radius, origin, shape, offset, values, scale
-        )
+        d1 = body_distance(trial[k, 0], trial[k, 1], trial[k, 2], maps, stretch, centres, solid, 0)[0]
         if d1 < skin:
             p = strand[k]
-            if d1 < body_distance(
-                p[0], p[1], p[2], maps, stretch, centres, radius, origin, shape, offset, values, scale
-            ):
+            if d1 < body_distance(p[0], p[1], p[2], maps, stretch, centres, solid, 0)[0]:
                 return False
     return True

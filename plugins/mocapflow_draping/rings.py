@@ -15,6 +15,8 @@ import numpy as np
 from mocapflow_draping.distance import body_distance
 
 UNFOLDED = 0.9  # two links fold no sharper than this share of their length
+CLEAR = 2e-4  # m beyond contact to which a particle is pushed, so that it need not be pushed again at once
+PUSHES = 3  # out of the body and back to the bar's length, per sweep
 PROBE = 1e-3  # m, for the direction out of the body
 
 
@@ -34,25 +36,27 @@ def close_batch(grid, links, first, last, beside, ring_length, skin, longest, st
         stiff: 0 to 1, the share of a shortened link's lack that one sweep makes good.
         straight: 0 to 1, the same share for a fold sharper than a right angle: it keeps folds wider than a link.
         sweeps: passes over each row.
-        bodies: rest_from_world (B, P, 3, 4), stretch (B, P) and ball centres (B, P, 3) of the parts.
-        solid: radius, origin, shape, offset, values and 1/voxel of the parts.
+        bodies: voxel_from_world (B, P, 3, 4), stretch (B, P) and ball centres (B, P, 3) of the parts.
+        solid: radius, shape, offset, values, 1/voxel and margin of the parts.
     """
     maps, stretch, centres = bodies
-    bars = np.empty((grid.shape[1], grid.shape[2], 3))
-    room = np.empty(grid.shape[1])
+    strands, rows = grid.shape[1], grid.shape[2]
+    bars, seen = np.empty((strands, rows, 3)), np.empty((strands, 3))
+    room, near = np.empty(strands), np.zeros(strands, np.int64)
     for b in range(len(grid)):
         _bars(grid[b], links, first, last, bars)
-        for row in range(1, grid.shape[2]):
+        for row in range(1, rows):
             _place(grid[b], bars, links, first, last, row)
-            room[:] = 0.0
+            room[:] = -1.0
             for sweep in range(sweeps):
                 _pull(grid[b], first, last, beside, ring_length, row, longest, stiff, sweep % 2 == 1)
                 if straight > 0.0:
                     _unfold(grid[b], first, last, beside, ring_length, row, straight, sweep % 2 == 1)
-                for n in range(grid.shape[1]):
+                for n in range(strands):
                     if first[n] < row <= last[n]:
-                        _settle(
-                            grid[b, n], row, links[n, row - 1], skin[b], room, n,
+                        _to_length(grid[b, n, row], grid[b, n, row - 1], links[n, row - 1])
+                        room[n], near[n] = _push_out(
+                            grid[b, n, row], grid[b, n, row - 1], links[n, row - 1], skin[b], seen[n], room[n], near[n],
                             maps[b], stretch[b], centres[b], solid,
                         )  # fmt: skip
 
@@ -129,39 +133,31 @@ def _draw(p, q, share, p_moves, q_moves):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def _settle(strand, row, link, skin, room, n, maps, stretch, centres, solid):  # type: ignore[no-untyped-def]
-    """Move one particle out of the body and back to the length of its bar."""
-    radius, origin, shape, offset, values, scale = solid
-    p, above = strand[row], strand[row - 1]
-    _to_length(p, above, link)
-    d = body_distance(p[0], p[1], p[2], maps, stretch, centres, radius, origin, shape, offset, values, scale) - skin
-    if d < 0.0:
-        gx = (
-            body_distance(
-                p[0] + PROBE, p[1], p[2], maps, stretch, centres, radius, origin, shape, offset, values, scale
-            )
-            - skin
-            - d
-        )
-        gy = (
-            body_distance(
-                p[0], p[1] + PROBE, p[2], maps, stretch, centres, radius, origin, shape, offset, values, scale
-            )
-            - skin
-            - d
-        )
-        gz = (
-            body_distance(
-                p[0], p[1], p[2] + PROBE, maps, stretch, centres, radius, origin, shape, offset, values, scale
-            )
-            - skin
-            - d
-        )
+def _push_out(p, above, link, skin, seen, room, near, maps, stretch, centres, solid):  # type: ignore[no-untyped-def]
+    """Move a particle that may be inside the body out of it, at the length of its bar.
+
+    `room` is how far it was from contact where it was `seen` last: until it has moved that far nothing is measured.
+    """
+    for _ in range(PUSHES):
+        if room >= 0.0:
+            moved = (p[0] - seen[0]) ** 2 + (p[1] - seen[1]) ** 2 + (p[2] - seen[2]) ** 2
+            if moved <= room * room:
+                return room, near
+        room, near = body_distance(p[0], p[1], p[2], maps, stretch, centres, solid, near)
+        room -= skin
+        seen[0], seen[1], seen[2] = p[0], p[1], p[2]
+        if room >= 0.0:
+            return room, near
+        gx = body_distance(p[0] + PROBE, p[1], p[2], maps, stretch, centres, solid, near)[0] - skin - room
+        gy = body_distance(p[0], p[1] + PROBE, p[2], maps, stretch, centres, solid, near)[0] - skin - room
+        gz = body_distance(p[0], p[1], p[2] + PROBE, maps, stretch, centres, solid, near)[0] - skin - room
         g = math.sqrt(gx * gx + gy * gy + gz * gz) + 1e-12
-        p[0] -= d * gx / g
-        p[1] -= d * gy / g
-        p[2] -= d * gz / g
+        depth = CLEAR - room
+        p[0] += depth * gx / g
+        p[1] += depth * gy / g
+        p[2] += depth * gz / g
         _to_length(p, above, link)
+    return -1.0, near
 
 
 @numba.njit(cache=True)

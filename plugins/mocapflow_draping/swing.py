@@ -14,7 +14,7 @@ import numpy as np
 
 from mocapflow_draping.distance import body_distance
 
-TOUCH = 2e-4  # m, nearer than this to the contact distance counts as touching
+TOUCH = 3e-4  # m, nearer than this to the contact distance counts as touching
 
 
 @numba.njit(cache=True)
@@ -30,58 +30,56 @@ def swing_batch(roots, facing, down, start, skin, links, first, last, bodies, so
         links: (N, L - 1) m, lengths of the bars.
         first: (N,) row of the first particle of each strand.
         last: (N,) row of the last one.
-        bodies: rest_from_world (B, P, 3, 4), stretch (B, P) and ball centres (B, P, 3) of the parts.
-        solid: radius, origin, shape, offset, values and 1/voxel of the parts.
+        bodies: voxel_from_world (B, P, 3, 4), stretch (B, P) and ball centres (B, P, 3) of the parts.
+        solid: radius, shape, offset, values, 1/voxel and margin of the parts.
         out: (B, N, L, 3) m, written.
         support: (B, N), written: the last supported particle of each strand.
     """
     maps, stretch, centres = bodies
-    reach, room = np.empty(links.shape[1] + 1), np.empty(links.shape[1] + 1)
+    rows = links.shape[1] + 1
+    reach, room, near = np.empty(rows), np.empty(rows), np.zeros(rows, np.int64)
     for b in range(len(roots)):
         for n in range(roots.shape[1]):
             support[b, n] = _swing(
                 roots[b, n], facing[b, n], down[b, n], start[b, n], skin[b], links[n], first[n], last[n],
-                maps[b], stretch[b], centres[b], solid, out[b, n], reach, room,
+                maps[b], stretch[b], centres[b], solid, out[b, n], reach, room, near,
             )  # fmt: skip
 
 
 @numba.njit(cache=True)
-def _swing(root, facing, down, start, skin, links, first, last, maps, stretch, centres, solid, out, reach, room):  # type: ignore[no-untyped-def]
-    radius, origin, shape, offset, values, scale = solid
+def _swing(root, facing, down, start, skin, links, first, last, maps, stretch, centres, solid, out, reach, room, near):  # type: ignore[no-untyped-def]
+    """Drape one strand; `reach` is along the strand, `room` how far each particle may yet move untouched."""
     out[first] = root
-    pivot, angle = first, start
+    reach[first] = 0.0
+    for k in range(first + 1, last + 1):
+        reach[k], room[k] = reach[k - 1] + links[k - 1], 0.0
+    pivot, angle, turn = first, start, 0.0
     while pivot < last:
-        x, y, z = out[pivot, 0], out[pivot, 1], out[pivot, 2]
-        arm = 0.0
-        for k in range(pivot + 1, last + 1):
-            arm += links[k - 1]
-            reach[k], room[k] = arm, 0.0
+        x, base = out[pivot], reach[pivot]
         touched = -1
-        while touched < 0:
+        while touched < 0 and angle > 0.0:
             bx, by, bz = _bar(facing, down, angle)
             turn = angle
-            for k in range(pivot + 1, last + 1):  # measure only where the room left could end the turn
-                if room[k] < reach[k] * turn:
-                    r = reach[k]
-                    room[k] = body_distance(
-                        x + r * bx, y + r * by, z + r * bz,
-                        maps, stretch, centres, radius, origin, shape, offset, values, scale,
-                    ) - skin  # fmt: skip
+            for k in range(pivot + 1, last + 1):  # measure only where the room left would end the turn
+                arm = reach[k] - base
+                if room[k] < arm * turn:
+                    room[k], near[k] = body_distance(
+                        x[0] + arm * bx, x[1] + arm * by, x[2] + arm * bz, maps, stretch, centres, solid, near[k]
+                    )
+                    room[k] -= skin
                     if room[k] < TOUCH:
                         touched = k
                         break
-                    turn = min(turn, room[k] / r)
-            if touched >= 0 or turn <= 0.0:
-                break
-            angle -= turn
-            for k in range(pivot + 1, last + 1):
-                room[k] -= reach[k] * turn
-        end = touched if touched >= 0 else last
+                    turn = min(turn, room[k] / arm)
+            if touched < 0:
+                angle -= turn
+                for k in range(pivot + 1, last + 1):
+                    room[k] -= (reach[k] - base) * turn
         bx, by, bz = _bar(facing, down, angle)
+        end = touched if touched >= 0 else last
         for k in range(pivot + 1, end + 1):
-            out[k, 0] = x + reach[k] * bx
-            out[k, 1] = y + reach[k] * by
-            out[k, 2] = z + reach[k] * bz
+            arm = reach[k] - base
+            out[k, 0], out[k, 1], out[k, 2] = x[0] + arm * bx, x[1] + arm * by, x[2] + arm * bz
         if touched < 0:
             return pivot
         pivot = touched

@@ -30,6 +30,8 @@ def signed_distance(
     indices = distance_transform_edt(nearest < 0, return_distances=False, return_indices=True)
     nearest = nearest[tuple(indices)]  # far from the surface: the face that is nearest to the nearest near voxel
     _far(vertices, faces, origin, voxel, distance, nearest)
+    for backwards in (False, True):
+        _sweep(vertices, faces, origin, voxel, distance, nearest, backwards)
     crossings = np.zeros(shape, np.int32)
     _crossings(vertices, faces, origin, voxel, crossings)
     winding = np.cumsum(crossings[:, :, ::-1], axis=2)[:, :, ::-1]
@@ -66,6 +68,29 @@ def _far(vertices, faces, origin, voxel, distance, nearest):  # type: ignore[no-
                     point[0], point[1], point[2] = origin[0] + voxel * i, origin[1] + voxel * j, origin[2] + voxel * k
                     f = faces[nearest[i, j, k]]
                     distance[i, j, k] = to_triangle(point, vertices[f[0]], vertices[f[1]], vertices[f[2]])
+
+
+@numba.njit(cache=True)
+def _sweep(vertices, faces, origin, voxel, distance, nearest, backwards):  # type: ignore[no-untyped-def]
+    """Let each voxel try the nearest faces of its three neighbours behind."""
+    point, step = np.empty(3), -1 if backwards else 1
+    n0, n1, n2 = distance.shape
+    for a in range(n0):
+        i = n0 - 1 - a if backwards else a
+        for b in range(n1):
+            j = n1 - 1 - b if backwards else b
+            for c in range(n2):
+                k = n2 - 1 - c if backwards else c
+                for side in range(3):
+                    u, v, w = i - step * (side == 0), j - step * (side == 1), k - step * (side == 2)
+                    if not (0 <= u < n0 and 0 <= v < n1 and 0 <= w < n2) or nearest[u, v, w] == nearest[i, j, k]:
+                        continue
+                    point[0], point[1], point[2] = origin[0] + voxel * i, origin[1] + voxel * j, origin[2] + voxel * k
+                    f = faces[nearest[u, v, w]]
+                    d = to_triangle(point, vertices[f[0]], vertices[f[1]], vertices[f[2]])
+                    if d < distance[i, j, k]:
+                        distance[i, j, k] = d
+                        nearest[i, j, k] = nearest[u, v, w]
 
 
 @numba.njit(cache=True)
