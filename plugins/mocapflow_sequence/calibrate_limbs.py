@@ -39,8 +39,11 @@ class CalibrateLimbs(Stage):
     name: ClassVar[str] = "calibrate_limbs"
     segmenter: Segmenter
     matchers: Annotated[tuple[Matcher, ...], Field(min_length=1)]
-    proportions: tuple[str, ...] = ("girth", "thigh", "shank", "foot", "upper_arm", "forearm")
-    spread: Positive = 0.03  # standard deviation of a log proportion about the body's
+    # contours see neither hip nor shoulder: without the trunk, the thigh would take up what the trunk is wrong by
+    proportions: tuple[str, ...] = (
+        "girth", "trunk", "shoulder_width", "thigh", "shank", "foot", "upper_arm", "forearm",
+    )  # fmt: skip
+    spread: Positive = 0.05  # standard deviation of a log proportion about the body's
     frames: Annotated[int, Field(ge=1)] = 10  # spread over the recording
     passes: Annotated[int, Field(ge=1)] = 2  # times that the images are segmented
     rounds: Annotated[int, Field(ge=1)] = 6  # matchings a pass
