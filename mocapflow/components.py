@@ -29,7 +29,7 @@ from mocapflow.data import (
     Surface,
     Turn,
 )
-from mocapflow.records import F64, I32
+from mocapflow.records import F64, I32, Bool
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -109,11 +109,15 @@ class Draper(Component):
     def velocity(self, pose: Pose, parameters: F64, vertices: I32, past: Past, scene: Scene) -> F64:
         """Return the velocities (M, 3, 6 + D + Q) of cloth vertices (M,) for unit changes of pose and parameters.
 
-        The default takes central differences of one batch of drapes.
+        The default takes differences of one batch of drapes.
         """
         from mocapflow.model import drape_differences
 
         return drape_differences(self, pose, parameters, vertices, past, scene)
+
+    def touchable(self, scene: Scene) -> Bool:
+        """Return which joints (J,) move what the garment hangs from or can touch; the rest never moves the cloth."""
+        return np.ones(len(scene.body.parents), bool)
 
 
 class ClothFitter(Component):
