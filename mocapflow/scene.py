@@ -9,7 +9,9 @@ import numpy as np
 
 from mocapflow.data import BODY, CLOTH, Background, Body, Camera, Cloth, GarmentMesh, Pose, Surface
 from mocapflow.geometry import kinematics, meshes
-from mocapflow.records import I32, U8, record
+from mocapflow.records import I32, U8, Bool, record
+
+HEM_REACH = 0.15  # m from the garment, at rest: skin that its edge can come to cover or lay bare
 
 
 @record
@@ -42,6 +44,17 @@ class Scene:
         """Layer of each surface vertex, body first: (N,)."""
         cloth = 0 if self.garment is None else len(self.garment.vertices)
         return np.repeat(np.array([BODY, CLOTH], np.uint8), [len(self.body.vertices), cloth])
+
+    @cached_property
+    def near_garment(self) -> Bool:
+        """Which body vertices (V,) a garment covers or ends close to, by the rest pose."""
+        if self.garment is None:
+            return np.zeros(len(self.body.vertices), bool)
+        from scipy.spatial import cKDTree
+
+        away, _ = cKDTree(self.garment.vertices).query(self.body.vertices, distance_upper_bound=HEM_REACH)
+        near: Bool = np.isfinite(away)
+        return near
 
     @cached_property
     def _bare_edges(self) -> I32:

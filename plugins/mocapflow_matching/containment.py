@@ -70,4 +70,5 @@ def inside_px(silhouette: Silhouette, pixels: F64) -> F64:
     height, width = silhouette.distance.shape
     column = np.clip(np.round(pixels[:, 0]).astype(int), 0, width - 1)
     row = np.clip(np.round(pixels[:, 1]).astype(int), 0, height - 1)
-    return silhouette.distance[row, column].astype(np.float64)
+    inside: F64 = silhouette.distance[row, column].astype(np.float64)
+    return inside

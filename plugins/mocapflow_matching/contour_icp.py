@@ -10,7 +10,6 @@ from pydantic import Field
 from mocapflow.components import Matcher, pool
 from mocapflow.data import (
     CLOTH,
-    Camera,
     Contour,
     Frame,
     Matches,
@@ -23,11 +22,14 @@ from mocapflow.data import (
 )
 from mocapflow.geometry.contours import nearest_compatible
 from mocapflow.geometry.silhouettes import occluding_contour
-from mocapflow.records import F64, I32
+from mocapflow.records import F64, I32, Bool
 from mocapflow.scene import Scene
 from mocapflow_matching.robust import Loss, robust_weights
 
 Positive = Annotated[float, Field(gt=0)]
+
+
+ANY_DIRECTION = -1.0  # least cosine between normals
 
 
 class ImageContour(NamedTuple):
@@ -49,6 +51,7 @@ class ContourIcp(Matcher):
     direction: Literal["both", "forward", "backward"] = "both"
     residual: Literal["normal", "point"] = "normal"  # let points slide along the contour, or not (the chapter)
     spacing_px: Positive = 4.0
+    hem_guard_px: Annotated[float, Field(ge=0)] = 12.0  # skin so near to cloth counts as cloth: a hem is uncertain
     calm_mm: Positive = 15.0
     first_reach_px: Positive = 40.0
     later_reach_px: Positive = 10.0
@@ -69,7 +72,7 @@ class ContourIcp(Matcher):
     ) -> Matches:
         """Return pairs of contour points; see the class."""
         parts = [
-            (1.0, self.match_view(scene.cameras[silhouette.camera], silhouette, surface, turn))
+            (1.0, self.match_view(silhouette, surface, scene, turn))
             for silhouette in segmentation.silhouettes
             if silhouette.layer == "person"
         ]
@@ -78,10 +81,10 @@ class ContourIcp(Matcher):
     def _calm(self, turn: Turn) -> bool:
         return turn.change is not None and turn.change.body <= self.calm_mm / 1000
 
-    def match_view(self, camera: Camera, silhouette: Silhouette, surface: Surface, turn: Turn) -> Matches:
+    def match_view(self, silhouette: Silhouette, surface: Surface, scene: Scene, turn: Turn) -> Matches:
         """Return the pairs of one view."""
         image = ImageContour(*(rows[:: self.stride] for rows in silhouette.zero_level))
-        model = _sorted_by_row(occluding_contour(surface, camera, self.spacing_px))
+        model = _sorted_by_row(occluding_contour(surface, scene.cameras[silhouette.camera], self.spacing_px))
         reach = self.later_reach_px if self._calm(turn) else self.first_reach_px
         cosine = float(np.cos(np.radians(self.normal_angle_deg)))
         nothing = np.empty(0, np.int32)
@@ -92,13 +95,14 @@ class ContourIcp(Matcher):
         if self.direction != "forward":  # every model point asks the image
             found = nearest_compatible(model.pixel, model.normal, image.pixel, image.normal, reach, cosine)
             seeing, showing = found[found >= 0], np.flatnonzero(found >= 0).astype(np.int32)
-        pairs = np.concatenate([seen, seeing]), np.concatenate([shown, showing])
-        return self.weigh(silhouette.camera, image, model, *pairs, surface, turn)
+        seen, shown = np.concatenate([seen, seeing]), np.concatenate([shown, showing])
+        sigma = np.where(self._near_cloth(model, surface, scene), self.cloth_sigma_px, self.sigma_px)
+        return self.weigh(silhouette.camera, image, model, seen, shown, sigma[shown], turn)
 
     def weigh(
-        self, index: int, image: ImageContour, model: Contour, seen: I32, shown: I32, surface: Surface, turn: Turn
+        self, index: int, image: ImageContour, model: Contour, seen: I32, shown: I32, sigma: F64, turn: Turn
     ) -> Matches:
-        """Return pairs of image points `seen` (M,) and model points `shown` (M,) with their weights."""
+        """Return pairs of image points `seen` (M,) and model points `shown` (M,), of error `sigma` (M,) px."""
         offset = model.pixel[shown] - image.pixel[seen]
         if self.residual == "normal":
             direction = image.normal[seen]
@@ -107,7 +111,6 @@ class ContourIcp(Matcher):
             direction = np.zeros_like(offset)
             distance = np.linalg.norm(offset, axis=1)
         loss = self.later_loss if self._calm(turn) else self.first_loss
-        sigma = np.where(surface.layer[model.vertex[shown]] == CLOTH, self.cloth_sigma_px, self.sigma_px)
         return Matches(
             camera=np.full(len(seen), index, np.int16),
             # a model point lies between vertices: moving the target by as much makes the vertex stand for it
@@ -117,9 +120,22 @@ class ContourIcp(Matcher):
             weight=robust_weights(distance / sigma, loss, self.scale) / sigma**2,
         )
 
+    def _near_cloth(self, model: Contour, surface: Surface, scene: Scene) -> Bool:
+        """Return which model points (K,) lie on cloth, or on skin so near its edge that the image may show cloth."""
+        cloth: Bool = surface.layer[model.vertex] == CLOTH
+        doubtful = ~cloth
+        doubtful[doubtful] = scene.near_garment[model.vertex[doubtful]]
+        if not cloth.any() or not doubtful.any() or not self.hem_guard_px:
+            return cloth
+        skin, hem = (model.pixel[part] for part in (doubtful, cloth))
+        directions = model.normal[doubtful], model.normal[cloth]
+        near = nearest_compatible(skin, directions[0], hem, directions[1], self.hem_guard_px, ANY_DIRECTION) >= 0
+        cloth[np.flatnonzero(doubtful)[near]] = True
+        return cloth
+
 
 def _sorted_by_row(contour: Contour) -> Contour:
-    order: F64 = np.argsort(contour.pixel[:, 1], kind="stable")
+    order = np.argsort(contour.pixel[:, 1], kind="stable")
     return Contour(
         vertex=contour.vertex[order],
         anchor=contour.anchor[order],
