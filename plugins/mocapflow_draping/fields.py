@@ -50,8 +50,8 @@ def build_fields(body: Body, joints: I32, voxel: float) -> BodyFields:
     kept = np.unique(label)
     kept = kept[kept >= 0]
     inside = body.vertices[label >= 0]
-    low = inside.min(axis=0) - MARGIN - 2 * voxel
-    shape = tuple(int(n) for n in np.ceil((np.ptp(inside, axis=0) + 2 * MARGIN + 4 * voxel) / voxel))
+    low = inside.min(axis=0) - MARGIN - 4 * voxel
+    shape = tuple(int(n) for n in np.ceil((np.ptp(inside, axis=0) + 2 * MARGIN + 8 * voxel) / voxel))
     from mocapflow_draping.voxels import signed_distance
 
     distance, nearest = signed_distance(body.vertices, body.faces, low, (shape[0], shape[1], shape[2]), voxel)
@@ -121,7 +121,7 @@ def _part(distance: F64, mine: Bool, low: F64, voxel: float) -> tuple[F64, F64]:
     """Return origin and field of one part: the body cut to the voxels that are nearest to the part's skin."""
     solid = mine & (distance < 0)
     where = np.argwhere(solid if solid.any() else mine)
-    pad = int(np.ceil(MARGIN / voxel)) + 1
+    pad = int(np.ceil(MARGIN / voxel + OVERLAP)) + 1
     first = np.maximum(where.min(axis=0) - pad, 0)
     last = np.minimum(where.max(axis=0) + pad + 1, distance.shape)
     crop = tuple(slice(a, b) for a, b in zip(first, last, strict=True))

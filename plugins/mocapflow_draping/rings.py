@@ -16,7 +16,7 @@ from mocapflow_draping.distance import body_distance
 
 UNFOLDED = 0.9  # two links fold no sharper than this share of their length
 CLEAR = 2e-4  # m beyond contact to which a particle is pushed, so that it need not be pushed again at once
-PUSHES = 3  # out of the body and back to the bar's length, per sweep
+PUSHES = 5  # out of the body and back to the bar's length, per sweep
 PROBE = 1e-3  # m, for the direction out of the body
 
 
@@ -49,16 +49,17 @@ def close_batch(grid, links, first, last, beside, ring_length, skin, longest, st
             _place(grid[b], bars, links, first, last, row)
             room[:] = -1.0
             for sweep in range(sweeps):
-                _pull(grid[b], first, last, beside, ring_length, row, longest, stiff, sweep % 2 == 1)
+                backwards = sweep % 2 == 1
+                _pull(grid[b], first, last, beside, ring_length, row, longest, stiff, backwards)
                 if straight > 0.0:
-                    _unfold(grid[b], first, last, beside, ring_length, row, straight, sweep % 2 == 1)
+                    _unfold(grid[b], first, last, beside, ring_length, row, straight, backwards)
                 for n in range(strands):
                     if first[n] < row <= last[n]:
-                        _to_length(grid[b, n, row], grid[b, n, row - 1], links[n, row - 1])
+                        p, above, link = grid[b, n, row], grid[b, n, row - 1], links[n, row - 1]
+                        _to_length(p, above, link)
                         room[n], near[n] = _push_out(
-                            grid[b, n, row], grid[b, n, row - 1], links[n, row - 1], skin[b], seen[n], room[n], near[n],
-                            maps[b], stretch[b], centres[b], solid,
-                        )  # fmt: skip
+                            p, above, link, skin[b], seen[n], room[n], near[n], maps[b], stretch[b], centres[b], solid
+                        )
 
 
 @numba.njit(cache=True)
@@ -148,16 +149,26 @@ def _push_out(p, above, link, skin, seen, room, near, maps, stretch, centres, so
         seen[0], seen[1], seen[2] = p[0], p[1], p[2]
         if room >= 0.0:
             return room, near
-        gx = body_distance(p[0] + PROBE, p[1], p[2], maps, stretch, centres, solid, near)[0] - skin - room
-        gy = body_distance(p[0], p[1] + PROBE, p[2], maps, stretch, centres, solid, near)[0] - skin - room
-        gz = body_distance(p[0], p[1], p[2] + PROBE, maps, stretch, centres, solid, near)[0] - skin - room
-        g = math.sqrt(gx * gx + gy * gy + gz * gz) + 1e-12
+        gx, gy, gz = _outwards(p, maps, stretch, centres, solid, near)
         depth = CLEAR - room
-        p[0] += depth * gx / g
-        p[1] += depth * gy / g
-        p[2] += depth * gz / g
+        p[0] += depth * gx
+        p[1] += depth * gy
+        p[2] += depth * gz
         _to_length(p, above, link)
     return -1.0, near
+
+
+@numba.njit(cache=True)
+def _outwards(p, maps, stretch, centres, solid, near):  # type: ignore[no-untyped-def]
+    """Return the unit direction out of the body at a point."""
+    gx = body_distance(p[0] + PROBE, p[1], p[2], maps, stretch, centres, solid, near)[0]
+    gx -= body_distance(p[0] - PROBE, p[1], p[2], maps, stretch, centres, solid, near)[0]
+    gy = body_distance(p[0], p[1] + PROBE, p[2], maps, stretch, centres, solid, near)[0]
+    gy -= body_distance(p[0], p[1] - PROBE, p[2], maps, stretch, centres, solid, near)[0]
+    gz = body_distance(p[0], p[1], p[2] + PROBE, maps, stretch, centres, solid, near)[0]
+    gz -= body_distance(p[0], p[1], p[2] - PROBE, maps, stretch, centres, solid, near)[0]
+    g = math.sqrt(gx * gx + gy * gy + gz * gz) + 1e-12
+    return gx / g, gy / g, gz / g
 
 
 @numba.njit(cache=True)

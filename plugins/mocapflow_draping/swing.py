@@ -14,6 +14,9 @@ import numpy as np
 
 from mocapflow_draping.distance import body_distance
 
+GUARD = 0.4  # voxels: so much too far can a field read near a sharp edge
+DEEP = 5e-5  # m, deeper than this a tail turns back
+BACKS = 64  # turns back of one strand, so that one that begins inside the body comes to an end
 TOUCH = 3e-4  # m, nearer than this to the contact distance counts as touching
 
 
@@ -53,28 +56,34 @@ def _swing(root, facing, down, start, skin, links, first, last, maps, stretch, c
     reach[first] = 0.0
     for k in range(first + 1, last + 1):
         reach[k], room[k] = reach[k - 1] + links[k - 1], 0.0
-    pivot, angle, turn = first, start, 0.0
+    pivot, angle, turn, backs = first, start, 0.0, 0
+    guard = GUARD / solid[4]
     while pivot < last:
         x, base = out[pivot], reach[pivot]
         touched = -1
-        while touched < 0 and angle > 0.0:
+        while touched < 0:
             bx, by, bz = _bar(facing, down, angle)
             turn = angle
-            for k in range(pivot + 1, last + 1):  # measure only where the room left would end the turn
+            for k in range(pivot + 1, last + 1):  # measure only where the room left could end the turn
                 arm = reach[k] - base
-                if room[k] < arm * turn:
+                if room[k] - guard < arm * turn:
                     room[k], near[k] = body_distance(
                         x[0] + arm * bx, x[1] + arm * by, x[2] + arm * bz, maps, stretch, centres, solid, near[k]
                     )
                     room[k] -= skin
+                    if room[k] < -DEEP and backs < BACKS and angle < math.pi:  # read too far at a sharp edge
+                        turn = 2.0 * room[k] / arm
+                        backs += 1
+                        break
                     if room[k] < TOUCH:
                         touched = k
                         break
                     turn = min(turn, room[k] / arm)
-            if touched < 0:
-                angle -= turn
-                for k in range(pivot + 1, last + 1):
-                    room[k] -= (reach[k] - base) * turn
+            if touched >= 0 or turn == 0.0:
+                break
+            angle -= turn
+            for k in range(pivot + 1, last + 1):
+                room[k] -= (reach[k] - base) * abs(turn)
         bx, by, bz = _bar(facing, down, angle)
         end = touched if touched >= 0 else last
         for k in range(pivot + 1, end + 1):

@@ -1,0 +1,152 @@
+"""The drape on analytic bodies: T-CL1 to T-CL3, and the distance fields under it."""
+
+import numpy as np
+import pytest
+from drape_bodies import SKIN, VOXEL, box, distances, leg_poses, legs, lying_cylinder, prepared, swing
+from mocapflow_draping.kinematic import Kinematic
+from mocapflow_draping.literal import settle_batch
+from mocapflow_draping.strands import strands_of
+from mocapflow_draping.voxels import signed_distance
+from mocapflow_garments.skirt import Skirt
+
+from mocapflow.data import Past
+from mocapflow.errors import PluginError
+from mocapflow.scene import Scene
+
+SKIRT = dict(waist_height_m=1.08, waist_circumference_m=0.92, hem_circumference_m=1.7, length_m=0.6)
+
+
+def literal(body, grid, fixed, step=2.0, iterations=50, limited=True):
+    """Return a grid (N, L, 3) laid step by step, and what is fixed."""
+    fields, bodies = prepared(body)
+    grid, fixed = grid[None].copy(), fixed[None].copy()
+    first, last = np.zeros(grid.shape[1], np.int32), np.full(grid.shape[1], grid.shape[2] - 1, np.int32)
+    settle_batch(grid, fixed, first, last, np.array([SKIN]), np.radians(step), iterations, limited, False, 0.002,
+                 bodies, fields.solid)  # fmt: skip
+    return grid[0], fixed[0]
+
+
+def strand(count, link, height):
+    """Return one level strand along x from the origin."""
+    x = link * np.arange(count)
+    return np.stack([x, 0 * x, np.full(count, height)], axis=1)[None]
+
+
+@pytest.fixture(scope="module")
+def skirted():
+    """A skirt on legs of capsules, and four poses."""
+    body = legs()
+    return Scene(cameras=(), body=body, garment=Skirt(**SKIRT).sew(body)), leg_poses()
+
+
+def test_distances_of_a_box_are_exact():
+    body = box([-0.1, -0.2, -0.3], [0.1, 0.2, 0.3])
+    origin = np.full(3, -0.5)
+    distance, _ = signed_distance(body.vertices, body.faces, origin, (51, 51, 51), 0.02)
+    points = origin + 0.02 * np.stack(np.meshgrid(*[np.arange(51)] * 3, indexing="ij"), -1)
+    over = np.abs(points) - [0.1, 0.2, 0.3]
+    exact = np.linalg.norm(np.maximum(over, 0), axis=-1) + np.minimum(over.max(-1), 0)
+    np.testing.assert_allclose(distance, exact, atol=1e-12)
+
+
+def test_fields_follow_the_joints(skirted):
+    scene, poses = skirted
+    shins = scene.body.vertices[(scene.body.vertices[:, 2] > 0.15) & (scene.body.vertices[:, 2] < 0.4)]
+    rest = distances(scene.body, np.tile(shins, (4, 1, 1)), leg_poses())[0]
+    assert np.abs(rest).max() < 1.5e-3  # coarse facets of the capsule and coarse voxels
+
+
+def test_a_flat_cloth_lies_on_a_plane_undeformed():
+    table = box([-0.3, -0.3, -0.1], [0.3, 0.3, 0.0])
+    grid = np.stack(np.meshgrid(np.linspace(-0.2, 0.2, 9), np.linspace(-0.2, 0.2, 9), indexing="ij"), -1)
+    grid = np.concatenate([grid, np.full((9, 9, 1), 0.05)], -1)
+    laid, fixed = literal(table, grid, np.zeros((9, 9), bool))
+    assert fixed.all()
+    np.testing.assert_allclose(laid[..., :2], grid[..., :2], atol=1e-12)
+    assert np.ptp(laid[..., 2]) == 0
+    assert SKIN - 0.002 - 1e-6 <= laid[0, 0, 2] < SKIN
+
+
+def test_an_overhang_hangs_straight_down_and_keeps_its_length():
+    table = box([-0.3, -0.3, -0.1], [0.105, 0.3, 0.0])
+    (laid,), (supported,) = swing(table, [[0.0, 0.0, SKIN]], [1.0, 0.0, 0.0], 31, 0.01)
+    assert 11 <= supported <= 22
+    straight = laid[supported] - np.outer(0.01 * np.arange(31 - supported), [0, 0, 1])
+    assert np.abs(laid[supported:] - straight).max() < 1e-4
+    assert SKIN <= laid[-1, 0] - 0.105 < SKIN + 5e-4
+    assert np.abs(np.linalg.norm(np.diff(laid, axis=0), axis=1) - 0.01).max() < 1e-12
+
+
+def test_without_the_limit_it_swings_by_no_more_than_a_step():
+    nothing = box([5, 5, 5], [5.1, 5.1, 5.1])
+    fixed = np.zeros((1, 11), bool)
+    fixed[0, 0] = True
+    laid, _ = literal(nothing, strand(11, 0.01, 0.0), fixed, limited=False)
+    bar = laid[0, -1] - laid[0, 0]
+    assert np.degrees(np.arctan2(np.hypot(*bar[:2]), -bar[2])) <= 2.0 + 1e-9
+
+
+def test_a_level_strand_hangs_after_45_steps():
+    nothing = box([5, 5, 5], [5.1, 5.1, 5.1])
+    fixed = np.zeros((1, 11), bool)
+    fixed[0, 0] = True
+    almost, _ = literal(nothing, strand(11, 0.01, 0.0), fixed, iterations=44)
+    hanging, _ = literal(nothing, strand(11, 0.01, 0.0), fixed, iterations=45)
+    assert almost[0, -1, 0] > 1e-3
+    np.testing.assert_allclose(hanging[0, -1], [0, 0, -0.1], atol=1e-9)
+
+
+@pytest.mark.parametrize("link", [0.002, 0.01, 0.02])
+def test_a_strand_over_a_cylinder_is_taut(link):
+    radius, length = 0.1, 0.32
+    count = round(length / link) + 1
+    laid, _ = swing(lying_cylinder(radius), [[0.0, 0.0, radius + SKIN]], [1.0, 0.0, 0.0], count, link)
+    away = radius + SKIN
+    chords = np.linalg.norm(np.diff(laid[0], axis=0), axis=1)
+    assert np.abs(chords - link).max() < 1e-12
+    tip = np.array([away, 0.0, -(length - np.pi / 2 * away)])
+    sag = link**2 / (8 * away)  # a chain of bars cuts corners
+    assert np.linalg.norm(laid[0, -1] - tip) < 5e-4 + 2 * sag
+
+
+def test_a_skirt_keeps_its_strands_and_stays_outside(skirted):
+    scene, poses = skirted
+    draped = Kinematic(sweeps=0, skin_m=SKIN, voxel_m=VOXEL).drape(poses, np.zeros((4, 6)), Past(), scene)
+    strands = strands_of(scene.garment, scene.body)
+    lengths = np.linalg.norm(np.diff(draped[:, strands.vertex], axis=2), axis=-1)
+    assert np.abs(lengths / strands.links - 1).max() < 1e-9
+    free = np.setdiff1d(np.arange(draped.shape[1]), scene.garment.pinned)
+    assert distances(scene.body, draped[:, free], poses).min() > SKIN - 1e-4
+
+
+def test_the_chapters_steps_end_near_the_taut_drape(skirted):
+    scene, poses = skirted
+    taut = Kinematic(sweeps=0, skin_m=SKIN).drape(poses, np.zeros((4, 6)), Past(), scene)
+    stepped = Kinematic(sweeps=0, skin_m=SKIN, rule="literal", limited=True)
+    steps = stepped.drape(poses, np.zeros((4, 6)), Past(), scene)
+    assert np.linalg.norm(taut - steps, axis=-1)[0].mean() < 0.01
+
+
+def test_a_batch_is_its_drapes_one_by_one(skirted):
+    scene, poses = skirted
+    draper = Kinematic()
+    parameters = np.random.default_rng(0).uniform(-0.1, 0.1, (4, 6))
+    together = draper.drape(poses, parameters, Past(), scene)
+    for row in range(4):
+        one = type(poses)(root=poses.root[row : row + 1].copy(), angles=poses.angles[row : row + 1].copy())
+        np.testing.assert_array_equal(draper.drape(one, parameters[row : row + 1], Past(), scene)[0], together[row])
+
+
+def test_a_strand_of_no_length_is_refused(skirted):
+    scene, _ = skirted
+    garment = scene.garment
+    vertices = garment.vertices.copy()
+    vertices[5] = vertices[4]
+    with pytest.raises(PluginError, match="strand 0 has a link of zero length"):
+        strands_of(type(garment)(**{**vars(garment), "vertices": vertices}), scene.body)
+
+
+def test_a_draper_without_a_garment_says_so(skirted):
+    scene, poses = skirted
+    with pytest.raises(PluginError, match="no garment to drape"):
+        Kinematic().drape(poses, np.zeros((4, 6)), Past(), Scene(cameras=(), body=scene.body))

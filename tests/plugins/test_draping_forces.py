@@ -1,0 +1,153 @@
+"""Forces and thickness: T-CL6, T-CL7 and what the parameters of a garment mean."""
+
+import numpy as np
+import pytest
+from drape_bodies import SKIN, VOXEL, box, distances, leg_poses, legs, lying_cylinder, prepared, swing
+from mocapflow_draping.forces import thickness, tilts
+from mocapflow_draping.frames import tilted
+from mocapflow_draping.kinematic import Kinematic
+from mocapflow_draping.literal import blow_batch
+from mocapflow_garments.skirt import Skirt
+from test_draping import SKIRT
+
+from mocapflow.data import Past, PoseBatch
+from mocapflow.errors import PluginError
+from mocapflow.scene import Scene
+
+DOWN = np.array([0.0, 0.0, -1.0])
+
+
+@pytest.fixture(scope="module")
+def skirted():
+    """A skirt on legs of capsules."""
+    body = legs()
+    return Scene(cameras=(), body=body, garment=Skirt(**SKIRT).sew(body))
+
+
+@pytest.fixture(scope="module")
+def draper():
+    """Strands alone, at the contact distance of these tests."""
+    return Kinematic(sweeps=0, skin_m=SKIN, voxel_m=VOXEL)
+
+
+def parameters(garment, **values):
+    return np.array([[values.get(name, 0.0) for name in garment.parameter_names]])
+
+
+def standing():
+    return PoseBatch(root=np.eye(4)[None], angles=np.zeros((1, 4)))
+
+
+def blown(body, grid, force, degrees, fixed=(0,)):
+    fields, bodies = prepared(body)
+    pinned = np.zeros((1, *grid.shape[:2]), bool)
+    pinned[..., list(fixed)] = True
+    out = grid[None].copy()
+    rows = np.zeros(len(grid), np.int32), np.full(len(grid), grid.shape[1] - 1, np.int32)
+    blow_batch(
+        out, pinned, *rows, np.array([SKIN]), np.array([force], float), np.radians([degrees]), bodies, fields.solid
+    )
+    return out[0]
+
+
+def test_the_chapters_wind_lifts_a_hanging_strand_by_its_amount():
+    nothing = box([5, 5, 5], [5.1, 5.1, 5.1])
+    hanging = np.outer(0.02 * np.arange(21), DOWN)[None]
+    tip = blown(nothing, hanging, [1, 0, 0], 23.0)[0, -1]
+    np.testing.assert_allclose(tip, 0.4 * np.array([np.sin(np.radians(23)), 0, -np.cos(np.radians(23))]), atol=1e-9)
+    np.testing.assert_array_equal(blown(nothing, hanging, [1, 0, 0], 0.0)[0], hanging[0])
+
+
+def test_wind_never_turns_a_strand_beyond_its_own_direction():
+    nothing = box([5, 5, 5], [5.1, 5.1, 5.1])
+    level = np.outer(0.02 * np.arange(6), [np.cos(0.1), 0, -np.sin(0.1)])[None]
+    np.testing.assert_allclose(blown(nothing, level, [1, 0, 0], 40.0)[0, -1], [0.1, 0, 0], atol=1e-9)
+
+
+def test_wind_against_a_wall_moves_nothing_into_it():
+    wall = box([0.03, -0.5, -0.6], [0.13, 0.5, 0.1])
+    hanging = np.outer(0.02 * np.arange(21), DOWN)[None]
+    pressed = blown(wall, hanging, [1, 0, 0], 30.0)
+    assert distances(wall, pressed).min() > SKIN - 1e-4
+    touching = hanging + [0.03 - SKIN, 0, 0]
+    np.testing.assert_allclose(blown(wall, touching, [1, 0, 0], 30.0), touching, atol=1e-3)
+
+
+@pytest.mark.parametrize("towards", [0.0, 1.0, 2.5])
+def test_order_one_is_a_wind_that_turns_every_strand_alike(skirted, towards):
+    azimuth = np.linspace(0, 2 * np.pi, 12, endpoint=False)
+    wind = parameters(skirted.garment, wind_cos_rad=0.3 * np.cos(towards), wind_sin_rad=0.3 * np.sin(towards))
+    out, aside = tilts(skirted.garment, wind, azimuth)
+    facing = np.stack([np.cos(azimuth), np.sin(azimuth), 0 * azimuth], -1)
+    down = tilted(np.broadcast_to(DOWN, facing.shape), facing, out[0], aside[0])
+    force = np.array([np.cos(towards), np.sin(towards), 0])
+    np.testing.assert_allclose(down, np.broadcast_to(np.cos(0.3) * DOWN + np.sin(0.3) * force, down.shape), atol=1e-12)
+
+
+def test_a_bulge_does_not_stretch_its_ring(skirted):
+    azimuth = np.linspace(0, 2 * np.pi, 720, endpoint=False)
+    for name in ("wind_cos_rad", "two_sin_rad", "two_cos_rad"):
+        small = 1e-3
+        out, aside = tilts(skirted.garment, parameters(skirted.garment, **{name: small}), azimuth)
+        radius = 1 + out[0]
+        ring = np.stack([radius * np.cos(azimuth) - aside[0] * np.sin(azimuth),
+                         radius * np.sin(azimuth) + aside[0] * np.cos(azimuth)], -1)  # fmt: skip
+        links = np.linalg.norm(np.roll(ring, -1, 0) - ring, axis=1)
+        assert np.ptp(links) / links.mean() < 1e-5
+
+
+def test_a_hanging_strand_reaches_the_tilt_it_is_given():
+    nothing = box([5, 5, 5], [5.1, 5.1, 5.1])
+    angle = np.radians(20)
+    down = [np.sin(angle), 0.0, -np.cos(angle)]
+    laid, _ = swing(nothing, [[0.0, 0.0, 0.0]], [np.cos(angle), 0.0, np.sin(angle)], 21, 0.02, down=down, start=60)
+    np.testing.assert_allclose(laid[0, -1], 0.4 * np.array(down), atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["flare_rad", "wind_cos_rad", "wind_sin_rad", "two_cos_rad", "two_sin_rad"])
+def test_no_force_presses_cloth_into_the_body(skirted, draper, name):
+    for amount in (-0.4, 0.4):
+        force = np.repeat(parameters(skirted.garment, **{name: amount}), 4, axis=0)
+        draped = draper.drape(leg_poses(), force, Past(), skirted)
+        free = np.setdiff1d(np.arange(draped.shape[1]), skirted.garment.pinned)
+        assert distances(skirted.body, draped[:, free], leg_poses()).min() > SKIN - 1e-4
+
+
+def test_wind_turns_with_the_person(skirted):
+    turn = np.eye(4)
+    turn[:2, :2] = [[0, -1], [1, 0]]
+    wind = parameters(skirted.garment, wind_cos_rad=0.2)
+    draper = Kinematic()
+    ahead = draper.drape(standing(), wind, Past(), skirted)[0]
+    turned = draper.drape(PoseBatch(root=turn[None], angles=np.zeros((1, 4))), wind, Past(), skirted)[0]
+    np.testing.assert_allclose(turned, ahead @ turn[:3, :3].T, atol=1e-6)
+
+
+def test_thickness_is_found_again():
+    cylinder = lying_cylinder(0.1)
+    garment_thickness = np.linspace(0, 0.010, 6)
+
+    def drape(h):
+        laid, _ = swing(cylinder, [[0.0, 0.0, 0.1 + SKIN + h / 2]], [1.0, 0, 0], 33, 0.01)
+        return laid[0] + [h / 2, 0, 0]
+
+    seen = drape(0.006)
+    errors = np.array([np.abs(drape(h) - seen)[:, 0].mean() for h in garment_thickness])
+    best = int(errors.argmin())
+    assert abs(garment_thickness[best] - 0.006) <= 0.002
+    assert (np.diff(errors[: best + 1]) < 0).all()
+    assert (np.diff(errors[best:]) > 0).all()
+
+
+def test_thick_cloth_keeps_farther_from_the_skin(skirted, draper):
+    thick = draper.drape(standing(), parameters(skirted.garment, thickness_m=0.010), Past(), skirted)
+    free = np.setdiff1d(np.arange(thick.shape[1]), skirted.garment.pinned)
+    assert distances(skirted.body, thick[:, free], standing()).min() > draper.skin_m + 0.005 - 1e-4
+    np.testing.assert_array_equal(thickness(skirted.garment, np.full((2, 6), 0.003)), [0.003, 0.003])
+
+
+def test_a_parameter_without_a_meaning_is_refused(skirted):
+    names = ("thickness_m", "flair_rad", *skirted.garment.parameter_names[2:])
+    odd = type(skirted.garment)(**{**vars(skirted.garment), "parameter_names": names})
+    with pytest.raises(PluginError, match=r"'flair_rad'(.|\n)*did you mean 'flare_rad'"):
+        tilts(odd, np.zeros((1, 6)), np.zeros(3))

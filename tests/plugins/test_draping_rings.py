@@ -1,0 +1,68 @@
+"""Re-constraining: T-CL4 on the skirt, T-CL5 on a tube around a thigh."""
+
+import numpy as np
+import pytest
+from drape_bodies import SKIN, VOXEL, distances, leg_poses, legs
+from mocapflow_draping.kinematic import Kinematic
+from mocapflow_draping.strands import strands_of
+from mocapflow_garments.cylinder import Cylinder
+from mocapflow_garments.skirt import Skirt
+from test_draping import SKIRT
+
+from mocapflow.data import Past, PoseBatch
+from mocapflow.scene import Scene
+
+
+def ring_strain(garment, draped):
+    a, b = garment.rings.T
+    return np.linalg.norm(draped[:, a] - draped[:, b], axis=-1) / garment.ring_length - 1
+
+
+@pytest.fixture(scope="module")
+def skirted():
+    """A skirt on legs of capsules."""
+    body = legs()
+    return Scene(cameras=(), body=body, garment=Skirt(**SKIRT).sew(body))
+
+
+def drape(scene, poses, **settings):
+    still = np.zeros((len(poses.root), len(scene.garment.parameter_names)))
+    return Kinematic(skin_m=SKIN, voxel_m=VOXEL, **settings).drape(poses, still, Past(), scene)
+
+
+def test_rings_come_back_to_their_length(skirted):
+    loose = ring_strain(skirted.garment, drape(skirted, leg_poses(), sweeps=0)).max(axis=1)
+    some = ring_strain(skirted.garment, drape(skirted, leg_poses(), sweeps=40)).max(axis=1)
+    assert loose[1] > 1.0  # a raised knee tears the fallen strands apart
+    assert (some < 0.24).all()
+
+
+def test_strands_keep_their_length_and_particles_stay_outside(skirted):
+    poses = leg_poses()
+    draped = drape(skirted, poses, sweeps=40)
+    strands = strands_of(skirted.garment, skirted.body)
+    lengths = np.linalg.norm(np.diff(draped[:, strands.vertex], axis=2), axis=-1)
+    assert np.abs(lengths / strands.links - 1).max() < 1e-9
+    free = np.setdiff1d(np.arange(draped.shape[1]), skirted.garment.pinned)
+    assert distances(skirted.body, draped[:, free], poses).min() > SKIN - 1e-4
+
+
+def test_links_that_are_short_stay_as_they_are(skirted):
+    standing = PoseBatch(root=np.eye(4)[None], angles=np.zeros((1, 4)))
+    fallen = drape(skirted, standing, sweeps=0)
+    closed = drape(skirted, standing, sweeps=20, stiff=0.0, straight=0.0, longest=10.0)
+    np.testing.assert_allclose(closed, fallen, atol=1e-9)
+
+
+@pytest.mark.parametrize("flexion", [0, 30, 60, 90])
+def test_a_tube_stays_around_its_thigh(flexion):
+    body = legs()
+    tube = Cylinder(joint="hip_l", start=0.45, upper_circumference_m=0.58, lower_circumference_m=0.60, length_m=0.20)
+    scene = Scene(cameras=(), body=body, garment=tube.sew(body))
+    poses = PoseBatch(root=np.eye(4)[None], angles=np.radians([[flexion, 0, 0, 0]]))
+    draped = drape(scene, poses, sweeps=20)
+    assert distances(body, draped, poses).min() > SKIN - 1e-4
+    strands = strands_of(scene.garment, body)
+    grid = draped[0, strands.vertex]
+    around = np.linalg.norm(grid - np.roll(grid, -1, axis=0), axis=-1).sum(axis=0)
+    assert (around / strands.ring_length.sum(axis=0) < 1.15).all()

@@ -1,0 +1,129 @@
+"""Garments: what tape measures become, and what is said when they can't be meant."""
+
+import numpy as np
+import pytest
+from drape_bodies import legs
+from mocapflow_garments import pattern, sections
+from mocapflow_garments.cylinder import Cylinder
+from mocapflow_garments.shorts import Shorts
+from mocapflow_garments.skirt import Skirt
+
+BODY = legs()
+SKIRT = dict(waist_height_m=1.08, waist_circumference_m=0.92, hem_circumference_m=1.7, length_m=0.6)
+SHORTS = dict(
+    waist_height_m=1.08, waist_circumference_m=0.92, hip_circumference_m=1.1, leg_opening_circumference_m=0.65,
+    inseam_m=0.18, length_m=0.52,
+)  # fmt: skip
+
+
+def around(garment, vertices):
+    return np.linalg.norm(vertices - np.roll(vertices, -1, axis=0), axis=1).sum()
+
+
+def test_a_skirt_has_its_measures():
+    garment = Skirt(**SKIRT, strands=40, rings=20).sew(BODY)
+    grid = garment.vertices[garment.strands]
+    assert grid.shape == (40, 20, 3)
+    np.testing.assert_allclose(np.linalg.norm(np.diff(grid, axis=1), axis=2).sum(axis=1), 0.6, atol=1e-12)
+    np.testing.assert_allclose(grid[:, 0, 2], 1.08)
+    assert abs(around(garment, grid[:, 0]) - 0.92) < 0.005
+    lengths = garment.ring_length.reshape(20, 40).sum(axis=1)
+    assert abs(lengths[0] - 0.92) < 0.005
+    assert abs(lengths[-1] - 1.7) < 1e-9
+    assert (np.diff(lengths) >= 0).all()
+    assert BODY.joint_names[garment.carried_by[0]] == "pelvis"
+
+
+def test_faces_look_outwards():
+    for garment in (Skirt(**SKIRT).sew(BODY), Cylinder().sew(BODY)):
+        a, b, c = np.moveaxis(garment.vertices[garment.faces], 1, 0)
+        out = (a + b + c) / 3 - garment.vertices.mean(axis=0)
+        normal = np.cross(b - a, c - a)
+        assert ((out * normal)[:, :2].sum(axis=1) > 0).all()
+
+
+def test_shorts_have_two_legs_with_their_measures():
+    garment = Shorts(**SHORTS).sew(BODY)
+    assert garment.strands.shape == (64, 20)
+    used = garment.strands >= 0
+    long = used.all(axis=1)
+    grid = garment.vertices[garment.strands[long]]
+    np.testing.assert_allclose(np.linalg.norm(np.diff(grid, axis=1), axis=2).sum(axis=1), 0.52, atol=1e-12)
+    assert long.sum() == 48
+    inner = garment.strands[~long]
+    seam = used[~long].sum(axis=1)
+    assert np.ptp(seam) == 0
+    assert abs((seam[0] - 1) * 0.52 / 19 - 0.18) < 0.52 / 19
+    assert np.isin(inner[:, 0], garment.pinned).all()
+    last = garment.strands[np.arange(64), used.sum(axis=1) - 1]
+    assert {BODY.joint_names[j] for j in garment.carried_by[last]} == {"hip_l", "hip_r"}
+    a, b = garment.rings.T
+    openings = np.isin(a, last) & np.isin(b, last)
+    assert abs(garment.ring_length[openings].sum() - 2 * 0.65) < 1e-9
+
+
+def test_a_band_has_its_length_and_faces_outwards():
+    square = np.array([[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.1, 0.1]])
+    ring, facing = sections.band(square, 0.05, 400)
+    assert abs(sections.perimeter(ring) - (0.8 + 2 * np.pi * 0.05)) < 1e-3
+    assert ((ring * facing).sum(axis=1) > 0.1).all()
+
+
+def test_a_section_of_two_legs_is_two_outlines():
+    found = sections.sections(BODY, sections.level(0.6))
+    assert len(found) == 2
+    for points in found:
+        assert abs(sections.perimeter(sections.outline(points)) - 2 * np.pi * 0.08) < 2e-3
+
+
+@pytest.mark.parametrize("measure", list(SKIRT))
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), 0.0, -0.3])
+def test_a_measure_that_is_no_length_is_refused(measure, value):
+    with pytest.raises(pattern.GarmentError, match=f"{measure} is {value}"):
+        Skirt(**{**SKIRT, measure: value}).sew(BODY)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (dict(waist_height_m=108.0, length_m=60.0), "was it meant in cm or mm"),
+        (dict(length_m=1.2), "below the floor"),
+        (dict(waist_height_m=2.5), "there is no body at waist_height_m = 2.50"),
+        (dict(waist_circumference_m=1.9), "can't stay up on a body"),
+        (dict(waist_circumference_m=0.5), "but the body measures"),
+        (dict(hem_circumference_m=3.9, length_m=0.3), "wider than a full circle"),
+    ],
+)
+def test_a_skirt_that_can_not_be_says_what_to_do(change, said):
+    with pytest.raises(pattern.GarmentError, match=said):
+        Skirt(**{**SKIRT, **change}).sew(BODY)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (dict(inseam_m=0.6), "the inseam"),
+        (dict(length_m=1.2), "below the floor"),
+        (dict(inseam_m=0.45), "legs have not parted"),
+        (dict(leg_opening_circumference_m=float("nan")), "leg_opening_circumference_m is nan"),
+    ],
+)
+def test_shorts_that_can_not_be_say_what_to_do(change, said):
+    with pytest.raises(pattern.GarmentError, match=said):
+        Shorts(**{**SHORTS, **change}).sew(BODY)
+
+
+def test_a_waist_inside_the_body_is_pushed_out_and_recorded():
+    with pytest.warns(
+        pattern.GarmentRepaired, match="waist_circumference_m 0.800 lies inside the body; widened to 0.8"
+    ):
+        garment = Skirt(**{**SKIRT, "waist_circumference_m": 0.80}).sew(BODY)
+    waist = garment.vertices[garment.pinned]
+    assert np.hypot(waist[:, 0] / 0.16, waist[:, 1] / 0.12).min() > 1.0
+
+
+def test_a_cylinder_on_an_unknown_limb_is_refused():
+    with pytest.raises(pattern.GarmentError, match=r"no joint 'hip_left'(.|\n)*did you mean 'hip_l'"):
+        Cylinder(joint="hip_left").sew(BODY)
+    with pytest.raises(pattern.GarmentError, match="nothing follows joint 'knee_l'"):
+        Cylinder(joint="knee_l").sew(BODY)
