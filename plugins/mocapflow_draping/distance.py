@@ -39,7 +39,7 @@ def part_distance(x, y, z, p, maps, stretch, solid, least):  # type: ignore[no-u
     return (v00 + a * (v10 - v00)) * stretch[p]
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def body_distance(x, y, z, maps, stretch, centres, solid, near):  # type: ignore[no-untyped-def]
     """Return the least distance over all parts and the part it is to; `near` is the part to try first.
 
@@ -59,7 +59,7 @@ def body_distance(x, y, z, maps, stretch, centres, solid, near):  # type: ignore
     return least, nearest
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def body_distances(points, out, maps, stretch, centres, solid):  # type: ignore[no-untyped-def]
     """Write the distances (N,) of points (N, 3) to one posed body."""
     near = 0

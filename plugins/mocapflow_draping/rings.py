@@ -20,7 +20,7 @@ PUSHES = 5  # out of the body and back to the bar's length, per sweep
 PROBE = 1e-3  # m, for the direction out of the body
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def close_batch(grid, links, first, last, beside, ring_length, skin, longest, stiff, straight, sweeps, bodies, solid):  # type: ignore[no-untyped-def]
     """Close the rings of B drapes in place.
 
@@ -62,7 +62,7 @@ def close_batch(grid, links, first, last, beside, ring_length, skin, longest, st
                         )
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _bars(grid, links, first, last, bars):  # type: ignore[no-untyped-def]
     for n in range(grid.shape[0]):
         for row in range(first[n] + 1, last[n] + 1):
@@ -70,7 +70,7 @@ def _bars(grid, links, first, last, bars):  # type: ignore[no-untyped-def]
                 bars[n, row, a] = (grid[n, row, a] - grid[n, row - 1, a]) / links[n, row - 1]
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _place(grid, bars, links, first, last, row):  # type: ignore[no-untyped-def]
     for n in range(grid.shape[0]):
         if first[n] < row <= last[n]:
@@ -78,7 +78,7 @@ def _place(grid, bars, links, first, last, row):  # type: ignore[no-untyped-def]
                 grid[n, row, a] = grid[n, row - 1, a] + links[n, row - 1] * bars[n, row, a]
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _pull(grid, first, last, beside, ring_length, row, longest, stiff, backwards):  # type: ignore[no-untyped-def]
     strands = grid.shape[0]
     for step in range(strands):
@@ -99,7 +99,7 @@ def _pull(grid, first, last, beside, ring_length, row, longest, stiff, backwards
         _draw(p, q, share, row > first[n], row > first[m])
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _unfold(grid, first, last, beside, ring_length, row, straight, backwards):  # type: ignore[no-untyped-def]
     """Push the outer ends of two links that fold sharply apart."""
     strands = grid.shape[0]
@@ -117,7 +117,7 @@ def _unfold(grid, first, last, beside, ring_length, row, straight, backwards):  
             _draw(p, q, straight * (length - least) / length, row > first[n], row > first[m])
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _draw(p, q, share, p_moves, q_moves):  # type: ignore[no-untyped-def]
     """Shorten the way from p to q by a share of it; what is pinned stays."""
     if p_moves and q_moves:
@@ -133,7 +133,7 @@ def _draw(p, q, share, p_moves, q_moves):  # type: ignore[no-untyped-def]
         q[2] -= dz
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _push_out(p, above, link, skin, seen, room, near, maps, stretch, centres, solid):  # type: ignore[no-untyped-def]
     """Move a particle that may be inside the body out of it, at the length of its bar.
 
@@ -158,7 +158,7 @@ def _push_out(p, above, link, skin, seen, room, near, maps, stretch, centres, so
     return -1.0, near
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _outwards(p, maps, stretch, centres, solid, near):  # type: ignore[no-untyped-def]
     """Return the unit direction out of the body at a point."""
     gx = body_distance(p[0] + PROBE, p[1], p[2], maps, stretch, centres, solid, near)[0]
@@ -171,7 +171,7 @@ def _outwards(p, maps, stretch, centres, solid, near):  # type: ignore[no-untype
     return gx / g, gy / g, gz / g
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _to_length(p, above, link):  # type: ignore[no-untyped-def]
     dx, dy, dz = p[0] - above[0], p[1] - above[1], p[2] - above[2]
     scale = link / max(math.sqrt(dx * dx + dy * dy + dz * dz), 1e-9)

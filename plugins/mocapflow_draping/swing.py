@@ -20,7 +20,7 @@ BACKS = 64  # turns back of one strand, so that one that begins inside the body 
 TOUCH = 3e-4  # m, nearer than this to the contact distance counts as touching
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def swing_batch(roots, facing, down, start, skin, links, first, last, bodies, solid, out, support):  # type: ignore[no-untyped-def]
     """Drape N strands of up to L particles on B posed bodies.
 
@@ -49,7 +49,7 @@ def swing_batch(roots, facing, down, start, skin, links, first, last, bodies, so
             )  # fmt: skip
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _swing(root, facing, down, start, skin, links, first, last, maps, stretch, centres, solid, out, reach, room, near):  # type: ignore[no-untyped-def]
     """Drape one strand; `reach` is along the strand, `room` how far each particle may yet move untouched."""
     out[first] = root
@@ -95,7 +95,7 @@ def _swing(root, facing, down, start, skin, links, first, last, maps, stretch, c
     return pivot
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _bar(facing, down, angle):  # type: ignore[no-untyped-def]
     """Return the direction of a tail that stands `angle` out from its `down`."""
     s, c = math.sin(angle), math.cos(angle)

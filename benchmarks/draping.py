@@ -1,0 +1,83 @@
+"""CPU ms per drape: event-driven and literal, with and without rings, one by one and in batches.
+
+Run it with one thread: `OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python benchmarks/draping.py [RECORDING]`.
+RECORDING is a folder with a skirt (default: the shipped demo clip). Medians of rounds taken in turn, compiled before.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from mocapflow_bodies.scanned import Scanned
+from mocapflow_draping.kinematic import Kinematic
+from mocapflow_garments.skirt import Skirt
+
+from mocapflow.data import Past, PoseBatch
+from mocapflow.scene import Scene
+
+ROUNDS = 7
+POSES = 40
+
+
+def main() -> None:
+    recording = Path(sys.argv[1]) if len(sys.argv) > 1 else Path("examples/data/skirt_steps")
+    body = Scanned().load(recording)
+    tapes = json.loads((recording / "subject" / "garment.json").read_text())
+    measures = {f"{key}_m": value for key, value in tapes.items() if key != "type"}
+    for strands, rings in ((48, 24), (96, 48)):
+        scene = Scene(cameras=(), body=body, garment=Skirt(**measures, strands=strands, rings=rings).sew(body))
+        report(scene, f"{strands} x {rings}")
+
+
+def report(scene: Scene, title: str) -> None:
+    poses, one = walking(scene, POSES), walking(scene, 1)
+    assert scene.garment is not None
+    free = np.zeros((POSES, len(scene.garment.parameter_names)))
+    same = PoseBatch(root=np.repeat(one.root, 25, axis=0), angles=np.repeat(one.angles, 25, axis=0))
+    winds = np.zeros((25, free.shape[1]))
+    winds[:, 2:4] = np.random.default_rng(0).uniform(-0.3, 0.3, (25, 2))
+    fall, closed = Kinematic(sweeps=0), Kinematic()
+    steps = Kinematic(rule="literal", sweeps=0)
+    jobs: dict[str, tuple[Callable[[], object], int]] = {
+        "event-driven, strands alone": (lambda: fall.drape(poses, free, Past(), scene), POSES),
+        "event-driven, with rings (10 sweeps)": (lambda: closed.drape(poses, free, Past(), scene), POSES),
+        "literal, 50 x 2 degrees": (lambda: steps.drape(poses, free, Past(), scene), POSES),
+        "one drape alone": (lambda: fall.drape(one, free[:1], Past(), scene), 1),
+        "25 winds of one pose, all of them": (lambda: fall.drape(same, winds, Past(), scene), 1),
+    }
+    print(f"\n{title}")
+    for name, milliseconds in timed(jobs).items():
+        print(f"  {name:42s} {milliseconds:8.3f} ms")
+
+
+def timed(jobs: dict[str, tuple[Callable[[], object], int]]) -> dict[str, float]:
+    """Return the median CPU ms of each job per drape, taken in turn."""
+    for job, _ in jobs.values():
+        job()
+    spent: dict[str, list[float]] = {name: [] for name in jobs}
+    for _ in range(ROUNDS):
+        for name, (job, share) in jobs.items():
+            start = time.process_time()
+            job()
+            spent[name].append(1e3 * (time.process_time() - start) / share)
+    return {name: float(np.median(values)) for name, values in spent.items()}
+
+
+def walking(scene: Scene, count: int) -> PoseBatch:
+    """Return poses with the legs swinging against each other."""
+    angles = np.zeros((count, len(scene.body.twists)))
+    phase = np.linspace(0.3, 2 * np.pi, count, endpoint=False)
+    for name, amount in (("hip_l.flexion", 0.5), ("hip_r.flexion", -0.5)):
+        angles[:, scene.body.screw_names.index(name)] = amount * np.sin(phase)
+    for name, shift in (("knee_l.flexion", 0.0), ("knee_r.flexion", np.pi)):
+        angles[:, scene.body.screw_names.index(name)] = 0.5 + 0.5 * np.cos(phase + shift)
+    return PoseBatch(root=np.tile(np.eye(4), (count, 1, 1)), angles=angles)
+
+
+if __name__ == "__main__":
+    main()
