@@ -9,7 +9,7 @@ import numpy as np
 
 from mocapflow.data import BODY, CLOTH, Background, Body, Camera, Cloth, GarmentMesh, Pose, Surface
 from mocapflow.geometry import kinematics, meshes
-from mocapflow.records import I32, U8, Bool, record
+from mocapflow.records import F64, I32, U8, Bool, record
 
 HEM_REACH = 0.15  # m from the garment, at rest: skin that its edge can come to cover or lay bare
 
@@ -44,6 +44,13 @@ class Scene:
         """Layer of each surface vertex, body first: (N,)."""
         cloth = 0 if self.garment is None else len(self.garment.vertices)
         return np.repeat(np.array([BODY, CLOTH], np.uint8), [len(self.body.vertices), cloth])
+
+    @cached_property
+    def hanging(self) -> F64:
+        """How far (W,) m each garment vertex is from the pinned end of its strand, along the cloth."""
+        if self.garment is None:
+            return np.empty(0)
+        return meshes.lengths_along(self.garment.vertices, self.garment.strands)
 
     @cached_property
     def near_garment(self) -> Bool:

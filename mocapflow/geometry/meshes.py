@@ -43,9 +43,18 @@ def grid_faces(rows: int, columns: int, closed: bool) -> I32:
     row, column = np.meshgrid(np.arange(rows - 1), np.arange(columns if closed else columns - 1), indexing="ij")
     a = (row * columns + column).ravel()
     b = (row * columns + (column + 1) % columns).ravel()
-    return np.concatenate([np.column_stack([a, a + columns, b]), np.column_stack([b, a + columns, b + columns])]).astype(
-        np.int32
-    )
+    return np.concatenate(
+        [np.column_stack([a, a + columns, b]), np.column_stack([b, a + columns, b + columns])]
+    ).astype(np.int32)
+
+
+def lengths_along(vertices: F64, strands: I32) -> F64:
+    """Return the length (W,) along its strand from the first vertex to each vertex; strands (N, L) are -1 padded."""
+    ahead = np.linalg.norm(np.diff(vertices[strands], axis=1), axis=2)
+    reached = np.concatenate([np.zeros((len(strands), 1)), np.cumsum(ahead, axis=1)], axis=1)
+    lengths = np.zeros(len(vertices))
+    lengths[strands[strands >= 0]] = reached[strands >= 0]
+    return lengths
 
 
 @numba.njit(cache=True)

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from mocapflow.components import Matcher, pool
 from mocapflow.data import (
+    BODY,
     CLOTH,
     Contour,
     Frame,
@@ -22,7 +23,7 @@ from mocapflow.data import (
 )
 from mocapflow.geometry.contours import nearest_compatible
 from mocapflow.geometry.silhouettes import occluding_contour
-from mocapflow.records import F64, I32, Bool
+from mocapflow.records import F64, I32
 from mocapflow.scene import Scene
 from mocapflow_matching.robust import Loss, robust_weights
 
@@ -60,7 +61,7 @@ class ContourIcp(Matcher):
     later_loss: Loss = "geman_mcclure"
     scale: Positive = 2.0  # standard deviations at which the loss begins to give way
     sigma_px: Positive = 1.0
-    cloth_sigma_px: Positive = 6.0  # free cloth is never where a draper lays it: its outline must not turn a knee
+    cloth_sigma_px_per_m: Positive = 30.0  # cloth is the less where a draper lays it, the longer it hangs
 
     @property
     def stride(self) -> int:
@@ -96,7 +97,7 @@ class ContourIcp(Matcher):
             found = nearest_compatible(model.pixel, model.normal, image.pixel, image.normal, reach, cosine)
             seeing, showing = found[found >= 0], np.flatnonzero(found >= 0).astype(np.int32)
         seen, shown = np.concatenate([seen, seeing]), np.concatenate([shown, showing])
-        sigma = np.where(self._near_cloth(model, surface, scene), self.cloth_sigma_px, self.sigma_px)
+        sigma = self._sigma(model, surface, scene)
         return self.weigh(silhouette.camera, image, model, seen, shown, sigma[shown], turn)
 
     def weigh(
@@ -120,18 +121,24 @@ class ContourIcp(Matcher):
             weight=robust_weights(distance / sigma, loss, self.scale) / sigma**2,
         )
 
-    def _near_cloth(self, model: Contour, surface: Surface, scene: Scene) -> Bool:
-        """Return which model points (K,) lie on cloth, or on skin so near its edge that the image may show cloth."""
-        cloth: Bool = surface.layer[model.vertex] == CLOTH
-        doubtful = ~cloth
-        doubtful[doubtful] = scene.near_garment[model.vertex[doubtful]]
-        if not cloth.any() or not doubtful.any() or not self.hem_guard_px:
-            return cloth
-        skin, hem = (model.pixel[part] for part in (doubtful, cloth))
-        directions = model.normal[doubtful], model.normal[cloth]
-        near = nearest_compatible(skin, directions[0], hem, directions[1], self.hem_guard_px, ANY_DIRECTION) >= 0
-        cloth[np.flatnonzero(doubtful)[near]] = True
-        return cloth
+    def _sigma(self, model: Contour, surface: Surface, scene: Scene) -> F64:
+        """Return the standard deviation (K,) px of model points: large on cloth, and on skin where a hem may be.
+
+        The outline of hanging cloth must not turn a knee; skin so near to the cloth's edge that the image may show
+        cloth there is as uncertain as the cloth beside it.
+        """
+        sigma = np.full(len(model.vertex), self.sigma_px)
+        cloth = np.flatnonzero(surface.layer[model.vertex] == CLOTH)
+        sigma[cloth] += self.cloth_sigma_px_per_m * scene.hanging[model.vertex[cloth] - len(scene.body.vertices)]
+        skin = np.flatnonzero(surface.layer[model.vertex] == BODY)
+        skin = skin[scene.near_garment[model.vertex[skin]]]
+        if len(cloth) and len(skin) and self.hem_guard_px:
+            beside = nearest_compatible(
+                *(model.pixel[skin], model.normal[skin], model.pixel[cloth], model.normal[cloth]),
+                *(self.hem_guard_px, ANY_DIRECTION),
+            )
+            sigma[skin[beside >= 0]] = sigma[cloth[beside[beside >= 0]]]
+        return sigma
 
 
 def _sorted_by_row(contour: Contour) -> Contour:
