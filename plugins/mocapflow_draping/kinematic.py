@@ -13,7 +13,7 @@ from mocapflow.components import Draper
 from mocapflow.data import Body, GarmentMesh, Past, PoseBatch
 from mocapflow.errors import PluginError
 from mocapflow.geometry.kinematics import chain_batch
-from mocapflow.records import F64, I32, Bool, array, record
+from mocapflow.records import F64, Bool, record
 from mocapflow.scene import Scene
 from mocapflow_draping.fields import BodyFields, build_fields, part_transforms, touchable_joints
 from mocapflow_draping.forces import thickness, tilts, wind
@@ -32,7 +32,6 @@ class Fitting:
     body: Body
     strands: Strands
     fields: BodyFields
-    touched: I32 = array("K", unit="joint whose skin the garment can touch")
 
 
 class Kinematic(Draper):
@@ -80,21 +79,25 @@ class Kinematic(Draper):
         return vertices
 
     def touchable(self, scene: Scene) -> Bool:
-        """Return which joints (J,) carry the garment or skin that it can touch."""
-        if scene.garment is None:
-            return super().touchable(scene)
+        """Return which joints (J,) move what the garment hangs from or can touch."""
         touched = np.zeros(len(scene.body.parents), bool)
-        touched[self._fitting(scene.garment, scene.body).touched] = True
-        touched[scene.garment.carried_by] = True
+        if scene.garment is not None:
+            fitting = self._fitting(scene.garment, scene.body)
+            strands = fitting.strands
+            touched[fitting.fields.joints] = True
+            touched[strands.root_joint[strands.root_weight > 0]] = True
+            if strands.rides:
+                touched[strands.skin_joint[strands.skin_weight > 0]] = True
+            else:
+                touched[strands.carrier] = True
         return touched
 
     def _fitting(self, garment: GarmentMesh, body: Body) -> Fitting:
         """Return what is computed once per garment and body; forgotten with the garment."""
         known = self._fittings.get(garment)
         if known is None or known.body is not body:
-            touched = touchable_joints(body, garment)
-            fields = build_fields(body, touched, self.voxel_m)
-            known = Fitting(body=body, strands=strands_of(garment, body), fields=fields, touched=touched)
+            fields = build_fields(body, touchable_joints(body, garment), self.voxel_m)
+            known = Fitting(body=body, strands=strands_of(garment, body), fields=fields)
             self._fittings[garment] = known
         return known
 

@@ -91,14 +91,25 @@ class Shorts(Garment):
         hips = pattern.hip_rings(body, self.waist_height_m, down, straight, away)
         top = max(CROTCH * hips[-1] / 2, self.leg_opening_circumference_m)
         leg = np.linspace(top, self.leg_opening_circumference_m, self.rings - crotch)
-        flat = waist[:, None] + ((hips[:-1] - hips[0]) / (2 * math.pi))[None, :, None] * facing[:, None]
-        upper = front.lift(flat) - down[:-1, None] * [0.0, 0.0, 1.0]
         heights = self.waist_height_m - np.linspace(link * crotch, self.length_m, self.rings - crotch)
         tubes = [self._tube(body, side, heights, leg) for side in (1.0, -1.0)]
         lower = np.concatenate([tube[:count] for tube in tubes])
+        upper = self._hips(body, front.lift(waist), lower[:, 0], facing @ front.across, away, crotch)
         outer = pattern.even_links(np.concatenate([upper, lower], axis=1), link)
         inner = pattern.even_links(np.concatenate([tube[count:] for tube in tubes]), link)
         return outer, inner, np.concatenate([hips[:-1], leg])
+
+    def _hips(self, body: Body, waist: F64, seam: F64, facing: F64, away: float, crotch: int) -> F64:
+        """Return the rows (strands, crotch, 3) between waist and legs: straight, but around the hips."""
+        share = np.linspace(0.0, 1.0, crotch + 1)[:-1, None]
+        rows: F64 = waist[:, None] * (1 - share) + seam[:, None] * share
+        for row in range(1, crotch):
+            height = float(rows[:, row, 2].mean())
+            points = sections.sections(body, sections.level(height))
+            torso = max((sections.outline(p) for p in points), key=sections.perimeter)
+            reach = (facing[:, :2] @ torso.T).max(axis=1) + away
+            rows[:, row] += np.maximum(reach - (rows[:, row] * facing).sum(axis=1), 0.0)[:, None] * facing
+        return rows
 
     def _tube(self, body: Body, side: float, heights: F64, around: F64) -> F64:
         """Return the rings (strands, rows, 3) of the leg on one side; strands run on from the waist's."""

@@ -9,9 +9,10 @@ from mocapflow_draping.strands import strands_of
 from mocapflow_draping.voxels import signed_distance
 from mocapflow_garments.skirt import Skirt
 
-from mocapflow.data import Past
+from mocapflow.data import Past, PoseBatch
 from mocapflow.errors import PluginError
 from mocapflow.scene import Scene
+from mocapflow.testing.bodies import tiny_body
 
 SKIRT = dict(waist_height_m=1.08, waist_circumference_m=0.92, hem_circumference_m=1.7, length_m=0.6)
 
@@ -150,3 +151,19 @@ def test_a_draper_without_a_garment_says_so(skirted):
     scene, poses = skirted
     with pytest.raises(PluginError, match="no garment to drape"):
         Kinematic().drape(poses, np.zeros((4, 6)), Past(), Scene(cameras=(), body=scene.body))
+
+
+def test_joints_that_it_can_not_touch_do_not_move_the_cloth():
+    body = tiny_body()
+    measures = dict(waist_height_m=1.05, waist_circumference_m=1.05, hem_circumference_m=1.1, length_m=0.15)
+    scene = Scene(cameras=(), body=body, garment=Skirt(**measures).sew(body))
+    draper = Kinematic()
+    touchable = draper.touchable(scene)
+    assert touchable[[body.joint("pelvis"), body.joint("hip_l"), body.joint("hip_r")]].all()
+    below = np.flatnonzero(~touchable[body.screw_joint])
+    assert len(below)
+    angles = np.zeros((2, len(body.twists)))
+    angles[1, below] = 0.3
+    poses = PoseBatch(root=np.tile(np.eye(4), (2, 1, 1)), angles=angles)
+    still, moved = draper.drape(poses, np.zeros((2, 6)), Past(), scene)
+    np.testing.assert_array_equal(still, moved)
