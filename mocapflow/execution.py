@@ -39,7 +39,7 @@ class Execution:
         self._steps = {step.label: step for step in steps}
         self._fresh, self._report = fresh, report
         self._results: dict[str, Any] = {}
-        self._scenes: dict[str | None, Scene] = {}
+        self._scenes: dict[tuple[str | None, str | None], Scene] = {}
         self.entries: dict[str, Mapping[str, Any]] = {}  # per finished stage
 
     def finish(self, step: Step) -> None:
@@ -144,13 +144,15 @@ class Execution:
         return supplied[source]() if source in supplied else self._result(str(source))
 
     def _scene(self, step: Step) -> Scene:
-        """Return the cameras, the body that holds at this place in the pipeline, and the garment sewn to it."""
-        if step.body not in self._scenes:
+        """Return the cameras and the body that hold at this place in the pipeline, and the garment sewn to it."""
+        place = step.body, step.rig
+        if place not in self._scenes:
             model, garment, folder = self._pipeline.body, self._pipeline.garment, self._pipeline.recording
             body = self._result(step.body) if step.body else self._blaming(model, lambda: model.load(folder))
             sewn = self._blaming(garment, lambda: garment.sew(body)) if garment else None
-            self._scenes[step.body] = Scene(cameras=step.recording.cameras, body=body, garment=sewn)
-        return self._scenes[step.body]
+            cameras = self._result(step.rig).cameras if step.rig else step.recording.cameras
+            self._scenes[place] = Scene(cameras=cameras, body=body, garment=sewn)
+        return self._scenes[place]
 
     def _blaming(self, component: Component, call: Callable[[], Value], kept: Callable[[], str] = str) -> Value:
         """Return what a component makes; if it raises, say who it was, what is saved and how to go on."""

@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from mocapflow.components import Component
-from mocapflow.data import Background, Body, Camera, Evaluation, Files, Start
+from mocapflow.data import Background, Body, Camera, Evaluation, Files, Rig, Start
 from mocapflow.digests import Digests, digest_array
 from mocapflow.keys import FORMAT, Recipe, component_recipe, key_of
 from mocapflow.pipeline import NamedStage, Pipeline
 from mocapflow.recording import Recording, open_recording
-from mocapflow.wiring import body_source, makes, wire
+from mocapflow.wiring import body_source, makes, rig_source, wire
 
-SEEN = {Start: "first", Background: "all", Body: "all"}  # the extent of a stage that says none
+SEEN = {Start: "first", Background: "all", Rig: "all", Body: "all"}  # the extent of a stage that says none
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,7 @@ class Step:
     named: NamedStage
     sources: Mapping[str, str | None]  # parameter -> label of a stage, or who supplies it
     body: str | None  # the stage whose Body replaces the pipeline's
+    rig: str | None  # the stage whose Rig replaces the recording's cameras
     recording: Recording  # as this stage sees it
     recipe: Recipe
     key: str
@@ -57,7 +58,8 @@ def steps_of(pipeline: Pipeline, digests: Digests) -> list[Step]:
     )
     wiring, steps, core = wire(pipeline), dict[str, Step](), digests.core()
     for named in pipeline.stages:
-        sources, body = wiring[named.label], body_source(pipeline, named.label)
+        sources = wiring[named.label]
+        body, rig = body_source(pipeline, named.label), rig_source(pipeline, named.label)
         chain = "checkpoint" in sources.values()
         part = replace(recording, indices=_extent(named, recording))
         recipe: dict[str, Any] = {
@@ -69,10 +71,10 @@ def steps_of(pipeline: Pipeline, digests: Digests) -> list[Step]:
         if "recording" in sources.values():
             recipe["recording"] = _frames(part, pipeline, chain) | _content(part, digests)
         if "scene" in sources.values():
-            recipe["scene"] = _scene(pipeline, recording, steps.get(body or ""), digests)
+            recipe["scene"] = _scene(pipeline, recording, steps.get(body or ""), steps.get(rig or ""), digests)
         files = [path for path in named.stage.inputs(recording.folder) if path.exists()]
         recipe["files"] = [digests.file(path, path.name) for path in files]
-        steps[named.label] = Step(named, sources, body, part, recipe, key_of(recipe))
+        steps[named.label] = Step(named, sources, body, rig, part, recipe, key_of(recipe))
     return list(steps.values())
 
 
@@ -109,10 +111,12 @@ def _content(part: Recording, digests: Digests) -> dict[str, Any]:
     }
 
 
-def _scene(pipeline: Pipeline, recording: Recording, body: Step | None, digests: Digests) -> dict[str, Any]:
+def _scene(
+    pipeline: Pipeline, recording: Recording, body: Step | None, rig: Step | None, digests: Digests
+) -> dict[str, Any]:
     garment = pipeline.garment
     return {
-        "cameras": {camera.name: _camera(camera) for camera in recording.cameras},
+        "cameras": _input(rig) if rig else {camera.name: _camera(camera) for camera in recording.cameras},
         "body": _input(body) if body else _asset(pipeline.body, pipeline, digests),
         "garment": None if garment is None else component_recipe(garment, pipeline.registry, digests),
     }

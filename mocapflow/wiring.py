@@ -8,7 +8,7 @@ from types import NoneType, UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
 from mocapflow.components import Stage
-from mocapflow.data import Body
+from mocapflow.data import Body, Rig
 from mocapflow.errors import MocapflowError, PipelineError, PluginError, alternatives
 from mocapflow.pipeline import NamedStage, Pipeline
 
@@ -19,7 +19,7 @@ def wire(pipeline: Pipeline) -> dict[str, dict[str, str | None]]:
     """Return, for each stage, where each parameter of its `run` comes from.
 
     A source is the label of an earlier stage, `scene`, `recording`, `checkpoint` or `run folder` (supplied by the
-    runner), or None for an optional input that nobody makes. See also `body_source`.
+    runner), or None for an optional input that nobody makes. See also `body_source` and `rig_source`.
 
     Raises:
         PipelineError: no earlier stage makes what a stage needs, or `from` names a wrong one.
@@ -29,13 +29,22 @@ def wire(pipeline: Pipeline) -> dict[str, dict[str, str | None]]:
 
 def body_source(pipeline: Pipeline, label: str) -> str | None:
     """Return the latest stage before `label` that makes a Body, which replaces the scene's; None: the pipeline's."""
-    labels = [named.label for named in pipeline.stages]
-    return _latest(Body, pipeline.stages[: labels.index(label)])
+    return _latest(Body, _before(pipeline, label))
+
+
+def rig_source(pipeline: Pipeline, label: str) -> str | None:
+    """Return the latest stage before `label` that makes a Rig, which replaces the recording's cameras, or None."""
+    return _latest(Rig, _before(pipeline, label))
 
 
 def makes(stage: Stage) -> Any:
     """Return the type a stage makes."""
     return _hints(stage).get("return")
+
+
+def _before(pipeline: Pipeline, label: str) -> Sequence[NamedStage]:
+    labels = [named.label for named in pipeline.stages]
+    return pipeline.stages[: labels.index(label)]
 
 
 def _wire_stage(named: NamedStage, earlier: Sequence[NamedStage]) -> dict[str, str | None]:

@@ -93,6 +93,14 @@ def test_an_added_stage_changes_what_reads_it(tmp_path, clip):
     assert changed(keys(tmp_path, clip, stages=without), before) == {"track", "smooth", "export"}
 
 
+def test_cameras_made_by_a_stage_change_what_comes_after_it(tmp_path, clip):
+    before = keys(tmp_path, clip)
+    stages = {"start": "tiny_start", "align": "tiny_align", "track": STAGES["track"], "background": "tiny_background"}
+    after = keys(tmp_path, clip, stages=stages)
+    assert after["start"] == before["start"]  # it comes before the other cameras
+    assert after["track"] != before["track"]
+
+
 @pytest.mark.parametrize(
     ("name", "expected"),
     [

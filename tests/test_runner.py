@@ -99,6 +99,15 @@ def test_a_body_made_by_a_stage_replaces_the_body_of_later_ones(tmp_path):
     assert json.loads((tmp_path / "out" / "results.json").read_text())["body"] == pytest.approx(3.0)
 
 
+def test_cameras_made_by_a_stage_replace_those_of_later_ones(tmp_path):
+    stages = {"start": "tiny_start", "align": "tiny_align", "track": STAGES["track"], "export": "tiny_export"}
+    path = write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=stages)
+    for action in ("run", "hit"):
+        assert actions(run_tiny(path, tmp_path)[0])["align"] == action
+        cameras = json.loads((tmp_path / "out" / "results.json").read_text())["cameras"]
+        assert cameras and all(name.startswith("aligned ") for name in cameras)
+
+
 def test_evaluations_always_run_and_are_not_stored(tmp_path):
     stages = {k: STAGES[k] for k in ("start", "track")} | {"evaluate": "tiny_evaluate"}
     path = write_pipeline(tmp_path, write_recording(tmp_path / "clip", frames=3), stages=stages)

@@ -31,7 +31,7 @@ class AlignCameras(Stage):
     """
 
     name: ClassVar[str] = "align_cameras"
-    frames: Annotated[int, Field(ge=2)] = 30  # spread over the recording
+    frames: Annotated[int, Field(ge=1)] = 30  # spread over the recording; 1: the first alone
     spread_deg: Positive = 0.5  # standard deviation of what a camera may have turned
     sigma_px: Positive = 6.0  # of a keypoint
     least_px: Positive = 6.0  # a rig whose views move by less is left as it is
