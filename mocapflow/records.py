@@ -60,7 +60,7 @@ def check_arrays(record: Any) -> None:
         ShapeError: an array's dtype, number of axes or a length contradicts the declaration.
     """
     lengths: dict[str, int] = {}
-    for name, declared in array_fields(type(record)).items():
+    for name, declared in array_fields(type(record)).items():  # type: ignore[arg-type]  # classes are hashable
         value = getattr(record, name)
         if value is None and declared.optional:
             continue

@@ -46,4 +46,5 @@ def error(points: F64, lines: F64) -> F64:
 def closest(points: F64, lines: F64) -> F64:
     """Return the point of each line (M, 6) that is closest to each point (M, 3), in m."""
     n, m = lines[:, :3], lines[:, 3:]
-    return np.cross(n, m) + np.sum(n * points, axis=1, keepdims=True) * n
+    nearest: F64 = np.cross(n, m) + np.sum(n * points, axis=1, keepdims=True) * n
+    return nearest

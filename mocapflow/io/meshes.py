@@ -1,4 +1,4 @@
-"""Triangle meshes from Wavefront OBJ, vertices in the order of the file.
+"""Triangle meshes: Wavefront OBJ with the vertices in the order of the file, other formats through Open3D.
 
 Skin weights are stored per vertex of the file, so the order matters; general mesh readers split vertices at the
 seams of a texture, drop those that no face uses, or sort them.
@@ -14,17 +14,27 @@ import numpy as np
 from mocapflow.errors import RecordingError
 from mocapflow.records import F64, I32
 
+OPEN3D_FORMATS = (".ply", ".stl", ".off", ".gltf", ".glb")
+
 
 def read_mesh(path: Path) -> tuple[F64, I32]:
-    """Read vertices (V, 3) and triangles (F, 3) of an OBJ file; larger polygons are cut into fans.
+    """Read vertices (V, 3) and triangles (F, 3) of a mesh file, by its suffix.
 
     Raises:
-        RecordingError: the file is missing, holds no mesh, or a face names a vertex that is not there.
+        RecordingError: the file is missing or of a format not known, holds no mesh, a face names a vertex that is not
+            there, or Open3D is needed and can't be loaded.
     """
-    if path.suffix.lower() != ".obj":
-        raise RecordingError("only OBJ meshes can be read", where=str(path), hint="export the mesh as Wavefront OBJ")
+    if path.suffix.lower() not in (".obj", *OPEN3D_FORMATS):
+        hint = f"meshes are read from .obj, {', '.join(OPEN3D_FORMATS)}; .obj keeps the order of the vertices"
+        raise RecordingError(f"a mesh in '{path.suffix}' can't be read", where=str(path), hint=hint)
     if not path.is_file():
         raise RecordingError("no such mesh", where=str(path))
+    points, triangles = _read_obj(path) if path.suffix.lower() == ".obj" else _read_by_open3d(path)
+    return _checked(points, triangles, path)
+
+
+def _read_obj(path: Path) -> tuple[list[Sequence[str]], list[tuple[int, int, int]]]:
+    """Return vertices as written and triangles; larger polygons are cut into fans."""
     points: list[Sequence[str]] = []
     triangles: list[tuple[int, int, int]] = []
     with path.open(encoding="utf-8", errors="replace") as lines:
@@ -34,7 +44,22 @@ def read_mesh(path: Path) -> tuple[F64, I32]:
                 points.append(fields[:3])
             elif kind == "f":
                 triangles += _fan(fields, len(points), f"{path}:{number}")
-    return _checked(points, triangles, path)
+    return points, triangles
+
+
+def _read_by_open3d(path: Path) -> tuple[F64, I32]:
+    try:
+        import open3d
+    except (ImportError, OSError) as error:
+        hint = (
+            "it needs libusb-1.0 and libGL (Debian, Ubuntu: apt install libusb-1.0-0 libgl1 libgomp1); "
+            "or export the mesh as Wavefront OBJ, which needs none of them"
+        )
+        raise RecordingError(
+            f"Open3D, which reads this format, can't be loaded: {error}", where=str(path), hint=hint
+        ) from None
+    mesh = open3d.io.read_triangle_mesh(path)
+    return np.asarray(mesh.vertices, np.float64), np.asarray(mesh.triangles, np.int32)
 
 
 def write_mesh(path: Path, vertices: F64, faces: I32) -> None:
@@ -54,7 +79,9 @@ def _fan(fields: Sequence[str], known: int, where: str) -> list[tuple[int, int, 
     return [(corners[0], corners[i], corners[i + 1]) for i in range(1, len(corners) - 1)]
 
 
-def _checked(points: Sequence[Sequence[str]], triangles: Sequence[tuple[int, int, int]], path: Path) -> tuple[F64, I32]:
+def _checked(
+    points: Sequence[Sequence[str]] | F64, triangles: Sequence[tuple[int, int, int]] | I32, path: Path
+) -> tuple[F64, I32]:
     try:
         vertices = np.array(points, np.float64).reshape(-1, 3)
     except ValueError as error:

@@ -1,6 +1,8 @@
-"""OBJ files: the order of the vertices is kept, whatever else the file holds."""
+"""OBJ files: the order of the vertices is kept, whatever else the file holds. Other formats: Open3D's."""
 
+import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -57,8 +59,39 @@ def test_bad_meshes(tmp_path, text, message):
         read_mesh(tmp_path / "a.obj")
 
 
-def test_other_formats_and_missing_files(tmp_path):
-    with pytest.raises(RecordingError, match="only OBJ meshes can be read\n       export the mesh as Wavefront OBJ"):
+def test_unknown_formats_and_missing_files(tmp_path):
+    with pytest.raises(
+        RecordingError, match=r"a mesh in '\.fbx' can't be read\n       meshes are read from \.obj, \.ply"
+    ):
+        read_mesh(tmp_path / "a.fbx")
+    for name in ("a.obj", "a.ply"):
+        with pytest.raises(RecordingError, match="no such mesh"):
+            read_mesh(tmp_path / name)
+
+
+def open3d_with(vertices, triangles):
+    """A stand-in for the module: its reader gives this mesh."""
+    mesh = SimpleNamespace(vertices=vertices, triangles=triangles)
+    return SimpleNamespace(io=SimpleNamespace(read_triangle_mesh=lambda path: mesh))
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".STL", ".off", ".gltf", ".glb"])
+def test_other_formats_go_through_open3d(tmp_path, monkeypatch, suffix):
+    path = tmp_path / f"a{suffix}"
+    path.touch()
+    monkeypatch.setitem(sys.modules, "open3d", open3d_with([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
+    vertices, faces = read_mesh(path)
+    assert (vertices.dtype, faces.dtype) == (np.float64, np.int32)
+    assert faces.tolist() == [[0, 1, 2]]
+    monkeypatch.setitem(sys.modules, "open3d", open3d_with([], []))  # what Open3D says of a file it can't read
+    with pytest.raises(RecordingError, match="0 vertices and 0 faces: no mesh"):
+        read_mesh(path)
+
+
+def test_without_open3d_the_error_says_what_to_install(tmp_path, monkeypatch):
+    (tmp_path / "a.ply").touch()
+    monkeypatch.setitem(sys.modules, "open3d", None)  # makes its import fail
+    with pytest.raises(
+        RecordingError, match=r"a\.ply  Open3D.*can't be loaded: .*open3d.*\n.*apt install libusb-1.0-0"
+    ):
         read_mesh(tmp_path / "a.ply")
-    with pytest.raises(RecordingError, match="no such mesh"):
-        read_mesh(tmp_path / "a.obj")
