@@ -1,0 +1,88 @@
+"""What the cloth hides has to stay inside the silhouette, and is left alone there."""
+
+import numpy as np
+import pytest
+from matching_scenes import FIRST, FRAME, seen
+from mocapflow_matching.containment import Containment, inside_px
+from mocapflow_matching.robust import robust_weights
+
+from mocapflow.data import CLOTH, NO_CLOTH, Past, Pose
+from mocapflow.geometry.cameras import project
+from mocapflow.geometry.silhouettes import occluding_contour
+from mocapflow.testing import tiny_cloth, tiny_pose, tiny_scene
+
+SCENE = tiny_scene(clothed=True)
+BARE = tiny_scene()
+
+
+@pytest.fixture(scope="module")
+def truth():
+    return tiny_pose(SCENE)
+
+
+def surface_at(pose):
+    return SCENE.surface(pose, tiny_cloth(SCENE, pose))
+
+
+def bent(pose, degrees):
+    """The same pose with the left hip spread: the leg sticks out of the tube, the cloth stays."""
+    angles = pose.angles.copy()
+    angles[SCENE.body.screw_names.index("hip_l.abduction")] += np.radians(degrees)
+    return Pose(root=pose.root, angles=angles)
+
+
+def match(surface, segmentation, scene=SCENE, **settings):
+    return Containment(**settings).match(FRAME, segmentation, surface, Past(), scene, FIRST)
+
+
+def test_silent_without_a_garment(truth):
+    outside = BARE.surface(bent(truth, 20), NO_CLOTH)
+    assert len(match(outside, seen(BARE.surface(truth, NO_CLOTH), BARE), BARE).vertex) == 0
+
+
+def test_silent_while_the_body_is_inside(truth):
+    surface = surface_at(truth)
+    matches = match(
+        surface, seen(surface, SCENE), margin_px=-1.0
+    )  # the field is of whole edges, looked up at whole pixels
+    assert len(matches.vertex) == 0
+
+
+def test_a_leg_within_the_cloth_is_not_drawn_to_it(truth):
+    """One-sided: a garment twice as wide as the leg pulls nothing."""
+    pose = bent(truth, 3)
+    shown = seen(surface_at(truth), SCENE)
+    bare = SCENE.bare(surface_at(pose))
+    matches = match(surface_at(pose), shown)
+    for camera in range(4):
+        view = SCENE.cameras[camera]
+        contour = occluding_contour(bare, view, 6.0)
+        inside = contour.vertex[inside_px(shown.silhouettes[camera], contour.pixel) > 2]
+        out = contour.vertex[inside_px(shown.silhouettes[camera], contour.pixel) <= 2]
+        touched = set(matches.vertex[matches.camera == camera].tolist())
+        assert len(inside) > 10
+        assert not touched & (set(inside.tolist()) - set(out.tolist()))
+
+
+def test_what_sticks_out_is_drawn_to_the_contour(truth):
+    surface, shown = surface_at(bent(truth, 25)), seen(surface_at(truth), SCENE)
+    matches = match(surface, shown)
+    assert len(matches.vertex) > 20
+    assert (surface.layer[matches.vertex] != CLOTH).all()
+    views = np.array([project(surface.vertices, camera) for camera in SCENE.cameras])
+    way = np.sum((matches.pixel - views[matches.camera, matches.vertex]) * matches.direction, axis=1)
+    np.testing.assert_allclose(np.linalg.norm(matches.direction, axis=1), 1)
+    assert (way < 0.75).all()  # inward; the field was looked up half a pixel's diagonal away
+    assert way.min() < -10
+    names = np.array(SCENE.body.joint_names)[SCENE.body.skin_joint[matches.vertex[way < -5], 0]]
+    assert set(names) == {"hip_l"}  # the first of the joints that carry the left leg
+    np.testing.assert_allclose(matches.weight, robust_weights(np.abs(way), "huber", 3.0), atol=1e-9)
+
+
+def test_the_margin_keeps_the_skin_further_inside(truth):
+    surface, shown = surface_at(bent(truth, 25)), seen(surface_at(truth), SCENE)
+    plain, further = match(surface, shown), match(surface, shown, margin_px=4.0)
+    assert len(further.vertex) > len(plain.vertex)
+    views = np.array([project(surface.vertices, camera) for camera in SCENE.cameras])
+    ways = [np.sum((m.pixel - views[m.camera, m.vertex]) * m.direction, axis=1) for m in (plain, further)]
+    assert ways[1].min() == pytest.approx(ways[0].min() - 4.0, abs=1e-9)
