@@ -61,7 +61,7 @@ class ContourIcp(Matcher):
     later_loss: Loss = "geman_mcclure"
     scale: Positive = 2.0  # standard deviations at which the loss begins to give way
     sigma_px: Positive = 1.0
-    cloth_sigma_px_per_m: Positive = 30.0  # cloth is the less where a draper lays it, the longer it hangs
+    cloth_sigma_px_per_m: Positive = 80.0  # the longer cloth hangs, the less it is where a draper lays it
 
     @property
     def stride(self) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -48,7 +49,7 @@ class TwistGaussNewton(PoseSolver):
     root_damping_m: Positive = 0.1  # standard deviation about the prediction
     root_damping_deg: Positive = 11.5
     angle_damping_deg: Positive = 60.0
-    cloth_damping: Positive = 0.3  # share of each parameter's range
+    cloth_sd: Positive = 0.06  # standard deviation of cloth parameters about a calm garment, share of their range
     stop_surface_mm: Annotated[float, Field(ge=0)] = 0.1
     stop_angle_deg: Annotated[float, Field(ge=0)] = 0.02
 
@@ -64,7 +65,7 @@ class TwistGaussNewton(PoseSolver):
         """Return the pose that explains the matches best, with its covariance."""
         guess = Guess(state.estimate.pose, state.cloth)
         motion = ClothMotion(model, past, self.cloth_unknowns, self.redrape == "every", self.cloth_jacobian == "once")
-        anchor = Anchor(guess, self._precision(model, guess))
+        anchor = Anchor(calmed(guess, model), self._precision(model, guess))
         surface, damping = model.surface(guess.pose, guess.cloth), self._least_damping(turn)
         for _ in range(self.iterations):
             problem = Problem(model, self._data(match(surface), model), priors, past, anchor)
@@ -104,7 +105,7 @@ class TwistGaussNewton(PoseSolver):
         turn, bend = np.radians(self.root_damping_deg), np.radians(self.angle_damping_deg)
         spread = [np.full(3, turn), np.full(3, self.root_damping_m), np.full(len(guess.pose.angles), bend)]
         if self.cloth_unknowns and model.clothed:
-            spread.append(np.maximum(self.cloth_damping * parameter_ranges(model), 1e-12))
+            spread.append(np.maximum(self.cloth_sd * parameter_ranges(model), 1e-12))
         precision: F64 = np.concatenate(spread) ** -2.0
         return precision
 
@@ -143,6 +144,14 @@ class TwistGaussNewton(PoseSolver):
             covariance=to_origin @ about_root @ to_origin.T,
             energies=problem.energies(guess),
         )
+
+
+def calmed(guess: Guess, model: ClothedModel) -> Guess:
+    """Return a guess whose garment hangs without forces: where its parameters are held, however they came about."""
+    if model.scene.garment is None:
+        return guess
+    calm = np.clip(0.0, *model.scene.garment.parameter_bounds.T)
+    return Guess(guess.pose, replace(guess.cloth, parameters=calm))
 
 
 def parameter_ranges(model: ClothedModel) -> F64:

@@ -76,7 +76,7 @@ def clothed_state(pose: Pose, parameters: F64) -> FrameState:
 
 
 def solve(matches: Matches, state: FrameState, **settings: Any) -> Estimate:
-    solver = TwistGaussNewton(**{**EXACT, "cloth_damping": 1e6, **settings})
+    solver = TwistGaussNewton(**{**EXACT, "cloth_sd": 1e6, **settings})
     return solver.solve(lambda _: matches, state, MODEL, [], Past(), TURN)
 
 
