@@ -365,7 +365,10 @@ def empty_matches() -> Matches:
     """Return matches without any pair."""
     pixels = np.empty((0, 2))
     return Matches(
-        camera=np.empty(0, np.int16), pixel=pixels, direction=pixels.copy(), vertex=np.empty(0, np.int32),
+        camera=np.empty(0, np.int16),
+        pixel=pixels,
+        direction=pixels.copy(),
+        vertex=np.empty(0, np.int32),
         weight=np.empty(0),
     )
 

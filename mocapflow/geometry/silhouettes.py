@@ -84,12 +84,16 @@ def model_distance(surface: Surface, camera: Camera, band_px: float) -> F32:
 
 
 def occluding_contour(surface: Surface, camera: Camera, spacing_px: float) -> Contour:
-    """Return points on the boundary of the silhouette within the image, evenly spaced along it.
+    """Return points on the boundary of the silhouette of a surface, see `samples`."""
+    return samples(outline(surface, camera), surface, camera, spacing_px)
+
+
+def samples(boundary: Outline, surface: Surface, camera: Camera, spacing_px: float) -> Contour:
+    """Return points on the boundary of a silhouette within the image, evenly spaced along it.
 
     Their normals are the projected surface normals, which look along the image plane at an occluding contour and
     are smoother than the short edges; at cloth, which has a rim, they are those of the edges.
     """
-    boundary = outline(surface, camera)
     segment, share = _even_samples(boundary.pixel, spacing_px)
     ends, vertices = boundary.pixel[segment], boundary.vertex[segment]
     near = (share > 0.5).astype(np.intp)

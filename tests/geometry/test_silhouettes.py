@@ -18,15 +18,22 @@ def camera() -> Camera:
     pose[:3, :3] = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]
     intrinsics = np.array([[FOCAL, 0, 159.5], [0, FOCAL, 119.5], [0, 0, 1.0]])
     return Camera(
-        name="cam", size=np.array([320, 240], np.int32), intrinsics=intrinsics, distortion=np.zeros(5),
+        name="cam",
+        size=np.array([320, 240], np.int32),
+        intrinsics=intrinsics,
+        distortion=np.zeros(5),
         camera_from_world=pose,
     )
 
 
 def surface(vertices: F64, faces: I32, layer: int = BODY) -> Surface:
     return Surface(
-        vertices=vertices, faces=faces, edges=meshes.edges(faces), layer=np.full(len(vertices), layer, np.uint8),
-        joints=np.zeros((1, 4, 4)), screws=np.zeros((0, 6)),
+        vertices=vertices,
+        faces=faces,
+        edges=meshes.edges(faces),
+        layer=np.full(len(vertices), layer, np.uint8),
+        joints=np.zeros((1, 4, 4)),
+        screws=np.zeros((0, 6)),
     )
 
 

@@ -86,7 +86,9 @@ def test_the_contour_is_sub_pixel():
     image = np.clip(alpha * [60, 90, 150] + (1 - alpha) * [140, 130, 120] + noise, 0, 255).astype(np.uint8)
     empty = np.full((160, 160, 3), (140, 130, 120), np.float32)
     start = redistance(np.roll(exact, 4, axis=1), 12.0)
-    view = View(image, start, start, counted(start.shape, 3), (empty, np.full_like(empty, 3), np.ones((160, 160), np.float32)))
+    view = View(
+        image, start, start, counted(start.shape, 3), (empty, np.full_like(empty, 3), np.ones((160, 160), np.float32))
+    )
     for plate in (view.plate, None):
         segmenter = LevelSet(shape_weight=0.0)
         levels, method = segmenter._levels(False, plate is not None), segmenter._method()
