@@ -115,6 +115,66 @@ def on_boundary(ends, corner, cover):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
+def sample(ends, vertices, points, normals, cloth, matrix, size, spacing):  # type: ignore[no-untyped-def]
+    """Return points every `spacing` px of the total length of segments, where they lie in the image.
+
+    Args:
+        ends: (B, 2, 2) px, directed segments, the covered side on the same hand as in `occluding_edges`.
+        vertices: (B, 2) vertex index of their ends.
+        points: (N, 3) m, the vertices.
+        normals: (N, 3), theirs.
+        cloth: (N,) bool.
+        matrix: (3, 4), px from m.
+        size: (2,) px, width and height of the image.
+        spacing: px.
+
+    Returns:
+        nearer vertex (K,), its image (K, 2) px, the point (K, 2) px and its unit normal outward (K, 2).
+    """
+    total = 0.0
+    for s in range(len(ends)):
+        total += math.hypot(ends[s, 1, 0] - ends[s, 0, 0], ends[s, 1, 1] - ends[s, 0, 1])
+    most = int(total / spacing) + 1
+    vertex, anchor = np.empty(most, np.int32), np.empty((most, 2))
+    pixel, normal = np.empty((most, 2)), np.empty((most, 2))
+    count, passed, total = 0, 0, 0.0
+    for s in range(len(ends)):
+        dx, dy = ends[s, 1, 0] - ends[s, 0, 0], ends[s, 1, 1] - ends[s, 0, 1]
+        length = math.hypot(dx, dy)
+        while (passed + 0.5) * spacing < total + length:
+            share = ((passed + 0.5) * spacing - total) / length
+            passed += 1
+            x, y = ends[s, 0, 0] + share * dx, ends[s, 0, 1] + share * dy
+            if not (0 <= x <= size[0] - 1 and 0 <= y <= size[1] - 1):
+                continue
+            near = 1 if share > 0.5 else 0
+            v = vertices[s, near]
+            nx, ny = image_normal(points[v], normals[v], matrix)
+            if cloth[v] or ny * dx - nx * dy <= 0:  # a rim has no such normal; nor has a vertex that is turned away
+                nx, ny = -dy, dx
+            norm = math.hypot(nx, ny)
+            vertex[count] = v
+            anchor[count, 0], anchor[count, 1] = ends[s, near, 0], ends[s, near, 1]
+            pixel[count, 0], pixel[count, 1] = x, y
+            normal[count, 0], normal[count, 1] = nx / norm, ny / norm
+            count += 1
+        total += length
+    return vertex[:count], anchor[:count], pixel[:count], normal[:count]
+
+
+@numba.njit(cache=True)
+def image_normal(point, normal, matrix):  # type: ignore[no-untyped-def]
+    """Return how the image of a point moves with its surface normal: x and y, not of unit length."""
+    x, y, w = matrix[0, 3], matrix[1, 3], matrix[2, 3]
+    dx, dy, dw = 0.0, 0.0, 0.0
+    for axis in range(3):
+        x, dx = x + matrix[0, axis] * point[axis], dx + matrix[0, axis] * normal[axis]
+        y, dy = y + matrix[1, axis] * point[axis], dy + matrix[1, axis] * normal[axis]
+        w, dw = w + matrix[2, axis] * point[axis], dw + matrix[2, axis] * normal[axis]
+    return (dx - x / w * dw) / w, (dy - y / w * dw) / w
+
+
+@numba.njit(cache=True)
 def paint_distance(ends, corner, cover, band, distance):  # type: ignore[no-untyped-def]
     """Write the signed distance to the nearest segment into a field of -band; the inside beyond reach is +band.
 

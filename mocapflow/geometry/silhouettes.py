@@ -9,7 +9,6 @@ triangles. Cloth is two-sided: both its sides cover.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mocapflow.data import CLOTH, Camera, Contour, Surface
 from mocapflow.geometry import silhouette_kernels as kernels
@@ -39,12 +38,12 @@ def outline(surface: Surface, camera: Camera) -> Outline:
     facing = np.empty(len(surface.faces), np.int8)
     kernels.face_directions(pixels, depth, surface.faces, facing)
     segments, times = kernels.occluding_edges(surface.edges, surface.faces, facing, surface.layer == CLOTH)
-    ends = pixels[segments]
+    ends = pixels.take(segments, axis=0)  # several times faster than pixels[segments]
     low, high = _crop(ends, camera)
     cover = np.zeros((high[1] - low[1], high[0] - low[0]), np.int32)
     kernels.wind(ends, times, low, cover)
-    outer = kernels.on_boundary(ends, low, cover)
-    return Outline(vertex=segments[outer], pixel=ends[outer], corner=low, cover=cover)
+    outer = np.flatnonzero(kernels.on_boundary(ends, low, cover))
+    return Outline(vertex=segments.take(outer, axis=0), pixel=ends.take(outer, axis=0), corner=low, cover=cover)
 
 
 def _crop(ends: F64, camera: Camera) -> tuple[I32, I32]:
@@ -94,37 +93,8 @@ def samples(boundary: Outline, surface: Surface, camera: Camera, spacing_px: flo
     Their normals are the projected surface normals, which look along the image plane at an occluding contour and
     are smoother than the short edges; at cloth, which has a rim, they are those of the edges.
     """
-    segment, share = _even_samples(boundary.pixel, spacing_px)
-    ends, vertices = boundary.pixel[segment], boundary.vertex[segment]
-    near = (share > 0.5).astype(np.intp)
-    rows = np.arange(len(segment))
-    vertex, anchor = vertices[rows, near], ends[rows, near]
-    pixel = ends[:, 0] + share[:, None] * (ends[:, 1] - ends[:, 0])
-    along = ends[:, 1] - ends[:, 0]
-    outward = np.column_stack([-along[:, 1], along[:, 0]])
-    smooth = _image_normals(surface.normals[vertex], surface.vertices[vertex], camera)
-    usable = (np.sum(smooth * outward, axis=1) > 0) & (surface.layer[vertex] != CLOTH)
-    normal = np.where(usable[:, None], smooth, outward)
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    inside = ((pixel >= 0) & (pixel <= camera.size - 1)).all(1)
-    return Contour(vertex=vertex[inside], anchor=anchor[inside], pixel=pixel[inside], normal=normal[inside])
-
-
-def _even_samples(ends: F64, spacing: float) -> tuple[NDArray[np.intp], F64]:
-    """Return segment numbers and shares along them of points every `spacing` px of the total length."""
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    total = np.cumsum(length)
-    at = np.arange(0.5 * spacing, total[-1] if len(total) else 0.0, spacing)
-    segment = np.searchsorted(total, at)
-    share = 1.0 - (total[segment] - at) / length[segment]
-    return segment, share
-
-
-def _image_normals(normals: F64, points: F64, camera: Camera) -> F64:
-    """Return how the image of a point moves with its surface normal: (K, 2), not of unit length."""
-    matrix = projection(camera)
-    homogeneous = points @ matrix[:, :3].T + matrix[:, 3]
-    change = normals @ matrix[:, :3].T
-    pixel = homogeneous[:, :2] / homogeneous[:, 2:]
-    moved: F64 = (change[:, :2] - pixel * change[:, 2:]) / homogeneous[:, 2:]
-    return moved
+    matrix, cloth = projection(camera), surface.layer == CLOTH
+    vertex, anchor, pixel, normal = kernels.sample(
+        boundary.pixel, boundary.vertex, surface.vertices, surface.normals, cloth, matrix, camera.size, spacing_px
+    )
+    return Contour(vertex=vertex, anchor=anchor, pixel=pixel, normal=normal)

@@ -110,7 +110,12 @@ def test_pairs_whose_normals_disagree_are_none(truth):
 def test_hanging_cloth_counts_less(truth):
     """The sigma of a pair grows with the length from which its cloth hangs."""
     surface = surface_at(truth, DRESSED)
-    matches = match(ContourIcp(first_loss="none", hem_guard_px=0), surface, seen(surface, DRESSED), scene=DRESSED)
+    matches = match(
+        ContourIcp(first_loss="none", hem_guard_px=0, cloth_sigma_px_per_m=30),
+        surface,
+        seen(surface, DRESSED),
+        scene=DRESSED,
+    )
     cloth = surface.layer[matches.vertex] == CLOTH
     assert cloth.sum() > 50
     hanging = DRESSED.hanging[matches.vertex[cloth] - len(DRESSED.body.vertices)]
@@ -121,7 +126,12 @@ def test_hanging_cloth_counts_less(truth):
 def test_skin_beside_a_hem_counts_as_the_cloth_there(truth):
     """Skin within 12 px of a cloth contour and near the garment at rest has the sigma of the nearest cloth."""
     surface = surface_at(truth, DRESSED)
-    matches = match(ContourIcp(first_loss="none", hem_guard_px=12), surface, seen(surface, DRESSED), scene=DRESSED)
+    matches = match(
+        ContourIcp(first_loss="none", hem_guard_px=12, cloth_sigma_px_per_m=30),
+        surface,
+        seen(surface, DRESSED),
+        scene=DRESSED,
+    )
     near = np.append(DRESSED.near_garment, np.zeros(len(DRESSED.hanging), bool))
     checked = []
     for number, camera in enumerate(DRESSED.cameras):
