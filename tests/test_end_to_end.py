@@ -1,0 +1,181 @@
+"""The real command line on the demo clips: what README promises, whatever happens on the way."""
+
+import csv
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from mocapflow.shipped import shipped
+
+MOCAPFLOW = Path(sys.executable).with_name("mocapflow")
+PIPELINES = shipped("pipelines")
+CLIPS = {name: shipped("examples", "data", f"{name}_steps") for name in ("skirt", "shorts")}
+NO_PICTURES = [part for stage in ("overlay", "virtual", "report") for part in ("--set", f"stages.{stage}=null")]
+FEW = ("--frames", "0:5", *NO_PICTURES)
+long = pytest.mark.long
+
+
+def call(*words, cwd, status=0):
+    """Run a command in a folder and return what it says on its way."""
+    done = subprocess.run([MOCAPFLOW, *map(str, words)], cwd=cwd, capture_output=True, text=True, check=False)
+    assert done.returncode == status, done.stderr
+    return done.stderr
+
+
+def table(path):
+    with path.open(newline="", encoding="utf-8") as lines:
+        rows = list(csv.reader(lines))
+    return dict(zip(rows[0], np.array(rows[1:], float).T, strict=True))
+
+
+def rows_after(path, heading):
+    """The rows of numbers in an OpenSim file, after the line that starts with `heading`."""
+    lines = path.read_text().splitlines()
+    first = next(k for k, line in enumerate(lines) if line.startswith(heading))
+    return [line.split() for line in lines[first + 1 :] if line[:1].isdigit()]
+
+
+def same_angles(one, other):
+    """Both runs wrote the same, to the last digit."""
+    for name in ("angles.csv", "angles_raw.csv", "joints.trc"):
+        assert (one / "results" / name).read_bytes() == (other / "results" / name).read_bytes()
+    return True
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory):
+    """Where the run folders lie; they share a store."""
+    return tmp_path_factory.mktemp("runs")
+
+
+@pytest.fixture(scope="module")
+def whole(home):
+    """Run folders of both clips, all frames; the demo is the skirt, called from somewhere else."""
+    call("demo", "--out", home / "skirt", cwd=home)
+    call("run", PIPELINES / "shorts.yaml", "--out", home / "shorts", *NO_PICTURES, cwd=home)
+    return {name: home / name for name in CLIPS}
+
+
+@pytest.fixture(scope="module")
+def few(home):
+    """A run of five frames of the shorts that nothing disturbed."""
+    call("run", PIPELINES / "shorts.yaml", *FEW, "--out", home / "few", cwd=home)
+    return home / "few"
+
+
+def test_two_frames_without_cloth(tmp_path):
+    said = call(
+        *("run", PIPELINES / "bare.yaml", "--recording", CLIPS["shorts"], "--frames", "0:2", "--out", "out"),
+        *NO_PICTURES,
+        cwd=tmp_path,
+    )
+    assert "track: 2 of 2 frames" in said
+    ours, truth = table(tmp_path / "out/results/angles.csv"), table(CLIPS["shorts"] / "truth/angles.csv")
+    assert ours["frame"].tolist() == [0, 1]
+    assert np.abs(ours["elbow_l"] - truth["elbow_l"][:2]).max() < 5
+
+
+@long
+@pytest.mark.parametrize("clip", CLIPS)
+@pytest.mark.parametrize("side", ["l", "r"])
+def test_knees_under_cloth_within_three_degrees(whole, clip, side):
+    ours, truth = table(whole[clip] / "results/angles.csv"), table(CLIPS[clip] / "truth/angles.csv")
+    error = ours[f"knee_flexion_{side}"] - truth[f"knee_flexion_{side}"]
+    assert len(error) == 60
+    assert np.sqrt(np.mean(error**2)) <= 3.0
+
+
+@long
+@pytest.mark.parametrize("clip", CLIPS)
+@pytest.mark.parametrize("file", ["angles.csv", "angles_raw.csv"])
+def test_every_frame_has_every_angle_and_its_deviation(whole, clip, file):
+    ours, truth = table(whole[clip] / "results" / file), table(CLIPS[clip] / "truth/angles.csv")
+    angles = [name for name in truth if name != "frame"]
+    assert list(ours) == ["frame", "time", *(column for name in angles for column in (name, f"{name}_sd"))]
+    np.testing.assert_array_equal(ours["frame"], truth["frame"])
+    assert (np.diff(ours["time"]) > 0).all()
+    assert all(np.isfinite(column).all() for column in ours.values())
+    assert all((ours[f"{name}_sd"] > 0).all() for name in angles)
+
+
+@long
+@pytest.mark.parametrize("clip", CLIPS)
+def test_files_for_opensim_and_the_record_of_the_run(whole, clip):
+    results = whole[clip] / "results"
+    assert len(rows_after(results / "angles.mot", "endheader")) == 60
+    assert [row[0] for row in rows_after(results / "joints.trc", "Frame#")] == [str(k) for k in range(1, 61)]
+    record = json.loads((whole[clip] / "run.json").read_text())
+    assert record["recipe"]["settings"]["track"]["name"] == "coupled_loop"
+    assert "\nknee_flexion_l,60," in (results / "evaluation.csv").read_text()
+
+
+@long
+def test_the_videos_can_be_read_back(whole):
+    videos = sorted((whole["skirt"] / "overlay").glob("*.mp4")) + [whole["skirt"] / "virtual/virtual.mp4"]
+    assert len(videos) == 5
+    for video in videos:
+        capture, frames = cv2.VideoCapture(str(video)), []
+        while True:
+            there, frame = capture.read()
+            if not there:
+                break
+            frames.append(frame)
+        assert len(frames) == 60
+        assert np.std(frames[0]) > 5
+
+
+@long
+def test_a_second_run_computes_nothing(whole, home):
+    """Nor does the same pipeline by another name and into another folder: results are found by what makes them."""
+    said = call("demo", "--out", whole["skirt"], cwd=home)
+    assert "running" not in said
+    said = call("run", PIPELINES / "skirt.yaml", "--out", home / "again", *NO_PICTURES, cwd=home)
+    assert "track: from the store" in said
+    assert same_angles(home / "again", whole["skirt"])
+
+
+@long
+def test_the_truth_is_not_looked_at(few, tmp_path):
+    recording = tmp_path / "recording"
+    shutil.copytree(CLIPS["shorts"], recording, ignore=shutil.ignore_patterns("truth", "reference"))
+    call("run", PIPELINES / "shorts.yaml", "--recording", recording, *FEW, "--out", "out", cwd=tmp_path)
+    assert not (recording / "truth").exists()
+    assert same_angles(tmp_path / "out", few)
+
+
+@long
+@pytest.mark.parametrize("after", ["track: running", "track: 3 of 5 frames"])
+def test_a_killed_run_goes_on_to_the_same_result(few, tmp_path, after):
+    words = ["run", PIPELINES / "shorts.yaml", *FEW, "--out", "out"]
+    with subprocess.Popen(
+        [MOCAPFLOW, *map(str, words)], cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True
+    ) as run:
+        assert any(line.startswith(after) for line in run.stderr)
+        os.kill(run.pid, signal.SIGKILL)
+    assert run.returncode == -signal.SIGKILL
+    assert not (tmp_path / "out/results/angles.csv").exists()
+    said = call(*words, cwd=tmp_path)
+    assert ("track: 1 of 5 frames" in said) == (after == "track: running")
+    assert same_angles(tmp_path / "out", few)
+
+
+@long
+@pytest.mark.parametrize("pipeline", ["paper", "bare"])
+def test_the_other_pipelines_run(tmp_path, pipeline):
+    said = call("run", PIPELINES / f"{pipeline}.yaml", "--frames", "0:2", "--out", "out", *NO_PICTURES, cwd=tmp_path)
+    assert "track: 2 of 2 frames" in said
+    assert len(table(tmp_path / "out/results/angles.csv")["frame"]) == 2
+
+
+def test_every_pipeline_is_run_here_but_the_one_whose_recording_is_not_shipped(tmp_path):
+    assert {path.stem for path in PIPELINES.glob("*.yaml")} == {*CLIPS, "demo", "paper", "bare", "balancing"}
+    said = call("plan", PIPELINES / "balancing.yaml", cwd=tmp_path, status=2)
+    assert "--recording" in said
