@@ -28,9 +28,9 @@ def body():
     return Template().load(DEMO)
 
 
-def aligned(folder, body, cameras, least_px):
+def aligned(folder, body, cameras, least_px, frames=8):
     write(folder, body, walking(body, 8), cameras, noise_px=0.7, bystander=())
-    return AlignCameras(frames=8, sigma_px=1.0, least_px=least_px).run(open_recording(folder, stop=8)).cameras
+    return AlignCameras(frames=frames, sigma_px=1.0, least_px=least_px).run(open_recording(folder, stop=8)).cameras
 
 
 def test_good_cameras_are_left_as_they_are(body, tmp_path):
@@ -51,6 +51,16 @@ def test_a_knocked_camera_is_turned_back(body, tmp_path, caplog):
     before, after = shift_px(cameras[1], truth[1]), shift_px(found[1], truth[1])
     assert before > 4 and after < 0.35 * before
     assert "cameras have turned since their calibration" in caplog.text
+
+
+def test_the_first_frame_alone_can_do(body, tmp_path):
+    folder = copy_demo(tmp_path / "recording")
+    cameras = open_recording(folder).cameras
+    knock = np.zeros((4, 3))
+    knock[1] = np.radians([0.3, 0.8, 0.2])
+    truth = turn(cameras, knock)
+    found = aligned(folder, body, truth, 1.0, frames=1)
+    assert shift_px(found[1], truth[1]) < 0.5 * shift_px(cameras[1], truth[1])
 
 
 def test_shift_is_that_of_the_image(body):
