@@ -8,6 +8,7 @@ import importlib.util
 import json
 import os
 import sys
+import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -18,6 +19,7 @@ import numpy.typing as npt
 
 from mocapflow.errors import RecordingError
 
+PARSER = threading.Lock()  # CPython 3.11 counts the parser's recursion across threads (python/cpython#106905)
 MARK = "blake2b:"  # a digest reads "blake2b:<hex> <name>"; the name is for people and never counts
 
 CORE = ("components", "data", "geometry", "loop", "model", "records", "scene", "track")
@@ -100,7 +102,8 @@ class Digests:
 
     def _source(self, path: Path) -> tuple[str, list[str]]:
         def read() -> list[Any]:
-            tree = ast.parse(path.read_bytes())
+            with PARSER:
+                tree = ast.parse(path.read_bytes())
             imports = sorted(set(_imports(tree)))  # before `_meaning`, which cuts the tree
             return [hashlib.blake2b(_meaning(tree).encode(), digest_size=16).hexdigest(), imports]
 
