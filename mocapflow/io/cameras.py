@@ -12,7 +12,7 @@ import numpy as np
 from mocapflow.data import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import twists
-from mocapflow.records import F64
+from mocapflow.io.calibrated import bad, make_camera
 
 FARTHEST = 100.0  # m; a camera further from the origin is one calibrated in millimetres
 YAML = (".yml", ".yaml")
@@ -48,7 +48,7 @@ def read_cameras(path: Path) -> tuple[Camera, ...]:
     for camera in cameras:
         _check(camera, path)
         if names.count(camera.name) > 1:
-            raise _bad(camera.name, path, "is there more than once")
+            raise bad(camera.name, path, "is there more than once")
     return cameras
 
 
@@ -89,46 +89,6 @@ def metadata(path: Path) -> Mapping[str, Any]:
     return found if isinstance(found, dict) else {}
 
 
-def camera(
-    name: str,
-    size: Any,
-    intrinsics: Any,
-    distortion: Any,
-    rotation: F64,
-    translation: Any,
-    *,
-    where: Path,
-    fisheye: bool = False,
-) -> Camera:
-    """Return a camera from the numbers of a file; `rotation` is a Rodrigues vector or a 3 x 3 matrix.
-
-    Raises:
-        RecordingError: an array has the wrong length, or the matrix is not a rotation.
-    """
-    motion = np.eye(4)
-    motion[:3, 3] = _numbers(translation, (3,), "translation", name, where)
-    if np.size(rotation) == 9:
-        motion[:3, :3] = _numbers(rotation, (3, 3), "rotation", name, where)
-    else:
-        vector = _numbers(rotation, (3,), "rotation", name, where)
-        motion[:3, :3] = twists.exp(np.concatenate([vector, np.zeros(3)]))[:3, :3]
-    coefficients = _numbers(distortion, (np.size(distortion),), "distortions", name, where)
-    if len(coefficients) > 5:
-        if coefficients[5:].any():
-            raise _bad(
-                name, where, f"has {len(coefficients)} distortion coefficients", "at most 5 are known: k1 k2 p1 p2 k3"
-            )
-        coefficients = coefficients[:5]
-    return Camera(
-        name=name,
-        size=_numbers(size, (2,), "size", name, where).astype(np.int32),
-        intrinsics=_numbers(intrinsics, (3, 3), "matrix", name, where),
-        distortion=np.pad(coefficients, (0, 5 - len(coefficients))),
-        camera_from_world=motion,
-        fisheye=fisheye,
-    )
-
-
 def _from_toml(path: Path) -> tuple[Camera, ...]:
     tables = {key: table for key, table in _load(path).items() if isinstance(table, dict) and key != "metadata"}
     return tuple(_from_table(key, table, path) for key, table in tables.items())
@@ -146,36 +106,20 @@ def _from_table(key: str, table: Mapping[str, Any], path: Path) -> Camera:
     missing = [field for field in FIELDS if field not in table]
     if missing:
         hint = f"each camera needs {', '.join(FIELDS)}; tables other than [metadata] are cameras"
-        raise _bad(name, path, f"lacks {', '.join(missing)}", hint)
+        raise bad(name, path, f"lacks {', '.join(missing)}", hint)
     size, matrix, distortion, rotation, translation = (table[field] for field in FIELDS)
     fisheye = bool(table.get("fisheye", False))
-    return camera(name, size, matrix, distortion, rotation, translation, where=path, fisheye=fisheye)
-
-
-def _numbers(value: Any, shape: tuple[int, ...], field: str, name: str, where: Path) -> F64:
-    try:
-        numbers = np.array(value, np.float64)
-    except (TypeError, ValueError):
-        raise _bad(name, where, f"has no numbers in {field}: {value!r}") from None
-    if numbers.size != int(np.prod(shape)):
-        raise _bad(name, where, f"has {numbers.size} numbers in {field}; expected {int(np.prod(shape))}")
-    if not np.isfinite(numbers).all():
-        raise _bad(
-            name, where, f"has NaN or infinity in {field}", "calibrate this camera again, or mend the file by hand"
-        )
-    return numbers.reshape(shape)
+    return make_camera(name, size, matrix, distortion, rotation, translation, where=path, fisheye=fisheye)
 
 
 def _check(camera: Camera, path: Path) -> None:
     k, rotation = camera.intrinsics, camera.camera_from_world[:3, :3]
     if (camera.size < 0).any():
-        raise _bad(camera.name, path, f"has the size {camera.size[0]} x {camera.size[1]}")
+        raise bad(camera.name, path, f"has the size {camera.size[0]} x {camera.size[1]}")
     if not (k[0, 0] > 0 and k[1, 1] > 0 and k[2, 2] == 1) or k[1, 0] or k[2, 0] or k[2, 1]:
-        raise _bad(
-            camera.name, path, "has no camera matrix", "expected [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] in pixels"
-        )
+        raise bad(camera.name, path, "has no camera matrix", "expected [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] in pixels")
     if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-3 or np.linalg.det(rotation) < 0:
-        raise _bad(
+        raise bad(
             camera.name,
             path,
             "has a matrix that is not a rotation",
@@ -183,16 +127,12 @@ def _check(camera: Camera, path: Path) -> None:
         )
     distance = float(np.linalg.norm(camera.camera_from_world[:3, 3]))
     if distance > FARTHEST:
-        raise _bad(
+        raise bad(
             camera.name,
             path,
             f"stands {distance:.0f} m from the origin: the calibration is in mm",
             "lengths are in metres: divide every translation by 1000",
         )
-
-
-def _bad(name: str, where: Path, what: str, hint: str = "") -> RecordingError:
-    return RecordingError(f"camera '{name}' {what}", where=str(where), hint=hint)
 
 
 def _table(camera: Camera) -> str:

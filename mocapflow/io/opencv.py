@@ -9,7 +9,7 @@ import numpy as np
 
 from mocapflow.data import Camera
 from mocapflow.errors import RecordingError
-from mocapflow.io.cameras import camera
+from mocapflow.io.calibrated import make_camera
 from mocapflow.records import F64
 
 
@@ -33,7 +33,7 @@ def _camera(name: str, inner: Any, outer: Any, folder: Path) -> Camera:
     matrix = _matrix(inner.getNode(f"K_{name}"), f"K_{name}", name, intri)
     distortion = _matrix(inner.getNode(f"dist_{name}"), f"dist_{name}", name, intri).ravel()
     size = [inner.getNode(f"{axis}_{name}").real() for axis in "WH"]
-    return camera(name, size, matrix, distortion, rotation, translation, where=intri)
+    return make_camera(name, size, matrix, distortion, rotation, translation, where=intri)
 
 
 def _open(path: Path) -> Any:

@@ -9,7 +9,7 @@ import numpy as np
 
 from mocapflow.data import Camera
 from mocapflow.errors import RecordingError
-from mocapflow.io.cameras import camera
+from mocapflow.io.calibrated import make_camera
 
 FRACTION = 64.0  # steps per pixel
 METRE = 1000.0  # mm
@@ -52,7 +52,7 @@ def _camera(node: ElementTree.Element, path: Path) -> Camera:
     position = np.array([_number(place, key, name, path) for key in "xyz"]) / METRE
     matrix = [[fx, 0, cx - left], [0, fy, cy - top], [0, 0, 1]]
     size = [right - left + 1, bottom - top + 1]
-    return camera(name, size, matrix, [k1, k2, p1, p2, k3], rotation, -rotation @ position, where=path)
+    return make_camera(name, size, matrix, [k1, k2, p1, p2, k3], rotation, -rotation @ position, where=path)
 
 
 def _child(node: ElementTree.Element, tag: str, name: str, path: Path) -> ElementTree.Element:

@@ -1,0 +1,77 @@
+"""A camera from the numbers of a calibration file, checked."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mocapflow.data import Camera
+from mocapflow.errors import RecordingError
+from mocapflow.geometry import twists
+from mocapflow.records import F64
+
+
+def make_camera(
+    name: str,
+    size: Any,
+    intrinsics: Any,
+    distortion: Any,
+    rotation: F64,
+    translation: Any,
+    *,
+    where: Path,
+    fisheye: bool = False,
+) -> Camera:
+    """Return a camera from the numbers of a file; `rotation` is a Rodrigues vector or a 3 x 3 matrix.
+
+    Raises:
+        RecordingError: an array has the wrong length, or the matrix is not a rotation.
+    """
+    motion = np.eye(4)
+    motion[:3, 3] = numbers(translation, (3,), "translation", name, where)
+    if np.size(rotation) == 9:
+        motion[:3, :3] = numbers(rotation, (3, 3), "rotation", name, where)
+    else:
+        vector = numbers(rotation, (3,), "rotation", name, where)
+        motion[:3, :3] = twists.exp(np.concatenate([vector, np.zeros(3)]))[:3, :3]
+    coefficients = numbers(distortion, (np.size(distortion),), "distortions", name, where)
+    if len(coefficients) > 5:
+        if coefficients[5:].any():
+            raise bad(
+                name, where, f"has {len(coefficients)} distortion coefficients", "at most 5 are known: k1 k2 p1 p2 k3"
+            )
+        coefficients = coefficients[:5]
+    return Camera(
+        name=name,
+        size=numbers(size, (2,), "size", name, where).astype(np.int32),
+        intrinsics=numbers(intrinsics, (3, 3), "matrix", name, where),
+        distortion=np.pad(coefficients, (0, 5 - len(coefficients))),
+        camera_from_world=motion,
+        fisheye=fisheye,
+    )
+
+
+def numbers(value: Any, shape: tuple[int, ...], field: str, name: str, where: Path) -> F64:
+    """Return a field's numbers in the shape it must have.
+
+    Raises:
+        RecordingError: they are no numbers, not finite, or too many or few.
+    """
+    try:
+        found = np.array(value, np.float64)
+    except (TypeError, ValueError):
+        raise bad(name, where, f"has no numbers in {field}: {value!r}") from None
+    if found.size != int(np.prod(shape)):
+        raise bad(name, where, f"has {found.size} numbers in {field}; expected {int(np.prod(shape))}")
+    if not np.isfinite(found).all():
+        raise bad(
+            name, where, f"has NaN or infinity in {field}", "calibrate this camera again, or mend the file by hand"
+        )
+    return found.reshape(shape)
+
+
+def bad(name: str, where: Path, what: str, hint: str = "") -> RecordingError:
+    """Return the error that says what is wrong with a camera."""
+    return RecordingError(f"camera '{name}' {what}", where=str(where), hint=hint)
