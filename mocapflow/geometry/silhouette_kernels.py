@@ -98,6 +98,27 @@ def bounds(ends):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
+def split(ends, longest):  # type: ignore[no-untyped-def]
+    """Return segments cut into equal pieces no longer than `longest` px: their segment (P,) and ends (P, 2, 2)."""
+    counts = np.empty(len(ends), np.int64)
+    for s in range(len(ends)):
+        length = math.hypot(ends[s, 1, 0] - ends[s, 0, 0], ends[s, 1, 1] - ends[s, 0, 1])
+        counts[s] = max(math.ceil(length / longest), 1)
+    total = counts.sum()
+    whole, pieces = np.empty(total, np.int64), np.empty((total, 2, 2))
+    piece = 0
+    for s in range(len(ends)):
+        for k in range(counts[s]):
+            whole[piece] = s
+            for axis in range(2):
+                reach = ends[s, 1, axis] - ends[s, 0, axis]
+                pieces[piece, 0, axis] = ends[s, 0, axis] + reach * k / counts[s]
+                pieces[piece, 1, axis] = ends[s, 0, axis] + reach * (k + 1) / counts[s]
+            piece += 1
+    return whole, pieces
+
+
+@numba.njit(cache=True)
 def on_boundary(ends, corner, cover):  # type: ignore[no-untyped-def]
     """Return which segments have nothing beyond them: the boundary of the covered region."""
     height, width = cover.shape
@@ -115,12 +136,13 @@ def on_boundary(ends, corner, cover):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def sample(ends, vertices, points, normals, cloth, matrix, size, spacing):  # type: ignore[no-untyped-def]
+def sample(ends, vertices, images, points, normals, cloth, matrix, size, spacing):  # type: ignore[no-untyped-def]
     """Return points every `spacing` px of the total length of segments, where they lie in the image.
 
     Args:
         ends: (B, 2, 2) px, directed segments, the covered side on the same hand as in `occluding_edges`.
-        vertices: (B, 2) vertex index of their ends.
+        vertices: (B, 2) vertex index of the ends of the edges they are pieces of.
+        images: (B, 2, 2) px, where these project.
         points: (N, 3) m, the vertices.
         normals: (N, 3), theirs.
         cloth: (N,) bool.
@@ -147,14 +169,15 @@ def sample(ends, vertices, points, normals, cloth, matrix, size, spacing):  # ty
             x, y = ends[s, 0, 0] + share * dx, ends[s, 0, 1] + share * dy
             if not (0 <= x <= size[0] - 1 and 0 <= y <= size[1] - 1):
                 continue
-            near = 1 if share > 0.5 else 0
+            first = math.hypot(images[s, 0, 0] - x, images[s, 0, 1] - y)
+            near = 1 if math.hypot(images[s, 1, 0] - x, images[s, 1, 1] - y) < first else 0
             v = vertices[s, near]
             nx, ny = image_normal(points[v], normals[v], matrix)
             if cloth[v] or ny * dx - nx * dy <= 0:  # a rim has no such normal; nor has a vertex that is turned away
                 nx, ny = -dy, dx
             norm = math.hypot(nx, ny)
             vertex[count] = v
-            anchor[count, 0], anchor[count, 1] = ends[s, near, 0], ends[s, near, 1]
+            anchor[count, 0], anchor[count, 1] = images[s, near, 0], images[s, near, 1]
             pixel[count, 0], pixel[count, 1] = x, y
             normal[count, 0], normal[count, 1] = nx / norm, ny / norm
             count += 1

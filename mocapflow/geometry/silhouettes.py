@@ -15,6 +15,7 @@ from mocapflow.geometry import silhouette_kernels as kernels
 from mocapflow.geometry.cameras import projection
 from mocapflow.records import F32, F64, I32, Bool, array, record
 
+PIECE = 4.0  # px; longer edges are judged piece by piece, for a part of one may be hidden
 MARGIN = 2  # px around the silhouette, so that the outside of its boundary is seen
 
 
@@ -22,8 +23,9 @@ MARGIN = 2  # px around the silhouette, so that the outside of its boundary is s
 class Outline:
     """The boundary of a silhouette in one view, as directed segments, and how often each pixel is covered."""
 
-    vertex: I32 = array("B", 2, unit="surface vertex index of the two ends")
-    pixel: F64 = array("B", 2, 2, unit="px, the two ends")
+    vertex: I32 = array("B", 2, unit="surface vertex index of the two ends of the edge that a segment is a piece of")
+    image: F64 = array("B", 2, 2, unit="px, where these project")
+    pixel: F64 = array("B", 2, 2, unit="px, the two ends of the segment")
     corner: I32 = array(2, unit="px, column and row of cover[0, 0]")
     cover: I32 = array("H", "W", unit="number of surface layers over each pixel, within the crop")
 
@@ -42,8 +44,16 @@ def outline(surface: Surface, camera: Camera) -> Outline:
     low, high = _crop(ends, camera)
     cover = np.zeros((high[1] - low[1], high[0] - low[0]), np.int32)
     kernels.wind(ends, times, low, cover)
-    outer = np.flatnonzero(kernels.on_boundary(ends, low, cover))
-    return Outline(vertex=segments.take(outer, axis=0), pixel=ends.take(outer, axis=0), corner=low, cover=cover)
+    whole, pieces = kernels.split(ends, PIECE)
+    outer = np.flatnonzero(kernels.on_boundary(pieces, low, cover))
+    whole = whole.take(outer)
+    return Outline(
+        vertex=segments.take(whole, axis=0),
+        image=ends.take(whole, axis=0),
+        pixel=pieces.take(outer, axis=0),
+        corner=low,
+        cover=cover,
+    )
 
 
 def _crop(ends: F64, camera: Camera) -> tuple[I32, I32]:
@@ -95,6 +105,14 @@ def samples(boundary: Outline, surface: Surface, camera: Camera, spacing_px: flo
     """
     matrix, cloth = projection(camera), surface.layer == CLOTH
     vertex, anchor, pixel, normal = kernels.sample(
-        boundary.pixel, boundary.vertex, surface.vertices, surface.normals, cloth, matrix, camera.size, spacing_px
+        boundary.pixel,
+        boundary.vertex,
+        boundary.image,
+        surface.vertices,
+        surface.normals,
+        cloth,
+        matrix,
+        camera.size,
+        spacing_px,
     )
     return Contour(vertex=vertex, anchor=anchor, pixel=pixel, normal=normal)

@@ -112,7 +112,7 @@ def test_an_open_sheet_of_cloth_is_seen_from_both_sides() -> None:
     for turned in (faces, faces[:, ::-1].copy()):
         boundary = silhouettes.outline(surface(grid, turned, CLOTH), camera())
         assert silhouettes.mask(boundary, camera()).sum() == pytest.approx((0.6 * FOCAL / DISTANCE) ** 2, rel=0.03)
-        assert len(boundary.pixel) == 24
+        assert len(np.unique(boundary.vertex, axis=0)) == 24
 
 
 def test_a_folded_sheet_ends_at_its_fold() -> None:
@@ -128,3 +128,19 @@ def test_a_surface_behind_the_camera_has_no_outline() -> None:
     boundary = silhouettes.outline(surface(*sphere((0, -DISTANCE, 0))), camera())
     assert len(boundary.pixel) == 0
     assert not silhouettes.mask(boundary, camera()).any()
+
+
+def test_the_visible_part_of_a_long_half_hidden_edge_stays() -> None:
+    wide = np.array([[x, DISTANCE, z] for z in (0.2, -0.2) for x in (-0.4, 0.4)])
+    tall = np.array([[x, DISTANCE - 0.5, z] for z in (0.4, -0.3) for x in (0.0, 0.5)])
+    sheet = meshes.grid_faces(2, 2, closed=False)
+    both = surface(np.concatenate([wide, tall]), np.concatenate([sheet, sheet + np.int32(4)]), CLOTH)
+    distance = silhouettes.model_distance(both, camera(), 12.0)
+    row = 119.5 - 0.2 * FOCAL / DISTANCE
+    column = int(159.5 - 0.3 * FOCAL / DISTANCE)
+    above = int(row) - 4
+    assert distance[above, column] == pytest.approx(above - row, abs=1e-4)
+    contour = silhouettes.occluding_contour(both, camera(), 4.0)
+    top = contour.pixel[np.abs(contour.pixel[:, 1] - row) < 1e-6]
+    assert top[:, 0].min() < 159.5 - 0.39 * FOCAL / DISTANCE
+    assert 155 < top[:, 0].max() < 161
