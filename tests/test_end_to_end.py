@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -161,13 +162,13 @@ def test_the_truth_is_not_looked_at(few, tmp_path):
 
 
 @long
-@pytest.mark.parametrize("after", ["track: running", "track: 3 of 5 frames"])
+@pytest.mark.parametrize("after", ["track: running", "track: [1-4] of 5 frames"])
 def test_a_killed_run_goes_on_to_the_same_result(few, tmp_path, after):
     words = ["run", PIPELINES / "shorts.yaml", *FEW, "--out", "out"]
     with subprocess.Popen(
         [MOCAPFLOW, *map(str, words)], cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True
     ) as run:
-        assert any(line.startswith(after) for line in run.stderr)
+        assert any(re.match(after, line) for line in run.stderr)  # progress is told once a second, not every frame
         os.kill(run.pid, signal.SIGKILL)
     assert run.returncode == -signal.SIGKILL
     assert not (tmp_path / "out/results/angles.csv").exists()
