@@ -1,0 +1,33 @@
+"""What the documents tell a reader to write works as it stands there."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+from mocapflow import load_registry
+
+ROOT = Path(__file__).parents[1]
+
+
+def blocks(document: str, language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", (ROOT / document).read_text(encoding="utf-8"), re.M | re.S)
+
+
+def test_the_plugin_in_contributing_loads_and_conforms(tmp_path: Path) -> None:
+    plugin, test = blocks("CONTRIBUTING.md", "python")
+    (tmp_path / "toes_ahead.py").write_text(plugin, encoding="utf-8")
+    (tmp_path / "test_toes_ahead.py").write_text(test, encoding="utf-8")
+    registry = load_registry([tmp_path / "toes_ahead.py"])
+    assert "toes_ahead" in registry.names("prior"), registry.failures
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:dash", "-p", "no:cacheprovider", "test_toes_ahead.py"]
+    run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stdout
+    assert "10 passed" in run.stdout
+
+
+def test_every_bash_block_of_the_readme_is_run_by_ci() -> None:
+    assert len(blocks("README.md", "bash")) >= 5
+    assert "readme_commands.py README.md" in (ROOT / ".ci/run").read_text(encoding="utf-8")
