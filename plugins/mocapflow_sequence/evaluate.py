@@ -30,12 +30,12 @@ class Evaluate(Stage):
     """
 
     name: ClassVar[str] = "evaluate"
-    reference: Path | None = None
+    reference: str = ""
 
     def run(self, track: Track, scene: Scene, recording: Recording, run_folder: RunFolder) -> Evaluation:
         """Return the evaluation of the track."""
         path = recording.folder / (self.reference or "truth/angles.csv")
-        if self.reference is None and not path.is_file():
+        if not self.reference and not path.is_file():
             return Evaluation(
                 reference="", rows=(), note="the recording has no truth/angles.csv, and no reference is set"
             )
