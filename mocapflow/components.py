@@ -7,7 +7,7 @@ key. Steps are pure functions of their arguments and keep no state between calls
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -208,4 +208,3 @@ def pool(parts: Sequence[tuple[float, Matches]]) -> Matches:
 
 
 Observe = Callable[[int, Turn, FrameState], None]
-Energies = Mapping[str, float]

@@ -371,6 +371,3 @@ def empty_matches() -> Matches:
         vertex=np.empty(0, np.int32),
         weight=np.empty(0),
     )
-
-
-Settings = Mapping[str, Any]
