@@ -18,7 +18,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from mocapflow.data import Camera
+from mocapflow.assets import Camera
 from mocapflow.io.cameras import write_cameras
 from mocapflow.recording import open_recording
 

@@ -20,7 +20,8 @@ from mocapflow_twist import normal_equations, solve
 from mocapflow_twist.constraint import Rows, image_rows
 from scipy.optimize import least_squares
 
-from mocapflow.data import Body, Matches, Pose
+from mocapflow.assets import Body
+from mocapflow.data import Matches, Pose
 from mocapflow.geometry import cameras, kinematics, twists
 from mocapflow.io.cameras import read_cameras
 from mocapflow.model import moved

@@ -16,7 +16,8 @@ import numpy as np
 from mocapflow_bodies.scanned import Scanned
 from mocapflow_sequence.start_from_file import read_pose
 
-from mocapflow.data import CLOTH, NO_CLOTH, Camera, Surface
+from mocapflow.assets import Camera
+from mocapflow.data import CLOTH, NO_CLOTH, Surface
 from mocapflow.geometry import meshes, silhouettes
 from mocapflow.geometry import silhouette_kernels as kernels
 from mocapflow.geometry.cameras import projection

@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from mocapflow.assets import Background, Body, Camera, GarmentMesh
     from mocapflow.components import (
         BodyModel,
         ClothFitter,
@@ -23,27 +24,20 @@ if TYPE_CHECKING:
         Stage,
     )
     from mocapflow.data import (
-        Background,
-        Body,
-        Camera,
         Cloth,
         Estimate,
-        Files,
         Frame,
         FrameResult,
         FrameState,
-        GarmentMesh,
         Matches,
         Past,
         Pose,
         PoseBatch,
         Residual,
-        RunFolder,
         Segmentation,
         Silhouette,
         Start,
         Surface,
-        Track,
         Turn,
     )
     from mocapflow.errors import MocapflowError, PipelineError, PluginError
@@ -52,19 +46,22 @@ if TYPE_CHECKING:
     from mocapflow.pipeline import Pipeline, load_pipeline
     from mocapflow.recording import Recording
     from mocapflow.registry import Registry, load_registry
+    from mocapflow.results import Files, RunFolder, Track
     from mocapflow.runner import plan, run
     from mocapflow.scene import Scene
 
 _HOMES = {
+    "assets": "Background Body Camera GarmentMesh",
     "components": "BodyModel ClothFitter Component Draper Garment Matcher PoseSolver Predictor Prior Segmenter Stage",
-    "data": "Background Body Camera Cloth Estimate Files Frame FrameResult FrameState GarmentMesh Matches Past Pose "
-    "PoseBatch Residual RunFolder Segmentation Silhouette Start Surface Track Turn",
+    "data": "Cloth Estimate Frame FrameResult FrameState Matches Past Pose PoseBatch Residual Segmentation Silhouette "
+    "Start Surface Turn",
     "errors": "MocapflowError PipelineError PluginError",
     "hookspecs": "hookimpl",
     "model": "ClothedModel",
     "pipeline": "Pipeline load_pipeline",
     "recording": "Recording",
     "registry": "Registry load_registry",
+    "results": "Files RunFolder Track",
     "runner": "plan run",
     "scene": "Scene",
 }

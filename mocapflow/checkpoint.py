@@ -29,12 +29,12 @@ from mocapflow.data import (
     Past,
     Pose,
     Silhouette,
-    Track,
     Turn,
 )
 from mocapflow.locks import Lock
 from mocapflow.packing import column
 from mocapflow.records import F64
+from mocapflow.results import Track
 from mocapflow.rows import Corrupted, Rows, write_json
 from mocapflow.sealing import seal
 from mocapflow.store import Artifact, Store, group_meta, writing

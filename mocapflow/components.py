@@ -13,13 +13,12 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
+from mocapflow.assets import Body, GarmentMesh
 from mocapflow.data import (
-    Body,
     Cloth,
     Estimate,
     Frame,
     FrameState,
-    GarmentMesh,
     Matches,
     Past,
     Pose,
@@ -29,6 +28,7 @@ from mocapflow.data import (
     Surface,
     Turn,
 )
+from mocapflow.geometry.differences import drape_differences
 from mocapflow.records import F64, I32, Bool
 
 if TYPE_CHECKING:
@@ -111,9 +111,13 @@ class Draper(Component):
 
         The default takes differences of one batch of drapes.
         """
-        from mocapflow.model import drape_differences
+        assert scene.garment is not None
 
-        return drape_differences(self, pose, parameters, vertices, past, scene)
+        def drape(poses: PoseBatch, values: F64) -> F64:
+            return self.drape(poses, values, past, scene)[:, vertices]
+
+        bounds = scene.garment.parameter_bounds
+        return drape_differences(drape, scene.body, self.touchable(scene), bounds, pose, parameters)
 
     def touchable(self, scene: Scene) -> Bool:
         """Return which joints (J,) move what the garment hangs from or can touch; the rest never moves the cloth."""

@@ -1,4 +1,4 @@
-"""Every type that travels between steps.
+"""Every type that travels between the steps of a frame; `assets` has what stays, `results` what comes out.
 
 Conventions, everywhere: SI units inside, pixels for images, radians; world right-handed, z up; images indexed
 [row = y, column = x] with pixel centres on integers; transforms read `a_from_b`; column vectors, active
@@ -14,8 +14,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import field
 from functools import cached_property
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -26,30 +24,11 @@ BORDER = 3  # px along the image border where a silhouette is cut, not occluding
 
 
 @record
-class Camera:
-    """A calibrated camera; distortion is OpenCV's k1 k2 p1 p2 k3 (fisheye: k1 k2 k3 k4 0)."""
-
-    name: str
-    size: I32 = array(2, unit="px, width and height")
-    intrinsics: F64 = array(3, 3, unit="px")
-    distortion: F64 = array(5, unit="1")
-    camera_from_world: F64 = array(4, 4, unit="m")
-    fisheye: bool = False
-
-
-@record
 class Flow:
     """Points tracked from the previous frame into this one, in one view."""
 
     pixel: F32 = array("P", 2, unit="px, in the previous frame")
     displacement: F32 = array("P", 2, unit="px")
-
-
-@record
-class Rig:
-    """The pinhole cameras of a scene, where a stage has corrected them."""
-
-    cameras: tuple[Camera, ...]
 
 
 @record
@@ -63,60 +42,6 @@ class Frame:
     reasons: tuple[str, ...] = ()  # why a view is not usable, "" where it is; empty: all usable
     flow: tuple[Flow | None, ...] | None = None
     keypoints: tuple[F64, ...] | None = None  # C x (N people, K, 3) px, px, confidence; undistorted
-
-
-@record
-class Body:
-    """A body at rest: triangle mesh, kinematic chain of zero-pitch screws, linear blend skinning (an asset).
-
-    Joints are ordered parents first and the screws of a joint stand together, in the order of the joints.
-    """
-
-    vertices: F64 = array("V", 3, unit="m, at rest")
-    faces: I32 = array("F", 3, unit="vertex index, outward by the right hand")
-    joint_names: tuple[str, ...]
-    parents: I32 = array("J", unit="joint index, -1 for the root")
-    positions: F64 = array("J", 3, unit="m, at rest")
-    screw_names: tuple[str, ...]  # e.g. knee_l.flexion
-    twists: F64 = array("D", 6, unit="unit twists (omega, v) at rest")
-    screw_joint: I32 = array("D", unit="joint index")
-    limits: F64 = array("D", 2, unit="rad")
-    rest_spread: F64 = array("D", unit="rad, standard deviation about zero; inf where free")
-    skin_joint: I32 = array("V", 5, unit="joint index")
-    skin_weight: F64 = array("V", 5, unit="1, rows sum to one")
-    cut: Bool = array("V", unit="True on the rim where a partial body was cut off")
-    morph_offset: F64 | None = array("V", 3, unit="m, added at rest in full where the morph is complete", default=None)
-    morph_screw: int = -1  # the angle that drives the morph
-    morph_range: tuple[float, float] = (0.0, 1.0)  # rad, where the morph begins and where it is complete
-
-    def joint(self, name: str) -> int:
-        """Return the index of a joint by name."""
-        return self.joint_names.index(name)
-
-
-@record
-class GarmentMesh:
-    """A garment at rest on the rest body (an asset)."""
-
-    name: str
-    vertices: F64 = array("W", 3, unit="m, at rest")
-    faces: I32 = array("G", 3, unit="vertex index")
-    strands: I32 = array("N", "L", unit="vertex index from the pinned end, -1 padded")
-    rings: I32 = array("E", 2, unit="vertex index: links around the garment")
-    ring_length: F64 = array("E", unit="m, rest length of each link")
-    carried_by: I32 = array("W", unit="joint that moves the vertex before the drape")
-    pinned: I32 = array("P", unit="vertex index")
-    pinned_to: I32 = array("P", unit="body vertex index")
-    parameter_names: tuple[str, ...]
-    parameter_bounds: F64 = array("Q", 2, unit="unit of the parameter")
-
-
-@record
-class Background:
-    """The empty scene, per camera: mean and spread of every pixel."""
-
-    mean: tuple[F32, ...]  # C x (H, W, 3) grey levels
-    spread: tuple[F32, ...]  # C x (H, W, 3) grey levels, standard deviation
 
 
 @record
@@ -309,56 +234,6 @@ class Start:
 
     pose: Pose
     parameters: F64 = array("Q", unit="by name")
-
-
-@record
-class Track:
-    """The result over T frames."""
-
-    frame: I32 = array("T", unit="frame index in the videos")
-    time: F64 = array("T", unit="s")
-    root: F64 = array("T", 4, 4, unit="m, world_from_body")
-    angles: F64 = array("T", "D", unit="rad")
-    covariance: F64 = array("T", "R", "R", unit="of (omega, v, angles)")
-    cloth: F64 = array("T", "W", 3, unit="m")
-    cloth_parameters: F64 = array("T", "Q", unit="by name")
-    iterations: I16 = array("T", unit="turns of the loop")
-    steady: Bool = array("T", unit="True where the loop came to rest")
-    usable: Bool = array("T", "C", unit="False: lost or corrupted view")
-    overlap: F64 = array("T", "C", unit="1, intersection over union of model and image silhouette")
-    seconds: F64 = array("T", "K", unit="s of CPU per step of the loop")
-    step_names: tuple[str, ...]  # the K steps
-    notes: tuple[str, ...] = ()  # what happened to frames, e.g. "frame 12: cam02 black"
-    raw_root: F64 | None = array("T", 4, 4, unit="m, world_from_body, before smoothing", default=None)
-    raw_angles: F64 | None = array("T", "D", unit="rad, before smoothing", default=None)
-
-    def pose(self, row: int) -> Pose:
-        """Return the pose of one row."""
-        return Pose(root=self.root[row].copy(), angles=self.angles[row].copy())
-
-
-@record
-class RunFolder:
-    """Where a run writes its results, and how it was made."""
-
-    path: Path
-    recipe: Mapping[str, Any]  # pipeline, settings, versions, and per finished stage: key, cached, seconds
-
-
-@record
-class Files:
-    """Files written into the run folder; a stage that returns them always runs."""
-
-    paths: tuple[Path, ...]
-
-
-@record
-class Evaluation:
-    """One row per compared angle; a stage that returns it always runs."""
-
-    reference: str  # the file compared with, "" where there is none
-    rows: tuple[Mapping[str, float | str], ...]
-    note: str = ""  # why there are no rows
 
 
 def empty_matches() -> Matches:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from mocapflow.data import Camera
+from mocapflow.assets import Camera
 from mocapflow.io import folders
 from mocapflow.io.cameras import find_calibration, read_cameras
 from mocapflow.io.findings import Finding, attempt, error, note, warning

@@ -10,11 +10,12 @@ from typing import Any, TypeVar
 from mocapflow.blame import failure
 from mocapflow.checkpoint import Checkpoint
 from mocapflow.components import Component
-from mocapflow.data import FrameResult, RunFolder
+from mocapflow.data import FrameResult
 from mocapflow.errors import ComponentFailed, MocapflowError, PluginError, ShapeError
 from mocapflow.locks import Lock
 from mocapflow.pipeline import Pipeline
 from mocapflow.recipes import Step
+from mocapflow.results import RunFolder
 from mocapflow.rows import Corrupted
 from mocapflow.scene import Scene
 from mocapflow.store import Artifact, Report, Store, remove, versions, with_versions

@@ -6,12 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from mocapflow.assets import Background, Body, Camera, Rig
 from mocapflow.components import Component
-from mocapflow.data import Background, Body, Camera, Evaluation, Files, Rig, Start
+from mocapflow.data import Start
 from mocapflow.digests import Digests, digest_array
 from mocapflow.keys import FORMAT, Recipe, component_recipe, key_of
 from mocapflow.pipeline import NamedStage, Pipeline
 from mocapflow.recording import Recording, open_recording
+from mocapflow.results import Evaluation, Files
 from mocapflow.wiring import body_source, makes, rig_source, wire
 
 SEEN = {Start: "first", Background: "all", Rig: "all", Body: "all"}  # the extent of a stage that says none

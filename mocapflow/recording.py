@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from mocapflow.data import Background, Camera, Frame
+from mocapflow.assets import Background, Camera
+from mocapflow.data import Frame
 from mocapflow.errors import RecordingError
 from mocapflow.io import folders
 from mocapflow.io.cameras import calibration_files

@@ -7,7 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from mocapflow.data import BODY, CLOTH, Background, Body, Camera, Cloth, GarmentMesh, Pose, Surface
+from mocapflow.assets import Background, Body, Camera, GarmentMesh
+from mocapflow.data import BODY, CLOTH, Cloth, Pose, Surface
 from mocapflow.geometry import kinematics, meshes
 from mocapflow.records import F64, I32, U8, Bool, record
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from mocapflow.archive import PLAIN, axis_names
-from mocapflow.data import Track
 from mocapflow.packing import Columns, column
 from mocapflow.records import array_fields
+from mocapflow.results import Track
 from mocapflow.rows import Corrupted, Rows, write_json
 from mocapflow.store import group_meta
 

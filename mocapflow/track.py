@@ -9,10 +9,10 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
+from mocapflow.assets import Background
 from mocapflow.checkpoint import Checkpoint
 from mocapflow.components import ClothFitter, Draper, Matcher, PoseSolver, Predictor, Prior, Segmenter, Stage
 from mocapflow.data import (
-    Background,
     Change,
     Cloth,
     Estimate,
@@ -23,7 +23,6 @@ from mocapflow.data import (
     Pose,
     Segmentation,
     Start,
-    Track,
     Turn,
     empty_matches,
 )
@@ -33,6 +32,7 @@ from mocapflow.loop import Steady, Steps, settle
 from mocapflow.model import ClothedModel
 from mocapflow.recording import Recording
 from mocapflow.records import F64
+from mocapflow.results import Track
 from mocapflow.scene import Scene
 from mocapflow.timing import Stopwatch
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from types import NoneType, UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
+from mocapflow.assets import Body, Rig
 from mocapflow.components import Stage
-from mocapflow.data import Body, Rig
 from mocapflow.errors import MocapflowError, PipelineError, PluginError, alternatives
 from mocapflow.pipeline import NamedStage, Pipeline
 

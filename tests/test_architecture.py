@@ -18,7 +18,9 @@ PLUGINS = ROOT.parent / "plugins"
 LAYERS = (  # a module imports only from its own layer or an earlier one; `io` and `geometry` are folders
     "errors",
     "records",
+    "assets",
     "data",
+    "results",
     "geometry",
     "scene",
     "io",
@@ -58,7 +60,7 @@ LAYERS = (  # a module imports only from its own layer or an earlier one; `io` a
     "commands",
     "cli",
 )
-LATE = {("components", "model"), ("data", "geometry")}  # inside a method, for a default everyone shares
+LATE = {("data", "geometry")}  # inside a method, for a default everyone shares
 HEAVY = {"open3d", "numba", "cv2", "zarr", "matplotlib"}
 CITATION = re.compile(r"Source: Rosenhahn 2008, (.+)$", re.MULTILINE)
 

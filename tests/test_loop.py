@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from mocapflow.assets import Camera
 from mocapflow.components import PoseSolver, Predictor
-from mocapflow.data import Camera, Estimate, Frame, Past, Pose
+from mocapflow.data import Estimate, Frame, Past, Pose
 from mocapflow.geometry.kinematics import chain, skin
 from mocapflow.loop import Steady, Steps, settle
 from mocapflow.model import ClothedModel

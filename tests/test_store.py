@@ -13,8 +13,9 @@ import pytest
 import zarr
 
 from mocapflow import locks, rows
+from mocapflow.assets import Background
 from mocapflow.checkpoint import Checkpoint
-from mocapflow.data import Background, Frame, Past, Pose, Silhouette, Start
+from mocapflow.data import Frame, Past, Pose, Silhouette, Start
 from mocapflow.errors import ComponentFailed, StoreError
 from mocapflow.packing import FINE, distance_of, match_row, matches_of, quantised
 from mocapflow.rows import Corrupted, Rows

@@ -35,7 +35,7 @@ def evaluate(run: Run, truth: Truth = None) -> None:
 def export(run: Run, format_: Format) -> None:
     """Write the track of a run in other formats, into the run folder."""
     from mocapflow.commands.running import execute
-    from mocapflow.data import Evaluation, Files
+    from mocapflow.results import Evaluation, Files
     from mocapflow.wiring import makes
 
     invocation = recall(run)

@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mocapflow.data import Body, Pose
+from mocapflow.assets import Body
+from mocapflow.data import Pose
 from mocapflow.geometry import kinematics, twists
 from mocapflow.records import F64, Bool, array, record
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mocapflow.data import Camera
+from mocapflow.assets import Camera
 from mocapflow.records import F64
 
 UNDISTORT_STEPS = 100

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from mocapflow.data import Body
+from mocapflow.assets import Body
 from mocapflow.geometry import twists
 from mocapflow.records import F64
 

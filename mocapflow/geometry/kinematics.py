@@ -8,7 +8,8 @@ from typing import Any
 import numba
 import numpy as np
 
-from mocapflow.data import Body, Pose, PoseBatch
+from mocapflow.assets import Body
+from mocapflow.data import Pose, PoseBatch
 from mocapflow.records import F64
 
 

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mocapflow.data import CLOTH, Camera, Contour, Surface
+from mocapflow.assets import Camera
+from mocapflow.data import CLOTH, Contour, Surface
 from mocapflow.geometry import silhouette_kernels as kernels
 from mocapflow.geometry.cameras import projection
 from mocapflow.records import F32, F64, I32, Bool, array, record

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mocapflow.data import Body
+from mocapflow.assets import Body
 from mocapflow.records import F64, I32
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mocapflow.data import Camera
+from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import twists
 from mocapflow.records import F64

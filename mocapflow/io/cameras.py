@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mocapflow.data import Camera
+from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import twists
 from mocapflow.io.calibrated import bad, make_camera

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mocapflow.data import Camera
+from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.io.cameras import find_calibration, metadata, read_cameras
 from mocapflow.io.keypoints import odd_keypoints

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mocapflow.data import Camera
+from mocapflow.assets import Camera
 from mocapflow.geometry.cameras import pinhole, scaled, undistort
 from mocapflow.records import F64, U8, record
 

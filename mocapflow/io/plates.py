@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mocapflow.data import Background
+from mocapflow.assets import Background
 from mocapflow.errors import RecordingError
 from mocapflow.io.folders import plates
 from mocapflow.io.lenses import View

@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from mocapflow.data import Camera
+from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.io.calibrated import make_camera
 

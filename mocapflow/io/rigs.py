@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-from mocapflow.data import Camera
+from mocapflow.assets import Camera
 from mocapflow.geometry.cameras import centre, pinhole, project, undistort
 from mocapflow.io.findings import Finding, note, warning
 from mocapflow.io.findings import error as problem

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mocapflow.data import Body, GarmentMesh
+from mocapflow.assets import Body, GarmentMesh
 from mocapflow.geometry import twists
 from mocapflow.geometry.meshes import grid_faces
 from mocapflow.records import F64, I32

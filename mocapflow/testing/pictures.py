@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from mocapflow.data import Camera, Estimate, Frame, FrameState, Pose, Segmentation, Silhouette, Surface, empty_matches
+from mocapflow.assets import Camera
+from mocapflow.data import Estimate, Frame, FrameState, Pose, Segmentation, Silhouette, Surface, empty_matches
 from mocapflow.geometry.cameras import project
 from mocapflow.records import F32, U8, Bool
 from mocapflow.scene import Scene

@@ -4,17 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from mocapflow.assets import Background
 from mocapflow.components import Draper
-from mocapflow.data import (
-    NO_CLOTH,
-    Background,
-    Cloth,
-    Matches,
-    Moment,
-    Past,
-    Pose,
-    PoseBatch,
-)
+from mocapflow.data import NO_CLOTH, Cloth, Matches, Moment, Past, Pose, PoseBatch
 from mocapflow.geometry import twists
 from mocapflow.geometry.cameras import project
 from mocapflow.model import ClothedModel

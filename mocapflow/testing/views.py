@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mocapflow.data import Camera
+from mocapflow.assets import Camera
 from mocapflow.records import F64
 
 SIZE = (320, 240)  # px

@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from mocapflow.data import Body
+from mocapflow.assets import Body
 from mocapflow.errors import RecordingError
 from mocapflow.geometry.meshes import edges
 from mocapflow.geometry.skeleton import Skeleton

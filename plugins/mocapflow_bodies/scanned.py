@@ -10,8 +10,8 @@ from typing import ClassVar
 
 from pydantic import BaseModel, ConfigDict, model_validator
 
+from mocapflow.assets import Body
 from mocapflow.components import BodyModel
-from mocapflow.data import Body
 from mocapflow.errors import PipelineError, RecordingError, alternatives
 from mocapflow.io.meshes import read_mesh
 from mocapflow.records import F64

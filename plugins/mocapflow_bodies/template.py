@@ -9,8 +9,8 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
+from mocapflow.assets import Body
 from mocapflow.components import BodyModel
-from mocapflow.data import Body
 from mocapflow.geometry.skeleton import Skeleton
 from mocapflow.records import I32
 from mocapflow_bodies.assemble import Part, assemble

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 from scipy.spatial import ConvexHull
 
-from mocapflow.data import Body, GarmentMesh
+from mocapflow.assets import Body, GarmentMesh
 from mocapflow.geometry.kinematics import descendants
 from mocapflow.records import F32, F64, I32, Bool, array, record
 

@@ -10,7 +10,7 @@ import re
 
 import numpy as np
 
-from mocapflow.data import GarmentMesh
+from mocapflow.assets import GarmentMesh
 from mocapflow.errors import PluginError, alternatives
 from mocapflow.records import F64
 

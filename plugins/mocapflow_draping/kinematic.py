@@ -9,8 +9,9 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from pydantic import Field, PrivateAttr
 
+from mocapflow.assets import Body, GarmentMesh
 from mocapflow.components import Draper
-from mocapflow.data import Body, GarmentMesh, Past, PoseBatch
+from mocapflow.data import Past, PoseBatch
 from mocapflow.errors import PluginError
 from mocapflow.geometry.kinematics import chain_batch
 from mocapflow.records import F64, Bool, record

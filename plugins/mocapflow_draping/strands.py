@@ -9,7 +9,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from mocapflow.data import Body, GarmentMesh
+from mocapflow.assets import Body, GarmentMesh
 from mocapflow.errors import PluginError
 from mocapflow.records import F64, I32, Bool, array, record
 

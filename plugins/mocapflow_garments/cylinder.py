@@ -8,8 +8,8 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from mocapflow.assets import Body, GarmentMesh
 from mocapflow.components import Garment
-from mocapflow.data import Body, GarmentMesh
 from mocapflow.errors import alternatives
 from mocapflow.records import F64
 from mocapflow_garments import pattern, sections

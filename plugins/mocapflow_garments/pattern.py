@@ -7,7 +7,7 @@ import warnings
 
 import numpy as np
 
-from mocapflow.data import Body
+from mocapflow.assets import Body
 from mocapflow.errors import MocapflowError
 from mocapflow.records import F64, I32
 from mocapflow_garments import sections

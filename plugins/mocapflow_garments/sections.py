@@ -7,7 +7,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull
 
-from mocapflow.data import Body
+from mocapflow.assets import Body
 from mocapflow.records import F64, record
 
 

@@ -7,8 +7,9 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
+from mocapflow.assets import Background
 from mocapflow.components import Segmenter
-from mocapflow.data import Background, Frame, FrameState, Past, Segmentation, Silhouette, Turn
+from mocapflow.data import Frame, FrameState, Past, Segmentation, Silhouette, Turn
 from mocapflow.errors import RecordingError
 from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.records import F32, U8, Bool

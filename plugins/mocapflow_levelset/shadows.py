@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mocapflow.data import Camera, Surface
+from mocapflow.assets import Camera
+from mocapflow.data import Surface
 from mocapflow.geometry.cameras import project
 from mocapflow.records import F32
 

@@ -7,8 +7,9 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
+from mocapflow.assets import Camera
 from mocapflow.components import Matcher, pool
-from mocapflow.data import CLOTH, Camera, Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn, empty_matches
+from mocapflow.data import CLOTH, Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn, empty_matches
 from mocapflow.geometry.contours import nearest_compatible
 from mocapflow.geometry.silhouettes import occluding_contour
 from mocapflow.records import F64

@@ -10,8 +10,8 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
+from mocapflow.assets import Camera, Rig
 from mocapflow.components import Stage
-from mocapflow.data import Camera, Rig
 from mocapflow.geometry import twists
 from mocapflow.geometry.cameras import project
 from mocapflow.recording import Recording

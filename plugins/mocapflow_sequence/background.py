@@ -8,8 +8,8 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from mocapflow.assets import Background
 from mocapflow.components import Stage
-from mocapflow.data import Background
 from mocapflow.errors import RecordingError
 from mocapflow.recording import Recording
 from mocapflow.records import F32, U8

@@ -11,11 +11,13 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
+from mocapflow.assets import Background, Body
 from mocapflow.components import Matcher, Segmenter, Stage
-from mocapflow.data import Background, Body, Cloth, Frame, Matches, Past, Pose, Segmentation, Track, Turn
+from mocapflow.data import Cloth, Frame, Matches, Past, Pose, Segmentation, Turn
 from mocapflow.errors import RecordingError
 from mocapflow.loop import pool_matches
 from mocapflow.recording import Recording
+from mocapflow.results import Track
 from mocapflow.scene import Scene
 from mocapflow.track import believed
 from mocapflow_sequence.detections import layout, persons, seen, spread

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mocapflow.data import Camera
+from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.io.keypoints import keypoint_files, people_at
 from mocapflow.recording import Recording

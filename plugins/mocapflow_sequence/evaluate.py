@@ -9,10 +9,10 @@ from typing import ClassVar
 import numpy as np
 
 from mocapflow.components import Stage
-from mocapflow.data import Evaluation, RunFolder, Track
 from mocapflow.errors import RecordingError
 from mocapflow.recording import Recording
 from mocapflow.records import F64
+from mocapflow.results import Evaluation, RunFolder, Track
 from mocapflow.scene import Scene
 from mocapflow_sequence import compare, layout, tables
 from mocapflow_sequence.export import before_smoothing, measured

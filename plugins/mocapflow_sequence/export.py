@@ -9,10 +9,11 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from mocapflow.components import Stage
-from mocapflow.data import Files, PoseBatch, RunFolder, Track
+from mocapflow.data import PoseBatch
 from mocapflow.geometry import angles, kinematics
 from mocapflow.io import markers
 from mocapflow.recording import Recording
+from mocapflow.results import Files, RunFolder, Track
 from mocapflow.scene import Scene
 from mocapflow_sequence import layout, opensim, runjson, tables
 

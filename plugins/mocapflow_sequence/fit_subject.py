@@ -9,8 +9,8 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from mocapflow.assets import Body, Camera
 from mocapflow.components import Stage
-from mocapflow.data import Body, Camera
 from mocapflow.errors import RecordingError
 from mocapflow.recording import Recording
 from mocapflow.records import F64

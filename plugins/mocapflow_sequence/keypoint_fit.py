@@ -7,7 +7,8 @@ from functools import partial
 
 import numpy as np
 
-from mocapflow.data import Body, Camera, Pose
+from mocapflow.assets import Body, Camera
+from mocapflow.data import Pose
 from mocapflow.geometry.cameras import projection
 from mocapflow.records import F64, array, record
 from mocapflow_sequence.landmarks import Landmarks, landmarks

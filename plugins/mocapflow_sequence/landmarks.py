@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mocapflow.data import Body
+from mocapflow.assets import Body
 from mocapflow.geometry.skeleton import body_directions, skeleton_of
 from mocapflow.records import F64, I32
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mocapflow.data import Track
 from mocapflow.records import Bool
+from mocapflow.results import Track
 
 
 def lost_rows(track: Track) -> Bool:

@@ -22,7 +22,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from mocapflow.data import Body, PoseBatch
+from mocapflow.assets import Body
+from mocapflow.data import PoseBatch
 from mocapflow.geometry import angles, kinematics
 from mocapflow.io import markers
 from mocapflow.records import F64

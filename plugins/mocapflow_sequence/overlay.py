@@ -7,11 +7,13 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from mocapflow.assets import Camera
 from mocapflow.components import Stage
-from mocapflow.data import CLOTH, NO_CLOTH, Camera, Files, Frame, RunFolder, Surface, Track
+from mocapflow.data import CLOTH, NO_CLOTH, Frame, Surface
 from mocapflow.geometry import cameras, kinematics, meshes, silhouettes
 from mocapflow.recording import Recording
 from mocapflow.records import F64, I32, U8
+from mocapflow.results import Files, RunFolder, Track
 from mocapflow.scene import Scene
 from mocapflow_sequence import drawing, layout
 from mocapflow_sequence.export import frame_rate

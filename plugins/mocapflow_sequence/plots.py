@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from mocapflow.data import Evaluation
 from mocapflow.records import F64
+from mocapflow.results import Evaluation
 
 NINETY_FIVE = 1.96  # standard deviations
 OURS, RAW, TRUTH = "#1f5fbf", "#8fb4e8", "black"

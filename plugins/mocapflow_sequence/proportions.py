@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mocapflow.data import Body
+from mocapflow.assets import Body
 from mocapflow.geometry import twists
 from mocapflow.geometry.skeleton import body_directions, skeleton_of
 from mocapflow.records import F64

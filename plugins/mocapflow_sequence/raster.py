@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mocapflow.data import Camera
+from mocapflow.assets import Camera
 from mocapflow.geometry import cameras, meshes
 from mocapflow.records import F32, F64, I32
 

@@ -10,9 +10,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mocapflow.components import Stage
-from mocapflow.data import Evaluation, Files, RunFolder, Track
 from mocapflow.recording import Recording
 from mocapflow.records import F64
+from mocapflow.results import Evaluation, Files, RunFolder, Track
 from mocapflow.scene import Scene
 from mocapflow_sequence import layout, page, plots, runjson, tables
 from mocapflow_sequence.evaluate import at_our_frames

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from mocapflow.data import Camera, Surface, Track
+from mocapflow.assets import Camera
+from mocapflow.data import Surface
 from mocapflow.geometry import angles, cameras, kinematics
 from mocapflow.records import F32, F64, U8
+from mocapflow.results import Track
 from mocapflow.scene import Scene
 from mocapflow_sequence import drawing, raster
 

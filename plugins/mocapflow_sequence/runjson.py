@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mocapflow.data import RunFolder, Track
+from mocapflow.results import RunFolder, Track
 from mocapflow_sequence.lost import lost_rows
 
 FRAME = re.compile(r"^frame (\d+): ?(.*)$")

@@ -8,7 +8,8 @@ from functools import partial
 
 import numpy as np
 
-from mocapflow.data import Body, Camera, Matches, Pose
+from mocapflow.assets import Body, Camera
+from mocapflow.data import Matches, Pose
 from mocapflow.geometry.cameras import projection
 from mocapflow.records import F64, I32
 from mocapflow_sequence.pose_fit import Observed, Solution, Spreads, View, descend

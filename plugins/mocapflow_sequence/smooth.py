@@ -9,9 +9,9 @@ import numpy as np
 from pydantic import Field
 
 from mocapflow.components import Stage
-from mocapflow.data import Track
 from mocapflow.geometry import twists
 from mocapflow.records import F64
+from mocapflow.results import Track
 from mocapflow_sequence.banded import difference_weights, minimise
 from mocapflow_sequence.lost import lost_rows
 

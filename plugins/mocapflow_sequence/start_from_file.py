@@ -9,8 +9,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from mocapflow.assets import Body, GarmentMesh
 from mocapflow.components import Stage
-from mocapflow.data import Body, GarmentMesh, Pose, Start
+from mocapflow.data import Pose, Start
 from mocapflow.errors import RecordingError, alternatives
 from mocapflow.geometry import twists
 from mocapflow.geometry.joints import angles_from_rotations

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mocapflow.data import Track
 from mocapflow.errors import RecordingError
 from mocapflow.geometry.angles import AngleSeries
 from mocapflow.records import F64
+from mocapflow.results import Track
 
 
 def angle_columns(track: Track, series: AngleSeries) -> dict[str, F64]:

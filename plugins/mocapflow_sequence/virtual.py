@@ -8,7 +8,8 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from mocapflow.components import Stage
-from mocapflow.data import NO_CLOTH, Files, RunFolder, Track
+from mocapflow.data import NO_CLOTH
+from mocapflow.results import Files, RunFolder, Track
 from mocapflow.scene import Scene
 from mocapflow_sequence import drawing, layout
 from mocapflow_sequence.export import frame_rate

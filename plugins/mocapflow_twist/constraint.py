@@ -12,7 +12,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mocapflow.data import Camera, Matches
+from mocapflow.assets import Camera
+from mocapflow.data import Matches
 from mocapflow.geometry import cameras as pinhole
 from mocapflow.geometry import lines, twists
 from mocapflow.records import F64, I32, Bool, array, record

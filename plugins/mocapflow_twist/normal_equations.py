@@ -15,7 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mocapflow.data import Body, Pose
+from mocapflow.assets import Body
+from mocapflow.data import Pose
 from mocapflow.geometry import kinematics
 from mocapflow.records import F64
 from mocapflow_twist import kernels

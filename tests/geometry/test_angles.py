@@ -4,7 +4,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mocapflow.data import Body, Pose
+from mocapflow.assets import Body
+from mocapflow.data import Pose
 from mocapflow.geometry import angles, twists
 from mocapflow.model import moved
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mocapflow.data import BODY, CLOTH, Camera, Surface
+from mocapflow.assets import Camera
+from mocapflow.data import BODY, CLOTH, Surface
 from mocapflow.geometry import meshes, silhouettes
 from mocapflow.records import F64, I32
 

@@ -9,7 +9,8 @@ from mocapflow_draping.distance import body_distances
 from mocapflow_draping.fields import build_fields, part_transforms
 from mocapflow_draping.swing import swing_batch
 
-from mocapflow.data import Body, PoseBatch
+from mocapflow.assets import Body
+from mocapflow.data import PoseBatch
 from mocapflow.geometry import kinematics, twists
 
 SKIN = 0.004

@@ -8,8 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mocapflow.data import Body, Camera, GarmentMesh, Pose, Track
+from mocapflow.assets import Body, Camera, GarmentMesh
+from mocapflow.data import Pose
 from mocapflow.geometry import joints, meshes, twists
+from mocapflow.results import Track
 from mocapflow.scene import Scene
 
 DEMO = Path(__file__).parents[2] / "examples" / "data" / "skirt_steps"

@@ -6,7 +6,8 @@ from mocapflow_levelset.background import BackgroundDifference
 from mocapflow_levelset.shadows import floor_around
 from mocapflow_sequence.background import EmptyScene, temporal_median
 
-from mocapflow.data import Background, Past, Turn
+from mocapflow.assets import Background
+from mocapflow.data import Past, Turn
 from mocapflow.errors import RecordingError
 from mocapflow.geometry.cameras import project
 from mocapflow.recording import open_recording

@@ -8,10 +8,10 @@ from mocapflow_sequence.evaluate import Evaluate, evaluate, evaluate_run
 from mocapflow_sequence.references import read_reference
 from results_scene import DEMO, demo_scene, stepping
 
-from mocapflow.data import RunFolder
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import angles
 from mocapflow.io import markers
+from mocapflow.results import RunFolder
 
 FRAMES = np.arange(120.0)
 

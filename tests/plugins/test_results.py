@@ -9,10 +9,10 @@ from mocapflow_sequence.export import Export
 from mocapflow_sequence.smooth import Smooth
 from results_scene import DEMO, ball_body, cameras, demo_scene, stepping
 
-from mocapflow.data import Files, RunFolder, Track
 from mocapflow.geometry import kinematics
 from mocapflow.io import markers
 from mocapflow.recording import Recording, open_recording
+from mocapflow.results import Files, RunFolder, Track
 from mocapflow.scene import Scene
 
 COLUMNS = [f"{n}_{s}" for n in ("knee_flexion", "hip_flexion", "ankle", "elbow") for s in "lr"]

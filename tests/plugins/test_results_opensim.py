@@ -5,7 +5,7 @@ import pytest
 from mocapflow_sequence import opensim
 from results_scene import ball_body, start_pose, stepping
 
-from mocapflow.data import Body
+from mocapflow.assets import Body
 from mocapflow.geometry import angles, twists
 
 

@@ -13,10 +13,10 @@ from mocapflow_sequence.smooth import Smooth
 from mocapflow_sequence.virtual import Virtual
 from results_scene import DEMO, demo_scene, stepping
 
-from mocapflow.data import Evaluation, RunFolder, Track
 from mocapflow.errors import StoreError
 from mocapflow.geometry import cameras
 from mocapflow.recording import Recording, open_recording
+from mocapflow.results import Evaluation, RunFolder, Track
 from mocapflow.scene import Scene
 
 

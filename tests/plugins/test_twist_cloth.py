@@ -13,8 +13,9 @@ from mocapflow_twist.solver import TwistGaussNewton
 from test_twist_solver import EXACT, TURN
 from twist_fixtures import exact_matches, make_pose, make_scene, make_state
 
+from mocapflow.assets import GarmentMesh
 from mocapflow.components import Draper, pool
-from mocapflow.data import Estimate, FrameState, GarmentMesh, Matches, Past, Pose, PoseBatch, Surface
+from mocapflow.data import Estimate, FrameState, Matches, Past, Pose, PoseBatch, Surface
 from mocapflow.geometry import cameras, twists
 from mocapflow.model import ClothedModel, moved
 from mocapflow.records import F64, I32

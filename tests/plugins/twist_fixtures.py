@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mocapflow.data import NO_CLOTH, Body, Camera, Estimate, FrameState, Matches, Pose, Segmentation, empty_matches
+from mocapflow.assets import Body, Camera
+from mocapflow.data import NO_CLOTH, Estimate, FrameState, Matches, Pose, Segmentation, empty_matches
 from mocapflow.geometry import cameras as pinhole
 from mocapflow.geometry import kinematics, twists
 from mocapflow.scene import Scene

@@ -1,0 +1,78 @@
+"""What stays the same over a recording: cameras, the body, the garment, the empty scene."""
+
+from __future__ import annotations
+
+from mocapflow.records import F32, F64, I32, Bool, array, record
+
+
+@record
+class Camera:
+    """A calibrated camera; distortion is OpenCV's k1 k2 p1 p2 k3 (fisheye: k1 k2 k3 k4 0)."""
+
+    name: str
+    size: I32 = array(2, unit="px, width and height")
+    intrinsics: F64 = array(3, 3, unit="px")
+    distortion: F64 = array(5, unit="1")
+    camera_from_world: F64 = array(4, 4, unit="m")
+    fisheye: bool = False
+
+
+@record
+class Rig:
+    """The pinhole cameras of a scene, where a stage has corrected them."""
+
+    cameras: tuple[Camera, ...]
+
+
+@record
+class Body:
+    """A body at rest: triangle mesh, kinematic chain of zero-pitch screws, linear blend skinning.
+
+    Joints are ordered parents first and the screws of a joint stand together, in the order of the joints.
+    """
+
+    vertices: F64 = array("V", 3, unit="m, at rest")
+    faces: I32 = array("F", 3, unit="vertex index, outward by the right hand")
+    joint_names: tuple[str, ...]
+    parents: I32 = array("J", unit="joint index, -1 for the root")
+    positions: F64 = array("J", 3, unit="m, at rest")
+    screw_names: tuple[str, ...]  # e.g. knee_l.flexion
+    twists: F64 = array("D", 6, unit="unit twists (omega, v) at rest")
+    screw_joint: I32 = array("D", unit="joint index")
+    limits: F64 = array("D", 2, unit="rad")
+    rest_spread: F64 = array("D", unit="rad, standard deviation about zero; inf where free")
+    skin_joint: I32 = array("V", 5, unit="joint index")
+    skin_weight: F64 = array("V", 5, unit="1, rows sum to one")
+    cut: Bool = array("V", unit="True on the rim where a partial body was cut off")
+    morph_offset: F64 | None = array("V", 3, unit="m, added at rest in full where the morph is complete", default=None)
+    morph_screw: int = -1  # the angle that drives the morph
+    morph_range: tuple[float, float] = (0.0, 1.0)  # rad, where the morph begins and where it is complete
+
+    def joint(self, name: str) -> int:
+        """Return the index of a joint by name."""
+        return self.joint_names.index(name)
+
+
+@record
+class GarmentMesh:
+    """A garment at rest on the rest body."""
+
+    name: str
+    vertices: F64 = array("W", 3, unit="m, at rest")
+    faces: I32 = array("G", 3, unit="vertex index")
+    strands: I32 = array("N", "L", unit="vertex index from the pinned end, -1 padded")
+    rings: I32 = array("E", 2, unit="vertex index: links around the garment")
+    ring_length: F64 = array("E", unit="m, rest length of each link")
+    carried_by: I32 = array("W", unit="joint that moves the vertex before the drape")
+    pinned: I32 = array("P", unit="vertex index")
+    pinned_to: I32 = array("P", unit="body vertex index")
+    parameter_names: tuple[str, ...]
+    parameter_bounds: F64 = array("Q", 2, unit="unit of the parameter")
+
+
+@record
+class Background:
+    """The empty scene, per camera: mean and spread of every pixel."""
+
+    mean: tuple[F32, ...]  # C x (H, W, 3) grey levels
+    spread: tuple[F32, ...]  # C x (H, W, 3) grey levels, standard deviation

@@ -1,0 +1,60 @@
+"""What a run hands over: the track over all frames, the files it wrote, how far it is from the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from mocapflow.data import Pose
+from mocapflow.records import F64, I16, I32, Bool, array, record
+
+
+@record
+class Track:
+    """The result over T frames."""
+
+    frame: I32 = array("T", unit="frame index in the videos")
+    time: F64 = array("T", unit="s")
+    root: F64 = array("T", 4, 4, unit="m, world_from_body")
+    angles: F64 = array("T", "D", unit="rad")
+    covariance: F64 = array("T", "R", "R", unit="of (omega, v, angles)")
+    cloth: F64 = array("T", "W", 3, unit="m")
+    cloth_parameters: F64 = array("T", "Q", unit="by name")
+    iterations: I16 = array("T", unit="turns of the loop")
+    steady: Bool = array("T", unit="True where the loop came to rest")
+    usable: Bool = array("T", "C", unit="False: lost or corrupted view")
+    overlap: F64 = array("T", "C", unit="1, intersection over union of model and image silhouette")
+    seconds: F64 = array("T", "K", unit="s of CPU per step of the loop")
+    step_names: tuple[str, ...]  # the K steps
+    notes: tuple[str, ...] = ()  # what happened to frames, e.g. "frame 12: cam02 black"
+    raw_root: F64 | None = array("T", 4, 4, unit="m, world_from_body, before smoothing", default=None)
+    raw_angles: F64 | None = array("T", "D", unit="rad, before smoothing", default=None)
+
+    def pose(self, row: int) -> Pose:
+        """Return the pose of one row."""
+        return Pose(root=self.root[row].copy(), angles=self.angles[row].copy())
+
+
+@record
+class RunFolder:
+    """Where a run writes its results, and how it was made."""
+
+    path: Path
+    recipe: Mapping[str, Any]  # pipeline, settings, versions, and per finished stage: key, cached, seconds
+
+
+@record
+class Files:
+    """Files written into the run folder; a stage that returns them always runs."""
+
+    paths: tuple[Path, ...]
+
+
+@record
+class Evaluation:
+    """One row per compared angle; a stage that returns it always runs."""
+
+    reference: str  # the file compared with, "" where there is none
+    rows: tuple[Mapping[str, float | str], ...]
+    note: str = ""  # why there are no rows
