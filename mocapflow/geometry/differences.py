@@ -8,7 +8,7 @@ import numpy as np
 
 from mocapflow.assets import Body
 from mocapflow.data import Pose, PoseBatch
-from mocapflow.geometry import kinematics, twists
+from mocapflow.geometry import twists
 from mocapflow.records import F64, Bool
 
 ANGLE_STEP = np.radians(1.0)  # rad; averages over changes of contact (method: finite differences of the drape)
@@ -31,6 +31,8 @@ def drape_differences(drape: Drape, body: Body, touching: Bool, bounds: F64, pos
         pose: where the velocities hold.
         parameters: (Q,), likewise.
     """
+    from mocapflow.geometry import kinematics  # compiled code, loaded where it is used
+
     angles, unknowns = len(pose.angles), 6 + len(pose.angles) + len(parameters)
     moving = kinematics.descendants(body.parents)[body.screw_joint] @ touching
     tried = np.concatenate([6 + np.flatnonzero(moving), np.arange(6 + angles, unknowns)])
