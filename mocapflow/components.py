@@ -186,10 +186,12 @@ class Stage(Component):
 
     `extent` says which frames of the recording it sees, and its cache key names: the "first" one of the run, those
     of the "run", or "all" there are; None: the first for a Start, all for a Background or Body, else the run's.
+    What a `causal` stage says of a frame depends on no later frame: a track made with it can go on when the run grows.
     """
 
     role: ClassVar[str] = "stage"
     extent: ClassVar[Literal["first", "run", "all"] | None] = None
+    causal: ClassVar[bool] = False
     run: ClassVar[Callable[..., Any]]
 
     def inputs(self, recording: Path) -> Sequence[Path]:

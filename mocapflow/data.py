@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import field
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -32,6 +33,24 @@ class Flow:
 
 
 @record
+class ImageFlow:
+    """The image flow of a recording: what was tracked into each frame from the frame before it in the run."""
+
+    frame: I32 = array("P", unit="frame index, ascending")
+    camera: I16 = array("P", unit="camera index, ascending within a frame")
+    pixel: F32 = array("P", 2, unit="px, in the frame before")
+    displacement: F32 = array("P", 2, unit="px")
+    cameras: int
+
+    def into(self, index: int) -> tuple[Flow, ...]:
+        """Return the flow into a frame, one per camera."""
+        first, last = np.searchsorted(self.frame, [index, index + 1])
+        borders = first + np.searchsorted(self.camera[first:last], np.arange(self.cameras + 1))
+        views = [slice(*pair) for pair in pairwise(borders.tolist())]
+        return tuple(Flow(pixel=self.pixel[view], displacement=self.displacement[view]) for view in views)
+
+
+@record
 class Frame:
     """One moment, seen by every camera."""
 
@@ -40,7 +59,7 @@ class Frame:
     images: tuple[U8, ...]  # C x (H, W, 3) BGR, undistorted
     usable: Bool = array("C", unit="False: lost or corrupted view")
     reasons: tuple[str, ...] = ()  # why a view is not usable, "" where it is; empty: all usable
-    flow: tuple[Flow | None, ...] | None = None
+    flow: tuple[Flow, ...] | None = None  # from the previous frame, C x
     keypoints: tuple[F64, ...] | None = None  # C x (N people, K, 3) px, px, confidence; undistorted
 
 

@@ -68,7 +68,9 @@ def steps_of(pipeline: Pipeline, digests: Digests) -> list[Step]:
             "format": FORMAT,
             "core": core,
             "component": component_recipe(named.stage, pipeline.registry, digests),
-            "inputs": {name: _input(steps[label]) if label in steps else None for name, label in sources.items()},
+            "inputs": {
+                name: _input(steps[label], chain) if label in steps else None for name, label in sources.items()
+            },
         }
         if "recording" in sources.values():
             recipe["recording"] = _frames(part, pipeline, chain) | _content(part, digests)
@@ -87,7 +89,10 @@ def _extent(named: NamedStage, recording: Recording) -> range:
     return {"first": recording.indices[:1], "all": range(recording.length), "run": recording.indices}[extent]
 
 
-def _input(step: Step) -> dict[str, Any]:
+def _input(step: Step, of_chain: bool = False) -> dict[str, Any]:
+    if of_chain and step.named.stage.causal:  # more frames only add to it
+        read = {name: value for name, value in step.recipe["recording"].items() if name != "stop"}
+        return {"key": key_of({**step.recipe, "recording": read})}
     return {"key": step.key} | ({"frames": step.frames} if step.chain else {})
 
 

@@ -19,6 +19,7 @@ from mocapflow.data import (
     Frame,
     FrameResult,
     FrameState,
+    ImageFlow,
     Past,
     Pose,
     Segmentation,
@@ -85,13 +86,15 @@ class CoupledLoop(Stage):
         scene: Scene,
         checkpoint: Checkpoint,
         background: Background | None = None,
+        flow: ImageFlow | None = None,
     ) -> Track:
         """Return the track; frames that are already saved are not computed again."""
         model = ClothedModel(scene=scene.with_background(background), draper=self.draper)
         if self.keep == "trace":
             checkpoint.keep_turns(self.steady.max_turns)
         past, watch = checkpoint.past(), Stopwatch()
-        for frame in recording.frames(since=checkpoint.next_index):
+        for picture in recording.frames(since=checkpoint.next_index):
+            frame = replace(picture, flow=flow.into(picture.index)) if flow else picture
             watch.lap("decode")
             state = self.begin(frame, past, start, model, watch)
             steps = self.steps if seen(frame) else None

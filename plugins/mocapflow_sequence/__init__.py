@@ -16,6 +16,7 @@ def mocapflow_stages() -> list[type[Stage]]:
     from mocapflow_sequence.evaluate import Evaluate
     from mocapflow_sequence.export import Export
     from mocapflow_sequence.fit_subject import FitSubject
+    from mocapflow_sequence.flow import FollowPoints
     from mocapflow_sequence.overlay import Overlay
     from mocapflow_sequence.report import Report
     from mocapflow_sequence.smooth import Smooth
@@ -31,6 +32,7 @@ def mocapflow_stages() -> list[type[Stage]]:
         AlignCameras,
         FitSubject,
         CalibrateLimbs,
+        FollowPoints,
         Evaluate,
         Export,
         Overlay,

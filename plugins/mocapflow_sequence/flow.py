@@ -1,0 +1,90 @@
+"""Stage `flow`: points on the person followed from each frame of the run into the next, in every view."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from mocapflow.assets import Background
+from mocapflow.components import Stage
+from mocapflow.data import Flow, Frame, ImageFlow
+from mocapflow.recording import Recording
+from mocapflow.records import F32, U8, Bool
+
+Positive = Annotated[float, Field(gt=0)]
+LEAST_CORNER = 0.005  # share of the best corner's strength
+BLOCK = 5  # px, over which a corner is judged
+
+
+class FollowPoints(Stage):
+    """Follows corners by pyramids of Lucas-Kanade steps, forward and back; those that do not come back are dropped.
+
+    Where the empty scene is known, corners are looked for where the picture differs from it; else everywhere. What
+    moves into a frame depends on no later frame.
+    """
+
+    name: ClassVar[str] = "flow"
+    causal: ClassVar[bool] = True
+    points: Annotated[int, Field(ge=1, le=500)] = 500  # a view, at most
+    spacing_px: Positive = 3.0  # between points, at least
+    window_px: Annotated[int, Field(ge=3)] = 11
+    levels: Annotated[int, Field(ge=0)] = 4  # of the pyramid: each doubles the motion that can be followed
+    round_trip_px: Positive = 1.0  # how near a point has to come to where it was
+    difference: Positive = 20.0  # grey levels from the empty scene
+
+    def run(self, recording: Recording, background: Background | None = None) -> ImageFlow:
+        """Return the points followed into every frame but the first."""
+        parts = list(self._parts(recording, background))
+        return ImageFlow(
+            frame=np.concatenate([np.full(len(flow.pixel), index, np.int32) for index, _, flow in parts]),
+            camera=np.concatenate([np.full(len(flow.pixel), camera, np.int16) for _, camera, flow in parts]),
+            pixel=np.concatenate([flow.pixel for _, _, flow in parts]),
+            displacement=np.concatenate([flow.displacement for _, _, flow in parts]),
+            cameras=len(recording.views),
+        )
+
+    def _parts(self, recording: Recording, background: Background | None) -> Iterator[tuple[int, int, Flow]]:
+        """Yield frame, camera and flow of every view that this frame and the one before it both have."""
+        before: Frame | None = None
+        for frame in recording.frames():
+            for camera in range(len(recording.views)):
+                both = before is not None and before.usable[camera] and frame.usable[camera]
+                mean = None if background is None else background.mean[camera]
+                flow = self.follow(before.images[camera], frame.images[camera], mean) if both and before else NOTHING
+                yield frame.index, camera, flow
+            before = frame
+
+    def follow(self, old: U8, new: U8, empty: F32 | None = None) -> Flow:
+        """Return corners of the old picture (H, W, 3) that are found in the new one and from there back."""
+        import cv2
+
+        a, b = (np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), np.uint8) for picture in (old, new))
+        mask = None if empty is None else self._differs(old, empty).astype(np.uint8)
+        corners = cv2.goodFeaturesToTrack(a, self.points, LEAST_CORNER, self.spacing_px, mask=mask, blockSize=BLOCK)
+        if corners is None:
+            return NOTHING
+        start = np.asarray(corners, np.float32).reshape(-1, 2)
+        there, found = self._step(a, b, start)
+        back, refound = self._step(b, a, there)
+        kept = found & refound & (np.linalg.norm(back - start, axis=1) < self.round_trip_px)
+        return Flow(pixel=start[kept], displacement=(there - start)[kept])
+
+    def _step(self, old: U8, new: U8, points: F32) -> tuple[F32, Bool]:
+        import cv2
+
+        window = (self.window_px, self.window_px)
+        to, found, _ = cv2.calcOpticalFlowPyrLK(old, new, points, None, winSize=window, maxLevel=self.levels)  # type: ignore[call-overload]
+        return np.asarray(to, np.float32), np.asarray(found, bool).ravel()
+
+    def _differs(self, picture: U8, empty: F32) -> Bool:
+        """Return where a picture differs from the empty scene, without single pixels of noise."""
+        import cv2
+
+        different = np.abs(picture - empty).max(axis=2) > self.difference
+        return np.asarray(cv2.medianBlur(different.astype(np.uint8), BLOCK), bool)
+
+
+NOTHING = Flow(pixel=np.empty((0, 2), np.float32), displacement=np.empty((0, 2), np.float32))
