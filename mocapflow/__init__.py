@@ -40,7 +40,7 @@ if TYPE_CHECKING:
         Surface,
         Turn,
     )
-    from mocapflow.errors import MocapflowError, PipelineError, PluginError
+    from mocapflow.errors import GarmentError, MocapflowError, PipelineError, PluginError
     from mocapflow.hookspecs import hookimpl
     from mocapflow.model import ClothedModel
     from mocapflow.pipeline import Pipeline, load_pipeline
@@ -55,7 +55,7 @@ _HOMES = {
     "components": "BodyModel ClothFitter Component Draper Garment Matcher PoseSolver Predictor Prior Segmenter Stage",
     "data": "Cloth Estimate Frame FrameResult FrameState Matches Past Pose PoseBatch Residual Segmentation Silhouette "
     "Start Surface Turn",
-    "errors": "MocapflowError PipelineError PluginError",
+    "errors": "GarmentError MocapflowError PipelineError PluginError",
     "hookspecs": "hookimpl",
     "model": "ClothedModel",
     "pipeline": "Pipeline load_pipeline",
@@ -82,6 +82,7 @@ __all__ = [  # noqa: PLE0604
     "FrameResult",
     "FrameState",
     "Garment",
+    "GarmentError",
     "GarmentMesh",
     "Matcher",
     "Matches",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mocapflow.errors import MocapflowError, alternatives
 from mocapflow.records import F32, F64, I32, Bool, array, record
 
 
@@ -49,7 +50,13 @@ class Body:
     morph_range: tuple[float, float] = (0.0, 1.0)  # rad, where the morph begins and where it is complete
 
     def joint(self, name: str) -> int:
-        """Return the index of a joint by name."""
+        """Return the index of a joint by name.
+
+        Raises:
+            MocapflowError: there is no such joint.
+        """
+        if name not in self.joint_names:
+            raise MocapflowError(f"the body has no joint '{name}'", hint=alternatives(name, self.joint_names))
         return self.joint_names.index(name)
 
 

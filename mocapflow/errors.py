@@ -42,6 +42,10 @@ class ShapeError(MocapflowError):
     """An array has the wrong shape or kind."""
 
 
+class GarmentError(MocapflowError):
+    """A garment can't be sewn from these measures."""
+
+
 class RecordingError(MocapflowError):
     """A recording folder is incomplete or contradicts itself."""
 

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from mocapflow import load_registry
 
 ROOT = Path(__file__).parents[1]
@@ -28,6 +30,7 @@ def test_the_plugin_in_contributing_loads_and_conforms(tmp_path: Path) -> None:
     assert "10 passed" in run.stdout
 
 
-def test_every_bash_block_of_the_readme_is_run_by_ci() -> None:
-    assert len(blocks("README.md", "bash")) >= 5
-    assert "readme_commands.py README.md" in (ROOT / ".ci/run").read_text(encoding="utf-8")
+@pytest.mark.parametrize(("document", "least"), [("README.md", 5), ("CONTRIBUTING.md", 1)])
+def test_every_bash_block_is_run_by_ci(document: str, least: int) -> None:
+    assert len(blocks(document, "bash")) >= least
+    assert f"readme_commands.py {document}" in (ROOT / ".ci/run").read_text(encoding="utf-8")

@@ -11,7 +11,7 @@ Needs pytest for the conformance classes.
 from __future__ import annotations
 
 from mocapflow.testing.assets import BodyConformance, DraperConformance, GarmentConformance
-from mocapflow.testing.bodies import tiny_body, tiny_garment
+from mocapflow.testing.bodies import template_body, tiny_body, tiny_garment
 from mocapflow.testing.jacobians import check_jacobian
 from mocapflow.testing.pictures import tiny_frame, tiny_segmentation, tiny_state
 from mocapflow.testing.same import assert_pure, same
@@ -40,6 +40,7 @@ __all__ = [
     "assert_pure",
     "check_jacobian",
     "same",
+    "template_body",
     "tiny_body",
     "tiny_cloth",
     "tiny_frame",

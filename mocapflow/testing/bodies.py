@@ -1,6 +1,8 @@
-"""A body of tubes and a tube of cloth, made by formula."""
+"""Bodies to test with: one of tubes with a tube of cloth, made by formula, and a whole person."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import numpy as np
 
@@ -8,6 +10,7 @@ from mocapflow.assets import Body, GarmentMesh
 from mocapflow.geometry import twists
 from mocapflow.geometry.meshes import grid_faces
 from mocapflow.records import F64, I32
+from mocapflow.registry import load_registry
 
 JOINTS = ("pelvis", "hip_l", "knee_l", "ankle_l", "hip_r", "knee_r", "ankle_r")
 PARENTS = (-1, 0, 1, 2, 0, 4, 5)
@@ -41,6 +44,12 @@ def tiny_body() -> Body:
         skin_weight=np.concatenate([weight for _, weight in skin]),
         cut=np.zeros(len(vertices), bool),
     )
+
+
+def template_body() -> Body:
+    """Return the whole person of the body `template`, about 13,000 vertices: for what needs arms or a head."""
+    template: Body = load_registry().get("body", "template")().load(Path())  # type: ignore[attr-defined]
+    return template
 
 
 def tiny_garment(body: Body) -> GarmentMesh:

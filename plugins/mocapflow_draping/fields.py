@@ -87,8 +87,12 @@ def part_transforms(fields: BodyFields, chain: F64) -> tuple[F64, F64, F64]:
 
 
 def touchable_joints(body: Body, garment: GarmentMesh) -> I32:
-    """Return the joints whose skin a garment can touch: those with skin within its hull, and their children."""
-    hull = ConvexHull(garment.vertices)
+    """Return the joints whose skin a garment can touch: those with skin within its hull, and their children.
+
+    The hull takes in the joints that carry the garment, up to the root: a flat one, as a cape, has no inside.
+    """
+    carrying = descendants(body.parents)[:, garment.carried_by].any(axis=1)
+    hull = ConvexHull(np.concatenate([garment.vertices, body.positions[carrying]]))
     within = np.all(body.vertices @ hull.equations[:, :3].T + hull.equations[:, 3] < 0.02, axis=1)
     main = body.skin_joint[np.arange(len(within)), body.skin_weight.argmax(axis=1)]
     seen = np.zeros(len(body.parents), bool)

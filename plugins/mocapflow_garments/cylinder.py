@@ -10,7 +10,8 @@ from pydantic import Field
 
 from mocapflow.assets import Body, GarmentMesh
 from mocapflow.components import Garment
-from mocapflow.errors import alternatives
+from mocapflow.errors import GarmentError
+from mocapflow.geometry import sewing
 from mocapflow.records import F64
 from mocapflow_garments import pattern, sections
 
@@ -34,48 +35,37 @@ class Cylinder(Garment):
         pattern.check_measures(self.name, {tape: getattr(self, tape) for tape in tapes})
         around = np.linspace(self.upper_circumference_m, self.lower_circumference_m, self.rings)
         upper, away = self._upper(body)
-        flat, facing = sections.band(upper[1], away, self.strands)
+        band = sections.band(upper[1], away, self.strands)
+        flat, facing = band[0][::-1], band[1][::-1]  # the plane is seen from above: its normal points down the limb
         out = (around - around[0]) / (2 * math.pi)
         link = self.length_m / (self.rings - 1)
         along = np.linspace(0.0, self.length_m, self.rings)
         rows = upper[0].lift(flat[:, None] + out[None, :, None] * facing[:, None])
         rows = pattern.even_links(rows + along[:, None] * upper[0].normal, link)
-        grid = np.arange(self.strands * self.rings, dtype=np.int32).reshape(self.strands, self.rings)
-        vertices = rows.reshape(-1, 3)
-        skin = pattern.nearest_skin(body, vertices)
-        names, bounds = pattern.parameters(self.force_orders)
-        main = [pattern.main_joint(body, skin[grid[:, row]]) for row in range(self.rings)]
-        return GarmentMesh(
-            name=self.name,
-            vertices=vertices,
-            faces=pattern.grid_faces(grid)[:, ::-1].copy(),
-            strands=grid,
-            rings=np.stack([grid.T, np.roll(grid, -1, axis=0).T], axis=-1).reshape(-1, 2),
-            ring_length=np.repeat(around / self.strands, self.strands),
-            carried_by=np.tile(np.array(main, np.int32), self.strands),
-            pinned=grid[:, 0].copy(),
-            pinned_to=skin[grid[:, 0]],
-            parameter_names=names,
-            parameter_bounds=bounds,
+        carried = [sewing.main_joint(body, sewing.nearest_skin(body, rows[:, row])) for row in range(self.rings)]
+        return sewing.sheet(
+            self.name,
+            body,
+            rows,
+            closed=True,
+            around=around,
+            carried_by=np.array(carried, np.int32),
+            parameters=sewing.force_parameters(self.force_orders),
         )
 
     def _upper(self, body: Body) -> tuple[tuple[sections.Plane, F64], float]:
         """Return the plane across the limb with the limb's outline in it, and the tube's distance from it."""
-        if self.joint not in body.joint_names:
-            raise pattern.GarmentError(
-                f"cylinder: the body has no joint '{self.joint}'", hint=alternatives(self.joint, body.joint_names)
-            )
         joint = body.joint(self.joint)
         below = np.flatnonzero(body.parents == joint)
         if not len(below):
-            raise pattern.GarmentError(
+            raise GarmentError(
                 f"cylinder: nothing follows joint '{self.joint}'", hint="name the joint at the upper end of a limb"
             )
         limb = body.positions[below[0]] - body.positions[joint]
         plane = _across(body.positions[joint] + self.start * limb, limb)
         outlines = [sections.outline(points) for points in sections.sections(body, plane)]
         if not outlines:
-            raise pattern.GarmentError(f"cylinder: there is no body around '{self.joint}'", hint="change `start`")
+            raise GarmentError(f"cylinder: there is no body around '{self.joint}'", hint="change `start`")
         limb_outline = min(outlines, key=lambda closed: float(np.linalg.norm(closed.mean(axis=0))))
         tape = sections.perimeter(limb_outline)
         away = pattern.room(self.name, "upper_circumference_m", self.upper_circumference_m, tape)

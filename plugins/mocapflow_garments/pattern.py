@@ -1,4 +1,4 @@
-"""What all garments share: checks of tape measures, parameters, and tubes of strands and rings."""
+"""What garments sewn from tape measures share: checks of the measures, and where a band lies on the body."""
 
 from __future__ import annotations
 
@@ -8,24 +8,13 @@ import warnings
 import numpy as np
 
 from mocapflow.assets import Body
-from mocapflow.errors import MocapflowError
-from mocapflow.records import F64, I32
+from mocapflow.errors import GarmentError
+from mocapflow.records import F64
 from mocapflow_garments import sections
 
 EASE = 0.002  # m, the least room between waistband and skin
 MEANT = 1.3  # a measure that is further below the body's own is a mistake
 LARGEST_ROOM = 0.08  # m between waistband and skin: more can't hold a garment up
-HARMONICS: tuple[tuple[str, ...], ...] = (
-    ("flare_rad",),
-    ("wind_cos_rad", "wind_sin_rad"),
-    ("two_cos_rad", "two_sin_rad"),
-)
-LARGEST_TILT = math.radians(40)
-LARGEST_THICKNESS = 0.010  # m
-
-
-class GarmentError(MocapflowError):
-    """A garment can't be sewn from these measures."""
 
 
 class GarmentRepaired(UserWarning):
@@ -50,37 +39,6 @@ def check_measures(garment: str, measures: dict[str, float]) -> None:
 def repaired(garment: str, what: str) -> None:
     """Record that a measure was changed."""
     warnings.warn(f"{garment}: {what}", GarmentRepaired, stacklevel=5)
-
-
-def parameters(orders: tuple[int, ...]) -> tuple[tuple[str, ...], F64]:
-    """Return names and bounds (Q, 2) of thickness and tail-angle harmonics of the given orders."""
-    tilts = [name for order in orders for name in HARMONICS[order]]
-    bounds = [[0.0, LARGEST_THICKNESS], *([-LARGEST_TILT, LARGEST_TILT] for _ in tilts)]
-    return ("thickness_m", *tilts), np.array(bounds)
-
-
-def grid_faces(grid: I32, closed: bool = True) -> I32:
-    """Return two triangles per cell of a grid (strands, rows) of vertex indices, outward for counter-clockwise."""
-    right = np.roll(grid, -1, axis=0) if closed else grid[1:]
-    left = grid if closed else grid[:-1]
-    a, b, c, d = left[:, :-1], right[:, :-1], right[:, 1:], left[:, 1:]
-    faces: I32 = np.concatenate([np.stack(t, axis=-1).reshape(-1, 3) for t in ((a, d, b), (b, d, c))])
-    return faces
-
-
-def nearest_skin(body: Body, points: F64) -> I32:
-    """Return the body vertex nearest to each point (N, 3)."""
-    from scipy.spatial import cKDTree
-
-    nearest: I32 = np.asarray(cKDTree(body.vertices).query(points)[1], np.int32)
-    return nearest
-
-
-def main_joint(body: Body, vertices: I32) -> int:
-    """Return the joint that moves most of the given body vertices."""
-    weight = np.zeros(len(body.parents))
-    np.add.at(weight, body.skin_joint[vertices], body.skin_weight[vertices])
-    return int(weight.argmax())
 
 
 def even_links(rows: F64, link: float) -> F64:

@@ -10,6 +10,8 @@ from pydantic import Field
 
 from mocapflow.assets import Body, GarmentMesh
 from mocapflow.components import Garment
+from mocapflow.errors import GarmentError
+from mocapflow.geometry import sewing
 from mocapflow.records import F64, I32
 from mocapflow_garments import pattern, sections
 
@@ -47,9 +49,9 @@ class Shorts(Garment):
         strands[: len(long)] = long
         strands[len(long) :, : short.shape[1]] = short
         pinned = strands[:, 0].copy()
-        pinned_to = pattern.nearest_skin(body, vertices[pinned])
-        names, bounds = pattern.parameters(self.force_orders)
-        faces = [pattern.grid_faces(long[:, : crotch + 1]), *(pattern.grid_faces(leg) for leg in legs)]
+        pinned_to = sewing.nearest_skin(body, vertices[pinned])
+        names, bounds = sewing.force_parameters(self.force_orders)
+        faces = [sewing.grid_faces(long[:, : crotch + 1]), *(sewing.grid_faces(leg) for leg in legs)]
         return GarmentMesh(
             name=self.name,
             vertices=vertices,
@@ -69,12 +71,12 @@ class Shorts(Garment):
         measures = {tape: getattr(self, tape) for tape in (*tapes, "inseam_m", "length_m")}
         pattern.check_measures(self.name, measures)
         if self.inseam_m >= self.length_m:
-            raise pattern.GarmentError(
+            raise GarmentError(
                 f"shorts: the inseam ({self.inseam_m:.2f} m) is as long as the outside ({self.length_m:.2f} m)",
                 hint="length_m runs from the waist's upper edge to the leg opening, inseam_m from the crotch",
             )
         if self.length_m > self.waist_height_m:
-            raise pattern.GarmentError(
+            raise GarmentError(
                 f"shorts: the legs would end {self.length_m - self.waist_height_m:.2f} m below the floor",
                 hint="shorten length_m or raise waist_height_m, the upper edge above the floor",
             )
@@ -120,7 +122,7 @@ class Shorts(Garment):
             outlines = [sections.outline(points) for points in sections.sections(body, plane)]
             legs = [o for o in outlines if side * plane.lift(o)[:, 0].mean() > 0.02 and sections.perimeter(o) > 0.2]
             if not legs:
-                raise pattern.GarmentError(
+                raise GarmentError(
                     f"shorts: the legs have not parted yet at {height:.2f} m, where the crotch should be",
                     hint="waist_height_m - (length_m - inseam_m) must lie below the body's crotch",
                 )
@@ -135,9 +137,9 @@ class Shorts(Garment):
         return [np.concatenate([outer, inner]) for outer, inner in pairs]
 
     def _carried_by(self, body: Body, vertices: F64, legs: list[I32], waist_skin: I32) -> I32:
-        carried = np.full(len(vertices), pattern.main_joint(body, waist_skin), np.int32)
+        carried = np.full(len(vertices), sewing.main_joint(body, waist_skin), np.int32)
         for leg in legs:
-            carried[leg] = pattern.main_joint(body, pattern.nearest_skin(body, vertices[leg[:, leg.shape[1] // 2]]))
+            carried[leg] = sewing.main_joint(body, sewing.nearest_skin(body, vertices[leg[:, leg.shape[1] // 2]]))
         return carried
 
 

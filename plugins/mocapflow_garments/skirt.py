@@ -10,6 +10,8 @@ from pydantic import Field
 
 from mocapflow.assets import Body, GarmentMesh
 from mocapflow.components import Garment
+from mocapflow.errors import GarmentError
+from mocapflow.geometry import sewing
 from mocapflow.records import F64
 from mocapflow_garments import pattern, sections
 
@@ -35,36 +37,21 @@ class Skirt(Garment):
         least = sections.perimeter(waist)
         straight = np.linspace(least, max(self.hem_circumference_m, least), self.rings)
         around = pattern.hip_rings(body, self.waist_height_m, down, straight, away)
-        link = self.length_m / (self.rings - 1)
-        vertices = self._cone(waist, facing, around, link)
-        grid = np.arange(self.strands * self.rings, dtype=np.int32).reshape(self.strands, self.rings)
-        pinned_to = pattern.nearest_skin(body, vertices[:, 0])
-        names, bounds = pattern.parameters(self.force_orders)
-        return GarmentMesh(
-            name=self.name,
-            vertices=vertices.reshape(-1, 3),
-            faces=pattern.grid_faces(grid),
-            strands=grid,
-            rings=np.stack([grid.T, np.roll(grid, -1, axis=0).T], axis=-1).reshape(-1, 2),
-            ring_length=np.repeat(around / self.strands, self.strands),
-            carried_by=np.full(grid.size, pattern.main_joint(body, pinned_to), np.int32),
-            pinned=grid[:, 0].copy(),
-            pinned_to=pinned_to,
-            parameter_names=names,
-            parameter_bounds=bounds,
-        )
+        rows = self._cone(waist, facing, around, self.length_m / (self.rings - 1))
+        parameters = sewing.force_parameters(self.force_orders)
+        return sewing.sheet(self.name, body, rows, closed=True, around=around, parameters=parameters)
 
     def _check(self, body: Body) -> None:
         tapes = ("waist_height_m", "waist_circumference_m", "hem_circumference_m", "length_m")
         pattern.check_measures(self.name, {tape: getattr(self, tape) for tape in tapes})
         if self.length_m > self.waist_height_m:
-            raise pattern.GarmentError(
+            raise GarmentError(
                 f"skirt: the hem would hang {self.length_m - self.waist_height_m:.2f} m below the floor",
                 hint="length_m is measured along the cloth, waist_height_m is its upper edge above the floor;\n"
                 "shorten length_m or raise waist_height_m",
             )
         if self.hem_circumference_m > self.waist_circumference_m + 2 * math.pi * self.length_m:
-            raise pattern.GarmentError(
+            raise GarmentError(
                 f"skirt: a hem of {self.hem_circumference_m:.2f} m is wider than a full circle of this length",
                 hint=f"at most {self.waist_circumference_m + 2 * math.pi * self.length_m:.2f} m for these measures",
             )

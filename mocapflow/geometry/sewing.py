@@ -1,0 +1,100 @@
+"""Sewing: how points laid out along strands become a garment that hangs from the skin."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mocapflow.assets import Body, GarmentMesh
+from mocapflow.records import F64, I32
+
+HARMONICS: tuple[tuple[str, ...], ...] = (
+    ("flare_rad",),
+    ("wind_cos_rad", "wind_sin_rad"),
+    ("two_cos_rad", "two_sin_rad"),
+)
+LARGEST_TILT = math.radians(40)
+LARGEST_THICKNESS = 0.010  # m
+
+Parameters = tuple[tuple[str, ...], F64]
+
+
+def force_parameters(orders: tuple[int, ...]) -> Parameters:
+    """Return names and bounds (Q, 2) of the cloth's thickness and of its tail-angle harmonics of the given orders.
+
+    Order 0 is a flare, order 1 a wind, order 2 two legs inside one ring; drapers know what they mean.
+    """
+    tilts = [name for order in orders for name in HARMONICS[order]]
+    bounds = [[0.0, LARGEST_THICKNESS], *([-LARGEST_TILT, LARGEST_TILT] for _ in tilts)]
+    return ("thickness_m", *tilts), np.array(bounds)
+
+
+def sheet(
+    name: str,
+    body: Body,
+    rows: F64,
+    *,
+    closed: bool,
+    around: F64 | None = None,
+    carried_by: I32 | None = None,
+    parameters: Parameters | None = None,
+) -> GarmentMesh:
+    """Return the garment of a grid of cloth: strands side by side, each pinned to the skin nearest its first point.
+
+    Args:
+        name: of the garment.
+        body: the body at rest.
+        rows: (N, L, 3) m, N strands of L points from the pinned end, counter-clockwise seen along the strands'
+            way back to it (from above, for a skirt): so faces look outwards.
+        closed: True for a tube, the last strand beside the first; False for a sheet with two free edges.
+        around: (L,) m, wanted length of each row from one end to the other; None: as the points lie.
+        carried_by: (L,) joint that moves each row before the drape; None: the one that moves the pinned skin.
+        parameters: names and bounds (Q, 2); None: thickness alone.
+    """
+    count, length = rows.shape[:2]
+    grid = np.arange(count * length, dtype=np.int32).reshape(count, length)
+    vertices = rows.reshape(-1, 3)
+    pinned_to = nearest_skin(body, rows[:, 0])
+    moved_by = np.full(length, main_joint(body, pinned_to), np.int32) if carried_by is None else carried_by
+    left, right = (grid, np.roll(grid, -1, axis=0)) if closed else (grid[:-1], grid[1:])
+    rings = np.stack([left.T, right.T], axis=-1).reshape(-1, 2)
+    apart = np.linalg.norm(vertices[rings[:, 0]] - vertices[rings[:, 1]], axis=1)
+    names, bounds = parameters or force_parameters(())
+    return GarmentMesh(
+        name=name,
+        vertices=vertices,
+        faces=grid_faces(grid, closed),
+        strands=grid,
+        rings=rings,
+        ring_length=apart if around is None else np.repeat(around / len(left), len(left)),
+        carried_by=np.tile(moved_by, count).astype(np.int32),
+        pinned=grid[:, 0].copy(),
+        pinned_to=pinned_to,
+        parameter_names=names,
+        parameter_bounds=bounds,
+    )
+
+
+def grid_faces(grid: I32, closed: bool = True) -> I32:
+    """Return two triangles per cell of a grid (strands, rows) of vertex indices, outward for counter-clockwise."""
+    right = np.roll(grid, -1, axis=0) if closed else grid[1:]
+    left = grid if closed else grid[:-1]
+    a, b, c, d = left[:, :-1], right[:, :-1], right[:, 1:], left[:, 1:]
+    faces: I32 = np.concatenate([np.stack(t, axis=-1).reshape(-1, 3) for t in ((a, d, b), (b, d, c))])
+    return faces
+
+
+def nearest_skin(body: Body, points: F64) -> I32:
+    """Return the body vertex nearest to each point (N, 3)."""
+    from scipy.spatial import cKDTree
+
+    nearest: I32 = np.asarray(cKDTree(body.vertices).query(points)[1], np.int32)
+    return nearest
+
+
+def main_joint(body: Body, vertices: I32) -> int:
+    """Return the joint that moves most of the given body vertices."""
+    weight = np.zeros(len(body.parents))
+    np.add.at(weight, body.skin_joint[vertices], body.skin_weight[vertices])
+    return int(weight.argmax())
