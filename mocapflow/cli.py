@@ -12,7 +12,7 @@ from typing import Any
 import typer
 import typer.core
 
-from mocapflow.commands import cache, looking, results, running
+from mocapflow.commands import cache, looking, prior, results, running
 from mocapflow.errors import MocapflowError
 
 
@@ -54,6 +54,7 @@ COMMANDS: tuple[Callable[..., None], ...] = (
 for command in COMMANDS:
     app.command()(command)
 app.add_typer(cache.app, name="cache")
+app.add_typer(prior.app, name="prior")
 
 
 def main() -> None:

@@ -111,10 +111,15 @@ class MatcherConformance(Conformance):
 
 
 class PriorConformance(Conformance):
-    """A prior."""
+    """A prior.
+
+    `bounds_energy` is for a prior that is no sum of squares: its rows are a quadratic bound of its energy with the
+    same slope, so their Jacobian is not the derivative of their error.
+    """
 
     role = "prior"
     prior: Prior
+    bounds_energy = False
     tolerance = 1e-5
 
     @pytest.mark.parametrize("known", [0, 1, 2])
@@ -138,7 +143,8 @@ class PriorConformance(Conformance):
         def energy(increment: F64) -> F64:
             return np.array([self.prior.residual(moved(pose, increment), past, scene).energy])
 
-        check_jacobian(at, np.zeros(unknowns), tolerance=self.tolerance)
+        if not self.bounds_energy:
+            check_jacobian(at, np.zeros(unknowns), tolerance=self.tolerance)
         slope = differences(energy, np.zeros(unknowns))[0]
         expected = residual.jacobian[:, :unknowns].T @ residual.error
         np.testing.assert_allclose(slope, expected, atol=self.tolerance * max(1.0, np.abs(expected).max()))

@@ -9,12 +9,14 @@ from mocapflow.hookspecs import hookimpl
 @hookimpl
 def mocapflow_priors() -> list[type[Prior]]:
     """Return the priors of this plugin."""
+    from mocapflow_priors.ground_plane import GroundPlane
     from mocapflow_priors.joint_limits import JointLimits
+    from mocapflow_priors.parzen import Parzen
     from mocapflow_priors.rest_pose import RestPose
     from mocapflow_priors.smooth_motion import SmoothMotion
     from mocapflow_priors.spine_coupling import SpineCoupling
 
-    return [JointLimits, RestPose, SmoothMotion, SpineCoupling]
+    return [GroundPlane, JointLimits, Parzen, RestPose, SmoothMotion, SpineCoupling]
 
 
 @hookimpl

@@ -1,0 +1,40 @@
+"""Commands on learned priors."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer(help="Learn which poses are likely.", no_args_is_help=True)
+
+
+@app.callback()
+def _prior() -> None:
+    """Keep `fit` a command of its own name."""
+
+
+@app.command()
+def fit(
+    files: Annotated[
+        list[Path], typer.Argument(metavar="FILES", help="angles.csv, .mot, .bvh or joint rotations (.npz).")
+    ],
+    out: Annotated[Path, typer.Option("--out", help="The file to write; `parzen: {poses: FILE}` reads it.")],
+    angles: Annotated[
+        list[str] | None,
+        typer.Option("--angle", help="A joint, or joint.angle; repeatable.  [default: hips, knees, ankles, arms]"),
+    ] = None,
+    percentile: Annotated[
+        float, typer.Option(min=1, max=100, help="Of the distances to the nearest pose; 100: the largest.")
+    ] = 100.0,
+) -> None:
+    """Learn the prior `parzen` from recorded motions; leave out the take that is to be tracked."""
+    import numpy as np
+    from mocapflow_bodies.template import Template
+    from mocapflow_priors import density, training
+
+    learned = training.fit(files, Template().load(Path()), angles or training.FREE, percentile)
+    density.write(out, learned)
+    typer.echo(f"{out}: {len(learned.poses)} poses, bandwidth {np.degrees(learned.bandwidth):.1f}°")
+    typer.echo(f"angles: {', '.join(learned.names)}")

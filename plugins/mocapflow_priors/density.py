@@ -1,0 +1,87 @@
+"""Parzen density of joint angles: a Gaussian about every training pose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from mocapflow.errors import PipelineError
+from mocapflow.records import F64, array, record
+
+TURN = 2 * np.pi
+
+
+@record
+class Density:
+    """Training poses with one bandwidth for all of them and for all angles."""
+
+    names: tuple[str, ...]  # of the angles, as screws are named: knee_l.flexion
+    poses: F64 = array("N", "K", unit="rad, zero in the rest pose")
+    bandwidth: float  # rad, standard deviation of each Gaussian
+
+    @property
+    def peak(self) -> float:
+        """Return the largest value that log p could have: all poses at one place."""
+        return float(-0.5 * self.poses.shape[1] * np.log(TURN * self.bandwidth**2))
+
+    def of(self, names: Sequence[str]) -> Density:
+        """Return the density of some of the angles, whatever the others are."""
+        chosen = [self.names.index(name) for name in names]
+        return Density(names=tuple(names), poses=self.poses[:, chosen], bandwidth=self.bandwidth)
+
+
+def log_density(density: Density, angles: F64) -> tuple[float, F64]:
+    """Return log p (rad^-K) of a pose (K,) rad and the mean (K,) rad of the training poses, weighted by nearness.
+
+    The gradient of log p is (mean - angles) / bandwidth^2. The largest exponent is taken out first: plain weights
+    vanish a few bandwidths away.
+
+    Source: Rosenhahn 2008, section 12.5.1
+    """
+    away = wrapped(density.poses - angles)
+    exponent = -0.5 * np.einsum("nk,nk->n", away, away) / density.bandwidth**2
+    weight = np.exp(exponent - exponent.max())
+    log_p = np.log(weight.mean()) + exponent.max() + density.peak
+    return float(log_p), angles + weight @ away / weight.sum()
+
+
+def bandwidth(poses: F64, percentile: float = 100.0) -> float:
+    """Return the largest distance (rad) from one of N poses (N, K) to its nearest neighbour.
+
+    Neighbours in a smooth motion then overlap within one bandwidth. A lower percentile is proof against odd poses.
+
+    Source: Rosenhahn 2008, section 12.5.1
+    """
+    nearest, _ = KDTree(poses).query(poses, 2)
+    return float(np.percentile(nearest[:, 1], percentile))
+
+
+def wrapped(difference: F64) -> F64:
+    """Return differences of angles in [-pi, pi)."""
+    return np.mod(difference + np.pi, TURN) - np.pi
+
+
+def write(path: Path, density: Density) -> None:
+    """Write a density; poses are kept to about 0.001 degrees."""
+    content = {"names": np.array(density.names), "poses": density.poses.astype(np.float32)}
+    np.savez_compressed(path, allow_pickle=False, bandwidth=np.array(density.bandwidth), **content)
+
+
+def read(path: Path) -> Density:
+    """Return the density in a file that `mocapflow prior fit` has written.
+
+    Raises:
+        PipelineError: there is no such file, or it is another kind of file.
+    """
+    hint = "`mocapflow prior fit FILES --out PATH` makes one from recorded angles"
+    try:
+        with np.load(path) as file:
+            names, poses = tuple(str(name) for name in file["names"]), file["poses"].astype(np.float64)
+            return Density(names=names, poses=poses, bandwidth=float(file["bandwidth"]))
+    except FileNotFoundError:
+        raise PipelineError("there is no such file of training poses", where=str(path), hint=hint) from None
+    except (OSError, ValueError, KeyError, AttributeError) as error:
+        raise PipelineError(f"this is no file of training poses: {error}", where=str(path), hint=hint) from None

@@ -1,0 +1,45 @@
+"""Poses like those people were seen in: a Parzen density of joint angles as extra equations."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+
+from mocapflow.components import Prior
+from mocapflow.data import Past, Pose, Residual
+from mocapflow.scene import Scene
+from mocapflow_priors.density import Density, log_density, read
+
+SHIPPED = Path(__file__).parent / "data" / "motions.npz"  # walks, squats, raised knees, jumps, kicks, crossed legs
+
+
+class Parzen(Prior):
+    """Draws the joint angles towards the training poses near them; limbs that no camera sees come to rest there.
+
+    One row an angle, a full step to the weighted mean of the training poses. In units of the bandwidth these rows
+    bound -log p from above, so a step that lowers their sum of squares lowers -log p.
+
+    Source: Rosenhahn 2008, section 12.5.1
+    """
+
+    name: ClassVar[str] = "parzen"
+    poses: Path = SHIPPED  # made by `mocapflow prior fit`; leave out the take that is tracked
+
+    def residual(self, pose: Pose, past: Past, scene: Scene) -> Residual:
+        """Return one row for each trained angle the body has; the energy is -log p above the least it can be."""
+        names, sharpness = scene.body.screw_names, 1 / self.density.bandwidth
+        screws = np.array([k for k, name in enumerate(names) if name in self.density.names], np.intp)
+        density = self.density.of(tuple(names[k] for k in screws))
+        log_p, mean = log_density(density, pose.angles[screws])
+        jacobian = np.zeros((len(screws), 6 + len(pose.angles)))
+        jacobian[np.arange(len(screws)), 6 + screws] = sharpness
+        error = sharpness * (pose.angles[screws] - mean)
+        return Residual(error=error, jacobian=jacobian, energy=density.peak - log_p)
+
+    @cached_property
+    def density(self) -> Density:
+        """The training poses."""
+        return read(self.poses)

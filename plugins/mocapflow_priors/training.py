@@ -1,0 +1,148 @@
+"""Training poses from recorded motions: angles.csv, OpenSim MOT, BVH, or joint rotations in an npz."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from mocapflow.data import Body
+from mocapflow.errors import RecordingError
+from mocapflow.geometry import angles
+from mocapflow.geometry.joints import angles_from_rotations
+from mocapflow.io import markers
+from mocapflow.records import F64
+from mocapflow_priors import training_bvh
+from mocapflow_priors.density import Density, bandwidth
+
+Angles = Mapping[str, F64]  # by screw: (T,) rad, zero in the rest pose
+FREE = ("hip", "knee.flexion", "ankle.dorsiflexion", "shoulder", "elbow.flexion")  # what no other prior holds
+COLUMNS = {  # of angles.csv: the screw that makes nearly all of each
+    "hip_flexion": "hip.flexion",
+    "knee_flexion": "knee.flexion",
+    "ankle": "ankle.dorsiflexion",
+    "elbow": "elbow.flexion",
+}
+COORDINATES = {  # of OpenSim, as `mocapflow_sequence.opensim` names them
+    "hip_flexion": "hip.flexion",
+    "knee_angle": "knee.flexion",
+    "ankle_angle": "ankle.dorsiflexion",
+    "elbow_flex": "elbow.flexion",
+}
+
+
+def fit(files: Sequence[Path], body: Body, wanted: Sequence[str] = FREE, percentile: float = 100.0) -> Density:
+    """Return the density of the angles that all files have.
+
+    Args:
+        files: recorded motions.
+        body: whose joints and rest pose the angles count from.
+        wanted: angles as `joint.angle` without the side, or whole joints.
+        percentile: of the distances between neighbours that the bandwidth is.
+
+    Raises:
+        RecordingError: a file cannot be read, or the files share no wanted angle.
+    """
+    takes = [chosen(read_angles(path, body), wanted) for path in files]
+    names = tuple(name for name in body.screw_names if all(name in take for take in takes))
+    if not names:
+        hint = "\n".join(
+            f"{path.name}: {', '.join(take) or 'none of them'}" for path, take in zip(files, takes, strict=True)
+        )
+        raise RecordingError(f"the files share none of the angles {', '.join(wanted)}", hint=hint)
+    poses = np.concatenate([np.stack([take[name] for name in names], axis=1) for take in takes])
+    poses = np.unique(poses[np.isfinite(poses).all(axis=1)], axis=0)
+    if len(poses) < 2:
+        raise RecordingError("a density needs two different poses at least", where=", ".join(map(str, files)))
+    return Density(names=names, poses=poses, bandwidth=bandwidth(poses, percentile))
+
+
+def chosen(take: Angles, wanted: Sequence[str]) -> Angles:
+    """Return the wanted angles of a take."""
+
+    def sought(name: str) -> bool:
+        joint, _, angle = name.partition(".")
+        joint = joint.removesuffix("_l").removesuffix("_r")
+        return joint in wanted or f"{joint}.{angle}" in wanted
+
+    return {name: values for name, values in take.items() if sought(name)}
+
+
+def read_angles(path: Path, body: Body) -> Angles:
+    """Return the angles of a recorded motion by the names of a body's screws, (T,) rad from its rest pose."""
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        hint = f"known: {', '.join(sorted(READERS))}"
+        raise RecordingError("no kind of file with joint angles", where=str(path), hint=hint)
+    if not path.is_file():
+        raise RecordingError("there is no such file", where=str(path))
+    try:
+        return reader(path, body)
+    except (ValueError, KeyError) as error:
+        raise RecordingError(f"cannot be read as {path.suffix}: {error}", where=str(path)) from error
+
+
+def from_rotations(path: Path, body: Body) -> Angles:
+    """Read joint rotations (T, J, 3) rad relative to the parent, with their joint names."""
+    with np.load(path) as file:
+        names, turns = [str(name) for name in file["joint_names"]], file["rotation_vectors"]
+    known = [k for k, name in enumerate(names) if name in body.joint_names]
+    poses = np.stack([angles_from_rotations(body, {names[k]: turn[k] for k in known}) for turn in turns])
+    moved = {names[k] for k in known}
+    return {n: poses[:, k] for k, n in enumerate(body.screw_names) if n.partition(".")[0] in moved}
+
+
+def from_table(path: Path, body: Body) -> Angles:
+    """Read an angles.csv: degrees between joint centres, as a run writes them."""
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    names = {name for name in rows[0] if name and name[:-2] in COLUMNS} if rows else set()
+    return from_columns({name: np.array([float(row[name] or "nan") for row in rows]) for name in names}, body)
+
+
+def from_joints(path: Path, body: Body) -> Angles:
+    """Read a BVH motion."""
+    return from_columns(training_bvh.columns(path), body)
+
+
+def from_columns(degrees: Mapping[str, F64], body: Body) -> Angles:
+    """Return angles between joint centres, named as in angles.csv, from a body's rest pose on."""
+    rest = angles.measure(body, np.eye(4)[None], np.zeros((1, len(body.twists))))
+    at_rest = dict(zip(rest.names, rest.value[0], strict=True))
+    return named({name: values - at_rest[name] for name, values in degrees.items() if name in at_rest}, COLUMNS)
+
+
+def from_opensim(path: Path, body: Body) -> Angles:
+    """Read an OpenSim motion: degrees from the straight limb."""
+    columns, _ = markers.read_mot(path)
+    rest = opensim_at_rest(body)
+    return named({name: columns[name] - rest[name] for name in rest if name in columns}, COORDINATES)
+
+
+def opensim_at_rest(body: Body) -> Mapping[str, float]:
+    """Return what OpenSim calls the angles of the rest pose, in degrees."""
+    from mocapflow_sequence.opensim import coordinates
+
+    found = coordinates(body, np.eye(4)[None], np.zeros((1, len(body.twists))))
+    return {name: float(value[0]) for name, value in found.items()}
+
+
+def named(degrees: Mapping[str, F64], table: Mapping[str, str]) -> Angles:
+    """Return columns in degrees by the screws that a table of names without sides gives them."""
+    found = {}
+    for name, values in degrees.items():
+        column, side = name[:-2], name[-2:]
+        if column in table:
+            joint, _, angle = table[column].partition(".")
+            found[f"{joint}{side}.{angle}"] = np.radians(values)
+    return found
+
+
+READERS: Mapping[str, Callable[[Path, Body], Angles]] = {
+    ".npz": from_rotations,
+    ".bvh": from_joints,
+    ".csv": from_table,
+    ".mot": from_opensim,
+}

@@ -1,0 +1,97 @@
+"""Joint angles from BVH motions, whose rest poses and axes differ: from the places of the joints alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from mocapflow.errors import RecordingError
+from mocapflow.geometry.angles import three_point
+from mocapflow.records import F64
+
+ALIASES: Mapping[str, tuple[str, ...]] = {  # ours: those of CMU and HDM05 conversions, Mixamo, MotionBuilder
+    "hip_l": ("leftupleg", "lefthip", "lhipjoint", "lefthipjoint", "lfemur"),
+    "knee_l": ("leftleg", "leftknee", "leftlowleg", "ltibia"),
+    "ankle_l": ("leftfoot", "leftankle", "lfoot"),
+    "toe_l": ("lefttoebase", "lefttoe", "ltoes"),
+    "shoulder_l": ("leftarm", "leftshoulder", "leftuparm", "lhumerus"),
+    "elbow_l": ("leftforearm", "leftelbow", "leftlowarm", "lradius"),
+    "wrist_l": ("lefthand", "leftwrist", "lwrist"),
+    "spine": ("spine", "lowerback", "torso", "chest"),
+}
+CHAINS = {
+    "knee_flexion": ("hip", "knee", "ankle"),
+    "ankle": ("knee", "ankle", "toe"),
+    "elbow": ("shoulder", "elbow", "wrist"),
+}
+
+
+def columns(path: Path) -> dict[str, F64]:
+    """Return the angles (T,) in degrees that the joints of a BVH file allow, named as in angles.csv.
+
+    Raises:
+        RecordingError: the reader of BVH files is not installed.
+    """
+    places = joint_places(path)
+    found: dict[str, F64] = {}
+    for side in ("l", "r"):
+        for column, chain in CHAINS.items():
+            names = [f"{joint}_{side}" for joint in chain]
+            if set(names) <= set(places):
+                bend = three_point(np.stack([places[name] for name in names], axis=1))
+                found[f"{column}_{side}"] = bend - 90 if column == "ankle" else bend
+        if {"hip_l", "hip_r", "spine", f"knee_{side}"} <= set(places):
+            found[f"hip_flexion_{side}"] = hip_flexion(places, side)
+    return found
+
+
+def joint_places(path: Path) -> dict[str, F64]:
+    """Return where each joint we have a name for is in every frame: (T, 3), in the unit of the file."""
+    try:
+        import bvhio
+    except ImportError as error:
+        hint = "pip install 'mocapflow[bvh]'"
+        raise RecordingError("BVH files need the package bvhio", where=str(path), hint=hint) from error
+    root = bvhio.readAsHierarchy(str(path))
+    joints = [joint for joint, _, _ in root.layout()]
+    ours = our_names([joint.Name for joint in joints])
+    first, last = root.getKeyframeRange()
+    places: dict[str, list[tuple[float, float, float]]] = {name: [] for name in ours}
+    for frame in range(first, last + 1):
+        root.loadPose(frame)
+        for name, index in ours.items():
+            places[name].append(tuple(joints[index].PositionWorld))
+    return {name: np.array(way) for name, way in places.items()}
+
+
+def our_names(names: Sequence[str]) -> dict[str, int]:
+    """Return which of the joints of a file are joints of ours."""
+    plain = [name.rpartition(":")[2].lower().replace("_", "").replace(" ", "") for name in names]
+    found = {}
+    for ours, others in ALIASES.items():
+        sides = ("l", "r") if ours.endswith("_l") else ("",)
+        for side in sides:
+            called = [mirrored(other) if side == "r" else other for other in others]
+            index = next((plain.index(name) for name in called if name in plain), None)
+            if index is not None:
+                found[ours[:-1] + side if side else ours] = index
+    return found
+
+
+def mirrored(name: str) -> str:
+    """Return the name of the same joint on the right."""
+    return name.replace("left", "right") if name.startswith("left") else "r" + name[1:]
+
+
+def hip_flexion(places: Mapping[str, F64], side: str) -> F64:
+    """Return the angle (T,) in degrees of a thigh from straight down in the pelvis' sagittal plane."""
+    left = places["hip_l"] - places["hip_r"]
+    up = places["spine"] - 0.5 * (places["hip_l"] + places["hip_r"])
+    forward = np.cross(left, up)
+    up = np.cross(forward, left)
+    thigh = places[f"knee_{side}"] - places[f"hip_{side}"]
+    ahead, above = ((thigh * axis).sum(axis=1) / np.linalg.norm(axis, axis=1) for axis in (forward, up))
+    angle: F64 = np.degrees(np.arctan2(ahead, -above))
+    return angle

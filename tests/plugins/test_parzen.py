@@ -1,0 +1,134 @@
+"""The density of training poses: its slope, integral and bandwidth; and limbs nobody sees."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mocapflow_priors.density import Density, bandwidth, log_density, read, write
+from mocapflow_priors.parzen import Parzen
+from mocapflow_twist.solver import TwistGaussNewton
+from twist_fixtures import exact_matches, make_pose, make_scene, make_state
+
+from mocapflow.data import Estimate, Past, Pose, Turn
+from mocapflow.errors import PipelineError
+from mocapflow.model import ClothedModel
+from mocapflow.testing import PriorConformance
+from mocapflow.testing.scenes import tiny_scene
+
+RNG = np.random.default_rng(0)
+LEG = ("screw0", "screw1", "screw2", "screw3", "screw4")  # of the random body: joints 1 to 3
+
+
+def gait(names: tuple[str, ...], count: int = 60) -> Density:
+    """A closed curve of poses."""
+    phase = np.linspace(0, 2 * np.pi, count, endpoint=False)
+    poses = np.stack([0.5 * np.sin(phase + k) for k in range(len(names))], axis=1)
+    return Density(names=names, poses=poses, bandwidth=bandwidth(poses))
+
+
+class TestParzenConforms(PriorConformance):
+    bounds_energy = True
+
+    @pytest.fixture(autouse=True)
+    def trained(self, tmp_path: Path) -> None:
+        write(tmp_path / "poses.npz", gait(tiny_scene().body.screw_names))
+        type(self).prior = Parzen(poses=tmp_path / "poses.npz")
+
+    prior = Parzen()
+
+
+def test_slope_of_the_density() -> None:
+    density, place, step = gait(("a", "b", "c")), np.array([0.3, -0.2, 0.9]), 1e-5
+    _, mean = log_density(density, place)
+    slope = [
+        (log_density(density, place + step * axis)[0] - log_density(density, place - step * axis)[0]) / (2 * step)
+        for axis in np.eye(3)
+    ]
+    assert (mean - place) / density.bandwidth**2 == pytest.approx(slope, rel=1e-8)
+
+
+def test_the_density_integrates_to_one() -> None:
+    density = gait(("a", "b"))
+    grid = np.linspace(-1.5, 1.5, 151)
+    total = sum(np.exp(log_density(density, np.array([x, y]))[0]) for x in grid for y in grid)
+    assert total * (grid[1] - grid[0]) ** 2 == pytest.approx(1.0, abs=1e-3)
+
+
+def test_bandwidth_is_the_largest_distance_to_a_neighbour() -> None:
+    poses = RNG.normal(size=(40, 3))
+    apart = np.linalg.norm(poses[:, None] - poses, axis=2) + 1e9 * np.eye(40)
+    assert bandwidth(poses) == pytest.approx(apart.min(axis=1).max())
+    assert bandwidth(poses, 50) == pytest.approx(np.median(apart.min(axis=1)))
+
+
+def test_angles_wrap_and_far_poses_do_not_underflow() -> None:
+    density = gait(("a", "b"))
+    place = np.array([0.2, 0.1])
+    near, far = log_density(density, place), log_density(density, place + 2 * np.pi)
+    assert near[0] == pytest.approx(far[0])
+    log_p, mean = log_density(density, np.array([2.9, -2.9]))
+    assert np.isfinite(log_p)
+    assert np.abs(mean).max() < 1.0
+
+
+def test_full_steps_to_the_mean_climb() -> None:
+    density, place = gait(("a", "b", "c")), np.array([1.2, -1.0, 0.8])
+    heights = []
+    for _ in range(20):
+        log_p, place = log_density(density, place)
+        heights.append(log_p)
+    assert (np.diff(heights) > -1e-12).all()
+
+
+def test_an_unseen_leg_comes_to_rest_in_a_training_pose(tmp_path: Path) -> None:
+    scene, truth = make_scene(), make_pose(1)
+    poses = np.tile([0.4, -0.3, 0.2, 0.5, 0.1], (6, 1)) + 0.01 * RNG.normal(size=(6, 5))
+    write(tmp_path / "poses.npz", Density(names=LEG, poses=poses, bandwidth=0.1))
+    leg = np.isin(scene.body.skin_joint, (1, 2, 3)) & (scene.body.skin_weight > 0)
+    seen = np.flatnonzero(~leg.any(axis=1))
+    solver = TwistGaussNewton(angle_damping_deg=1e4)
+    matches = exact_matches(scene, truth, seen, directed=False)
+
+    def solved(*priors: Parzen) -> Estimate:
+        state = make_state(Pose(root=truth.root, angles=np.full(12, 0.05)))
+        return solver.solve(lambda _: matches, state, ClothedModel(scene=scene), priors, Past(), Turn(index=0, cap=1))
+
+    with_prior, without = solved(Parzen(poses=tmp_path / "poses.npz")), solved()
+    np.testing.assert_allclose(with_prior.pose.angles[:5], poses.mean(axis=0), atol=0.01)
+    np.testing.assert_allclose(without.pose.angles[:5], 0.05, atol=1e-6)
+    np.testing.assert_allclose(with_prior.pose.angles[5:], truth.angles[5:], atol=1e-4)
+    spread, unknown = (np.sqrt(np.diag(estimate.covariance))[6:11] for estimate in (with_prior, without))
+    assert (spread < 0.1 + 1e-9).all()
+    assert (unknown > 100).all()  # rad: the damping alone
+
+
+def test_angles_the_body_lacks_are_left_out(tmp_path: Path) -> None:
+    density = gait((*LEG, "tail.wag"))
+    write(tmp_path / "poses.npz", density)
+    scene, pose = make_scene(), make_pose(2)
+    residual = Parzen(poses=tmp_path / "poses.npz").residual(pose, Past(), scene)
+    log_p, _ = log_density(density.of(LEG), pose.angles[:5])
+    assert residual.error.shape == (5,)
+    assert residual.energy == pytest.approx(density.of(LEG).peak - log_p)
+    bare = replace(scene, body=replace(scene.body, screw_names=tuple(f"other{k}" for k in range(12))))
+    assert Parzen(poses=tmp_path / "poses.npz").residual(pose, Past(), bare).error.shape == (0,)
+
+
+def test_the_shipped_poses_are_walks_squats_and_more() -> None:
+    density = Parzen().density
+    knees = np.degrees(density.poses[:, [density.names.index(f"knee_{side}.flexion") for side in "lr"]])
+    assert {"hip_l.abduction", "shoulder_r.raise", "elbow_l.flexion"} < set(density.names)
+    assert knees.min() > -25
+    assert 60 < knees.max() < 140
+    assert 5 < np.degrees(density.bandwidth) < 30
+
+
+def test_a_file_of_something_else(tmp_path: Path) -> None:
+    (tmp_path / "poses.npz").write_text("hello")
+    with pytest.raises(PipelineError, match=r"this is no file of training poses"):
+        read(tmp_path / "poses.npz")
+    with pytest.raises(PipelineError, match=r"there is no such file of training poses"):
+        read(tmp_path / "none.npz")

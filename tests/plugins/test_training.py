@@ -1,0 +1,143 @@
+"""Training poses: one motion comes out the same from every kind of file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mocapflow_bodies.template import Template
+from mocapflow_priors import training, training_bvh
+from mocapflow_priors.density import read
+from mocapflow_sequence import opensim, tables
+from typer.testing import CliRunner
+
+from mocapflow.cli import app
+from mocapflow.data import Body
+from mocapflow.errors import RecordingError
+from mocapflow.geometry import angles
+from mocapflow.geometry.joints import rotations_from_angles
+from mocapflow.io import markers
+
+BENT = {"hip_l.flexion": 40.0, "knee_l.flexion": 70.0, "ankle_l.dorsiflexion": 12.0, "elbow_l.flexion": 50.0}
+BVH = """HIERARCHY
+ROOT Hips
+{{
+  OFFSET 0 0 0
+  CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+  JOINT Spine
+  {{
+    OFFSET 0 10 0
+    CHANNELS 3 Zrotation Xrotation Yrotation
+    End Site
+    {{
+      OFFSET 0 10 0
+    }}
+  }}
+{legs}
+}}
+MOTION
+Frames: 1
+Frame Time: 0.0333
+{values}
+"""
+LEG = """  JOINT {side}UpLeg
+  {{
+    OFFSET {x} 0 0
+    CHANNELS 3 Zrotation Xrotation Yrotation
+    JOINT {side}Leg
+    {{
+      OFFSET 0 -40 0
+      CHANNELS 3 Zrotation Xrotation Yrotation
+      JOINT {side}Foot
+      {{
+        OFFSET 0 -40 0
+        CHANNELS 3 Zrotation Xrotation Yrotation
+        JOINT {side}ToeBase
+        {{
+          OFFSET 0 0 15
+          CHANNELS 3 Zrotation Xrotation Yrotation
+          End Site
+          {{
+            OFFSET 0 0 5
+          }}
+        }}
+      }}
+    }}
+  }}"""
+
+
+@pytest.fixture(scope="module")
+def body() -> Body:
+    return Template().load(Path())
+
+
+@pytest.fixture(scope="module")
+def motion(body: Body) -> np.ndarray:
+    poses = np.zeros((12, len(body.twists)))
+    for name, degrees in BENT.items():
+        poses[:, body.screw_names.index(name)] = np.radians(np.linspace(0.3, 1, 12) * degrees)
+    return poses
+
+
+def assert_same(found: training.Angles, motion: np.ndarray, body: Body, atol_deg: float = 1e-4) -> None:
+    assert set(BENT) <= set(found)
+    for name in BENT:
+        expected = np.degrees(motion[:, body.screw_names.index(name)])
+        np.testing.assert_allclose(np.degrees(found[name]), expected, atol=atol_deg, err_msg=name)
+
+
+def test_joint_rotations(body: Body, motion: np.ndarray, tmp_path: Path) -> None:
+    turns = [rotations_from_angles(body, pose) for pose in motion]
+    names = list(turns[0])
+    vectors = np.array([[turn[name] for name in names] for turn in turns])
+    np.savez(tmp_path / "take.npz", rotation_vectors=vectors, joint_names=np.array(names))
+    assert_same(training.read_angles(tmp_path / "take.npz", body), motion, body)
+
+
+def test_a_table_of_angles(body: Body, motion: np.ndarray, tmp_path: Path) -> None:
+    series = angles.measure(body, np.tile(np.eye(4), (12, 1, 1)), motion)
+    columns = {name: series.value[:, k] for k, name in enumerate(series.names)}
+    tables.write_columns(tmp_path / "angles.csv", columns)
+    found = training.read_angles(tmp_path / "angles.csv", body)
+    assert_same(
+        found, motion, body, atol_deg=1.5
+    )  # a hinge that is not quite square to the limb, and hip against thigh
+
+
+def test_an_opensim_motion(body: Body, motion: np.ndarray, tmp_path: Path) -> None:
+    columns = opensim.coordinates(body, np.tile(np.eye(4), (12, 1, 1)), motion)
+    markers.write_mot(tmp_path / "angles.mot", columns, np.arange(12) / 30)
+    assert_same(training.read_angles(tmp_path / "angles.mot", body), motion, body, atol_deg=2.5)
+
+
+def test_a_bvh_motion(tmp_path: Path) -> None:
+    pytest.importorskip("bvhio")
+    legs = "\n".join(LEG.format(side=side, x=x) for side, x in (("Left", 10), ("Right", -10)))
+    values = "0 0 0 0 0 0  0 0 0  0 -30 0  0 70 0  0 -15 0  0 0 0  0 0 0  0 0 0  0 0 0  0 0 0"
+    (tmp_path / "take.bvh").write_text(BVH.format(legs=legs, values=values))
+    found = training_bvh.columns(tmp_path / "take.bvh")
+    expected = {"hip_flexion_l": 30, "knee_flexion_l": 70, "ankle_l": 15, "hip_flexion_r": 0, "knee_flexion_r": 0}
+    for name, degrees in expected.items():
+        assert found[name] == pytest.approx([degrees], abs=1e-3), name
+
+
+def test_the_command(body: Body, motion: np.ndarray, tmp_path: Path) -> None:
+    columns = opensim.coordinates(body, np.tile(np.eye(4), (12, 1, 1)), motion)
+    markers.write_mot(tmp_path / "take.mot", columns, np.arange(12) / 30)
+    out = tmp_path / "poses.npz"
+    command = ["prior", "fit", str(tmp_path / "take.mot"), "--out", str(out), "--angle", "knee.flexion"]
+    said = CliRunner().invoke(app, command)
+    assert said.exit_code == 0, said.output
+    assert "12 poses" in said.output
+    assert read(out).names == ("knee_l.flexion", "knee_r.flexion")
+
+
+def test_errors(body: Body, tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"no kind of file with joint angles\n.*known: \.bvh, \.csv, \.mot, \.npz"):
+        training.read_angles(tmp_path / "take.txt", body)
+    with pytest.raises(RecordingError, match=r"there is no such file"):
+        training.read_angles(tmp_path / "take.mot", body)
+    (tmp_path / "empty.csv").write_text("frame,time\n0,0\n")
+    with pytest.raises(RecordingError, match=r"the files share none of the angles hip"):
+        training.fit([tmp_path / "empty.csv"], body)
