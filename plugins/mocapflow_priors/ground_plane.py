@@ -7,8 +7,9 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
+from mocapflow.assets import Body
 from mocapflow.components import Prior
-from mocapflow.data import Body, Past, Pose, Residual
+from mocapflow.data import Past, Pose, Residual
 from mocapflow.geometry import kinematics
 from mocapflow.records import F64
 from mocapflow.scene import Scene

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mocapflow.data import Body
+from mocapflow.assets import Body
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import angles
 from mocapflow.geometry.joints import angles_from_rotations

@@ -12,8 +12,8 @@ from mocapflow_priors.density import read
 from mocapflow_sequence import opensim, tables
 from typer.testing import CliRunner
 
+from mocapflow.assets import Body
 from mocapflow.cli import app
-from mocapflow.data import Body
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import angles
 from mocapflow.geometry.joints import rotations_from_angles
