@@ -55,8 +55,8 @@ def bandwidth(poses: F64, percentile: float = 100.0) -> float:
 
     Source: Rosenhahn 2008, section 12.5.1
     """
-    nearest, _ = KDTree(poses).query(poses, 2)
-    return float(np.percentile(nearest[:, 1], percentile))
+    distance = np.asarray(KDTree(poses).query(poses, 2)[0])  # to itself and to the nearest other
+    return float(np.percentile(distance[:, 1], percentile))
 
 
 def wrapped(difference: F64) -> F64:
