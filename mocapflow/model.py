@@ -25,11 +25,19 @@ class ClothedModel:
 
     def drape(self, pose: Pose, parameters: F64, past: Past) -> Cloth:
         """Return the garment laid on one pose."""
-        if self.draper is None or self.scene.garment is None:
+        if not self.clothed:
             return NO_CLOTH
-        poses = PoseBatch(root=pose.root[None], angles=pose.angles[None])
-        vertices = self.draper.drape(poses, parameters[None], past, self.scene)[0]
-        return Cloth(vertices=vertices, parameters=parameters)
+        return Cloth(vertices=self.drapes(pose, parameters[None], past)[0], parameters=parameters)
+
+    def drapes(self, pose: Pose, parameters: F64, past: Past) -> F64:
+        """Return the garment's vertices (B, W, 3) laid on one pose with parameters (B, Q)."""
+        if self.draper is None:
+            return np.empty((len(parameters), 0, 3))
+        count = len(parameters)
+        poses = PoseBatch(
+            root=np.repeat(pose.root[None], count, axis=0), angles=np.repeat(pose.angles[None], count, axis=0)
+        )
+        return self.draper.drape(poses, parameters, past, self.scene)
 
     def surface(self, pose: Pose, cloth: Cloth) -> Surface:
         """Return body and given cloth posed in the world."""

@@ -10,8 +10,9 @@ from mocapflow.hookspecs import hookimpl
 def mocapflow_cloth_fitters() -> list[type[ClothFitter]]:
     """Return the cloth fitters of this package."""
     from mocapflow_draping.fixed import Fixed
+    from mocapflow_draping.sampled_forces import SampledForces
 
-    return [Fixed]
+    return [Fixed, SampledForces]
 
 
 @hookimpl

@@ -1,0 +1,47 @@
+"""How far the outline of a surface is off the silhouettes of a frame, read from their distance fields."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from mocapflow.assets import Camera
+from mocapflow.data import Contour, Segmentation, Silhouette, Surface
+from mocapflow.geometry.silhouettes import occluding_contour
+from mocapflow.records import F32, F64
+
+PERSON = "person"
+
+
+def misfit(surface: Surface, segmentation: Segmentation, cameras: Sequence[Camera], spacing_px: float) -> F64:
+    """Return the integral along the model's outline of its squared distance to the silhouette, per view (C,) px³.
+
+    It is what the area term of section 12.4 measures, without drawing the surface: where two contours are d apart,
+    their distance fields differ by d all across the band. Zero where a view has no silhouette.
+    """
+    error = np.zeros(len(cameras))
+    for silhouette, contour in outlines(surface, segmentation, cameras, spacing_px):
+        error[silhouette.camera] = spacing_px * float(np.sum(at(silhouette.distance, contour.pixel) ** 2))
+    return error
+
+
+def outlines(
+    surface: Surface, segmentation: Segmentation, cameras: Sequence[Camera], spacing_px: float
+) -> Iterator[tuple[Silhouette, Contour]]:
+    """Yield every silhouette of the person with the occluding contour of the surface in its view."""
+    for silhouette in segmentation.silhouettes:
+        if silhouette.layer == PERSON:
+            yield silhouette, occluding_contour(surface, cameras[silhouette.camera], spacing_px)
+
+
+def at(field: F32 | F64, pixels: F64) -> F64:
+    """Return a field (H, W) at pixels (K, 2), bilinearly; outside the image the value at its edge."""
+    height, width = field.shape
+    x, y = np.clip(pixels[:, 0], 0, width - 1.001), np.clip(pixels[:, 1], 0, height - 1.001)
+    column, row = x.astype(int), y.astype(int)
+    right, down = x - column, y - row
+    above = (1 - right) * field[row, column] + right * field[row, column + 1]
+    below = (1 - right) * field[row + 1, column] + right * field[row + 1, column + 1]
+    value: F64 = (1 - down) * above + down * below
+    return value

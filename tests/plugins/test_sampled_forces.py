@@ -1,0 +1,111 @@
+"""Forces and thickness found again from silhouettes."""
+
+import numpy as np
+import pytest
+from drape_bodies import legs
+from mocapflow_draping import samples
+from mocapflow_draping.kinematic import Kinematic
+from mocapflow_draping.sampled_forces import SampledForces
+from mocapflow_garments.skirt import Skirt
+from test_draping import SKIRT
+
+from mocapflow.data import Estimate, Frame, Moment, Past, Pose, Segmentation, Silhouette, Turn
+from mocapflow.geometry.misfit import misfit
+from mocapflow.geometry.silhouettes import model_distance
+from mocapflow.model import ClothedModel
+from mocapflow.scene import Scene
+from mocapflow.testing.views import SIZE, tiny_camera
+
+STEP = np.radians(10.0)  # between the amounts that are tried first
+TURN = Turn(index=0, cap=8)
+STANDING = Pose(root=np.eye(4), angles=np.zeros(4))
+
+
+@pytest.fixture(scope="module")
+def model():
+    """A skirt on legs of capsules before four cameras."""
+    body = legs()
+    cameras = tuple(tiny_camera(index, 2 * np.pi * (index + 0.3) / 4) for index in range(4))
+    garment = Skirt(**SKIRT, force_orders=(0, 1, 2)).sew(body)
+    return ClothedModel(scene=Scene(cameras=cameras, body=body, garment=garment), draper=Kinematic(sweeps=0))
+
+
+def parameters(model, **values):
+    return np.array([values.get(name, 0.0) for name in model.scene.garment.parameter_names])
+
+
+def seen(model, truth):
+    """Return the silhouettes of the person whose garment hangs by the true parameters."""
+    surface = model.surface(STANDING, model.drape(STANDING, truth, Past()))
+    found = [
+        Silhouette(camera=index, layer="person", distance=model_distance(surface, camera, 12.0))
+        for index, camera in enumerate(model.scene.cameras)
+    ]
+    return Segmentation(silhouettes=tuple(found))
+
+
+def fitted(model, truth, start, past=None, **settings):
+    blank = np.zeros((SIZE[1], SIZE[0], 3), np.uint8)
+    frame = Frame(index=0, time=0.0, images=(blank,) * 4, usable=np.ones(4, bool))
+    estimate = Estimate(pose=STANDING, parameters=start, covariance=np.eye(10 + len(start)))
+    fitter = SampledForces(**settings)
+    return fitter.fit(frame, seen(model, truth), estimate, model, past or Past(), TURN)
+
+
+def later(model):
+    """Return what a frame after the first ones knows."""
+    calm = model.drape(STANDING, parameters(model), Past())
+    return Past(moments=tuple(Moment(time=index / 30, pose=STANDING, cloth=calm) for index in range(2)))
+
+
+@pytest.mark.parametrize("azimuth_deg", [10.0, 155.0, 280.0])
+def test_a_known_wind_is_recovered_within_one_sampling_step(model, azimuth_deg):
+    azimuth = np.radians(azimuth_deg)
+    truth = parameters(model, wind_cos_rad=0.3 * np.cos(azimuth), wind_sin_rad=0.3 * np.sin(azimuth))
+    found = fitted(model, truth, parameters(model)).parameters
+    cos, sin = (found[model.scene.garment.parameter_names.index(f"wind_{part}_rad")] for part in ("cos", "sin"))
+    turned = np.degrees(np.abs(np.angle(np.exp(1j * (np.arctan2(sin, cos) - azimuth)))))
+    assert turned < 360 / 8 / 2
+    assert abs(np.hypot(cos, sin) - 0.3) < STEP
+
+
+def test_thickness_is_measured_in_the_first_frame_and_kept(model):
+    truth, nothing = parameters(model, thickness_m=0.006), parameters(model)
+    thickness = model.scene.garment.parameter_names.index("thickness_m")
+    assert abs(fitted(model, truth, nothing).parameters[thickness] - 0.006) <= 0.002
+    assert fitted(model, truth, nothing, later(model)).parameters[thickness] == 0
+
+
+def test_later_frames_follow_a_force_step_by_step(model):
+    column = model.scene.garment.parameter_names.index("flare_rad")
+    found = parameters(model)
+    for _ in range(4):
+        found = fitted(model, parameters(model, flare_rad=0.12), found, later(model)).parameters
+    assert abs(found[column] - 0.12) < np.radians(2.5)
+
+
+def test_forces_that_gain_nothing_are_left_alone(model):
+    truth = parameters(model, flare_rad=0.1)
+    np.testing.assert_array_equal(fitted(model, truth, truth, later(model)).parameters, truth)
+
+
+def test_the_misfit_grows_with_the_distance_between_outlines(model):
+    segmentation = seen(model, parameters(model))
+    errors = []
+    for flare in (0.0, 0.05, 0.1, 0.2):
+        surface = model.surface(STANDING, model.drape(STANDING, parameters(model, flare_rad=flare), Past()))
+        errors.append(misfit(surface, segmentation, model.scene.cameras, 4.0))
+    assert (np.diff(errors, axis=0) > 0).all()
+    assert np.array(errors)[0].max() < 0.1 * np.array(errors)[1].min()
+
+
+def test_samples_cover_every_force(model):
+    garment = model.scene.garment
+    assert [[garment.parameter_names[c] for c in columns] for columns in samples.forces(garment)] == [
+        ["flare_rad"], ["wind_cos_rad", "wind_sin_rad"], ["two_cos_rad", "two_sin_rad"],
+    ]  # fmt: skip
+    values = samples.in_all_directions(2, 8, np.radians([5.0, 10.0, 20.0]))
+    assert values.shape == (25, 2)
+    beside = samples.neighbours(garment, parameters(model), 0.1, 0.0)
+    assert beside.shape == (10, 6)
+    assert (beside[:, garment.parameter_names.index("thickness_m")] == 0).all()
