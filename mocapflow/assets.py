@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from mocapflow.errors import MocapflowError, alternatives
+import numpy as np
+
+from mocapflow.errors import GarmentError, MocapflowError, alternatives
 from mocapflow.records import F32, F64, I32, Bool, array, record
 
 
@@ -75,6 +77,28 @@ class GarmentMesh:
     pinned_to: I32 = array("P", unit="body vertex index")
     parameter_names: tuple[str, ...]
     parameter_bounds: F64 = array("Q", 2, unit="unit of the parameter")
+    repairs: tuple[str, ...] = ()  # tape measures that were changed so that it could be sewn; also in run.json
+
+    def __post_init__(self) -> None:
+        """Refuse what no draper could lay.
+
+        Raises:
+            GarmentError: a vertex is not finite or not there, or a link has no length.
+        """
+        count = len(self.vertices)
+        for what, index in (("face", self.faces), ("strand", self.strands), ("ring", self.rings), ("pin", self.pinned)):
+            if index.max(initial=-1) >= count:
+                raise GarmentError(f"{self.name}: a {what} names vertex {index.max()} of {count}")
+        if not np.isfinite(self.vertices).all():
+            first = int(np.argwhere(~np.isfinite(self.vertices))[0, 0])
+            raise GarmentError(f"{self.name}: vertex {first} is not finite", hint="check the tape measures")
+        links = np.linalg.norm(np.diff(self.vertices[self.strands], axis=1), axis=2)
+        short = np.argwhere((links <= 0) & (self.strands[:, 1:] >= 0))
+        if len(short):
+            hint = "each vertex of a strand must lie below the one before it"
+            raise GarmentError(f"{self.name}: strand {short[0, 0]} has a link of zero length", hint=hint)
+        if not (self.ring_length > 0).all():
+            raise GarmentError(f"{self.name}: ring link {int((self.ring_length > 0).argmin())} has no length")
 
 
 @record

@@ -152,7 +152,9 @@ class Execution:
             body = self._result(step.body) if step.body else self._blaming(model, lambda: model.load(folder))
             sewn = self._blaming(garment, lambda: garment.sew(body)) if garment else None
             cameras = self._result(step.rig).cameras if step.rig else step.recording.cameras
-            self._scenes[place] = Scene(cameras=cameras, body=body, garment=sewn)
+            scene = self._scenes[place] = Scene(cameras=cameras, body=body, garment=sewn)
+            for warning in scene.warnings:
+                self._report(f"warning: {warning}")
         return self._scenes[place]
 
     def _blaming(self, component: Component, call: Callable[[], Value], kept: Callable[[], str] = str) -> Value:

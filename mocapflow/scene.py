@@ -24,6 +24,11 @@ class Scene:
     garment: GarmentMesh | None = None
     background: Background | None = None
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a user should know of the person's clothes; also in run.json."""
+        return () if self.garment is None else tuple(f"{self.garment.name}: {said}" for said in self.garment.repairs)
+
     def with_background(self, background: Background | None) -> Scene:
         """Return the scene with the empty room known."""
         return replace(self, background=background)

@@ -16,6 +16,7 @@ HARMONICS: tuple[tuple[str, ...], ...] = (
 )
 LARGEST_TILT = math.radians(40)
 LARGEST_THICKNESS = 0.010  # m
+NOTICED = 0.001  # m by which a garment is wider than its measure: less is not worth a word
 
 Parameters = tuple[tuple[str, ...], F64]
 
@@ -39,6 +40,7 @@ def sheet(
     around: F64 | None = None,
     carried_by: I32 | None = None,
     parameters: Parameters | None = None,
+    repairs: tuple[str, ...] = (),
 ) -> GarmentMesh:
     """Return the garment of a grid of cloth: strands side by side, each pinned to the skin nearest its first point.
 
@@ -51,6 +53,7 @@ def sheet(
         around: (L,) m, wanted length of each row from one end to the other; None: as the points lie.
         carried_by: (L,) joint that moves each row before the drape; None: the one that moves the pinned skin.
         parameters: names and bounds (Q, 2); None: thickness alone.
+        repairs: tape measures that were changed so that it could be sewn, see `widened`.
     """
     count, length = rows.shape[:2]
     grid = np.arange(count * length, dtype=np.int32).reshape(count, length)
@@ -73,6 +76,16 @@ def sheet(
         pinned_to=pinned_to,
         parameter_names=names,
         parameter_bounds=bounds,
+        repairs=repairs,
+    )
+
+
+def widened(**measures: tuple[float, float]) -> tuple[str, ...]:
+    """Return what to record of tape measures, wanted and sewn (m), that are too tight for the body under them."""
+    return tuple(
+        f"{name} {wanted:.3f} is tighter than the body; widened to {sewn:.3f}"
+        for name, (wanted, sewn) in measures.items()
+        if sewn > wanted + NOTICED
     )
 
 

@@ -49,18 +49,12 @@ def strands_of(garment: GarmentMesh, body: Body) -> Strands:
     """Return the strands of a garment.
 
     Raises:
-        PluginError: a strand does not begin at a pinned vertex or has a link without length.
+        PluginError: a strand does not begin at a pinned vertex.
     """
     vertex, first, last = _rows(garment)
     rows = garment.vertices[vertex]
     links = np.linalg.norm(np.diff(rows, axis=1), axis=2)
     own = _own(first, last, vertex.shape[1])
-    if (links[own[:, 1:] & own[:, :-1]] <= 0).any():
-        strand = int(np.argwhere((links <= 0) & own[:, 1:] & own[:, :-1])[0, 0])
-        raise PluginError(
-            f"garment {garment.name}: strand {strand} has a link of zero length",
-            hint="each vertex of a strand must lie below the one before it",
-        )
     skin = _pinned_skin(garment, vertex[:, 0])
     beside, ring_length = _beside(garment, vertex, own)
     carrier = garment.carried_by[vertex[:, -1]]

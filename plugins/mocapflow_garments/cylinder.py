@@ -33,9 +33,10 @@ class Cylinder(Garment):
         """Return the tube on the rest body."""
         tapes = ("upper_circumference_m", "lower_circumference_m", "length_m")
         pattern.check_measures(self.name, {tape: getattr(self, tape) for tape in tapes})
-        around = np.linspace(self.upper_circumference_m, self.lower_circumference_m, self.rings)
         upper, away = self._upper(body)
         band = sections.band(upper[1], away, self.strands)
+        sewn = max(self.upper_circumference_m, sections.perimeter(band[0]))
+        around = np.linspace(sewn, self.lower_circumference_m, self.rings)
         flat, facing = band[0][::-1], band[1][::-1]  # the plane is seen from above: its normal points down the limb
         out = (around - around[0]) / (2 * math.pi)
         link = self.length_m / (self.rings - 1)
@@ -51,6 +52,7 @@ class Cylinder(Garment):
             around=around,
             carried_by=np.array(carried, np.int32),
             parameters=sewing.force_parameters(self.force_orders),
+            repairs=sewing.widened(upper_circumference_m=(self.upper_circumference_m, sewn)),
         )
 
     def _upper(self, body: Body) -> tuple[tuple[sections.Plane, F64], float]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 
 import numpy as np
 
@@ -15,10 +14,6 @@ from mocapflow_garments import sections
 EASE = 0.002  # m, the least room between waistband and skin
 MEANT = 1.3  # a measure that is further below the body's own is a mistake
 LARGEST_ROOM = 0.08  # m between waistband and skin: more can't hold a garment up
-
-
-class GarmentRepaired(UserWarning):
-    """A measure was changed so that the garment could be sewn."""
 
 
 def check_measures(garment: str, measures: dict[str, float]) -> None:
@@ -34,11 +29,6 @@ def check_measures(garment: str, measures: dict[str, float]) -> None:
             raise GarmentError(
                 f"{garment}: {key} is {value} m", hint="measures are in metres; was it meant in cm or mm?"
             )
-
-
-def repaired(garment: str, what: str) -> None:
-    """Record that a measure was changed."""
-    warnings.warn(f"{garment}: {what}", GarmentRepaired, stacklevel=5)
 
 
 def even_links(rows: F64, link: float) -> F64:
@@ -61,11 +51,7 @@ def room(garment: str, measure: str, around: float, tape: float) -> float:
             f"{garment}: {measure} is {around:.2f} m, but the body measures {tape:.2f} m there",
             hint="check the place and the measure, and that the body is this person's",
         )
-    away = (around - tape) / (2 * math.pi)
-    if away < EASE:
-        wider = tape + 2 * math.pi * EASE
-        repaired(garment, f"{measure} {around:.3f} lies inside the body; widened to {wider:.3f}")
-    return max(away, EASE)
+    return max((around - tape) / (2 * math.pi), EASE)
 
 
 def waistband(garment: str, body: Body, height: float, around: float) -> tuple[F64, float]:

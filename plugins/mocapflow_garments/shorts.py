@@ -64,6 +64,11 @@ class Shorts(Garment):
             pinned_to=pinned_to,
             parameter_names=names,
             parameter_bounds=bounds,
+            repairs=sewing.widened(
+                waist_circumference_m=(self.waist_circumference_m, around[0]),
+                hip_circumference_m=(self.hip_circumference_m, around[:crotch].max()),
+                leg_opening_circumference_m=(self.leg_opening_circumference_m, around[-1]),
+            ),
         )
 
     def _check(self) -> None:
@@ -94,7 +99,8 @@ class Shorts(Garment):
         top = max(CROTCH * hips[-1] / 2, self.leg_opening_circumference_m)
         leg = np.linspace(top, self.leg_opening_circumference_m, self.rings - crotch)
         heights = self.waist_height_m - np.linspace(link * crotch, self.length_m, self.rings - crotch)
-        tubes = [self._tube(body, side, heights, leg) for side in (1.0, -1.0)]
+        tubes, thighs = zip(*(self._tube(body, side, heights, leg) for side in (1.0, -1.0)), strict=True)
+        leg = np.maximum(leg, np.max(thighs, axis=0))
         lower = np.concatenate([tube[:count] for tube in tubes])
         upper = self._hips(body, front.lift(waist), lower[:, 0], facing @ front.across, away, crotch)
         outer = pattern.even_links(np.concatenate([upper, lower], axis=1), link)
@@ -113,10 +119,13 @@ class Shorts(Garment):
             rows[:, row] += np.maximum(reach - (rows[:, row] * facing).sum(axis=1), 0.0)[:, None] * facing
         return rows
 
-    def _tube(self, body: Body, side: float, heights: F64, around: F64) -> F64:
-        """Return the rings (strands, rows, 3) of the leg on one side; strands run on from the waist's."""
+    def _tube(self, body: Body, side: float, heights: F64, around: F64) -> tuple[F64, F64]:
+        """Return the rings (strands, rows, 3) of the leg on one side, and the least length (rows,) around it.
+
+        Strands run on from the waist's.
+        """
         start = math.radians(-135.0 if side > 0 else 45.0)
-        rows = []
+        rows, least = [], []
         for height, length in zip(heights, around, strict=True):
             plane = sections.level(height, start)
             outlines = [sections.outline(points) for points in sections.sections(body, plane)]
@@ -127,9 +136,11 @@ class Shorts(Garment):
                     hint="waist_height_m - (length_m - inseam_m) must lie below the body's crotch",
                 )
             closed = min(legs, key=lambda o: abs(plane.lift(o)[:, 0].mean()))
-            away = max((length - sections.perimeter(closed)) / (2 * math.pi), pattern.EASE)
+            tape = sections.perimeter(closed)
+            away = pattern.room(self.name, "leg_opening_circumference_m", length, tape)
             rows.append(plane.lift(sections.band(closed, away, self.strands, 0.5)[0]))
-        return np.stack(rows, axis=1)
+            least.append(tape + 2 * math.pi * pattern.EASE)
+        return np.stack(rows, axis=1), np.array(least)
 
     def _legs(self, long: I32, short: I32, crotch: int) -> list[I32]:
         """Return the vertices (strands, rows) of each leg's tube, round the leg."""

@@ -39,7 +39,11 @@ class Skirt(Garment):
         around = pattern.hip_rings(body, self.waist_height_m, down, straight, away)
         rows = self._cone(waist, facing, around, self.length_m / (self.rings - 1))
         parameters = sewing.force_parameters(self.force_orders)
-        return sewing.sheet(self.name, body, rows, closed=True, around=around, parameters=parameters)
+        repairs = sewing.widened(
+            waist_circumference_m=(self.waist_circumference_m, around[0]),
+            hem_circumference_m=(self.hem_circumference_m, around[-1]),
+        )
+        return sewing.sheet(self.name, body, rows, closed=True, around=around, parameters=parameters, repairs=repairs)
 
     def _check(self, body: Body) -> None:
         tapes = ("waist_height_m", "waist_circumference_m", "hem_circumference_m", "length_m")

@@ -32,7 +32,7 @@ class Export(Stage):
         """Write the files and return their paths."""
         writers = {"csv": write_angles, "mot": write_motion, "trc": write_joints}
         paths = [path for format in self.formats for path in writers[format](track, scene, run_folder.path)]
-        content = runjson.summary(track, run_folder, recording.warnings)
+        content = runjson.summary(track, run_folder, recording.warnings + scene.warnings)
         return Files(paths=(*paths, runjson.write(layout.place(run_folder.path, layout.RUN), content)))
 
 

@@ -43,7 +43,7 @@ class Report(Stage):
     ) -> Files:
         """Write the report and return its paths."""
         curves = plot(track, scene, evaluation, run_folder.path)
-        summary = runjson.plain(runjson.summary(track, run_folder, recording.warnings))
+        summary = runjson.plain(runjson.summary(track, run_folder, recording.warnings + scene.warnings))
         sections = [
             ("Deviation from the reference", _deviations(evaluation)),
             ("Angles", page.picture(curves.read_bytes(), "png")),

@@ -138,15 +138,6 @@ def test_a_batch_is_its_drapes_one_by_one(skirted):
         np.testing.assert_array_equal(draper.drape(one, parameters[row : row + 1], Past(), scene)[0], together[row])
 
 
-def test_a_strand_of_no_length_is_refused(skirted):
-    scene, _ = skirted
-    garment = scene.garment
-    vertices = garment.vertices.copy()
-    vertices[5] = vertices[4]
-    with pytest.raises(PluginError, match="strand 0 has a link of zero length"):
-        strands_of(type(garment)(**{**vars(garment), "vertices": vertices}), scene.body)
-
-
 def test_a_draper_without_a_garment_says_so(skirted):
     scene, poses = skirted
     with pytest.raises(PluginError, match="no garment to drape"):

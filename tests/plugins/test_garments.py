@@ -1,14 +1,17 @@
 """Garments: what tape measures become, and what is said when they can't be meant."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from drape_bodies import legs
-from mocapflow_garments import pattern, sections
+from mocapflow_garments import sections
 from mocapflow_garments.cylinder import Cylinder
 from mocapflow_garments.shorts import Shorts
 from mocapflow_garments.skirt import Skirt
 
 from mocapflow.errors import GarmentError, MocapflowError
+from mocapflow.scene import Scene
 
 BODY = legs()
 SKIRT = dict(waist_height_m=1.08, waist_circumference_m=0.92, hem_circumference_m=1.7, length_m=0.6)
@@ -115,13 +118,52 @@ def test_shorts_that_can_not_be_say_what_to_do(change, said):
         Shorts(**{**SHORTS, **change}).sew(BODY)
 
 
-def test_a_waist_inside_the_body_is_pushed_out_and_recorded():
-    with pytest.warns(
-        pattern.GarmentRepaired, match="waist_circumference_m 0.800 lies inside the body; widened to 0.8"
-    ):
-        garment = Skirt(**{**SKIRT, "waist_circumference_m": 0.80}).sew(BODY)
+@pytest.mark.parametrize(
+    ("garment", "measure", "said"),
+    [
+        (Skirt(**{**SKIRT, "waist_circumference_m": 0.80}), "waist", "waist_circumference_m 0.800 is tighter"),
+        (Skirt(**{**SKIRT, "hem_circumference_m": 0.70}), "hem", "hem_circumference_m 0.700 is tighter"),
+        (Shorts(**{**SHORTS, "hip_circumference_m": 0.80}), "hip", "hip_circumference_m 0.800 is tighter"),
+        (
+            Shorts(**{**SHORTS, "leg_opening_circumference_m": 0.45}),
+            "leg",
+            "leg_opening_circumference_m 0.450",
+        ),
+        (Cylinder(upper_circumference_m=0.45), "upper", "upper_circumference_m 0.450 is tighter"),
+    ],
+)
+def test_a_measure_inside_the_body_is_widened_and_recorded(garment, measure, said):
+    sewn = garment.sew(BODY)
+    (repair,) = [text for text in sewn.repairs if text.startswith(measure)]
+    assert repair.startswith(said)
+    assert Scene(cameras=(), body=BODY, garment=sewn).warnings[0].startswith(f"{sewn.name}: ")
+
+
+def test_a_waist_inside_the_body_is_pushed_out():
+    garment = Skirt(**{**SKIRT, "waist_circumference_m": 0.80}).sew(BODY)
     waist = garment.vertices[garment.pinned]
     assert np.hypot(waist[:, 0] / 0.16, waist[:, 1] / 0.12).min() > 1.0
+
+
+def test_measures_that_fit_are_not_repaired():
+    assert [garment.sew(BODY).repairs for garment in (Skirt(**SKIRT), Shorts(**SHORTS), Cylinder())] == [(), (), ()]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda mesh: {"vertices": np.where(np.arange(len(mesh.vertices))[:, None] == 7, np.nan, mesh.vertices)},
+         "vertex 7 is not finite"),
+        (lambda mesh: {"vertices": np.concatenate([mesh.vertices[:1], mesh.vertices[:1], mesh.vertices[2:]])},
+         "strand 0 has a link of zero length"),
+        (lambda mesh: {"faces": mesh.faces + 1}, "a face names vertex"),
+        (lambda mesh: {"ring_length": 0 * mesh.ring_length}, "ring link 0 has no length"),
+    ],
+)  # fmt: skip
+def test_a_garment_that_can_not_be_draped_is_refused_when_it_is_made(change, said):
+    mesh = Skirt(**SKIRT).sew(BODY)
+    with pytest.raises(GarmentError, match=f"skirt: {said}"):
+        replace(mesh, **change(mesh))
 
 
 def test_a_cylinder_on_an_unknown_limb_is_refused():

@@ -56,6 +56,15 @@ def test_angles_have_the_columns_of_the_truth_each_with_its_deviation(folder: Pa
     assert all(np.isfinite(v).all() for v in columns.values())
 
 
+def test_a_repaired_garment_is_told_in_run_json(recording: Recording, tmp_path: Path) -> None:
+    scene = demo_scene(clothed=True)
+    assert scene.garment is not None
+    mended = replace(scene, garment=replace(scene.garment, repairs=("waist_circumference_m 0.500 is tighter",)))
+    exported(stepping(scene.body, 4), mended, recording, tmp_path)
+    said = json.loads((tmp_path / layout.RUN).read_text())["warnings"]
+    assert f"{scene.garment.name}: waist_circumference_m 0.500 is tighter" in said
+
+
 def test_raw_angles_are_those_before_smoothing(folder: Path) -> None:
     smooth, raw = (tables.read_columns(folder / part) for part in (layout.ANGLES, layout.RAW_ANGLES))
     assert list(smooth) == list(raw)
