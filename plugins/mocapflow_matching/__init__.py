@@ -11,5 +11,6 @@ def mocapflow_matchers() -> list[type[Matcher]]:
     """Return the built-in matchers."""
     from mocapflow_matching.containment import Containment
     from mocapflow_matching.contour_icp import ContourIcp
+    from mocapflow_matching.optical_flow import OpticalFlow
 
-    return [ContourIcp, Containment]
+    return [ContourIcp, Containment, OpticalFlow]

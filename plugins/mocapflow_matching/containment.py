@@ -15,9 +15,9 @@ from mocapflow.geometry.silhouettes import occluding_contour
 from mocapflow.records import F64
 from mocapflow.scene import Scene
 from mocapflow_matching.robust import robust_weights
+from mocapflow_matching.uncertainty import ANY_DIRECTION
 
 Positive = Annotated[float, Field(gt=0)]
-ANY_DIRECTION = -1.0  # least cosine between normals
 
 
 class Containment(Matcher):

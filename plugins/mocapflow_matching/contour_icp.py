@@ -9,8 +9,6 @@ from pydantic import Field
 
 from mocapflow.components import Matcher, pool
 from mocapflow.data import (
-    BODY,
-    CLOTH,
     Contour,
     Frame,
     Matches,
@@ -26,11 +24,9 @@ from mocapflow.geometry.silhouettes import occluding_contour
 from mocapflow.records import F64, I32
 from mocapflow.scene import Scene
 from mocapflow_matching.robust import Loss, robust_weights
+from mocapflow_matching.uncertainty import contour_sigma
 
 Positive = Annotated[float, Field(gt=0)]
-
-
-ANY_DIRECTION = -1.0  # least cosine between normals
 
 
 class ImageContour(NamedTuple):
@@ -97,7 +93,8 @@ class ContourIcp(Matcher):
             found = nearest_compatible(model.pixel, model.normal, image.pixel, image.normal, reach, cosine)
             seeing, showing = found[found >= 0], np.flatnonzero(found >= 0).astype(np.int32)
         seen, shown = np.concatenate([seen, seeing]), np.concatenate([shown, showing])
-        sigma = self._sigma(model, surface, scene)
+        guard = self.hem_guard_px
+        sigma = contour_sigma(model, surface, scene, self.sigma_px, self.cloth_sigma_px_per_m, guard)
         return self.weigh(silhouette.camera, image, model, seen, shown, sigma[shown], turn)
 
     def weigh(
@@ -120,25 +117,6 @@ class ContourIcp(Matcher):
             vertex=model.vertex[shown],
             weight=robust_weights(distance / sigma, loss, self.scale) / sigma**2,
         )
-
-    def _sigma(self, model: Contour, surface: Surface, scene: Scene) -> F64:
-        """Return the standard deviation (K,) px of model points: large on cloth, and on skin where a hem may be.
-
-        The outline of hanging cloth must not turn a knee; skin so near to the cloth's edge that the image may show
-        cloth there is as uncertain as the cloth beside it.
-        """
-        sigma = np.full(len(model.vertex), self.sigma_px)
-        cloth = np.flatnonzero(surface.layer[model.vertex] == CLOTH)
-        sigma[cloth] += self.cloth_sigma_px_per_m * scene.hanging[model.vertex[cloth] - len(scene.body.vertices)]
-        skin = np.flatnonzero(surface.layer[model.vertex] == BODY)
-        skin = skin[scene.near_garment[model.vertex[skin]]]
-        if len(cloth) and len(skin) and self.hem_guard_px:
-            beside = nearest_compatible(
-                *(model.pixel[skin], model.normal[skin], model.pixel[cloth], model.normal[cloth]),
-                *(self.hem_guard_px, ANY_DIRECTION),
-            )
-            sigma[skin[beside >= 0]] = sigma[cloth[beside[beside >= 0]]]
-        return sigma
 
 
 def _sorted_by_row(contour: Contour) -> Contour:

@@ -24,5 +24,6 @@ def mocapflow_predictors() -> list[type[Predictor]]:
     """Return the predictors of this plugin."""
     from mocapflow_priors.constant_velocity import ConstantVelocity
     from mocapflow_priors.hold import Hold
+    from mocapflow_priors.image_flow import ImageFlowPredictor
 
-    return [ConstantVelocity, Hold]
+    return [ConstantVelocity, Hold, ImageFlowPredictor]

@@ -152,14 +152,14 @@ def test_skin_beside_a_hem_counts_as_the_cloth_there(truth):
 
 def test_five_degrees_off_is_found_to_less_than_one():
     """T-ICP4, the first row of the table: 5 degrees and 7 mm off, pairs both ways."""
-    assert max(knee_error_deg(SCENE, ContourIcp(), seed) for seed in STARTS) < 1.0
+    assert max(knee_error_deg(SCENE, [ContourIcp()], seed) for seed in STARTS) < 1.0
 
 
 def test_clutter():
     """T-ICP2, a quarter of stray points in every contour; plain least squares is led astray by them."""
     plain = ContourIcp(first_loss="none", later_loss="none")
-    robust = np.array([knee_error_deg(SCENE, ContourIcp(), seed, clutter=0.25) for seed in STARTS])
-    squares = np.array([knee_error_deg(SCENE, plain, seed, clutter=0.25) for seed in STARTS])
+    robust = np.array([knee_error_deg(SCENE, [ContourIcp()], seed, clutter=0.25) for seed in STARTS])
+    squares = np.array([knee_error_deg(SCENE, [plain], seed, clutter=0.25) for seed in STARTS])
     print(f"worst knee, degrees: ours {robust.round(2)}, plain least squares {squares.round(2)}")
     assert robust.max() < 2.0
     assert np.median(robust) < 1.0
@@ -170,7 +170,7 @@ def test_clutter():
 def test_a_redescending_loss_from_the_first_turn_gives_up_a_leg():
     """Why there is a schedule: the limb that is furthest off counts as clutter."""
     early = ContourIcp(first_loss="geman_mcclure")
-    assert max(knee_error_deg(SCENE, early, seed, clutter=0.25) for seed in STARTS) > 2.0
+    assert max(knee_error_deg(SCENE, [early], seed, clutter=0.25) for seed in STARTS) > 2.0
 
 
 def test_the_clutter_is_where_it_should_be(truth):

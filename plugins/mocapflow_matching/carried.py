@@ -1,0 +1,48 @@
+"""2D-3D pairs from image flow: the surface point seen in the frame before, and where it is now."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mocapflow.components import pool
+from mocapflow.data import Frame, Matches, Past, empty_matches
+from mocapflow.geometry.visibility import front_vertices
+from mocapflow.records import F64
+from mocapflow.scene import Scene
+
+
+def carried_points(frame: Frame, past: Past, scene: Scene) -> Matches:
+    """Return the tracked points that lie on the surface of the frame before, each with unit weight.
+
+    A point lies between vertices; the nearest vertex of what is seen there stands for it and is shifted as it is.
+    """
+    if frame.flow is None or not past.moments:
+        return empty_matches()
+    before = past.moments[-1]
+    surface = scene.surface(before.pose, before.cloth)
+    parts = [empty_matches()]
+    for index, flow in enumerate(frame.flow):
+        if frame.usable[index] and len(flow.pixel):
+            vertex, image = front_vertices(surface, scene.cameras[index], flow.pixel.astype(np.float64))
+            on = vertex >= 0
+            parts.append(_pairs(index, image[vertex[on]] + flow.displacement[on], vertex[on]))
+    return pool([(1.0, part) for part in parts])
+
+
+def _pairs(camera: int, pixel: F64, vertex: np.ndarray) -> Matches:
+    return Matches(
+        camera=np.full(len(vertex), camera, np.int16),
+        pixel=pixel,
+        direction=np.zeros_like(pixel),
+        vertex=vertex,
+        weight=np.ones(len(vertex)),
+    )
+
+
+def distances(matches: Matches, image: list[F64]) -> F64:
+    """Return how far (M,) px the vertices of matches are from their targets; `image` (N, 2) per camera."""
+    away = np.empty(len(matches.vertex))
+    for index, projected in enumerate(image):
+        own = matches.camera == index
+        away[own] = np.linalg.norm(projected[matches.vertex[own]] - matches.pixel[own], axis=1)
+    return away

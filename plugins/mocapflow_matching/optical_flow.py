@@ -1,0 +1,126 @@
+"""Matcher `optical_flow`: where flow takes the points of the surface, between distance images or between frames."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from mocapflow.components import Matcher, pool
+from mocapflow.data import CLOTH, Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn, empty_matches
+from mocapflow.geometry import silhouettes
+from mocapflow.geometry.cameras import project
+from mocapflow.records import F32, F64, Bool
+from mocapflow.scene import Scene
+from mocapflow_matching.carried import carried_points, distances
+from mocapflow_matching.robust import robust_weights
+from mocapflow_matching.shape_flow import register, signed_distance
+from mocapflow_matching.uncertainty import contour_sigma
+
+Positive = Annotated[float, Field(gt=0)]
+Share = Annotated[float, Field(ge=0)]
+
+ON_CONTOUR = 1.0  # px from the image contour within which a target has to end
+
+
+class OpticalFlow(Matcher):
+    """Pairs by flow, to be pooled with those of `contour_icp`.
+
+    `contours`: the flow that registers the model's distance image with the silhouette's takes each contour point of
+    the model to its target; it reaches further than the nearest neighbour, above all for shifts. It is needed only
+    while the body still moves by more than `calm_mm` a turn. `image`: points tracked from the frame before (stage
+    `flow`) that lie on the surface as it was found there. They see what no contour shows, as turns of a limb about
+    itself, but add up their errors over frames; on cloth they follow the cloth, which slides over the skin.
+    """
+
+    name = "optical_flow"
+    use: Literal["both", "contours", "image"] = "both"
+    calm_mm: Positive = 15.0
+    first_share: Share = 2.3  # against contour_icp's while the body still moves: 0.7 to 0.3
+    later_share: Share = 0.25  # 0.2 to 0.8
+    spacing_px: Positive = 4.0
+    smoothness: Positive = 10.0
+    band_px: Positive = 40.0  # about the model's contour
+    levels: Annotated[int, Field(ge=0)] = 3  # of the pyramid, above images of half size
+    contour_sigma_px: Positive = 1.0
+    cloth_sigma_px_per_m: Positive = 80.0  # as for contour_icp
+    image_sigma_px: Positive = 1.5
+    cloth_share: Share = 0.2  # of a point on cloth against one on skin
+    scale: Positive = 2.0  # standard deviations beyond which a pair pulls no harder (Huber)
+
+    def match(
+        self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn
+    ) -> Matches:
+        """Return the pairs of every view; see the class."""
+        calm = turn.change is not None and turn.change.body <= self.calm_mm / 1000
+        parts = [empty_matches()]
+        if self.use != "contours":
+            parts.append(self.carried(frame, surface, past, scene))
+        if self.use != "image" and not calm:
+            people = [s for s in segmentation.silhouettes if s.layer == "person"]
+            parts += [self.registered(silhouette, surface, scene) for silhouette in people]
+        share = self.later_share if calm else self.first_share
+        return pool([(share, part) for part in parts])
+
+    def carried(self, frame: Frame, surface: Surface, past: Past, scene: Scene) -> Matches:
+        """Return the pairs by flow between frames."""
+        matches = carried_points(frame, past, scene)
+        away = distances(matches, [project(surface.vertices, camera) for camera in scene.cameras])
+        weight = self._robust(away, np.full(len(away), self.image_sigma_px))
+        on_cloth = surface.layer[matches.vertex] == CLOTH
+        return replace(matches, weight=weight * np.where(on_cloth, self.cloth_share, 1.0))
+
+    def registered(self, silhouette: Silhouette, surface: Surface, scene: Scene) -> Matches:
+        """Return the pairs of one view by flow between distance images."""
+        camera = scene.cameras[silhouette.camera]
+        boundary = silhouettes.outline(surface, camera)
+        model = silhouettes.samples(boundary, surface, camera, self.spacing_px)
+        here = signed_distance(_halved(silhouettes.mask(boundary, camera)))
+        there = signed_distance(_halved(silhouette.distance > 0))
+        flow = register(here, there, self.smoothness, self.levels, self.band_px / 2)
+        target = model.pixel + 2 * _sampled(flow, (model.pixel - 0.5) / 2)
+        target = 2 * _snapped((target - 0.5) / 2, there) + 0.5
+        target = _snapped(target, silhouette.distance)
+        on = np.abs(_sampled(silhouette.distance, target)) < ON_CONTOUR
+        away = np.linalg.norm(target - model.pixel, axis=1)
+        sigma = contour_sigma(model, surface, scene, self.contour_sigma_px, self.cloth_sigma_px_per_m)
+        return Matches(
+            camera=np.full(int(on.sum()), silhouette.camera, np.int16),
+            pixel=(target - (model.pixel - model.anchor))[on],
+            direction=np.zeros((int(on.sum()), 2)),
+            vertex=model.vertex[on],
+            weight=self._robust(away, sigma)[on],
+        )
+
+    def _robust(self, away: F64, sigma: F64) -> F64:
+        weight: F64 = robust_weights(away / sigma, "huber", self.scale) / sigma**2
+        return weight
+
+
+def _halved(mask: Bool) -> Bool:
+    """Return a mask at half the size."""
+    import cv2
+
+    height, width = mask.shape
+    half = cv2.resize(mask.astype(np.float32), ((width + 1) // 2, (height + 1) // 2), interpolation=cv2.INTER_AREA)
+    return np.asarray(half > 0.5)
+
+
+def _sampled(field: F32, points: F64) -> F64:
+    """Return the values of a field (H, W) or (H, W, 2) at points (K, 2) px, linear between pixels."""
+    import cv2
+
+    x, y = np.ascontiguousarray(points.T[:, None], np.float32)
+    values = cv2.remap(field, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(values[0], np.float64)
+
+
+def _snapped(points: F64, distance: F32) -> F64:
+    """Return points (K, 2) px after one step down a distance image (H, W); where it is flat they stay."""
+    shifts = 0.5 * np.eye(2)
+    slope = np.stack([_sampled(distance, points + s) - _sampled(distance, points - s) for s in shifts], axis=1)
+    square = np.sum(slope**2, axis=1, keepdims=True)
+    step = _sampled(distance, points)[:, None] * slope / np.maximum(square, 0.25)
+    return np.asarray(points - step)

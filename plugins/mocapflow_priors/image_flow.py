@@ -1,0 +1,88 @@
+"""The next pose is where the flow of the image takes the surface."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated
+
+import numpy as np
+from mocapflow_matching.carried import carried_points, distances
+from mocapflow_matching.robust import robust_weights
+from mocapflow_twist.solver import TwistGaussNewton
+from pydantic import Field
+
+from mocapflow.components import PoseSolver, Predictor
+from mocapflow.data import CLOTH, NO_CLOTH, Frame, Matches, Past, Pose, Surface, Turn
+from mocapflow.geometry.cameras import project
+from mocapflow.model import ClothedModel
+from mocapflow.records import F64
+from mocapflow.scene import Scene
+from mocapflow.track import believed
+from mocapflow_priors.constant_velocity import ConstantVelocity
+
+Positive = Annotated[float, Field(gt=0)]
+
+
+class ImageFlowPredictor(Predictor):
+    """Moves the last pose so that its surface points follow the points tracked into this frame (stage `flow`).
+
+    What no point shows goes on as it was. Where points are few, or most of them contradict each other (a wrong
+    picture), the whole pose goes on as it was.
+    """
+
+    name = "image_flow"
+
+    otherwise: Predictor = ConstantVelocity()
+    pose_solver: PoseSolver = TwistGaussNewton(iterations=8, angle_damping_deg=20.0)
+    sigma_px: Positive = 1.0
+    scale: Positive = 2.0  # standard deviations beyond which a point pulls less (Geman-McClure after Huber)
+    cloth_share: Annotated[float, Field(ge=0)] = 0.2  # of a point on cloth that touches the skin; other cloth: none
+    touching_mm: Positive = 20.0
+    least_points: Annotated[int, Field(ge=1)] = 30
+    least_agreement: Annotated[float, Field(ge=0, le=1)] = 0.5  # share of points that come to lie within `agreeing_px`
+    agreeing_px: Positive = 4.0
+
+    def predict(self, frame: Frame, past: Past, scene: Scene) -> Pose:
+        """Return the pose the flow leads to, or what `otherwise` predicts."""
+        guess = self.otherwise.predict(frame, past, scene)
+        followed = self.on_skin(carried_points(frame, past, scene), past, scene)
+        if len(followed.vertex) < self.least_points:
+            return guess
+        model = ClothedModel(scene=Scene(cameras=scene.cameras, body=scene.body))
+
+        def match(surface: Surface) -> Matches:
+            away = self._away(followed, surface, scene)
+            robust = robust_weights(away / self.sigma_px, "huber", self.scale)
+            return replace(followed, weight=followed.weight * robust / self.sigma_px**2)
+
+        state = believed(guess, np.empty(0), NO_CLOTH)
+        pose = self.pose_solver.solve(match, state, model, (), past, Turn(index=0, cap=1)).pose
+        reached = self._away(followed, model.surface(pose, NO_CLOTH), scene)
+        return pose if np.mean(reached < self.agreeing_px) >= self.least_agreement else guess
+
+    def on_skin(self, matches: Matches, past: Past, scene: Scene) -> Matches:
+        """Return the points with those on cloth moved to the skin that it touches; other cloth is left out."""
+        cloth = matches.vertex >= len(scene.body.vertices)
+        if not cloth.any():
+            return matches
+        from scipy.spatial import cKDTree
+
+        surface = scene.surface(past.moments[-1].pose, past.moments[-1].cloth)
+        skin = surface.vertices[surface.layer != CLOTH]
+        reach = self.touching_mm / 1000
+        _, below = cKDTree(skin).query(surface.vertices[matches.vertex[cloth]], distance_upper_bound=reach)
+        image = np.stack([project(surface.vertices, camera) for camera in scene.cameras])
+        vertex, touching = matches.vertex.copy(), np.ones(len(cloth), bool)
+        touching[cloth] = below < len(skin)
+        vertex[cloth] = np.where(below < len(skin), below, 0)
+        shift = image[matches.camera, vertex] - image[matches.camera, matches.vertex]
+        return Matches(
+            camera=matches.camera[touching],
+            pixel=(matches.pixel + shift)[touching],
+            direction=matches.direction[touching],
+            vertex=vertex[touching],
+            weight=(matches.weight * np.where(cloth, self.cloth_share, 1.0))[touching],
+        )
+
+    def _away(self, matches: Matches, surface: Surface, scene: Scene) -> F64:
+        return distances(matches, [project(surface.vertices, camera) for camera in scene.cameras])
