@@ -2,6 +2,8 @@ import json
 import sys
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -144,7 +146,7 @@ def test_show(call):
     assert "  sd_deg     float (> 0) = 2.0  # standard deviation of an angle beyond its limits\n" in shown
     missing = call("show", "prior", "joint_limit")
     assert missing.exit_code == 2
-    assert missing.stderr.startswith("error: no prior named 'joint_limit'\n       available: joint_limits, ")
+    assert missing.stderr.startswith("error: no prior named 'joint_limit'\n       available: ")
     assert missing.stderr.endswith("did you mean 'joint_limits'?\n")
 
 
@@ -184,3 +186,18 @@ def test_progress_is_plain_lines_unless_on_a_terminal(capsys):
     assert terminal.written == (
         f"\r\x1b[Ktrack: {'█' * 15}{'·' * 15} 3 of 6 frames, at rest after 2 turns\nsmooth: running\n"
     )
+
+
+@pytest.mark.parametrize("garment", ["skirt", "shorts", "cylinder"])
+def test_a_garment_is_drawn(call, garment):
+    shown = call("show", "garment", garment, "--out", "garment.png")
+    assert shown.exit_code == 0, shown.output
+    assert "vertices in" in shown.stdout
+    image = cv2.imread("garment.png")
+    cloth = (image[..., 0] > 1.5 * image[..., 2]) & (image[..., 0] > 60)  # blue
+    panels = np.array([panel.mean() for panel in np.hsplit(cloth, 5)])
+    assert (panels > 0.004).all(), panels
+
+
+def test_only_a_garment_has_a_picture(call):
+    assert "only a garment has a picture" in call("show", "matcher", "contour_icp", "--out", "it.png").output

@@ -29,8 +29,13 @@ def plugins() -> None:
 def show(
     role: Annotated[str, typer.Argument(help="draper, garment, matcher, stage, …")],
     name: Annotated[str, typer.Argument(help="Its name, as in a pipeline file.")],
+    out: Annotated[Path | None, typer.Option(metavar="PNG", help="Of a garment: draw it there.")] = None,
+    recording: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Whose person and tape measures; a shipped clip if not given.")
+    ] = None,
+    draper: Annotated[str, typer.Option(help="Lays the garment in the picture.")] = "kinematic",
 ) -> None:
-    """Show what a component does and its settings."""
+    """Show what a component does and its settings; draw a garment."""
     from mocapflow.describe import describe
     from mocapflow.registry import load_registry
 
@@ -39,6 +44,13 @@ def show(
     typer.echo(f"{role} {name}, from {registry.origin(cls)}")
     for line in describe(cls):
         typer.echo(line)
+    if out is not None:
+        if role != "garment":
+            raise typer.BadParameter("only a garment has a picture", param_hint="--out")
+        from mocapflow.commands.pictures import draw_garment
+
+        for line in draw_garment(registry, name, recording, draper, out):
+            typer.echo(line)
 
 
 def equations(

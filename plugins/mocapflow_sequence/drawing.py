@@ -41,14 +41,23 @@ def dots(image: U8, places: F64, colour: Colour, radius: float) -> None:
 
 def label(image: U8, text: str, line: int = 0) -> None:
     """Write text into the upper left corner, readable on any ground."""
+    size = _text_size(image)
+    note(image, text, (18 * size, (44 + 44 * line) * size))
+
+
+def note(image: U8, text: str, place: tuple[float, float]) -> None:
+    """Write text whose lower left corner is at a place in px, readable on any ground."""
     import cv2
 
-    size = 0.45 * max(1.0, image.shape[0] / 800)
-    x, y = round(18 * size), round((44 + 44 * line) * size)
+    size = _text_size(image)
     width = max(1, round(1.6 * size))
     for colour, shift in (((0, 0, 0), width), ((255, 255, 255), 0)):
-        at = (x + shift, y + shift)
+        at = (round(place[0]) + shift, round(place[1]) + shift)
         cv2.putText(image, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, colour, width, cv2.LINE_AA)
+
+
+def _text_size(image: U8) -> float:
+    return float(0.45 * max(1.0, image.shape[0] / 800))
 
 
 def bones(parents: Any, places: F64) -> F64:

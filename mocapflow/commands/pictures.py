@@ -1,0 +1,83 @@
+"""A picture of a garment: at rest, draped, and laid flat with its measures."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mocapflow.components import Draper, Garment
+from mocapflow.data import Past, Pose, PoseBatch
+from mocapflow.measures import garment_of
+from mocapflow.records import F64, U8
+from mocapflow.registry import Registry
+from mocapflow.resolve import Resolver
+from mocapflow.scene import Scene
+from mocapflow.shipped import shipped
+from mocapflow.yamlfile import Document, Place
+
+CLIPS = ("skirt_steps", "shorts_steps")
+RAISED = {"hip_l.flexion": 65.0, "knee_l.flexion": 70.0}  # deg
+
+
+def draw_garment(registry: Registry, name: str, recording: Path | None, draper: str, out: Path) -> list[str]:
+    """Write the picture of a garment on the person of a recording and return lines to print.
+
+    Raises:
+        MocapflowError: the garment needs measures that the recording does not have, or can't be sewn from them.
+    """
+    import cv2
+
+    recording = recording or _example(name)
+    resolver = Resolver(Document({}, {(): Place(f"show garment {name}", Path())}), registry)
+    garment: Any = garment_of(name, recording, resolver)
+    body: Any = registry.get("body", "scanned")()
+    loaded = body.load(recording)
+    scene = Scene(cameras=(), body=loaded, garment=garment.sew(loaded))
+    cv2.imwrite(str(out), poster(scene, garment, registry.get("draper", draper)()))  # type: ignore[arg-type]
+    assert scene.garment is not None
+    count, strands = len(scene.garment.vertices), len(scene.garment.strands)
+    sewn = f"sewn on {recording.name}: {count} vertices in {strands} strands; picture: {out}"
+    return [*(f"warning: {said}" for said in scene.warnings), sewn]
+
+
+def poster(scene: Scene, garment: Garment, draper: Draper) -> U8:
+    """Return the image (H, W, 3) BGR: rest from two sides, draped standing and with a knee raised, the pattern."""
+    from mocapflow_sequence import drawing, portrait
+
+    assert scene.garment is not None
+    standing, raised = _pose(scene, {}), _pose(scene, RAISED)
+    panels = {
+        "at rest, from the front": portrait.portrait(scene, standing, scene.garment.vertices, bearing_deg=0),
+        "at rest, from behind": portrait.portrait(scene, standing, scene.garment.vertices, bearing_deg=145),
+        "draped": portrait.portrait(scene, standing, _draped(draper, scene, standing)),
+        "draped, knee raised": portrait.portrait(scene, raised, _draped(draper, scene, raised), opacity=0.8),
+        "pattern": portrait.pattern(scene.garment),
+    }
+    for title, panel in panels.items():
+        drawing.label(panel, title)
+    image = np.hstack(list(panels.values()))
+    measures = [f"{key} {value:g}" for key, value in garment.model_dump().items() if key.endswith("_m")]
+    drawing.note(image, f"{garment.name}: {', '.join(measures)}", (8, image.shape[0] - 8))
+    return image
+
+
+def _draped(draper: Draper, scene: Scene, pose: Pose) -> F64:
+    assert scene.garment is not None
+    batch = PoseBatch(root=pose.root[None].copy(), angles=pose.angles[None].copy())
+    draped: F64 = draper.drape(batch, np.zeros((1, len(scene.garment.parameter_names))), Past(), scene)[0]
+    return draped
+
+
+def _pose(scene: Scene, degrees: dict[str, float]) -> Pose:
+    names = scene.body.screw_names
+    return Pose(root=np.eye(4), angles=np.array([np.radians(degrees.get(name, 0.0)) for name in names]))
+
+
+def _example(name: str) -> Path:
+    """Return the shipped clip whose person wears such a garment, or the first."""
+    clips = [shipped("examples", "data", clip) for clip in CLIPS]
+    worn = {json.loads((clip / "subject" / "garment.json").read_text())["type"]: clip for clip in clips}
+    return worn.get(name, clips[0])
