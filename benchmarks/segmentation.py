@@ -10,7 +10,7 @@ second run on, they are cached) stands apart. Last, the same figure before an em
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import cv2
@@ -18,8 +18,9 @@ import numpy as np
 from mocapflow_levelset.grabcut import GrabCut
 from mocapflow_levelset.levelset import LevelSet
 from mocapflow_levelset.masks import counted
+from mocapflow_levelset.plates import Plate, plate_of
 from mocapflow_levelset.redistance import redistance
-from mocapflow_levelset.view import View, find
+from mocapflow_levelset.view import Empty, View, find
 from skimage.segmentation import chan_vese, morphological_chan_vese
 
 from mocapflow.records import F32, U8, Bool
@@ -33,7 +34,7 @@ class Task(NamedTuple):
     """A picture with its true outline."""
 
     image: U8
-    empty: F32  # (H, W, 3) the same without the figure
+    plates: Mapping[int, Plate]  # the same without the figure, by how much it is shrunk
     truth: F32  # (H, W) px, signed distance, positive inside
 
 
@@ -45,7 +46,9 @@ def make_task(seed: int = 0) -> Task:
     room = texture(rng, (135, 125, 115), ((-40, 40), (60, -20), (-30, 30)))
     clean = alpha[..., None] * person + (1 - alpha[..., None]) * room
     image = np.clip(clean + rng.normal(0, 4, clean.shape), 0, 255).astype(np.uint8)
-    return Task(image, np.clip(room, 0, 255), redistance(alpha - np.float32(0.5), 40.0))
+    room = np.clip(room, 0, 255)
+    plates = {factor: plate_of(room, np.full_like(room, 4.0), factor) for factor in (1, 2, 4)}  # once per recording
+    return Task(image, plates, redistance(alpha - np.float32(0.5), 40.0))
 
 
 def figure() -> F32:
@@ -84,10 +87,10 @@ def shifted(truth: F32, pixels: int) -> F32:
 
 def levelset(task: Task, start: F32, known: bool = False) -> Bool:
     segmenter = LevelSet(shape_weight=0.0)
-    floor = np.zeros((HEIGHT, WIDTH), np.float32)
-    plate = (task.empty, np.full_like(task.empty, 4.0), floor) if known else None
-    view = View(task.image, start, start, counted(start.shape, segmenter.border_px), plate)
-    return find(view, segmenter._levels(False, known), segmenter._method(), BAND_PX).level > 0
+    levels = segmenter._levels(warm=False)
+    empty = Empty(task.plates, np.zeros((HEIGHT, WIDTH), np.float32)) if known else None
+    view = View(task.image, start, start, counted(start.shape, segmenter.border_px), empty)
+    return find(view, levels, segmenter._method(), BAND_PX).level > 0
 
 
 def grabcut(task: Task, start: F32, iterations: int) -> Bool:

@@ -18,11 +18,11 @@ from mocapflow_levelset.channels import ChannelName
 from mocapflow_levelset.evidence import calmed
 from mocapflow_levelset.evolve import Rhythm, Weights
 from mocapflow_levelset.masks import counted
-from mocapflow_levelset.plates import Shadow, density_of
+from mocapflow_levelset.plates import Plate, Shadow, density_of, plate_of
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.shadows import floor_around
 from mocapflow_levelset.statistics import Window
-from mocapflow_levelset.view import Level, Method, View, find
+from mocapflow_levelset.view import Empty, Level, Method, View, find
 
 PERSON = "person"
 INNER_BAND_PX = 7.0  # while the contour moves
@@ -88,22 +88,22 @@ class BackgroundDifference(Segmenter):
             background: the empty scene.
             camera: which of its views.
         """
-        plate = background.mean[camera], background.spread[camera], floor
-        start = self._start(image, model, plate)
+        plate = plate_of(background.mean[camera], background.spread[camera])
+        start = self._start(image, model, plate, floor)
         if not self.refine_steps:
             return redistance(start, self.band_px)
-        view = View(image, np.clip(start, -self.band_px, self.band_px), start, counted(start.shape, 0), plate)
+        view = View(image, start, start, counted(start.shape, 0), Empty({1: plate}, floor))
         against_plate = Level(1, Rhythm(self.refine_steps, 3, 3), Window(12.0, 8, 0.02))
         levels = [against_plate, against_plate._replace(use_plate=False)]
         return find(view, levels, self._method(), self.band_px).level
 
-    def _start(self, image: U8, model: F32, plate: tuple[F32, F32, F32]) -> F32:
+    def _start(self, image: U8, model: F32, plate: Plate, floor: F32) -> F32:
         """Return a level set (H, W), not a distance: positive where the image is unlike the plate."""
         import cv2
 
         calm = calmed(image, self.smooth_px).reshape(-1, 3)
-        mean, spread, floor = plate[0].reshape(-1, 3), plate[1].reshape(-1, 3), plate[2].ravel()
-        density = density_of(calm, mean, spread, floor, CHANNELS, self._shadow()).reshape(model.shape)
+        empty = plate.mean.reshape(-1, 3), plate.spread.ravel()
+        density = density_of(calm, *empty, floor.ravel(), CHANNELS, self._shadow()).reshape(model.shape)
         change = cv2.GaussianBlur(np.clip(-density, -6, 6), (0, 0), self.smooth_px)
         kept = self._person(change > 0, model)
         return np.where(kept, np.maximum(change, 0.1), np.minimum(change, -0.1)).astype(np.float32)

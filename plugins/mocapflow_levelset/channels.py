@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal
 
+import numba
 import numpy as np
 
 from mocapflow.records import F32, U8
@@ -48,9 +49,20 @@ def decorrelation(planes: F32) -> F32:
     return np.ascontiguousarray(axes.T, np.float32)
 
 
-def _scaled(planes: U8) -> F32:
+def _scaled(levels: U8) -> F32:
     """Return interleaved grey levels (H, W, C) as separate planes (C, H, W) in [0, 1]."""
-    return np.multiply(planes.transpose(2, 0, 1), np.float32(1 / 255), dtype=np.float32, order="C")
+    planes = np.empty((levels.shape[2], *levels.shape[:2]), np.float32)
+    _separate(levels, planes)
+    return planes
+
+
+@numba.njit(cache=True)
+def _separate(levels, planes):  # type: ignore[no-untyped-def]
+    for row in range(levels.shape[0]):
+        for c in range(planes.shape[0]):
+            line, mixed = planes[c, row], levels[row, :, c]
+            for x in range(line.size):
+                line[x] = np.float32(mixed[x]) * np.float32(1 / 255)
 
 
 def _median(image: U8, width: int) -> U8:

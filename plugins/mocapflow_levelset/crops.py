@@ -25,9 +25,13 @@ class Crop(NamedTuple):
         """Return the rectangle of an image of grey levels, (h, w, ...)."""
         return image[self.top : self.bottom, self.left : self.right]
 
+    def at(self, factor: int) -> Crop:
+        """Return the rectangle of the image at 1 / factor of its size; its sides must be multiples of the factor."""
+        return Crop(*(side // factor for side in self))
+
 
 def around(level: F32, margin_px: int, multiple: int) -> Crop | None:
-    """Return the rectangle around the inside of a level set (H, W), its sides multiples of `multiple`.
+    """Return the rectangle around the inside of a level set (H, W), its sides at multiples of `multiple`.
 
     None where nothing is inside.
     """
@@ -36,36 +40,42 @@ def around(level: F32, margin_px: int, multiple: int) -> Crop | None:
     x, y, width, height = cv2.boundingRect((level > 0).view(np.uint8))
     if not width:
         return None
-    top, bottom = _widen(y, y + height, level.shape[0], margin_px, multiple)
-    left, right = _widen(x, x + width, level.shape[1], margin_px, multiple)
+    top, bottom = _widened(y, y + height, level.shape[0], margin_px, multiple)
+    left, right = _widened(x, x + width, level.shape[1], margin_px, multiple)
     return Crop(top, bottom, left, right)
 
 
-def _widen(first: int, last: int, length: int, margin: int, multiple: int) -> tuple[int, int]:
-    """Return an interval with a margin, within the image, its length rounded up (or down at the image's end)."""
+def _widened(first: int, last: int, length: int, margin: int, multiple: int) -> tuple[int, int]:
+    """Return an interval with a margin, within the image, its ends rounded outward (or in, at the image's end)."""
     first, last = max(first - margin, 0), min(last + margin, length)
-    wanted = -(-(last - first) // multiple) * multiple
-    if first + wanted <= length:
-        return first, first + wanted
-    if wanted <= length:
-        return length - wanted, length
-    return 0, length // multiple * multiple
+    return first // multiple * multiple, min(-(-last // multiple), length // multiple) * multiple
 
 
 def shrink(image: U8, factor: int) -> U8:
     """Return an image at 1 / factor of its size, the mean of each square of pixels."""
-    import cv2
-
-    size = (image.shape[1] // factor, image.shape[0] // factor)
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
+    return np.asarray(_shrunk(image, factor), np.uint8)
 
 
 def shrink_values(image: F32, factor: int) -> F32:
     """Return an array at 1 / factor of its size, the mean of each square of pixels."""
+    return np.asarray(_shrunk(image, factor), np.float32)
+
+
+def shrink_mask(mask: F32, factor: int) -> F32:
+    """Return a mask (H, W) at 1 / factor of its size, by the pixel nearest to the middle of each square."""
+    rows, columns = (length // factor * factor for length in mask.shape)
+    return np.ascontiguousarray(mask[factor // 2 : rows : factor, factor // 2 : columns : factor])
+
+
+def _shrunk(image: U8 | F32, factor: int) -> np.ndarray:
+    """Return the mean of each square of pixels; what is left over at the right and at the bottom is dropped."""
     import cv2
 
-    size = (image.shape[1] // factor, image.shape[0] // factor)
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.float32)
+    if factor == 1:
+        return image
+    height, width = image.shape[0] // factor, image.shape[1] // factor
+    whole = image[: height * factor, : width * factor]
+    return np.asarray(cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA))
 
 
 def enlarge(level: F32, factor: int) -> F32:

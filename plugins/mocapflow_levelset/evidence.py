@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numba
 import numpy as np
 
 from mocapflow.records import F32, I32, U8
 from mocapflow_levelset.channels import LAG_PX, ChannelName, decorrelation, features
-from mocapflow_levelset.plates import Shadow, density_of
+from mocapflow_levelset.plates import Plate, Shadow, density_of
 
 POINTWISE = ("grey", "lab")  # channels that depend on one pixel only
 
@@ -36,14 +36,14 @@ def from_image(
     channels: Sequence[ChannelName],
     median_px: int,
     stride: int,
-    plate: tuple[F32, F32, F32] | None,
+    plate: tuple[Plate, F32] | None,
     shadow: Shadow,
     decorrelate: bool,
     calm_px: float = 0.0,
 ) -> Evidence:
     """Return the evidence of a BGR image (H, W, 3), and of the empty scene if it is known.
 
-    The empty scene is its mean, its spread (H, W, 3) and where a shadow may fall (H, W).
+    The empty scene is its plate, and where a shadow may fall (H, W).
 
     Channels that depend on one pixel only are computed for the pixels that need them. Decorrelated, the channels
     are turned to the image's own principal axes, so that treating them as independent is right; the empty scene's
@@ -62,14 +62,14 @@ def from_image(
             return gather_planes(planes, runs)
 
     if plate is not None:
-        mean, spread, floor = plate
+        empty, floor = plate
         calm = calmed(image, calm_px)
 
         def outside(runs: I32) -> F32:
             return density_of(
                 gather(calm, runs),
-                gather(mean, runs),
-                gather(spread, runs),
+                gather(empty.mean, runs),
+                gather_planes(empty.spread[None], runs)[0],
                 gather_planes(floor[None], runs)[0],
                 channels,
                 shadow,
@@ -90,12 +90,9 @@ def calmed(image: U8, smooth_px: float) -> U8:
     return np.asarray(cv2.GaussianBlur(image, (0, 0), smooth_px), np.uint8) if smooth_px > 0.3 else image
 
 
-Pixels = TypeVar("Pixels", U8, F32)
-
-
-def gather(image: Pixels, runs: I32) -> Pixels:
+def gather(image: U8, runs: I32) -> U8:
     """Return the pixels (N, 3) of an image (H, W, 3) along runs, rows of (y, first x, last x + 1)."""
-    pixels: Pixels = _gather(image, runs, np.empty((int((runs[:, 2] - runs[:, 1]).sum()), 3), image.dtype))
+    pixels: U8 = _gather(image, runs, np.empty((int((runs[:, 2] - runs[:, 1]).sum()), 3), np.uint8))
     return pixels
 
 

@@ -37,10 +37,17 @@ class Rhythm(NamedTuple):
 
 
 class Settled(NamedTuple):
-    """Where the descent ended and what it costs."""
+    """Where the descent ended, and the last evidence along the runs it moved in."""
 
-    level: F32  # (H, W) px, signed distance within the band
-    data: float  # -sum of H log(p1 / p2) near the contour
+    level: F32  # (H, W) px, near a signed distance within the band
+    ratio: F32  # (H, W) log p1 - log p2
+    runs: I32  # (N, 3) y, first x, last x + 1
+
+
+class Costs(NamedTuple):
+    """The terms of the energy near the contour."""
+
+    data: float  # -sum of H log(p1 / p2)
     length: float
     shape: float
 
@@ -49,7 +56,7 @@ def settle(level: F32, prior: F32, evidence: Evidence, window: Window, weights: 
     """Descend from `level` for some steps, renewing statistics and distances in between.
 
     Args:
-        level: (H, W) px, positive inside; only its zero contour counts.
+        level: (H, W) px, a signed distance (clipped is fine), positive inside.
         prior: (H, W) px, signed distance to the model's outline.
         evidence: features, mask and plate on the same grid.
         window: how local the statistics are.
@@ -64,7 +71,7 @@ def settle(level: F32, prior: F32, evidence: Evidence, window: Window, weights: 
     first = (grid.cell_px - 1) * stride // 2
     reach = FRONT * weights.sigma_px / stride + 3 * grid.cell_px
     sums = totals(evidence.sparse, weight, grid.cell_px)
-    level = redistance(level, weights.band_px)
+    level = np.clip(level, -np.float32(weights.band_px), np.float32(weights.band_px))
     ratio, change = np.zeros_like(level), np.empty_like(level)
     runs = near(level, prior, weights, first)
     for step in range(rhythm.steps):
@@ -73,14 +80,17 @@ def settle(level: F32, prior: F32, evidence: Evidence, window: Window, weights: 
         if step % rhythm.statistics_every == 0:
             sparse = np.ascontiguousarray(level[::stride, ::stride]) / np.float32(stride)
             gaussians = local_gaussians(evidence.sparse, weight, sparse, sums, grid, weights.sigma_px / stride, reach)
-            runs = near(level, prior, weights, first)
+            runs = near(level, prior, weights, first) if step else runs
             log_ratio(runs, evidence, gaussians, grid.cell_px * stride, stride, weights.clip, ratio)
         advance(level, ratio, prior, runs, change, weights)
-    table = step_table(weights.sigma_px)
-    data, length, shape = kernels.terms(
-        level, ratio, prior, runs, table, np.float32(weights.sigma_px), np.float32(weights.band_px)
-    )
-    return Settled(level, float(data), weights.length * float(length), weights.shape * float(shape))
+    return Settled(level, ratio, runs)
+
+
+def costs(settled: Settled, prior: F32, weights: Weights) -> Costs:
+    """Return the terms of the energy where the descent ended."""
+    table, sigma, band = step_table(), np.float32(weights.sigma_px), np.float32(weights.band_px)
+    data, length, shape = kernels.terms(settled.level, settled.ratio, prior, settled.runs, table, sigma, band)
+    return Costs(float(data), weights.length * float(length), weights.shape * float(shape))
 
 
 def near(level: F32, prior: F32, weights: Weights, first: int = 0) -> I32:

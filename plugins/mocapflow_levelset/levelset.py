@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, ClassVar
+from weakref import WeakKeyDictionary
 
-from pydantic import Field
+from pydantic import Field, PrivateAttr
 
 from mocapflow.components import Segmenter
-from mocapflow.data import Frame, FrameState, Past, Segmentation, Silhouette, Surface, Turn
+from mocapflow.data import Background, Frame, FrameState, Past, Segmentation, Silhouette, Surface, Turn
 from mocapflow.geometry.silhouettes import model_distance
-from mocapflow.records import F32
 from mocapflow.scene import Scene
 from mocapflow_levelset.channels import ChannelName
 from mocapflow_levelset.evolve import Rhythm, Weights
 from mocapflow_levelset.masks import counted, without_cut
-from mocapflow_levelset.plates import Shadow
+from mocapflow_levelset.plates import Plate, Shadow, plate_of
 from mocapflow_levelset.shadows import floor_around
 from mocapflow_levelset.statistics import Window
-from mocapflow_levelset.view import Level, Method, View, find
+from mocapflow_levelset.view import Empty, Level, Method, View, find
 
 Count = Annotated[int, Field(gt=0)]
 NonNegativeCount = Annotated[int, Field(ge=0)]
@@ -27,13 +28,18 @@ Share = Annotated[float, Field(ge=0, lt=1)]
 
 PERSON = "person"
 INNER_BAND_PX = 7.0  # while the contour moves
+COARSE, HALF, FULL = 4, 2, 1  # what the image is shrunk by
 
 
 class LevelSet(Segmenter):
     """Region-based level set (12.1) with the projected model as shape prior (12.9), descended by (12.10).
 
-    The chapter's own settings: `use_background: false`, `coarse_steps: 0`, `cell_px: 1`, `steps: 50`,
-    `statistics_every: 1`; `shape_weight: 0` uncouples it from the model.
+    It goes from coarse to fine. The empty scene, where it is known, gives the density of the outside at reduced size;
+    at full size both sides have local statistics, because a pixel on the edge mixes two colours and the narrow density
+    of an empty scene takes it for the person.
+
+    The chapter's own settings: `use_background: false`, `coarse_steps: 0`, `half_steps: 0`, `cell_px: 1`,
+    `stride_px: 1`, `steps: 50`, `statistics_every: 1`; `shape_weight: 0` uncouples it from the model.
     """
 
     name: ClassVar[str] = "levelset"
@@ -41,22 +47,21 @@ class LevelSet(Segmenter):
     channels: tuple[ChannelName, ...] = Field(("lab",), min_length=1)  # independent, their likelihoods add
     decorrelate: bool = True  # turn the channels to the image's principal axes, where no empty scene is known
     rho_px: Positive = 12.0  # Gaussian window of the local statistics; inf: one Gaussian per region
-    cell_px: Count = 9  # the statistics are summed over cells of this size
-    stride_px: Count = 3  # and taken from every so many-th pixel; 1: from all
+    reduced_rho_px: Positive = 8.0  # at reduced sizes, in px of the shrunken image
+    cell_px: Count = 8  # the statistics are summed over cells of this size
+    stride_px: Count = 4  # and taken from every so many-th pixel; 1: from all
     variance_floor: Positive = 0.03  # smallest standard deviation inside and outside, share of a channel's range
     sigma_px: Positive = 1.5  # width of the smooth step
     length_weight: NonNegative = 0.9  # nu; explicit steps are stable below 0.94
     shape_weight: NonNegative = 0.05  # lambda: 0.05 clean, 0.1 with occlusion, 0.1-0.3 in heavy noise, 0 uncoupled
     ratio_clip: Positive = 6.0  # bound on log p1/p2
     time_step: Positive = 1.0
-    coarse_factor: Count = 4
-    coarse_steps: NonNegativeCount = 9  # on the first turn, at 1 / coarse_factor of the size
-    coarse_rho_px: Positive = 32.0  # window there, in px of the full image: a poor start needs a wide one
-    steps: Count = 6  # on the first turn
-    later_steps: Count = 3  # on later turns, from the last turn's contour
-    local_steps: NonNegativeCount = 3  # after those against the empty scene, with local statistics on both sides
-    statistics_every: Count = 3  # steps
-    redistance_every: Count = 3  # steps
+    coarse_steps: NonNegativeCount = 8  # at a quarter of the size, on the first turn
+    half_steps: NonNegativeCount = 4  # at half the size
+    steps: Count = 3  # at full size
+    later_steps: Count = 3  # at full size on later turns, which start from the last turn's contour
+    statistics_every: Count = 4  # steps
+    redistance_every: Count = 4  # steps
     band_px: Annotated[float, Field(ge=8)] = 12.0
     median_px: NonNegativeCount = 0  # median filter against pixels of no meaning, e.g. 9; 0: none
     border_px: NonNegativeCount = 3  # left out at the image's border
@@ -69,6 +74,9 @@ class LevelSet(Segmenter):
     darkest_shadow: Annotated[float, Field(gt=0, lt=1)] = 0.5  # factor of L + 16, a and b in the deepest shadow
     shadow_chroma: Positive = 0.005  # how far a shadow may be off the plate's chromaticity, share of the range
     stranger: float = -6.0  # log density below which no region calls a pixel more unlikely
+    _plates: WeakKeyDictionary[Background, dict[tuple[int, int], Plate]] = PrivateAttr(
+        default_factory=WeakKeyDictionary
+    )
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
         """Return the person's silhouette in each usable view.
@@ -84,42 +92,41 @@ class LevelSet(Segmenter):
                 continue
             model = model_distance(surface, camera, self.band_px)
             warm = turn.index > 0 and c in last
+            levels = self._levels(warm)
             view = View(
                 image=frame.images[c],
                 start=last[c] if warm else model,
                 prior=model,
                 counted=without_cut(counted(model.shape, self.border_px), model, scene.body, surface, camera),
-                plate=self._plate(scene, surface, c),
+                empty=self._empty(scene, surface, c, levels),
             )
-            found = find(view, self._levels(warm, view.plate is not None), self._method(), self.band_px)
+            found = find(view, levels, self._method(), self.band_px)
             silhouettes.append(Silhouette(camera=c, layer=PERSON, distance=found.level))
-            terms = {"data": found.data, "length": found.length, "shape": found.shape}
-            energies |= {f"{camera.name}.{term}": value for term, value in terms.items()}
+            energies |= {f"{camera.name}.{term}": value for term, value in found.costs._asdict().items()}
         return Segmentation(silhouettes=tuple(silhouettes), energies=energies)
 
-    def _plate(self, scene: Scene, surface: Surface, camera: int) -> tuple[F32, F32, F32] | None:
+    def _empty(self, scene: Scene, surface: Surface, camera: int, levels: Sequence[Level]) -> Empty | None:
         if scene.background is None or not self.use_background:
             return None
-        floor = floor_around(surface, scene.cameras[camera], self.shadow_reach_m)
-        return scene.background.mean[camera], scene.background.spread[camera], floor
+        plates = {level.factor: self._plate(scene.background, camera, level.factor) for level in levels}
+        return Empty(plates, floor_around(surface, scene.cameras[camera], self.shadow_reach_m))
 
-    def _levels(self, warm: bool, known: bool) -> list[Level]:
-        steps = self.later_steps if warm else self.steps
-        fine = Level(1, self._rhythm(steps), Window(self.rho_px, self.cell_px, self.variance_floor))
-        levels = [fine, *self._exact(fine, known)]
-        if warm or not self.coarse_steps or self.coarse_factor == 1:
-            return levels
-        wide = Window(self.coarse_rho_px, 2 * self.cell_px, self.variance_floor)
-        return [Level(self.coarse_factor, self._rhythm(self.coarse_steps), wide), *levels]
+    def _plate(self, background: Background, camera: int, factor: int) -> Plate:
+        """Return a view of the empty scene, shrunk; computed once, forgotten with the background."""
+        known = self._plates.setdefault(background, {})
+        if (camera, factor) not in known:
+            known[camera, factor] = plate_of(background.mean[camera], background.spread[camera], factor)
+        return known[camera, factor]
 
-    def _exact(self, fine: Level, known: bool) -> list[Level]:
-        """Return the last steps after the plate: it tells the sides apart, the local statistics where they meet.
-
-        A pixel on the edge mixes both colours, so the plate's narrow density takes it for the person.
-        """
-        if not known or not self.local_steps:
-            return []
-        return [fine._replace(rhythm=self._rhythm(self.local_steps), use_plate=False)]
+    def _levels(self, warm: bool) -> list[Level]:
+        reduced = Window(self.reduced_rho_px, self.cell_px, self.variance_floor)
+        full = Window(self.rho_px, self.cell_px, self.variance_floor)
+        levels = [
+            Level(COARSE, self._rhythm(0 if warm else self.coarse_steps), reduced),
+            Level(HALF, self._rhythm(self.half_steps), reduced),
+            Level(FULL, self._rhythm(self.later_steps if warm else self.steps), full, use_plate=False),
+        ]
+        return [level for level in levels if level.rhythm.steps]
 
     def _rhythm(self, steps: int) -> Rhythm:
         return Rhythm(steps, self.statistics_every, self.redistance_every)

@@ -14,6 +14,7 @@ import numba
 import numpy as np
 
 from mocapflow.records import F32, U8
+from mocapflow_levelset import crops
 from mocapflow_levelset.channels import ChannelName, features
 
 BLACK = (-16 / 100, 128 / 255, 128 / 255)  # where the rays start, in lab channels scaled to [0, 1]
@@ -31,21 +32,35 @@ class Shadow(NamedTuple):
     stranger: float  # log density below which nothing is called more unlikely
 
 
-def density_of(pixels: U8, mean: F32, spread: F32, floor: F32, channels: Sequence[ChannelName], shadow: Shadow) -> F32:
-    """Return the log density (N,) of pixels under the empty scene.
+class Plate(NamedTuple):
+    """The empty scene in one view, as pixels are compared with it."""
 
-    The spread in each channel is taken as the root mean square over the colours.
+    mean: U8  # (H, W, 3) BGR
+    spread: F32  # (H, W) grey levels, standard deviation: the root mean square over the colours
+
+    def of(self, crop: crops.Crop) -> Plate:
+        """Return the rectangle of a plate."""
+        return Plate(crop.of_grey_levels(self.mean), crop.of(self.spread))
+
+
+def plate_of(mean: F32, spread: F32, factor: int = 1) -> Plate:
+    """Return a plate, at 1 / factor of its size, from mean and spread (H, W, 3) in grey levels."""
+    mean, spread = crops.shrink_values(mean, factor), crops.shrink_values(spread, factor)
+    return Plate(mean=np.clip(np.rint(mean), 0, 255).astype(np.uint8), spread=np.sqrt(np.mean(spread * spread, axis=2)))
+
+
+def density_of(pixels: U8, mean: U8, spread: F32, floor: F32, channels: Sequence[ChannelName], shadow: Shadow) -> F32:
+    """Return the log density (N,) of pixels under the empty scene.
 
     Args:
         pixels: (N, 3) BGR.
-        mean: (N, 3) grey levels of the empty scene there.
-        spread: (N, 3) grey levels, standard deviation.
+        mean: (N, 3) BGR of the empty scene there.
+        spread: (N,) grey levels, standard deviation.
         floor: (N,) 1 where a shadow may fall, 0 elsewhere.
         channels: in which they are compared.
         shadow: what counts as background.
     """
-    values = features(pixels[None], channels)[:, 0]
-    plate = features(np.clip(np.rint(mean), 0, 255).astype(np.uint8)[None], channels)[:, 0]
+    values, plate = features(pixels[None], channels)[:, 0], features(mean[None], channels)[:, 0]
     constants = tuple(np.float32(value) for value in shadow)
     out = np.empty(values.shape[1], np.float32)
     _densities(values, plate, spread, floor, constants, first_lab(channels), out)
@@ -62,10 +77,9 @@ def first_lab(channels: Sequence[ChannelName]) -> int:
 def _densities(values, plate, spread, may_fall, shadow, lab, out):  # type: ignore[no-untyped-def]
     floor, _, _, _, stranger = shadow
     channels = values.shape[0]
-    scale = np.float32(1 / 255**2 / 3)
+    scale = np.float32(1 / 255**2)
     for n in range(out.size):
-        s = spread[n]
-        variance = max((s[0] * s[0] + s[1] * s[1] + s[2] * s[2]) * scale, floor * floor)
+        variance = max(spread[n] * spread[n] * scale, floor * floor)
         inverse = np.float32(0.5) / variance
         norm = LOG_ROOT - np.float32(0.5) * np.log(variance)
         lit, others = np.float32(0), np.float32(0)

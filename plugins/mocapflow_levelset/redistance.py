@@ -46,7 +46,7 @@ def _redistance(level, band, out):  # type: ignore[no-untyped-def]
     for y in range(height):
         for x in range(width):
             distance = np.sqrt(min(out[y, x], far))
-            out[y, x] = distance if level[y, x] > 0 else -distance
+            out[y, x] = max(distance, np.float32(1e-6)) if level[y, x] > 0 else -distance
     return out
 
 
@@ -78,23 +78,30 @@ def _crossings(a, b, c, d, x, y, points):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, error_model="numpy")
 def _stamp(out, points, i, j, x, y, reach):  # type: ignore[no-untyped-def]
-    """Lower the squared distances around cell (x, y) to those of the segment from point i to point j."""
+    """Lower the squared distances around cell (x, y) to those of the segment from point i to point j.
+
+    Along the segment a pixel is `along` from its middle and beyond its ends by what that exceeds half its length;
+    across it is `across` away.
+    """
     height, width = out.shape
     # whole vectors of pixels: a remainder would cost as much as another vector
     left = max(x - reach, 0)
     right = min(left + (2 * reach + 2 + LANES - 1) // LANES * LANES, width)
-    ax, ay = points[i, 0] - np.float32(left), points[i, 1]
-    dx, dy = points[j, 0] - points[i, 0], points[j, 1] - ay
-    inverse = np.float32(1) / max(dx * dx + dy * dy, np.float32(1e-12))
-    zero, one = np.float32(0), np.float32(1)
+    dx, dy = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
+    length, zero = np.sqrt(dx * dx + dy * dy), np.float32(0)
+    half = np.float32(0.5) * length
+    # a point has no direction; any will do
+    ux, uy = (dx / length, dy / length) if length > zero else (np.float32(1), zero)
+    mx = np.float32(0.5) * (points[i, 0] + points[j, 0]) - np.float32(left)
+    my = np.float32(0.5) * (points[i, 1] + points[j, 1])
     for row in range(max(y - reach, 0), min(y + reach + 2, height)):
-        ey = np.float32(row) - ay
+        ey = np.float32(row) - my
+        first_along, first_across = ey * uy - mx * ux, ey * ux + mx * uy
         line = out[row, left:right]
         for k in range(line.size):
-            ex = np.float32(np.int32(k)) - ax
-            along = (ex * dx + ey * dy) * inverse
-            along = along if along > zero else zero
-            along = along if along < one else one
-            rx, ry = ex - along * dx, ey - along * dy
-            squared = rx * rx + ry * ry
+            place = np.float32(np.int32(k))
+            beyond = abs(first_along + place * ux) - half
+            beyond = beyond if beyond > zero else zero
+            across = first_across - place * uy
+            squared = across * across + beyond * beyond
             line[k] = squared if squared < line[k] else line[k]

@@ -6,6 +6,7 @@ pixel needs them. With cells of one pixel this is the windowed statistic of the 
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 import numba
@@ -27,7 +28,8 @@ class Window(NamedTuple):
     floor: float  # smallest standard deviation, as a share of the channel's range
 
 
-def step_table(sigma_px: float) -> F32:
+@cache
+def step_table() -> F32:
     """Return the smooth step sampled from -STEP_RANGE to STEP_RANGE sigmas, for interpolation in kernels."""
     from scipy.special import erf
 
@@ -35,6 +37,7 @@ def step_table(sigma_px: float) -> F32:
     table = 0.5 * (1 + erf(scaled / np.sqrt(2)))
     table[0], table[-1] = 0, 1
     result: F32 = table.astype(np.float32)
+    result.flags.writeable = False
     return result
 
 
@@ -62,7 +65,7 @@ def local_gaussians(
 
     Source: Rosenhahn 2008, section 12.2.1 (local Gaussian region model)
     """
-    inside = _inside_sums(features, weight, level, sums, window.cell_px, step_table(sigma_px), np.float32(sigma_px))
+    inside = _inside_sums(features, weight, level, sums, window.cell_px, step_table(), np.float32(sigma_px))
     both = np.concatenate([inside, sums - inside], axis=2)
     everywhere = both.reshape(-1, both.shape[2]).sum(axis=0, dtype=np.float64).astype(np.float32)
     smooth = _smooth(both, window)

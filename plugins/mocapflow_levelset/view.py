@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,21 +11,28 @@ from mocapflow.records import F32, U8
 from mocapflow_levelset import crops
 from mocapflow_levelset.channels import ChannelName
 from mocapflow_levelset.crops import Crop
-from mocapflow_levelset.evidence import from_image
-from mocapflow_levelset.evolve import Rhythm, Settled, Weights, settle
-from mocapflow_levelset.plates import Shadow
+from mocapflow_levelset.evidence import Evidence, from_image
+from mocapflow_levelset.evolve import Costs, Rhythm, Weights, costs, settle
+from mocapflow_levelset.plates import Plate, Shadow
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.statistics import Window
+
+
+class Empty(NamedTuple):
+    """What is known of the empty scene in one view."""
+
+    plates: Mapping[int, Plate]  # by how much it is shrunk
+    floor: F32  # (H, W) 1 where shadows may fall
 
 
 class View(NamedTuple):
     """What is given of one view."""
 
     image: U8  # (H, W, 3) BGR
-    start: F32  # (H, W) px, signed distance to the start contour, positive inside
+    start: F32  # (H, W) signed distance to the start contour, positive inside; only its zero contour counts
     prior: F32  # (H, W) px, signed distance to the model's outline
     counted: F32  # (H, W) 1 where a pixel counts
-    plate: tuple[F32, F32, F32] | None = None  # the empty scene: mean, spread (H, W, 3), where shadows may fall (H, W)
+    empty: Empty | None = None
 
 
 class Level(NamedTuple):
@@ -33,7 +40,7 @@ class Level(NamedTuple):
 
     factor: int
     rhythm: Rhythm
-    window: Window  # in px of the full image
+    window: Window  # in px of the shrunken image
     use_plate: bool = True  # False: local statistics on both sides even where the empty scene is known
 
 
@@ -45,80 +52,56 @@ class Method(NamedTuple):
     weights: Weights
     shadow: Shadow
     decorrelate: bool
-    calm_px: float  # smoothing of the image before it is compared with the empty scene
-    stride: int  # of the pixels the statistics are taken from
+    calm_px: float  # smoothing of the full image before it is compared with the empty scene
+    stride: int  # of the pixels of the full image that the statistics are taken from
     margin_px: int
 
 
-def find(view: View, levels: Sequence[Level], method: Method, band_px: float) -> Settled:
-    """Return the silhouette of one view (H, W) and its energies; everything outside without a start contour."""
-    multiple = max(level.factor for level in levels)
-    crop = crops.around(view.start, method.margin_px, multiple)
+class Found(NamedTuple):
+    """The silhouette of one view, and what it costs."""
+
+    level: F32  # (H, W) px, signed distance clipped to the band
+    costs: Costs
+
+
+def find(view: View, levels: Sequence[Level], method: Method, band_px: float) -> Found:
+    """Return the silhouette of one view (H, W) and its costs; everything outside without a start contour."""
+    crop = crops.around(view.start, method.margin_px, multiple=max(level.factor for level in levels))
     outside = np.full(view.start.shape, -band_px, np.float32)
     if crop is None:
-        return Settled(outside, 0.0, 0.0, 0.0)
-    part = _cut(view, crop)
-    level = part.start
-    for resolution in levels:
-        settled = _settle_at(part._replace(start=level), resolution, method)
-        level = settled.level
-    crop.of(outside)[:] = redistance(level, band_px)
-    return settled._replace(level=outside)
+        return Found(outside, Costs(0.0, 0.0, 0.0))
+    front, factor = crop.of(view.start), 1
+    for level in levels:
+        prior = crops.shrink_values(crop.of(view.prior), level.factor) / np.float32(level.factor)
+        front = _brought(front, factor, level.factor, method.weights.band_px)
+        settled = settle(front, prior, _evidence(view, crop, level, method), level.window, method.weights, level.rhythm)
+        front, factor = settled.level, level.factor
+    crop.of(outside)[:] = redistance(_brought(front, factor, 1, band_px), band_px)
+    return Found(outside, costs(settled, prior, method.weights))
 
 
-def _cut(view: View, crop: Crop) -> View:
-    plate = None
-    if view.plate is not None:
-        mean, spread, floor = view.plate
-        plate = crop.of(mean), crop.of(spread), crop.of(floor)
-    return View(
-        image=crop.of_grey_levels(view.image),
-        start=np.ascontiguousarray(crop.of(view.start)),
-        prior=np.ascontiguousarray(crop.of(view.prior)),
-        counted=np.ascontiguousarray(crop.of(view.counted)),
-        plate=plate,
-    )
+def _brought(level: F32, factor: int, wanted: int, band_px: float) -> F32:
+    """Return a level set of the image shrunk by `factor` as a signed distance where it is shrunk by `wanted`."""
+    if wanted < factor:  # a distance first, where it costs least
+        return crops.enlarge(redistance(level, band_px), factor // wanted)
+    times = wanted // factor
+    return redistance(crops.shrink_values(level, times) / np.float32(times), band_px)
 
 
-def _settle_at(view: View, level: Level, method: Method) -> Settled:
-    """Return the descent at one resolution, its level set back on the full grid."""
+def _evidence(view: View, crop: Crop, level: Level, method: Method) -> Evidence:
+    """Return what the image says at one resolution."""
     factor = level.factor
-    if not level.use_plate:
-        view = view._replace(plate=None)
-    if factor > 1:
-        view = _shrunk(view, factor)
-    stride = method.stride if factor == 1 else 1
-    image = np.ascontiguousarray(view.image)
-    evidence = from_image(
-        image,
-        view.counted,
+    plate = None
+    if view.empty is not None and level.use_plate:
+        plate = view.empty.plates[factor].of(crop.at(factor)), crops.shrink_mask(crop.of(view.empty.floor), factor)
+    return from_image(
+        crops.shrink(crop.of_grey_levels(view.image), factor),
+        crops.shrink_mask(crop.of(view.counted), factor),
         method.channels,
         method.median_px,
-        stride,
-        view.plate,
+        max(method.stride // factor, 1),
+        plate,
         method.shadow,
         method.decorrelate,
-        method.calm_px / factor,
-    )
-    full = level.window
-    window = Window(full.rho_px / factor, max(full.cell_px // factor, 1), full.floor)
-    settled = settle(view.start, view.prior, evidence, window, method.weights, level.rhythm)
-    return settled if factor == 1 else settled._replace(level=crops.enlarge(settled.level, factor))
-
-
-def _shrunk(view: View, factor: int) -> View:
-    plate = view.plate
-    if plate is not None:
-        mean, spread, floor = plate
-        plate = (
-            crops.shrink_values(mean, factor),
-            crops.shrink_values(spread, factor),
-            (crops.shrink_values(floor, factor) > 0.5).astype(np.float32),
-        )
-    return View(
-        image=crops.shrink(view.image, factor),
-        start=crops.shrink_values(view.start, factor) / np.float32(factor),
-        prior=crops.shrink_values(view.prior, factor) / np.float32(factor),
-        counted=(crops.shrink_values(view.counted, factor) > 0.5).astype(np.float32),
-        plate=plate,
+        method.calm_px if factor == 1 else 0.0,  # the mean over pixels is calm
     )

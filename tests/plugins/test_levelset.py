@@ -8,8 +8,9 @@ from levelset_scenes import ellipse
 from mocapflow_levelset.grabcut import GrabCut
 from mocapflow_levelset.levelset import LevelSet
 from mocapflow_levelset.masks import counted, without_cut
+from mocapflow_levelset.plates import plate_of
 from mocapflow_levelset.redistance import redistance
-from mocapflow_levelset.view import View, find
+from mocapflow_levelset.view import Empty, View, find
 
 from mocapflow.data import Past, Turn
 from mocapflow.geometry.silhouettes import model_distance
@@ -86,13 +87,11 @@ def test_the_contour_is_sub_pixel():
     image = np.clip(alpha * [60, 90, 150] + (1 - alpha) * [140, 130, 120] + noise, 0, 255).astype(np.uint8)
     empty = np.full((160, 160, 3), (140, 130, 120), np.float32)
     start = redistance(np.roll(exact, 4, axis=1), 12.0)
-    view = View(
-        image, start, start, counted(start.shape, 3), (empty, np.full_like(empty, 3), np.ones((160, 160), np.float32))
-    )
-    for plate in (view.plate, None):
+    plates = {factor: plate_of(empty, np.full_like(empty, 3), factor) for factor in (1, 2, 4)}
+    for scene in (Empty(plates, np.ones((160, 160), np.float32)), None):
         segmenter = LevelSet(shape_weight=0.0)
-        levels, method = segmenter._levels(False, plate is not None), segmenter._method()
-        found = find(view._replace(plate=plate), levels, method, 12.0).level
+        view = View(image, start, start, counted(start.shape, 3), scene)
+        found = find(view, segmenter._levels(warm=False), segmenter._method(), 12.0).level
         at = np.abs(found) < 0.7
         assert abs((found - exact)[at].mean()) < 0.15
         assert np.abs((found - exact)[at]).mean() < 0.35
@@ -101,8 +100,8 @@ def test_the_contour_is_sub_pixel():
 def test_the_literal_chapter_runs(scene, pose):
     frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, believed(pose))
     literal = LevelSet(
-        channels=("grey",), use_background=False, decorrelate=False, coarse_steps=0, cell_px=1, stride_px=1, steps=20,
-        statistics_every=1, redistance_every=5, length_weight=0.5, variance_floor=0.02,
+        channels=("grey",), use_background=False, decorrelate=False, coarse_steps=0, half_steps=0, cell_px=1,
+        stride_px=1, steps=20, statistics_every=1, redistance_every=5, length_weight=0.5, variance_floor=0.02,
     )  # fmt: skip
     assert min(overlaps(literal.segment(frame, state, Past(), scene, FIRST), scene, pose)) > 0.85
 
@@ -136,5 +135,5 @@ def test_the_start_may_touch_the_image_border():
     image = np.random.default_rng(0).integers(0, 256, (160, 160, 3), dtype=np.uint8)
     segmenter = LevelSet()
     view = View(image, start, start, counted(start.shape, 3))
-    found = find(view, segmenter._levels(False, False), segmenter._method(), 12.0)
+    found = find(view, segmenter._levels(warm=False), segmenter._method(), 12.0)
     assert np.isfinite(found.level).all() and found.level.shape == start.shape
