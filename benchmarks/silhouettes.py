@@ -67,21 +67,21 @@ def cpu_ms(actions: list[Callable[[], object]], repeats: int) -> tuple[float, fl
 
 def steps_of(surface: Surface, camera: Camera) -> dict[str, Callable[[], object]]:
     """The whole, its parts, and the alternatives for one view."""
-    pixels, depth = np.empty((len(surface.vertices), 2)), np.empty(len(surface.vertices))
+    pixels = np.empty((len(surface.vertices), 2))
     facing, matrix = np.empty(len(surface.faces), np.int8), projection(camera)
-    kernels.project(surface.vertices, matrix, pixels, depth)
-    kernels.face_directions(pixels, depth, surface.faces, facing)
+    kernels.project(surface.vertices, matrix, pixels)
+    kernels.face_directions(pixels, surface.faces, facing)
     cloth = surface.layer == CLOTH
-    segments, times = kernels.occluding_edges(surface.edges, surface.faces, facing, cloth)
+    segments, times = kernels.occluding_edges(surface.edges, facing, cloth)
     boundary = silhouettes.outline(surface, camera)
     cover = np.zeros_like(boundary.cover)
     fine = np.round(pixels[surface.faces] * 16).astype(np.int32)
     coarse = np.round(pixels[surface.faces]).astype(np.int32)[:, :, None]
     return {
         "mask and contour": lambda: both(surface, camera),
-        "  project": lambda: kernels.project(surface.vertices, matrix, pixels, depth),
-        "  faces towards the camera": lambda: kernels.face_directions(pixels, depth, surface.faces, facing),
-        "  occluding edges": lambda: kernels.occluding_edges(surface.edges, surface.faces, facing, cloth),
+        "  project": lambda: kernels.project(surface.vertices, matrix, pixels),
+        "  faces towards the camera": lambda: kernels.face_directions(pixels, surface.faces, facing),
+        "  occluding edges": lambda: kernels.occluding_edges(surface.edges, facing, cloth),
         "  wind": lambda: kernels.wind(pixels[segments], times, boundary.corner, np.zeros_like(cover)),
         "  outline, all of the above": lambda: silhouettes.outline(surface, camera),
         "  contour samples": lambda: silhouettes.samples(boundary, surface, camera, SPACING),

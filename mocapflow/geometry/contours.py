@@ -7,6 +7,8 @@ import numpy as np
 
 from mocapflow.records import F32, F64
 
+BLOCK = 32  # pixels looked at together
+
 
 def zero_crossings(distance: F32, border_px: int) -> tuple[F64, F64]:
     """Return where a signed distance crosses zero between neighbouring pixels, all components and holes included.
@@ -31,25 +33,40 @@ def _crossings(distance, border):  # type: ignore[no-untyped-def]
     pixel, normal = np.empty((capacity, 2)), np.empty((capacity, 2))
     count = 0
     for row in range(border, height - border - 1):
-        for column in range(border, width - border - 1):
-            here = distance[row, column]
-            for down in range(2):
-                there = distance[row + down, column + 1 - down]
-                if (here > 0) == (there > 0):
-                    continue
-                t = here / (here - there)
-                gx = (1 - t) * _slope(distance, row, column, 0) + t * _slope(distance, row + down, column + 1 - down, 0)
-                gy = (1 - t) * _slope(distance, row, column, 1) + t * _slope(distance, row + down, column + 1 - down, 1)
-                length = np.sqrt(gx * gx + gy * gy)
-                if length == 0.0:
-                    continue
-                if count == capacity:
-                    pixel, normal = np.concatenate((pixel, pixel)), np.concatenate((normal, normal))
-                    capacity *= 2
-                pixel[count, 0], pixel[count, 1] = column + (1 - down) * t, row + down * t
-                normal[count, 0], normal[count, 1] = -gx / length, -gy / length
-                count += 1
+        for block in range(border, width - border - 1, BLOCK):
+            end = min(block + BLOCK, width - border - 1)
+            if _one_sided(distance[row, block:end], distance[row, block + 1 : end + 1], distance[row + 1, block:end]):
+                continue
+            for column in range(block, end):
+                here = distance[row, column]
+                for down in range(2):
+                    there = distance[row + down, column + 1 - down]
+                    if (here > 0) == (there > 0):
+                        continue
+                    t = here / (here - there)
+                    ahead = row + down, column + 1 - down
+                    gx = (1 - t) * _slope(distance, row, column, 0) + t * _slope(distance, ahead[0], ahead[1], 0)
+                    gy = (1 - t) * _slope(distance, row, column, 1) + t * _slope(distance, ahead[0], ahead[1], 1)
+                    length = np.sqrt(gx * gx + gy * gy)
+                    if length == 0.0:
+                        continue
+                    if count == capacity:
+                        pixel, normal = np.concatenate((pixel, pixel)), np.concatenate((normal, normal))
+                        capacity *= 2
+                    pixel[count, 0], pixel[count, 1] = column + (1 - down) * t, row + down * t
+                    normal[count, 0], normal[count, 1] = -gx / length, -gy / length
+                    count += 1
     return pixel[:count], normal[:count]
+
+
+@numba.njit(cache=True)
+def _one_sided(here, east, south):  # type: ignore[no-untyped-def]
+    """True where no two neighbours lie on different sides; without branches, so that it vectorises."""
+    crossed = False
+    for k in range(here.size):
+        side = here[k] > 0
+        crossed |= (side != (east[k] > 0)) | (side != (south[k] > 0))
+    return not crossed
 
 
 @numba.njit(cache=True)

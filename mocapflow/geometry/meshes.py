@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numba
 import numpy as np
 
@@ -59,8 +61,9 @@ def lengths_along(vertices: F64, strands: I32) -> F64:
 
 @numba.njit(cache=True)
 def _add_face_normals(vertices, faces, normals):  # type: ignore[no-untyped-def]
+    index = numba.uint64  # unsigned: nothing is checked for counting from the end
     for f in range(len(faces)):
-        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        a, b, c = index(faces[f, 0]), index(faces[f, 1]), index(faces[f, 2])
         ux, wx = vertices[b, 0] - vertices[a, 0], vertices[c, 0] - vertices[a, 0]
         uy, wy = vertices[b, 1] - vertices[a, 1], vertices[c, 1] - vertices[a, 1]
         uz, wz = vertices[b, 2] - vertices[a, 2], vertices[c, 2] - vertices[a, 2]
@@ -70,7 +73,7 @@ def _add_face_normals(vertices, faces, normals):  # type: ignore[no-untyped-def]
             normals[corner, 1] += ny
             normals[corner, 2] += nz
     for v in range(len(normals)):
-        length = np.sqrt(normals[v, 0] ** 2 + normals[v, 1] ** 2 + normals[v, 2] ** 2)
-        if length > 0:
-            for axis in range(3):  # normals[v] /= length takes twice as long
-                normals[v, axis] /= length
+        x, y, z = normals[v, 0], normals[v, 1], normals[v, 2]
+        square = x * x + y * y + z * z
+        scale = 1.0 / math.sqrt(square) if square > 0 else 0.0
+        normals[v, 0], normals[v, 1], normals[v, 2] = scale * x, scale * y, scale * z

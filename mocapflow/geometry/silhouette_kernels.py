@@ -8,59 +8,57 @@ import numba
 import numpy as np
 
 REACH = 1.0  # px beyond a segment at which its outside is looked up
+NEAREST = 1e-6  # m, depth of what still counts as before the camera
+
+index = numba.uint64  # of an array: unsigned, so that nothing is checked for counting from the end; twice as fast
 
 
 @numba.njit(cache=True)
-def project(vertices, matrix, pixels, depth):  # type: ignore[no-untyped-def]
-    """Write pixels (N, 2) and depths (N,) m of world points (N, 3)."""
+def project(vertices, matrix, pixels):  # type: ignore[no-untyped-def]
+    """Write pixels (N, 2) of world points (N, 3); NaN for those behind the camera."""
     for v in range(len(vertices)):
         x, y, z = vertices[v, 0], vertices[v, 1], vertices[v, 2]
-        w = matrix[2, 0] * x + matrix[2, 1] * y + matrix[2, 2] * z + matrix[2, 3]
-        depth[v] = w
-        inverse = 1.0 / w if w > 1e-6 else 0.0
+        depth = matrix[2, 0] * x + matrix[2, 1] * y + matrix[2, 2] * z + matrix[2, 3]
+        inverse = 1.0 / depth if depth > NEAREST else math.nan
         pixels[v, 0] = (matrix[0, 0] * x + matrix[0, 1] * y + matrix[0, 2] * z + matrix[0, 3]) * inverse
         pixels[v, 1] = (matrix[1, 0] * x + matrix[1, 1] * y + matrix[1, 2] * z + matrix[1, 3]) * inverse
 
 
 @numba.njit(cache=True)
-def face_directions(pixels, depth, faces, facing):  # type: ignore[no-untyped-def]
-    """Write +1 for faces that look at the camera, -1 for those that look away, 0 for those behind it."""
+def face_directions(pixels, faces, facing):  # type: ignore[no-untyped-def]
+    """Write +1 for faces that look at the camera, -1 for those that look away, 0 for those (partly) behind it."""
     for f in range(len(faces)):
-        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
-        if depth[a] <= 1e-6 or depth[b] <= 1e-6 or depth[c] <= 1e-6:
-            facing[f] = 0
-            continue
-        area = (pixels[b, 0] - pixels[a, 0]) * (pixels[c, 1] - pixels[a, 1]) - (pixels[c, 0] - pixels[a, 0]) * (
-            pixels[b, 1] - pixels[a, 1]
-        )
-        facing[f] = 1 if area < 0 else -1  # y points down: counterclockwise from outside is negative
+        a, b, c = index(faces[f, 0]), index(faces[f, 1]), index(faces[f, 2])
+        ux, uy = pixels[b, 0] - pixels[a, 0], pixels[b, 1] - pixels[a, 1]
+        wx, wy = pixels[c, 0] - pixels[a, 0], pixels[c, 1] - pixels[a, 1]
+        area = ux * wy - wx * uy  # y points down: counterclockwise from outside is negative
+        facing[f] = np.int8(area < 0) - np.int8(area > 0)
 
 
 @numba.njit(cache=True)
-def occluding_edges(edges, faces, facing, cloth):  # type: ignore[no-untyped-def]
-    """Return directed occluding edges (K, 2), covered side on the same hand, and how many layers end there (K,)."""
+def occluding_edges(edges, facing, cloth):  # type: ignore[no-untyped-def]
+    """Return directed occluding edges (K, 2), covered side on the same hand, and how many layers end there (K,).
+
+    A face covers if it looks at the camera; cloth covers with both its sides, and counts negative turned over.
+    """
     out = np.empty((len(edges), 2), np.int32)
     times = np.empty(len(edges), np.int32)
     count = 0
     for e in range(len(edges)):
         a, b, left, right = edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
-        two_sided = cloth[a]
-        ends = _share(left, facing, two_sided) - _share(right, facing, two_sided)
+        here = facing[index(left)] if left >= 0 else 0
+        there = facing[index(right)] if right >= 0 else 0
+        if here == there:  # nearly all
+            continue
+        if not cloth[index(a)]:
+            here, there = max(here, 0), max(there, 0)
+        ends = here - there
         if ends == 0:
             continue
         out[count, 0], out[count, 1] = (a, b) if ends > 0 else (b, a)
         times[count] = abs(ends)
         count += 1
     return out[:count], times[:count]
-
-
-@numba.njit(cache=True)
-def _share(face, facing, two_sided):  # type: ignore[no-untyped-def]
-    """Return what a face adds along its own direction: 1 if it covers, -1 if it covers turned over."""
-    if face < 0:
-        return 0
-    direction = facing[face]
-    return direction if two_sided else max(direction, 0)
 
 
 @numba.njit(cache=True)
@@ -223,28 +221,31 @@ def paint_distance(ends, corner, cover, band, distance):  # type: ignore[no-unty
                 distance[row + top, column + left] = d if inside else -d
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _lower_to_segments(ends, left, top, band, square):  # type: ignore[no-untyped-def]
-    """Lower each element of `square` within the band to its squared distance from the segments (float32, SIMD)."""
-    zero, one = np.float32(0), np.float32(1)
+    """Lower each element of `square` within the band to its squared distance from the segments (float32, SIMD).
+
+    Along a segment a pixel lies beyond its ends by what its distance from the middle exceeds half the length.
+    """
+    zero, one, half = np.float32(0), np.float32(1), np.float32(0.5)
     columns = np.arange(square.shape[1]).astype(np.float32)
     for s in range(len(ends)):
         ax, ay = np.float32(ends[s, 0, 0] - left), np.float32(ends[s, 0, 1] - top)
-        dx, dy = np.float32(ends[s, 1, 0] - ends[s, 0, 0]), np.float32(ends[s, 1, 1] - ends[s, 0, 1])
-        inverse = one / max(dx * dx + dy * dy, np.float32(1e-12))
-        first = max(math.ceil(min(ay, ay + dy) - band), 0)
-        last = min(math.floor(max(ay, ay + dy) + band) + 1, square.shape[0])
-        begin = max(math.ceil(min(ax, ax + dx) - band), 0)
-        end = min(math.floor(max(ax, ax + dx) + band) + 1, square.shape[1])
+        bx, by = np.float32(ends[s, 1, 0] - left), np.float32(ends[s, 1, 1] - top)
+        length = np.sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay))
+        ux, uy = ((bx - ax) / length, (by - ay) / length) if length > zero else (one, zero)
+        mx, my, reach = half * (ax + bx), half * (ay + by), half * length
+        first = max(math.ceil(min(ay, by) - band), 0)
+        last = min(math.floor(max(ay, by) + band) + 1, square.shape[0])
+        begin = max(math.ceil(min(ax, bx) - band), 0)
+        end = min(math.floor(max(ax, bx) + band) + 1, square.shape[1])
         for row in range(first, last):
-            line = square[row, begin:end]
-            place = columns[begin:end]
-            py = np.float32(row) - ay
+            line, place = square[row, begin:end], columns[begin:end]
+            py = np.float32(row) - my
+            along, across = py * uy - mx * ux, py * ux + mx * uy
             for k in range(len(line)):
-                px = place[k] - ax
-                t = (px * dx + py * dy) * inverse
-                t = zero if t < zero else t
-                t = one if t > one else t
-                ex, ey = px - t * dx, py - t * dy
-                d = ex * ex + ey * ey
+                beyond = abs(along + place[k] * ux) - reach
+                beyond = beyond if beyond > zero else zero
+                off = across - place[k] * uy
+                d = off * off + beyond * beyond
                 line[k] = d if d < line[k] else line[k]
