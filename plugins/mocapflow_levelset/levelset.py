@@ -8,8 +8,9 @@ from weakref import WeakKeyDictionary
 
 from pydantic import Field, PrivateAttr
 
+from mocapflow.assets import Background
 from mocapflow.components import Segmenter
-from mocapflow.data import Background, Frame, FrameState, Past, Segmentation, Silhouette, Surface, Turn
+from mocapflow.data import Frame, FrameState, Past, Segmentation, Silhouette, Surface, Turn
 from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.scene import Scene
 from mocapflow_levelset.channels import ChannelName
