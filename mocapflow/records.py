@@ -64,27 +64,28 @@ def check_arrays(record: Any) -> None:
         value = getattr(record, name)
         if value is None and declared.optional:
             continue
-        where = f"{type(record).__name__}.{name}"
         if not isinstance(value, np.ndarray):
-            raise ShapeError(f"{where} is {type(value).__name__}, not a numpy array")
+            raise ShapeError(f"{type(record).__name__}.{name} is {type(value).__name__}, not a numpy array")
         if value.dtype != declared.dtype:
-            raise ShapeError(f"{where} has dtype {value.dtype}; expected {declared.dtype}")
-        _check_shape(where, value.shape, declared.axes, lengths)
+            raise ShapeError(f"{type(record).__name__}.{name} has dtype {value.dtype}; expected {declared.dtype}")
+        if not _fits(value.shape, declared.axes, lengths):
+            _complain(f"{type(record).__name__}.{name}", value.shape, declared.axes, lengths)
         value.flags.writeable = False
 
 
-def _check_shape(where: str, shape: tuple[int, ...], axes: tuple[str | int, ...], lengths: dict[str, int]) -> None:
-    expected = [axis if isinstance(axis, int) else lengths.get(axis) for axis in axes]
-    fits = len(shape) == len(axes) and all(
-        want is None or want == have for want, have in zip(expected, shape, strict=True)
-    )
-    if not fits:
-        wanted = ", ".join(
-            str(axis) if isinstance(axis, int) or length is None else f"{axis}={length}"
-            for axis, length in zip(axes, expected, strict=True)
-        )
-        raise ShapeError(f"{where} has shape {shape}; expected ({wanted})")
-    lengths.update({axis: have for axis, have in zip(axes, shape, strict=True) if isinstance(axis, str)})
+def _fits(shape: tuple[int, ...], axes: tuple[str | int, ...], lengths: dict[str, int]) -> bool:
+    """True where a shape agrees with the declaration and the lengths so far, which it adds to."""
+    if len(shape) != len(axes):
+        return False
+    for have, axis in zip(shape, axes, strict=True):
+        if have != (axis if isinstance(axis, int) else lengths.setdefault(axis, have)):
+            return False
+    return True
+
+
+def _complain(where: str, shape: tuple[int, ...], axes: tuple[str | int, ...], lengths: dict[str, int]) -> None:
+    wanted = ", ".join(f"{axis}={lengths[axis]}" if axis in lengths else str(axis) for axis in axes)
+    raise ShapeError(f"{where} has shape {shape}; expected ({wanted})")
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(array, dataclasses.field))
