@@ -67,9 +67,9 @@ def cpu_ms(actions: list[Callable[[], object]], repeats: int) -> tuple[float, fl
 
 def steps_of(surface: Surface, camera: Camera) -> dict[str, Callable[[], object]]:
     """The whole, its parts, and the alternatives for one view."""
-    pixels = np.empty((len(surface.vertices), 2))
+    pixels, depth = np.empty((len(surface.vertices), 2)), np.empty(len(surface.vertices))
     facing, matrix = np.empty(len(surface.faces), np.int8), projection(camera)
-    kernels.project(surface.vertices, matrix, pixels)
+    kernels.project(surface.vertices, matrix, pixels, depth)
     kernels.face_directions(pixels, surface.faces, facing)
     cloth = surface.layer == CLOTH
     segments, times = kernels.occluding_edges(surface.edges, facing, cloth)
@@ -79,7 +79,7 @@ def steps_of(surface: Surface, camera: Camera) -> dict[str, Callable[[], object]
     coarse = np.round(pixels[surface.faces]).astype(np.int32)[:, :, None]
     return {
         "mask and contour": lambda: both(surface, camera),
-        "  project": lambda: kernels.project(surface.vertices, matrix, pixels),
+        "  project": lambda: kernels.project(surface.vertices, matrix, pixels, depth),
         "  faces towards the camera": lambda: kernels.face_directions(pixels, surface.faces, facing),
         "  occluding edges": lambda: kernels.occluding_edges(surface.edges, facing, cloth),
         "  wind": lambda: kernels.wind(pixels[segments], times, boundary.corner, np.zeros_like(cover)),

@@ -14,12 +14,13 @@ index = numba.uint64  # of an array: unsigned, so that nothing is checked for co
 
 
 @numba.njit(cache=True)
-def project(vertices, matrix, pixels):  # type: ignore[no-untyped-def]
-    """Write pixels (N, 2) of world points (N, 3); NaN for those behind the camera."""
+def project(vertices, matrix, pixels, depth):  # type: ignore[no-untyped-def]
+    """Write pixels (N, 2), NaN behind the camera, and depths (N,) m of world points (N, 3)."""
     for v in range(len(vertices)):
         x, y, z = vertices[v, 0], vertices[v, 1], vertices[v, 2]
-        depth = matrix[2, 0] * x + matrix[2, 1] * y + matrix[2, 2] * z + matrix[2, 3]
-        inverse = 1.0 / depth if depth > NEAREST else math.nan
+        w = matrix[2, 0] * x + matrix[2, 1] * y + matrix[2, 2] * z + matrix[2, 3]
+        depth[v] = w
+        inverse = 1.0 / w if w > NEAREST else math.nan
         pixels[v, 0] = (matrix[0, 0] * x + matrix[0, 1] * y + matrix[0, 2] * z + matrix[0, 3]) * inverse
         pixels[v, 1] = (matrix[1, 0] * x + matrix[1, 1] * y + matrix[1, 2] * z + matrix[1, 3]) * inverse
 

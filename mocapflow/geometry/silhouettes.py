@@ -36,8 +36,9 @@ def outline(surface: Surface, camera: Camera) -> Outline:
 
     Edges that lie inside the silhouette (a leg before the other) are not part of the boundary.
     """
-    pixels, facing = np.empty((len(surface.vertices), 2)), np.empty(len(surface.faces), np.int8)
-    kernels.project(surface.vertices, projection(camera), pixels)
+    pixels, depth = np.empty((len(surface.vertices), 2)), np.empty(len(surface.vertices))
+    kernels.project(surface.vertices, projection(camera), pixels, depth)
+    facing = np.empty(len(surface.faces), np.int8)
     kernels.face_directions(pixels, surface.faces, facing)
     segments, times = kernels.occluding_edges(surface.edges, facing, surface.layer == CLOTH)
     ends = pixels.take(segments, axis=0)  # several times faster than pixels[segments]
