@@ -46,6 +46,7 @@ COMMANDS: tuple[Callable[..., None], ...] = (
     running.demo,
     results.evaluate,
     results.export,
+    results.view,
     looking.plugins,
     looking.show,
     looking.equations,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -12,7 +14,9 @@ from mocapflow.errors import RecordingError
 
 Run = Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")]
 Truth = Annotated[Path | None, typer.Option(help="Angles to compare with.  [default: those of the recording]")]
-Format = Annotated[list[str], typer.Option("--format", help="csv, mot or trc; repeatable.")]
+Format = Annotated[
+    list[str], typer.Option("--format", help="csv, mot, trc, bvh, c3d, gltf, movement, parquet or rrd; repeatable.")
+]
 COLUMNS = ("angle", "frames", "rms_deg", "mae_deg", "offset_deg", "max_deg", "worst_frame")
 
 
@@ -43,6 +47,18 @@ def export(run: Run, format_: Format) -> None:
     silent = [f"stages.{named.label}=null" for named in writers]
     wanted = f"stages.export={{use: export, formats: [{', '.join(format_)}]}}"
     typer.echo(execute(invocation.changed(*silent, wanted), run, fresh=False))
+
+
+def view(
+    run: Run,
+    show: Annotated[
+        bool, typer.Option("--show/--no-show", help="Open the viewer, or only write results/scene.rrd.")
+    ] = True,
+) -> None:
+    """Look at a run in Rerun: cameras, images, outlines, body, garment and angles on one timeline."""
+    export(run, ["rrd"])
+    if show:
+        subprocess.run([sys.executable, "-m", "rerun", str(run / "results" / "scene.rrd")], check=True)
 
 
 def table(rows: list[dict[str, object]]) -> str:

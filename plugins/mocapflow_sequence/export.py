@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import ClassVar, Literal
 
 import numpy as np
+from mocapflow_formats import Result, write
 
 from mocapflow.components import Stage
 from mocapflow.data import PoseBatch
@@ -17,21 +18,28 @@ from mocapflow.results import Files, RunFolder, Track
 from mocapflow.scene import Scene
 from mocapflow_sequence import layout, opensim, runjson, tables
 
+Format = Literal["csv", "mot", "trc", "bvh", "c3d", "gltf", "movement", "parquet", "rrd"]
+
 
 class Export(Stage):
     """Writes results/angles.csv and angles_raw.csv, angles.mot, joints.trc and run.json.
 
     The csv hold one row per frame: the angles between joint centres in degrees (`geometry.angles`) and their
     standard deviations; the mot holds signed joint angles by OpenSim's names (`opensim`), the trc joint centres.
+    Other formats are written by `mocapflow_formats`, each by a library of its own.
     """
 
     name: ClassVar[str] = "export"
-    formats: tuple[Literal["csv", "mot", "trc"], ...] = ("csv", "mot", "trc")
+    formats: tuple[Format, ...] = ("csv", "mot", "trc")
 
     def run(self, track: Track, scene: Scene, recording: Recording, run_folder: RunFolder) -> Files:
         """Write the files and return their paths."""
         writers = {"csv": write_angles, "mot": write_motion, "trc": write_joints}
-        paths = [path for format in self.formats for path in writers[format](track, scene, run_folder.path)]
+        plain = [
+            path for name in self.formats if name in writers for path in writers[name](track, scene, run_folder.path)
+        ]
+        result, folder = Result(track=track, scene=scene, recording=recording), run_folder.path / layout.RESULTS
+        paths = plain + [write(name, result, folder) for name in self.formats if name not in writers]
         content = runjson.summary(track, run_folder, recording.warnings + scene.warnings)
         return Files(paths=(*paths, runjson.write(layout.place(run_folder.path, layout.RUN), content)))
 

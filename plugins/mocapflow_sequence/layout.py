@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-ANGLES = Path("results/angles.csv")
-RAW_ANGLES = Path("results/angles_raw.csv")
-MOTION = Path("results/angles.mot")
-JOINTS = Path("results/joints.trc")
-EVALUATION = Path("results/evaluation.csv")
-PLOT = Path("results/angles.png")
+RESULTS = Path("results")
+ANGLES = RESULTS / "angles.csv"
+RAW_ANGLES = RESULTS / "angles_raw.csv"
+MOTION = RESULTS / "angles.mot"
+JOINTS = RESULTS / "joints.trc"
+EVALUATION = RESULTS / "evaluation.csv"
+PLOT = RESULTS / "angles.png"
 RUN = Path("run.json")
 REPORT = Path("report.html")
 VIRTUAL = Path("virtual/virtual.mp4")

@@ -1,0 +1,27 @@
+"""Tracks in the files of other programs: one writer a module; each imports its library only when it writes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import import_module
+from pathlib import Path
+
+from mocapflow_formats.result import Result
+
+__all__ = ["FILES", "Result", "write"]
+FILES: Mapping[str, str] = {  # format, which is the module's name: its file in results/
+    "bvh": "motion.bvh",
+    "c3d": "joints.c3d",
+    "gltf": "scene.glb",
+    "movement": "poses.nc",
+    "parquet": "angles.parquet",
+    "rrd": "scene.rrd",
+}
+
+
+def write(name: str, result: Result, folder: Path) -> Path:
+    """Write a result in one of the formats into a folder and return the path."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / FILES[name]
+    import_module(f"mocapflow_formats.{name}").write(result, path)
+    return path

@@ -1,0 +1,73 @@
+"""What every writer gets."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from importlib import import_module
+from types import ModuleType
+
+import numpy as np
+
+from mocapflow.data import NO_CLOTH, Cloth, PoseBatch, Surface
+from mocapflow.errors import PipelineError
+from mocapflow.geometry import kinematics
+from mocapflow.recording import Recording
+from mocapflow.records import F64, record
+from mocapflow.results import Track
+from mocapflow.scene import Scene
+
+
+@record
+class Result:
+    """A track with what it is a track of."""
+
+    track: Track
+    scene: Scene
+    recording: Recording
+
+    @cached_property
+    def joints(self) -> F64:
+        """World_from_rest of every joint: (T, J, 4, 4) m."""
+        return kinematics.chain_batch(self.scene.body, PoseBatch(root=self.track.root, angles=self.track.angles))
+
+    @cached_property
+    def places(self) -> F64:
+        """Joint centres: (T, J, 3) m."""
+        return kinematics.joint_positions(self.scene.body, self.joints)
+
+    @cached_property
+    def turns(self) -> F64:
+        """Rotation of every joint relative to its parent, of the root in the world: (T, J, 3, 3)."""
+        world, parents = self.joints[..., :3, :3], self.scene.body.parents
+        relative: F64 = np.swapaxes(world[:, parents], -1, -2) @ world
+        relative[:, parents < 0] = world[:, parents < 0]
+        return relative
+
+    def surface(self, row: int) -> Surface:
+        """Return body and garment in one frame."""
+        parameters = self.track.cloth_parameters[row]
+        return self.scene.surface(self.track.pose(row), Cloth(vertices=self.track.cloth[row], parameters=parameters))
+
+    def bare(self, row: int) -> Surface:
+        """Return the body alone in one frame."""
+        return replace(self.scene, garment=None).surface(self.track.pose(row), NO_CLOTH)
+
+    @property
+    def frame_rate(self) -> float:
+        """Frames per second of the track, 30 where a single frame does not tell."""
+        time = self.track.time
+        return float(1 / np.median(np.diff(time))) if len(time) > 1 else 30.0
+
+
+def library(module: str, extra: str) -> ModuleType:
+    """Return a module that one of the optional extras brings.
+
+    Raises:
+        PipelineError: it is not installed.
+    """
+    try:
+        return import_module(module)
+    except ImportError as error:
+        hint = f"pip install 'mocapflow[{extra}]'"
+        raise PipelineError(f"this format needs {module.partition('.')[0]}: {error}", hint=hint) from error

@@ -1,0 +1,80 @@
+"""Rerun: cameras, images, outlines, body, garment and angles on one timeline."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mocapflow.geometry import angles, silhouettes
+from mocapflow_formats.result import Result, library
+
+BODY, GARMENT, OUTLINE = (200, 160, 135), (60, 120, 130), (255, 200, 0)
+QUALITY = 80  # of the images, per cent
+
+
+def write(result: Result, path: Path) -> None:
+    """Write a recording that `rerun` and `mocapflow view` open; one frame is in memory at a time."""
+    rr = library("rerun", "view")
+    stream = rr.RecordingStream("mocapflow")
+    stream.save(str(path))
+    stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    log_cameras(rr, stream, result)
+    rows = {int(index): row for row, index in enumerate(result.track.frame)}
+    for frame in result.recording.frames():
+        if frame.index in rows:
+            stream.set_time("time", duration=frame.time)
+            stream.set_time("frame", sequence=frame.index)
+            log_model(rr, stream, result, rows[frame.index])
+            log_images(rr, stream, result, rows[frame.index], frame.images)
+    stream.disconnect()
+
+
+def log_cameras(rr: Any, stream: Any, result: Result) -> None:
+    """Log where the cameras are and what lens they have."""
+    for camera in result.scene.cameras:
+        world_from_camera = np.linalg.inv(camera.camera_from_world)
+        place = rr.Transform3D(translation=world_from_camera[:3, 3], mat3x3=world_from_camera[:3, :3])
+        stream.log(f"world/{camera.name}", place, static=True)
+        lens = rr.Pinhole(
+            image_from_camera=camera.intrinsics, resolution=camera.size, camera_xyz=rr.ViewCoordinates.RDF
+        )
+        stream.log(f"world/{camera.name}", lens, static=True)
+
+
+def log_model(rr: Any, stream: Any, result: Result, row: int) -> None:
+    """Log body, garment, stick model and angles of a row."""
+    scene, track = result.scene, result.track
+    body = result.bare(row)
+    skin = rr.Mesh3D(
+        vertex_positions=body.vertices, triangle_indices=body.faces, vertex_normals=body.normals, albedo_factor=BODY
+    )
+    stream.log("world/body", skin)
+    if scene.garment is not None and track.cloth.shape[1]:
+        cloth = rr.Mesh3D(
+            vertex_positions=track.cloth[row], triangle_indices=scene.garment.faces, albedo_factor=GARMENT
+        )
+        stream.log("world/garment", cloth)
+    bones = [[result.places[row, p], result.places[row, j]] for j, p in enumerate(scene.body.parents) if p >= 0]
+    stream.log("world/skeleton", rr.LineStrips3D(bones))
+    pose = track.root[row : row + 1], track.angles[row : row + 1]
+    series = angles.measure(scene.body, *pose, track.covariance[row : row + 1])
+    for name, value in zip(series.names, series.value[0], strict=True):
+        stream.log(f"angles/{name}", rr.Scalars(value))
+
+
+def log_images(rr: Any, stream: Any, result: Result, row: int, images: Any) -> None:
+    """Log the image of every view with the outline of the model on it."""
+    import cv2
+
+    track = result.track
+    surface = result.surface(row)
+    for camera, image, usable in zip(result.scene.cameras, images, track.usable[row], strict=True):
+        if usable:
+            _, encoded = cv2.imencode(".jpg", np.asarray(image), [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+            stream.log(
+                f"world/{camera.name}/image", rr.EncodedImage(contents=encoded.tobytes(), media_type="image/jpeg")
+            )
+        outline = silhouettes.outline(surface, camera).pixel
+        stream.log(f"world/{camera.name}/outline", rr.LineStrips2D(outline, colors=[OUTLINE]))
