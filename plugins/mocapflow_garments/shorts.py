@@ -16,6 +16,7 @@ from mocapflow.records import F64, I32
 from mocapflow_garments import pattern, sections
 
 OUTER = 0.75  # share of a leg's strands that begin at the waist; the others begin at the crotch seam
+TOUCHING = 0.05  # m below the crotch seam over which the skin of the thighs may still touch
 CROTCH = 1.2  # a leg's length around at the crotch over half the hip's: the seam adds what reaches between the legs
 
 
@@ -128,14 +129,7 @@ class Shorts(Garment):
         rows, least = [], []
         for height, length in zip(heights, around, strict=True):
             plane = sections.level(height, start)
-            outlines = [sections.outline(points) for points in sections.sections(body, plane)]
-            legs = [o for o in outlines if side * plane.lift(o)[:, 0].mean() > 0.02 and sections.perimeter(o) > 0.2]
-            if not legs:
-                raise GarmentError(
-                    f"shorts: the legs have not parted yet at {height:.2f} m, where the crotch should be",
-                    hint="waist_height_m - (length_m - inseam_m) must lie below the body's crotch",
-                )
-            closed = min(legs, key=lambda o: abs(plane.lift(o)[:, 0].mean()))
+            closed = _leg(body, side, height, start)
             tape = sections.perimeter(closed)
             away = pattern.room(self.name, "leg_opening_circumference_m", length, tape)
             rows.append(plane.lift(sections.band(closed, away, self.strands, 0.5)[0]))
@@ -152,6 +146,20 @@ class Shorts(Garment):
         for leg in legs:
             carried[leg] = sewing.main_joint(body, sewing.nearest_skin(body, vertices[leg[:, leg.shape[1] // 2]]))
         return carried
+
+
+def _leg(body: Body, side: float, height: float, start: float) -> F64:
+    """Return the outline (N, 2) of the leg on one side; where thighs still touch, that of where they part below."""
+    for lower in np.linspace(0.0, TOUCHING, 11):
+        plane = sections.level(height - lower, start)
+        outlines = [sections.outline(points) for points in sections.sections(body, plane)]
+        legs = [o for o in outlines if side * plane.lift(o)[:, 0].mean() > 0.02 and sections.perimeter(o) > 0.2]
+        if legs:
+            return min(legs, key=lambda o: abs(plane.lift(o)[:, 0].mean()))
+    raise GarmentError(
+        f"shorts: the legs have not parted yet at {height:.2f} m, where the crotch should be",
+        hint="waist_height_m - (length_m - inseam_m) must lie below the body's crotch",
+    )
 
 
 def _rings(long: I32, legs: list[I32], crotch: int, around: F64) -> tuple[I32, F64]:
