@@ -7,10 +7,27 @@ from pathlib import Path
 
 import numpy as np
 
+from mocapflow.geometry.skeleton import Skeleton, body_directions
 from mocapflow.io.meshes import read_mesh
+from mocapflow.records import F64
 from mocapflow_bodies.skeleton import read_skeleton
 from mocapflow_bodies.template import FILE, UNIT
 from mocapflow_bodies.weights import read_weights, strongest
+
+# MakeHuman's hips lie behind and outside the femoral heads (Bell 1989: from the front spines of the pelvis inward by
+# 14 % of their distance, back by 22 %, down by 30 %), its knees above the epicondyles (thighs are as long as shanks).
+MOVED_M = {"hip": (-0.026, 0.04, 0.0), "knee": (0.0, 0.0, -0.016)}  # m, outward, forward, up
+
+
+def joint_centres(skeleton: Skeleton) -> F64:
+    """Return the joint positions (J, 3) m with hips and knees where people have their centres of rotation."""
+    forward, left, up = body_directions(skeleton)
+    positions = skeleton.positions.copy()
+    for joint, name in enumerate(skeleton.names):
+        base, _, side = name.rpartition("_")
+        outward = left if side == "l" else -left
+        positions[joint] += np.array(MOVED_M.get(base, (0.0, 0.0, 0.0))) @ np.stack([outward, forward, up])
+    return positions
 
 
 def pack(first: Path, second: Path, out: Path) -> None:
@@ -27,7 +44,7 @@ def pack(first: Path, second: Path, out: Path) -> None:
     np.savez_compressed(
         out,
         vertices=np.stack([np.round(vertices / UNIT) for vertices, _ in meshes]).astype(np.int16),
-        positions=np.stack([np.round(skeleton.positions / UNIT) for skeleton in skeletons]).astype(np.int16),
+        positions=np.stack([np.round(joint_centres(skeleton) / UNIT) for skeleton in skeletons]).astype(np.int16),
         faces=meshes[0][1].astype(np.uint16),
         names=np.array(skeletons[0].names),
         parents=skeletons[0].parents.astype(np.int8),

@@ -12,11 +12,10 @@ from mocapflow.assets import Body
 from mocapflow.geometry.skeleton import body_directions, skeleton_of
 from mocapflow.records import F64, I32
 
-# Estimators mark what they see, not joint centres. Fixed offsets, from bodies fitted to silhouettes of real footage:
-# shoulders are marked above their centres, as a share of the way from the hips to the neck (hips are not, within 1 cm);
-RAISED = {"shoulder": 0.055}
-# ankles before the centre, as a share of the shank; heel and toes inside the outline, as a share of the foot.
-BEFORE_JOINT = {"ankle": 0.06}
+# Estimators mark what they see, not joint centres. Fixed offsets, from silhouettes and skin markers of real footage:
+# shoulders above their centres, as a share of the way from the hips to the neck; hips outside theirs, as a share of
+# the distance between them; heel and toes inside the outline, as a share of the foot.
+SHOULDER_RAISED, HIP_OUTSIDE = 0.055, 0.12
 HEEL_INSIDE, TOE_INSIDE = 0.07, 0.13
 # Expected error of a keypoint against its place on the body, m; joints under clothes or muscle are marked less well.
 SPREAD_M = {"hip": 0.03, "shoulder": 0.03, "neck": 0.03, "head_top": 0.03, "nose": 0.03, "ear": 0.03}
@@ -36,14 +35,12 @@ def landmarks(body: Body) -> Landmarks:
     skeleton = skeleton_of(body)
     directions = body_directions(skeleton)
     points: dict[str, tuple[int, F64]] = {}
-    trunk = _trunk(body)
     for joint, name in enumerate(body.joint_names):
         base = name.removesuffix("_l").removesuffix("_r")
         if base in {"shoulder", "elbow", "wrist", "hip", "knee", "ankle", "neck"}:
-            share = BEFORE_JOINT.get(base, 0.0)
-            carrier = int(body.parents[joint]) if share or base in RAISED else joint
-            point = body.positions[joint] - share * skeleton.bone_before(joint) + RAISED.get(base, 0.0) * trunk
-            points[name] = (max(carrier, 0), point)
+            beside = _beside(body, name)
+            carrier = max(int(body.parents[joint]), 0) if beside.any() else joint
+            points[name] = (carrier, body.positions[joint] + beside)
     for side in "lr":
         points |= _foot(body, directions, side)
     points |= _head(body, directions)
@@ -63,12 +60,17 @@ def _carrying(body: Body, vertices: F64, carriers: I32) -> Body:
     )  # fmt: skip
 
 
-def _trunk(body: Body) -> F64:
-    """Return the vector (3,) m from between the hips to the neck, none where a part of the body lacks them."""
-    if not {"hip_l", "hip_r", "neck"} <= set(body.joint_names):
+def _beside(body: Body, name: str) -> F64:
+    """Return how far (3,) m from its centre a joint is marked; zero where a partial body lacks what tells it."""
+    base, _, side = name.rpartition("_")
+    if base not in {"hip", "shoulder"} or not {"hip_l", "hip_r"} <= set(body.joint_names):
         return np.zeros(3)
-    hips = body.positions[[body.joint("hip_l"), body.joint("hip_r")]].mean(axis=0)
-    return np.asarray(body.positions[body.joint("neck")] - hips)
+    left, right = (body.positions[body.joint(f"hip_{s}")] for s in "lr")
+    if base == "hip":
+        return np.asarray(HIP_OUTSIDE * (left - right if side == "l" else right - left))
+    if "neck" not in body.joint_names:
+        return np.zeros(3)
+    return np.asarray(SHOULDER_RAISED * (body.positions[body.joint("neck")] - (left + right) / 2))
 
 
 def _foot(body: Body, directions: F64, side: str) -> Mapping[str, tuple[int, F64]]:

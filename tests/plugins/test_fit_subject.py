@@ -11,6 +11,7 @@ from mocapflow_sequence.proportions import PROPORTIONS, scaled
 from mocapflow_sequence.start_from_file import read_pose
 
 from mocapflow.data import Pose
+from mocapflow.geometry import angles
 from mocapflow.recording import open_recording
 from mocapflow.scene import Scene
 
@@ -44,6 +45,15 @@ def test_template_is_a_person():
     np.testing.assert_allclose(np.ptp(Template(height_m=1.9).load(DEMO).vertices[:, 2]), 1.9, atol=1e-9)
     assert Template(part="legs").load(DEMO).cut.any()
     assert all(path.is_file() and path.stat().st_size < 1.5e6 for path in Template().inputs(DEMO))
+
+
+@pytest.mark.parametrize("shape", [0.0, 1.0])
+def test_joint_centres_of_the_template_are_those_of_people(shape):
+    body = Template(shape=shape).load(DEMO)
+    hip, knee, ankle = (body.positions[body.joint(name)] for name in ("hip_l", "knee_l", "ankle_l"))
+    assert length(body, "hip_l", "hip_r") == pytest.approx(0.17, abs=0.02)
+    assert length(body, "hip_l", "knee_l") == pytest.approx(length(body, "knee_l", "ankle_l"), rel=0.05)
+    assert angles.three_point(np.stack([hip, knee, ankle])) < 6  # degrees: it stands with straight legs
 
 
 def test_no_change_without_factors(body):

@@ -93,6 +93,9 @@ def test_landmarks_lie_where_their_names_say(body):
     assert at["small_toe_l"][0] > at["big_toe_l"][0] + 0.03 and at["big_toe_l"][2] < 0.06
     assert at["nose"][1] < at["ear_l"][1] - 0.05 and at["ear_l"][0] > 0.06 > -0.06 > at["ear_r"][0]
     assert at["head_top"][2] > body.vertices[:, 2].max() - 1e-9
+    centre = {name: body.positions[body.joint(name)] for name in ("hip_l", "knee_l", "ankle_l", "shoulder_l")}
+    assert at["hip_l"][0] > centre["hip_l"][0] + 0.01 and at["shoulder_l"][2] > centre["shoulder_l"][2] + 0.01
+    assert all(np.array_equal(at[name], centre[name]) for name in ("knee_l", "ankle_l"))
     for name in ("big_toe", "heel", "small_toe", "hip"):
         np.testing.assert_allclose(at[f"{name}_r"], at[f"{name}_l"] * (-1, 1, 1), atol=0.005)
 
