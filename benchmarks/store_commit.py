@@ -42,6 +42,7 @@ T = TypeVar("T")
 SIZE = (640, 800)  # px, width and height
 CLIP = Path(__file__).parents[1] / "examples" / "data" / "skirt_steps"
 ANGLES, CLOTH, MATCHES, BAND = 33, 1152, 1200, 12.0
+TERMS = tuple(f"term {k}" for k in range(20))  # of the functional
 STEPS = ("decode", "predict", "drape", "segment", "solve", "cloth", "match")
 
 
@@ -168,8 +169,9 @@ def result_of(silhouettes, dice):  # type: ignore[no-untyped-def]
         matches=matches,
     )
     return FrameResult(
-        state=state, iterations=3, steady=True, oscillating=False, change=Change(surface=0.0, body=0.0, angles=0.0),
-        overlap=np.ones(4), seconds=dict.fromkeys(STEPS, 0.001),
+        state=state, iterations=3, steady=True, oscillating=False, change=Change(body=0.0, cloth=0.0, angles=0.0),
+        overlap=np.ones(4), energy=dice.normal(size=(8, len(TERMS))), energy_terms=TERMS,
+        seconds=dict.fromkeys(STEPS, 0.001),
     )  # fmt: skip
 
 

@@ -175,6 +175,7 @@ class Checkpoint:
         columns = packing.columns_of(result, len(self._cameras))
         self._attributes["columns"] = [[name, list(shape)] for name, shape in columns.items()]
         self._attributes["step_names"] = list(result.seconds)
+        self._attributes["energy_terms"] = list(result.energy_terms)
         self._attributes["cloth_vertices"] = len(result.state.cloth.vertices)
 
     def _write_seen(self, row: int, silhouettes: Sequence[Silhouette], matches: Matches) -> None:

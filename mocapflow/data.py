@@ -150,6 +150,10 @@ class Segmentation:
     energies: Mapping[str, float] = field(default_factory=dict)
     appearance: Mapping[str, F64] = field(default_factory=dict)  # region statistics for the next frame
 
+    def of(self, layer: str) -> list[Silhouette]:
+        """Return the silhouettes of one layer."""
+        return [silhouette for silhouette in self.silhouettes if silhouette.layer == layer]
+
 
 @record
 class Matches:
@@ -199,8 +203,8 @@ class FrameState:
 class Change:
     """How far one turn moved the solution."""
 
-    surface: float  # m, largest move of a surface vertex
-    body: float  # m, largest move of a body vertex: cloth may swing while the body rests
+    body: float  # m, largest move of a body vertex
+    cloth: float  # m, root mean square move of the cloth: a fold may flip while all the rest hangs still
     angles: float  # rad, largest change of a joint angle
 
 
@@ -223,6 +227,8 @@ class FrameResult:
     oscillating: bool
     change: Change
     overlap: F64 = array("C", unit="1, intersection over union of model and image silhouette; NaN where unseen")
+    energy: F64 = array("U", "E", unit="terms of the functional after each of at most U turns; NaN where there is none")
+    energy_terms: tuple[str, ...]  # their E names
     seconds: Mapping[str, float] = field(default_factory=dict)  # CPU time of each step; never part of a result
 
 

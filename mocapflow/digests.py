@@ -22,7 +22,20 @@ from mocapflow.errors import RecordingError
 PARSER = threading.Lock()  # CPython 3.11 counts the parser's recursion across threads (python/cpython#106905)
 MARK = "blake2b:"  # a digest reads "blake2b:<hex> <name>"; the name is for people and never counts
 
-CORE = ("assets", "components", "data", "geometry", "loop", "model", "records", "results", "scene", "track")
+CORE = (
+    "assets",
+    "components",
+    "data",
+    "functional",
+    "geometry",
+    "loop",
+    "model",
+    "records",
+    "rest",
+    "results",
+    "scene",
+    "track",
+)
 SHARED = ("io", "recording")  # counted where a component imports them
 PYTHON = f" {sys.version_info.major}.{sys.version_info.minor}"  # another minor version writes syntax trees otherwise
 

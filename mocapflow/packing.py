@@ -26,8 +26,9 @@ def columns_of(result: FrameResult, cameras: int) -> Columns:
     angles = len(estimate.pose.angles)
     return {
         "frame": (), "time": (), "root": (4, 4), "angles": (angles,), "cloth_parameters": (len(estimate.parameters),),
-        "iterations": (), "steady": (), "oscillating": (), "surface_change": (), "angle_change": (),
+        "iterations": (), "steady": (), "oscillating": (), "body_change": (), "cloth_change": (), "angle_change": (),
         "usable": (cameras,), "overlap": (cameras,), "seconds": (len(result.seconds),), "match_count": (),
+        "energy": result.energy.shape,
         "covariance": (6 + angles, 6 + angles),
     }  # fmt: skip
 
@@ -38,10 +39,10 @@ def row_of(columns: Columns, frame: Frame, result: FrameResult, steps: Sequence[
     values: dict[str, Any] = {
         "frame": frame.index, "time": frame.time, "root": estimate.pose.root, "angles": estimate.pose.angles,
         "cloth_parameters": result.state.cloth.parameters, "iterations": result.iterations, "steady": result.steady,
-        "oscillating": result.oscillating, "surface_change": result.change.surface,
+        "oscillating": result.oscillating, "body_change": result.change.body, "cloth_change": result.change.cloth,
         "angle_change": result.change.angles, "usable": frame.usable, "overlap": result.overlap,
         "seconds": [result.seconds.get(step, 0.0) for step in steps], "match_count": len(result.state.matches.weight),
-        "covariance": estimate.covariance[:rank, :rank],
+        "energy": result.energy, "covariance": estimate.covariance[:rank, :rank],
     }  # fmt: skip
     parts = [np.asarray(values[name], float) for name in columns]
     for part, (name, shape) in zip(parts, columns.items(), strict=True):

@@ -27,6 +27,8 @@ class Track:
     overlap: F64 = array("T", "C", unit="1, intersection over union of model and image silhouette")
     seconds: F64 = array("T", "K", unit="s of CPU per step of the loop")
     step_names: tuple[str, ...]  # the K steps
+    energy: F64 = array("T", "U", "E", unit="terms of the functional after each turn of the loop; NaN after the last")
+    energy_terms: tuple[str, ...]  # the E terms
     notes: tuple[str, ...] = ()  # what happened to frames, e.g. "frame 12: cam02 black"
     raw_root: F64 | None = array("T", 4, 4, unit="m, world_from_body, before smoothing", default=None)
     raw_angles: F64 | None = array("T", "D", unit="rad, before smoothing", default=None)

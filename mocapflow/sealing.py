@@ -33,7 +33,8 @@ def seal(
             array.write_block(block, column(columns, values, name))
     if not attributes["cloth_vertices"]:
         _array(path, "cloth", (0, 3), len(indices), sealed)
-    plain = {"step_names": attributes["step_names"], "notes": told(attributes.get("notes", []), indices)}
+    names = {name: attributes[name] for name in ("step_names", "energy_terms")}
+    plain = names | {"notes": told(attributes.get("notes", []), indices)}
     record = {"record": f"{Track.__module__}:{Track.__qualname__}", PLAIN: plain}
     attributes = {**attributes, **record, "sealed": len(indices), "complete": True}
     write_json(path / "zarr.json", group_meta(attributes))

@@ -7,11 +7,11 @@ from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from mocapflow.assets import Background
 from mocapflow.checkpoint import Checkpoint
-from mocapflow.components import ClothFitter, Draper, Matcher, PoseSolver, Predictor, Prior, Segmenter, Stage
+from mocapflow.components import ClothFitter, Draper, Matcher, Observe, PoseSolver, Predictor, Prior, Segmenter, Stage
 from mocapflow.data import (
     Change,
     Cloth,
@@ -24,15 +24,16 @@ from mocapflow.data import (
     Pose,
     Segmentation,
     Start,
-    Turn,
     empty_matches,
 )
 from mocapflow.errors import ComponentFailed
+from mocapflow.functional import Functional
 from mocapflow.keys import FREE
-from mocapflow.loop import Steady, Steps, settle
+from mocapflow.loop import Steps, settle
 from mocapflow.model import ClothedModel
 from mocapflow.recording import Recording
 from mocapflow.records import F64
+from mocapflow.rest import Steady
 from mocapflow.results import Track
 from mocapflow.scene import Scene
 from mocapflow.timing import Stopwatch
@@ -53,11 +54,17 @@ class SteadyState(BaseModel):
     angle_deg: Positive = 0.1
     turns: Count = 2  # in a row within both tolerances
     max_turns: Count = 8
+    halvings: Annotated[int, Field(ge=0)] = 0  # at most, of a step that raises the functional; 0: any step is taken
 
     def limits(self) -> Steady:
         """Return the same in metres and radians."""
-        angle = float(np.radians(self.angle_deg))
-        return Steady(surface=self.surface_mm / 1000, angle=angle, turns=self.turns, max_turns=self.max_turns)
+        return Steady(
+            surface=self.surface_mm / 1000,
+            angle=float(np.radians(self.angle_deg)),
+            turns=self.turns,
+            max_turns=self.max_turns,
+            halvings=self.halvings,
+        )
 
 
 class CoupledLoop(Stage):
@@ -73,11 +80,17 @@ class CoupledLoop(Stage):
     matchers: Annotated[tuple[Matcher, ...], Field(min_length=1)]
     pose_solver: PoseSolver
     draper: Draper | None = None  # needed with a garment
-    cloth_fitter: ClothFitter | None = None  # none: the garment is draped with the parameters it has
+    cloth_fitter: ClothFitter | None = None  # likewise
     priors: tuple[Prior, ...] = ()
     steady: SteadyState = SteadyState()
     keep: Annotated[Literal["final", "trace"], FREE] = "final"  # trace: also the pose of every turn
     on_unsteady: Annotated[Literal["go_on", "stop"], FREE] = "go_on"
+
+    @model_validator(mode="after")
+    def _cloth_is_draped_and_fitted(self) -> CoupledLoop:
+        if (self.draper is None) != (self.cloth_fitter is None):
+            raise ValueError("name both draper and cloth_fitter, or none: one lays the cloth, the other fits it")
+        return self
 
     def run(
         self,
@@ -97,8 +110,8 @@ class CoupledLoop(Stage):
             frame = replace(picture, flow=flow.into(picture.index)) if flow else picture
             watch.lap("decode")
             state = self.begin(frame, past, start, model, watch)
-            steps = self.steps if seen(frame) else None
-            result = settle(frame, state, past, steps, model, checkpoint.observe) if steps else lost(frame, state)
+            settled = settle if seen(frame) else lost
+            result = settled(frame, state, past, self.steps, model, checkpoint.observe)
             seconds = {step: watch.seconds.get(step, 0.0) + result.seconds.get(step, 0.0) for step in STEPS}
             past = checkpoint.commit(frame, past, replace(result, seconds=seconds), notes_on(frame, scene))
             self.complain(frame, result)
@@ -113,7 +126,7 @@ class CoupledLoop(Stage):
             segmenter=self.segmenter,
             matchers=self.matchers,
             pose_solver=self.pose_solver,
-            cloth_fitter=self.cloth_fitter or Unfitted(),
+            cloth_fitter=self.cloth_fitter,
             priors=self.priors,
             steady=self.steady.limits(),
         )
@@ -142,25 +155,11 @@ class CoupledLoop(Stage):
         """Stop at a frame that did not settle, if that is wanted."""
         if self.on_unsteady == "stop" and not result.steady and result.iterations:
             kind = "swings between two states" if result.oscillating else "did not come to rest"
-            moved = (
-                f"{1000 * result.change.surface:.2f} mm and {np.degrees(result.change.angles):.2f}° in the last turn"
-            )
+            moved = f"{1000 * result.change.body:.2f} mm and {np.degrees(result.change.angles):.2f}° in the last turn"
             hint = (
                 "the frame is saved; on_unsteady: go_on continues after it, steady: {max_turns: …} gives it more turns"
             )
             raise ComponentFailed(f"frame {frame.index} {kind} in {result.iterations} turns: {moved}", hint=hint)
-
-
-class Unfitted(ClothFitter):
-    """Leaves the cloth parameters as they are estimated."""
-
-    name: ClassVar[str] = "none"
-
-    def fit(
-        self, frame: Frame, segmentation: Segmentation, estimate: Estimate, model: ClothedModel, past: Past, turn: Turn
-    ) -> Cloth:
-        """Return the garment draped at the estimated pose."""
-        return model.drape(estimate.pose, estimate.parameters, past)
 
 
 def seen(frame: Frame) -> bool:
@@ -179,11 +178,21 @@ def believed(pose: Pose, parameters: F64, cloth: Cloth) -> FrameState:
     )
 
 
-def lost(frame: Frame, state: FrameState) -> FrameResult:
-    """Return the prediction as the result of a frame that too few cameras have seen."""
-    unseen = np.full(len(frame.usable), np.nan)
-    still = Change(surface=0.0, body=0.0, angles=0.0)
-    return FrameResult(state=state, iterations=0, steady=False, oscillating=False, change=still, overlap=unseen)
+def lost(
+    frame: Frame, state: FrameState, past: Past, steps: Steps, model: ClothedModel, observe: Observe
+) -> FrameResult:
+    """Return the prediction as the result of a frame that too few cameras have seen; see `settle`."""
+    terms = Functional(model, steps.priors, past).terms
+    return FrameResult(
+        state=state,
+        iterations=0,
+        steady=False,
+        oscillating=False,
+        change=Change(body=0.0, cloth=0.0, angles=0.0),
+        overlap=np.full(len(frame.usable), np.nan),
+        energy=np.full((steps.steady.max_turns, len(terms)), np.nan),
+        energy_terms=terms,
+    )
 
 
 def notes_on(frame: Frame, scene: Scene) -> Sequence[str]:

@@ -29,6 +29,8 @@ LAYERS = (  # a module imports only from its own layer or an earlier one; `io` a
     "components",
     "model",
     "timing",
+    "functional",
+    "rest",
     "loop",
     "hookspecs",
     "observers",

@@ -159,7 +159,7 @@ def test_lost_frames_keep_the_prediction_and_say_so(tmp_path):
 
 
 def test_without_a_garment_there_is_no_cloth(tmp_path):
-    stages = STAGES | {"track": STAGES["track"] | {"draper": None}}
+    stages = STAGES | {"track": STAGES["track"] | {"draper": None, "cloth_fitter": None}}
     path = write_pipeline(tmp_path, write_recording(tmp_path / "clip"), garment=None, stages=stages)
     run_tiny(path, tmp_path, frames=5)
     run_tiny(path, tmp_path)

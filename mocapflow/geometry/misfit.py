@@ -11,8 +11,6 @@ from mocapflow.data import Contour, Segmentation, Silhouette, Surface
 from mocapflow.geometry.silhouettes import occluding_contour
 from mocapflow.records import F32, F64
 
-PERSON = "person"
-
 
 def misfit(surface: Surface, segmentation: Segmentation, cameras: Sequence[Camera], spacing_px: float) -> F64:
     """Return the integral along the model's outline of its squared distance to the silhouette, per view (C,) px³.
@@ -30,9 +28,8 @@ def outlines(
     surface: Surface, segmentation: Segmentation, cameras: Sequence[Camera], spacing_px: float
 ) -> Iterator[tuple[Silhouette, Contour]]:
     """Yield every silhouette of the person with the occluding contour of the surface in its view."""
-    for silhouette in segmentation.silhouettes:
-        if silhouette.layer == PERSON:
-            yield silhouette, occluding_contour(surface, cameras[silhouette.camera], spacing_px)
+    for silhouette in segmentation.of("person"):
+        yield silhouette, occluding_contour(surface, cameras[silhouette.camera], spacing_px)
 
 
 def at(field: F32 | F64, pixels: F64) -> F64:

@@ -22,10 +22,11 @@ Format = Literal["csv", "mot", "trc", "bvh", "c3d", "gltf", "movement", "parquet
 
 
 class Export(Stage):
-    """Writes results/angles.csv and angles_raw.csv, angles.mot, joints.trc and run.json.
+    """Writes results/angles.csv, angles_raw.csv and energy.csv, angles.mot, joints.trc and run.json.
 
-    The csv hold one row per frame: the angles between joint centres in degrees (`geometry.angles`) and their
-    standard deviations; the mot holds signed joint angles by OpenSim's names (`opensim`), the trc joint centres.
+    The csv of angles hold one row per frame: the angles between joint centres in degrees (`geometry.angles`) and their
+    standard deviations; energy.csv one per turn of the loop: the terms of the functional. The mot holds signed joint
+    angles by OpenSim's names (`opensim`), the trc joint centres.
     Other formats are written by `mocapflow_formats`, each by a library of its own.
     """
 
@@ -52,11 +53,13 @@ def before_smoothing(track: Track) -> Track:
 
 
 def write_angles(track: Track, scene: Scene, folder: Path) -> list[Path]:
-    """Write angles.csv and angles_raw.csv into a run folder."""
-    return [
-        tables.write_columns(layout.place(folder, part), tables.angle_columns(each, measured(each, scene)))
-        for part, each in ((layout.ANGLES, track), (layout.RAW_ANGLES, before_smoothing(track)))
-    ]
+    """Write angles.csv, angles_raw.csv and energy.csv into a run folder."""
+    columns = {
+        layout.ANGLES: tables.angle_columns(track, measured(track, scene)),
+        layout.RAW_ANGLES: tables.angle_columns(track, measured(before_smoothing(track), scene)),
+        layout.ENERGY: tables.energy_columns(track),
+    }
+    return [tables.write_columns(layout.place(folder, part), each) for part, each in columns.items()]
 
 
 def write_motion(track: Track, scene: Scene, folder: Path) -> list[Path]:

@@ -9,6 +9,7 @@ ANGLES = RESULTS / "angles.csv"
 RAW_ANGLES = RESULTS / "angles_raw.csv"
 MOTION = RESULTS / "angles.mot"
 JOINTS = RESULTS / "joints.trc"
+ENERGY = RESULTS / "energy.csv"
 EVALUATION = RESULTS / "evaluation.csv"
 PLOT = RESULTS / "angles.png"
 RUN = Path("run.json")

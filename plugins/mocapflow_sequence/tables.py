@@ -23,9 +23,16 @@ def angle_columns(track: Track, series: AngleSeries) -> dict[str, F64]:
     return columns
 
 
+def energy_columns(track: Track) -> dict[str, F64]:
+    """Return the columns of energy.csv, one row per frame and turn: frame, turn, then every term of the functional."""
+    row, turn = np.nonzero(np.isfinite(track.energy).any(axis=2))
+    terms = dict(zip(track.energy_terms, track.energy[row, turn].T, strict=True))
+    return {"frame": track.frame[row].astype(np.float64), "turn": turn.astype(np.float64), **terms}
+
+
 def write_columns(path: Path, columns: Mapping[str, F64]) -> Path:
-    """Write columns (T,) with four decimals; frames are whole numbers, times have six decimals."""
-    formats = {"frame": "%d", "time": "%.6f"}
+    """Write columns (T,) with four decimals; frames and turns are whole numbers, times have six decimals."""
+    formats = {"frame": "%d", "turn": "%d", "time": "%.6f"}
     styles = [formats.get(name, "%.4f") for name in columns]
     rows = np.column_stack(list(columns.values()))
     np.savetxt(path, rows, fmt=styles, delimiter=",", header=",".join(columns), comments="")

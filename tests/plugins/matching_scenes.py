@@ -33,7 +33,7 @@ from mocapflow.testing.scenes import tiny_past
 
 BAND = 12.0  # px
 FIRST = Turn(index=0, cap=5)
-CALM = Turn(index=3, cap=5, change=Change(surface=0.005, body=0.005, angles=0.0))
+CALM = Turn(index=3, cap=5, change=Change(body=0.005, cloth=0.0, angles=0.0))
 FRAME = Frame(index=0, time=0.0, images=(), usable=np.ones(4, bool))
 
 

@@ -118,6 +118,8 @@ def make_track(
         cloth_parameters=np.zeros((count, 0)), iterations=np.full(count, 3, np.int16), steady=np.ones(count, bool),
         usable=np.ones((count, views), bool), overlap=np.full((count, views), 0.9),
         seconds=np.full((count, 2), 0.01), step_names=("segment", "solve"),
+        energy=np.tile([[1.0, 2.0], [0.5, 2.0], [np.nan, np.nan]], (count, 1, 1)),
+        energy_terms=("cam01.data", "rest_pose"),
     )  # fmt: skip
 
 

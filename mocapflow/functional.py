@@ -1,0 +1,98 @@
+"""The functional of section 12.4, term by term and view by view, and steps that do not raise it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from mocapflow.assets import Camera
+from mocapflow.components import Prior
+from mocapflow.data import Cloth, Estimate, FrameState, Matches, Past, Pose, Segmentation, Silhouette, Surface
+from mocapflow.geometry import silhouettes, twists
+from mocapflow.geometry.cameras import project
+from mocapflow.model import ClothedModel, moved
+from mocapflow.records import F64
+
+SHAPE_WEIGHT = 0.05  # lambda, px^-2; a segmenter may descend with another one
+BAND_PX = 12.0  # around both contours, beyond which the area term does not grow
+SLACK = 0.01  # share by which a step may raise what it is judged by: contours are matched, the area is not
+IN_VIEW = ("data", "length", "shape", "contour")  # contour: what the pose solver lowers; not part of the sum
+
+
+@dataclass(frozen=True)
+class Functional:
+    """What a state costs: per view the regions' data and length and the area between model and silhouette; priors."""
+
+    model: ClothedModel
+    priors: Sequence[Prior]
+    past: Past
+
+    @cached_property
+    def terms(self) -> tuple[str, ...]:
+        """The names (E,) of the terms: view and term, then the priors."""
+        views = [f"{camera.name}.{term}" for camera in self.model.scene.cameras for term in IN_VIEW]
+        return (*views, *(prior.name for prior in self.priors))
+
+    def values(self, state: FrameState) -> F64:
+        """Return the terms (E,); NaN where a view is not seen or a segmenter has no such energy.
+
+        Source: Rosenhahn 2008, section 12.4
+        """
+        surface, cameras = self.model.surface(state.estimate.pose, state.cloth), self.model.scene.cameras
+        said = state.segmentation.energies
+        views = np.array([[said.get(f"{camera.name}.{term}", np.nan) for term in IN_VIEW] for camera in cameras])
+        for silhouette in state.segmentation.of("person"):
+            c = silhouette.camera
+            views[c, 2] = area(surface, silhouette, cameras[c])
+            views[c, 3] = contour(surface, state.matches, c, cameras[c])
+        return np.concatenate([views.ravel(), self._priors(state.estimate.pose)])
+
+    def pull(self, segmentation: Segmentation, pose: Pose, cloth: Cloth) -> float:
+        """Return the terms that pose and cloth can change, summed: area and priors."""
+        surface, cameras = self.model.surface(pose, cloth), self.model.scene.cameras
+        areas = [area(surface, silhouette, cameras[silhouette.camera]) for silhouette in segmentation.of("person")]
+        return sum(areas) + sum(self._priors(pose))
+
+    def step(
+        self, state: FrameState, segmentation: Segmentation, estimate: Estimate, cloth: Cloth, halvings: int
+    ) -> tuple[Estimate, Cloth]:
+        """Return a new estimate and cloth, halfway back to the state's as often as they cost more than it does."""
+        if not halvings:
+            return estimate, cloth
+        most = (1 + SLACK) * self.pull(segmentation, state.estimate.pose, state.cloth)
+        for _ in range(halvings):
+            if self.pull(segmentation, estimate.pose, cloth) <= most:
+                break
+            pose = halfway(state.estimate.pose, estimate.pose)
+            cloth = self.model.drape(pose, (state.cloth.parameters + cloth.parameters) / 2, self.past)
+            estimate = replace(estimate, pose=pose, parameters=cloth.parameters)
+        return estimate, cloth
+
+    def _priors(self, pose: Pose) -> list[float]:
+        return [prior.weight * prior.residual(pose, self.past, self.model.scene).energy for prior in self.priors]
+
+
+def area(surface: Surface, silhouette: Silhouette, camera: Camera) -> float:
+    """Return the shape term of a view: the squared difference of the two distance fields, within the band."""
+    model = silhouettes.model_distance(surface, camera, BAND_PX)
+    off = (model - np.clip(silhouette.distance, -BAND_PX, BAND_PX)).ravel()
+    return SHAPE_WEIGHT * float(off @ off)
+
+
+def contour(surface: Surface, matches: Matches, view: int, camera: Camera) -> float:
+    """Return half the weighted squared error of the matches of a view."""
+    here = matches.camera == view
+    off = project(surface.vertices[matches.vertex[here]], camera) - matches.pixel[here]
+    direction = matches.direction[here]
+    along = np.sum(off * direction, axis=1) ** 2
+    squared = np.where(direction.any(axis=1), along, np.sum(off**2, axis=1))
+    return 0.5 * float(matches.weight[here] @ squared)
+
+
+def halfway(one: Pose, other: Pose) -> Pose:
+    """Return the pose in the middle of two."""
+    between = twists.log(other.root @ np.linalg.inv(one.root))
+    return moved(one, 0.5 * np.concatenate([between, other.angles - one.angles]))
