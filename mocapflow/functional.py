@@ -17,7 +17,7 @@ from mocapflow.model import ClothedModel, moved
 from mocapflow.records import F64
 
 SHAPE_WEIGHT = 0.05  # lambda, px^-2; a segmenter may descend with another one
-BAND_PX = 12.0  # around both contours, beyond which the area term does not grow
+BAND_PX = 12.0  # around both contours, at most; beyond, the area term does not grow
 SLACK = 0.01  # share by which a step may raise what it is judged by: contours are matched, the area is not
 IN_VIEW = ("data", "length", "shape", "contour")  # contour: what the pose solver lowers; not part of the sum
 
@@ -77,8 +77,9 @@ class Functional:
 
 def area(surface: Surface, silhouette: Silhouette, camera: Camera) -> float:
     """Return the shape term of a view: the squared difference of the two distance fields, within the band."""
-    model = silhouettes.model_distance(surface, camera, BAND_PX)
-    off = (model - np.clip(silhouette.distance, -BAND_PX, BAND_PX)).ravel()
+    band = min(BAND_PX, float(silhouette.distance.max()))  # a segmenter may keep a narrower one
+    model = silhouettes.model_distance(surface, camera, band)
+    off = (model - np.clip(silhouette.distance, -band, band)).ravel()
     return SHAPE_WEIGHT * float(off @ off)
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from mocapflow.assets import Camera
-from mocapflow.data import Contour, Segmentation, Silhouette, Surface
+from mocapflow.data import CLOTH, Contour, Segmentation, Silhouette, Surface
 from mocapflow.geometry.silhouettes import occluding_contour
 from mocapflow.records import F32, F64
 
@@ -30,6 +31,11 @@ def outlines(
     """Yield every silhouette of the person with the occluding contour of the surface in its view."""
     for silhouette in segmentation.of("person"):
         yield silhouette, occluding_contour(surface, cameras[silhouette.camera], spacing_px)
+
+
+def dressed(surface: Surface, cloth: F64) -> Surface:
+    """Return a surface with its cloth (W, 3) m hanging another way."""
+    return replace(surface, vertices=np.concatenate([surface.vertices[surface.layer != CLOTH], cloth]))
 
 
 def at(field: F32 | F64, pixels: F64) -> F64:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from functools import partial
 from typing import Annotated, ClassVar
 
@@ -13,7 +12,7 @@ from pydantic import Field
 from mocapflow.assets import GarmentMesh
 from mocapflow.components import ClothFitter
 from mocapflow.data import Cloth, Estimate, Frame, Past, Segmentation, Turn
-from mocapflow.geometry.misfit import misfit
+from mocapflow.geometry.misfit import dressed, misfit
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow_draping import samples
@@ -47,11 +46,10 @@ class SampledForces(ClothFitter):
         cloth, garment = model.drape(estimate.pose, estimate.parameters, past), model.scene.garment
         if garment is None or not segmentation.silhouettes:
             return cloth
-        surface, body = model.surface(estimate.pose, cloth), len(model.scene.body.vertices)
+        surface = model.surface(estimate.pose, cloth)
 
         def error(vertices: F64) -> float:
-            dressed = replace(surface, vertices=np.concatenate([surface.vertices[:body], vertices]))
-            return float(misfit(dressed, segmentation, model.scene.cameras, self.spacing_px).sum())
+            return float(misfit(dressed(surface, vertices), segmentation, model.scene.cameras, self.spacing_px).sum())
 
         best, least = cloth, error(cloth.vertices)
         enough = (1 - self.least_gain) * least

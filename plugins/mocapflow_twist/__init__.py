@@ -1,8 +1,8 @@
-"""Pose from matches: twists, linear equations, Gauss–Newton (section 12.2.2)."""
+"""Pose, and cloth, from matches: twists, linear equations, Gauss–Newton (section 12.2.2)."""
 
 from __future__ import annotations
 
-from mocapflow.components import PoseSolver
+from mocapflow.components import ClothFitter, PoseSolver
 from mocapflow.hookspecs import hookimpl
 
 
@@ -12,3 +12,11 @@ def mocapflow_pose_solvers() -> list[type[PoseSolver]]:
     from mocapflow_twist.solver import TwistGaussNewton
 
     return [TwistGaussNewton]
+
+
+@hookimpl
+def mocapflow_cloth_fitters() -> list[type[ClothFitter]]:
+    """Return the cloth fitters of this plugin."""
+    from mocapflow_twist.gauss_newton import GaussNewton
+
+    return [GaussNewton]

@@ -72,6 +72,14 @@ def test_raw_angles_are_those_before_smoothing(folder: Path) -> None:
     assert jitter[0] < jitter[1]
 
 
+def test_energy_has_a_row_per_frame_and_turn(folder: Path) -> None:
+    columns = tables.read_columns(folder / layout.ENERGY)
+    assert list(columns) == ["frame", "turn", "cam01.data", "rest_pose"]
+    assert columns["frame"][:4].tolist() == [0, 0, 1, 1]  # the third turn of the test's track was not needed
+    assert columns["turn"][:4].tolist() == [0, 1, 0, 1]
+    assert columns["cam01.data"][:2].tolist() == [1.0, 0.5]
+
+
 def test_without_smoothing_both_tables_are_the_same(scene: Scene, recording: Recording, tmp_path: Path) -> None:
     exported(stepping(scene.body, 5), scene, recording, tmp_path, formats=("csv",))
     assert (tmp_path / layout.ANGLES).read_bytes() == (tmp_path / layout.RAW_ANGLES).read_bytes()

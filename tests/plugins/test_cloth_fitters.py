@@ -7,6 +7,7 @@ from mocapflow_draping import samples
 from mocapflow_draping.kinematic import Kinematic
 from mocapflow_draping.sampled_forces import SampledForces
 from mocapflow_garments.skirt import Skirt
+from mocapflow_twist.gauss_newton import GaussNewton, Task
 from test_draping import SKIRT
 
 from mocapflow.data import Estimate, Frame, Moment, Past, Pose, Segmentation, Silhouette, Turn
@@ -44,11 +45,10 @@ def seen(model, truth):
     return Segmentation(silhouettes=tuple(found))
 
 
-def fitted(model, truth, start, past=None, **settings):
+def fitted(fitter, model, truth, start, past=None):
     blank = np.zeros((SIZE[1], SIZE[0], 3), np.uint8)
     frame = Frame(index=0, time=0.0, images=(blank,) * 4, usable=np.ones(4, bool))
     estimate = Estimate(pose=STANDING, parameters=start, covariance=np.eye(10 + len(start)))
-    fitter = SampledForces(**settings)
     return fitter.fit(frame, seen(model, truth), estimate, model, past or Past(), TURN)
 
 
@@ -58,11 +58,16 @@ def later(model):
     return Past(moments=tuple(Moment(time=index / 30, pose=STANDING, cloth=calm) for index in range(2)))
 
 
+@pytest.fixture(params=[SampledForces(), GaussNewton()], ids=lambda fitter: fitter.name)
+def fitter(request):
+    return request.param
+
+
 @pytest.mark.parametrize("azimuth_deg", [10.0, 155.0, 280.0])
-def test_a_known_wind_is_recovered_within_one_sampling_step(model, azimuth_deg):
+def test_a_known_wind_is_recovered_within_one_sampling_step(fitter, model, azimuth_deg):
     azimuth = np.radians(azimuth_deg)
     truth = parameters(model, wind_cos_rad=0.3 * np.cos(azimuth), wind_sin_rad=0.3 * np.sin(azimuth))
-    found = fitted(model, truth, parameters(model)).parameters
+    found = fitted(fitter, model, truth, parameters(model)).parameters
     cos, sin = (found[model.scene.garment.parameter_names.index(f"wind_{part}_rad")] for part in ("cos", "sin"))
     turned = np.degrees(np.abs(np.angle(np.exp(1j * (np.arctan2(sin, cos) - azimuth)))))
     assert turned < 360 / 8 / 2
@@ -72,21 +77,21 @@ def test_a_known_wind_is_recovered_within_one_sampling_step(model, azimuth_deg):
 def test_thickness_is_measured_in_the_first_frame_and_kept(model):
     truth, nothing = parameters(model, thickness_m=0.006), parameters(model)
     thickness = model.scene.garment.parameter_names.index("thickness_m")
-    assert abs(fitted(model, truth, nothing).parameters[thickness] - 0.006) <= 0.002
-    assert fitted(model, truth, nothing, later(model)).parameters[thickness] == 0
+    assert abs(fitted(SampledForces(), model, truth, nothing).parameters[thickness] - 0.006) <= 0.002
+    assert fitted(SampledForces(), model, truth, nothing, later(model)).parameters[thickness] == 0
 
 
-def test_later_frames_follow_a_force_step_by_step(model):
+def test_later_frames_follow_a_force_step_by_step(fitter, model):
     column = model.scene.garment.parameter_names.index("flare_rad")
     found = parameters(model)
     for _ in range(4):
-        found = fitted(model, parameters(model, flare_rad=0.12), found, later(model)).parameters
+        found = fitted(fitter, model, parameters(model, flare_rad=0.12), found, later(model)).parameters
     assert abs(found[column] - 0.12) < np.radians(2.5)
 
 
 def test_forces_that_gain_nothing_are_left_alone(model):
     truth = parameters(model, flare_rad=0.1)
-    np.testing.assert_array_equal(fitted(model, truth, truth, later(model)).parameters, truth)
+    np.testing.assert_array_equal(fitted(SampledForces(), model, truth, truth, later(model)).parameters, truth)
 
 
 def test_the_misfit_grows_with_the_distance_between_outlines(model):
@@ -109,3 +114,16 @@ def test_samples_cover_every_force(model):
     beside = samples.neighbours(garment, parameters(model), 0.1, 0.0)
     assert beside.shape == (10, 6)
     assert (beside[:, garment.parameter_names.index("thickness_m")] == 0).all()
+
+
+def test_the_slope_that_gauss_newton_follows_is_the_energys(model):
+    truth, start = parameters(model, flare_rad=0.1, wind_cos_rad=0.1), parameters(model, thickness_m=0.005)
+    cloth = model.drape(STANDING, start, Past())
+    estimate = Estimate(pose=STANDING, parameters=start, covariance=np.eye(16))
+    surface = model.surface(STANDING, cloth)
+    task = Task(GaussNewton(spacing_px=1.0), seen(model, truth), estimate, model, model.scene.garment, Past(), surface)
+    slope = task.equations(cloth).gradient[1:]  # without the thickness
+    steps = np.radians(4.0) * np.eye(6)[1:]
+    ends = [[task.energy(model.drape(STANDING, start + k * step, Past())) for step in steps] for k in (-1, 1)]
+    risen = np.diff(ends, axis=0)[0]  # a drape jumps where contacts change: the direction is what counts
+    assert slope @ risen / np.linalg.norm(slope) / np.linalg.norm(risen) > 0.9

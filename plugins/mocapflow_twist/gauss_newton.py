@@ -1,0 +1,157 @@
+"""The cloth fitter that alternates with the pose: Gauss–Newton on the parameters of the garment at a fixed pose."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from mocapflow.assets import GarmentMesh
+from mocapflow.components import ClothFitter, pool
+from mocapflow.data import Cloth, Estimate, Frame, Matches, Past, PoseBatch, Segmentation, Surface, Turn
+from mocapflow.geometry.differences import drape_differences
+from mocapflow.geometry.misfit import at, dressed, misfit, outlines
+from mocapflow.model import ClothedModel
+from mocapflow.records import F64, Bool
+from mocapflow_twist import solve
+from mocapflow_twist.constraint import image_rows
+from mocapflow_twist.normal_equations import Equations, dense_equations
+
+RAISED, LOWERED = 10.0, 0.1  # what a rejected and an accepted step do to the damping
+TRIALS = 4  # times that the damping is raised before a step is given up
+
+Positive = Annotated[float, Field(gt=0)]
+
+
+class GaussNewton(ClothFitter):
+    """Moves the outline of the cloth onto the silhouettes by its forces.
+
+    Each force is held about none. The thickness, which moves the outline by less than a pixel, is left as it is.
+    `cloth_unknowns` of twist_gauss_newton solves for the same parameters together with the pose, and from matches;
+    this fitter alternates with the pose, and reads the distance fields.
+    """
+
+    name: ClassVar[str] = "gauss_newton"
+    iterations: Annotated[int, Field(ge=1)] = 3
+    sigma_px: Positive = 3.0  # standard deviation of the outline of cloth
+    correlation_px: Positive = 15.0  # length over which its errors agree
+    cloth_sd: Positive = 0.15  # standard deviation of each parameter about a calm garment, share of its range
+    damping: Positive = 1e-3  # share of the mean diagonal
+    spacing_px: Positive = 4.0  # between the points of the outline
+
+    def fit(
+        self, frame: Frame, segmentation: Segmentation, estimate: Estimate, model: ClothedModel, past: Past, turn: Turn
+    ) -> Cloth:
+        """Return the cloth at the estimated pose with the parameters that fit best."""
+        cloth, garment = model.drape(estimate.pose, estimate.parameters, past), model.scene.garment
+        if garment is None or not segmentation.silhouettes:
+            return cloth
+        task = Task(self, segmentation, estimate, model, garment, past, model.surface(estimate.pose, cloth))
+        energy, damping = task.energy(cloth), self.damping
+        for _ in range(self.iterations):
+            equations, before = task.equations(cloth), cloth
+            for _ in range(TRIALS):
+                trial = task.moved(before, equations, damping)
+                reached = task.energy(trial)
+                if reached < energy:
+                    cloth, energy, damping = trial, reached, LOWERED * damping
+                    break
+                damping *= RAISED
+            if cloth is before:
+                break
+        return cloth
+
+
+class Task(NamedTuple):
+    """What stays the same while one garment is fitted."""
+
+    by: GaussNewton
+    segmentation: Segmentation
+    estimate: Estimate
+    model: ClothedModel
+    garment: GarmentMesh
+    past: Past
+    surface: Surface
+
+    @property
+    def precision(self) -> F64:
+        """One over the variance of each parameter: (Q,)."""
+        spread: F64 = self.by.cloth_sd * np.ptp(self.garment.parameter_bounds, axis=1)
+        return np.maximum(spread, 1e-12) ** -2.0
+
+    @property
+    def weight(self) -> float:
+        """One over the variance (px^-2) of an outline point, as one of many whose errors agree."""
+        return self.by.spacing_px / self.by.correlation_px / self.by.sigma_px**2
+
+    def energy(self, cloth: Cloth) -> float:
+        """Return half the weighted squared errors of the whole outline and of the parameters."""
+        now = dressed(self.surface, cloth.vertices)
+        off = misfit(now, self.segmentation, self.model.scene.cameras, self.by.spacing_px).sum() / self.by.spacing_px
+        return 0.5 * (self.weight * float(off) + float(self.precision @ self._from_calm(cloth) ** 2))
+
+    def equations(self, cloth: Cloth) -> Equations:
+        """Return the quadratic model of the energy about the parameters of a cloth."""
+        cameras, first = self.model.scene.cameras, len(self.model.scene.body.vertices)
+        matches = self._matches(dressed(self.surface, cloth.vertices))
+        rows = image_rows(matches, cameras)
+        worn = rows.part(rows.vertex >= first, rows.weight, first)
+        hessian, gradient, energy = dense_equations(
+            worn, cloth.vertices[worn.vertex], self._velocity(cloth)[worn.vertex]
+        )
+        pull = self.precision * self._from_calm(cloth)
+        return Equations(hessian + np.diag(self.precision), gradient + pull, energy)
+
+    def moved(self, cloth: Cloth, equations: Equations, damping: float) -> Cloth:
+        """Return the cloth after one damped step, its parameters within their bounds."""
+        low, high = self.garment.parameter_bounds.T
+        parameters, downhill = cloth.parameters, -equations.gradient
+        free = ~(((parameters <= low) & (downhill < 0)) | ((parameters >= high) & (downhill > 0))) & self._fitted
+        part = Equations(equations.hessian[np.ix_(free, free)], equations.gradient[free], equations.energy)
+        increment = np.zeros(len(parameters))
+        increment[free] = solve.step(part, solve.CLOTH_LEVER / (high - low)[free], damping)
+        return self.model.drape(self.estimate.pose, np.clip(parameters + increment, low, high), self.past)
+
+    @property
+    def _fitted(self) -> Bool:
+        return np.array([name != "thickness_m" for name in self.garment.parameter_names])
+
+    def _from_calm(self, cloth: Cloth) -> F64:
+        return cloth.parameters - np.clip(0.0, *self.garment.parameter_bounds.T)
+
+    def _velocity(self, cloth: Cloth) -> F64:
+        """Return the velocities (W, 3, Q) of the cloth for unit changes of its parameters."""
+        body, pose = self.model.scene.body, self.estimate.pose
+
+        def drape(poses: PoseBatch, parameters: F64) -> F64:
+            return self.model.drapes(pose, parameters, self.past)
+
+        still = np.zeros(len(body.parents), bool)  # the pose is fixed: no joint is tried
+        bounds = self.garment.parameter_bounds
+        velocity = drape_differences(drape, body, still, bounds, pose, cloth.parameters)
+        parameters: F64 = velocity[..., 6 + len(pose.angles) :]
+        return parameters
+
+    def _matches(self, surface: Surface) -> Matches:
+        """Return the points of the outline, each with where the distance field says the silhouette is."""
+        parts = []
+        for silhouette, contour in outlines(surface, self.segmentation, self.model.scene.cameras, self.by.spacing_px):
+            slope = np.stack([at(axis, contour.pixel) for axis in np.gradient(silhouette.distance)[::-1]], axis=1)
+            steep = np.linalg.norm(slope, axis=1)
+            seen = steep > 0.5  # beyond the band the field is level
+            outward = -slope[seen] / steep[seen, None]
+            inside = at(silhouette.distance, contour.pixel[seen])[:, None]
+            parts.append(
+                (
+                    1.0,
+                    Matches(
+                        camera=np.full(len(outward), silhouette.camera, np.int16),
+                        pixel=contour.anchor[seen] + inside * outward,
+                        direction=outward,
+                        vertex=contour.vertex[seen],
+                        weight=np.full(len(outward), self.weight),
+                    ),
+                )
+            )
+        return pool(parts)

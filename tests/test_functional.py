@@ -1,0 +1,75 @@
+"""The functional: its terms, and steps that do not raise it."""
+
+import numpy as np
+import pytest
+
+from mocapflow.data import Estimate, FrameState, Matches, Past, Pose
+from mocapflow.functional import SHAPE_WEIGHT, Functional, area, contour, halfway
+from mocapflow.geometry.cameras import project
+from mocapflow.geometry.silhouettes import model_distance
+from mocapflow.model import moved
+from mocapflow.testing import pictures, scenes
+
+SCENE = scenes.tiny_scene(clothed=True)
+MODEL = scenes.tiny_model(SCENE)
+POSE = scenes.tiny_pose(SCENE, 3)
+CLOTH = scenes.tiny_cloth(SCENE, POSE)
+
+
+def off(pose, shift):
+    """Return the pose moved sideways by a shift in m."""
+    increment = np.zeros(6 + len(pose.angles))
+    increment[3] = shift
+    return moved(pose, increment)
+
+
+def test_area_is_the_squared_difference_of_the_distance_fields():
+    surface, camera = SCENE.surface(POSE, CLOTH), SCENE.cameras[0]
+    seen = pictures.tiny_segmentation(SCENE, POSE).silhouettes[0]
+    model = model_distance(surface, camera, pictures.BAND)  # narrower than the functional's
+    assert area(surface, seen, camera) == pytest.approx(SHAPE_WEIGHT * np.sum((model - seen.distance) ** 2), rel=1e-4)
+
+
+def test_contour_is_half_the_weighted_squared_error_along_the_direction_or_in_full():
+    surface, camera = SCENE.surface(POSE, CLOTH), SCENE.cameras[1]
+    pixel = project(surface.vertices[:2], camera) - [3.0, 4.0]
+    matches = Matches(
+        camera=np.array([1, 1], np.int16), pixel=pixel, direction=np.array([[1.0, 0.0], [0.0, 0.0]]),
+        vertex=np.arange(2, dtype=np.int32), weight=np.array([2.0, 1.0]),
+    )  # fmt: skip
+    assert contour(surface, matches, 1, camera) == pytest.approx(0.5 * (2 * 9 + 25))
+    assert contour(surface, matches, 0, camera) == 0
+
+
+def test_every_view_has_its_terms_and_a_lost_one_none():
+    functional, state = Functional(MODEL, (), Past()), pictures.tiny_state(SCENE, POSE)
+    aside = pictures.tiny_state(SCENE, off(POSE, 0.05), POSE)
+    values = dict(zip(functional.terms, functional.values(state), strict=True))
+    assert set(values) == {f"cam0{c}.{term}" for c in (1, 2, 3, 4) for term in ("data", "length", "shape", "contour")}
+    assert np.isnan(values["cam01.data"])  # these silhouettes are drawn, nothing was segmented
+    assert 0 < values["cam01.shape"] < 0.1 * functional.values(aside)[functional.terms.index("cam01.shape")]
+    lost = FrameState(**{**vars(state), "segmentation": pictures.without_silhouette(state.segmentation, 1)})
+    values = dict(zip(functional.terms, functional.values(lost), strict=True))
+    assert np.isnan(values["cam02.shape"]) and np.isfinite(values["cam01.shape"])
+
+
+@pytest.mark.parametrize(("shift", "halvings", "share"), [(0.01, 3, 1), (0.05, 3, 0.125), (0.05, 1, 0.5), (0.05, 0, 1)])
+def test_a_step_that_raises_the_functional_is_halved(shift, halvings, share):
+    """From the true pose 5 cm aside costs more however often it is halved; 1 cm towards it costs less."""
+    begin = off(POSE, -shift) if shift == 0.01 else POSE
+    state, target = pictures.tiny_state(SCENE, begin, POSE), off(begin, shift)
+    estimate = Estimate(pose=target, parameters=CLOTH.parameters, covariance=state.estimate.covariance)
+    step = Functional(MODEL, (), Past()).step
+    reached, cloth = step(state, state.segmentation, estimate, scenes.tiny_cloth(SCENE, target), halvings)
+    went = reached.pose.root[:3, 3] - begin.root[:3, 3]
+    np.testing.assert_allclose(went, share * (target.root[:3, 3] - begin.root[:3, 3]), atol=1e-12)
+    np.testing.assert_allclose(cloth.vertices, scenes.tiny_cloth(SCENE, reached.pose).vertices, atol=1e-9)
+
+
+def test_halfway_lies_in_the_middle():
+    other = moved(POSE, np.random.default_rng(1).normal(size=6 + len(POSE.angles)))
+    middle = halfway(POSE, other)
+    np.testing.assert_allclose(middle.angles, (POSE.angles + other.angles) / 2)
+    there = halfway(other, POSE)
+    np.testing.assert_allclose(middle.root, there.root, atol=1e-12)
+    assert isinstance(middle, Pose)
