@@ -34,7 +34,7 @@ class Steps:
 def settle(
     frame: Frame, state: FrameState, past: Past, steps: Steps, model: ClothedModel, observe: Observe
 ) -> FrameResult:
-    """Repeat segmentation, pose and cloth until the surface stops moving; no step may raise the functional.
+    """Repeat segmentation, pose and cloth until the surface stops moving.
 
     Source: Rosenhahn 2008, Fig. 12.14
     """

@@ -54,7 +54,7 @@ class SteadyState(BaseModel):
     angle_deg: Positive = 0.1
     turns: Count = 2  # in a row within both tolerances
     max_turns: Count = 8
-    halvings: Annotated[int, Field(ge=0)] = 0  # at most, of a step that raises the functional; 0: any step is taken
+    halvings: Annotated[int, Field(ge=0)] = 0  # at most, of a step that raises the functional; 0: it is taken whole
 
     def limits(self) -> Steady:
         """Return the same in metres and radians."""

@@ -118,7 +118,8 @@ class Task(NamedTuple):
         return np.array([name != "thickness_m" for name in self.garment.parameter_names])
 
     def _from_calm(self, cloth: Cloth) -> F64:
-        return cloth.parameters - np.clip(0.0, *self.garment.parameter_bounds.T)
+        low, high = self.garment.parameter_bounds.T
+        return cloth.parameters - np.clip(0.0, low, high)
 
     def _velocity(self, cloth: Cloth) -> F64:
         """Return the velocities (W, 3, Q) of the cloth for unit changes of its parameters."""
