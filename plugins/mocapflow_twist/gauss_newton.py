@@ -119,7 +119,8 @@ class Task(NamedTuple):
 
     def _from_calm(self, cloth: Cloth) -> F64:
         low, high = self.garment.parameter_bounds.T
-        return cloth.parameters - np.clip(0.0, low, high)
+        off: F64 = cloth.parameters - np.clip(0.0, low, high)
+        return off
 
     def _velocity(self, cloth: Cloth) -> F64:
         """Return the velocities (W, 3, Q) of the cloth for unit changes of its parameters."""
