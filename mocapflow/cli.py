@@ -12,7 +12,7 @@ from typing import Any
 import typer
 import typer.core
 
-from mocapflow.commands import cache, looking, prior, results, running
+from mocapflow.commands import cache, comparing, looking, prior, results, running
 from mocapflow.errors import MocapflowError
 
 
@@ -44,6 +44,7 @@ COMMANDS: tuple[Callable[..., None], ...] = (
     running.plan,
     running.status,
     running.demo,
+    comparing.compare,
     results.evaluate,
     results.export,
     results.view,

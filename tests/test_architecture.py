@@ -50,6 +50,7 @@ LAYERS = (  # a module imports only from its own layer or an earlier one; `io` a
     "resolve",
     "measures",
     "pipeline",
+    "experiment",
     "wiring",
     "recipes",
     "blame",

@@ -4,6 +4,7 @@ from pathlib import Path
 import pytest
 
 from mocapflow.errors import MocapflowError
+from mocapflow.experiment import load_experiment
 from mocapflow.pipeline import load_pipeline
 from mocapflow.registry import load_registry
 from mocapflow.shipped import shipped
@@ -219,7 +220,18 @@ def test_a_stage_is_not_called_like_an_input(folder):
         wire(load())
 
 
-@pytest.mark.parametrize("file", sorted(shipped("pipelines").glob("*.yaml")), ids=lambda file: file.name)
+def shipped_files(experiments):
+    files = sorted(shipped("pipelines").glob("*.yaml"))
+    return [file for file in files if ("\nfactors:" in file.read_text()) == experiments]
+
+
+@pytest.mark.parametrize("file", shipped_files(experiments=True), ids=lambda file: file.name)
+def test_every_cell_of_a_shipped_experiment_loads(file):
+    for cell in load_experiment(file):
+        assert wire(load_pipeline(cell.pipeline, load_registry(), recording=cell.recording, changes=cell.changes))
+
+
+@pytest.mark.parametrize("file", shipped_files(experiments=False), ids=lambda file: file.name)
 def test_every_shipped_pipeline_loads_and_is_wired(file):
     pipeline = load_pipeline(file, load_registry(), recording=shipped("examples", "data", "skirt_steps"))
     assert wire(pipeline)

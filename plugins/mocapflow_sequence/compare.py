@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from mocapflow.records import F64
 
@@ -52,13 +53,17 @@ def rms(error: F64) -> float:
 
 def rms_interval(error: F64) -> tuple[float, float]:
     """Return the 95 % interval of the RMS by a circular block bootstrap with a fixed seed."""
-    count = len(error)
-    block = min(BLOCK, -(-count // 4))  # of a short take at least four blocks
-    starts = np.random.default_rng(SEED).integers(0, count, size=(DRAWS, -(-count // block)))
-    rows = (starts[:, :, None] + np.arange(block)).reshape(DRAWS, -1)[:, :count] % count
-    drawn = np.sqrt(np.mean(error[rows] ** 2, axis=1))
+    drawn = np.sqrt(np.mean(error[drawn_blocks(len(error))] ** 2, axis=1))
     low, high = np.percentile(drawn, [2.5, 97.5])
     return float(low), float(high)
+
+
+def drawn_blocks(count: int) -> npt.NDArray[np.intp]:
+    """Return row numbers (DRAWS, count) of a circular block bootstrap, the same at every call."""
+    block = min(BLOCK, -(-count // 4))  # of a short take at least four blocks
+    starts = np.random.default_rng(SEED).integers(0, count, size=(DRAWS, -(-count // block)))
+    rows: npt.NDArray[np.intp] = (starts[:, :, None] + np.arange(block)).reshape(DRAWS, -1)[:, :count] % count
+    return rows
 
 
 def correlation(ours: F64, truth: F64) -> float:

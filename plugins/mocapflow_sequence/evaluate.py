@@ -26,7 +26,7 @@ class Evaluate(Stage):
 
     `reference` is a .csv with our columns, an OpenSim .mot or a .trc of joint centres (relative to the recording).
     Rows with frame numbers are matched by them, others interpolated at our times. Failures are not left out.
-    Writes results/evaluation.csv.
+    Writes results/evaluation.csv and, frame by frame, results/errors.csv.
     """
 
     name: ClassVar[str] = "evaluate"
@@ -58,7 +58,7 @@ def evaluate_run(run_folder: Path, truth: Path) -> Evaluation:
 
 
 def evaluate(ours: Mapping[str, F64], raw: Mapping[str, F64], truth: Path, folder: Path) -> Evaluation:
-    """Compare tables of angles (smoothed and raw) with a reference file; writes results/evaluation.csv."""
+    """Compare tables of angles (smoothed and raw) with a reference file; writes evaluation.csv and errors.csv."""
     reference = at_our_frames(read_reference(truth), ours)
     shared = [name for name in ours if name in reference and name not in ("frame", "time")]
     rows: list[Mapping[str, float | str]] = []
@@ -70,7 +70,9 @@ def evaluate(ours: Mapping[str, F64], raw: Mapping[str, F64], truth: Path, folde
         unsmoothed = compare.figures(raw[name], reference[name], sd, ours["frame"])["rms_deg"]
         rows.append({"angle": name, **row, "rms_unsmoothed_deg": unsmoothed})
     note = "" if rows else "the reference shares no angle and frame with the track"
+    errors = {str(row["angle"]): ours[str(row["angle"])] - reference[str(row["angle"])] for row in rows}
     tables.write_rows(layout.place(folder, layout.EVALUATION), rows)
+    tables.write_columns(layout.place(folder, layout.ERRORS), {"frame": ours["frame"], **errors})
     return Evaluation(reference=str(truth), rows=tuple(rows), note=note)
 
 

@@ -11,6 +11,7 @@ MOTION = RESULTS / "angles.mot"
 JOINTS = RESULTS / "joints.trc"
 ENERGY = RESULTS / "energy.csv"
 EVALUATION = RESULTS / "evaluation.csv"
+ERRORS = RESULTS / "errors.csv"
 PLOT = RESULTS / "angles.png"
 RUN = Path("run.json")
 REPORT = Path("report.html")

@@ -1,0 +1,93 @@
+"""An experiment: one pipeline in variants, on several recordings, read from a YAML file."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import Field
+
+from mocapflow.errors import PipelineError
+from mocapflow.pipeline import Strict
+from mocapflow.registry import Registry
+from mocapflow.resolve import Resolver
+from mocapflow.yamlfile import Document, read
+
+PIPELINE = "pipeline"  # in a level: another pipeline file instead of a change
+
+
+class ExperimentFile(Strict):
+    """What an experiment file may say."""
+
+    name: ClassVar[str] = "an experiment"
+    mocapflow: Literal[1] = 1
+    pipeline: str
+    recordings: Annotated[tuple[str, ...], Field(min_length=1)]
+    frames: str | None = None  # as --frames
+    change: dict[str, Any] = {}  # in every variant
+    factors: dict[str, Annotated[dict[str, dict[str, Any] | None], Field(min_length=1)]]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One run of an experiment: a variant on a recording."""
+
+    variant: str  # its level of every factor, e.g. kinematic+contours
+    name: str  # of the recording, different from all others
+    pipeline: Path
+    recording: Path
+    changes: tuple[str, ...]  # as in --set
+    frames: str | None
+
+
+def load_experiment(path: Path, recordings: Sequence[Path] = ()) -> tuple[Cell, ...]:
+    """Return the runs of an experiment: every combination of levels on every recording, the first one the baseline.
+
+    Args:
+        path: the YAML file; paths in it start at its folder.
+        recordings: instead of those of the file.
+
+    Raises:
+        PipelineError: the file says something else than an experiment does; with its line.
+    """
+    document = read(path)
+    resolver = Resolver(document, Registry())
+    said = resolver.build(ExperimentFile, document.values, ())
+    assert isinstance(said, ExperimentFile)
+    folders = tuple(recordings) or tuple(
+        resolver.file(name, ("recordings", index)) for index, name in enumerate(said.recordings)
+    )
+    cells = []
+    for combination in itertools.product(*(levels(said, factor, document) for factor in said.factors)):
+        variant = "+".join(name for name, _ in combination)
+        chosen = {target: value for _, level in combination for target, value in level.items()}
+        changes = said.change | chosen
+        pipeline = str(changes.pop(PIPELINE, said.pipeline))
+        written = tuple(f"{target}={json.dumps(value)}" for target, value in changes.items())
+        cells += [
+            Cell(variant, name, resolver.file(pipeline, (PIPELINE,)), folder, written, said.frames)
+            for name, folder in zip(short_names(folders), folders, strict=True)
+        ]
+    return tuple(cells)
+
+
+def levels(said: ExperimentFile, factor: str, document: Document) -> list[tuple[str, Mapping[str, Any]]]:
+    """Return the levels of a factor with what each changes."""
+    for name in said.factors[factor]:
+        if "/" in name or "+" in name:
+            where = document.place(("factors", factor, name)).text
+            raise PipelineError(f"a level can't be called '{name}': it names folders and columns", where=where)
+    return [(name, changes or {}) for name, changes in said.factors[factor].items()]
+
+
+def short_names(folders: Sequence[Path]) -> list[str]:
+    """Return the names of folders; those of the same name get their parent's in front."""
+    names = [folder.name for folder in folders]
+    return [
+        f"{folder.parent.name}-{name}" if names.count(name) > 1 else name
+        for folder, name in zip(folders, names, strict=True)
+    ]

@@ -1,0 +1,55 @@
+"""Variants side by side: known errors come out, and a paired difference knows what the two share."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mocapflow_sequence import comparison, layout, tables
+from mocapflow_sequence.compare import rms
+
+FRAMES = np.arange(90.0)
+SHARED = 3 * np.sin(FRAMES / 5)
+
+
+def finished(folder: Path, error: np.ndarray, lost: int = 0) -> Path:
+    """Write what a run leaves behind."""
+    tables.write_columns(layout.place(folder, layout.ERRORS), {"frame": FRAMES, "knee_flexion_l": error})
+    frames = [
+        {"iterations": 3, "steady": row % 2 == 0, "cpu_seconds": 0.2, **({"lost": True} if row < lost else {})}
+        for row in range(len(FRAMES))
+    ]
+    layout.place(folder, layout.RUN).write_text(json.dumps({"per_frame": frames, "overlap_median": [0.9, None, 0.8]}))
+    return folder
+
+
+def test_figures_of_two_variants(tmp_path: Path) -> None:
+    base, worse = finished(tmp_path / "base", SHARED), finished(tmp_path / "worse", SHARED + 1.0, lost=9)
+    rows = comparison.compare([("base", "take", base), ("worse", "take", worse)], tmp_path)
+    assert [(row["variant"], row["angle"]) for row in rows] == [("base", "knee_flexion_l"), ("worse", "knee_flexion_l")]
+    assert rows[0]["difference_deg"] == 0
+    assert rows[1]["difference_deg"] == pytest.approx(rms(SHARED + 1) - rms(SHARED), abs=1e-4)
+    with (tmp_path / "runs.csv").open() as file:
+        runs = list(csv.DictReader(file))
+    assert [float(run["lost"]) for run in runs] == [0.0, 0.1]
+    assert float(runs[0]["overlap"]) == pytest.approx(0.85)
+    assert float(runs[0]["not_at_rest"]) == pytest.approx(0.5)
+    assert (tmp_path / "compare.png").stat().st_size > 5000
+
+
+def test_a_paired_difference_is_sharper_than_its_parts() -> None:
+    difference, low, high = comparison.paired_difference(1.05 * SHARED, SHARED)
+    alone_low, alone_high = comparison.rms_interval(SHARED)
+    assert low <= difference <= high
+    assert high - low < 0.2 * (alone_high - alone_low)
+    assert low > 0
+
+
+def test_runs_without_a_reference_have_no_angles(tmp_path: Path) -> None:
+    run = finished(tmp_path / "run", SHARED)
+    (run / layout.ERRORS).unlink()
+    assert comparison.compare([("only", "take", run)], tmp_path) == []
+    assert (tmp_path / "runs.csv").is_file()

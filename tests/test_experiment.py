@@ -1,0 +1,64 @@
+"""Experiments: every combination of levels on every recording, and errors with their lines."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from mocapflow.errors import PipelineError
+from mocapflow.experiment import load_experiment
+
+GRID = """mocapflow: 1
+pipeline: base.yaml
+recordings: [takes/a, b]
+frames: 0:20
+change: {stages.overlay: null}
+factors:
+  draper:
+    rings:
+    strands: {stages.track.draper: {use: kinematic, sweeps: 0}}
+  matcher:
+    contours:
+    both: {stages.track.matchers: [contour_icp, optical_flow], pipeline: other.yaml}
+"""
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "grid.yaml"
+    path.write_text(text)
+    return path
+
+
+def test_every_combination_on_every_recording(tmp_path: Path) -> None:
+    cells = load_experiment(written(tmp_path, GRID))
+    assert [cell.variant for cell in cells[::2]] == ["rings+contours", "rings+both", "strands+contours", "strands+both"]
+    assert [cell.name for cell in cells[:2]] == ["a", "b"]
+    assert cells[0].recording == tmp_path / "takes" / "a"
+    assert cells[0].changes == ("stages.overlay=null",)
+    last = cells[-1]
+    assert (last.pipeline, last.frames) == (tmp_path / "other.yaml", "0:20")
+    assert last.changes == (
+        "stages.overlay=null",
+        'stages.track.draper={"use": "kinematic", "sweeps": 0}',
+        'stages.track.matchers=["contour_icp", "optical_flow"]',
+    )
+
+
+def test_recordings_of_one_name_are_told_apart(tmp_path: Path) -> None:
+    cells = load_experiment(written(tmp_path, GRID), [Path("one/take"), Path("two/take"), Path("three")])
+    assert [cell.name for cell in cells[:3]] == ["one-take", "two-take", "three"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("pipeline: base.yaml\n", "", r"grid\.yaml:1:1  an experiment needs pipeline"),
+        ("recordings: [takes/a, b]", "recordings: []", r"grid\.yaml:3:13?.*recordings"),
+        ("frames:", "frame:", r"grid\.yaml:4:1  frame: unknown setting of an experiment"),
+        ("    rings:", "    a/b:", r"grid\.yaml:8:5  a level can't be called 'a/b'"),
+    ],
+)
+def test_what_is_wrong_is_told_by_line(tmp_path: Path, old: str, new: str, message: str) -> None:
+    with pytest.raises(PipelineError, match=message):
+        load_experiment(written(tmp_path, GRID.replace(old, new)))
