@@ -80,7 +80,8 @@ def _slope(distance, row, column, axis):  # type: ignore[no-untyped-def]
 def nearest_compatible(points, normals, others, other_normals, reach, least_cosine):  # type: ignore[no-untyped-def]
     """Return, for each point, the nearest other within reach whose normal agrees, or -1.
 
-    The others are visited outward from the point's row in the order of their rows (they must be sorted by y).
+    Points (N, 2 + F) px and others have features in the columns after x and y, which add to the distance. The others
+    are visited outward from the point's row in the order of their rows (they must be sorted by y).
     """
     found = np.full(len(points), -1, np.int32)
     rows = others[:, 1].copy()
@@ -96,6 +97,8 @@ def nearest_compatible(points, normals, others, other_normals, reach, least_cosi
                     break
                 dx = others[k, 0] - x
                 d = dx * dx + dy * dy
+                for feature in range(2, points.shape[1]):
+                    d += (others[k, feature] - points[p, feature]) ** 2
                 if d < best:
                     cosine = normals[p, 0] * other_normals[k, 0] + normals[p, 1] * other_normals[k, 1]
                     if cosine >= least_cosine:

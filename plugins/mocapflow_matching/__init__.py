@@ -11,6 +11,7 @@ def mocapflow_matchers() -> list[type[Matcher]]:
     """Return the built-in matchers."""
     from mocapflow_matching.containment import Containment
     from mocapflow_matching.contour_icp import ContourIcp
+    from mocapflow_matching.fourier_icp import FourierIcp
     from mocapflow_matching.optical_flow import OpticalFlow
 
-    return [ContourIcp, Containment, OpticalFlow]
+    return [ContourIcp, Containment, FourierIcp, OpticalFlow]

@@ -30,10 +30,18 @@ Positive = Annotated[float, Field(gt=0)]
 
 
 class ImageContour(NamedTuple):
-    """Points of the image contour: pixels (K, 2) sorted by row, and unit normals (K, 2) outward."""
+    """Points of the image contour (K,) sorted by row: pixels, unit normals outward, curvature where it is known."""
 
     pixel: F64
     normal: F64
+    curvature: F64
+
+
+class ModelContour(NamedTuple):
+    """Points of the model's contour sorted by row, and their curvature (K,) where it is known."""
+
+    contour: Contour
+    curvature: F64
 
 
 class ContourIcp(Matcher):
@@ -55,6 +63,7 @@ class ContourIcp(Matcher):
     normal_angle_deg: Annotated[float, Field(gt=0, le=180)] = 60.0
     first_loss: Loss = "huber"
     later_loss: Loss = "geman_mcclure"
+    normal_px: Annotated[float, Field(ge=0)] = 0.0  # px that count as far as normals at right angles, over sqrt 2
     scale: Positive = 2.0  # standard deviations at which the loss begins to give way
     sigma_px: Positive = 1.0
     cloth_sigma_px_per_m: Positive = 80.0  # the longer cloth hangs, the less it is where a draper lays it
@@ -80,22 +89,35 @@ class ContourIcp(Matcher):
 
     def match_view(self, silhouette: Silhouette, surface: Surface, scene: Scene, turn: Turn) -> Matches:
         """Return the pairs of one view."""
-        image = ImageContour(*(rows[:: self.stride] for rows in silhouette.zero_level))
-        model = _sorted_by_row(occluding_contour(surface, scene.cameras[silhouette.camera], self.spacing_px))
+        image, (model, curvature) = self.contours(silhouette, surface, scene, turn)
         reach = self.later_reach_px if self._calm(turn) else self.first_reach_px
         cosine = float(np.cos(np.radians(self.normal_angle_deg)))
+        one = self.described(*image)
+        other = self.described(model.pixel, model.normal, curvature)
         nothing = np.empty(0, np.int32)
         seen, shown, seeing, showing = nothing, nothing, nothing, nothing
         if self.direction != "backward":  # every image point asks the model
-            found = nearest_compatible(image.pixel, image.normal, model.pixel, model.normal, reach, cosine)
+            found = nearest_compatible(one, image.normal, other, model.normal, reach, cosine)
             seen, shown = np.flatnonzero(found >= 0).astype(np.int32), found[found >= 0]
         if self.direction != "forward":  # every model point asks the image
-            found = nearest_compatible(model.pixel, model.normal, image.pixel, image.normal, reach, cosine)
+            found = nearest_compatible(other, model.normal, one, image.normal, reach, cosine)
             seeing, showing = found[found >= 0], np.flatnonzero(found >= 0).astype(np.int32)
         seen, shown = np.concatenate([seen, seeing]), np.concatenate([shown, showing])
         guard = self.hem_guard_px
         sigma = contour_sigma(model, surface, scene, self.sigma_px, self.cloth_sigma_px_per_m, guard)
         return self.weigh(silhouette.camera, image, model, seen, shown, sigma[shown], turn)
+
+    def contours(
+        self, silhouette: Silhouette, surface: Surface, scene: Scene, turn: Turn
+    ) -> tuple[ImageContour, ModelContour]:
+        """Return the contours of one view that are to be paired."""
+        pixel, normal = (rows[:: self.stride] for rows in silhouette.zero_level)
+        model = occluding_contour(surface, scene.cameras[silhouette.camera], self.spacing_px)
+        return ImageContour(pixel, normal, np.zeros(len(pixel))), sorted_by_row(model, np.zeros(len(model.pixel)))
+
+    def described(self, pixel: F64, normal: F64, curvature: F64) -> F64:
+        """Return what points (K,) are compared by, in px: their place first, then features."""
+        return np.column_stack([pixel, self.normal_px * normal]) if self.normal_px else pixel
 
     def weigh(
         self, index: int, image: ImageContour, model: Contour, seen: I32, shown: I32, sigma: F64, turn: Turn
@@ -119,11 +141,13 @@ class ContourIcp(Matcher):
         )
 
 
-def _sorted_by_row(contour: Contour) -> Contour:
+def sorted_by_row(contour: Contour, curvature: F64) -> ModelContour:
+    """Return the points of a model's contour in the order of their rows."""
     order = np.argsort(contour.pixel[:, 1], kind="stable")
-    return Contour(
+    ordered = Contour(
         vertex=contour.vertex[order],
         anchor=contour.anchor[order],
         pixel=contour.pixel[order],
         normal=contour.normal[order],
     )
+    return ModelContour(ordered, curvature[order])

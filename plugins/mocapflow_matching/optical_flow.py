@@ -22,6 +22,7 @@ from mocapflow_matching.uncertainty import contour_sigma
 Positive = Annotated[float, Field(gt=0)]
 Share = Annotated[float, Field(ge=0)]
 
+WORKING_SIDE = 200  # px, at most, of the distance images: they are smooth
 ON_CONTOUR = 1.0  # px from the image contour within which a target has to end
 
 
@@ -41,9 +42,9 @@ class OpticalFlow(Matcher):
     first_share: Share = 2.3  # against contour_icp's while the body still moves: 0.7 to 0.3
     later_share: Share = 0.25  # 0.2 to 0.8
     spacing_px: Positive = 4.0
-    smoothness: Positive = 10.0
-    band_px: Positive = 40.0  # about the model's contour
-    levels: Annotated[int, Field(ge=0)] = 3  # of the pyramid, above images of half size
+    smoothness: Positive = 3.0
+    band: Positive = 0.1  # half its width about the model's contour, against the longer side of the picture
+    levels: Annotated[int, Field(ge=0)] = 3  # of the pyramid
     contour_sigma_px: Positive = 1.0
     cloth_sigma_px_per_m: Positive = 80.0  # as for contour_icp
     image_sigma_px: Positive = 1.5
@@ -77,11 +78,13 @@ class OpticalFlow(Matcher):
         camera = scene.cameras[silhouette.camera]
         boundary = silhouettes.outline(surface, camera)
         model = silhouettes.samples(boundary, surface, camera, self.spacing_px)
-        here = signed_distance(_halved(silhouettes.mask(boundary, camera)))
-        there = signed_distance(_halved(silhouette.distance > 0))
-        flow = register(here, there, self.smoothness, self.levels, self.band_px / 2)
-        target = model.pixel + 2 * _sampled(flow, (model.pixel - 0.5) / 2)
-        target = 2 * _snapped((target - 0.5) / 2, there) + 0.5
+        shrink = int(np.ceil(camera.size.max() / WORKING_SIDE))
+        covered, shown = silhouettes.mask(boundary, camera), silhouette.distance > 0
+        here, there = (signed_distance(_shrunk(mask, shrink)) for mask in (covered, shown))
+        flow = register(here, there, self.smoothness, self.levels, self.band * max(here.shape))
+        middle = (shrink - 1) / 2  # pixel centres are on integers in both sizes
+        small = (model.pixel - middle) / shrink
+        target = shrink * _snapped(small + _sampled(flow, small), there) + middle
         target = _snapped(target, silhouette.distance)
         on = np.abs(_sampled(silhouette.distance, target)) < ON_CONTOUR
         away = np.linalg.norm(target - model.pixel, axis=1)
@@ -99,13 +102,13 @@ class OpticalFlow(Matcher):
         return weight
 
 
-def _halved(mask: Bool) -> Bool:
-    """Return a mask at half the size."""
+def _shrunk(mask: Bool, factor: int) -> Bool:
+    """Return a mask at one over `factor` of its size, cut to whole pixels."""
     import cv2
 
-    height, width = mask.shape
-    half = cv2.resize(mask.astype(np.float32), ((width + 1) // 2, (height + 1) // 2), interpolation=cv2.INTER_AREA)
-    return np.asarray(half > 0.5)
+    height, width = (side // factor for side in mask.shape)
+    whole = mask[: height * factor, : width * factor].astype(np.float32)
+    return np.asarray(cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA) > 0.5)
 
 
 def _sampled(field: F32, points: F64) -> F64:

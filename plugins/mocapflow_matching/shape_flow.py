@@ -7,8 +7,8 @@ import numpy as np
 
 from mocapflow.records import F32, Bool
 
-WARPS = 3  # linearisations a level
-SWEEPS = 25  # of successive over-relaxation a linearisation
+WARPS = 2  # linearisations a level
+SWEEPS = 8  # of successive over-relaxation a linearisation
 RELAXATION = 1.8
 LEAST_SIDE = 8  # px of the coarsest level
 
@@ -74,24 +74,30 @@ def _refine(model: F32, image: F32, smoothness: float, band: float, flow: F32) -
 def _relax(inside, gx, gy, wanted, smoothness, flow):  # type: ignore[no-untyped-def]
     """Solve g (g . w - wanted) = smoothness laplacian(w) at every pixel inside, by over-relaxation."""
     height, width = inside.shape
+    places = np.empty((inside.size, 2), np.int32)
+    total = 0
+    for row in range(height):
+        for column in range(width):
+            if inside[row, column]:
+                places[total, 0], places[total, 1] = row, column
+                total += 1
     relaxation = np.float32(RELAXATION)
     for _ in range(SWEEPS):
-        for row in range(height):
-            for column in range(width):
-                if not inside[row, column]:
-                    continue
-                u = v = count = np.float32(0.0)
-                for k in range(4):
-                    r, c = row + (k == 0) - (k == 1), column + (k == 2) - (k == 3)
-                    if 0 <= r < height and 0 <= c < width and inside[r, c]:
-                        u += flow[r, c, 0]
-                        v += flow[r, c, 1]
-                        count += np.float32(1.0)
-                if count == 0.0:
-                    continue
-                u /= count
-                v /= count
-                g, h = gx[row, column], gy[row, column]
-                step = (wanted[row, column] - g * u - h * v) / (smoothness * count + g * g + h * h)
-                flow[row, column, 0] += relaxation * (u + g * step - flow[row, column, 0])
-                flow[row, column, 1] += relaxation * (v + h * step - flow[row, column, 1])
+        for k in range(total):
+            row, column = places[k, 0], places[k, 1]
+            u = v = count = np.float32(0.0)
+            if row > 0 and inside[row - 1, column]:
+                u, v, count = u + flow[row - 1, column, 0], v + flow[row - 1, column, 1], count + np.float32(1.0)
+            if column > 0 and inside[row, column - 1]:
+                u, v, count = u + flow[row, column - 1, 0], v + flow[row, column - 1, 1], count + np.float32(1.0)
+            if row < height - 1 and inside[row + 1, column]:
+                u, v, count = u + flow[row + 1, column, 0], v + flow[row + 1, column, 1], count + np.float32(1.0)
+            if column < width - 1 and inside[row, column + 1]:
+                u, v, count = u + flow[row, column + 1, 0], v + flow[row, column + 1, 1], count + np.float32(1.0)
+            if count == 0.0:
+                continue
+            u, v = u / count, v / count
+            g, h = gx[row, column], gy[row, column]
+            step = (wanted[row, column] - g * u - h * v) / (smoothness * count + g * g + h * h)
+            flow[row, column, 0] += relaxation * (u + g * step - flow[row, column, 0])
+            flow[row, column, 1] += relaxation * (v + h * step - flow[row, column, 1])

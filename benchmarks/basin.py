@@ -1,0 +1,119 @@
+"""How far off a start may be: success of the contour matchers on exact silhouettes of the demo bodies.
+
+Run `OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python benchmarks/basin.py [STARTS]`. Every joint angle is off by a normal
+error of 5, 10 or 20 degrees, the root by a third of that and 1.4 mm a degree. A start counts as found when the surface
+comes to lie within 1 cm of the true one in the mean. The bodies and cameras (320 x 400 px) are those of the two demo
+clips; no cloth, no images: what is compared is matching alone.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from mocapflow_bodies.scanned import Scanned
+from mocapflow_matching.contour_icp import ContourIcp
+from mocapflow_matching.fourier_icp import FourierIcp
+from mocapflow_matching.optical_flow import OpticalFlow
+from mocapflow_priors.hold import Hold
+from mocapflow_priors.joint_limits import JointLimits
+from mocapflow_priors.rest_pose import RestPose
+from mocapflow_priors.spine_coupling import SpineCoupling
+from mocapflow_sequence.start_from_file import read_pose
+from mocapflow_twist.solver import TwistGaussNewton
+
+from mocapflow.components import Matcher, Segmenter
+from mocapflow.data import NO_CLOTH, Frame, FrameState, Past, Pose, Segmentation, Silhouette, Turn
+from mocapflow.geometry import silhouettes, twists
+from mocapflow.io.cameras import read_cameras
+from mocapflow.loop import Steady, Steps, settle
+from mocapflow.model import ClothedModel
+from mocapflow.scene import Scene
+from mocapflow.shipped import shipped
+from mocapflow.track import Unfitted, believed
+
+CLIPS = ("skirt_steps", "shorts_steps")
+SPREADS = (5.0, 10.0, 20.0)  # degrees
+FOUND = 0.01  # m
+FLOW = OpticalFlow(use="contours")
+MATCHERS: dict[str, Sequence[Matcher]] = {
+    "contour_icp": [ContourIcp()],
+    "fourier_icp": [FourierIcp()],
+    "contour_icp + optical_flow": [ContourIcp(), FLOW],
+    "fourier_icp + optical_flow": [FourierIcp(), FLOW],
+}
+
+
+class Given(Segmenter):
+    """Hands over the silhouettes of the state."""
+
+    name = "given"
+
+    def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
+        """Return the silhouettes of the state."""
+        return state.segmentation
+
+
+def scene_of(clip: str) -> tuple[Scene, Pose]:
+    """The unclothed scene of a clip, and a pose in it."""
+    folder = shipped("examples", "data", clip)
+    body = Scanned().load(folder)
+    return Scene(cameras=read_cameras(folder), body=body), read_pose(folder / "init.json", body)
+
+
+def shown(scene: Scene, pose: Pose) -> Segmentation:
+    """The exact silhouettes of a pose."""
+    surface = scene.surface(pose, NO_CLOTH)
+    fields = [silhouettes.model_distance(surface, camera, 10.0) for camera in scene.cameras]
+    return Segmentation(
+        silhouettes=tuple(Silhouette(camera=k, layer="person", distance=field) for k, field in enumerate(fields))
+    )
+
+
+def bent(scene: Scene, pose: Pose, spread_deg: float, rng: np.random.Generator) -> Pose:
+    """A pose off by so much in every angle, within the limits, and by a third in the turn of the root."""
+    spread = np.radians(spread_deg)
+    root = pose.root.copy()
+    root[:3, :3] = twists.exp(np.concatenate([spread / 3 * rng.normal(size=3), np.zeros(3)]))[:3, :3] @ root[:3, :3]
+    root[:3, 3] += 0.0014 * spread_deg * rng.normal(size=3)
+    angles = np.clip(pose.angles + spread * rng.normal(size=len(pose.angles)), *scene.body.limits.T)
+    return Pose(root=root, angles=angles)
+
+
+def error(scene: Scene, truth: Pose, start: Pose, matchers: Sequence[Matcher]) -> float:
+    """The mean distance (m) of the surface from the true one when the loop is done."""
+    state = replace(believed(start, np.empty(0), NO_CLOTH), segmentation=shown(scene, truth))
+    frame = Frame(index=0, time=0.0, images=(), usable=np.ones(len(scene.cameras), bool))
+    steps = Steps(
+        predictor=Hold(), segmenter=Given(), matchers=matchers, pose_solver=TwistGaussNewton(iterations=5),
+        cloth_fitter=Unfitted(), priors=[JointLimits(), RestPose(), SpineCoupling()],
+        steady=Steady(surface=0.002, angle=np.radians(0.3), turns=1, max_turns=8),
+    )  # fmt: skip
+    found = settle(frame, state, Past(), steps, ClothedModel(scene=scene), lambda *_: None).state.estimate.pose
+    one, other = (scene.surface(pose, NO_CLOTH).vertices for pose in (truth, found))
+    return float(np.linalg.norm(one - other, axis=1).mean())
+
+
+def main() -> None:
+    starts = int(sys.argv[1]) if len(sys.argv) > 1 else 10
+    scenes = [scene_of(clip) for clip in CLIPS]
+    print(f"found of {len(CLIPS) * starts} starts a row; seconds of CPU a start")
+    print(f"{'off by':>8}  {'matchers':28}{'found':>7}{'median mm':>11}{'s':>7}")
+    for spread in SPREADS:
+        for name, matchers in MATCHERS.items():
+            begin, errors = time.process_time(), []
+            for number, (scene, centre) in enumerate(scenes):
+                for seed in range(starts):
+                    rng = np.random.default_rng([number, seed])
+                    truth = bent(scene, centre, 10.0, rng)
+                    errors.append(error(scene, truth, bent(scene, truth, spread, rng), matchers))
+            spent = (time.process_time() - begin) / len(errors)
+            found = int(np.sum(np.array(errors) < FOUND))
+            print(f"{spread:7.0f}°  {name:28}{found:7}{1e3 * np.median(errors):11.1f}{spent:7.2f}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
