@@ -15,6 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 from mocapflow_bodies.scanned import Scanned
+from mocapflow_draping.fixed import Fixed
 from mocapflow_matching.contour_icp import ContourIcp
 from mocapflow_matching.fourier_icp import FourierIcp
 from mocapflow_matching.optical_flow import OpticalFlow
@@ -29,11 +30,12 @@ from mocapflow.components import Matcher, Segmenter
 from mocapflow.data import NO_CLOTH, Frame, FrameState, Past, Pose, Segmentation, Silhouette, Turn
 from mocapflow.geometry import silhouettes, twists
 from mocapflow.io.cameras import read_cameras
-from mocapflow.loop import Steady, Steps, settle
+from mocapflow.loop import Steps, settle
 from mocapflow.model import ClothedModel
+from mocapflow.rest import Steady
 from mocapflow.scene import Scene
 from mocapflow.shipped import shipped
-from mocapflow.track import Unfitted, believed
+from mocapflow.track import believed
 
 CLIPS = ("skirt_steps", "shorts_steps")
 SPREADS = (5.0, 10.0, 20.0)  # degrees
@@ -89,8 +91,8 @@ def error(scene: Scene, truth: Pose, start: Pose, matchers: Sequence[Matcher]) -
     frame = Frame(index=0, time=0.0, images=(), usable=np.ones(len(scene.cameras), bool))
     steps = Steps(
         predictor=Hold(), segmenter=Given(), matchers=matchers, pose_solver=TwistGaussNewton(iterations=5),
-        cloth_fitter=Unfitted(), priors=[JointLimits(), RestPose(), SpineCoupling()],
-        steady=Steady(surface=0.002, angle=np.radians(0.3), turns=1, max_turns=8),
+        cloth_fitter=Fixed(), priors=[JointLimits(), RestPose(), SpineCoupling()],
+        steady=Steady(surface=0.002, angle=np.radians(0.3), turns=1, max_turns=8, halvings=0),
     )  # fmt: skip
     found = settle(frame, state, Past(), steps, ClothedModel(scene=scene), lambda *_: None).state.estimate.pose
     one, other = (scene.surface(pose, NO_CLOTH).vertices for pose in (truth, found))
