@@ -1,4 +1,4 @@
-"""Matcher `containment`: what the cloth hides stays inside the clothed silhouette."""
+"""Matcher `containment`: the body stays inside the silhouette, clothed or not."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pydantic import Field
 
 from mocapflow.assets import Camera
 from mocapflow.components import Matcher, pool
-from mocapflow.data import CLOTH, Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn, empty_matches
+from mocapflow.data import Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn, empty_matches
 from mocapflow.geometry.contours import nearest_compatible
 from mocapflow.geometry.silhouettes import occluding_contour
 from mocapflow.records import F64
@@ -23,8 +23,8 @@ Positive = Annotated[float, Field(gt=0)]
 class Containment(Matcher):
     """Pairs points of the bare body's contour that stick out of the image silhouette with the image contour.
 
-    One-sided: a limb inside the silhouette is left alone, so nothing pulls it to the cloth. Without a garment there
-    is nothing hidden and no pair.
+    One-sided: a limb inside the silhouette is left alone, so nothing pulls it to the cloth. It reaches further than
+    nearest contours may: an arm that has strayed is brought back although no contour looks like it.
     """
 
     name: ClassVar[str] = "containment"
@@ -38,8 +38,6 @@ class Containment(Matcher):
         self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn
     ) -> Matches:
         """Return the pairs of every view; see the class."""
-        if not (surface.layer == CLOTH).any():
-            return empty_matches()
         bare = scene.bare(surface)
         people = [s for s in segmentation.silhouettes if s.layer == "person"]
         parts = [(1.0, self.match_view(scene.cameras[s.camera], s, bare)) for s in people]
