@@ -12,7 +12,7 @@ from typing import Any
 import typer
 import typer.core
 
-from mocapflow.commands import cache, comparing, looking, prior, results, running
+from mocapflow.commands import cache, comparing, looking, new, prior, results, running
 from mocapflow.errors import MocapflowError
 
 
@@ -57,6 +57,7 @@ for command in COMMANDS:
     app.command()(command)
 app.add_typer(cache.app, name="cache")
 app.add_typer(prior.app, name="prior")
+app.add_typer(new.app, name="new")
 
 
 def main() -> None:

@@ -1,0 +1,74 @@
+"""A new plugin package from templates: one module, one test, ready to install."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from string import Template
+from typing import NamedTuple
+
+from mocapflow.errors import PluginError
+
+TEMPLATES = Path(__file__).parent / "templates"
+NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
+
+
+class Kind(NamedTuple):
+    """What the templates of a role are filled with."""
+
+    conformance: str
+    usage: str  # in a pipeline
+    extra_import: str = ""
+    extra_body: str = ""
+
+
+KINDS: Mapping[str, Kind] = {
+    "draper": Kind("DraperConformance", "`stages.track.draper: $module`"),
+    "garment": Kind(
+        "GarmentConformance",
+        "`garment: $module`",
+        ", template_body",
+        "\n    make_body = staticmethod(template_body)  # the usual body for tests has no shoulders",
+    ),
+    "matcher": Kind("MatcherConformance", "add `$module` to `stages.track.matchers`"),
+    "prior": Kind("PriorConformance", "add `$module` to `stages.track.priors`"),
+}
+
+
+def write_plugin(name: str, role: str, folder: Path) -> list[Path]:
+    """Write a plugin package into a new folder and return its files.
+
+    Raises:
+        PluginError: the name can't be one, or the folder is there already.
+    """
+    if not NAME.fullmatch(name):
+        hint = "lower-case letters, digits and single hyphens, a letter first: my-dress"
+        raise PluginError(f"'{name}' can't be the name of a package", hint=hint)
+    if folder.exists():
+        raise PluginError("there is something already", where=str(folder), hint="name another folder with --out")
+    module, kind = name.replace("-", "_"), KINDS[role]
+    words = {
+        "name": name,
+        "module": module,
+        "Class": name.title().replace("-", ""),
+        "title": name.replace("-", " ").capitalize(),
+        "role": role,
+        "usage": Template(kind.usage).substitute(module=module),
+        "conformance": kind.conformance,
+        "imports": kind.conformance + kind.extra_import,
+        "body": kind.extra_body,
+    }
+    files = {
+        "pyproject.toml": "pyproject.toml.txt",
+        "README.md": "README.md.txt",
+        f"mocapflow_{module}.py": f"{role}.py.txt",
+        f"tests/test_{module}.py": "test.py.txt",
+    }
+    return [_write(folder / path, TEMPLATES / template, words) for path, template in files.items()]
+
+
+def _write(path: Path, template: Path, words: Mapping[str, str]) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(Template(template.read_text(encoding="utf-8")).substitute(words), encoding="utf-8")
+    return path

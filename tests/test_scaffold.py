@@ -1,0 +1,38 @@
+"""New plugins: what is written loads, conforms, and passes our own linter."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from mocapflow import load_registry
+from mocapflow.cli import app
+from mocapflow.errors import PluginError
+from mocapflow.scaffold import KINDS, write_plugin
+
+
+@pytest.mark.parametrize("role", KINDS)
+def test_a_new_plugin_loads_and_conforms(role: str, tmp_path: Path) -> None:
+    folder = tmp_path / "mocapflow-my-own"
+    said = CliRunner().invoke(app, ["new", "plugin", "my-own", "--role", role, "--out", str(folder)])
+    assert said.exit_code == 0, said.output
+    registry = load_registry([folder / "mocapflow_my_own.py"])
+    assert "my_own" in registry.names(role), registry.failures
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")])}
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:dash", "-p", "no:cacheprovider", "tests"]
+    run = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, env=env)
+    assert run.returncode == 0, run.stdout
+    ruff = [sys.executable, "-m", "ruff", "check", "--isolated", "--select", "E,F,I,B", "--line-length", "120", folder]
+    assert subprocess.run(ruff, capture_output=True, check=False).returncode == 0
+
+
+def test_errors(tmp_path: Path) -> None:
+    with pytest.raises(PluginError, match=r"'My Dress' can't be the name of a package\n.*a letter first: my-dress"):
+        write_plugin("My Dress", "garment", tmp_path / "new")
+    with pytest.raises(PluginError, match=r"there is something already\n.*--out"):
+        write_plugin("dress", "garment", tmp_path)
