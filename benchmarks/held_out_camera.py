@@ -1,0 +1,92 @@
+"""Do forces fitted on three cameras explain the fourth? Share of frames where they lower its silhouette error.
+
+`OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python benchmarks/held_out_camera.py [RECORDING [FRAMES]]`. The person is
+tracked without forces; at these poses each cloth fitter sees all silhouettes but one. The error in that view is the
+number of pixels in which the silhouettes of model and person differ; calm cloth, without forces, has to be beaten.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mocapflow_draping.sampled_forces import SampledForces
+from mocapflow_twist.gauss_newton import GaussNewton
+
+from mocapflow.components import ClothFitter
+from mocapflow.data import Cloth, Frame, FrameState, Moment, Past, Segmentation, Turn
+from mocapflow.geometry import silhouettes
+from mocapflow.model import ClothedModel
+from mocapflow.pipeline import load_pipeline
+from mocapflow.recording import open_recording
+from mocapflow.records import F64
+from mocapflow.runner import run
+from mocapflow.scene import Scene
+
+RECORDING = Path("examples/data/skirt_steps")
+NO_FORCES = ("stages.track.pose_solver.cloth_unknowns=false", "stages.track.cloth_fitter=fixed", "stages.smooth=null")
+NO_FILES = tuple(f"stages.{stage}=null" for stage in ("export", "evaluate", "overlay", "virtual", "report"))
+TURN = Turn(index=0, cap=1)
+
+
+def main() -> None:
+    recording = Path(sys.argv[1]) if len(sys.argv) > 1 else RECORDING
+    states, model = tracked(recording, int(sys.argv[2]) if len(sys.argv) > 2 else 60)
+    for fitter in (SampledForces(), GaussNewton()):
+        for view, camera in enumerate(model.scene.cameras):
+            calm, fitted = errors(fitter, states, model, view)
+            better, saved = np.mean(fitted < calm), 1 - fitted.sum() / calm.sum()
+            print(
+                f"{fitter.name:15} {camera.name}: better on {better:4.0%} of frames, error {saved:+.0%} smaller",
+                flush=True,
+            )
+
+
+def tracked(recording: Path, frames: int) -> tuple[list[FrameState], ClothedModel]:
+    """Return what is known of each frame tracked without forces, and the model."""
+    pipeline = load_pipeline(
+        Path("pipelines/skirt.yaml"), recording=recording, changes=[*NO_FORCES, *NO_FILES], frames=slice(0, frames)
+    )
+    states: list[FrameState] = []
+    observers: Any = pipeline.registry.observers
+    observers.frame_done = lambda index, result: states.append(result.state)
+    with tempfile.TemporaryDirectory() as folder:
+        run(pipeline, store=Path(folder) / "store.zarr", out=Path(folder) / "run")
+    assert pipeline.garment is not None
+    body, loop = pipeline.body.load(recording), next(s.stage for s in pipeline.stages if s.label == "track")
+    scene = Scene(cameras=open_recording(recording).cameras, body=body, garment=pipeline.garment.sew(body))
+    return states, ClothedModel(scene=scene, draper=loop.draper)  # type: ignore[attr-defined]
+
+
+def errors(fitter: ClothFitter, states: Sequence[FrameState], model: ClothedModel, view: int) -> tuple[F64, F64]:
+    """Return the error (T,) px of one view with calm cloth, and with forces fitted on the other views."""
+    frame = Frame(index=0, time=0.0, images=(), usable=np.empty(0, bool))  # fitters read silhouettes
+    past, found = Past(), []
+    parameters = np.zeros(len(states[0].cloth.parameters))
+    for state in states:
+        calm = model.drape(state.estimate.pose, np.zeros(len(parameters)), past)
+        others = tuple(s for s in state.segmentation.of("person") if s.camera != view)
+        estimate = replace(state.estimate, parameters=parameters)
+        cloth = fitter.fit(frame, Segmentation(silhouettes=others), estimate, model, past, TURN)
+        past = past.after(Moment(time=0.0, pose=estimate.pose, cloth=cloth), {})
+        parameters = cloth.parameters
+        found.append([differing(state, each, model, view) for each in (calm, cloth)])
+    calm_error, fitted_error = np.array(found, float).T
+    return calm_error, fitted_error
+
+
+def differing(state: FrameState, cloth: Cloth, model: ClothedModel, view: int) -> int:
+    """Return how many pixels of a view only one of the two silhouettes covers."""
+    seen = next(s for s in state.segmentation.of("person") if s.camera == view)
+    camera, surface = model.scene.cameras[view], model.surface(state.estimate.pose, cloth)
+    covered = silhouettes.mask(silhouettes.outline(surface, camera), camera)
+    return int(np.count_nonzero(covered != (seen.distance > 0)))
+
+
+if __name__ == "__main__":
+    main()
