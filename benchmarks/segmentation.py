@@ -47,7 +47,9 @@ def make_task(seed: int = 0) -> Task:
     clean = alpha[..., None] * person + (1 - alpha[..., None]) * room
     image = np.clip(clean + rng.normal(0, 4, clean.shape), 0, 255).astype(np.uint8)
     room = np.clip(room, 0, 255)
-    plates = {factor: plate_of(room, np.full_like(room, 4.0), factor) for factor in (1, 2, 4)}  # once per recording
+    plates = {
+        factor: plate_of(room, np.full_like(room, 4.0), ("lab",), factor) for factor in (1, 2, 4)
+    }  # once per recording
     return Task(image, plates, redistance(alpha - np.float32(0.5), 40.0))
 
 

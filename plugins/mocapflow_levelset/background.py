@@ -14,7 +14,7 @@ from mocapflow.errors import RecordingError
 from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.records import F32, U8, Bool
 from mocapflow.scene import Scene
-from mocapflow_levelset.channels import ChannelName
+from mocapflow_levelset.channels import ChannelName, features
 from mocapflow_levelset.evidence import calmed
 from mocapflow_levelset.evolve import Rhythm, Weights
 from mocapflow_levelset.masks import counted
@@ -88,7 +88,7 @@ class BackgroundDifference(Segmenter):
             background: the empty scene.
             camera: which of its views.
         """
-        plate = plate_of(background.mean[camera], background.spread[camera])
+        plate = plate_of(background.mean[camera], background.spread[camera], CHANNELS)
         start = self._start(image, model, plate, floor)
         if not self.refine_steps:
             return redistance(start, self.band_px)
@@ -101,10 +101,10 @@ class BackgroundDifference(Segmenter):
         """Return a level set (H, W), not a distance: positive where the image is unlike the plate."""
         import cv2
 
-        calm = calmed(image, self.smooth_px).reshape(-1, 3)
-        empty = plate.mean.reshape(-1, 3), plate.spread.ravel()
-        density = density_of(calm, *empty, floor.ravel(), CHANNELS, self._shadow()).reshape(model.shape)
-        change = cv2.GaussianBlur(np.clip(-density, -6, 6), (0, 0), self.smooth_px)
+        calm = features(calmed(image, self.smooth_px), CHANNELS)
+        values, expected = calm.reshape(len(calm), -1), plate.planes.reshape(len(calm), -1)
+        density = density_of(values, expected, plate.spread.ravel(), floor.ravel(), CHANNELS, self._shadow())
+        change = cv2.GaussianBlur(np.clip(-density.reshape(model.shape), -6, 6), (0, 0), self.smooth_px)
         kept = self._person(change > 0, model)
         return np.where(kept, np.maximum(change, 0.1), np.minimum(change, -0.1)).astype(np.float32)
 

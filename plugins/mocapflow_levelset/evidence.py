@@ -22,7 +22,7 @@ class Evidence(NamedTuple):
     weight: F32  # (H, W) 1 where a pixel counts, 0 where it is masked
     stride: int
     along: Callable[[I32], F32]  # features (C, N) of the N pixels of some runs
-    outside: Callable[[I32], F32] | None = None  # log density (N,) of these pixels in the empty scene
+    outside: Callable[[I32, F32], F32] | None = None  # log density (N,) in the empty scene, from runs and features
 
 
 def from_features(planes: F32, weight: F32) -> Evidence:
@@ -65,15 +65,11 @@ def from_image(
         empty, floor = plate
         calm = calmed(image, calm_px)
 
-        def outside(runs: I32) -> F32:
-            return density_of(
-                gather(calm, runs),
-                gather(empty.mean, runs),
-                gather_planes(empty.spread[None], runs)[0],
-                gather_planes(floor[None], runs)[0],
-                channels,
-                shadow,
-            )
+        def outside(runs: I32, values: F32) -> F32:
+            if calm is not image:
+                values = features(gather(calm, runs)[None], channels)[:, 0]
+            expected, spread = gather_planes(empty.planes, runs), gather_planes(empty.spread[None], runs)[0]
+            return density_of(values, expected, spread, gather_planes(floor[None], runs)[0], channels, shadow)
 
         return Evidence(sparse, weight, stride, along, outside)
     if decorrelate and len(sparse) > 1 and sparse.shape[2] > LAG_PX:

@@ -73,14 +73,14 @@ def settle(level: F32, prior: F32, evidence: Evidence, window: Window, weights: 
     sums = totals(evidence.sparse, weight, grid.cell_px)
     level = np.clip(level, -np.float32(weights.band_px), np.float32(weights.band_px))
     ratio, change = np.zeros_like(level), np.empty_like(level)
-    runs = near(level, prior, weights, first)
+    runs = near(level, weights, first)
     for step in range(rhythm.steps):
         if step and step % rhythm.redistance_every == 0:
             level = redistance(level, weights.band_px)
         if step % rhythm.statistics_every == 0:
             sparse = np.ascontiguousarray(level[::stride, ::stride]) / np.float32(stride)
             gaussians = local_gaussians(evidence.sparse, weight, sparse, sums, grid, weights.sigma_px / stride, reach)
-            runs = near(level, prior, weights, first) if step else runs
+            runs = near(level, weights, first) if step else runs
             log_ratio(runs, evidence, gaussians, grid.cell_px * stride, stride, weights.clip, ratio)
         advance(level, ratio, prior, runs, change, weights)
     return Settled(level, ratio, runs)
@@ -93,11 +93,10 @@ def costs(settled: Settled, prior: F32, weights: Weights) -> Costs:
     return Costs(float(data), weights.length * float(length), weights.shape * float(shape))
 
 
-def near(level: F32, prior: F32, weights: Weights, first: int = 0) -> I32:
-    """Return the runs of pixels that may change, rows of (y, first x, last x + 1)."""
-    reach = FRONT * weights.sigma_px
-    band = np.float32(weights.band_px - 1e-3)
-    runs: I32 = kernels.find_runs(level, prior, np.float32(reach), band, weights.shape > 0, BLOCK, first)
+def near(level: F32, weights: Weights, first: int = 0) -> I32:
+    """Return the runs of pixels near enough to the contour to move it, rows of (y, first x, last x + 1)."""
+    reach = min(FRONT * weights.sigma_px, weights.band_px - 1e-3)
+    runs: I32 = kernels.find_runs(level, np.float32(reach), BLOCK, first)
     return runs
 
 
@@ -108,7 +107,7 @@ def log_ratio(runs: I32, evidence: Evidence, gaussians: F32, cell_px: int, strid
     """
     values = evidence.along(runs)
     known = evidence.outside is not None
-    outside = evidence.outside(runs) if evidence.outside is not None else np.empty(0, np.float32)
+    outside = evidence.outside(runs, values) if evidence.outside is not None else np.empty(0, np.float32)
     first = np.float32((cell_px // stride - 1) * stride / 2)  # centre of the first cell's pixels
     kernels.log_ratio(runs, values, evidence.weight, outside, known, gaussians, cell_px, first, np.float32(clip), out)
 

@@ -9,13 +9,13 @@ from mocapflow_levelset.statistics import STEP_BINS, STEP_RANGE
 
 
 @numba.njit(cache=True, error_model="numpy")
-def find_runs(level, prior, reach, band, shape, block, first):  # type: ignore[no-untyped-def]
+def find_runs(level, reach, block, first):  # type: ignore[no-untyped-def]
     """Return runs made of whole blocks of pixels, the blocks of a row starting at `first`, modulo a block."""
     height, width = level.shape
     runs = np.empty((height * (width // (2 * block) + 2), 3), np.int32)
     count = 0
     for y in range(height):
-        here, wanted = level[y], prior[y]
+        here = level[y]
         start = -1
         left = min(first - block, 0)
         while left < width:
@@ -23,9 +23,6 @@ def find_runs(level, prior, reach, band, shape, block, first):  # type: ignore[n
             moves = False
             for x in range(a, b):
                 moves |= abs(here[x]) < reach
-            if shape and not moves:
-                for x in range(a, b):
-                    moves |= abs(here[x]) < band or abs(wanted[x]) < band
             if moves and start < 0:
                 start = a
             elif not moves and start >= 0:

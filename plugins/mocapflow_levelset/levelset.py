@@ -116,7 +116,8 @@ class LevelSet(Segmenter):
         """Return a view of the empty scene, shrunk; computed once, forgotten with the background."""
         known = self._plates.setdefault(background, {})
         if (camera, factor) not in known:
-            known[camera, factor] = plate_of(background.mean[camera], background.spread[camera], factor)
+            mean, spread = background.mean[camera], background.spread[camera]
+            known[camera, factor] = plate_of(mean, spread, self.channels, factor)
         return known[camera, factor]
 
     def _levels(self, warm: bool) -> list[Level]:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from mocapflow.records import F32, U8
+from mocapflow.records import F32
 from mocapflow_levelset import crops
 from mocapflow_levelset.channels import ChannelName, features
 
@@ -35,32 +35,35 @@ class Shadow(NamedTuple):
 class Plate(NamedTuple):
     """The empty scene in one view, as pixels are compared with it."""
 
-    mean: U8  # (H, W, 3) BGR
-    spread: F32  # (H, W) grey levels, standard deviation: the root mean square over the colours
+    planes: F32  # (C, H, W) features in [0, 1]
+    spread: F32  # (H, W) standard deviation, share of a channel's range: the root mean square over the colours
 
     def of(self, crop: crops.Crop) -> Plate:
         """Return the rectangle of a plate."""
-        return Plate(crop.of_grey_levels(self.mean), crop.of(self.spread))
+        rows, columns = slice(crop.top, crop.bottom), slice(crop.left, crop.right)
+        return Plate(self.planes[:, rows, columns], self.spread[rows, columns])
 
 
-def plate_of(mean: F32, spread: F32, factor: int = 1) -> Plate:
+def plate_of(mean: F32, spread: F32, channels: Sequence[ChannelName], factor: int = 1) -> Plate:
     """Return a plate, at 1 / factor of its size, from mean and spread (H, W, 3) in grey levels."""
-    mean, spread = crops.shrink_values(mean, factor), crops.shrink_values(spread, factor)
-    return Plate(mean=np.clip(np.rint(mean), 0, 255).astype(np.uint8), spread=np.sqrt(np.mean(spread * spread, axis=2)))
+    mean, spread = crops.shrink_values(mean, factor), crops.shrink_values(spread, factor) / np.float32(255)
+    levels = np.clip(np.rint(mean), 0, 255).astype(np.uint8)
+    return Plate(features(levels, channels), np.sqrt(np.mean(spread * spread, axis=2)))
 
 
-def density_of(pixels: U8, mean: U8, spread: F32, floor: F32, channels: Sequence[ChannelName], shadow: Shadow) -> F32:
+def density_of(
+    values: F32, plate: F32, spread: F32, floor: F32, channels: Sequence[ChannelName], shadow: Shadow
+) -> F32:
     """Return the log density (N,) of pixels under the empty scene.
 
     Args:
-        pixels: (N, 3) BGR.
-        mean: (N, 3) BGR of the empty scene there.
-        spread: (N,) grey levels, standard deviation.
+        values: (C, N) features of the pixels.
+        plate: (C, N) those of the empty scene there.
+        spread: (N,) its standard deviation.
         floor: (N,) 1 where a shadow may fall, 0 elsewhere.
-        channels: in which they are compared.
+        channels: what the features are.
         shadow: what counts as background.
     """
-    values, plate = features(pixels[None], channels)[:, 0], features(mean[None], channels)[:, 0]
     constants = tuple(np.float32(value) for value in shadow)
     out = np.empty(values.shape[1], np.float32)
     _densities(values, plate, spread, floor, constants, first_lab(channels), out)
@@ -77,9 +80,8 @@ def first_lab(channels: Sequence[ChannelName]) -> int:
 def _densities(values, plate, spread, may_fall, shadow, lab, out):  # type: ignore[no-untyped-def]
     floor, _, _, _, stranger = shadow
     channels = values.shape[0]
-    scale = np.float32(1 / 255**2)
     for n in range(out.size):
-        variance = max(spread[n] * spread[n] * scale, floor * floor)
+        variance = max(spread[n] * spread[n], floor * floor)
         inverse = np.float32(0.5) / variance
         norm = LOG_ROOT - np.float32(0.5) * np.log(variance)
         lit, others = np.float32(0), np.float32(0)

@@ -76,14 +76,14 @@ def find(view: View, levels: Sequence[Level], method: Method, band_px: float) ->
         front = _brought(front, factor, level.factor, method.weights.band_px)
         settled = settle(front, prior, _evidence(view, crop, level, method), level.window, method.weights, level.rhythm)
         front, factor = settled.level, level.factor
-    crop.of(outside)[:] = redistance(_brought(front, factor, 1, band_px), band_px)
+    crop.of(outside)[:] = _brought(front, factor, 1, band_px)
     return Found(outside, costs(settled, prior, method.weights))
 
 
 def _brought(level: F32, factor: int, wanted: int, band_px: float) -> F32:
     """Return a level set of the image shrunk by `factor` as a signed distance where it is shrunk by `wanted`."""
     if wanted < factor:  # a distance first, where it costs least
-        return crops.enlarge(redistance(level, band_px), factor // wanted)
+        return np.clip(crops.enlarge(redistance(level, band_px), factor // wanted), -band_px, band_px)
     times = wanted // factor
     return redistance(crops.shrink_values(level, times) / np.float32(times), band_px)
 

@@ -78,7 +78,7 @@ def test_the_kernel_takes_the_step_of_the_equation():
     level, prior = np.clip(level, -7, 7), np.clip(prior, -7, 7)
     ratio = rng.uniform(-6, 6, level.shape).astype(np.float32)
     weights = Weights(SIGMA, 0.5, 0.05, 6.0, 1.0, 7.0)
-    runs = near(level, prior, weights)
+    runs = near(level, weights)
     moved = level.copy()
     advance(moved, ratio, prior, runs, np.empty_like(level), weights)
     push = delta(level, SIGMA) * (ratio + 0.5 * np.clip(curvature(level), -1, 1))

@@ -55,7 +55,7 @@ def test_coarse_cells_give_nearly_the_same():
         window = Window(12.0, cell, 0.02)
         gaussians = local_gaussians(planes, ONES, level, totals(planes, ONES, cell), window, SIGMA)
         ratio = np.zeros_like(level)
-        runs = near(level, level, weights, (cell - 1) // 2)
+        runs = near(level, weights, (cell - 1) // 2)
         log_ratio(runs, from_features(planes, ONES), gaussians, cell, 1, 50.0, ratio)
         ratios.append(ratio[np.abs(level) < 4])
     assert np.sqrt(np.mean((ratios[0] - ratios[1]) ** 2)) < 0.06 * ratios[0].std()
@@ -80,7 +80,7 @@ def test_known_gaussians_give_the_known_ratio():
     hard = np.where(inside, np.float32(12), np.float32(-12))  # so that the smooth step is 0 or 1
     gaussians = local_gaussians(planes, ONES, hard, totals(planes, ONES, 1), window, SIGMA)
     ratio = np.zeros_like(level)
-    runs = near(level, level, Weights(SIGMA, 0.5, 0.0, 6.0, 1.0, 7.0))
+    runs = near(level, Weights(SIGMA, 0.5, 0.0, 6.0, 1.0, 7.0))
     log_ratio(runs, from_features(planes, ONES), gaussians, 1, 1, 100.0, ratio)
     at = np.abs(level) < 4
     np.testing.assert_allclose(ratio[at], known[at], rtol=1e-3, atol=5e-3)
