@@ -40,7 +40,7 @@ from mocapflow.track import believed
 CLIPS = ("skirt_steps", "shorts_steps")
 SPREADS = (5.0, 10.0, 20.0)  # degrees
 FOUND = 0.01  # m
-FLOW = OpticalFlow(use="contours")
+FLOW = OpticalFlow(between="shapes")
 MATCHERS: dict[str, Sequence[Matcher]] = {
     "contour_icp": [ContourIcp()],
     "fourier_icp": [FourierIcp()],

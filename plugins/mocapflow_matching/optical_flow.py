@@ -29,15 +29,15 @@ ON_CONTOUR = 1.0  # px from the image contour within which a target has to end
 class OpticalFlow(Matcher):
     """Pairs by flow, to be pooled with those of `contour_icp`.
 
-    `contours`: the flow that registers the model's distance image with the silhouette's takes each contour point of
+    `shapes`: the flow that registers the model's distance image with the silhouette's takes each contour point of
     the model to its target; it reaches further than the nearest neighbour, above all for shifts. It is needed only
-    while the body still moves by more than `calm_mm` a turn. `image`: points tracked from the frame before (stage
+    while the body still moves by more than `calm_mm` a turn. `frames`: points tracked from the frame before (stage
     `flow`) that lie on the surface as it was found there. They see what no contour shows, as turns of a limb about
     itself, but add up their errors over frames; on cloth they follow the cloth, which slides over the skin.
     """
 
     name = "optical_flow"
-    use: Literal["both", "contours", "image"] = "both"
+    between: Literal["both", "shapes", "frames"] = "both"
     calm_mm: Positive = 15.0
     first_share: Share = 2.3  # against contour_icp's while the body still moves: 0.7 to 0.3
     later_share: Share = 0.25  # 0.2 to 0.8
@@ -57,9 +57,9 @@ class OpticalFlow(Matcher):
         """Return the pairs of every view; see the class."""
         calm = turn.change is not None and turn.change.body <= self.calm_mm / 1000
         parts = [empty_matches()]
-        if self.use != "contours":
+        if self.between != "shapes":
             parts.append(self.carried(frame, surface, past, scene))
-        if self.use != "image" and not calm:
+        if self.between != "frames" and not calm:
             people = [s for s in segmentation.silhouettes if s.layer == "person"]
             parts += [self.registered(silhouette, surface, scene) for silhouette in people]
         share = self.later_share if calm else self.first_share

@@ -62,7 +62,7 @@ def test_targets_lie_on_the_contour_and_the_shift_is_found():
     truth = tiny_pose(SCENE)
     aside = moved(truth, np.r_[0, 0, 0, 0, 0.15, 0, np.zeros(len(truth.angles))])
     surface, there = (SCENE.surface(pose, NO_CLOTH) for pose in (truth, aside))
-    matches = OpticalFlow(use="contours").match(FRAME, seen(there, SCENE), surface, Past(), SCENE, FIRST)
+    matches = OpticalFlow(between="shapes").match(FRAME, seen(there, SCENE), surface, Past(), SCENE, FIRST)
     assert len(matches.vertex) > 100
     assert not matches.direction.any()
     goals = np.array([project(there.vertices, camera) for camera in SCENE.cameras])[matches.camera, matches.vertex]
@@ -81,7 +81,7 @@ def test_hanging_cloth_counts_less():
     truth = tiny_pose(DRESSED)
     surface = DRESSED.surface(truth, tiny_cloth(DRESSED, truth))
     shown = seen(surface, DRESSED)
-    matches = OpticalFlow(use="contours", first_share=1.0).match(FRAME, shown, surface, Past(), DRESSED, FIRST)
+    matches = OpticalFlow(between="shapes", first_share=1.0).match(FRAME, shown, surface, Past(), DRESSED, FIRST)
     cloth = surface.layer[matches.vertex] == CLOTH
     assert cloth.sum() > 20
     assert np.median(matches.weight[cloth]) < 0.1 * np.median(matches.weight[~cloth])
@@ -91,7 +91,7 @@ def test_both_matchers_reach_further_than_nearest_neighbours():
     """T-FLOW1: 10 degrees off, right more often with both than without."""
     alone, both = (
         [knee_error_deg(SCENE, matchers, seed, off_deg=10.0, priors=[JointLimits()]) for seed in range(8)]
-        for matchers in ([ContourIcp()], [ContourIcp(), OpticalFlow(use="contours")])
+        for matchers in ([ContourIcp()], [ContourIcp(), OpticalFlow(between="shapes")])
     )
     print(f"knees, degrees: alone {np.round(alone, 1)}, with flow {np.round(both, 1)}")
     assert np.sum(np.array(both) < 2) > np.sum(np.array(alone) < 2)
