@@ -1,0 +1,125 @@
+"""Keypoints paired with the landmarks of a body: where they stand, who is meant, and how far they are trusted."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+from keypoint_recording import DEMO, bystander_of, keypoints
+from mocapflow_bodies.scanned import Scanned
+from mocapflow_matching.keypoints import Keypoints, marks_on
+from mocapflow_sequence.landmarks import landmarks
+from mocapflow_sequence.start_from_file import read_pose
+from mocapflow_twist.solver import TwistGaussNewton
+
+from mocapflow.data import NO_CLOTH, Frame, Past, Segmentation, Turn
+from mocapflow.geometry import kinematics
+from mocapflow.geometry.cameras import project
+from mocapflow.io.cameras import read_cameras
+from mocapflow.model import ClothedModel, moved
+from mocapflow.scene import Scene
+from mocapflow.track import believed
+
+BODY = Scanned().load(DEMO)
+SCENE = Scene(cameras=read_cameras(DEMO), body=BODY)
+POSE = read_pose(DEMO / "init.json", BODY)
+NOTHING = Segmentation(silhouettes=())
+FIRST = Turn(index=0, cap=5)
+
+
+def frame_of(pose, noise_px=0.0, bystander=(), wild=(), seed=0):
+    """A frame with keypoints of a pose, of a bystander in some views (listed first), and with some points astray."""
+    rng, views = np.random.default_rng(seed), []
+    for index, camera in enumerate(SCENE.cameras):
+        people = [keypoints(BODY, pose, camera, rng, noise_px, confidence=1.0)]
+        for row in wild:
+            people[0][row, :2] += rng.normal(scale=60, size=2)
+        if index in bystander:
+            people.insert(0, keypoints(BODY, bystander_of(pose), camera, rng, noise_px))
+        views.append(np.stack(people))
+    usable = np.ones(len(views), bool)
+    return Frame(index=0, time=0.0, images=(), usable=usable, keypoints=tuple(views))
+
+
+def match(frame, pose=POSE, matcher=None):
+    return (matcher or Keypoints()).match(frame, NOTHING, SCENE.surface(pose, NO_CLOTH), Past(), SCENE, FIRST)
+
+
+def away(matches):
+    """How far (M,) px each vertex of the true pose has to move."""
+    vertices = SCENE.surface(POSE, NO_CLOTH).vertices
+    image = np.stack([project(vertices, camera) for camera in SCENE.cameras])
+    return np.linalg.norm(matches.pixel - image[matches.camera, matches.vertex], axis=1)
+
+
+@pytest.mark.parametrize("by", [0.0, 0.4])
+def test_landmarks_are_means_of_the_skin_around_them(by):
+    """At rest and bent, within what the skin slides over a joint."""
+    pose = moved(POSE, np.r_[np.zeros(6), by * np.random.default_rng(0).normal(size=len(POSE.angles))])
+    places, marks = landmarks(BODY), marks_on(BODY)
+    exact = kinematics.skin(places.body, kinematics.chain(places.body, pose)[0])
+    skin = SCENE.surface(pose, NO_CLOTH).vertices
+    means = np.einsum("lk,lka->la", marks.share, skin[marks.vertex])
+    np.testing.assert_allclose(marks.share.sum(axis=1), 1)
+    assert (marks.share >= 0).all()
+    off = np.linalg.norm(means - exact, axis=1)
+    assert np.median(off) < 0.01
+    assert off.max() < 0.04
+
+
+def test_at_the_true_pose_nothing_has_to_move_much():
+    matches = match(frame_of(POSE))
+    assert np.median(away(matches)) < 1.0
+    assert set(matches.camera) == {0, 1, 2, 3}
+
+
+def test_the_pose_is_found_from_keypoints_alone():
+    """Ten degrees off: the landmarks come back to where they are seen."""
+    start = moved(POSE, np.r_[np.zeros(6), np.radians(10) * np.random.default_rng(1).normal(size=len(POSE.angles))])
+    frame, model = frame_of(POSE, noise_px=0.3), ClothedModel(scene=SCENE)
+    pose = start
+    for index in range(3):
+        state, turn = believed(pose, np.empty(0), NO_CLOTH), Turn(index=index, cap=3)
+        again = partial(Keypoints().match, frame, NOTHING, past=Past(), scene=SCENE, turn=turn)
+        pose = TwistGaussNewton().solve(again, state, model, (), Past(), turn).pose
+    places = landmarks(BODY).body
+    truth, before, after = (kinematics.skin(places, kinematics.chain(places, p)[0]) for p in (POSE, start, pose))
+    assert np.linalg.norm(before - truth, axis=1).mean() > 0.05
+    assert np.linalg.norm(after - truth, axis=1).mean() < 0.01
+
+
+def test_a_bystander_is_not_meant():
+    alone, crowded = match(frame_of(POSE)), match(frame_of(POSE, bystander=(0, 2)))
+    np.testing.assert_allclose(crowded.pixel, alone.pixel)
+
+
+def test_somebody_far_away_is_not_taken():
+    other = moved(POSE, np.r_[0, 0, 0, 1.5, 0, 0, np.zeros(len(POSE.angles))])
+    assert len(match(frame_of(other)).vertex) == 0
+
+
+def test_the_weight_is_learned_from_the_reprojection():
+    """Keypoints that contradict each other by more count for less; the estimate is right to a third."""
+    quiet, noisy = (match(frame_of(POSE, noise_px=px)).weight.sum() for px in (0.5, 12.0))
+    assert noisy < 0.3 * quiet
+    estimates = []
+    for seed in range(5):
+        seen = np.stack([view[0] for view in frame_of(POSE, noise_px=4.0, seed=seed).keypoints])
+        estimates.append(Keypoints()._estimator_px(seen, SCENE.cameras))
+    assert np.mean(estimates) == pytest.approx(4.0, rel=0.33)
+
+
+def test_points_astray_pull_little():
+    matches, clean = match(frame_of(POSE, wild=(11,))), match(frame_of(POSE))
+    np.testing.assert_array_equal(matches.vertex, clean.vertex)
+    wild = away(matches) > 30
+    assert wild.any()
+    assert (matches.weight[wild] < 0.5 * clean.weight[wild]).all()
+
+
+def test_no_keypoints_no_pairs():
+    frame = frame_of(POSE)
+    assert len(match(replace(frame, keypoints=None)).vertex) == 0
+    assert len(match(replace(frame, keypoints=tuple(np.empty((0, 0, 3)) for _ in frame.keypoints))).vertex) == 0
+    lost = replace(frame, usable=np.array([True, False, True, True]))
+    assert set(match(lost).camera) == {0, 2, 3}
