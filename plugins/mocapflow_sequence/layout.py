@@ -13,6 +13,7 @@ ENERGY = RESULTS / "energy.csv"
 EVALUATION = RESULTS / "evaluation.csv"
 ERRORS = RESULTS / "errors.csv"
 PLOT = RESULTS / "angles.png"
+OVERLAP = RESULTS / "overlap.png"
 RUN = Path("run.json")
 REPORT = Path("report.html")
 VIRTUAL = Path("virtual/virtual.mp4")

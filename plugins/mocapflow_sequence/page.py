@@ -15,7 +15,8 @@ body { font: 15px/1.5 system-ui, sans-serif; color: #222; max-width: 1200px; mar
 h1 { font-size: 1.6rem; margin-bottom: 0 } h2 { font-size: 1.15rem; margin-top: 2.2rem }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums } figure { margin: 1rem 0 }
 td, th { padding: .25rem .8rem .25rem 0; text-align: right; border-bottom: 1px solid #e5e5e5 }
-td:first-child, th:first-child { text-align: left } img { max-width: 100% } figcaption, .quiet { color: #666 }
+td:first-child, th:first-child { text-align: left } th { vertical-align: bottom }
+img { max-width: 100% } figcaption, .quiet { color: #666 }
 pre { background: #f6f6f6; padding: .8rem; overflow-x: auto; font-size: 13px }
 </style></head><body>
 <h1>$title</h1><p class="quiet">$subtitle</p>
@@ -34,7 +35,7 @@ def table(rows: Sequence[Mapping[str, Any]]) -> str:
     """Return a table; the keys of the first row are the header."""
     if not rows:
         return ""
-    head = "".join(f"<th>{escape(str(key))}</th>" for key in rows[0])
+    head = "".join(f"<th>{escape(str(key).replace('_', ' '))}</th>" for key in rows[0])  # may break into lines
     lines = ["".join(f"<td>{escape(_cell(value))}</td>" for value in row.values()) for row in rows]
     return f"<table><tr>{head}</tr>\n" + "\n".join(f"<tr>{line}</tr>" for line in lines) + "</table>"
 

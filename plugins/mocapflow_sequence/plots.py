@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mocapflow.records import F64
-from mocapflow.results import Evaluation
+from mocapflow.records import F64, Bool
+from mocapflow.results import Evaluation, Track
 
 NINETY_FIVE = 1.96  # standard deviations
 OURS, RAW, TRUTH = "#1f5fbf", "#8fb4e8", "black"
@@ -53,6 +53,33 @@ def plot_angles(
     if names:
         handles, labels = panels[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper right", ncols=4, frameon=False, fontsize=9)
+    figure.savefig(path, dpi=110)
+    return path
+
+
+def plot_overlap(path: Path, track: Track, views: Sequence[str], lost: Bool) -> Path:
+    """Write how much of each view's silhouette the model covers, frame by frame; frames lost are shaded.
+
+    Args:
+        path: the png.
+        track: the track.
+        views: names of the cameras.
+        lost: (T,), True where a frame was bridged.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(12, 2.6), layout="constrained")
+    FigureCanvasAgg(figure)
+    panel = figure.subplots()
+    for view, overlap in zip(views, track.overlap.T, strict=True):
+        panel.plot(track.frame, overlap, linewidth=1.2, label=view)
+    for frame in track.frame[lost]:
+        panel.axvspan(frame - 0.5, frame + 0.5, color="#d62728", alpha=0.25, linewidth=0)
+    panel.set_xlabel("frame")
+    panel.set_ylabel("intersection over union")
+    panel.grid(color="0.9", linewidth=0.6)
+    panel.legend(loc="lower left", ncols=len(views), frameon=False, fontsize=9)
     figure.savefig(path, dpi=110)
     return path
 

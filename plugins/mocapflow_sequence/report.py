@@ -29,7 +29,7 @@ STILL_WIDTH = 1500  # px
 
 
 class Report(Stage):
-    """Writes report.html, which holds everything it shows, and results/angles.png."""
+    """Writes report.html, which holds everything it shows, results/angles.png and results/overlap.png."""
 
     name: ClassVar[str] = "report"
 
@@ -43,11 +43,14 @@ class Report(Stage):
     ) -> Files:
         """Write the report and return its paths."""
         curves = plot(track, scene, evaluation, run_folder.path)
+        views, overlap = [camera.name for camera in scene.cameras], layout.place(run_folder.path, layout.OVERLAP)
+        plots.plot_overlap(overlap, track, views, lost_rows(track))
         summary = runjson.plain(runjson.summary(track, run_folder, recording.warnings + scene.warnings))
         sections = [
             ("Deviation from the reference", _deviations(evaluation)),
             ("Angles", page.picture(curves.read_bytes(), "png")),
             ("Overlay", "\n".join(stills(track, scene, recording))),
+            ("Overlap of model and image", page.picture(overlap.read_bytes(), "png")),
             ("What happened", page.listing([*summary["warnings"], *_mishaps(track), *summary["notes"]])),
             ("CPU time", page.table(_times(track))),
             ("How it was made", page.code(json.dumps(summary["recipe"], indent=1, ensure_ascii=False))),
@@ -56,7 +59,7 @@ class Report(Stage):
         subtitle = f"{recording.folder.name}: {counts}"
         path = layout.place(run_folder.path, layout.REPORT)
         path.write_text(page.page(run_folder.path.resolve().name, subtitle, sections), encoding="utf-8")
-        return Files(paths=(path, curves))
+        return Files(paths=(path, curves, overlap))
 
 
 def plot(track: Track, scene: Scene, evaluation: Evaluation | None, folder: Path) -> Path:

@@ -116,7 +116,7 @@ def test_report_holds_everything(scene: Scene, track: Track, recording: Recordin
     evaluation = Evaluate().run(track=noted, scene=scene, recording=recording, run_folder=run_folder)
     files = Report().run(track=noted, scene=scene, recording=recording, run_folder=run_folder, evaluation=evaluation)
     page = (tmp_path / layout.REPORT).read_text()
-    assert set(files.paths) == {tmp_path / layout.REPORT, tmp_path / layout.PLOT}
+    assert set(files.paths) == {tmp_path / part for part in (layout.REPORT, layout.PLOT, layout.OVERLAP)}
     for text in ("knee_flexion_l", "frame 2: cam02 black", "&lt;skirt&gt;", "best: frame", "worst: frame", "segment"):
         assert text in page
     assert page.count("data:image/jpeg;base64") == 3
