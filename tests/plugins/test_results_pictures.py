@@ -120,7 +120,7 @@ def test_report_holds_everything(scene: Scene, track: Track, recording: Recordin
     for text in ("knee_flexion_l", "frame 2: cam02 black", "&lt;skirt&gt;", "best: frame", "worst: frame", "segment"):
         assert text in page
     assert page.count("data:image/jpeg;base64") == 3
-    assert page.count("data:image/png;base64") == 1
+    assert page.count("data:image/png;base64") == 2
     assert "://" not in page and 'src="/' not in page  # no address: pictures are inside (base64 may spell http)
 
 
