@@ -17,6 +17,7 @@ from mocapflow.data import Matches
 from mocapflow.geometry import cameras as pinhole
 from mocapflow.geometry import lines, twists
 from mocapflow.records import F64, I32, Bool, array, record
+from mocapflow_twist import kernels
 
 
 @record
@@ -55,13 +56,9 @@ def image_rows(matches: Matches, cameras: Sequence[Camera]) -> Rows:
     direction = matches.direction[match].copy()
     direction[: len(free)][free] = [1.0, 0.0]
     direction[len(free) :] = [0.0, 1.0]
-    offset = np.sum(direction * matches.pixel[match], axis=1, keepdims=True)
+    matrices = np.array([pinhole.projection(camera) for camera in cameras]).reshape(-1, 3, 4)
     plane, divisor = np.empty((len(match), 4)), np.empty((len(match), 4))
-    for index, camera in enumerate(cameras):
-        seen = matches.camera[match] == index
-        matrix = pinhole.projection(camera)
-        divisor[seen] = matrix[2]
-        plane[seen] = direction[seen] @ matrix[:2] - offset[seen] * matrix[2]
+    kernels.image_planes(matches.camera[match], matches.pixel[match], direction, matrices, plane, divisor)
     return Rows(
         plane=plane,
         divisor=divisor,

@@ -6,6 +6,7 @@ import numpy as np
 
 from mocapflow.data import Matches
 from mocapflow.records import F64
+from mocapflow_twist import kernels
 
 CELLS = 128  # cells along an image axis before their numbers repeat: two far parts of a contour may share one
 PRIOR_FREEDOM = 10.0  # residuals' worth of trust in the stated weights: keeps the scale sane when few are left
@@ -23,15 +24,13 @@ def effective_share(matches: Matches, correlation_px: float) -> F64:
     used = matches.weight > 0
     if correlation_px <= 0 or not used.any():
         return share
-    camera, weight = matches.camera[used].astype(np.int64), matches.weight[used]
+    camera, pixel, weight = matches.camera[used].astype(np.int64), matches.pixel[used], matches.weight[used]
     views = int(camera.max()) + 1
     clustered = np.zeros(views)
     for shift in (0.0, 0.5):
-        cell = np.floor(matches.pixel[used] / correlation_px + [shift, 0.0]).astype(np.int64)
-        x, y = (cell - cell.min(axis=0)).T % CELLS
-        columns, cells = x.max() + 1, (x.max() + 1) * (y.max() + 1)
-        in_cell = np.bincount(camera * cells + y * columns + x, weight, views * cells)
-        clustered += 0.5 * np.sum(in_cell.reshape(views, -1) ** 2, axis=1)
+        cells = np.zeros((views, CELLS, CELLS))
+        kernels.add_to_cells(camera, pixel, weight, correlation_px, shift, cells)
+        clustered += 0.5 * np.einsum("vyx,vyx->v", cells, cells)
     alone = np.bincount(camera, weight**2, views)
     share[used] = (alone / np.where(clustered > 0, clustered, 1.0))[camera]
     return share

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numba
 import numpy as np
 
@@ -143,3 +145,23 @@ def energy(plane, divisor, vertex, weight, rest, skin_joint, skin_weight, joints
             error = (a[0] * x + a[1] * y + a[2] * z + a[3]) / depth
             energy += 0.5 * weight[row] * error * error
     return energy
+
+
+@numba.njit(cache=True)
+def image_planes(camera, pixel, direction, matrices, plane, divisor):  # type: ignore[no-untyped-def]
+    """Write the plane through each image line across `direction` at `pixel`, and the plane of its depth."""
+    for row in range(len(camera)):
+        matrix, dx, dy = matrices[camera[row]], direction[row, 0], direction[row, 1]
+        offset = dx * pixel[row, 0] + dy * pixel[row, 1]
+        for k in range(4):
+            plane[row, k] = dx * matrix[0, k] + dy * matrix[1, k] - offset * matrix[2, k]
+            divisor[row, k] = matrix[2, k]
+
+
+@numba.njit(cache=True)
+def add_to_cells(camera, pixel, weight, size, shift, cells):  # type: ignore[no-untyped-def]
+    """Add weights (M,) to the square cell of their view (C, N, N) that each pixel (M, 2) lies in."""
+    count = cells.shape[1]
+    for m in range(len(camera)):
+        column = math.floor(pixel[m, 0] / size + shift) % count
+        cells[camera[m], math.floor(pixel[m, 1] / size) % count, column] += weight[m]

@@ -112,9 +112,10 @@ class Problem(NamedTuple):
         if velocity is None:
             return Equations(hessian, gradient, skin.energy)
         points = guess.cloth.vertices[self.data.cloth.vertex]
-        about_root = velocity[..., : self.unknowns] @ about_origin(guess.centre, self.unknowns)
-        worn = normal_equations.dense_equations(self.data.cloth, points, about_root)
-        return Equations(hessian + worn.hessian, gradient + worn.gradient, skin.energy + worn.energy)
+        worn = normal_equations.dense_equations(self.data.cloth, points, velocity[..., : self.unknowns])
+        move = about_origin(guess.centre, self.unknowns)
+        hessian += move.T @ worn.hessian @ move
+        return Equations(hessian, gradient + move.T @ worn.gradient, skin.energy + worn.energy)
 
     def _prior_equations(self, guess: Guess) -> Equations:
         hessian, gradient, energy = self.anchor.equations(guess)
