@@ -10,6 +10,7 @@ import json
 import sys
 import time
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +51,12 @@ def report(scene: Scene, title: str) -> None:
         "one drape alone": (lambda: fall.drape(one, free[:1], Past(), scene), 1),
         "25 winds of one pose, all of them": (lambda: fall.drape(same, winds, Past(), scene), 1),
     }
+    if find_spec("newton"):  # the extra `physics`
+        from mocapflow_physics.xpbd import Xpbd
+
+        simulated, few = Xpbd(), walking(scene, 8)
+        jobs["newton XPBD, 0.6 s from rest, one alone"] = (lambda: simulated.drape(one, free[:1], Past(), scene), 1)
+        jobs["newton XPBD, eight together"] = (lambda: simulated.drape(few, free[:8], Past(), scene), 8)
     print(f"\n{title}")
     for name, milliseconds in timed(jobs).items():
         print(f"  {name:42s} {milliseconds:8.3f} ms")

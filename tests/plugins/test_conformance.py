@@ -1,5 +1,7 @@
 """Every component of every installed plugin, through the conformance tests of its role."""
 
+from importlib.util import find_spec
+
 import pytest
 
 from mocapflow import testing
@@ -31,6 +33,7 @@ NEEDED = {  # what has no default, as a pipeline would write it; measures fit th
         inseam_m=0.3, length_m=0.6,
     ),
 }  # fmt: skip
+EXTRAS = {("draper", "xpbd"): "newton"}  # what they need beyond the base installation
 PARTS = {  # for settings that are components themselves
     "Predictor": "hold",
     "Segmenter": "levelset",
@@ -53,7 +56,9 @@ def component(role, name):
 for _role in PROVIDERS:
     for _name in REGISTRY.names(_role):
         _parts = {_role: property(lambda self, role=_role, name=_name: component(role, name)), "recording": CLIP}
-        globals()[f"Test_{_role}_{_name}"] = type(f"Test_{_role}_{_name}", (CONFORMANCE[_role],), _parts)
+        _extra = EXTRAS.get((_role, _name))
+        _mark = pytest.mark.skipif(_extra is not None and find_spec(_extra) is None, reason=f"needs {_extra}")
+        globals()[f"Test_{_role}_{_name}"] = _mark(type(f"Test_{_role}_{_name}", (CONFORMANCE[_role],), _parts))
 
 
 def test_every_plugin_loads():

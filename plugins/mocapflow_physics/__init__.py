@@ -1,0 +1,14 @@
+"""Draping by simulation, on an existing simulator: the extra `physics`."""
+
+from __future__ import annotations
+
+from mocapflow.components import Draper
+from mocapflow.hookspecs import hookimpl
+
+
+@hookimpl
+def mocapflow_drapers() -> list[type[Draper]]:
+    """Return the drapers of this package."""
+    from mocapflow_physics.xpbd import Xpbd
+
+    return [Xpbd]

@@ -1,0 +1,106 @@
+"""Draper `xpbd`: cloth simulated by newton (extended position-based dynamics) instead of laid by geometry."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from typing import Annotated, ClassVar
+from weakref import WeakKeyDictionary
+
+from mocapflow_draping.fields import BodyFields, build_fields, part_transforms, touchable_joints
+from mocapflow_draping.forces import thickness
+from mocapflow_draping.kinematic import Kinematic
+from mocapflow_draping.strands import Strands, strands_of
+from pydantic import Field, PrivateAttr, model_validator
+
+from mocapflow.assets import Body, GarmentMesh
+from mocapflow.components import Draper
+from mocapflow.data import Past, Pose, PoseBatch
+from mocapflow.errors import PluginError
+from mocapflow.geometry.kinematics import chain_batch
+from mocapflow.records import F64, I32, Bool, record
+from mocapflow.scene import Scene
+from mocapflow_physics.cloth import links_of, pinned_of, pins_at, pull_of
+from mocapflow_physics.motion import beginning, between, centred
+from mocapflow_physics.simulation import Simulation
+
+EVERY = 4  # steps of the solver between two looks for contacts
+
+
+@record
+class Fitting:
+    """A garment on a body, prepared once for simulation."""
+
+    body: Body
+    strands: Strands
+    fields: BodyFields
+    simulations: dict[int, Simulation]  # by how many copies step together
+
+
+class Xpbd(Draper):
+    """Lets the cloth fall in newton's XPBD solver while the body moves from its last pose into the new one.
+
+    Velocities are those of the kinematic draper: differences of a simulation would cost a hundred of them a turn.
+    """
+
+    name: ClassVar[str] = "xpbd"
+    skin_m: Annotated[float, Field(ge=0)] = 0.005  # room between skin and cloth of no thickness
+    voxel_m: Annotated[float, Field(gt=0)] = 0.010
+    rate_hz: Annotated[float, Field(ge=60)] = 960.0  # steps of the solver per second
+    move_s: Annotated[float, Field(gt=0)] = 0.3  # in which the body comes from its last pose, or from rest
+    rest_s: Annotated[float, Field(ge=0)] = 0.3  # in which the cloth comes to rest
+    moves_like: Draper = Kinematic(sweeps=4)  # whose velocities it has
+    _fittings: WeakKeyDictionary[GarmentMesh, Fitting] = PrivateAttr(default_factory=WeakKeyDictionary)
+
+    @model_validator(mode="after")
+    def _simulator_is_there(self) -> Xpbd:
+        if find_spec("newton") is None:
+            raise ValueError("draper xpbd needs the simulator newton: pip install 'mocapflow[physics]'")
+        return self
+
+    def drape(self, poses: PoseBatch, parameters: F64, past: Past, scene: Scene) -> F64:
+        """Return cloth vertices (B, W, 3) m in the world for B poses and parameters (B, Q)."""
+        garment = scene.garment
+        if garment is None:
+            raise PluginError("the draper has no garment to drape", hint="name a garment in the pipeline's scene")
+        fitting = self._fitting(garment, scene.body)
+        strands = fitting.strands
+        root, centre = centred(scene, poses.root)
+        end = PoseBatch(root=root, angles=poses.angles)
+        start, cloth = beginning(past, scene, end)
+        moving = max(round(self.move_s * self.rate_hz / EVERY), 1)
+        chains = [chain_batch(scene.body, moment) for moment in between(start, end, moving)]
+        resting = 1 + round(self.rest_s * self.rate_hz / EVERY)
+        bodies = [part_transforms(fitting.fields, chain) for chain in chains]
+        settled = self._simulation(fitting, garment, len(cloth)).settle(
+            cloth,
+            [pins_at(strands, chain) for chain in chains] + [pins_at(strands, chains[-1])] * resting,
+            bodies + [bodies[-1]] * resting,
+            fitting.fields.solid,
+            self.skin_m + thickness(garment, parameters) / 2,
+            pull_of(strands, garment, parameters, chains[-1]),
+            EVERY,
+        )
+        return settled + centre[:, None]
+
+    def velocity(self, pose: Pose, parameters: F64, vertices: I32, past: Past, scene: Scene) -> F64:
+        """Return the velocities (M, 3, 6 + D + Q) of cloth vertices (M,), taken from another draper."""
+        return self.moves_like.velocity(pose, parameters, vertices, past, scene)
+
+    def touchable(self, scene: Scene) -> Bool:
+        """Return which joints (J,) move what the garment hangs from or can touch."""
+        return self.moves_like.touchable(scene)
+
+    def _fitting(self, garment: GarmentMesh, body: Body) -> Fitting:
+        """Return what is prepared once per garment and body; forgotten with the garment."""
+        known = self._fittings.get(garment)
+        if known is None or known.body is not body:
+            fields = build_fields(body, touchable_joints(body, garment), self.voxel_m)
+            known = Fitting(body=body, strands=strands_of(garment, body), fields=fields, simulations={})
+            self._fittings[garment] = known
+        return known
+
+    def _simulation(self, fitting: Fitting, garment: GarmentMesh, copies: int) -> Simulation:
+        if copies not in fitting.simulations:
+            pinned = pinned_of(fitting.strands, garment)
+            fitting.simulations[copies] = Simulation(links_of(garment), pinned, copies, 1 / self.rate_hz)
+        return fitting.simulations[copies]
