@@ -192,16 +192,42 @@ def test_every_pipeline_is_run_here_but_the_one_whose_recording_is_not_shipped(t
     assert "--recording" in said
 
 
-@long
-def test_an_experiment_on_two_workers_shares_what_its_variants_share(tmp_path):
+@pytest.fixture
+def grid(tmp_path):
+    """An experiment of two variants on two recordings, three frames each."""
     (tmp_path / "grid.yaml").write_text(
         f"mocapflow: 1\npipeline: {PIPELINES / 'bare.yaml'}\nrecordings: [{CLIPS['skirt']}, {CLIPS['shorts']}]\n"
         "frames: 0:3\nchange: {stages.overlay: null, stages.virtual: null, stages.report: null}\n"
         "factors:\n  turns:\n    three:\n    one: {stages.track.steady.max_turns: 1}\n"
     )
-    said = call("compare", "grid.yaml", "--workers", "2", "--out", "two", cwd=tmp_path)
+    return "grid.yaml"
+
+
+@long
+def test_an_experiment_on_two_workers_shares_what_its_variants_share(tmp_path, grid):
+    said = call("compare", grid, "--workers", "2", "--out", "two", cwd=tmp_path)
     computed = [line for line in said.splitlines() if "computed:" in line]
     assert len(computed) == 4
     assert sum("background" in line for line in computed) == 2  # once a recording, whoever came first
-    call("compare", "grid.yaml", "--out", "one", "--store", "fresh.zarr", cwd=tmp_path)
+    call("compare", grid, "--out", "one", "--store", "fresh.zarr", cwd=tmp_path)
+    assert (tmp_path / "two/compare.csv").read_text() == (tmp_path / "one/compare.csv").read_text()
+
+
+@long
+def test_a_lost_worker_costs_only_the_frame_in_flight(tmp_path, grid):
+    import psutil
+
+    call("compare", grid, "--out", "one", "--store", "fresh.zarr", cwd=tmp_path)
+    command = [MOCAPFLOW, "compare", grid, "--workers", "2", "--out", "two"]
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as running:
+        assert running.stderr is not None
+        said = []
+        for line in running.stderr:
+            said.append(line)
+            if line.startswith("track: 1 of 3") or line.startswith("track: 2 of 3"):
+                break
+        working = [p for p in psutil.Process(running.pid).children(recursive=True) if p.cpu_percent(0.3) > 10]
+        working[0].kill()
+        said += list(running.stderr)
+    assert running.returncode == 0, "".join(said)
     assert (tmp_path / "two/compare.csv").read_text() == (tmp_path / "one/compare.csv").read_text()
