@@ -107,10 +107,9 @@ def main() -> None:
     for spread in SPREADS:
         for name, matchers in MATCHERS.items():
             begin, errors = time.process_time(), []
-            for number, (scene, centre) in enumerate(scenes):
+            for number, (scene, truth) in enumerate(scenes):
                 for seed in range(starts):
                     rng = np.random.default_rng([number, seed])
-                    truth = bent(scene, centre, 10.0, rng)
                     errors.append(error(scene, truth, bent(scene, truth, spread, rng), matchers))
             spent = (time.process_time() - begin) / len(errors)
             found = int(np.sum(np.array(errors) < FOUND))

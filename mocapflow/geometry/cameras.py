@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from mocapflow.assets import Camera
-from mocapflow.records import F64
+from mocapflow.records import F64, I16
 
 UNDISTORT_STEPS = 100
 UNDISTORT_TOLERANCE = 1e-12  # of the focal length
@@ -24,6 +25,15 @@ def project(points: F64, camera: Camera) -> F64:
     homogeneous = points @ matrix[:, :3].T + matrix[:, 3]
     depth = np.where(homogeneous[:, 2:] > 0, homogeneous[:, 2:], np.nan)
     pixels: F64 = homogeneous[:, :2] / depth
+    return pixels
+
+
+def project_each(points: F64, view: I16, cameras: Sequence[Camera]) -> F64:
+    """Return undistorted pixels (M, 2) of world points (M, 3) in m, each in its own view (M,)."""
+    pixels = np.empty((len(points), 2))
+    for index, camera in enumerate(cameras):
+        own = view == index
+        pixels[own] = project(points[own], camera)
     return pixels
 
 

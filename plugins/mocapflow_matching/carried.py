@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mocapflow.components import pool
-from mocapflow.data import Frame, Matches, Past, empty_matches
+from mocapflow.data import Frame, Matches, Past, Surface, empty_matches
+from mocapflow.geometry.cameras import project_each
 from mocapflow.geometry.visibility import front_vertices
 from mocapflow.records import F64
 from mocapflow.scene import Scene
@@ -39,10 +40,7 @@ def _pairs(camera: int, pixel: F64, vertex: np.ndarray) -> Matches:
     )
 
 
-def distances(matches: Matches, image: list[F64]) -> F64:
-    """Return how far (M,) px the vertices of matches are from their targets; `image` (N, 2) per camera."""
-    away = np.empty(len(matches.vertex))
-    for index, projected in enumerate(image):
-        own = matches.camera == index
-        away[own] = np.linalg.norm(projected[matches.vertex[own]] - matches.pixel[own], axis=1)
-    return away
+def distances(matches: Matches, surface: Surface, scene: Scene) -> F64:
+    """Return how far (M,) px the vertices of matches are from their targets."""
+    image = project_each(surface.vertices[matches.vertex], matches.camera, scene.cameras)
+    return np.asarray(np.linalg.norm(image - matches.pixel, axis=1))

@@ -15,7 +15,7 @@ from pydantic import Field
 from mocapflow.assets import Body, Camera
 from mocapflow.components import Matcher
 from mocapflow.data import Frame, Matches, Past, Segmentation, Surface, Turn, empty_matches
-from mocapflow.geometry.cameras import centre, project
+from mocapflow.geometry.cameras import centre, project, project_each
 from mocapflow.records import F64, I32
 from mocapflow.scene import Scene
 from mocapflow_matching.robust import robust_weights
@@ -133,13 +133,13 @@ def _median_error(points: F64, projected: F64) -> float:
 def _pairs(camera: I32, mark: I32, off: F64, weight: F64, marks: Marks, surface: Surface, scene: Scene) -> Matches:
     """Return a pair for every vertex that a landmark is a mean of, with its share of the landmark's weight."""
     vertex, share = marks.vertex[mark], marks.share[mark]
-    image = np.stack([project(surface.vertices, view) for view in scene.cameras])
     used = share > 0
-    pixel = (image[camera[:, None], vertex] + off[:, None])[used]
+    view, vertex = np.broadcast_to(camera[:, None], used.shape)[used].astype(np.int16), vertex[used]
+    image = project_each(surface.vertices[vertex], view, scene.cameras)
     return Matches(
-        camera=np.broadcast_to(camera[:, None], used.shape)[used].astype(np.int16),
-        pixel=pixel,
-        direction=np.zeros_like(pixel),
-        vertex=vertex[used],
+        camera=view,
+        pixel=image + np.repeat(off, used.sum(axis=1), axis=0),
+        direction=np.zeros_like(image),
+        vertex=vertex,
         weight=(weight[:, None] * share)[used],
     )

@@ -11,7 +11,6 @@ from pydantic import Field
 from mocapflow.components import Matcher, pool
 from mocapflow.data import CLOTH, Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn, empty_matches
 from mocapflow.geometry import silhouettes
-from mocapflow.geometry.cameras import project
 from mocapflow.records import F32, F64, Bool
 from mocapflow.scene import Scene
 from mocapflow_matching.carried import carried_points, distances
@@ -68,7 +67,7 @@ class OpticalFlow(Matcher):
     def carried(self, frame: Frame, surface: Surface, past: Past, scene: Scene) -> Matches:
         """Return the pairs by flow between frames."""
         matches = carried_points(frame, past, scene)
-        away = distances(matches, [project(surface.vertices, camera) for camera in scene.cameras])
+        away = distances(matches, surface, scene)
         weight = self._robust(away, np.full(len(away), self.image_sigma_px))
         on_cloth = surface.layer[matches.vertex] == CLOTH
         return replace(matches, weight=weight * np.where(on_cloth, self.cloth_share, 1.0))

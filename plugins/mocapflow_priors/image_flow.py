@@ -13,9 +13,8 @@ from pydantic import Field
 
 from mocapflow.components import PoseSolver, Predictor
 from mocapflow.data import CLOTH, NO_CLOTH, Frame, Matches, Past, Pose, Surface, Turn
-from mocapflow.geometry.cameras import project
+from mocapflow.geometry.cameras import project_each
 from mocapflow.model import ClothedModel
-from mocapflow.records import F64
 from mocapflow.scene import Scene
 from mocapflow.track import believed
 from mocapflow_priors.constant_velocity import ConstantVelocity
@@ -51,13 +50,13 @@ class ImageFlowPredictor(Predictor):
         model = ClothedModel(scene=Scene(cameras=scene.cameras, body=scene.body))
 
         def match(surface: Surface) -> Matches:
-            away = self._away(followed, surface, scene)
+            away = distances(followed, surface, scene)
             robust = robust_weights(away / self.sigma_px, "huber", self.scale)
             return replace(followed, weight=followed.weight * robust / self.sigma_px**2)
 
         state = believed(guess, np.empty(0), NO_CLOTH)
         pose = self.pose_solver.solve(match, state, model, (), past, Turn(index=0, cap=1)).pose
-        reached = self._away(followed, model.surface(pose, NO_CLOTH), scene)
+        reached = distances(followed, model.surface(pose, NO_CLOTH), scene)
         return pose if np.mean(reached < self.agreeing_px) >= self.least_agreement else guess
 
     def on_skin(self, matches: Matches, past: Past, scene: Scene) -> Matches:
@@ -71,18 +70,16 @@ class ImageFlowPredictor(Predictor):
         skin = surface.vertices[surface.layer != CLOTH]
         reach = self.touching_mm / 1000
         _, below = cKDTree(skin).query(surface.vertices[matches.vertex[cloth]], distance_upper_bound=reach)
-        image = np.stack([project(surface.vertices, camera) for camera in scene.cameras])
         vertex, touching = matches.vertex.copy(), np.ones(len(cloth), bool)
         touching[cloth] = below < len(skin)
         vertex[cloth] = np.where(below < len(skin), below, 0)
-        shift = image[matches.camera, vertex] - image[matches.camera, matches.vertex]
+        on_skin, on_cloth = (
+            project_each(surface.vertices[points], matches.camera, scene.cameras) for points in (vertex, matches.vertex)
+        )
         return Matches(
             camera=matches.camera[touching],
-            pixel=(matches.pixel + shift)[touching],
+            pixel=(matches.pixel + on_skin - on_cloth)[touching],
             direction=matches.direction[touching],
             vertex=vertex[touching],
             weight=(matches.weight * np.where(cloth, self.cloth_share, 1.0))[touching],
         )
-
-    def _away(self, matches: Matches, surface: Surface, scene: Scene) -> F64:
-        return distances(matches, [project(surface.vertices, camera) for camera in scene.cameras])

@@ -83,7 +83,8 @@ class FollowPoints(Stage):
         """Return where a picture differs from the empty scene, without single pixels of noise."""
         import cv2
 
-        different = np.abs(picture - empty).max(axis=2) > self.difference
+        away = cv2.absdiff(picture, np.clip(np.rint(empty), 0, 255).astype(np.uint8))
+        different = cv2.max(cv2.max(away[..., 0], away[..., 1]), away[..., 2]) > self.difference
         return np.asarray(cv2.medianBlur(different.astype(np.uint8), BLOCK), bool)
 
 

@@ -75,3 +75,11 @@ def test_pinhole_only_drops_the_distortion():
     assert not plain.distortion.any()
     assert not plain.fisheye
     np.testing.assert_array_equal(plain.intrinsics, view.intrinsics)
+
+
+def test_each_point_in_its_own_view():
+    views = [look_at(str(k), np.array([3.0, k - 1.0, 1.7])) for k in range(3)]
+    points = np.random.default_rng(0).uniform(0, 1, (5, 3))
+    view = np.array([2, 0, 1, 0, 2], np.int16)
+    expected = [cameras.project(point[None], views[k])[0] for point, k in zip(points, view, strict=True)]
+    np.testing.assert_allclose(cameras.project_each(points, view, views), expected)
