@@ -9,7 +9,7 @@ import numpy as np
 
 from mocapflow.assets import Camera
 from mocapflow.components import Stage
-from mocapflow.data import CLOTH, NO_CLOTH, Frame, Surface
+from mocapflow.data import CLOTH, NO_CLOTH, Frame, Pose, Surface
 from mocapflow.geometry import cameras, kinematics, meshes, silhouettes
 from mocapflow.recording import Recording
 from mocapflow.records import F64, I32, U8
@@ -62,19 +62,21 @@ class Painter:
         factor = -(-LEAST_HEIGHT // image.shape[0])
         if factor > 1:
             image = np.asarray(cv2.resize(image, None, fx=factor, fy=factor, interpolation=cv2.INTER_CUBIC), np.uint8)
-        self._draw(image, track, row, cameras.scaled(camera, factor))
+        self.draw(image, camera, factor, track.pose(row), track.cloth[row])
         drawing.label(image, f"{camera.name}  frame {frame.index}")
         for line, text in enumerate(_remarks(frame, track, row, view)):
             drawing.label(image, text, line + 1)
         return image[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2].copy()  # codecs want even sizes
 
-    def _draw(self, image: U8, track: Track, row: int, camera: Camera) -> None:
+    def draw(self, image: U8, camera: Camera, enlarged: float, pose: Pose, cloth: F64) -> None:
+        """Draw outlines and skeleton of a pose and its cloth (W, 3) m into an image, enlarged from the camera's."""
+        camera = cameras.scaled(camera, enlarged)
         thick = max(1, round(image.shape[0] / 800))
-        body = self._bare.surface(track.pose(row), NO_CLOTH)
+        body = self._bare.surface(pose, NO_CLOTH)
         drawing.segments(image, silhouettes.outline(body, camera).pixel, drawing.BODY, thick)
-        if len(self._cloth_faces) and track.cloth.shape[1]:
-            cloth = _cloth_surface(track.cloth[row], self._cloth_faces, self._cloth_edges, body)
-            drawing.segments(image, silhouettes.outline(cloth, camera).pixel, drawing.CLOTH, thick)
+        if len(self._cloth_faces) and len(cloth):
+            surface = _cloth_surface(cloth, self._cloth_faces, self._cloth_edges, body)
+            drawing.segments(image, silhouettes.outline(surface, camera).pixel, drawing.CLOTH, thick)
         places = kinematics.joint_positions(self._bare.body, body.joints)
         pixels = cameras.project(places, camera)
         drawing.segments(image, drawing.bones(self._bare.body.parents, pixels), drawing.BONE, thick)

@@ -30,6 +30,7 @@ def portrait(
     bearing_deg: float = 40.0,
     size: tuple[int, int] = SIZE,
     opacity: float = 1.0,
+    above: float = 0.08,
 ) -> U8:
     """Return the image (H, W, 3) BGR of a person in a pose, dressed or not.
 
@@ -40,11 +41,12 @@ def portrait(
         bearing_deg: where it is seen from: 0 the front, 90 the person's left.
         size: width and height in px.
         opacity: of the garment.
+        above: how far above the level of the person's middle it is seen from, over the distance.
     """
     import cv2
 
     skin = kinematics.skin(scene.body, kinematics.chain(scene.body, pose)[0], pose.angles)
-    camera = _before(scene, pose, np.radians(bearing_deg), (SMOOTH * size[0], SMOOTH * size[1]))
+    camera = _before(scene, pose, np.radians(bearing_deg), above, (SMOOTH * size[0], SMOOTH * size[1]))
     canvas = raster.Canvas(np.full((SMOOTH * size[1], SMOOTH * size[0], 3), WALL, np.float32), camera)
     canvas.draw(skin, scene.body.faces, raster.shade(skin, scene.body.faces, SKIN))
     if scene.garment is not None and len(cloth):
@@ -91,12 +93,12 @@ def _rows(garment: GarmentMesh) -> list[tuple[float, float, float]]:
     return rows
 
 
-def _before(scene: Scene, pose: Pose, bearing: float, size: tuple[int, int]) -> Camera:
+def _before(scene: Scene, pose: Pose, bearing: float, above: float, size: tuple[int, int]) -> Camera:
     """Return a view of the whole person at rest, from a bearing about the body's own up."""
     forward, up, right = anatomical_axes(scene.body) @ pose.root[:3, :3].T
     low, high = scene.body.vertices[:, 2].min(), scene.body.vertices[:, 2].max()
     middle = np.array([*scene.body.positions[0, :2], (low + high) / 2])
     target = pose.root[:3, :3] @ middle + pose.root[:3, 3]
     distance = HEAD_ROOM * (high - low) / 2 / np.tan(np.radians(FIELD_OF_VIEW) / 2)
-    away = np.cos(bearing) * forward - np.sin(bearing) * right + 0.08 * up
+    away = np.cos(bearing) * forward - np.sin(bearing) * right + above * up
     return raster.look_at(target + distance * away, target, size, FIELD_OF_VIEW)

@@ -8,7 +8,6 @@ from mocapflow.assets import Camera
 from mocapflow.data import Surface
 from mocapflow.geometry import angles, cameras, kinematics
 from mocapflow.records import F32, F64, U8
-from mocapflow.results import Track
 from mocapflow.scene import Scene
 from mocapflow_sequence import drawing, raster
 
@@ -26,16 +25,22 @@ ASIDE = (32.0, -32.0, 45.0, -45.0, 20.0, -20.0, 60.0, -60.0)  # deg from straigh
 
 
 class Room:
-    """Draws frames of one track from one place, in front of the person, a little to the side and above."""
+    """Draws a person in motion from one place, in front of the person, a little to the side and above.
 
-    def __init__(self, scene: Scene, track: Track, size: tuple[int, int]) -> None:
+    Args:
+        scene: the person and the cameras.
+        root: (T, 4, 4) m, world_from_body over the motion: all of it is in the picture.
+        size: of a picture, width and height in px.
+    """
+
+    def __init__(self, scene: Scene, root: F64, size: tuple[int, int]) -> None:
         self._scene = scene
         self._faces = None if scene.garment is None else scene.garment.faces
-        roots = track.root @ np.append(scene.body.positions[0], 1.0)
+        roots = root @ np.append(scene.body.positions[0], 1.0)
         lowest = scene.body.vertices[:, 2].min() - scene.body.positions[0, 2]
         height = float(np.median(roots[:, 2]) + lowest)
         self._floor = 0.0 if abs(height) < 0.2 else height  # the world's floor, unless the person stands elsewhere
-        self._camera = self._place(roots[:, :3], track.root[0, :3, :3], (SMOOTH * size[0], SMOOTH * size[1]))
+        self._camera = self._place(roots[:, :3], root[0, :3, :3], (SMOOTH * size[0], SMOOTH * size[1]))
         self._side = BESIDE * self._camera.camera_from_world[0, :3]
         self._empty = self._backdrop()
 

@@ -34,7 +34,7 @@ class Virtual(Stage):
             return Files(paths=())
         path = layout.place(run_folder.path, layout.VIRTUAL)
         bare = replace(scene, garment=None)
-        room = Room(scene, track, (self.width_px, self.height_px))
+        room = Room(scene, track.root, (self.width_px, self.height_px))
         with drawing.videos([path], frame_rate(track) / self.every, self.codec) as (video,):
             for row in range(0, len(track.frame), self.every):
                 image = room.picture(bare.surface(track.pose(row), NO_CLOTH), track.cloth[row])
