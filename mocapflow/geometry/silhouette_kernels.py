@@ -8,6 +8,7 @@ import numba
 import numpy as np
 
 REACH = 1.0  # px beyond a segment at which its outside is looked up
+MOST_PIECES = 2048  # of one edge: at 4 px, longer than the diagonal of any image
 NEAREST = 1e-6  # m, depth of what still counts as before the camera
 
 index = numba.uint64  # of an array: unsigned, so that nothing is checked for counting from the end; twice as fast
@@ -98,11 +99,14 @@ def bounds(ends):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True)
 def split(ends, longest):  # type: ignore[no-untyped-def]
-    """Return segments cut into equal pieces no longer than `longest` px: their segment (P,) and ends (P, 2, 2)."""
+    """Return segments cut into equal pieces no longer than `longest` px: their segment (P,) and ends (P, 2, 2).
+
+    An edge that all but touches the plane of a camera is cut into no more than MOST_PIECES.
+    """
     counts = np.empty(len(ends), np.int64)
     for s in range(len(ends)):
         length = math.hypot(ends[s, 1, 0] - ends[s, 0, 0], ends[s, 1, 1] - ends[s, 0, 1])
-        counts[s] = max(math.ceil(length / longest), 1)
+        counts[s] = max(math.ceil(min(length / longest, MOST_PIECES)), 1)
     total = counts.sum()
     whole, pieces = np.empty(total, np.int64), np.empty((total, 2, 2))
     piece = 0

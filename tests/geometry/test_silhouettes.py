@@ -8,6 +8,7 @@ import pytest
 from mocapflow.assets import Camera
 from mocapflow.data import BODY, CLOTH, Surface
 from mocapflow.geometry import meshes, silhouettes
+from mocapflow.geometry import silhouette_kernels as kernels
 from mocapflow.records import F64, I32
 
 FOCAL, DISTANCE, RADIUS = 500.0, 3.0, 0.5
@@ -145,3 +146,10 @@ def test_the_visible_part_of_a_long_half_hidden_edge_stays() -> None:
     top = contour.pixel[np.abs(contour.pixel[:, 1] - row) < 1e-6]
     assert top[:, 0].min() < 159.5 - 0.39 * FOCAL / DISTANCE
     assert 155 < top[:, 0].max() < 161
+
+
+def test_an_edge_that_runs_away_takes_no_memory():
+    ends = np.array([[[0.0, 0.0], [1e12, 5.0]], [[0.0, 0.0], [8.0, 0.0]]])
+    whole, pieces = kernels.split(ends, 4.0)
+    assert np.bincount(whole).tolist() == [kernels.MOST_PIECES, 2]
+    np.testing.assert_allclose(pieces[kernels.MOST_PIECES - 1, 1], ends[0, 1])

@@ -34,6 +34,7 @@ NEEDED = {  # what has no default, as a pipeline would write it; measures fit th
     ),
 }  # fmt: skip
 EXTRAS = {("draper", "xpbd"): "newton"}  # what they need beyond the base installation
+TRAITS = {("prior", "parzen"): {"bounds_energy": True}}  # what the conformance class has to know of them
 PARTS = {  # for settings that are components themselves
     "Predictor": "hold",
     "Segmenter": "levelset",
@@ -56,6 +57,7 @@ def component(role, name):
 for _role in PROVIDERS:
     for _name in REGISTRY.names(_role):
         _parts = {_role: property(lambda self, role=_role, name=_name: component(role, name)), "recording": CLIP}
+        _parts |= TRAITS.get((_role, _name), {})
         _extra = EXTRAS.get((_role, _name))
         _mark = pytest.mark.skipif(_extra is not None and find_spec(_extra) is None, reason=f"needs {_extra}")
         globals()[f"Test_{_role}_{_name}"] = _mark(type(f"Test_{_role}_{_name}", (CONFORMANCE[_role],), _parts))
