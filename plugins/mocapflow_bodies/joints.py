@@ -55,7 +55,7 @@ TABLE: Mapping[str, tuple[Dof, ...]] = {
     ),
     "knee": (Dof("flexion", "left", -8, 160), Dof("varus", "-forward", -15, 15, 3), Dof("rotation", "-up", -20, 20, 3)),
     "ankle": (
-        Dof("dorsiflexion", "-left", -75, 75),
+        Dof("dorsiflexion", "-left", -75, 75, 20),
         Dof("inversion", "-forward", -45, 45, 12),
         Dof("rotation", "-up", -45, 45, 8),
     ),
