@@ -77,7 +77,7 @@ class Functional:
 
 def area(surface: Surface, silhouette: Silhouette, camera: Camera) -> float:
     """Return the shape term of a view: the squared difference of the two distance fields, within the band."""
-    band = min(BAND_PX, float(silhouette.distance.max()))  # a segmenter may keep a narrower one
+    band = min(BAND_PX, float(np.abs(silhouette.distance).max()))  # a segmenter may keep a narrower one
     model = silhouettes.model_distance(surface, camera, band)
     off = (model - np.clip(silhouette.distance, -band, band)).ravel()
     return SHAPE_WEIGHT * float(off @ off)
