@@ -11,6 +11,8 @@ from mocapflow_twist.registers import LANES, add_scaled
 
 BEHIND = 1e-6  # divisors below this are points behind a camera
 
+index = numba.uint64  # of an array: unsigned, so that nothing is checked for counting from the end
+
 
 @numba.njit(cache=True)
 def equations(  # type: ignore[no-untyped-def]
@@ -51,7 +53,7 @@ def _sum_rows(  # type: ignore[no-untyped-def]
     cx, cy, cz = centre[0], centre[1], centre[2]
     energy = 0.0
     for row in range(len(vertex)):
-        v = vertex[row]
+        v = index(vertex[row])
         rx, ry, rz = rest[v, 0], rest[v, 1], rest[v, 2]
         count = 0
         x = y = z = 0.0
@@ -59,13 +61,13 @@ def _sum_rows(  # type: ignore[no-untyped-def]
             w = skin_weight[v, k]
             if w == 0.0:
                 continue
-            n = skin_joint[v, k]
+            n = index(skin_joint[v, k])
             px = joints[n, 0, 0] * rx + joints[n, 0, 1] * ry + joints[n, 0, 2] * rz + joints[n, 0, 3]
             py = joints[n, 1, 0] * rx + joints[n, 1, 1] * ry + joints[n, 1, 2] * rz + joints[n, 1, 3]
             pz = joints[n, 2, 0] * rx + joints[n, 2, 1] * ry + joints[n, 2, 2] * rz + joints[n, 2, 3]
             x, y, z = x + w * px, y + w * py, z + w * pz
             at[count, 0], at[count, 1], at[count, 2] = px - cx, py - cy, pz - cz
-            share[count], node[count] = w, n + 1
+            share[count], node[count] = w, skin_joint[v, k] + 1
             count += 1
         depth = divisor[row, 0] * x + divisor[row, 1] * y + divisor[row, 2] * z + divisor[row, 3]
         if depth < BEHIND:
@@ -128,14 +130,14 @@ def energy(plane, divisor, vertex, weight, rest, skin_joint, skin_weight, joints
     """Return half the weighted squared error."""
     energy = 0.0
     for row in range(len(vertex)):
-        v = vertex[row]
+        v = index(vertex[row])
         rx, ry, rz = rest[v, 0], rest[v, 1], rest[v, 2]
         x = y = z = 0.0
         for k in range(skin_joint.shape[1]):
             w = skin_weight[v, k]
             if w == 0.0:
                 continue
-            m = joints[skin_joint[v, k]]
+            m = joints[index(skin_joint[v, k])]
             x += w * (m[0, 0] * rx + m[0, 1] * ry + m[0, 2] * rz + m[0, 3])
             y += w * (m[1, 0] * rx + m[1, 1] * ry + m[1, 2] * rz + m[1, 3])
             z += w * (m[2, 0] * rx + m[2, 1] * ry + m[2, 2] * rz + m[2, 3])
