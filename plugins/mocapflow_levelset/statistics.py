@@ -80,13 +80,21 @@ def _smooth(sums: F32, window: Window) -> F32:
 
     if not np.isfinite(window.rho_px):
         return np.zeros_like(sums)  # no local weight: the global statistics take over
-    sigma = window.rho_px / window.cell_px
-    radius = int(np.ceil(TRUNCATE * sigma))
-    kernel = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
-    kernel = (kernel / kernel.sum()).astype(np.float32)
-    padded = np.pad(sums, ((1, 1), (1, 1), (0, 0)))  # replicating this rim continues with zeros
+    kernel = _kernel(window.rho_px / window.cell_px)
+    padded = np.zeros((sums.shape[0] + 2, sums.shape[1] + 2, sums.shape[2]), np.float32)
+    padded[1:-1, 1:-1] = sums  # replicating the rim continues with zeros
     smooth = cv2.sepFilter2D(padded, cv2.CV_32F, kernel, kernel, borderType=cv2.BORDER_REPLICATE)
     return np.ascontiguousarray(smooth[1:-1, 1:-1])
+
+
+@cache
+def _kernel(sigma: float) -> F32:
+    """Return the weights of a Gaussian window of `sigma` cells."""
+    radius = int(np.ceil(TRUNCATE * sigma))
+    kernel = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
+    weights: F32 = (kernel / kernel.sum()).astype(np.float32)
+    weights.flags.writeable = False
+    return weights
 
 
 @numba.njit(cache=True, error_model="numpy")
