@@ -70,8 +70,9 @@ class Scene:
         return near
 
     @cached_property
-    def _bare_edges(self) -> I32:
-        return meshes.edges(self.body.faces)
+    def undressed(self) -> Scene:
+        """The same scene without the garment."""
+        return self if self.garment is None else replace(self, garment=None)
 
     def bare(self, surface: Surface) -> Surface:
         """Return the body of a surface without its cloth."""
@@ -80,7 +81,7 @@ class Scene:
             surface,
             vertices=surface.vertices[:count],
             faces=self.body.faces,
-            edges=self._bare_edges,
+            edges=self.undressed.edges,
             layer=surface.layer[:count],
         )
 

@@ -34,7 +34,7 @@ class ImageFlowPredictor(Predictor):
     otherwise: Predictor = ConstantVelocity()
     pose_solver: PoseSolver = TwistGaussNewton(iterations=8, angle_damping_deg=20.0)
     sigma_px: Positive = 1.0
-    scale: Positive = 2.0  # standard deviations beyond which a point pulls less (Geman-McClure after Huber)
+    scale: Positive = 2.0  # standard deviations beyond which a point pulls no harder (Huber)
     cloth_share: Annotated[float, Field(ge=0)] = 0.2  # of a point on cloth that touches the skin; other cloth: none
     touching_mm: Positive = 20.0
     least_points: Annotated[int, Field(ge=1)] = 30
@@ -47,7 +47,7 @@ class ImageFlowPredictor(Predictor):
         followed = self.on_skin(carried_points(frame, past, scene), past, scene)
         if len(followed.vertex) < self.least_points:
             return guess
-        model = ClothedModel(scene=Scene(cameras=scene.cameras, body=scene.body))
+        model = ClothedModel(scene=scene.undressed)
 
         def match(surface: Surface) -> Matches:
             away = distances(followed, surface, scene)
