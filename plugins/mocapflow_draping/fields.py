@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, QhullError
 
 from mocapflow.assets import Body, GarmentMesh
 from mocapflow.geometry.kinematics import descendants
@@ -56,7 +56,7 @@ def build_fields(body: Body, joints: I32, voxel: float) -> BodyFields:
 
     distance, nearest = signed_distance(body.vertices, body.faces, low, (shape[0], shape[1], shape[2]), voxel)
     voxel_label = label[body.faces[nearest, 0]]
-    parts = [_part(distance, voxel_label == part, low, voxel) for part in kept]
+    parts = [_part(distance, voxel_label == part, body.vertices[label == part], low, voxel) for part in kept]
     sizes = [values.size for _, values in parts]
     balls = [_ball(body.vertices[label == part]) for part in kept]
     return BodyFields(
@@ -121,8 +121,12 @@ def _labels(body: Body, pairs: I32) -> I32:
     return np.where(nearest < len(pairs), nearest, -1).astype(np.int32)
 
 
-def _part(distance: F64, mine: Bool, low: F64, voxel: float) -> tuple[F64, F64]:
-    """Return origin and field of one part: the body cut to the voxels that are nearest to the part's skin."""
+def _part(distance: F64, mine: Bool, skin: F64, low: F64, voxel: float) -> tuple[F64, F64]:
+    """Return origin and field of one part: the body cut to the voxels that are nearest to the part's skin (N, 3).
+
+    It does not reach beyond the hull of that skin: what lies deeper belongs to the neighbours, and would come out
+    of the body on the other side where the part turns.
+    """
     solid = mine & (distance < 0)
     where = np.argwhere(solid if solid.any() else mine)
     pad = int(np.ceil(MARGIN / voxel + OVERLAP)) + 1
@@ -133,7 +137,22 @@ def _part(distance: F64, mine: Bool, low: F64, voxel: float) -> tuple[F64, F64]:
     if own.all():
         return low + voxel * first, distance[crop]
     edge = voxel * (distance_transform_edt(~own) - distance_transform_edt(own) - OVERLAP)
-    return low + voxel * first, np.maximum(distance[crop], edge)
+    origin = low + voxel * first
+    grid = np.stack(np.meshgrid(*[np.arange(n) for n in own.shape], indexing="ij"), axis=-1).reshape(-1, 3)
+    beyond = _beyond_hull(skin, origin + voxel * grid) - OVERLAP * voxel
+    return origin, np.maximum(np.maximum(distance[crop], edge), beyond.reshape(own.shape))
+
+
+def _beyond_hull(skin: F64, points: F64) -> F64:
+    """Return how far points (M, 3) lie outside the hull of `skin` at least, negative within; -inf for flat skin."""
+    try:
+        planes = np.unique(ConvexHull(skin).equations.round(6), axis=0)
+    except QhullError:
+        return np.full(len(points), -np.inf)
+    beyond = np.full(len(points), -np.inf)
+    for plane in planes:
+        np.maximum(beyond, points @ plane[:3] + plane[3], out=beyond)
+    return beyond
 
 
 def _ball(points: F64) -> tuple[F64, float]:

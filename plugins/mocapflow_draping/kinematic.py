@@ -50,10 +50,10 @@ class Kinematic(Draper):
     iterations: Annotated[int, Field(ge=1)] = 50  # literal
     limited: bool = False  # literal: stop at straight down instead of swinging about it
     pivot: Literal["strand", "space"] = "strand"  # literal: where the nearest fixed point is looked for
-    sweeps: Annotated[int, Field(ge=0)] = 10  # of the rings, per row; 0 leaves them as they fell
+    sweeps: Annotated[int, Field(ge=0)] = 20  # of the rings, at most, per row; 0 leaves them as they fell
     longest: Annotated[float, Field(ge=1)] = 1.0  # of a ring link, over its rest length
     stiff: Annotated[float, Field(ge=0, le=1)] = 0.3  # how much a ring resists being shortened
-    straight: Annotated[float, Field(ge=0, le=1)] = 0.1  # how much a ring resists sharp folds
+    bending_m: Annotated[float, Field(ge=0)] = 0.06  # along which a hanging strand takes up a new direction
     _fittings: WeakKeyDictionary[GarmentMesh, Fitting] = PrivateAttr(default_factory=WeakKeyDictionary)
 
     def drape(self, poses: PoseBatch, parameters: F64, past: Past, scene: Scene) -> F64:
@@ -138,7 +138,11 @@ class Kinematic(Draper):
         from mocapflow_draping.rings import close_batch
 
         strands = fitting.strands
+        across, length = strands.spans
+        bend = np.zeros_like(strands.links)
+        if self.bending_m > 0 and not strands.rides:
+            bend = np.exp(-strands.links / self.bending_m)
         close_batch(
-            grid, strands.links, strands.first, strands.last, strands.beside, strands.ring_length, skin,
-            self.longest, self.stiff, self.straight, self.sweeps, bodies, fitting.fields.solid,
+            grid, strands.links, strands.first, strands.last, across, length, skin, self.longest, self.stiff, bend,
+            self.sweeps, bodies, fitting.fields.solid,
         )  # fmt: skip

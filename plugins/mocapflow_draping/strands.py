@@ -13,6 +13,8 @@ from mocapflow.assets import Body, GarmentMesh
 from mocapflow.errors import PluginError
 from mocapflow.records import F64, I32, Bool, array, record
 
+DOUBLINGS = 3  # of the way between particles that are kept from parting
+
 
 @record
 class Strands:
@@ -43,6 +45,17 @@ class Strands:
     def own(self) -> Bool:
         """(N, L), True where a strand has a particle of its own."""
         return _own(self.first, self.last, self.vertex.shape[1])
+
+    @cached_property
+    def spans(self) -> tuple[I32, F64]:
+        """Strands (K, N, L) that lie 1, 2, 4, ... links to the left within a row, or -1, and the cloth between in m."""
+        across, length = [self.beside], [self.ring_length]
+        row = np.arange(self.beside.shape[1])
+        for _ in range(DOUBLINGS):
+            next_one = np.maximum(across[-1], 0)
+            across.append(np.where(across[-1] >= 0, across[-1][next_one, row], np.int32(-1)))
+            length.append(length[-1] + length[-1][next_one, row])
+        return np.stack(across), np.stack(length)
 
 
 def strands_of(garment: GarmentMesh, body: Body) -> Strands:

@@ -25,6 +25,12 @@ def skirted():
     return Scene(cameras=(), body=body, garment=Skirt(**SKIRT).sew(body))
 
 
+def deep_poses():
+    """Return one knee pulled up, one far up, and two squats."""
+    angles = np.radians([[75, 60, 0, 0], [90, 90, 0, 0], [110, 110, 0, 0], [75, 90, 75, 90], [95, 110, 95, 110]])
+    return PoseBatch(root=np.tile(np.eye(4), (len(angles), 1, 1)), angles=angles)
+
+
 def drape(scene, poses, **settings):
     still = np.zeros((len(poses.root), len(scene.garment.parameter_names)))
     return Kinematic(skin_m=SKIN, voxel_m=VOXEL, **settings).drape(poses, still, Past(), scene)
@@ -47,10 +53,37 @@ def test_strands_keep_their_length_and_particles_stay_outside(skirted):
     assert distances(skirted.body, draped[:, free], poses).min() > SKIN - 1e-4
 
 
+def test_no_ring_parts_around_a_raised_thigh(skirted):
+    poses = deep_poses()
+    draped = drape(skirted, poses)
+    assert np.quantile(ring_strain(skirted.garment, draped), 0.99) < 0.5
+    a, b = skirted.garment.rings.T
+    middles = (draped[:, a] + draped[:, b]) / 2
+    assert distances(skirted.body, middles, poses).min() > -0.03  # no limb between neighbours
+    strands = strands_of(skirted.garment, skirted.body)
+    lengths = np.linalg.norm(np.diff(draped[:, strands.vertex], axis=2), axis=-1)
+    assert np.abs(lengths / strands.links - 1).max() < 1e-9
+    free = np.setdiff1d(np.arange(draped.shape[1]), skirted.garment.pinned)
+    assert distances(skirted.body, draped[:, free], poses).min() > SKIN - 1e-4
+
+
+def test_a_strand_takes_up_a_new_direction_gradually(skirted):
+    knee_up = leg_poses()
+    sharp, soft = (drape(skirted, knee_up, bending_m=m)[1] for m in (0.0, 0.06))
+    grid = strands_of(skirted.garment, skirted.body).vertex
+
+    def sharpest(cloth):
+        bars = np.diff(cloth[grid], axis=1)
+        bars /= np.linalg.norm(bars, axis=-1, keepdims=True)
+        return np.quantile((bars[:, 1:] * bars[:, :-1]).sum(-1), 0.02)
+
+    assert sharpest(soft) > sharpest(sharp)
+
+
 def test_links_that_are_short_stay_as_they_are(skirted):
     standing = PoseBatch(root=np.eye(4)[None], angles=np.zeros((1, 4)))
     fallen = drape(skirted, standing, sweeps=0)
-    closed = drape(skirted, standing, sweeps=20, stiff=0.0, straight=0.0, longest=10.0)
+    closed = drape(skirted, standing, sweeps=20, stiff=0.0, bending_m=0.0, longest=10.0)
     np.testing.assert_allclose(closed, fallen, atol=1e-9)
 
 

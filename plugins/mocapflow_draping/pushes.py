@@ -1,0 +1,110 @@
+"""Out of the body: particles at the ends of their bars, and links whose middle a limb has come through (numba).
+
+`seen` (N, 3) m is where each strand was measured last and `room` (N,) m how far from contact it was there, below
+zero where it was inside: within that room nothing is measured anew.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+
+from mocapflow_draping.distance import body_distance
+
+CLEAR = 2e-4  # m beyond contact to which a particle is pushed, so that it need not be pushed again at once
+PUSHES = 5  # out of the body and back to the bar's length
+TURNS = 12  # of a bar that pushing did not free, towards straight out of the body
+PROBE = 1e-3  # m, for the direction out of the body
+
+
+@numba.njit(cache=True, error_model="numpy")
+def push_out(grid, n, row, link, seen, room, near, body):  # type: ignore[no-untyped-def]
+    """Move a particle that may be inside the body out of it, at the length of its bar."""
+    p, above = grid[n, row], grid[n, row - 1]
+    for _ in range(PUSHES):
+        if room[n] >= way(p, seen[n]):
+            return
+        _measure(p, n, seen, room, near, body)
+        if room[n] >= 0.0:
+            return
+        _move(p, CLEAR - room[n], _outwards(p, near[n], body))
+        to_length(p, above, link)
+    gx, gy, gz = _outwards(above, near[n], body)
+    ux, uy, uz = (p[0] - above[0]) / link, (p[1] - above[1]) / link, (p[2] - above[2]) / link
+    for turn in range(TURNS + 1):  # from where it was left to straight away from the skin above
+        w = turn / TURNS
+        p[0] = above[0] + link * ((1.0 - w) * ux + w * gx)
+        p[1] = above[1] + link * ((1.0 - w) * uy + w * gy)
+        p[2] = above[2] + link * ((1.0 - w) * uz + w * gz)
+        to_length(p, above, link)
+        _measure(p, n, seen, room, near, body)
+        if room[n] >= 0.0:
+            return
+
+
+@numba.njit(cache=True, error_model="numpy")
+def lift(grid, first, last, beside, row, seen, room, near, body):  # type: ignore[no-untyped-def]
+    """Move both ends of a link out of the body where its middle is inside: no limb shall come between them."""
+    skin, maps, stretch, centres, solid, parts = body
+    middle = np.empty(3)
+    for n in range(grid.shape[0]):
+        m = beside[n, row]
+        if m < 0 or row > last[n] or (row <= first[n] and row <= first[m]):
+            continue
+        p, q = grid[n, row], grid[m, row]
+        for a in range(3):
+            middle[a] = 0.5 * (p[a] + q[a])
+        if room[n] > way(middle, seen[n]) or room[m] > way(middle, seen[m]):
+            continue
+        d, part = body_distance(middle[0], middle[1], middle[2], maps, stretch, centres, solid, near[n], parts)
+        if d < skin:
+            out = _outwards(middle, part, body)
+            if row > first[n]:
+                _move(p, skin - d, out)
+            if row > first[m]:
+                _move(q, skin - d, out)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def to_length(p, above, link):  # type: ignore[no-untyped-def]
+    """Put the lower end of a bar at its length from the upper one."""
+    dx, dy, dz = p[0] - above[0], p[1] - above[1], p[2] - above[2]
+    scale = link / max(math.sqrt(dx * dx + dy * dy + dz * dz), 1e-9)
+    p[0], p[1], p[2] = above[0] + scale * dx, above[1] + scale * dy, above[2] + scale * dz
+
+
+@numba.njit(cache=True, error_model="numpy")
+def way(p, q):  # type: ignore[no-untyped-def]
+    """Return the distance between two points."""
+    return math.sqrt((p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _measure(p, n, seen, room, near, body):  # type: ignore[no-untyped-def]
+    skin, maps, stretch, centres, solid, parts = body
+    d, near[n] = body_distance(p[0], p[1], p[2], maps, stretch, centres, solid, near[n], parts)
+    room[n] = d - skin
+    seen[n, 0], seen[n, 1], seen[n, 2] = p[0], p[1], p[2]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _move(p, amount, towards):  # type: ignore[no-untyped-def]
+    p[0], p[1], p[2] = p[0] + amount * towards[0], p[1] + amount * towards[1], p[2] + amount * towards[2]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _outwards(p, near, body):  # type: ignore[no-untyped-def]
+    """Return the unit direction out of the body at a point."""
+    gx = _distance(p[0] + PROBE, p[1], p[2], near, body) - _distance(p[0] - PROBE, p[1], p[2], near, body)
+    gy = _distance(p[0], p[1] + PROBE, p[2], near, body) - _distance(p[0], p[1] - PROBE, p[2], near, body)
+    gz = _distance(p[0], p[1], p[2] + PROBE, near, body) - _distance(p[0], p[1], p[2] - PROBE, near, body)
+    g = math.sqrt(gx * gx + gy * gy + gz * gz) + 1e-12
+    return gx / g, gy / g, gz / g
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _distance(x, y, z, near, body):  # type: ignore[no-untyped-def]
+    _, maps, stretch, centres, solid, parts = body
+    return body_distance(x, y, z, maps, stretch, centres, solid, near, parts)[0]
