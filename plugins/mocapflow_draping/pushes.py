@@ -47,7 +47,7 @@ def push_out(grid, n, row, link, seen, room, near, body):  # type: ignore[no-unt
 @numba.njit(cache=True, error_model="numpy")
 def lift(grid, first, last, beside, row, seen, room, near, body):  # type: ignore[no-untyped-def]
     """Move both ends of a link out of the body where its middle is inside: no limb shall come between them."""
-    skin, maps, stretch, centres, solid, parts = body
+    _, maps, stretch, centres, solid, parts = body
     middle = np.empty(3)
     for n in range(grid.shape[0]):
         m = beside[n, row]
@@ -59,12 +59,12 @@ def lift(grid, first, last, beside, row, seen, room, near, body):  # type: ignor
         if room[n] > way(middle, seen[n]) or room[m] > way(middle, seen[m]):
             continue
         d, part = body_distance(middle[0], middle[1], middle[2], maps, stretch, centres, solid, near[n], parts)
-        if d < skin:
+        if d < 0.0:
             out = _outwards(middle, part, body)
             if row > first[n]:
-                _move(p, skin - d, out)
+                _move(p, CLEAR - d, out)
             if row > first[m]:
-                _move(q, skin - d, out)
+                _move(q, CLEAR - d, out)
 
 
 @numba.njit(cache=True, error_model="numpy")
