@@ -57,6 +57,13 @@ def test_fields_follow_the_joints(skirted):
     assert np.abs(rest).max() < 1.5e-3  # coarse facets of the capsule and coarse voxels
 
 
+def test_a_raised_thigh_does_not_come_out_behind_the_body(skirted):
+    scene, _ = skirted
+    raised = PoseBatch(root=np.eye(4)[None], angles=np.radians([[90.0, 90.0, 0, 0]]))
+    behind = np.array([[[0.05, 0.15, 0.92]]])  # the pelvis ends at 0.12
+    assert distances(scene.body, behind, raised)[0, 0] > 0.02
+
+
 def test_a_flat_cloth_lies_on_a_plane_undeformed():
     table = box([-0.3, -0.3, -0.1], [0.3, 0.3, 0.0])
     grid = np.stack(np.meshgrid(np.linspace(-0.2, 0.2, 9), np.linspace(-0.2, 0.2, 9), indexing="ij"), -1)
