@@ -46,7 +46,7 @@ def report(scene: Scene, title: str) -> None:
     steps = Kinematic(rule="literal", sweeps=0)
     jobs: dict[str, tuple[Callable[[], object], int]] = {
         "event-driven, strands alone": (lambda: fall.drape(poses, free, Past(), scene), POSES),
-        "event-driven, with rings (10 sweeps)": (lambda: closed.drape(poses, free, Past(), scene), POSES),
+        "event-driven, with rings": (lambda: closed.drape(poses, free, Past(), scene), POSES),
         "literal, 50 x 2 degrees": (lambda: steps.drape(poses, free, Past(), scene), POSES),
         "one drape alone": (lambda: fall.drape(one, free[:1], Past(), scene), 1),
         "25 winds of one pose, all of them": (lambda: fall.drape(same, winds, Past(), scene), 1),
