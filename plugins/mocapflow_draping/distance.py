@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numba
-import numpy as np
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -41,16 +40,15 @@ def part_distance(x, y, z, p, maps, stretch, solid, least):  # type: ignore[no-u
 
 
 @numba.njit(cache=True, error_model="numpy")
-def body_distance(x, y, z, maps, stretch, centres, solid, near, parts):  # type: ignore[no-untyped-def]
-    """Return the least distance over some parts and the part it is to; `near` is the part to try first.
+def body_distance(x, y, z, maps, stretch, centres, solid, near):  # type: ignore[no-untyped-def]
+    """Return the least distance over all parts and the part it is to; `near` is the part to try first.
 
     Parts whose ball is farther than the least so far are skipped.
     """
     radius = solid[0]
     least = part_distance(x, y, z, near, maps, stretch, solid, 1e9)
     nearest = near
-    for k in range(len(parts)):
-        p = parts[k]
+    for p in range(len(radius)):
         dx, dy, dz = x - centres[p, 0], y - centres[p, 1], z - centres[p, 2]
         reach = least + radius[p]
         if p == near or reach <= 0.0 or dx * dx + dy * dy + dz * dz > reach * reach:
@@ -64,7 +62,6 @@ def body_distance(x, y, z, maps, stretch, centres, solid, near, parts):  # type:
 @numba.njit(cache=True, error_model="numpy")
 def body_distances(points, out, maps, stretch, centres, solid):  # type: ignore[no-untyped-def]
     """Write the distances (N,) of points (N, 3) to one posed body."""
-    near, parts = 0, np.arange(len(centres))
+    near = 0
     for n in range(len(points)):
-        x, y, z = points[n, 0], points[n, 1], points[n, 2]
-        out[n], near = body_distance(x, y, z, maps, stretch, centres, solid, near, parts)
+        out[n], near = body_distance(points[n, 0], points[n, 1], points[n, 2], maps, stretch, centres, solid, near)

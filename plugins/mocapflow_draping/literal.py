@@ -48,12 +48,11 @@ FLOOR = -10.0  # m: what falls past everything stops here
 
 @numba.njit(cache=True)
 def _touch(grid, fixed, first, last, skin, maps, stretch, centres, solid):  # type: ignore[no-untyped-def]
-    parts = np.arange(len(centres))
     for n in range(grid.shape[0]):
         for k in range(first[n], last[n] + 1):
             if not fixed[n, k]:
                 p = grid[n, k]
-                d = body_distance(p[0], p[1], p[2], maps, stretch, centres, solid, 0, parts)[0]
+                d = body_distance(p[0], p[1], p[2], maps, stretch, centres, solid, 0)[0]
                 fixed[n, k] = d < skin
 
 
@@ -143,7 +142,6 @@ def blow_batch(grid, fixed, first, last, skin, force, amount, bodies, solid):  #
 @numba.njit(cache=True)
 def _blown(strand, pivot, last, force, angle, skin, maps, stretch, centres, solid, trial):  # type: ignore[no-untyped-def]
     """Write the tail turned towards the force and return True if it stays clear of the body or leaves it."""
-    parts = np.arange(len(centres))
     x = strand[pivot]
     d = strand[last] - x
     axis = np.array(
@@ -162,9 +160,9 @@ def _blown(strand, pivot, last, force, angle, skin, maps, stretch, centres, soli
         trial[k, 0] = x[0] + c * q[0] + s * (axis[1] * q[2] - axis[2] * q[1]) + along * axis[0]
         trial[k, 1] = x[1] + c * q[1] + s * (axis[2] * q[0] - axis[0] * q[2]) + along * axis[1]
         trial[k, 2] = x[2] + c * q[2] + s * (axis[0] * q[1] - axis[1] * q[0]) + along * axis[2]
-        d1 = body_distance(trial[k, 0], trial[k, 1], trial[k, 2], maps, stretch, centres, solid, 0, parts)[0]
+        d1 = body_distance(trial[k, 0], trial[k, 1], trial[k, 2], maps, stretch, centres, solid, 0)[0]
         if d1 < skin:
             p = strand[k]
-            if d1 < body_distance(p[0], p[1], p[2], maps, stretch, centres, solid, 0, parts)[0]:
+            if d1 < body_distance(p[0], p[1], p[2], maps, stretch, centres, solid, 0)[0]:
                 return False
     return True

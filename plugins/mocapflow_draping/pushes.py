@@ -47,7 +47,7 @@ def push_out(grid, n, row, link, seen, room, near, body):  # type: ignore[no-unt
 @numba.njit(cache=True, error_model="numpy")
 def lift(grid, first, last, beside, row, seen, room, near, body):  # type: ignore[no-untyped-def]
     """Move both ends of a link out of the body where its middle is inside: no limb shall come between them."""
-    _, maps, stretch, centres, solid, parts = body
+    _, maps, stretch, centres, solid = body
     middle = np.empty(3)
     for n in range(grid.shape[0]):
         m = beside[n, row]
@@ -58,7 +58,7 @@ def lift(grid, first, last, beside, row, seen, room, near, body):  # type: ignor
             middle[a] = 0.5 * (p[a] + q[a])
         if room[n] > way(middle, seen[n]) or room[m] > way(middle, seen[m]):
             continue
-        d, part = body_distance(middle[0], middle[1], middle[2], maps, stretch, centres, solid, near[n], parts)
+        d, part = body_distance(middle[0], middle[1], middle[2], maps, stretch, centres, solid, near[n])
         if d < 0.0:
             out = _outwards(middle, part, body)
             if row > first[n]:
@@ -83,8 +83,8 @@ def way(p, q):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, error_model="numpy")
 def _measure(p, n, seen, room, near, body):  # type: ignore[no-untyped-def]
-    skin, maps, stretch, centres, solid, parts = body
-    d, near[n] = body_distance(p[0], p[1], p[2], maps, stretch, centres, solid, near[n], parts)
+    skin, maps, stretch, centres, solid = body
+    d, near[n] = body_distance(p[0], p[1], p[2], maps, stretch, centres, solid, near[n])
     room[n] = d - skin
     seen[n, 0], seen[n, 1], seen[n, 2] = p[0], p[1], p[2]
 
@@ -106,5 +106,5 @@ def _outwards(p, near, body):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, error_model="numpy")
 def _distance(x, y, z, near, body):  # type: ignore[no-untyped-def]
-    _, maps, stretch, centres, solid, parts = body
-    return body_distance(x, y, z, maps, stretch, centres, solid, near, parts)[0]
+    _, maps, stretch, centres, solid = body
+    return body_distance(x, y, z, maps, stretch, centres, solid, near)[0]

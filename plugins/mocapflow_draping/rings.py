@@ -45,9 +45,8 @@ def close_batch(grid, links, first, last, across, length, skin, longest, stiff, 
     strands, rows = grid.shape[1], grid.shape[2]
     bars, seen = np.empty((strands, rows, 3)), np.empty((strands, 3))
     room, near = np.empty(strands), np.zeros(strands, np.int64)
-    parts = np.arange(len(solid[0]))
     for b in range(len(grid)):
-        body = (skin[b], maps[b], stretch[b], centres[b], solid, parts)
+        body = (skin[b], maps[b], stretch[b], centres[b], solid)
         seen[:], room[:] = grid[b, :, 0], -1.0
         _bars(grid[b], links, first, last, bars)
         for row in range(1, rows):

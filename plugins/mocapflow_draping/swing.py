@@ -40,20 +40,17 @@ def swing_batch(roots, facing, down, start, skin, links, first, last, bodies, so
     """
     maps, stretch, centres = bodies
     rows = links.shape[1] + 1
-    reach, room, near = np.empty(rows), np.empty(rows), np.empty(rows, np.int64)
-    parts = np.empty(len(solid[0]), np.int64)
+    reach, room, near = np.empty(rows), np.empty(rows), np.zeros(rows, np.int64)
     for b in range(len(roots)):
         for n in range(roots.shape[1]):
             support[b, n] = _swing(
                 roots[b, n], facing[b, n], down[b, n], start[b, n], skin[b], links[n], first[n], last[n],
-                maps[b], stretch[b], centres[b], solid, out[b, n], reach, room, near, parts,
+                maps[b], stretch[b], centres[b], solid, out[b, n], reach, room, near,
             )  # fmt: skip
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _swing(
-    root, facing, down, start, skin, links, first, last, maps, stretch, centres, solid, out, reach, room, near, parts
-):  # type: ignore[no-untyped-def]
+def _swing(root, facing, down, start, skin, links, first, last, maps, stretch, centres, solid, out, reach, room, near):  # type: ignore[no-untyped-def]
     """Drape one strand; `reach` is along the strand, `room` how far each particle may yet move untouched."""
     out[first] = root
     reach[first] = 0.0
@@ -61,9 +58,6 @@ def _swing(
         reach[k], room[k] = reach[k - 1] + links[k - 1], 0.0
     pivot, angle, turn, backs = first, start, 0.0, 0
     guard = GUARD / solid[4]
-    ahead = parts[: _ahead(root, facing, down, skin, centres, solid[0], parts)]
-    for k in range(first + 1, last + 1):
-        near[k] = ahead[0] if len(ahead) else 0
     while pivot < last:
         x, base = out[pivot], reach[pivot]
         touched = -1
@@ -74,7 +68,7 @@ def _swing(
                 arm = reach[k] - base
                 if room[k] - guard < arm * turn:
                     room[k], near[k] = body_distance(
-                        x[0] + arm * bx, x[1] + arm * by, x[2] + arm * bz, maps, stretch, centres, solid, near[k], ahead
+                        x[0] + arm * bx, x[1] + arm * by, x[2] + arm * bz, maps, stretch, centres, solid, near[k]
                     )
                     room[k] -= skin
                     if room[k] < -DEEP and backs < BACKS and angle < math.pi:  # read too far at a sharp edge
@@ -99,21 +93,6 @@ def _swing(
             return pivot
         pivot = touched
     return pivot
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _ahead(root, facing, down, skin, centres, radius, parts):  # type: ignore[no-untyped-def]
-    """Write which parts a strand can meet at all and return how many: it stays in half of a plane."""
-    found = 0
-    for p in range(len(radius)):
-        x, y, z = centres[p, 0] - root[0], centres[p, 1] - root[1], centres[p, 2] - root[2]
-        out = x * facing[0] + y * facing[1] + z * facing[2]
-        along = x * down[0] + y * down[1] + z * down[2]
-        beside = math.sqrt(max(x * x + y * y + z * z - out * out - along * along, 0.0))
-        if beside < radius[p] + skin and out > -radius[p] - skin:
-            parts[found] = p
-            found += 1
-    return found
 
 
 @numba.njit(cache=True, error_model="numpy")
