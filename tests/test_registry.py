@@ -106,7 +106,7 @@ def test_installed_plugins_come_sorted_with_the_built_in_ones_first(tmp_path, mo
     monkeypatch.syspath_prepend(tmp_path)
     registry = load_registry()
     assert [origin.plugin for origin in registry.plugins] == sorted(
-        ["levelset", "matching", "twist", "draping", "garments", "priors", "bodies", "sequence"]
+        ["levelset", "matching", "twist", "draping", "garments", "physics", "priors", "bodies", "sequence"]
     )
     assert list(map(str, registry.failures)) == [
         "plugin 'z_cape' (aaa-cape 0.3) did not load: ModuleNotFoundError: No module named 'absent_z_cape'",

@@ -19,6 +19,7 @@ from mocapflow_priors.density import Density, bandwidth
 
 Angles = Mapping[str, F64]  # by screw: (T,) rad, zero in the rest pose
 FREE = ("hip", "knee.flexion", "ankle.dorsiflexion", "shoulder", "elbow.flexion")  # what no other prior holds
+BENDS = np.radians(np.linspace(-60, 170, 461))  # of any joint, to look up what they show
 COLUMNS = {  # of angles.csv: the screw that makes nearly all of each
     "hip_flexion": "hip.flexion",
     "knee_flexion": "knee.flexion",
@@ -108,10 +109,20 @@ def from_joints(path: Path, body: Body) -> Angles:
 
 
 def from_columns(degrees: Mapping[str, F64], body: Body) -> Angles:
-    """Return angles between joint centres, named as in angles.csv, from a body's rest pose on."""
-    rest = angles.measure(body, np.eye(4)[None], np.zeros((1, len(body.twists))))
-    at_rest = dict(zip(rest.names, rest.value[0], strict=True))
-    return named({name: values - at_rest[name] for name, values in degrees.items() if name in at_rest}, COLUMNS)
+    """Return angles between joint centres, named as in angles.csv, as the bends of a body's joints that show them.
+
+    What a bend shows is looked up on the body, joint by joint: hinges are not quite square to the limbs.
+    """
+    poses = np.zeros((len(BENDS), len(body.twists)))
+    screws = {name: screw for name in degrees if (screw := screw_of(name, COLUMNS)) in body.screw_names}
+    poses[:, [body.screw_names.index(screw) for screw in screws.values()]] = BENDS[:, None]
+    shown = angles.measure(body, np.tile(np.eye(4), (len(BENDS), 1, 1)), poses)
+    found = {}
+    for name, screw in screws.items():
+        curve = shown.value[:, shown.names.index(name)]
+        bent = slice(int(curve.argmin()), int(curve.argmax()) + 1)  # a limb bent backwards shows the same
+        found[screw] = np.interp(degrees[name], curve[bent], BENDS[bent])
+    return found
 
 
 def from_opensim(path: Path, body: Body) -> Angles:
@@ -131,13 +142,13 @@ def opensim_at_rest(body: Body) -> Mapping[str, float]:
 
 def named(degrees: Mapping[str, F64], table: Mapping[str, str]) -> Angles:
     """Return columns in degrees by the screws that a table of names without sides gives them."""
-    found = {}
-    for name, values in degrees.items():
-        column, side = name[:-2], name[-2:]
-        if column in table:
-            joint, _, angle = table[column].partition(".")
-            found[f"{joint}{side}.{angle}"] = np.radians(values)
-    return found
+    return {screw: np.radians(values) for name, values in degrees.items() if (screw := screw_of(name, table))}
+
+
+def screw_of(column: str, table: Mapping[str, str]) -> str:
+    """Return the screw that a table without sides gives a column, "" for none: knee_flexion_l → knee_l.flexion."""
+    joint, _, angle = table.get(column[:-2], "").partition(".")
+    return f"{joint}{column[-2:]}.{angle}" if joint else ""
 
 
 READERS: Mapping[str, Callable[[Path, Body], Angles]] = {
