@@ -16,6 +16,7 @@ from mocapflow.records import F32, F64, I32, Bool, array, record
 
 MARGIN = 0.06  # m around a part in which its field is stored; farther out the distance to its box is used
 OVERLAP = 1.5  # voxels by which neighbouring parts overlap
+BLOCK = 512  # points measured against all planes of a hull at once: what stays in cache
 
 
 @record
@@ -149,9 +150,10 @@ def _beyond_hull(skin: F64, points: F64) -> F64:
         planes = np.unique(ConvexHull(skin).equations.round(6), axis=0)
     except QhullError:
         return np.full(len(points), -np.inf)
-    beyond = np.full(len(points), -np.inf)
-    for plane in planes:
-        np.maximum(beyond, points @ plane[:3] + plane[3], out=beyond)
+    beyond = np.empty(len(points))
+    for start in range(0, len(points), BLOCK):
+        part = slice(start, start + BLOCK)
+        beyond[part] = (points[part] @ planes[:, :3].T + planes[:, 3]).max(axis=1)
     return beyond
 
 
