@@ -187,7 +187,6 @@ def dressed(folder: Path, scene: Scene, poses: Sequence[Pose]) -> tuple[Surface,
     faces = np.concatenate([scene.body.faces, garment + np.int32(len(scene.body.vertices))])
     edges, shape = meshes.edges(faces), cloth["vertices"]
     layer = np.repeat(np.array([BODY, CLOTH], np.uint8), [len(scene.body.vertices), shape.shape[1]])
-    bare = replace(scene, garment=None)
     return tuple(
         replace(
             skin,
@@ -196,7 +195,7 @@ def dressed(folder: Path, scene: Scene, poses: Sequence[Pose]) -> tuple[Surface,
             edges=edges,
             layer=layer,
         )  # fmt: skip
-        for row, skin in enumerate(bare.surface(pose, NO_CLOTH) for pose in poses)
+        for row, skin in enumerate(scene.undressed.surface(pose, NO_CLOTH) for pose in poses)
     )
 
 

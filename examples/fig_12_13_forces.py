@@ -25,7 +25,8 @@ def main() -> None:
     panels = {}
     for title, fitter in FITTERS.items():
         model, frame, state = first_frame(tuple(change.format(fitter=fitter) for change in CHANGES))
-        agreement = overlaps(state, model)
+        surface = model.surface(state.estimate.pose, state.cloth)
+        agreement = overlaps(surface, state.segmentation, model.scene.cameras)
         for view in VIEWS:
             camera, cloth = model.scene.cameras[view], state.cloth.vertices
             image = cv2.resize(frame.images[view], None, fx=ENLARGED, fy=ENLARGED, interpolation=cv2.INTER_CUBIC)

@@ -7,13 +7,14 @@ from functools import partial
 
 import numpy as np
 
+from mocapflow.assets import Camera
 from mocapflow.components import ClothFitter, Matcher, Observe, PoseSolver, Predictor, Prior, Segmenter, pool
 from mocapflow.data import NO_CLOTH, Frame, FrameResult, FrameState, Matches, Past, Segmentation, Surface, Turn
 from mocapflow.functional import Functional
 from mocapflow.geometry import silhouettes
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64, record
-from mocapflow.rest import Steady, measure_change
+from mocapflow.rest import Shown, Steady, measure_change
 from mocapflow.scene import Scene
 from mocapflow.timing import Stopwatch
 
@@ -39,7 +40,8 @@ def settle(
     Source: Rosenhahn 2008, Fig. 12.14
     """
     functional, steady, watch = Functional(model, steps.priors, past), steps.steady, Stopwatch()
-    calm, earlier, turn = 0, state, Turn(index=0, cap=steady.max_turns)
+    calm, turn = 0, Turn(index=0, cap=steady.max_turns)
+    last = before_last = Shown(state.estimate.pose, model.surface(state.estimate.pose, state.cloth))
     energy = np.full((steady.max_turns, len(functional.terms)), np.nan)
     for index in range(steady.max_turns):
         turn = Turn(index=index, cap=turn.cap, change=turn.change)
@@ -52,13 +54,14 @@ def settle(
         cloth = fitter.fit(frame, segmentation, estimate, model, past, turn) if fitter else NO_CLOTH
         estimate, cloth = functional.step(state, segmentation, estimate, cloth, steady.halvings)
         watch.lap("cloth")
-        matches = match(model.surface(estimate.pose, cloth))
-        new = FrameState(segmentation=segmentation, matches=matches, estimate=estimate, cloth=cloth)
-        energy[index] = functional.values(new)
-        change, swing = measure_change(state, new, model), measure_change(earlier, new, model)
+        surface = model.surface(estimate.pose, cloth)
+        state = FrameState(segmentation=segmentation, matches=match(surface), estimate=estimate, cloth=cloth)
+        energy[index] = functional.values(state, surface)
+        now = Shown(estimate.pose, surface)
+        change, swing = measure_change(last, now), measure_change(before_last, now)
         watch.lap("match")
-        observe(frame.index, turn, new)
-        earlier, state = state, new
+        observe(frame.index, turn, state)
+        before_last, last = last, now
         turn = Turn(index=index, cap=turn.cap, change=change)
         calm = calm + 1 if steady.holds(change) else 0
         if calm >= steady.turns:
@@ -70,7 +73,7 @@ def settle(
         steady=calm >= steady.turns,
         oscillating=calm == 0 and turn.index > 1 and steady.holds(swing),
         change=turn.change,
-        overlap=overlaps(state, model),
+        overlap=overlaps(surface, segmentation, model.scene.cameras),
         energy=energy,
         energy_terms=functional.terms,
         seconds=watch.seconds,
@@ -90,12 +93,11 @@ def pool_matches(
     return pool([(m.share, m.match(frame, segmentation, surface, past, scene, turn)) for m in matchers])
 
 
-def overlaps(state: FrameState, model: ClothedModel) -> F64:
+def overlaps(surface: Surface, segmentation: Segmentation, cameras: Sequence[Camera]) -> F64:
     """Return intersection over union of the model's silhouette and the person's in each view; NaN where unseen."""
-    surface = model.surface(state.estimate.pose, state.cloth)
-    overlap = np.full(len(model.scene.cameras), np.nan)
-    for silhouette in state.segmentation.of("person"):
-        camera = model.scene.cameras[silhouette.camera]
+    overlap = np.full(len(cameras), np.nan)
+    for silhouette in segmentation.of("person"):
+        camera = cameras[silhouette.camera]
         covered = silhouettes.mask(silhouettes.outline(surface, camera), camera)
         overlap[silhouette.camera] = silhouettes.intersection_over_union(covered, silhouette.distance > 0)
     return overlap

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from mocapflow.data import Change, FrameState
-from mocapflow.model import ClothedModel
+from mocapflow.data import CLOTH, Change, Pose, Surface
 from mocapflow.records import record
 
 
@@ -24,13 +25,19 @@ class Steady:
         return max(change.body, change.cloth) <= self.surface and change.angles <= self.angle
 
 
-def measure_change(old: FrameState, new: FrameState, model: ClothedModel) -> Change:
-    """Return how far body, cloth and joint angles moved between two states."""
-    before = model.surface(old.estimate.pose, old.cloth).vertices
-    after = model.surface(new.estimate.pose, new.cloth).vertices
-    squared = np.sum((after - before) ** 2, axis=1)
-    body, cloth = np.split(squared, [len(model.scene.body.vertices)])
-    angles = np.abs(new.estimate.pose.angles - old.estimate.pose.angles)
+class Shown(NamedTuple):
+    """A pose with the surface it has."""
+
+    pose: Pose
+    surface: Surface
+
+
+def measure_change(old: Shown, new: Shown) -> Change:
+    """Return how far body, cloth and joint angles moved between two poses."""
+    squared = np.sum((new.surface.vertices - old.surface.vertices) ** 2, axis=1)
+    worn = new.surface.layer == CLOTH
+    body, cloth = squared[~worn], squared[worn]
+    angles = np.abs(new.pose.angles - old.pose.angles)
     return Change(
         body=float(np.sqrt(body.max())),
         cloth=float(np.sqrt(cloth.mean())) if len(cloth) else 0.0,

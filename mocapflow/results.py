@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from mocapflow.data import Pose
 from mocapflow.records import F64, I16, I32, Bool, array, record
 
@@ -32,6 +34,11 @@ class Track:
     notes: tuple[str, ...] = ()  # what happened to frames, e.g. "frame 12: cam02 black"
     raw_root: F64 | None = array("T", 4, 4, unit="m, world_from_body, before smoothing", default=None)
     raw_angles: F64 | None = array("T", "D", unit="rad, before smoothing", default=None)
+
+    @property
+    def frame_rate(self) -> float:
+        """Frames per second, 30 where a single frame does not tell."""
+        return float(1 / np.median(np.diff(self.time))) if len(self.time) > 1 else 30.0
 
     def pose(self, row: int) -> Pose:
         """Return the pose of one row."""

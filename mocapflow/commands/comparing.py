@@ -45,9 +45,9 @@ def compare(
     done = on_workers(invocations, workers, scheduler) if several else one_by_one(invocations)
     for number, (run, said) in enumerate(done, 1):
         typer.echo(f"{number} of {len(cells)}  {run.relative_to(folder)}  {said}", err=True)
-    from mocapflow_sequence import comparison
+    from mocapflow_sequence import variants
 
-    rows = comparison.compare([(cell.variant, cell.name, place(folder, cell)) for cell in cells], folder)
+    rows = variants.compare([(cell.variant, cell.name, place(folder, cell)) for cell in cells], folder)
     if rows:
         typer.echo(table([{name: row[name] for name in SHOWN} for row in rows]))
     typer.echo(f"all figures: {folder}/compare.csv, runs.csv and compare.png")

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from mocapflow.components import Draper, Garment
-from mocapflow.data import Past, Pose, PoseBatch
+from mocapflow.data import Past, Pose
 from mocapflow.measures import garment_of
+from mocapflow.model import ClothedModel
 from mocapflow.records import F64, U8
 from mocapflow.registry import Registry
 from mocapflow.resolve import Resolver
@@ -66,9 +67,8 @@ def poster(scene: Scene, garment: Garment, draper: Draper) -> U8:
 
 def _draped(draper: Draper, scene: Scene, pose: Pose) -> F64:
     assert scene.garment is not None
-    batch = PoseBatch(root=pose.root[None].copy(), angles=pose.angles[None].copy())
-    draped: F64 = draper.drape(batch, np.zeros((1, len(scene.garment.parameter_names))), Past(), scene)[0]
-    return draped
+    calm = np.zeros(len(scene.garment.parameter_names))
+    return ClothedModel(scene=scene, draper=draper).drape(pose, calm, Past()).vertices
 
 
 def _pose(scene: Scene, degrees: dict[str, float]) -> Pose:

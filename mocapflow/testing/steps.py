@@ -55,7 +55,7 @@ class SegmenterConformance(Conformance):
         frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, believed)
         past = scenes.tiny_past(scene, believed)
         found = assert_pure(self.segmenter.segment, frame, state, past, scene, TURN)
-        persons = [silhouette for silhouette in found.silhouettes if silhouette.layer == "person"]
+        persons = found.of("person")
         assert [silhouette.camera for silhouette in persons] == list(range(len(scene.cameras)))
         for silhouette, truth in zip(persons, pictures.tiny_masks(scene, pose), strict=True):
             assert silhouette.distance.shape == truth.shape

@@ -16,7 +16,7 @@ def write(result: Result, path: Path) -> None:
     points[:3] = 1000 * np.transpose(result.places, (2, 1, 0))
     point = file["parameters"]["POINT"]
     point["LABELS"]["value"] = list(result.scene.body.joint_names)
-    point["RATE"]["value"] = [result.frame_rate]
+    point["RATE"]["value"] = [result.track.frame_rate]
     point["UNITS"]["value"] = ["mm"]
     file["data"]["points"] = points
     file.write(str(path))

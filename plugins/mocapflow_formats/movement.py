@@ -26,6 +26,11 @@ def write(result: Result, path: Path) -> None:
             "keypoints": list(result.scene.body.joint_names),
             "individuals": ["person"],
         },
-        attrs={"ds_type": "poses", "fps": result.frame_rate, "time_unit": "seconds", "source_software": "mocapflow"},
+        attrs={
+            "ds_type": "poses",
+            "fps": result.track.frame_rate,
+            "time_unit": "seconds",
+            "source_software": "mocapflow",
+        },
     )
     dataset.to_netcdf(path, engine="h5netcdf")

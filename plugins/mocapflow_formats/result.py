@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cached_property
 from importlib import import_module
 from types import ModuleType
@@ -51,13 +50,7 @@ class Result:
 
     def bare(self, row: int) -> Surface:
         """Return the body alone in one frame."""
-        return replace(self.scene, garment=None).surface(self.track.pose(row), NO_CLOTH)
-
-    @property
-    def frame_rate(self) -> float:
-        """Frames per second of the track, 30 where a single frame does not tell."""
-        time = self.track.time
-        return float(1 / np.median(np.diff(time))) if len(time) > 1 else 30.0
+        return self.scene.undressed.surface(self.track.pose(row), NO_CLOTH)
 
 
 def library(module: str, extra: str) -> ModuleType:

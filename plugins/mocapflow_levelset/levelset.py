@@ -85,7 +85,7 @@ class LevelSet(Segmenter):
         The first turn starts from the projected model, later turns from the last turn's silhouettes.
         """
         surface = scene.surface(state.estimate.pose, state.cloth)
-        last = {s.camera: s.distance for s in state.segmentation.silhouettes if s.layer == PERSON}
+        last = {s.camera: s.distance for s in state.segmentation.of(PERSON)}
         silhouettes: list[Silhouette] = []
         energies: dict[str, float] = {}
         for c, camera in enumerate(scene.cameras):

@@ -39,8 +39,7 @@ class Containment(Matcher):
     ) -> Matches:
         """Return the pairs of every view; see the class."""
         bare = scene.bare(surface)
-        people = [s for s in segmentation.silhouettes if s.layer == "person"]
-        parts = [(1.0, self.match_view(scene.cameras[s.camera], s, bare)) for s in people]
+        parts = [(1.0, self.match_view(scene.cameras[s.camera], s, bare)) for s in segmentation.of("person")]
         return pool(parts) if parts else empty_matches()
 
     def match_view(self, camera: Camera, silhouette: Silhouette, bare: Surface) -> Matches:

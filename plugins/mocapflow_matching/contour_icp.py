@@ -77,11 +77,7 @@ class ContourIcp(Matcher):
         self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn
     ) -> Matches:
         """Return pairs of contour points; see the class."""
-        parts = [
-            (1.0, self.match_view(silhouette, surface, scene, turn))
-            for silhouette in segmentation.silhouettes
-            if silhouette.layer == "person"
-        ]
+        parts = [(1.0, self.match_view(s, surface, scene, turn)) for s in segmentation.of("person")]
         return pool(parts) if parts else empty_matches()
 
     def _calm(self, turn: Turn) -> bool:

@@ -59,8 +59,7 @@ class OpticalFlow(Matcher):
         if self.between != "shapes":
             parts.append(self.carried(frame, surface, past, scene))
         if self.between != "frames" and not calm:
-            people = [s for s in segmentation.silhouettes if s.layer == "person"]
-            parts += [self.registered(silhouette, surface, scene) for silhouette in people]
+            parts += [self.registered(silhouette, surface, scene) for silhouette in segmentation.of("person")]
         share = self.later_share if calm else self.first_share
         return pool([(share, part) for part in parts])
 

@@ -6,12 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar, Literal
 
-import numpy as np
 from mocapflow_formats import Result, write
 
 from mocapflow.components import Stage
-from mocapflow.data import PoseBatch
-from mocapflow.geometry import angles, kinematics
+from mocapflow.geometry import angles
 from mocapflow.io import markers
 from mocapflow.recording import Recording
 from mocapflow.results import Files, RunFolder, Track
@@ -27,7 +25,7 @@ class Export(Stage):
     The csv of angles hold one row per frame: the angles between joint centres in degrees (`geometry.angles`) and their
     standard deviations; energy.csv one per turn of the loop: the terms of the functional. The mot holds signed joint
     angles by OpenSim's names (`opensim`), the trc joint centres.
-    Other formats are written by `mocapflow_formats`, each by a library of its own.
+    Other formats are written by `mocapflow_formats`.
     """
 
     name: ClassVar[str] = "export"
@@ -35,12 +33,8 @@ class Export(Stage):
 
     def run(self, track: Track, scene: Scene, recording: Recording, run_folder: RunFolder) -> Files:
         """Write the files and return their paths."""
-        writers = {"csv": write_angles, "mot": write_motion, "trc": write_joints}
-        plain = [
-            path for name in self.formats if name in writers for path in writers[name](track, scene, run_folder.path)
-        ]
-        result, folder = Result(track=track, scene=scene, recording=recording), run_folder.path / layout.RESULTS
-        paths = plain + [write(name, result, folder) for name in self.formats if name not in writers]
+        result = Result(track=track, scene=scene, recording=recording)
+        paths = [path for name in self.formats for path in written(name, result, run_folder.path)]
         content = runjson.summary(track, run_folder, recording.warnings + scene.warnings)
         return Files(paths=(*paths, runjson.write(layout.place(run_folder.path, layout.RUN), content)))
 
@@ -52,8 +46,15 @@ def before_smoothing(track: Track) -> Track:
     return replace(track, root=track.raw_root, angles=track.raw_angles)
 
 
-def write_angles(track: Track, scene: Scene, folder: Path) -> list[Path]:
+def written(name: str, result: Result, folder: Path) -> list[Path]:
+    """Write one format into a run folder and return its files."""
+    own = {"csv": write_angles, "mot": write_motion, "trc": write_joints}
+    return own[name](result, folder) if name in own else [write(name, result, folder / layout.RESULTS)]
+
+
+def write_angles(result: Result, folder: Path) -> list[Path]:
     """Write angles.csv, angles_raw.csv and energy.csv into a run folder."""
+    track, scene = result.track, result.scene
     columns = {
         layout.ANGLES: tables.angle_columns(track, measured(track, scene)),
         layout.RAW_ANGLES: tables.angle_columns(track, measured(before_smoothing(track), scene)),
@@ -62,27 +63,21 @@ def write_angles(track: Track, scene: Scene, folder: Path) -> list[Path]:
     return [tables.write_columns(layout.place(folder, part), each) for part, each in columns.items()]
 
 
-def write_motion(track: Track, scene: Scene, folder: Path) -> list[Path]:
+def write_motion(result: Result, folder: Path) -> list[Path]:
     """Write angles.mot into a run folder."""
-    path = layout.place(folder, layout.MOTION)
-    markers.write_mot(path, opensim.coordinates(scene.body, track.root, track.angles), track.time)
+    path, track = layout.place(folder, layout.MOTION), result.track
+    markers.write_mot(path, opensim.coordinates(result.scene.body, track.root, track.angles), track.time)
     return [path]
 
 
-def write_joints(track: Track, scene: Scene, folder: Path) -> list[Path]:
+def write_joints(result: Result, folder: Path) -> list[Path]:
     """Write joints.trc into a run folder."""
-    path = layout.place(folder, layout.JOINTS)
-    joints = kinematics.chain_batch(scene.body, PoseBatch(root=track.root, angles=track.angles))
-    places = markers.opensim_from_world(kinematics.joint_positions(scene.body, joints))
-    markers.write_trc(path, scene.body.joint_names, places, frame_rate(track), start=float(track.time[0]))
+    path, track = layout.place(folder, layout.JOINTS), result.track
+    places = markers.opensim_from_world(result.places)
+    markers.write_trc(path, result.scene.body.joint_names, places, track.frame_rate, start=float(track.time[0]))
     return [path]
 
 
 def measured(track: Track, scene: Scene) -> angles.AngleSeries:
     """Return the angles of a track with their standard deviations."""
     return angles.measure(scene.body, track.root, track.angles, track.covariance)
-
-
-def frame_rate(track: Track) -> float:
-    """Return the frames per second of a track, 30 where a single frame does not tell."""
-    return float(1 / np.median(np.diff(track.time))) if len(track.time) > 1 else 30.0

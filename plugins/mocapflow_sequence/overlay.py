@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -16,7 +15,6 @@ from mocapflow.records import F64, I32, U8
 from mocapflow.results import Files, RunFolder, Track
 from mocapflow.scene import Scene
 from mocapflow_sequence import drawing, layout
-from mocapflow_sequence.export import frame_rate
 from mocapflow_sequence.lost import lost_rows
 
 LEAST_HEIGHT = 600  # px; smaller images are enlarged so that lines can be told apart
@@ -37,7 +35,7 @@ class Overlay(Stage):
         paths = [layout.place(run_folder.path, layout.overlay(camera.name)) for camera in scene.cameras]
         rows = {int(index): row for row, index in enumerate(track.frame)}
         painter = Painter(scene)
-        with drawing.videos(paths, frame_rate(track), self.codec) as opened:
+        with drawing.videos(paths, track.frame_rate, self.codec) as opened:
             for frame in recording.frames():
                 if frame.index in rows:
                     for view, video in enumerate(opened):
@@ -50,7 +48,7 @@ class Painter:
 
     def __init__(self, scene: Scene) -> None:
         self._cameras = scene.cameras
-        self._bare = replace(scene, garment=None)
+        self._bare = scene.undressed
         self._cloth_faces = np.empty((0, 3), np.int32) if scene.garment is None else scene.garment.faces
         self._cloth_edges = meshes.edges(self._cloth_faces)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
@@ -12,7 +11,6 @@ from mocapflow.data import NO_CLOTH
 from mocapflow.results import Files, RunFolder, Track
 from mocapflow.scene import Scene
 from mocapflow_sequence import drawing, layout
-from mocapflow_sequence.export import frame_rate
 from mocapflow_sequence.room import Room
 
 
@@ -33,11 +31,10 @@ class Virtual(Stage):
         if not len(track.frame):
             return Files(paths=())
         path = layout.place(run_folder.path, layout.VIRTUAL)
-        bare = replace(scene, garment=None)
         room = Room(scene, track.root, (self.width_px, self.height_px))
-        with drawing.videos([path], frame_rate(track) / self.every, self.codec) as (video,):
+        with drawing.videos([path], track.frame_rate / self.every, self.codec) as (video,):
             for row in range(0, len(track.frame), self.every):
-                image = room.picture(bare.surface(track.pose(row), NO_CLOTH), track.cloth[row])
+                image = room.picture(scene.undressed.surface(track.pose(row), NO_CLOTH), track.cloth[row])
                 drawing.label(image, f"frame {track.frame[row]}   {track.time[row]:.2f} s")
                 video.write(image)
         return Files(paths=(path,))

@@ -66,7 +66,7 @@ class GaussNewton(ClothFitter):
 class Task(NamedTuple):
     """What stays the same while one garment is fitted."""
 
-    by: GaussNewton
+    fitter: GaussNewton
     segmentation: Segmentation
     estimate: Estimate
     model: ClothedModel
@@ -77,18 +77,19 @@ class Task(NamedTuple):
     @property
     def precision(self) -> F64:
         """One over the variance of each parameter: (Q,)."""
-        spread: F64 = self.by.cloth_sd * np.ptp(self.garment.parameter_bounds, axis=1)
+        spread: F64 = self.fitter.cloth_sd * np.ptp(self.garment.parameter_bounds, axis=1)
         return np.maximum(spread, 1e-12) ** -2.0
 
     @property
     def weight(self) -> float:
         """One over the variance (px^-2) of an outline point, as one of many whose errors agree."""
-        return self.by.spacing_px / self.by.correlation_px / self.by.sigma_px**2
+        return self.fitter.spacing_px / self.fitter.correlation_px / self.fitter.sigma_px**2
 
     def energy(self, cloth: Cloth) -> float:
         """Return half the weighted squared errors of the whole outline and of the parameters."""
         now = dressed(self.surface, cloth.vertices)
-        off = misfit(now, self.segmentation, self.model.scene.cameras, self.by.spacing_px).sum() / self.by.spacing_px
+        spacing = self.fitter.spacing_px
+        off = misfit(now, self.segmentation, self.model.scene.cameras, spacing).sum() / spacing
         return 0.5 * (self.weight * float(off) + float(self.precision @ self._from_calm(cloth) ** 2))
 
     def equations(self, cloth: Cloth) -> Equations:
@@ -137,8 +138,8 @@ class Task(NamedTuple):
 
     def _matches(self, surface: Surface) -> Matches:
         """Return the points of the outline, each with where the distance field says the silhouette is."""
-        parts = []
-        for silhouette, contour in outlines(surface, self.segmentation, self.model.scene.cameras, self.by.spacing_px):
+        parts, spacing = [], self.fitter.spacing_px
+        for silhouette, contour in outlines(surface, self.segmentation, self.model.scene.cameras, spacing):
             slope = np.stack([at(axis, contour.pixel) for axis in np.gradient(silhouette.distance)[::-1]], axis=1)
             steep = np.linalg.norm(slope, axis=1)
             seen = steep > 0.5  # beyond the band the field is level

@@ -38,7 +38,7 @@ class TwistGaussNewton(PoseSolver):
     residual: Literal["image", "line"] = "image"  # pixels, or distance to projection rays in space
     line_sigma_mm: Positive = 3.0  # standard deviation of every distance to a ray
     damping: Annotated[float, Field(ge=0)] = 1e-4  # share of the mean diagonal; ten times more after a worse step
-    damping_growth: Annotated[float, Field(gt=0)] = 1.0  # factor at each turn of the loop: below 1, gentle then exact
+    damping_per_turn: Annotated[float, Field(gt=0)] = 1.0  # factor at each turn of the loop: below 1, gentle then exact
     cap_deg: Positive = 10.0  # a step, each angle
     cap_mm: Positive = 100.0  # a step, the root
     correlation_px: Annotated[float, Field(ge=0)] = 15.0  # length over which contour errors agree; 0: independent
@@ -98,7 +98,7 @@ class TwistGaussNewton(PoseSolver):
         )
 
     def _least_damping(self, turn: Turn) -> float:
-        return self.damping * self.damping_growth**turn.index
+        return self.damping * self.damping_per_turn**turn.index
 
     def _precision(self, model: ClothedModel, guess: Guess) -> F64:
         """Return one over the variance of the damping of every unknown."""

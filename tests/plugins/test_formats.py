@@ -67,7 +67,7 @@ def test_bvh_by_another_reader(result: Result, tmp_path: Path) -> None:
 
     text = Bvh(write("bvh", result, tmp_path).read_text())
     assert text.nframes == 5
-    assert text.frame_time == pytest.approx(1 / result.frame_rate, abs=1e-6)
+    assert text.frame_time == pytest.approx(1 / result.track.frame_rate, abs=1e-6)
     assert set(text.get_joints_names()) == set(result.scene.body.joint_names)
 
 
@@ -79,7 +79,7 @@ def test_c3d(result: Result, tmp_path: Path) -> None:
         reader = c3d.Reader(file)
         frames = [points[:, :3] for _, points, _ in reader.read_frames()]
     assert [label.strip() for label in reader.point_labels] == list(result.scene.body.joint_names)
-    assert reader.point_rate == pytest.approx(result.frame_rate)
+    assert reader.point_rate == pytest.approx(result.track.frame_rate)
     np.testing.assert_allclose(np.array(frames) / 1000, result.places, atol=NEAR)
 
 

@@ -146,7 +146,7 @@ def test_a_step_is_capped() -> None:
 def test_growing_damping_shortens_the_steps_of_later_turns() -> None:
     scene, truth = make_scene(), make_pose(0)
     matches, start = exact_matches(scene, truth, np.arange(0, 300, 9), directed=False), start_from(truth, 0)
-    solver = TwistGaussNewton(iterations=1, damping=0.1, damping_growth=10.0, cap_deg=90.0, cap_mm=1000.0)
+    solver = TwistGaussNewton(iterations=1, damping=0.1, damping_per_turn=10.0, cap_deg=90.0, cap_mm=1000.0)
     moves = []
     for index in range(3):
         turn = Turn(index=index, cap=8)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mocapflow_sequence import comparison, layout, tables
+from mocapflow_sequence import layout, tables, variants
 from mocapflow_sequence.compare import rms
 
 FRAMES = np.arange(90.0)
@@ -28,7 +28,7 @@ def finished(folder: Path, error: np.ndarray, lost: int = 0) -> Path:
 
 def test_figures_of_two_variants(tmp_path: Path) -> None:
     base, worse = finished(tmp_path / "base", SHARED), finished(tmp_path / "worse", SHARED + 1.0, lost=9)
-    rows = comparison.compare([("base", "take", base), ("worse", "take", worse)], tmp_path)
+    rows = variants.compare([("base", "take", base), ("worse", "take", worse)], tmp_path)
     assert [(row["variant"], row["angle"]) for row in rows] == [("base", "knee_flexion_l"), ("worse", "knee_flexion_l")]
     assert rows[0]["difference_deg"] == 0
     assert rows[1]["difference_deg"] == pytest.approx(rms(SHARED + 1) - rms(SHARED), abs=1e-4)
@@ -41,8 +41,8 @@ def test_figures_of_two_variants(tmp_path: Path) -> None:
 
 
 def test_a_paired_difference_is_sharper_than_its_parts() -> None:
-    difference, low, high = comparison.paired_difference(1.05 * SHARED, SHARED)
-    alone_low, alone_high = comparison.rms_interval(SHARED)
+    difference, low, high = variants.paired_difference(1.05 * SHARED, SHARED)
+    alone_low, alone_high = variants.rms_interval(SHARED)
     assert low <= difference <= high
     assert high - low < 0.2 * (alone_high - alone_low)
     assert low > 0
@@ -51,5 +51,5 @@ def test_a_paired_difference_is_sharper_than_its_parts() -> None:
 def test_runs_without_a_reference_have_no_angles(tmp_path: Path) -> None:
     run = finished(tmp_path / "run", SHARED)
     (run / layout.ERRORS).unlink()
-    assert comparison.compare([("only", "take", run)], tmp_path) == []
+    assert variants.compare([("only", "take", run)], tmp_path) == []
     assert (tmp_path / "runs.csv").is_file()
