@@ -61,6 +61,7 @@ def load_experiment(path: Path, recordings: Sequence[Path] = ()) -> tuple[Cell, 
     folders = tuple(recordings) or tuple(
         resolver.file(name, ("recordings", index)) for index, name in enumerate(said.recordings)
     )
+    names = short_names(folders)
     cells = []
     for combination in itertools.product(*(levels(said, factor, document) for factor in said.factors)):
         variant = "+".join(name for name, _ in combination)
@@ -70,7 +71,7 @@ def load_experiment(path: Path, recordings: Sequence[Path] = ()) -> tuple[Cell, 
         written = tuple(f"{target}={json.dumps(value)}" for target, value in changes.items())
         cells += [
             Cell(variant, name, resolver.file(pipeline, (PIPELINE,)), folder, written, said.frames)
-            for name, folder in zip(short_names(folders), folders, strict=True)
+            for name, folder in zip(names, folders, strict=True)
         ]
     return tuple(cells)
 
@@ -85,9 +86,17 @@ def levels(said: ExperimentFile, factor: str, document: Document) -> list[tuple[
 
 
 def short_names(folders: Sequence[Path]) -> list[str]:
-    """Return the names of folders; those of the same name get their parent's in front."""
-    names = [folder.name for folder in folders]
-    return [
-        f"{folder.parent.name}-{name}" if names.count(name) > 1 else name
-        for folder, name in zip(folders, names, strict=True)
-    ]
+    """Return the names of folders, all different; those of the same name get their parent's in front.
+
+    Raises:
+        PipelineError: two folders have the same name even so, or are the same.
+    """
+    last = [folder.name for folder in folders]
+    names = [f"{folder.parent.name}-{name}" if last.count(name) > 1 else name
+             for folder, name in zip(folders, last, strict=True)]  # fmt: skip
+    for name in names:
+        if names.count(name) > 1:
+            same = [str(folder) for folder, other in zip(folders, names, strict=True) if other == name]
+            message = f"{len(same)} recordings would be called '{name}': {', '.join(same)}"
+            raise PipelineError(message, hint="name each recording once; rename a folder where two end alike")
+    return names

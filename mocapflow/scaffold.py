@@ -8,7 +8,7 @@ from pathlib import Path
 from string import Template
 from typing import NamedTuple
 
-from mocapflow.errors import PluginError
+from mocapflow.errors import PluginError, alternatives
 
 TEMPLATES = Path(__file__).parent / "templates"
 NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
@@ -40,8 +40,10 @@ def write_plugin(name: str, role: str, folder: Path) -> list[Path]:
     """Write a plugin package into a new folder and return its files.
 
     Raises:
-        PluginError: the name can't be one, or the folder is there already.
+        PluginError: the name can't be one, nobody wrote templates for the role, or the folder is there already.
     """
+    if role not in KINDS:
+        raise PluginError(f"there are no templates for a {role}", hint=alternatives(role, KINDS))
     if not NAME.fullmatch(name):
         hint = "lower-case letters, digits and single hyphens, a letter first: my-dress"
         raise PluginError(f"'{name}' can't be the name of a package", hint=hint)

@@ -50,6 +50,13 @@ def test_recordings_of_one_name_are_told_apart(tmp_path: Path) -> None:
     assert [cell.name for cell in cells[:3]] == ["one-take", "two-take", "three"]
 
 
+@pytest.mark.parametrize("folders", [("one/take", "one/take"), ("a/x/take", "b/x/take"), ("a/x", "b/x", "a-x")])
+def test_recordings_that_cannot_be_told_apart_are_refused(tmp_path: Path, folders: tuple[str, ...]) -> None:
+    with pytest.raises(PipelineError, match=r"2 recordings would be called '(\w-|one-)(x|take)': ") as caught:
+        load_experiment(written(tmp_path, GRID), list(map(Path, folders)))
+    assert "name each recording once" in caught.value.hint
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [

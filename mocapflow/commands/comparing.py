@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -108,5 +108,5 @@ def finish(invocation: Invocation, out: Path) -> str:
     except MocapflowError as error:
         message = f"{out.parent.name} on {out.name}: {error.message}"
         raise type(error)(message, where=error.where, hint=error.hint) from None
-    computed: Sequence[str] = [str(stage["label"]) for stage in getattr(summary, "stages", ()) if not stage["cached"]]
+    computed = [stage["label"] for stage in summary.stages if not stage["cached"]]
     return f"computed: {', '.join(computed) or 'nothing'}"

@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from mocapflow import scaffold
+
 app = typer.Typer(help="Begin something of your own.", no_args_is_help=True)
-
-
-class Role(StrEnum):
-    """What a new plugin may be."""
-
-    GARMENT = "garment"
-    DRAPER = "draper"
-    MATCHER = "matcher"
-    PRIOR = "prior"
 
 
 @app.callback()
@@ -28,13 +20,11 @@ def _new() -> None:
 @app.command()
 def plugin(
     name: Annotated[str, typer.Argument(help="Of the package, without mocapflow-: my-dress.")],
-    role: Annotated[Role, typer.Option(help="What it adds.")] = Role.GARMENT,
+    role: Annotated[str, typer.Option(help=f"What it adds: {', '.join(scaffold.KINDS)}.")] = "garment",
     out: Annotated[Path | None, typer.Option(help="The folder to make.  [default: mocapflow-NAME]")] = None,
 ) -> None:
     """Write a plugin package that works: a module, its test, ready to install and to be changed."""
-    from mocapflow.scaffold import write_plugin
-
     folder = out or Path(f"mocapflow-{name}")
-    for path in write_plugin(name, role.value, folder):
+    for path in scaffold.write_plugin(name, role, folder):
         typer.echo(path)
     typer.echo(f"to go on: pip install -e {folder} && pytest {folder}")

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mocapflow.commands.again import Invocation, recall, remember
 from mocapflow.commands.progress import reporter
+
+if TYPE_CHECKING:
+    from mocapflow.runner import RunSummary
 
 File = Annotated[Path, typer.Argument(metavar="PIPELINE", help="A pipeline file (.yaml).")]
 Recording = Annotated[Path | None, typer.Option(help="Use this recording folder instead of the file's.")]
@@ -59,7 +62,7 @@ def demo(out: Annotated[Path, typer.Option(help="The run folder.")] = Path("runs
     typer.echo(f"joint angles    {out / 'results' / 'angles.csv'}")
 
 
-def execute(invocation: Invocation, out: Path, fresh: bool) -> object:
+def execute(invocation: Invocation, out: Path, fresh: bool) -> RunSummary:
     """Run what an invocation says and return the summary."""
     pipeline = invocation.load()
     from mocapflow import runner

@@ -61,7 +61,7 @@ class Kinematic(Draper):
         garment = scene.garment
         if garment is None:
             raise PluginError("the draper has no garment to drape", hint="name a garment in the pipeline's scene")
-        fitting = self._fitting(garment, scene.body)
+        fitting = self.fitting(garment, scene.body)
         strands = fitting.strands
         chain = chain_batch(scene.body, poses)
         bodies = part_transforms(fitting.fields, chain)
@@ -83,7 +83,7 @@ class Kinematic(Draper):
         """Return which joints (J,) move what the garment hangs from or can touch."""
         touched = np.zeros(len(scene.body.parents), bool)
         if scene.garment is not None:
-            fitting = self._fitting(scene.garment, scene.body)
+            fitting = self.fitting(scene.garment, scene.body)
             strands = fitting.strands
             touched[fitting.fields.joints] = True
             touched[strands.root_joint[strands.root_weight > 0]] = True
@@ -93,8 +93,8 @@ class Kinematic(Draper):
                 touched[strands.carrier] = True
         return touched
 
-    def _fitting(self, garment: GarmentMesh, body: Body) -> Fitting:
-        """Return what is computed once per garment and body; forgotten with the garment."""
+    def fitting(self, garment: GarmentMesh, body: Body) -> Fitting:
+        """Return what is measured once per garment and body; forgotten with the garment."""
         known = self._fittings.get(garment)
         if known is None or known.body is not body:
             fields = build_fields(body, touchable_joints(body, garment), self.voxel_m)

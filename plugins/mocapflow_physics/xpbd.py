@@ -6,34 +6,23 @@ from importlib.util import find_spec
 from typing import Annotated, ClassVar
 from weakref import WeakKeyDictionary
 
-from mocapflow_draping.fields import BodyFields, build_fields, part_transforms, touchable_joints
+from mocapflow_draping.fields import part_transforms
 from mocapflow_draping.forces import thickness
-from mocapflow_draping.kinematic import Kinematic
-from mocapflow_draping.strands import Strands, strands_of
+from mocapflow_draping.kinematic import Fitting, Kinematic
 from pydantic import Field, PrivateAttr, model_validator
 
-from mocapflow.assets import Body, GarmentMesh
+from mocapflow.assets import GarmentMesh
 from mocapflow.components import Draper
 from mocapflow.data import Past, Pose, PoseBatch
 from mocapflow.errors import PluginError
 from mocapflow.geometry.kinematics import chain_batch
-from mocapflow.records import F64, I32, Bool, record
+from mocapflow.records import F64, I32, Bool
 from mocapflow.scene import Scene
 from mocapflow_physics.cloth import links_of, pinned_of, pins_at, pull_of
 from mocapflow_physics.motion import beginning, between, centred
 from mocapflow_physics.simulation import Simulation
 
 EVERY = 4  # steps of the solver between two looks for contacts
-
-
-@record
-class Fitting:
-    """A garment on a body, prepared once for simulation."""
-
-    body: Body
-    strands: Strands
-    fields: BodyFields
-    simulations: dict[int, Simulation]  # by how many copies step together
 
 
 class Xpbd(Draper):
@@ -44,12 +33,11 @@ class Xpbd(Draper):
 
     name: ClassVar[str] = "xpbd"
     skin_m: Annotated[float, Field(ge=0)] = 0.005  # room between skin and cloth of no thickness
-    voxel_m: Annotated[float, Field(gt=0)] = 0.010
     rate_hz: Annotated[float, Field(ge=60)] = 960.0  # steps of the solver per second
     move_s: Annotated[float, Field(gt=0)] = 0.3  # in which the body comes from its last pose, or from rest
     rest_s: Annotated[float, Field(ge=0)] = 0.3  # in which the cloth comes to rest
-    moves_like: Draper = Kinematic(sweeps=4)  # whose velocities it has
-    _fittings: WeakKeyDictionary[GarmentMesh, Fitting] = PrivateAttr(default_factory=WeakKeyDictionary)
+    moves_like: Kinematic = Kinematic(sweeps=4)  # whose strands, distance fields and velocities it has
+    _simulations: WeakKeyDictionary[Fitting, dict[int, Simulation]] = PrivateAttr(default_factory=WeakKeyDictionary)
 
     @model_validator(mode="after")
     def _simulator_is_there(self) -> Xpbd:
@@ -62,7 +50,7 @@ class Xpbd(Draper):
         garment = scene.garment
         if garment is None:
             raise PluginError("the draper has no garment to drape", hint="name a garment in the pipeline's scene")
-        fitting = self._fitting(garment, scene.body)
+        fitting = self.moves_like.fitting(garment, scene.body)
         strands = fitting.strands
         root, centre = centred(scene, poses.root)
         end = PoseBatch(root=root, angles=poses.angles)
@@ -90,17 +78,9 @@ class Xpbd(Draper):
         """Return which joints (J,) move what the garment hangs from or can touch."""
         return self.moves_like.touchable(scene)
 
-    def _fitting(self, garment: GarmentMesh, body: Body) -> Fitting:
-        """Return what is prepared once per garment and body; forgotten with the garment."""
-        known = self._fittings.get(garment)
-        if known is None or known.body is not body:
-            fields = build_fields(body, touchable_joints(body, garment), self.voxel_m)
-            known = Fitting(body=body, strands=strands_of(garment, body), fields=fields, simulations={})
-            self._fittings[garment] = known
-        return known
-
     def _simulation(self, fitting: Fitting, garment: GarmentMesh, copies: int) -> Simulation:
-        if copies not in fitting.simulations:
-            pinned = pinned_of(fitting.strands, garment)
-            fitting.simulations[copies] = Simulation(links_of(garment), pinned, copies, 1 / self.rate_hz)
-        return fitting.simulations[copies]
+        """Return the simulation of so many copies that step together; forgotten with the fitting."""
+        known = self._simulations.setdefault(fitting, {})
+        if copies not in known:
+            known[copies] = Simulation(links_of(garment), pinned_of(fitting.strands, garment), copies, 1 / self.rate_hz)
+        return known[copies]
