@@ -182,10 +182,11 @@ class Stage(Component):
 
     A subclass defines `run(self, **typed_inputs) -> Artifact`. Each parameter receives the result of the nearest
     earlier stage that makes its type; `Scene`, `Recording`, `Checkpoint` and `RunFolder` come from the runner;
-    `X | None = None` makes an input optional.
+    `X | None = None` makes an input optional. A stage that returns a `Recording` changes how later stages see it.
 
     `extent` says which frames of the recording it sees, and its cache key names: the "first" one of the run, those
-    of the "run", or "all" there are; None: the first for a Start, all for a Background or Body, else the run's.
+    of the "run", or "all" there are; None: the first for a Start, all for a Background, Body, Rig or Recording, else
+    the run's.
     What a `causal` stage says of a frame depends on no later frame: a track made with it can go on when the run grows.
     """
 

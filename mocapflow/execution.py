@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -15,6 +16,7 @@ from mocapflow.errors import ComponentFailed, MocapflowError, PluginError, Shape
 from mocapflow.locks import Lock
 from mocapflow.pipeline import Pipeline
 from mocapflow.recipes import Step
+from mocapflow.recording import Recording
 from mocapflow.results import RunFolder
 from mocapflow.rows import Corrupted
 from mocapflow.scene import Scene
@@ -142,7 +144,10 @@ class Execution:
             "checkpoint": lambda: checkpoint,
             "run folder": lambda: RunFolder(path=self._out, recipe=self._recipe()),
         }
-        return supplied[source]() if source in supplied else self._result(str(source))
+        if source in supplied:
+            return supplied[source]()
+        made = self._result(str(source))
+        return replace(made, indices=step.recording.indices) if isinstance(made, Recording) else made
 
     def _scene(self, step: Step) -> Scene:
         """Return the cameras and the body that hold at this place in the pipeline, and the garment sewn to it."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import UnionType
 from typing import Any
 
 from mocapflow.assets import Background, Body, Camera, Rig
@@ -16,7 +17,7 @@ from mocapflow.recording import Recording, open_recording
 from mocapflow.results import Evaluation, Files
 from mocapflow.wiring import body_source, makes, rig_source, wire
 
-SEEN = {Start: "first", Background: "all", Rig: "all", Body: "all"}  # the extent of a stage that says none
+SEEN = {Start: "first", Background: "all", Rig: "all", Body: "all", Recording: "all"}  # of a stage that says none
 
 
 @dataclass(frozen=True)
@@ -49,8 +50,12 @@ class Step:
     @property
     def stored(self) -> bool:
         """False for a stage that writes files or compares: it always runs."""
-        made = makes(self.named.stage)
-        return not (isinstance(made, type) and issubclass(made, Files | Evaluation))
+        return not _makes(self.named, Files | Evaluation) and not self.passes_frames
+
+    @property
+    def passes_frames(self) -> bool:
+        """True for a stage that only says how frames are to be read."""
+        return _makes(self.named, Recording)
 
 
 def steps_of(pipeline: Pipeline, digests: Digests) -> list[Step]:
@@ -72,7 +77,8 @@ def steps_of(pipeline: Pipeline, digests: Digests) -> list[Step]:
                 name: _input(steps[label], chain) if label in steps else None for name, label in sources.items()
             },
         }
-        if "recording" in sources.values():
+        changed = [label for label, step in steps.items() if step.passes_frames]
+        if {"recording", *changed} & set(sources.values()):
             recipe["recording"] = _frames(part, pipeline, chain) | _content(part, digests)
         if "scene" in sources.values():
             recipe["scene"] = _scene(pipeline, recording, steps.get(body or ""), steps.get(rig or ""), digests)
@@ -83,10 +89,14 @@ def steps_of(pipeline: Pipeline, digests: Digests) -> list[Step]:
 
 
 def _extent(named: NamedStage, recording: Recording) -> range:
-    made = makes(named.stage)
-    kinds = [extent for cls, extent in SEEN.items() if isinstance(made, type) and issubclass(made, cls)]
+    kinds = [extent for cls, extent in SEEN.items() if _makes(named, cls)]
     extent = named.stage.extent or (kinds[0] if kinds else "run")
     return {"first": recording.indices[:1], "all": range(recording.length), "run": recording.indices}[extent]
+
+
+def _makes(named: NamedStage, wanted: type | UnionType) -> bool:
+    made = makes(named.stage)
+    return isinstance(made, type) and issubclass(made, wanted)
 
 
 def _input(step: Step, of_chain: bool = False) -> dict[str, Any]:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -20,6 +22,16 @@ from mocapflow.io.video import Video, read_frames
 from mocapflow.records import record
 
 
+class FrameChange(Protocol):
+    """Changes frames as they are read: what a stage that returns a `Recording` puts between it and later stages.
+
+    Which frames are asked for, and in what order, must not matter for what any of them becomes.
+    """
+
+    def frames(self, source: Recording, indices: range) -> Iterator[Frame]:
+        """Yield the changed frames; `source` gives them as they were, and any other."""
+
+
 @record
 class Recording:
     """The frames of a recording folder that a run looks at; nothing is written there."""
@@ -33,6 +45,7 @@ class Recording:
     indices: range  # frame numbers in the videos
     length: int  # frames in the videos
     warnings: tuple[str, ...] = ()  # what a user should know; also in run.json
+    changes: tuple[FrameChange, ...] = ()  # to the frames as they are read, one after another
 
     @cached_property
     def cameras(self) -> tuple[Camera, ...]:
@@ -61,6 +74,11 @@ class Recording:
             )
         return next(self._read(range(index, index + 1)))
 
+    def seen_by(self, camera: int) -> Recording:
+        """Return the recording as one camera has it, without keypoints."""
+        one = slice(camera, camera + 1)
+        return replace(self, views=self.views[one], videos=self.videos[one], keypoint_folders=(None,))
+
     def background(self) -> Background | None:
         """Return the empty scene from the clean plates, or None where there are none."""
         return background(self.folder, self.views, self.videos)
@@ -83,6 +101,11 @@ class Recording:
         }
 
     def _read(self, indices: range) -> Iterator[Frame]:
+        if not self.changes:
+            return self._decode(indices)
+        return self.changes[-1].frames(replace(self, changes=self.changes[:-1]), indices)
+
+    def _decode(self, indices: range) -> Iterator[Frame]:
         files = [None if folder is None else keypoint_files(folder) for folder in self.keypoint_folders]
         pictures = zip(*(read_frames(video, indices) for video in self.videos), strict=True)
         for index, row in zip(indices, pictures, strict=True):

@@ -97,6 +97,8 @@ def _plan_line(step: Step, store: Store) -> PlanLine:
 
 
 def _outlook(step: Step, store: Store) -> tuple[str, str]:
+    if step.passes_frames:
+        return "run", "changes frames as they are read"
     if not step.stored:
         return "run", "writes files or compares: always"
     found = store.find(step.key)

@@ -19,7 +19,8 @@ def wire(pipeline: Pipeline) -> dict[str, dict[str, str | None]]:
     """Return, for each stage, where each parameter of its `run` comes from.
 
     A source is the label of an earlier stage, `scene`, `recording`, `checkpoint` or `run folder` (supplied by the
-    runner), or None for an optional input that nobody makes. See also `body_source` and `rig_source`.
+    runner where no earlier stage makes one), or None for an optional input that nobody makes. See also `body_source`
+    and `rig_source`.
 
     Raises:
         PipelineError: no earlier stage makes what a stage needs, or `from` names a wrong one.
@@ -63,7 +64,7 @@ def _source(named: NamedStage, parameter: str, hint: Any, earlier: Sequence[Name
     if parameter in named.wiring:
         return _chosen(named, parameter, wanted, earlier)
     supplied = SUPPLIED.get(wanted.__name__) if wanted.__module__.startswith("mocapflow.") else None
-    source = supplied or _latest(wanted, earlier)
+    source = _latest(wanted, earlier) or supplied
     if source is None and not optional:
         article = "an" if wanted.__name__[0] in "AEIOU" else "a"
         message = f"stage '{named.label}' needs {article} {wanted.__name__} but no earlier stage makes one"

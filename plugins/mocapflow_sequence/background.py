@@ -51,15 +51,8 @@ class EmptyScene(Stage):
 
     def _pictures(self, recording: Recording, camera: int) -> U8:
         """Return pictures (N, H, W, 3) of one camera, spread over the recording."""
-        one = slice(camera, camera + 1)
         step = max(recording.length // self.samples, 1)
-        sampled = replace(
-            recording,
-            views=recording.views[one],
-            videos=recording.videos[one],
-            keypoint_folders=(None,),
-            indices=range(step // 2, recording.length, step),
-        )
+        sampled = replace(recording.seen_by(camera), indices=range(step // 2, recording.length, step))
         pictures = [frame.images[0] for frame in sampled.frames() if frame.usable[0]]
         if len(pictures) < 3:
             raise RecordingError(

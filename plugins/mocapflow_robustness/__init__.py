@@ -1,0 +1,14 @@
+"""Images that do not cooperate: made on purpose, and found where they happen."""
+
+from __future__ import annotations
+
+from mocapflow.components import Stage
+from mocapflow.hookspecs import hookimpl
+
+
+@hookimpl
+def mocapflow_stages() -> list[type[Stage]]:
+    """Return the stages of this package."""
+    from mocapflow_robustness.corrupt import Corrupt
+
+    return [Corrupt]

@@ -1,0 +1,129 @@
+"""Stage `corrupt`: disturbs a recording on purpose, the same way every time, as its frames are read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Annotated, ClassVar, Literal
+from zlib import crc32
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from mocapflow.components import Stage
+from mocapflow.data import Frame
+from mocapflow.errors import RecordingError, alternatives
+from mocapflow.recording import Recording
+from mocapflow.records import U8
+from mocapflow_robustness import pixels
+from mocapflow_robustness.events import Event
+from mocapflow_robustness.tape import Tape
+
+Share = Annotated[float, Field(ge=0, le=1)]
+Count = Annotated[int, Field(ge=0)]
+Tapes = dict[tuple[Event, str], Tape]
+
+
+class Corrupt(Stage):
+    """Noise, rectangles and a stripe over every picture, and events: black, torn, wrong, late or missing frames.
+
+    Pictures are changed as they are read; the files are left alone. What becomes of a picture depends on the seed, its
+    camera and its number only. Clean plates stay clean.
+    """
+
+    name: ClassVar[str] = "corrupt"
+    seed: Count = 0
+    noise: Share = 0.0  # share of the pixels that get a random colour
+    noise_kind: Literal["replaced", "added"] = "replaced"  # added: noise up to that share of the range, on every pixel
+    rectangles: tuple[Count, Count] = (0, 0)  # grey ones, at least and at most so many on each picture
+    stripe: Share = 0.0  # height of a black stripe, share of the picture
+    stripe_centre: Share = 0.5  # share of the picture from its top
+    events: tuple[Event, ...] = ()  # a later one goes before an earlier one
+
+    @model_validator(mode="after")
+    def _at_least_is_not_more_than_at_most(self) -> Corrupt:
+        if self.rectangles[0] > self.rectangles[1]:
+            raise ValueError("rectangles: [at least, at most]")
+        return self
+
+    def run(self, recording: Recording) -> Recording:
+        """Return the recording as it looks when disturbed.
+
+        Raises:
+            RecordingError: an event names a camera that is not there.
+        """
+        names = [view.lens.name for view in recording.views]
+        for view in (view for event in self.events for view in event.views):
+            if view not in names:
+                raise RecordingError(f"corrupt: there is no camera '{view}'", hint=alternatives(view, names))
+        return replace(recording, changes=(*recording.changes, Corruption(self, recording)))
+
+
+@dataclass(frozen=True)
+class Corruption:
+    """Frames disturbed by the settings of a stage; `whole` is the recording with all its cameras."""
+
+    settings: Corrupt
+    whole: Recording
+
+    def frames(self, source: Recording, indices: range) -> Iterator[Frame]:
+        """Yield the disturbed frames."""
+        names = [view.lens.name for view in source.views]
+        tapes: Tapes = {}
+        for frame in replace(source, indices=indices).frames():
+            yield self._disturbed(frame, names, tapes)
+
+    def _disturbed(self, frame: Frame, names: list[str], tapes: Tapes) -> Frame:
+        images, usable = list(frame.images), frame.usable.copy()
+        reasons = list(frame.reasons or [""] * len(names))
+        keypoints = None if frame.keypoints is None else list(frame.keypoints)
+        for camera, view in enumerate(names):
+            event = next((e for e in reversed(self.settings.events) if e.holds(frame.index, view)), None)
+            if event is not None and event.what == "dropped":
+                usable[camera], reasons[camera] = False, "dropped"
+                images[camera] = np.zeros_like(images[camera])
+            elif usable[camera]:
+                rng = np.random.default_rng([self.settings.seed, crc32(view.encode()), frame.index])
+                image = (
+                    images[camera] if event is None else self._instead(event, images[camera], frame, view, rng, tapes)
+                )
+                images[camera] = self._spoiled(image, rng)
+            if event is not None and keypoints is not None:
+                keypoints[camera] = keypoints[camera][:0]
+        return replace(
+            frame,
+            images=tuple(images),
+            usable=usable,
+            reasons=() if usable.all() else tuple(reasons),
+            keypoints=None if keypoints is None else tuple(keypoints),
+        )
+
+    def _spoiled(self, image: U8, rng: np.random.Generator) -> U8:
+        """Return a picture with what covers every picture."""
+        chosen = self.settings
+        if chosen.noise:
+            image = pixels.noisy(image, chosen.noise, chosen.noise_kind, rng)
+        if chosen.rectangles[1]:
+            image = pixels.with_rectangles(image, chosen.rectangles, rng)
+        return pixels.with_stripe(image, chosen.stripe, chosen.stripe_centre) if chosen.stripe else image
+
+    def _instead(self, event: Event, image: U8, frame: Frame, view: str, rng: np.random.Generator, tapes: Tapes) -> U8:
+        """Return what an event puts in the place of a picture."""
+        if event.what == "black":
+            return np.zeros_like(image)
+        if event.what == "torn":
+            return pixels.torn(image, rng)
+        if event.what == "covered":
+            return pixels.covered(image, round(len(image) * (1 - event.share)), len(image))
+        names = [v.lens.name for v in self.whole.views]
+        camera = (names.index(view) + (event.what == "other_camera")) % len(names)
+        tape = tapes.setdefault((event, view), Tape(self.whole.seen_by(camera)))
+        return fitted(tape.at(event.source(frame.index, self.whole.length)).images[0], image)
+
+
+def fitted(image: U8, like: U8) -> U8:
+    """Return an image in the size of another."""
+    import cv2
+
+    size = like.shape[1::-1]
+    return image if image.shape == like.shape else np.asarray(cv2.resize(image, size), np.uint8)

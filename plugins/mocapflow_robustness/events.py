@@ -1,0 +1,35 @@
+"""What can happen to the frames of a camera, for a while or for good."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Count = Annotated[int, Field(ge=1)]
+
+
+class Event(BaseModel):
+    """Something that happens to some cameras over some frames."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    what: Literal["black", "torn", "covered", "frozen", "late", "other_time", "other_camera", "dropped"]
+    first: Annotated[int, Field(ge=0)] = 0  # frame
+    count: Count | None = None  # frames; none: for good
+    views: tuple[str, ...] = ()  # names of cameras; none: all of them
+    by: Count = 3  # late: so many frames; other_time: so many frames ahead, or back where there are none
+    share: Annotated[float, Field(gt=0, le=1)] = 0.5  # covered: the lower part of the picture
+
+    def holds(self, index: int, view: str) -> bool:
+        """Return whether it happens to a frame of a view."""
+        last = index if self.count is None else self.first + self.count - 1
+        return self.first <= index <= last and (not self.views or view in self.views)
+
+    def source(self, index: int, length: int) -> int:
+        """Return which frame, of `length`, stands in the place of a frame."""
+        wanted = {
+            "frozen": self.first - 1,
+            "late": index - self.by,
+            "other_time": index + self.by if self.first + self.by + (self.count or 1) <= length else index - self.by,
+        }.get(self.what, index)
+        return min(max(wanted, 0), length - 1)

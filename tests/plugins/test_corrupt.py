@@ -1,0 +1,120 @@
+"""Recordings that are disturbed on purpose: what becomes of pictures, and how later stages see it."""
+
+import numpy as np
+import pytest
+from mocapflow_robustness import pixels
+from mocapflow_robustness.corrupt import Corrupt
+from mocapflow_robustness.events import Event
+
+from mocapflow.errors import RecordingError
+from mocapflow.recording import open_recording
+from mocapflow.runner import plan
+from tests.fixtures.stores import STAGES, actions, load, run_tiny, write_pipeline, write_recording
+
+FRAMES, GOOD = 12, ("cam01",)
+
+
+@pytest.fixture(scope="module")
+def clip(tmp_path_factory):
+    return write_recording(tmp_path_factory.mktemp("corrupt") / "clip", frames=FRAMES)
+
+
+def images(recording, since=None):
+    return {frame.index: frame.images for frame in recording.frames(since)}
+
+
+def disturbed(clip, *events, **settings):
+    return Corrupt(events=tuple(Event(**event) for event in events), **settings).run(open_recording(clip))
+
+
+def equal(one, other):
+    return all((a == b).all() for a, b in zip(one, other, strict=True))
+
+
+def test_the_same_picture_becomes_the_same_whoever_asks(clip):
+    everything = dict(noise=0.6, rectangles=(3, 8), stripe=0.1, stripe_centre=0.7)
+    events = [dict(what="torn", first=2, count=2), dict(what="late", first=5, by=2, views=["cam02"])]
+    one = disturbed(clip, *events, **everything)
+    seen = images(one)
+    for other in (images(one), images(one, since=6), images(disturbed(clip, *events, **everything), since=3)):
+        assert all(equal(other[index], seen[index]) for index in other)
+    assert equal(one.frame(7).images, seen[7])
+    assert (images(one.seen_by(1))[7][0] == seen[7][1]).all()
+    assert not equal(images(disturbed(clip, *events, seed=1, **everything))[0], seen[0])
+
+
+def test_nothing_is_changed_by_default(clip):
+    plain = images(open_recording(clip))
+    assert all(equal(images(disturbed(clip))[index], plain[index]) for index in plain)
+
+
+def test_noise_replaces_or_moves_values():
+    rng, grey = np.random.default_rng(0), np.full((200, 200, 3), 128, np.uint8)
+    replaced = (pixels.noisy(grey, 0.6, "replaced", rng) != 128).any(axis=2)
+    assert replaced.mean() == pytest.approx(0.6, abs=0.01)
+    neighbours = np.corrcoef(replaced[:, 1:].ravel(), replaced[:, :-1].ravel())[0, 1]
+    assert abs(neighbours) < 0.02
+    added = pixels.noisy(grey, 0.2, "added", rng).astype(int) - 128
+    assert np.abs(added).max() == 51
+    assert added.std() == pytest.approx(51 / np.sqrt(3), rel=0.02)
+
+
+def test_rectangles_and_stripe():
+    white, rng = np.full((100, 200, 3), 255, np.uint8), np.random.default_rng(1)
+    behind = (pixels.with_rectangles(white, (3, 8), rng) != 255).any(axis=2).mean()
+    assert 3 * 0.05**2 < behind < 8 * 0.25**2
+    rows = np.flatnonzero((pixels.with_stripe(white, 0.1, 0.5) == 0).all(axis=(1, 2)))
+    assert rows.tolist() == list(range(45, 55))
+
+
+@pytest.mark.parametrize(
+    ("event", "source"),
+    [
+        (dict(what="frozen", first=5), (0, 4)),
+        (dict(what="late", by=3), (0, 3)),
+        (dict(what="other_time", first=5, count=2, by=4), (0, 10)),
+        (dict(what="other_time", first=5, count=6, by=4), (0, 2)),
+        (dict(what="other_camera"), (1, 6)),
+    ],
+)
+def test_a_picture_from_elsewhere(clip, event, source):
+    plain, found = images(open_recording(clip)), disturbed(clip, dict(views=GOOD, **event))
+    camera, index = source
+    assert (found.frame(6).images[0] == plain[index][camera]).all()
+    assert (found.frame(6).images[1] == plain[6][1]).all()
+
+
+def test_a_picture_that_is_spoiled_or_missing(clip):
+    plain = images(open_recording(clip))
+    events = ["black", "torn", "covered", "dropped"]
+    found = disturbed(clip, *(dict(what=what, first=2 * k, count=2, views=GOOD) for k, what in enumerate(events)))
+    frames = {frame.index: frame for frame in found.frames()}
+    assert not frames[0].images[0].any()
+    assert (frames[2].images[0] != plain[2][0]).mean() > 0.5
+    half = len(plain[4][0]) // 2
+    assert (frames[4].images[0][:half] == plain[4][0][:half]).all()
+    assert not frames[4].images[0][half:].any()
+    assert frames[6].usable.tolist() == [False, True]
+    assert frames[6].reasons == ("dropped", "")
+    assert frames[8].usable.all()
+    assert all(equal(frames[k].images[1:], plain[k][1:]) for k in frames)
+
+
+def test_a_camera_that_is_not_there_is_named(clip):
+    with pytest.raises(RecordingError, match="there is no camera 'cam03'"):
+        disturbed(clip, dict(what="black", views=["cam03"]))
+
+
+def test_later_stages_see_it_and_its_settings_are_in_their_keys(tmp_path):
+    clip = write_recording(tmp_path / "clip", frames=6)
+    path = write_pipeline(tmp_path, clip, stages={"corrupt": {"use": "corrupt", "noise": 0.5}, **STAGES})
+    run_tiny(path, tmp_path, frames=4)
+    everything = dict.fromkeys(("background", "start", "track", "smooth"), "hit")
+    again, _ = run_tiny(path, tmp_path, frames=4)
+    assert {label: made for label, made in actions(again).items() if label in everything} == everything
+    lines = {line.label: line for line in plan(load(path, frames=6), store=tmp_path / "store.zarr")}
+    assert lines["corrupt"].why == "changes frames as they are read"
+    assert lines["track"].action == "resume"
+    for change in ("stages.corrupt.seed=1", "stages.corrupt=null"):
+        changed = {line.label: line.action for line in plan(load(path, change), store=tmp_path / "store.zarr")}
+        assert changed["track"] == changed["background"] == "run"
