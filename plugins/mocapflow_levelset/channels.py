@@ -15,18 +15,15 @@ TEXTURE_SCALE_PX = 2.0  # smoothing of the structure tensor
 LAG_PX = 4  # distance of the pixels whose differences tell how channels vary together
 
 
-def features(image: U8, channels: Sequence[ChannelName], median_px: int = 0) -> F32:
+def features(image: U8, channels: Sequence[ChannelName]) -> F32:
     """Return the channels of a BGR image (H, W, 3) as (C, H, W) in [0, 1].
 
     Args:
         image: (H, W, 3) BGR grey levels.
         channels: which channels, in order; lab gives three, texture gives three.
-        median_px: odd width in px of a median filter applied first, against pixels of no meaning; 0 for none.
     """
     import cv2
 
-    if median_px > 1:
-        image = _median(image, median_px)
     parts: list[F32] = []
     for name in channels:
         if name == "grey":
@@ -63,12 +60,6 @@ def _separate(levels, planes):  # type: ignore[no-untyped-def]
             line, mixed = planes[c, row], levels[row, :, c]
             for x in range(line.size):
                 line[x] = np.float32(mixed[x]) * np.float32(1 / 255)
-
-
-def _median(image: U8, width: int) -> U8:
-    import cv2
-
-    return np.asarray(cv2.medianBlur(np.ascontiguousarray(image), width), np.uint8)
 
 
 def _texture(image: U8) -> F32:

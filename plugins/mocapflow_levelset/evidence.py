@@ -34,7 +34,6 @@ def from_image(
     image: U8,
     weight: F32,
     channels: Sequence[ChannelName],
-    median_px: int,
     stride: int,
     plate: tuple[Plate, F32] | None,
     shadow: Shadow,
@@ -49,13 +48,13 @@ def from_image(
     are turned to the image's own principal axes, so that treating them as independent is right; the empty scene's
     density needs them as they are, so where it is known they stay.
     """
-    if all(name in POINTWISE for name in channels) and median_px <= 1:
+    if all(name in POINTWISE for name in channels):
         sparse = features(np.ascontiguousarray(image[::stride, ::stride]), channels)
 
         def along(runs: I32) -> F32:
             return features(gather(image, runs)[None], channels)[:, 0]
     else:
-        planes = features(np.ascontiguousarray(image), channels, median_px)
+        planes = features(np.ascontiguousarray(image), channels)
         sparse = np.ascontiguousarray(planes[:, ::stride, ::stride])
 
         def along(runs: I32) -> F32:
@@ -84,6 +83,13 @@ def calmed(image: U8, smooth_px: float) -> U8:
     import cv2
 
     return np.asarray(cv2.GaussianBlur(image, (0, 0), smooth_px), np.uint8) if smooth_px > 0.3 else image
+
+
+def without_outliers(image: U8, median_px: int) -> U8:
+    """Return an image (H, W, 3) after a median filter of odd width, against pixels of no meaning; 0: as it is."""
+    import cv2
+
+    return np.asarray(cv2.medianBlur(np.ascontiguousarray(image), median_px), np.uint8) if median_px > 1 else image
 
 
 def gather(image: U8, runs: I32) -> U8:

@@ -11,7 +11,7 @@ from mocapflow.records import F32, U8
 from mocapflow_levelset import crops
 from mocapflow_levelset.channels import ChannelName
 from mocapflow_levelset.crops import Crop
-from mocapflow_levelset.evidence import Evidence, from_image
+from mocapflow_levelset.evidence import Evidence, from_image, without_outliers
 from mocapflow_levelset.evolve import Costs, Rhythm, Weights, costs, settle
 from mocapflow_levelset.plates import Plate, Shadow
 from mocapflow_levelset.redistance import redistance
@@ -48,7 +48,7 @@ class Method(NamedTuple):
     """How to find a silhouette."""
 
     channels: Sequence[ChannelName]
-    median_px: int
+    median_px: int  # of the full image, before all else: the mean over pixels would spread what it takes out
     weights: Weights
     shadow: Shadow
     decorrelate: bool
@@ -71,10 +71,12 @@ def find(view: View, levels: Sequence[Level], method: Method, band_px: float) ->
     if crop is None:
         return Found(outside, Costs(0.0, 0.0, 0.0))
     front, factor = crop.of(view.start), 1
+    image = without_outliers(crop.of_grey_levels(view.image), method.median_px)
     for level in levels:
         prior = crops.shrink_values(crop.of(view.prior), level.factor) / np.float32(level.factor)
         front = _brought(front, factor, level.factor, method.weights.band_px)
-        settled = settle(front, prior, _evidence(view, crop, level, method), level.window, method.weights, level.rhythm)
+        evidence = _evidence(image, view, crop, level, method)
+        settled = settle(front, prior, evidence, level.window, method.weights, level.rhythm)
         front, factor = settled.level, level.factor
     crop.of(outside)[:] = _brought(front, factor, 1, band_px)
     return Found(outside, costs(settled, prior, method.weights))
@@ -88,17 +90,16 @@ def _brought(level: F32, factor: int, wanted: int, band_px: float) -> F32:
     return redistance(crops.shrink_values(level, times) / np.float32(times), band_px)
 
 
-def _evidence(view: View, crop: Crop, level: Level, method: Method) -> Evidence:
-    """Return what the image says at one resolution."""
+def _evidence(image: U8, view: View, crop: Crop, level: Level, method: Method) -> Evidence:
+    """Return what the image within the crop says at one resolution."""
     factor = level.factor
     plate = None
     if view.empty is not None and level.use_plate:
         plate = view.empty.plates[factor].of(crop.at(factor)), crops.shrink_mask(crop.of(view.empty.floor), factor)
     return from_image(
-        crops.shrink(crop.of_grey_levels(view.image), factor),
+        crops.shrink(image, factor),
         crops.shrink_mask(crop.of(view.counted), factor),
         method.channels,
-        method.median_px,
         max(method.stride // factor, 1),
         plate,
         method.shadow,

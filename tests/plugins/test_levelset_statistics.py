@@ -100,7 +100,7 @@ def test_masked_pixels_do_not_count():
 
 def test_channels_are_in_range():
     image = np.random.default_rng(0).integers(0, 256, (40, 50, 3), dtype=np.uint8)
-    planes = features(image, ("grey", "lab", "texture"), median_px=3)
+    planes = features(image, ("grey", "lab", "texture"))
     assert planes.shape == (7, 40, 50) and planes.dtype == np.float32
     assert planes.min() >= 0 and planes.max() <= 1
 
