@@ -163,7 +163,7 @@ def result_of(silhouettes, dice):  # type: ignore[no-untyped-def]
         weight=dice.uniform(size=MATCHES),
     )  # fmt: skip
     state = FrameState(
-        estimate=Estimate(pose=pose, parameters=parameters, covariance=spread @ spread.T),
+        estimate=Estimate(pose=pose, parameters=parameters, covariance=spread @ spread.T, observed=np.ones(ANGLES)),
         cloth=Cloth(vertices=dice.normal(size=(CLOTH, 3)), parameters=parameters),
         segmentation=Segmentation(silhouettes=silhouettes, appearance={"regions": dice.normal(size=(4, 2, 6))}),
         matches=matches,

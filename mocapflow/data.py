@@ -186,6 +186,7 @@ class Estimate:
     pose: Pose
     parameters: F64 = array("Q", unit="by name")
     covariance: F64 = array("S", "S", unit="of (omega, v, angles, parameters)")
+    observed: F64 = array("D", unit="1, share of the priors' variance of each angle that the images took away")
     energies: Mapping[str, float] = field(default_factory=dict)
 
 

@@ -29,7 +29,7 @@ def columns_of(result: FrameResult, cameras: int) -> Columns:
         "iterations": (), "steady": (), "oscillating": (), "body_change": (), "cloth_change": (), "angle_change": (),
         "usable": (cameras,), "overlap": (cameras,), "seconds": (len(result.seconds),), "match_count": (),
         "energy": result.energy.shape,
-        "covariance": (6 + angles, 6 + angles),
+        "observed": (angles,), "covariance": (6 + angles, 6 + angles),
     }  # fmt: skip
 
 
@@ -42,7 +42,7 @@ def row_of(columns: Columns, frame: Frame, result: FrameResult, steps: Sequence[
         "oscillating": result.oscillating, "body_change": result.change.body, "cloth_change": result.change.cloth,
         "angle_change": result.change.angles, "usable": frame.usable, "overlap": result.overlap,
         "seconds": [result.seconds.get(step, 0.0) for step in steps], "match_count": len(result.state.matches.weight),
-        "energy": result.energy, "covariance": estimate.covariance[:rank, :rank],
+        "energy": result.energy, "observed": estimate.observed, "covariance": estimate.covariance[:rank, :rank],
     }  # fmt: skip
     parts = [np.asarray(values[name], float) for name in columns]
     for part, (name, shape) in zip(parts, columns.items(), strict=True):

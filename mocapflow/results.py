@@ -21,6 +21,7 @@ class Track:
     root: F64 = array("T", 4, 4, unit="m, world_from_body")
     angles: F64 = array("T", "D", unit="rad")
     covariance: F64 = array("T", "R", "R", unit="of (omega, v, angles)")
+    observed: F64 = array("T", "D", unit="1, share of the priors' variance of each angle that the images took away")
     cloth: F64 = array("T", "W", 3, unit="m")
     cloth_parameters: F64 = array("T", "Q", unit="by name")
     iterations: I16 = array("T", unit="turns of the loop")

@@ -171,7 +171,7 @@ def believed(pose: Pose, parameters: F64, cloth: Cloth) -> FrameState:
     """Return the state of a frame nobody has looked at."""
     covariance = UNKNOWN * np.eye(6 + len(pose.angles) + len(parameters))
     return FrameState(
-        estimate=Estimate(pose=pose, parameters=parameters, covariance=covariance),
+        estimate=Estimate(pose=pose, parameters=parameters, covariance=covariance, observed=np.zeros(len(pose.angles))),
         cloth=cloth,
         segmentation=Segmentation(silhouettes=()),
         matches=empty_matches(),

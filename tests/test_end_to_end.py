@@ -100,11 +100,13 @@ def test_knees_under_cloth_within_three_degrees(whole, clip, side):
 def test_every_frame_has_every_angle_and_its_deviation(whole, clip, file):
     ours, truth = table(whole[clip] / "results" / file), table(CLIPS[clip] / "truth/angles.csv")
     angles = [name for name in truth if name != "frame"]
-    assert list(ours) == ["frame", "time", *(column for name in angles for column in (name, f"{name}_sd"))]
+    pairs = [column for name in angles for column in (name, f"{name}_sd")]
+    assert list(ours) == ["frame", "time", *pairs, *(f"{name}_observed" for name in angles)]
     np.testing.assert_array_equal(ours["frame"], truth["frame"])
     assert (np.diff(ours["time"]) > 0).all()
     assert all(np.isfinite(column).all() for column in ours.values())
     assert all((ours[f"{name}_sd"] > 0).all() for name in angles)
+    assert all((ours[f"{name}_observed"] > 0.5).all() for name in angles if name.startswith("knee"))
 
 
 @long

@@ -25,7 +25,7 @@ class Towards(PoseSolver):
         pose = state.estimate.pose
         match(model.surface(pose, state.cloth))
         moved = Pose(root=pose.root, angles=pose.angles * (1 - self.share))
-        return Estimate(pose=moved, parameters=state.estimate.parameters, covariance=np.eye(8))
+        return Estimate(pose=moved, parameters=state.estimate.parameters, covariance=np.eye(8), observed=np.ones(2))
 
 
 class Nothing(Predictor):

@@ -31,6 +31,7 @@ class AngleSeries:
     names: tuple[str, ...]
     value: F64 = array("T", "A", unit="deg")
     sd: F64 = array("T", "A", unit="deg, standard deviation")
+    observed: F64 = array("T", "A", unit="1, share that the images determined; the rest is the priors'")
 
 
 def definitions(joint_names: tuple[str, ...]) -> tuple[Definition, ...]:
@@ -68,17 +69,21 @@ def anatomical_axes(body: Body) -> F64:
     return np.stack([np.cross(left, up), up, -left])
 
 
-def measure(body: Body, root: F64, angles: F64, covariance: F64 | None = None) -> AngleSeries:
-    """Return the angles of a track and, by first-order propagation, their standard deviations.
+def measure(
+    body: Body, root: F64, angles: F64, covariance: F64 | None = None, observed: F64 | None = None
+) -> AngleSeries:
+    """Return the angles of a track, by first-order propagation their standard deviations, and what was seen of them.
 
     Args:
         body: the body.
         root: (T, 4, 4) m, world_from_body.
         angles: (T, D) rad.
         covariance: (T, 6 + D, 6 + D) of increments (omega, v, angles); without it the deviations are NaN.
+        observed: (T, D) share of each joint angle that the images determined; without it those of the result are NaN.
     """
     wanted = definitions(body.joint_names)
-    value, sd = np.empty((len(root), len(wanted))), np.full((len(root), len(wanted)), np.nan)
+    value = np.empty((len(root), len(wanted)))
+    sd, share = np.full_like(value, np.nan), np.full_like(value, np.nan)
     axes = anatomical_axes(body)
     below = kinematics.descendants(body.parents)[body.screw_joint]  # (D, J)
     indices = [[body.joint(name) for name in wish.points] for wish in wanted]
@@ -98,7 +103,9 @@ def measure(body: Body, root: F64, angles: F64, covariance: F64 | None = None) -
             if covariance is not None:
                 variance = gradient @ covariance[row] @ gradient
                 sd[row, column] = np.degrees(np.sqrt(max(variance, 0.0)))
-    return AngleSeries(names=tuple(d.name for d in wanted), value=value, sd=sd)
+            if observed is not None:
+                share[row, column] = np.average(observed[row], weights=gradient[6:] ** 2)
+    return AngleSeries(names=tuple(d.name for d in wanted), value=value, sd=sd, observed=share)
 
 
 def _velocities(places: F64, screws: F64, below: Bool) -> F64:

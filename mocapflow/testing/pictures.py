@@ -48,7 +48,8 @@ def tiny_state(scene: Scene, pose: Pose, seen: Pose | None = None) -> FrameState
     """Return what the loop knows when it believes in `pose` while the silhouettes show `seen`."""
     cloth = tiny_cloth(scene, pose)
     unknowns = 6 + len(pose.angles) + len(cloth.parameters)
-    estimate = Estimate(pose=pose, parameters=cloth.parameters, covariance=1e-4 * np.eye(unknowns))
+    observed = np.ones(len(pose.angles))
+    estimate = Estimate(pose=pose, parameters=cloth.parameters, covariance=1e-4 * np.eye(unknowns), observed=observed)
     return FrameState(
         estimate=estimate, cloth=cloth, segmentation=tiny_segmentation(scene, seen or pose), matches=empty_matches()
     )

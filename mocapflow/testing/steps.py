@@ -157,7 +157,7 @@ class PoseSolverConformance(Conformance):
     pose_solver: PoseSolver
 
     def test_it_solves(self) -> None:
-        """A few calls bring every vertex to within a millimetre; the covariance is one; nothing is changed."""
+        """A few calls bring every vertex within a millimetre; covariance and shares are such; nothing is changed."""
         scene = scenes.tiny_scene()
         truth = scenes.tiny_pose(scene, 8)
         pose = moved(truth, np.full(6 + len(truth.angles), 0.03))
@@ -170,6 +170,7 @@ class PoseSolverConformance(Conformance):
         assert estimate.covariance.shape == (unknowns, unknowns)
         np.testing.assert_allclose(estimate.covariance, estimate.covariance.T, rtol=1e-6, atol=1e-15)
         assert np.linalg.eigvalsh(estimate.covariance).min() >= -1e-12
+        assert ((estimate.observed >= 0) & (estimate.observed <= 1)).all()
         reached, wanted = scene.surface(pose, NO_CLOTH).vertices, scene.surface(truth, NO_CLOTH).vertices
         assert np.linalg.norm(reached - wanted, axis=1).max() < 1e-3
 

@@ -11,8 +11,8 @@ from mocapflow_formats.result import Result, library
 
 
 def write(result: Result, path: Path) -> None:
-    """Write frame, time and every angle with its standard deviation; degrees."""
+    """Write frame, time, and of every angle value, standard deviation (degrees) and observed share."""
     track = result.track
-    series = angles.measure(result.scene.body, track.root, track.angles, track.covariance)
+    series = angles.measure(result.scene.body, track.root, track.angles, track.covariance, track.observed)
     table = library("pyarrow", "parquet").table({**tables.angle_columns(track, series), "frame": track.frame})
     library("pyarrow.parquet", "parquet").write_table(table, path)

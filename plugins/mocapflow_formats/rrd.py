@@ -59,7 +59,7 @@ def log_model(rr: Any, stream: Any, result: Result, row: int) -> None:
     bones = [[result.places[row, p], result.places[row, j]] for j, p in enumerate(scene.body.parents) if p >= 0]
     stream.log("world/skeleton", rr.LineStrips3D(bones))
     pose = track.root[row : row + 1], track.angles[row : row + 1]
-    series = angles.measure(scene.body, *pose, track.covariance[row : row + 1])
+    series = angles.measure(scene.body, *pose)
     for name, value in zip(series.names, series.value[0], strict=True):
         stream.log(f"angles/{name}", rr.Scalars(value))
 

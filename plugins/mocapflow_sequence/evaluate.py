@@ -60,7 +60,7 @@ def evaluate_run(run_folder: Path, truth: Path) -> Evaluation:
 def evaluate(ours: Mapping[str, F64], raw: Mapping[str, F64], truth: Path, folder: Path) -> Evaluation:
     """Compare tables of angles (smoothed and raw) with a reference file; writes evaluation.csv and errors.csv."""
     reference = at_our_frames(read_reference(truth), ours)
-    shared = [name for name in ours if name in reference and name not in ("frame", "time")]
+    shared = [name for name in tables.angle_names(ours) if name in reference]
     rows: list[Mapping[str, float | str]] = []
     for name in shared:
         if not np.isfinite(reference[name]).any():

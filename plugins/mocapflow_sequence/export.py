@@ -22,9 +22,10 @@ Format = Literal["csv", "mot", "trc", "bvh", "c3d", "gltf", "movement", "parquet
 class Export(Stage):
     """Writes results/angles.csv, angles_raw.csv and energy.csv, angles.mot, joints.trc and run.json.
 
-    The csv of angles hold one row per frame: the angles between joint centres in degrees (`geometry.angles`) and their
-    standard deviations; energy.csv one per turn of the loop: the terms of the functional. The mot holds signed joint
-    angles by OpenSim's names (`opensim`), the trc joint centres.
+    The csv of angles hold one row per frame: the angles between joint centres in degrees (`geometry.angles`), their
+    standard deviations, and as `_observed` the share of each that the images determined; energy.csv
+    one per turn of the loop: the terms of the functional. The mot holds signed joint angles by OpenSim's names
+    (`opensim`), the trc joint centres.
     Other formats are written by `mocapflow_formats`.
     """
 
@@ -35,7 +36,8 @@ class Export(Stage):
         """Write the files and return their paths."""
         result = Result(track=track, scene=scene, recording=recording)
         paths = [path for name in self.formats for path in written(name, result, run_folder.path)]
-        content = runjson.summary(track, run_folder, recording.warnings + scene.warnings)
+        warnings = recording.warnings + scene.warnings
+        content = runjson.summary(track, measured(track, scene), run_folder, warnings)
         return Files(paths=(*paths, runjson.write(layout.place(run_folder.path, layout.RUN), content)))
 
 
@@ -79,5 +81,5 @@ def write_joints(result: Result, folder: Path) -> list[Path]:
 
 
 def measured(track: Track, scene: Scene) -> angles.AngleSeries:
-    """Return the angles of a track with their standard deviations."""
-    return angles.measure(scene.body, track.root, track.angles, track.covariance)
+    """Return the angles of a track, how sure they are, and what was seen of them."""
+    return angles.measure(scene.body, track.root, track.angles, track.covariance, track.observed)

@@ -1,11 +1,13 @@
-"""Which frames of a track were lost: their poses are guesses."""
+"""What is a guess: frames of a track that were lost, angles that no image shows."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from mocapflow.records import Bool
+from mocapflow.records import F64, Bool
 from mocapflow.results import Track
+
+HALF = 0.5  # of an angle's variance: where the images take away less, the priors decide it
 
 
 def lost_rows(track: Track) -> Bool:
@@ -14,3 +16,9 @@ def lost_rows(track: Track) -> Bool:
     unknown = ~np.isfinite(track.covariance).all((1, 2))
     lost: Bool = (track.iterations == 0) | blind | unknown
     return lost
+
+
+def unseen(observed: F64) -> Bool:
+    """Return True where the priors decided an angle, by the share that was observed; False where that is unknown."""
+    held: Bool = observed < HALF
+    return held

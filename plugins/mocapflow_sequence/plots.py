@@ -10,9 +10,11 @@ import numpy as np
 
 from mocapflow.records import F64, Bool
 from mocapflow.results import Evaluation, Track
+from mocapflow_sequence import tables
+from mocapflow_sequence.lost import unseen
 
 NINETY_FIVE = 1.96  # standard deviations
-OURS, RAW, TRUTH = "#1f5fbf", "#8fb4e8", "black"
+OURS, RAW, TRUTH, HELD = "#1f5fbf", "#8fb4e8", "black", "#888888"
 
 
 def plot_angles(
@@ -24,6 +26,8 @@ def plot_angles(
 ) -> Path:
     """Write one panel per angle: ours with its 95 % band, unsmoothed thin, the reference black, the RMS in the title.
 
+    Frames in which no image shows the angle are shaded grey.
+
     Args:
         path: the png.
         ours: columns of angles.csv.
@@ -34,7 +38,7 @@ def plot_angles(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    names = [name for name in ours if name not in ("frame", "time") and not name.endswith("_sd")]
+    names = tables.angle_names(ours)
     rows = max(1, -(-len(names) // 2))
     figure = Figure(figsize=(12, 0.6 + 2.3 * rows), layout="constrained")
     FigureCanvasAgg(figure)
@@ -90,6 +94,8 @@ def _panel(
     frame, value, half = ours["frame"], ours[name], NINETY_FIVE * ours[f"{name}_sd"]
     shown = np.where(np.isfinite(half), half, 0.0)
     panel.fill_between(frame, value - shown, value + shown, color=OURS, alpha=0.18, linewidth=0, label="95 % interval")
+    for row in np.flatnonzero(unseen(ours[f"{name}_observed"])):
+        panel.axvspan(frame[row] - 0.5, frame[row] + 0.5, color=HELD, alpha=0.25, linewidth=0)
     panel.plot(frame, raw[name], color=RAW, linewidth=0.8, label="unsmoothed")
     if name in reference:
         panel.plot(frame, reference[name], color=TRUTH, linewidth=1.3, label="reference")

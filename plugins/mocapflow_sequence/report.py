@@ -45,13 +45,19 @@ class Report(Stage):
         curves = plot(track, scene, evaluation, run_folder.path)
         views, overlap = [camera.name for camera in scene.cameras], layout.place(run_folder.path, layout.OVERLAP)
         plots.plot_overlap(overlap, track, views, lost_rows(track))
-        summary = runjson.plain(runjson.summary(track, run_folder, recording.warnings + scene.warnings))
+        warnings = recording.warnings + scene.warnings
+        summary = runjson.plain(runjson.summary(track, measured(track, scene), run_folder, warnings))
         sections = [
             ("Deviation from the reference", _deviations(evaluation)),
             ("Angles", page.picture(curves.read_bytes(), "png")),
             ("Overlay", "\n".join(stills(track, scene, recording))),
             ("Overlap of model and image", page.picture(overlap.read_bytes(), "png")),
-            ("What happened", page.listing([*summary["warnings"], *_mishaps(track), *summary["notes"]])),
+            (
+                "What happened",
+                page.listing(
+                    [*summary["warnings"], *_mishaps(track, summary["frames"]["held_by_priors"]), *summary["notes"]]
+                ),
+            ),
             ("CPU time", page.table(_times(track))),
             ("How it was made", page.code(json.dumps(summary["recipe"], indent=1, ensure_ascii=False))),
         ]
@@ -122,10 +128,11 @@ def _deviations(evaluation: Evaluation | None) -> str:
     )
 
 
-def _mishaps(track: Track) -> list[str]:
+def _mishaps(track: Track, held: Mapping[str, int]) -> list[str]:
     lost, restless = track.frame[lost_rows(track)], track.frame[~track.steady]
     said = [f"frames lost and bridged: {', '.join(map(str, lost))}"] if len(lost) else []
-    return said + ([f"frames that did not come to rest: {', '.join(map(str, restless))}"] if len(restless) else [])
+    said += [f"frames that did not come to rest: {', '.join(map(str, restless))}"] if len(restless) else []
+    return said + [f"{name}: no image shows it in {count} frames; the priors hold it" for name, count in held.items()]
 
 
 def _times(track: Track) -> list[dict[str, Any]]:

@@ -11,13 +11,14 @@ from typing import Any
 
 import numpy as np
 
+from mocapflow.geometry.angles import AngleSeries
 from mocapflow.results import RunFolder, Track
-from mocapflow_sequence.lost import lost_rows
+from mocapflow_sequence.lost import lost_rows, unseen
 
 FRAME = re.compile(r"^frame (\d+): ?(.*)$")
 
 
-def summary(track: Track, run_folder: RunFolder, warnings: tuple[str, ...] = ()) -> dict[str, Any]:
+def summary(track: Track, series: AngleSeries, run_folder: RunFolder, warnings: tuple[str, ...] = ()) -> dict[str, Any]:
     """Return what run.json says: recipe, seconds per step, and per frame iterations, rest, overlap and mishaps."""
     seconds = track.seconds
     lost = lost_rows(track)
@@ -31,6 +32,7 @@ def summary(track: Track, run_folder: RunFolder, warnings: tuple[str, ...] = ())
             "not_at_rest": track.frame[~track.steady],
             "lost": track.frame[lost],
             "bridged_by": "the neighbouring frames, in `smooth`" if lost.any() and track.raw_root is not None else None,
+            "held_by_priors": held_by_priors(series),
         },
         "cpu_seconds": {
             "total": float(np.nansum(seconds)),
@@ -41,6 +43,12 @@ def summary(track: Track, run_folder: RunFolder, warnings: tuple[str, ...] = ())
         "notes": list(track.notes),
         "per_frame": [_frame(track, row, bool(lost[row])) for row in range(len(track.frame))],
     }
+
+
+def held_by_priors(series: AngleSeries) -> dict[str, int]:
+    """Return in how many frames the priors decided an angle, for the angles where they did."""
+    counts = dict(zip(series.names, unseen(series.observed).sum(axis=0).tolist(), strict=True))
+    return {name: count for name, count in counts.items() if count}
 
 
 def write(path: Path, content: Mapping[str, Any]) -> Path:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,12 +15,18 @@ from mocapflow.results import Track
 
 
 def angle_columns(track: Track, series: AngleSeries) -> dict[str, F64]:
-    """Return the columns of angles.csv: frame, time, then every angle followed by its standard deviation."""
+    """Return the columns of angles.csv: frame, time, every angle followed by its deviation, then what was seen."""
     columns = {"frame": track.frame.astype(np.float64), "time": track.time}
     for column, name in enumerate(series.names):
         columns[name] = series.value[:, column]
         columns[f"{name}_sd"] = series.sd[:, column]
-    return columns
+    observed = {f"{name}_observed": series.observed[:, column] for column, name in enumerate(series.names)}
+    return columns | observed
+
+
+def angle_names(columns: Iterable[str]) -> list[str]:
+    """Return which columns of angles.csv are angles."""
+    return [name for name in columns if name not in ("frame", "time") and not name.endswith(("_sd", "_observed"))]
 
 
 def energy_columns(track: Track) -> dict[str, F64]:

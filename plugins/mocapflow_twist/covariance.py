@@ -69,6 +69,26 @@ def covariance(data: F64, prior: F64, energy: float, measurements: float) -> F64
     both = (data + prior) / scale / scale[:, None]
     spent = float(np.trace(np.linalg.solve(both, data / scale / scale[:, None])))
     s2 = residual_scale(energy, measurements, spent)
-    inverse = np.linalg.inv((data / s2 + prior) / scale / scale[:, None])
-    spread: F64 = 0.5 * (inverse + inverse.T) / scale / scale[:, None]
-    return spread
+    return _inverse(data / s2 + prior)
+
+
+def observed(spread: F64, prior: F64) -> F64:
+    """Return which share of the variance that the priors leave to each unknown the data took away: (S,), 0 to 1.
+
+    Where the priors don't link unknowns this is the diagonal of the model resolution matrix, covariance times
+    information of the data: what a unit change of the truth moves the estimate by, and nothing where a limb is unseen.
+
+    Args:
+        spread: (S, S) covariance given data and priors.
+        prior: (S, S) precision of the priors, positive definite.
+    """
+    share: F64 = np.clip(1.0 - np.diag(spread) / np.diag(_inverse(prior)), 0.0, 1.0)
+    return share
+
+
+def _inverse(precision: F64) -> F64:
+    """Return the inverse of a positive definite matrix, scaled to a unit diagonal first: units differ widely."""
+    scale = np.sqrt(np.diag(precision))
+    inverse = np.linalg.inv(precision / scale / scale[:, None])
+    symmetric: F64 = 0.5 * (inverse + inverse.T) / scale / scale[:, None]
+    return symmetric

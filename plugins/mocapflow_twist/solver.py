@@ -15,7 +15,7 @@ from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow_twist import solve
 from mocapflow_twist.constraint import image_rows, line_rows
-from mocapflow_twist.covariance import covariance, effective_share, view_balance
+from mocapflow_twist.covariance import covariance, effective_share, observed, view_balance
 from mocapflow_twist.motion import ClothMotion
 from mocapflow_twist.problem import Anchor, Data, Guess, Problem
 
@@ -62,7 +62,7 @@ class TwistGaussNewton(PoseSolver):
         past: Past,
         turn: Turn,
     ) -> Estimate:
-        """Return the pose that explains the matches best, with its covariance."""
+        """Return the pose that explains the matches best, its covariance, and what the images told of it."""
         guess = Guess(state.estimate.pose, state.cloth)
         motion = ClothMotion(model, past, self.cloth_unknowns, self.redrape == "every", self.cloth_jacobian == "once")
         anchor = Anchor(calmed(guess, model), self._precision(model, guess))
@@ -142,6 +142,7 @@ class TwistGaussNewton(PoseSolver):
             pose=guess.pose,
             parameters=np.array(guess.cloth.parameters),
             covariance=to_origin @ about_root @ to_origin.T,
+            observed=observed(about_root, prior.hessian)[6 : 6 + len(guess.pose.angles)],
             energies=problem.energies(guess),
         )
 

@@ -98,3 +98,12 @@ def test_legs_only_body_has_no_elbows() -> None:
     body = stick_body(keep=("pelvis", "hip", "knee", "ankle", "toe"))
     names = angles.measure(body, np.eye(4)[None], np.zeros((1, len(body.twists)))).names
     assert names == ("knee_flexion_l", "knee_flexion_r", "hip_flexion_l", "hip_flexion_r", "ankle_l", "ankle_r")
+
+
+def test_an_angle_is_observed_as_far_as_the_joint_that_makes_it() -> None:
+    body = stick_body()
+    root, at = np.eye(4)[None], np.full((1, len(body.twists)), 0.2)
+    seen = np.array([not name.startswith("knee_l") for name in body.screw_names], float)[None]
+    shares = angles.measure(body, root, at, observed=seen)
+    assert shares.observed[0] == pytest.approx([float(name != "knee_flexion_l") for name in shares.names])
+    assert np.isnan(angles.measure(body, root, at).observed).all()

@@ -48,7 +48,7 @@ def seen(model, truth):
 def fitted(fitter, model, truth, start, past=None):
     blank = np.zeros((SIZE[1], SIZE[0], 3), np.uint8)
     frame = Frame(index=0, time=0.0, images=(blank,) * 4, usable=np.ones(4, bool))
-    estimate = Estimate(pose=STANDING, parameters=start, covariance=np.eye(10 + len(start)))
+    estimate = Estimate(pose=STANDING, parameters=start, covariance=np.eye(10 + len(start)), observed=np.ones(4))
     return fitter.fit(frame, seen(model, truth), estimate, model, past or Past(), TURN)
 
 
@@ -119,7 +119,7 @@ def test_samples_cover_every_force(model):
 def test_the_slope_that_gauss_newton_follows_is_the_energys(model):
     truth, start = parameters(model, flare_rad=0.1, wind_cos_rad=0.1), parameters(model, thickness_m=0.005)
     cloth = model.drape(STANDING, start, Past())
-    estimate = Estimate(pose=STANDING, parameters=start, covariance=np.eye(16))
+    estimate = Estimate(pose=STANDING, parameters=start, covariance=np.eye(16), observed=np.ones(4))
     surface = model.surface(STANDING, cloth)
     task = Task(GaussNewton(spacing_px=1.0), seen(model, truth), estimate, model, model.scene.garment, Past(), surface)
     slope = task.equations(cloth).gradient[1:]  # without the thickness

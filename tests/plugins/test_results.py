@@ -49,8 +49,12 @@ def folder(scene: Scene, recording: Recording, tmp_path_factory: pytest.TempPath
 
 def test_angles_have_the_columns_of_the_truth_each_with_its_deviation(folder: Path) -> None:
     header = (folder / layout.ANGLES).read_text().splitlines()[0].split(",")
-    assert [c for c in header if not c.endswith("_sd")] == ["frame", "time", *COLUMNS]
-    assert {c for c in header if c.endswith("_sd")} == {f"{c}_sd" for c in COLUMNS}
+    assert header == [
+        *("frame", "time"),
+        *(column for name in COLUMNS for column in (name, f"{name}_sd")),
+        *(f"{name}_observed" for name in COLUMNS),
+    ]
+    assert tables.angle_names(header) == COLUMNS
     columns = tables.read_columns(folder / layout.ANGLES)
     assert (columns["frame"] == np.arange(40)).all()
     assert all(np.isfinite(v).all() for v in columns.values())
@@ -124,12 +128,15 @@ def test_run_json_says_how_it_was_made_and_how_it_went(scene: Scene, recording: 
     broken = replace(
         track, iterations=turns, steady=steady, usable=usable, overlap=overlap, notes=("frame 3: cam02 black", note)
     )
-    exported(Smooth().run(track=broken), scene, recording, tmp_path)
+    observed = track.observed.copy()
+    observed[4:, scene.body.screw_names.index("knee_l.x")] = 0.2
+    exported(Smooth().run(track=replace(broken, observed=observed)), scene, recording, tmp_path)
     got = json.loads((tmp_path / layout.RUN).read_text())
     assert got["recipe"]["versions"] == {"numpy": np.__version__}
     assert got["frames"]["lost"] == [3]
     assert "neighbouring" in got["frames"]["bridged_by"]
     assert got["frames"]["not_at_rest"] == [2, 3]
+    assert got["frames"]["held_by_priors"] == {"knee_flexion_l": 2}
     assert got["cpu_seconds"]["per_step"] == pytest.approx({"segment": 0.06, "solve": 0.06})
     assert [f["iterations"] for f in got["per_frame"]] == [3, 3, 3, 0, 3, 3]
     assert got["per_frame"][3]["overlap"] == [None] * 4
@@ -145,7 +152,7 @@ def test_plain_makes_json_of_what_a_recipe_may_hold() -> None:
 def test_legs_alone_export(recording: Recording, tmp_path: Path) -> None:
     body = ball_body(("pelvis", "hip_l", "knee_l", "ankle_l", "toe_l", "hip_r", "knee_r", "ankle_r", "toe_r"))
     exported(stepping(body, 4), Scene(cameras=cameras(), body=body), recording, tmp_path)
-    assert list(tables.read_columns(tmp_path / layout.ANGLES))[2::2] == COLUMNS[:6]
+    assert tables.angle_names(tables.read_columns(tmp_path / layout.ANGLES)) == COLUMNS[:6]
 
 
 def test_table_with_a_missing_cell_says_where(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mocapflow_twist.covariance import effective_share, view_balance
+from mocapflow_twist.covariance import covariance, effective_share, observed, view_balance
 from mocapflow_twist.solver import TwistGaussNewton
 from test_twist_solver import FREE, solve
 from twist_fixtures import exact_matches, make_pose, make_scene
@@ -81,3 +81,19 @@ def test_the_covariance_is_that_of_repeated_noise(promised: float) -> None:
     assert np.sqrt(np.mean(spread**2, axis=0) / np.diag(stated)) == pytest.approx(1.0, abs=0.15)  # 2.5 of its sd
     squared = [e @ np.linalg.solve(c, e) for e, c in zip(spread, covariances, strict=True)]
     assert np.mean(squared) == pytest.approx(18.0, rel=0.1)
+
+
+def test_the_observed_share_is_the_resolution_where_priors_do_not_link_the_unknowns() -> None:
+    rng = np.random.default_rng(1)
+    rows = rng.normal(size=(5, 8)) * np.logspace(-3, 3, 8)  # five measurements of eight unknowns
+    data, prior = rows.T @ rows, np.diag(np.logspace(-4, 4, 8))
+    spread = covariance(data, prior, 2.5, 5.0)
+    resolution = np.eye(8) - spread @ prior
+    assert observed(spread, prior) == pytest.approx(np.diag(resolution), abs=1e-9)
+
+
+def test_what_only_a_prior_links_to_the_images_counts_as_far_as_the_link_holds() -> None:
+    loose, tight = (np.array([[1.0, 0.0], [0.0, 1.0]]) + k * np.array([[1.0, -1.0], [-1.0, 1.0]]) for k in (0, 1e4))
+    data = np.diag([1e6, 0.0])  # only the first is seen
+    for prior, share in ((loose, 0.0), (tight, 1.0)):
+        assert observed(np.linalg.inv(data + prior), prior) == pytest.approx([1.0, share], abs=1e-3)

@@ -96,6 +96,7 @@ def test_a_hidden_limb_stays_and_is_unsure() -> None:
     assert np.degrees(np.abs(estimate.pose.angles - truth.angles)[seen]).max() < 0.05
     sd = np.degrees(np.sqrt(np.diag(estimate.covariance)))[6:]
     assert sd[HIDDEN] == pytest.approx(60.0, rel=1e-6) and sd[seen].max() < 2
+    assert estimate.observed[HIDDEN].max() < 1e-9 and estimate.observed[seen].min() > 0.99
 
 
 def test_a_hidden_limb_goes_where_a_prior_puts_it() -> None:
@@ -105,6 +106,7 @@ def test_a_hidden_limb_goes_where_a_prior_puts_it() -> None:
     stiff = [d for d in HIDDEN if np.isfinite(scene.body.rest_spread[d])]
     assert np.abs(estimate.pose.angles[stiff]).max() < 0.01
     assert np.sqrt(np.diag(estimate.covariance))[6:][stiff] == pytest.approx(scene.body.rest_spread[stiff], rel=0.02)
+    assert estimate.observed[HIDDEN].max() < 1e-9
 
 
 def test_without_matches_the_prediction_stays_with_the_priors_covariance() -> None:
@@ -117,6 +119,7 @@ def test_without_matches_the_prediction_stays_with_the_priors_covariance() -> No
         free = np.isinf(scene.body.rest_spread) & (np.abs(start.angles) < 1)
         assert np.degrees(sd[6:][free]) == pytest.approx(60.0)
         assert np.isfinite(estimate.covariance).all() and estimate.energies["data"] == 0
+        assert np.abs(estimate.observed).max() < 1e-9
 
 
 @pytest.mark.parametrize("seed", range(20))

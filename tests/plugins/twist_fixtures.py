@@ -96,7 +96,7 @@ def exact_matches(scene: Scene, pose: Pose, vertices: np.ndarray, directed: bool
 
 def make_state(pose: Pose) -> FrameState:
     unknowns = 6 + len(pose.angles)
-    estimate = Estimate(pose=pose, parameters=np.empty(0), covariance=np.eye(unknowns))
+    estimate = Estimate(pose=pose, parameters=np.empty(0), covariance=np.eye(unknowns), observed=np.ones(unknowns - 6))
     return FrameState(
         estimate=estimate, cloth=NO_CLOTH, segmentation=Segmentation(silhouettes=()), matches=empty_matches()
     )
