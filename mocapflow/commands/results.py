@@ -15,7 +15,8 @@ from mocapflow.errors import RecordingError
 Run = Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")]
 Truth = Annotated[Path | None, typer.Option(help="Angles to compare with.  [default: those of the recording]")]
 Format = Annotated[
-    list[str], typer.Option("--format", help="csv, mot, trc, bvh, c3d, gltf, movement, parquet or rrd; repeatable.")
+    list[str],
+    typer.Option("--format", help="csv, mot, trc, bvh, c3d, gltf, movement, parquet, rrd or usd; repeatable."),
 ]
 COLUMNS = ("angle", "frames", "rms_deg", "mae_deg", "offset_deg", "max_deg", "worst_frame")
 

@@ -16,6 +16,7 @@ FILES: Mapping[str, str] = {  # format, which is the module's name: its file in 
     "movement": "poses.nc",
     "parquet": "angles.parquet",
     "rrd": "scene.rrd",
+    "usd": "scene.usdc",
 }
 
 

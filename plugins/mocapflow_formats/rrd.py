@@ -12,6 +12,7 @@ from mocapflow_formats.result import Result, library
 
 BODY, GARMENT, OUTLINE = (200, 160, 135), (60, 120, 130), (255, 200, 0)
 QUALITY = 80  # of the images, per cent
+DOT = 0.012  # m, radius of a joint
 
 
 def write(result: Result, path: Path) -> None:
@@ -58,6 +59,8 @@ def log_model(rr: Any, stream: Any, result: Result, row: int) -> None:
         stream.log("world/garment", cloth)
     bones = [[result.places[row, p], result.places[row, j]] for j, p in enumerate(scene.body.parents) if p >= 0]
     stream.log("world/skeleton", rr.LineStrips3D(bones))
+    names = list(scene.body.joint_names)
+    stream.log("world/joints", rr.Points3D(result.places[row], labels=names, show_labels=False, radii=DOT))
     pose = track.root[row : row + 1], track.angles[row : row + 1]
     series = angles.measure(scene.body, *pose)
     for name, value in zip(series.names, series.value[0], strict=True):

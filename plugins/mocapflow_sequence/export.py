@@ -16,7 +16,7 @@ from mocapflow.results import Files, RunFolder, Track
 from mocapflow.scene import Scene
 from mocapflow_sequence import layout, opensim, runjson, tables
 
-Format = Literal["csv", "mot", "trc", "bvh", "c3d", "gltf", "movement", "parquet", "rrd"]
+Format = Literal["csv", "mot", "trc", "bvh", "c3d", "gltf", "movement", "parquet", "rrd", "usd"]
 
 
 class Export(Stage):

@@ -5,16 +5,16 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
+import cv2
 import numpy as np
 import pytest
-from mocapflow_formats import Result, write
+import readers
+from mocapflow_formats import FILES, Result, write
 from results_scene import DEMO, demo_scene, stepping
-from scipy.spatial.transform import Rotation
 
 from mocapflow.errors import PipelineError
+from mocapflow.geometry import angles
 from mocapflow.recording import open_recording
 
 NEAR = 1e-4  # m
@@ -39,6 +39,7 @@ def result() -> Result:
         ("movement", "h5netcdf"),
         ("parquet", "pyarrow.parquet"),
         ("rrd", "rerun"),
+        ("usd", "pxr.Usd"),
     ],
 )
 def test_a_missing_library_is_named(
@@ -49,17 +50,15 @@ def test_a_missing_library_is_named(
         write(name, result, tmp_path)
 
 
-@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")  # of the reader
-def test_bvh(result: Result, tmp_path: Path) -> None:
-    import bvhio
-
-    root = bvhio.readAsHierarchy(str(write("bvh", result, tmp_path)))
-    for row in range(len(result.track.frame)):
-        root.loadPose(row)
-        for joint, _, _ in root.layout():
-            x, y, z = joint.PositionWorld
-            expected = result.places[row, result.scene.body.joint(joint.Name)]
-            np.testing.assert_allclose([x / 100, -z / 100, y / 100], expected, atol=NEAR)
+@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning", "ignore:No analog data")  # of the readers
+@pytest.mark.parametrize("name", sorted(set(FILES) & set(readers.JOINTS)))
+def test_joint_centres_come_back(name: str, result: Result, tmp_path: Path) -> None:
+    if name == "usd":
+        pytest.importorskip("pxr")
+    names, places = readers.JOINTS[name](write(name, result, tmp_path))
+    assert set(names) == set(result.scene.body.joint_names)
+    order = [names.index(joint) for joint in result.scene.body.joint_names]
+    np.testing.assert_allclose(places[:, order], result.places, atol=NEAR)
 
 
 def test_bvh_by_another_reader(result: Result, tmp_path: Path) -> None:
@@ -72,15 +71,11 @@ def test_bvh_by_another_reader(result: Result, tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("ignore:No analog data")
-def test_c3d(result: Result, tmp_path: Path) -> None:
+def test_c3d_has_the_frame_rate(result: Result, tmp_path: Path) -> None:
     import c3d
 
     with write("c3d", result, tmp_path).open("rb") as file:
-        reader = c3d.Reader(file)
-        frames = [points[:, :3] for _, points, _ in reader.read_frames()]
-    assert [label.strip() for label in reader.point_labels] == list(result.scene.body.joint_names)
-    assert reader.point_rate == pytest.approx(result.track.frame_rate)
-    np.testing.assert_allclose(np.array(frames) / 1000, result.places, atol=NEAR)
+        assert c3d.Reader(file).point_rate == pytest.approx(result.track.frame_rate)
 
 
 def test_parquet(result: Result, tmp_path: Path) -> None:
@@ -91,17 +86,15 @@ def test_parquet(result: Result, tmp_path: Path) -> None:
     np.testing.assert_array_equal(table["frame"].to_numpy(), result.track.frame)
 
 
-def test_movement(result: Result, tmp_path: Path) -> None:
+def test_movement_has_the_names_the_toolbox_reads(result: Result, tmp_path: Path) -> None:
     import xarray
 
     with xarray.open_dataset(write("movement", result, tmp_path), engine="h5netcdf") as dataset:
         assert dataset.position.dims == ("time", "space", "keypoints", "individuals")
         assert (dataset.attrs["ds_type"], dataset.attrs["time_unit"]) == ("poses", "seconds")
-        knee = dataset.position.sel(keypoints="knee_l", individuals="person")
-        np.testing.assert_allclose(knee, result.places[:, result.scene.body.joint("knee_l")])
 
 
-def test_gltf(result: Result, tmp_path: Path) -> None:
+def test_gltf_opens_and_moves_body_and_garment(result: Result, tmp_path: Path) -> None:
     import trimesh
 
     path = write("gltf", result, tmp_path)
@@ -109,46 +102,40 @@ def test_gltf(result: Result, tmp_path: Path) -> None:
     assert result.scene.garment is not None
     assert len(viewed.geometry["body"].faces) == len(result.scene.body.faces)
     assert len(viewed.geometry["garment"].faces) == len(result.scene.garment.faces)
-    places = played(path, 3)
-    y_up = np.stack([places[..., 0], -places[..., 2], places[..., 1]], axis=-1)
-    np.testing.assert_allclose(y_up, result.places[3], atol=NEAR)
+    played = readers.Gltf(path)
+    for row in (0, 3):
+        np.testing.assert_allclose(played.garment(row), result.track.cloth[row], atol=NEAR)
+        off = np.linalg.norm(played.skinned(row) - result.bare(row).vertices, axis=1)
+        assert off.max() < 2e-3  # the format has four joints a vertex, ours five
 
 
-def played(path: Path, row: int) -> np.ndarray:
-    """Return where the joints of a glTF file are in one frame, by the rules of the format: (J, 3) m, y up."""
-    import pygltflib
+def test_usd_opens_and_moves_body_and_garment(result: Result, tmp_path: Path) -> None:
+    pytest.importorskip("pxr")
+    from pxr import Usd, UsdGeom, UsdSkel
 
-    gltf = pygltflib.GLTF2.load_binary(str(path))
-    blob = gltf.binary_blob()
-
-    def values(index: int, width: int) -> np.ndarray:
-        view = gltf.bufferViews[gltf.accessors[index].bufferView]
-        return np.frombuffer(blob, np.float32, view.byteLength // 4, view.byteOffset).reshape(-1, width)
-
-    moves: dict[int, Any] = {k: SimpleNamespace(rotation=None, translation=None) for k in range(len(gltf.nodes))}
-    for channel in gltf.animations[0].channels:
-        output = gltf.animations[0].samplers[channel.sampler].output
-        width = {"rotation": 4, "translation": 3, "weights": 5}[channel.target.path]
-        setattr(moves[channel.target.node], channel.target.path, values(output, width)[row])
-    world = {}
-
-    def visit(index: int, parent: np.ndarray) -> None:
-        node, local = gltf.nodes[index], np.eye(4)
-        rotation, translation = moves[index].rotation, moves[index].translation
-        turn = node.rotation if rotation is None else rotation
-        shift = node.translation if translation is None else translation
-        local[:3, :3] = np.eye(3) if turn is None else Rotation.from_quat(turn).as_matrix()
-        local[:3, 3] = 0 if shift is None else shift
-        world[index] = parent @ local
-        for child in node.children:
-            visit(child, world[index])
-
-    visit(0, np.eye(4))
-    return np.array([world[joint][:3, 3] for joint in gltf.skins[0].joints])
+    stage = Usd.Stage.Open(str(write("usd", result, tmp_path)))
+    assert (UsdGeom.GetStageUpAxis(stage), UsdGeom.GetStageMetersPerUnit(stage)) == ("Z", 1.0)
+    assert stage.GetTimeCodesPerSecond() == pytest.approx(result.track.frame_rate)
+    garment = UsdGeom.Mesh(stage.GetPrimAtPath("/World/Garment")).GetPointsAttr()
+    np.testing.assert_allclose(garment.Get(3), result.track.cloth[3], atol=NEAR)
+    assert UsdSkel.BakeSkinning(UsdSkel.Root(stage.GetPrimAtPath("/World/Person")))
+    body = UsdGeom.Mesh(stage.GetPrimAtPath("/World/Person/Body")).GetPointsAttr()
+    np.testing.assert_allclose(body.Get(3), result.bare(3).vertices, atol=NEAR)
 
 
-def test_rerun(result: Result, tmp_path: Path) -> None:
-    pytest.importorskip("rerun")
-    path = write("rrd", result, tmp_path)
-    assert path.read_bytes()[:3] == b"RRF"
-    assert path.stat().st_size > 50_000
+def test_rerun_holds_everything_on_one_timeline(result: Result, tmp_path: Path) -> None:
+    logged = readers.rerun_entities(write("rrd", result, tmp_path))
+    track, body = result.track, result.scene.body
+    assert logged["/world/joints"]["frame"] == track.frame.tolist()
+    np.testing.assert_allclose(logged["/world/garment"]["Mesh3D:vertex_positions"], track.cloth, atol=NEAR)
+    np.testing.assert_allclose(logged["/world/body"]["Mesh3D:vertex_positions"][3], result.bare(3).vertices, atol=NEAR)
+    series = angles.measure(body, track.root, track.angles)
+    for column, name in enumerate(series.names):
+        np.testing.assert_allclose(np.ravel(logged[f"/angles/{name}"]["Scalars:scalars"]), series.value[:, column])
+    for camera in result.scene.cameras:
+        (lens,) = logged[f"/world/{camera.name}"]["Pinhole:image_from_camera"]
+        np.testing.assert_allclose(np.reshape(lens, (3, 3)).T, camera.intrinsics, rtol=1e-6)
+        image = np.array(logged[f"/world/{camera.name}/image"]["EncodedImage:blob"][3][0], np.uint8)
+        assert cv2.imdecode(image, cv2.IMREAD_COLOR).shape == (*camera.size[::-1], 3)
+        outline = np.concatenate(logged[f"/world/{camera.name}/outline"]["LineStrips2D:strips"][3])
+        assert (outline.min(0) > 0).all() and (outline.max(0) < camera.size).all()
