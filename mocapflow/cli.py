@@ -50,6 +50,7 @@ COMMANDS: tuple[Callable[..., None], ...] = (
     results.view,
     looking.plugins,
     looking.show,
+    looking.settings,
     looking.equations,
     looking.doctor,
 )

@@ -146,7 +146,7 @@ class Prior(Component):
     """A term the pose solver adds: limits, learned poses, smoothness."""
 
     role: ClassVar[str] = "prior"
-    weight: Annotated[float, Field(ge=0)] = 1.0
+    weight: Annotated[float, Field(ge=0)] = 1.0  # factor on its energy
 
     @abstractmethod
     def residual(self, pose: Pose, past: Past, scene: Scene) -> Residual:

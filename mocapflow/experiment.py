@@ -19,17 +19,20 @@ from mocapflow.yamlfile import Document, read
 
 PIPELINE = "pipeline"  # in a level: another pipeline file instead of a change
 
+Changes = dict[str, Any]  # PATH: value, as in --set
+Factors = dict[str, Annotated[dict[str, Changes | None], Field(min_length=1)]]
+
 
 class ExperimentFile(Strict):
     """What an experiment file may say."""
 
     name: ClassVar[str] = "an experiment"
-    mocapflow: Literal[1] = 1
-    pipeline: str
-    recordings: Annotated[tuple[str, ...], Field(min_length=1)]
+    mocapflow: Literal[1] = 1  # version of the format
+    pipeline: str  # a pipeline file
+    recordings: Annotated[tuple[str, ...], Field(min_length=1)]  # folders
     frames: str | None = None  # as --frames
-    change: dict[str, Any] = {}  # in every variant
-    factors: dict[str, Annotated[dict[str, dict[str, Any] | None], Field(min_length=1)]]
+    change: Changes = {}  # in every variant
+    factors: Factors  # factor: level: what it changes; `pipeline` in a level names another pipeline file
 
 
 @dataclass(frozen=True)

@@ -26,23 +26,23 @@ class Strict(BaseModel):
 class Frames(Strict):
     """The part of the recording to work on: `start` up to, without, `stop`."""
 
-    start: Annotated[int, Field(ge=0)] = 0
-    stop: Annotated[int, Field(ge=0)] | None = None
-    step: Annotated[int, Field(ge=1)] = 1
+    start: Annotated[int, Field(ge=0)] = 0  # the first frame
+    stop: Annotated[int, Field(ge=0)] | None = None  # where it ends, without this frame; null: with the recording
+    step: Annotated[int, Field(ge=1)] = 1  # takes every so many-th frame
 
 
 class PipelineFile(Strict):
-    """What a pipeline file may say at its top level."""
+    """What a pipeline file may say at its top level, besides `extends: FILE` and `change: {PATH: value}`."""
 
     name: ClassVar[str] = "a pipeline"
-    mocapflow: Literal[1] = 1
-    recording: str | None = None
-    plugins: tuple[str, ...] = ()
-    body: Any = "scanned"
-    garment: Any = None
+    mocapflow: Literal[1] = 1  # version of the format
+    recording: str | None = None  # a folder, from the folder of this file; instead of --recording
+    plugins: tuple[str, ...] = ()  # plugin files, from the folder of this file
+    body: Any = "scanned"  # a component `body`
+    garment: Any = None  # a component `garment`
     frames: Frames = Frames()
-    scale: Annotated[float, Field(gt=0, le=1)] = 1.0
-    stages: dict[str, Any]
+    scale: Annotated[float, Field(gt=0, le=1)] = 1.0  # of the images
+    stages: dict[str, Any]  # label: component `stage`, in their order
 
 
 @dataclass(frozen=True)

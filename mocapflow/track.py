@@ -50,10 +50,10 @@ class SteadyState(BaseModel):
     """When the loop counts as at rest."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
-    surface_mm: Positive = 0.5
-    angle_deg: Positive = 0.1
-    turns: Count = 2  # in a row within both tolerances
-    max_turns: Count = 8
+    surface_mm: Positive = 0.5  # largest move of a body vertex from turn to turn, RMS move of the cloth
+    angle_deg: Positive = 0.1  # largest change of a joint angle
+    turns: Count = 2  # in a row within both tolerances, then the frame is at rest
+    max_turns: Count = 8  # then the frame is left as it is
     halvings: Annotated[int, Field(ge=0)] = 0  # at most, of a step that raises the functional; 0: it is taken whole
 
     def limits(self) -> Steady:
@@ -74,17 +74,17 @@ class CoupledLoop(Stage):
     """
 
     name: ClassVar[str] = "coupled_loop"
-    predictor: Predictor
-    segmenter: Segmenter
+    predictor: Predictor  # where each frame begins
+    segmenter: Segmenter  # of every turn
     first_segmenter: Segmenter | None = None  # settles the first frame beforehand: one that needs no good pose
-    matchers: Annotated[tuple[Matcher, ...], Field(min_length=1)]
-    pose_solver: PoseSolver
+    matchers: Annotated[tuple[Matcher, ...], Field(min_length=1)]  # their pairs are pooled
+    pose_solver: PoseSolver  # of every turn
     draper: Draper | None = None  # needed with a garment
-    cloth_fitter: ClothFitter | None = None  # likewise
-    priors: tuple[Prior, ...] = ()
+    cloth_fitter: ClothFitter | None = None  # needed with a garment
+    priors: tuple[Prior, ...] = ()  # added to the matches
     steady: SteadyState = SteadyState()
     keep: Annotated[Literal["final", "trace"], FREE] = "final"  # trace: also the pose of every turn
-    on_unsteady: Annotated[Literal["go_on", "stop"], FREE] = "go_on"
+    on_unsteady: Annotated[Literal["go_on", "stop"], FREE] = "go_on"  # after a frame that did not come to rest
 
     @model_validator(mode="after")
     def _cloth_is_draped_and_fitted(self) -> CoupledLoop:

@@ -60,6 +60,7 @@ LAYERS = (  # a module imports only from its own layer or an earlier one; `io` a
     "shipped",
     "equations",
     "describe",
+    "manual",
     "scaffold",
     "commands",
     "cli",

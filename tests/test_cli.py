@@ -140,6 +140,12 @@ def test_plugins(call):
     assert result.stderr == ""
 
 
+def test_settings(call):
+    said = call("settings", "mocapflow").stdout
+    assert "| `steady.turns` | `int (≥ 1)` | `2` | | in a row within both tolerances" in said
+    assert "### contour_icp" not in call("settings", "someone-elses").stdout
+
+
 def test_show(call):
     shown = call("show", "prior", "joint_limits").stdout
     assert shown.startswith("prior joint_limits, from plugin 'priors' (mocapflow 0.1.0)\nA soft wall at the limits")

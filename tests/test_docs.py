@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from mocapflow import load_registry
+from mocapflow.manual import manual
 
 ROOT = Path(__file__).parents[1]
 
@@ -34,3 +35,15 @@ def test_the_plugin_in_contributing_loads_and_conforms(tmp_path: Path) -> None:
 def test_every_bash_block_is_run_by_ci(document: str, least: int) -> None:
     assert len(blocks(document, "bash")) >= least
     assert f"readme_commands.py {document}" in (ROOT / ".ci/run").read_text(encoding="utf-8")
+
+
+def test_the_table_of_settings_is_what_the_code_says() -> None:
+    written = (ROOT / "docs/settings.md").read_text(encoding="utf-8")
+    again = "write it again: mocapflow settings mocapflow > docs/settings.md"
+    assert written == manual(load_registry(), "mocapflow"), again
+
+
+def test_every_setting_has_a_meaning() -> None:
+    rows = re.findall(r"^\| `(.*?)` \|.*\| (.*?) ?\|$", (ROOT / "docs/settings.md").read_text(encoding="utf-8"), re.M)
+    assert len(rows) > 200
+    assert [name for name, meaning in rows if not meaning] == []

@@ -53,6 +53,16 @@ def show(
             typer.echo(line)
 
 
+def settings(
+    package: Annotated[str, typer.Argument(metavar="[PACKAGE]", help="Only its.", show_default=False)] = "",
+) -> None:
+    """Print the settings of every installed component as a Markdown document."""
+    from mocapflow.manual import manual
+    from mocapflow.registry import load_registry
+
+    typer.echo(manual(load_registry(), package), nl=False)
+
+
 def equations(
     wanted: Annotated[str, typer.Argument(metavar="[FILTER]", help="A number or a word.", show_default=False)] = "",
 ) -> None:

@@ -40,8 +40,8 @@ class Scanned(BodyModel):
     """A scan of the person: `subject/body.obj`, `skeleton.json` and, if there, `weights.npz`."""
 
     name: ClassVar[str] = "scanned"
-    part: Part = "full"
-    morph: Morph | None = None
+    part: Part = "full"  # what is used of it; the rest is cut off
+    morph: Morph | None = None  # a second shape, for a knee or elbow that bends far
 
     def inputs(self, recording: Path) -> Sequence[Path]:
         """Return the files that are read."""

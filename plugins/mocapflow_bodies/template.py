@@ -24,8 +24,8 @@ class Template(BodyModel):
 
     name: ClassVar[str] = "template"
     shape: Annotated[float, Field(ge=0, le=1)] = 0.5  # 0 the woman, 1 the man
-    height_m: Annotated[float, Field(gt=0.5, lt=2.6)] | None = None  # None: as blended
-    part: Part = "full"
+    height_m: Annotated[float, Field(gt=0.5, lt=2.6)] | None = None  # null: as blended
+    part: Part = "full"  # what is used of it; the rest is cut off
 
     def inputs(self, recording: Path) -> Sequence[Path]:
         """Return the files that are read."""

@@ -43,11 +43,11 @@ class Kinematic(Draper):
 
     name: ClassVar[str] = "kinematic"
     skin_m: Annotated[float, Field(ge=0)] = 0.005  # room between skin and cloth of no thickness
-    voxel_m: Annotated[float, Field(gt=0)] = 0.010
+    voxel_m: Annotated[float, Field(gt=0)] = 0.010  # edge of a voxel of the body's distance fields
     start_deg: Annotated[float, Field(gt=0, lt=180)] = 95.0  # how far out from straight down a strand begins to fall
     rule: Literal["contact", "literal"] = "contact"  # from contact to contact, or step by step as printed
     step_deg: Annotated[float, Field(gt=0)] = 2.0  # literal: of one iteration
-    iterations: Annotated[int, Field(ge=1)] = 50  # literal
+    iterations: Annotated[int, Field(ge=1)] = 50  # literal: at most
     limited: bool = False  # literal: stop at straight down instead of swinging about it
     pivot: Literal["strand", "space"] = "strand"  # literal: where the nearest fixed point is looked for
     sweeps: Annotated[int, Field(ge=0)] = 20  # of the rings, at most, per row; 0 leaves them as they fell

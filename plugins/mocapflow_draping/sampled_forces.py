@@ -31,11 +31,11 @@ class SampledForces(ClothFitter):
     """
 
     name: ClassVar[str] = "sampled_forces"
-    directions: Annotated[int, Field(ge=2)] = 8
-    amounts_deg: tuple[Positive, ...] = (5.0, 10.0, 20.0)
+    directions: Annotated[int, Field(ge=2)] = 8  # tried of a force that has two components
+    amounts_deg: tuple[Positive, ...] = (5.0, 10.0, 20.0)  # tried in each direction
     step_deg: Positive = 2.5  # of the refinement; half as much each round
     step_mm: Positive = 1.0  # of the thickness, likewise
-    rounds: Annotated[int, Field(ge=0)] = 2
+    rounds: Annotated[int, Field(ge=0)] = 2  # of the refinement
     least_gain: Annotated[float, Field(ge=0, lt=1)] = 0.01  # share of the error that another force has to save
     spacing_px: Positive = 4.0  # between the points of the outline that are compared
 

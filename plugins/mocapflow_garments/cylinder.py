@@ -22,12 +22,12 @@ class Cylinder(Garment):
     name: ClassVar[str] = "cylinder"
     joint: str = "hip_l"  # the joint at the upper end of the limb
     start: Annotated[float, Field(ge=0, le=1)] = 0.3  # where the tube is pinned, as a share of the limb from the joint
-    upper_circumference_m: float = 0.60
-    lower_circumference_m: float = 0.55
+    upper_circumference_m: float = 0.60  # where it is pinned
+    lower_circumference_m: float = 0.55  # of its hem
     length_m: float = 0.40  # along the cloth
-    strands: Annotated[int, Field(ge=8)] = 32
-    rings: Annotated[int, Field(ge=3)] = 16
-    force_orders: tuple[Literal[0, 1, 2], ...] = (0, 1)
+    strands: Annotated[int, Field(ge=8)] = 32  # columns of particles
+    rings: Annotated[int, Field(ge=3)] = 16  # rows of particles
+    force_orders: tuple[Literal[0, 1, 2], ...] = (0, 1)  # harmonics of the tail angle; 1 alone is a wind
 
     def sew(self, body: Body) -> GarmentMesh:
         """Return the tube on the rest body."""

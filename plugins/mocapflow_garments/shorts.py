@@ -25,13 +25,13 @@ class Shorts(Garment):
 
     name: ClassVar[str] = "shorts"
     waist_height_m: float  # upper edge above the floor, rest pose
-    waist_circumference_m: float
-    hip_circumference_m: float
-    leg_opening_circumference_m: float
-    inseam_m: float
+    waist_circumference_m: float  # of the upper edge
+    hip_circumference_m: float  # of the cloth at its widest
+    leg_opening_circumference_m: float  # of each hem
+    inseam_m: float  # from the crotch to the hem
     length_m: float  # along the cloth, outside of the leg
-    strands: Annotated[int, Field(ge=8, multiple_of=4)] = 32  # of each leg
-    rings: Annotated[int, Field(ge=6)] = 20
+    strands: Annotated[int, Field(ge=8, multiple_of=4)] = 32  # columns of particles of each leg
+    rings: Annotated[int, Field(ge=6)] = 20  # rows of particles
     force_orders: tuple[Literal[0, 1, 2], ...] = (0, 1, 2)  # harmonics of the tail angle; 1 alone is a wind
 
     def sew(self, body: Body) -> GarmentMesh:

@@ -21,11 +21,11 @@ class Skirt(Garment):
 
     name: ClassVar[str] = "skirt"
     waist_height_m: float  # upper edge above the floor, rest pose
-    waist_circumference_m: float
-    hem_circumference_m: float
+    waist_circumference_m: float  # of the upper edge
+    hem_circumference_m: float  # of the lower edge
     length_m: float  # along the cloth
-    strands: Annotated[int, Field(ge=8)] = 48
-    rings: Annotated[int, Field(ge=3)] = 24
+    strands: Annotated[int, Field(ge=8)] = 48  # columns of particles
+    rings: Annotated[int, Field(ge=3)] = 24  # rows of particles
     force_orders: tuple[Literal[0, 1, 2], ...] = (0, 1, 2)  # harmonics of the tail angle; 1 alone is a wind
 
     def sew(self, body: Body) -> GarmentMesh:

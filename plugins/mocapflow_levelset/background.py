@@ -54,8 +54,8 @@ class BackgroundDifference(Segmenter):
     reach_px: NonNegative = 60.0  # parts further from the projected model than this are someone else; 0: keep all
     smallest_part: Annotated[float, Field(ge=0, le=1)] = 0.01  # of the largest part's area; smaller parts are noise
     refine_steps: Count = 4  # against the plate, then as many with local statistics on both sides
-    length_weight: NonNegative = 0.5
-    band_px: Annotated[float, Field(ge=8)] = 12.0
+    length_weight: NonNegative = 0.5  # of the boundary's length in the refinement
+    band_px: Annotated[float, Field(ge=8)] = 12.0  # half width of the band in which the distance is computed
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
         """Return the person's silhouette in each usable view.

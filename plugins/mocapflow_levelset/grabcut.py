@@ -26,10 +26,10 @@ class GrabCut(Segmenter):
 
     name: ClassVar[str] = "grabcut"
 
-    iterations: Annotated[int, Field(gt=0)] = 2
+    iterations: Annotated[int, Field(gt=0)] = 2  # of the cut
     unsure_px: Annotated[float, Field(gt=0)] = 15.0  # half width of the band that is left to the cut
     margin_px: Annotated[int, Field(gt=0)] = 60  # of the crop around the model
-    band_px: Annotated[float, Field(ge=8)] = 12.0
+    band_px: Annotated[float, Field(ge=8)] = 12.0  # half width of the band in which the distance is computed
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
         """Return the person's silhouette in each usable view."""

@@ -56,14 +56,14 @@ class LevelSet(Segmenter):
     length_weight: NonNegative = 0.9  # nu; explicit steps are stable below 0.94
     shape_weight: NonNegative = 0.05  # lambda: 0.05 clean, 0.1 with occlusion, 0.1-0.3 in heavy noise, 0 uncoupled
     ratio_clip: Positive = 6.0  # bound on log p1/p2
-    time_step: Positive = 1.0
+    time_step: Positive = 1.0  # of the explicit scheme
     coarse_steps: NonNegativeCount = 8  # at a quarter of the size, on the first turn
     half_steps: NonNegativeCount = 4  # at half the size
     steps: Count = 3  # at full size
     later_steps: Count = 3  # at full size on later turns, which start from the last turn's contour
-    statistics_every: Count = 4  # steps
-    redistance_every: Count = 4  # steps
-    band_px: Annotated[float, Field(ge=8)] = 12.0
+    statistics_every: Count = 4  # steps between estimates of the colours
+    redistance_every: Count = 4  # steps between repairs of the distance function
+    band_px: Annotated[float, Field(ge=8)] = 12.0  # half width of the band in which the distance is computed
     median_px: NonNegativeCount = 0  # median filter against pixels of no meaning, e.g. 9; 0: none
     border_px: NonNegativeCount = 3  # left out at the image's border
     margin_px: Count = 40  # of the crop around the start contour

@@ -28,10 +28,10 @@ class Containment(Matcher):
     """
 
     name: ClassVar[str] = "containment"
-    spacing_px: Positive = 6.0
-    reach_px: Positive = 60.0
+    spacing_px: Positive = 6.0  # between the points of the contour
+    reach_px: Positive = 60.0  # pairs farther apart are left out
     margin_px: float = 0.0  # how far inside the silhouette the skin has to stay
-    sigma_px: Positive = 1.0
+    sigma_px: Positive = 1.0  # standard deviation of a pair
     scale: Positive = 3.0  # standard deviations beyond which a pair pulls no harder (Huber)
 
     def match(

@@ -36,9 +36,9 @@ class Keypoints(Matcher):
     """
 
     name = "keypoints"
-    layout: Layout | None = None  # order of the keypoints; None: told by their number
+    layout: Layout | None = None  # order of the keypoints; null: told by their number
     sigma_px: Positive = 5.0  # of the estimator, where fewer than three views tell
-    least_sigma_px: Positive = 1.0
+    least_sigma_px: Positive = 1.0  # however well the keypoints agree
     scale: Positive = 2.0  # standard deviations beyond which a keypoint pulls no harder (Huber)
 
     def match(

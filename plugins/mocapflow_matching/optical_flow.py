@@ -36,17 +36,17 @@ class OpticalFlow(Matcher):
     """
 
     name = "optical_flow"
-    between: Literal["both", "shapes", "frames"] = "both"
-    calm_mm: Positive = 15.0
+    between: Literal["both", "shapes", "frames"] = "both"  # model and image of a frame, two frames, or both
+    calm_mm: Positive = 15.0  # change of the body in a turn below which shapes are not needed
     first_share: Share = 2.3  # against contour_icp's while the body still moves: 0.7 to 0.3
     later_share: Share = 0.25  # 0.2 to 0.8
-    spacing_px: Positive = 4.0
-    smoothness: Positive = 3.0
+    spacing_px: Positive = 4.0  # between the points of the model's contour
+    smoothness: Positive = 3.0  # of the flow, against the constancy of the distance images
     band: Positive = 0.1  # half its width about the model's contour, against the longer side of the picture
     levels: Annotated[int, Field(ge=0)] = 3  # of the pyramid
-    contour_sigma_px: Positive = 1.0
+    contour_sigma_px: Positive = 1.0  # standard deviation of a pair of contour points on skin
     cloth_sigma_px_per_m: Positive = 80.0  # as for contour_icp
-    image_sigma_px: Positive = 1.5
+    image_sigma_px: Positive = 1.5  # standard deviation of a tracked point
     cloth_share: Share = 0.2  # of a point on cloth against one on skin
     scale: Positive = 2.0  # standard deviations beyond which a pair pulls no harder (Huber)
 

@@ -22,7 +22,7 @@ class GroundPlane(Prior):
     """A soft floor at one height: the lowest point of each part of the feet is pushed up from under it."""
 
     name: ClassVar[str] = "ground_plane"
-    height_m: float = 0.0
+    height_m: float = 0.0  # of the floor, world z
     sd_mm: Positive = 10.0  # standard deviation of a point under the floor
     slack_mm: Positive = 5.0  # depth within which the floor is soft
     parts: tuple[str, ...] = ("ankle_l", "toe_l", "ankle_r", "toe_r")  # joints that carry the soles

@@ -31,15 +31,15 @@ class ImageFlowPredictor(Predictor):
 
     name = "image_flow"
 
-    otherwise: Predictor = ConstantVelocity()
-    pose_solver: PoseSolver = TwistGaussNewton(iterations=8, angle_damping_deg=20.0)
-    sigma_px: Positive = 1.0
+    otherwise: Predictor = ConstantVelocity()  # guesses what no point shows
+    pose_solver: PoseSolver = TwistGaussNewton(iterations=8, angle_damping_deg=20.0)  # of the pose that the points show
+    sigma_px: Positive = 1.0  # standard deviation of a tracked point
     scale: Positive = 2.0  # standard deviations beyond which a point pulls no harder (Huber)
     cloth_share: Annotated[float, Field(ge=0)] = 0.2  # of a point on cloth that touches the skin; other cloth: none
-    touching_mm: Positive = 20.0
-    least_points: Annotated[int, Field(ge=1)] = 30
+    touching_mm: Positive = 20.0  # distance from the skin within which cloth touches it
+    least_points: Annotated[int, Field(ge=1)] = 30  # fewer are not believed
     least_agreement: Annotated[float, Field(ge=0, le=1)] = 0.5  # share of points that come to lie within `agreeing_px`
-    agreeing_px: Positive = 4.0
+    agreeing_px: Positive = 4.0  # distance to where it was tracked
 
     def predict(self, frame: Frame, past: Past, scene: Scene) -> Pose:
         """Return the pose the flow leads to, or what `otherwise` predicts."""

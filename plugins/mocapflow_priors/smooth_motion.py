@@ -29,9 +29,9 @@ class SmoothMotion(Prior):
 
     name = "smooth_motion"
 
-    angle_sd_deg: Positive = 5.0
-    root_sd_deg: Positive = 3.0
-    root_sd_mm: Positive = 10.0
+    angle_sd_deg: Positive = 5.0  # of every joint angle
+    root_sd_deg: Positive = 3.0  # of the turn of the root
+    root_sd_mm: Positive = 10.0  # of the place of the root
 
     def residual(self, pose: Pose, past: Past, scene: Scene) -> Residual:
         """Return three rows for the root's turn, three for its place and one per joint angle."""

@@ -22,8 +22,8 @@ class SpineCoupling(Prior):
     """
 
     name: ClassVar[str] = "spine_coupling"
-    lower: str = "spine"
-    upper: str = "chest"
+    lower: str = "spine"  # a joint
+    upper: str = "chest"  # another joint
     sd_deg: Annotated[float, Field(gt=0)] = 3.0  # 2.5 to 2.8 in motion capture of walks, squats, kicks, jumps
 
     def residual(self, pose: Pose, past: Past, scene: Scene) -> Residual:

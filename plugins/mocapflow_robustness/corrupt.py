@@ -32,7 +32,7 @@ class Corrupt(Stage):
     """
 
     name: ClassVar[str] = "corrupt"
-    seed: Count = 0
+    seed: Count = 0  # of the noise and of where rectangles lie
     noise: Share = 0.0  # share of the pixels that get a random colour
     noise_kind: Literal["replaced", "added"] = "replaced"  # added: noise up to that share of the range, on every pixel
     rectangles: tuple[Count, Count] = (0, 0)  # grey ones, at least and at most so many on each picture

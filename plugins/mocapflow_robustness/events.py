@@ -13,7 +13,9 @@ class Event(BaseModel):
     """Something that happens to some cameras over some frames."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
-    what: Literal["black", "torn", "covered", "frozen", "late", "other_time", "other_camera", "dropped"]
+    what: Literal[
+        "black", "torn", "covered", "frozen", "late", "other_time", "other_camera", "dropped"
+    ]  # to the pictures
     first: Annotated[int, Field(ge=0)] = 0  # frame
     count: Count | None = None  # frames; none: for good
     views: tuple[str, ...] = ()  # names of cameras; none: all of them

@@ -39,10 +39,10 @@ class CalibrateLimbs(Stage):
     """
 
     name: ClassVar[str] = "calibrate_limbs"
-    segmenter: Segmenter
-    matchers: Annotated[tuple[Matcher, ...], Field(min_length=1)]
+    segmenter: Segmenter  # as in the track
+    matchers: Annotated[tuple[Matcher, ...], Field(min_length=1)]  # as in the track
     # contours see neither hip nor shoulder: without the trunk, the thigh would take up what the trunk is wrong by
-    proportions: tuple[str, ...] = (
+    proportions: tuple[str, ...] = (  # those that are fitted
         "girth", "trunk", "shoulder_width", "thigh", "shank", "foot", "upper_arm", "forearm",
     )  # fmt: skip
     spread: Positive = 0.05  # standard deviation of a log proportion about the body's

@@ -30,7 +30,7 @@ class Evaluate(Stage):
     """
 
     name: ClassVar[str] = "evaluate"
-    reference: str = ""
+    reference: str = ""  # a file, from the folder of the recording; empty: truth/angles.csv
 
     def run(self, track: Track, scene: Scene, recording: Recording, run_folder: RunFolder) -> Evaluation:
         """Return the evaluation of the track."""

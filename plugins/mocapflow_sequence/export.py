@@ -30,7 +30,7 @@ class Export(Stage):
     """
 
     name: ClassVar[str] = "export"
-    formats: tuple[Format, ...] = ("csv", "mot", "trc")
+    formats: tuple[Format, ...] = ("csv", "mot", "trc")  # those beyond these three need their extra
 
     def run(self, track: Track, scene: Scene, recording: Recording, run_folder: RunFolder) -> Files:
         """Write the files and return their paths."""

@@ -42,8 +42,8 @@ class FitSubject(Stage):
 
     name: ClassVar[str] = "fit_subject"
     frames: Annotated[int, Field(ge=1)] = 16  # spread over the recording
-    trial: Literal["auto", "static", "recording"] = "auto"
-    layout: Layout | None = None  # order of the keypoints; None: told by their number
+    trial: Literal["auto", "static", "recording"] = "auto"  # auto: both, if the standing trial shows the same person
+    layout: Layout | None = None  # order of the keypoints; null: told by their number
 
     def run(self, recording: Recording, scene: Scene) -> Body:
         """Return the scaled body.

@@ -30,7 +30,7 @@ class FollowPoints(Stage):
     causal: ClassVar[bool] = True
     points: Annotated[int, Field(ge=1, le=500)] = 500  # a view, at most
     spacing_px: Positive = 3.0  # between points, at least
-    window_px: Annotated[int, Field(ge=3)] = 11
+    window_px: Annotated[int, Field(ge=3)] = 11  # edge of the square that is compared
     levels: Annotated[int, Field(ge=0)] = 4  # of the pyramid: each doubles the motion that can be followed
     round_trip_px: Positive = 1.0  # how near a point has to come to where it was
     difference: Positive = 20.0  # grey levels from the empty scene

@@ -28,7 +28,7 @@ class Overlay(Stage):
     """
 
     name: ClassVar[str] = "overlay"
-    codec: Literal["mp4v", "vp09"] = "mp4v"
+    codec: Literal["mp4v", "vp09"] = "mp4v"  # vp09 plays in browsers, mp4v is fast
 
     def run(self, track: Track, scene: Scene, recording: Recording, run_folder: RunFolder) -> Files:
         """Write one video per view and return their paths."""

@@ -29,9 +29,9 @@ class Smooth(Stage):
     """
 
     name: ClassVar[str] = "smooth"
-    angle_acceleration_deg_s2: Positive = 4000.0
-    root_acceleration_deg_s2: Positive = 2000.0
-    root_acceleration_m_s2: Positive = 15.0
+    angle_acceleration_deg_s2: Positive = 4000.0  # of every joint angle
+    root_acceleration_deg_s2: Positive = 2000.0  # of the turn of the root
+    root_acceleration_m_s2: Positive = 15.0  # of the root
 
     def run(self, track: Track) -> Track:
         """Return the smoothed track, which keeps the poses it was made from.

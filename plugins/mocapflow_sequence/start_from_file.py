@@ -29,7 +29,7 @@ class StartFromFile(Stage):
     """Reads the pose of the first frame from `init.json` of the recording."""
 
     name: ClassVar[str] = "start_from_file"
-    file: str = "init.json"
+    file: str = "init.json"  # from the folder of the recording
 
     def inputs(self, recording: Path) -> Sequence[Path]:
         """Return the files that are read: their content is part of the cache key."""

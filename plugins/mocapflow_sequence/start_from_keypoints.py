@@ -23,7 +23,7 @@ class StartFromKeypoints(Stage):
     """
 
     name: ClassVar[str] = "start_from_keypoints"
-    layout: Layout | None = None  # order of the keypoints; None: told by their number
+    layout: Layout | None = None  # order of the keypoints; null: told by their number
     search_frames: int = 10  # how far to look for a usable frame
 
     def run(self, recording: Recording, scene: Scene) -> Start:

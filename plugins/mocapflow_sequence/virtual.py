@@ -21,10 +21,10 @@ class Virtual(Stage):
     """
 
     name: ClassVar[str] = "virtual"
-    width_px: Annotated[int, Field(ge=64, multiple_of=2)] = 640
-    height_px: Annotated[int, Field(ge=64, multiple_of=2)] = 480
-    every: Annotated[int, Field(ge=1)] = 1
-    codec: Literal["mp4v", "vp09"] = "mp4v"
+    width_px: Annotated[int, Field(ge=64, multiple_of=2)] = 640  # of the video
+    height_px: Annotated[int, Field(ge=64, multiple_of=2)] = 480  # of the video
+    every: Annotated[int, Field(ge=1)] = 1  # takes every so many-th frame
+    codec: Literal["mp4v", "vp09"] = "mp4v"  # vp09 plays in browsers, mp4v is fast
 
     def run(self, track: Track, scene: Scene, run_folder: RunFolder) -> Files:
         """Write the video and return its path."""

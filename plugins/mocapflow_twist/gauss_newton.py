@@ -33,7 +33,7 @@ class GaussNewton(ClothFitter):
     """
 
     name: ClassVar[str] = "gauss_newton"
-    iterations: Annotated[int, Field(ge=1)] = 3
+    iterations: Annotated[int, Field(ge=1)] = 3  # steps, at most
     sigma_px: Positive = 3.0  # standard deviation of the outline of cloth
     correlation_px: Positive = 15.0  # length over which its errors agree
     cloth_sd: Positive = 0.15  # standard deviation of each parameter about a calm garment, share of its range

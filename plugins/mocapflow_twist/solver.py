@@ -34,7 +34,7 @@ class TwistGaussNewton(PoseSolver):
     name = "twist_gauss_newton"
 
     iterations: Annotated[int, Field(ge=1)] = 10  # times that it matches anew, at most
-    steps_per_match: Annotated[int, Field(ge=1)] = 1
+    steps_per_match: Annotated[int, Field(ge=1)] = 1  # steps with the same pairs
     residual: Literal["image", "line"] = "image"  # pixels, or distance to projection rays in space
     line_sigma_mm: Positive = 3.0  # standard deviation of every distance to a ray
     damping: Annotated[float, Field(ge=0)] = 1e-4  # share of the mean diagonal; ten times more after a worse step
@@ -47,11 +47,11 @@ class TwistGaussNewton(PoseSolver):
     redrape: Literal["every", "once"] = "every"  # drape at each new pose, or once and move the cloth linearly
     cloth_jacobian: Literal["every", "once"] = "once"  # how often the motion of the cloth is measured
     root_damping_m: Positive = 0.1  # standard deviation about the prediction
-    root_damping_deg: Positive = 11.5
-    angle_damping_deg: Positive = 60.0
+    root_damping_deg: Positive = 11.5  # likewise
+    angle_damping_deg: Positive = 60.0  # likewise, of every joint angle
     cloth_sd: Positive = 0.06  # standard deviation of cloth parameters about a calm garment, share of their range
-    stop_surface_mm: Annotated[float, Field(ge=0)] = 0.1
-    stop_angle_deg: Annotated[float, Field(ge=0)] = 0.02
+    stop_surface_mm: Annotated[float, Field(ge=0)] = 0.1  # a step by which no surface point moves farther ends it
+    stop_angle_deg: Annotated[float, Field(ge=0)] = 0.02  # and no angle
 
     def solve(
         self,
