@@ -15,14 +15,13 @@ from mocapflow.data import FrameResult
 from mocapflow.errors import ComponentFailed, MocapflowError, PluginError, ShapeError
 from mocapflow.locks import Lock
 from mocapflow.pipeline import Pipeline
+from mocapflow.progress import Progress
 from mocapflow.recipes import Step
 from mocapflow.recording import Recording
 from mocapflow.results import RunFolder
 from mocapflow.rows import Corrupted
 from mocapflow.scene import Scene
 from mocapflow.store import Artifact, Report, Store, remove, versions, with_versions
-
-BEAT = 2.0  # s between lines of progress
 
 Value = TypeVar("Value")
 
@@ -116,10 +115,11 @@ class Execution:
         indices, observers = step.recording.indices, self._pipeline.registry.observers
         longer = range(indices.start, indices.start + indices.step * max(len(indices), artifact.frames), indices.step)
         names = [camera.name for camera in step.recording.cameras]
-        progress = Progress(step, self._report)
+        progress = Progress(step.label, self._report)
 
         def frame_done(frame: int, result: FrameResult) -> None:
-            progress.frame_done(frame, result)
+            rest = "at rest" if result.steady else "not at rest"
+            progress.tell(indices.index(frame) + 1, len(indices), f"{rest} after {result.iterations} turns")
             observers.frame_done(frame, result)
 
         return Checkpoint(
@@ -137,12 +137,13 @@ class Execution:
         return value
 
     def _input(self, step: Step, source: str | None, checkpoint: Checkpoint | None) -> Any:
+        watch = Progress(step.label, self._report, brief=True).tell
         supplied: dict[str | None, Callable[[], Any]] = {
             None: lambda: None,
             "scene": lambda: self._scene(step),
-            "recording": lambda: step.recording,
+            "recording": lambda: step.recording if checkpoint else replace(step.recording, watch=watch),
             "checkpoint": lambda: checkpoint,
-            "run folder": lambda: RunFolder(path=self._out, recipe=self._recipe()),
+            "run folder": lambda: RunFolder(path=self._out, recipe=self._recipe(), watch=watch),
         }
         if source in supplied:
             return supplied[source]()
@@ -206,20 +207,3 @@ class Execution:
     def _set_aside(self, path: Path, error: Corrupted) -> None:
         aside = self._store.set_aside(path)
         self._report(f"warning: {path.name} is damaged and made anew: {error.message} (kept as {aside.name})")
-
-
-class Progress:
-    """Tells now and then how far a chain is."""
-
-    def __init__(self, step: Step, report: Report) -> None:
-        self._step, self._report, self._last = step, report, time.monotonic()
-
-    def frame_done(self, frame: int, result: FrameResult) -> None:
-        """Count a frame; tell if the last line is some time ago, or it is the last frame."""
-        indices = self._step.recording.indices
-        if time.monotonic() - self._last < BEAT and frame != indices[-1]:
-            return
-        self._last = time.monotonic()
-        rest = "at rest" if result.steady else "not at rest"
-        done = indices.index(frame) + 1
-        self._report(f"{self._step.label}: {done} of {len(indices)} frames, {rest} after {result.iterations} turns")

@@ -9,7 +9,7 @@ import socket
 import threading
 import time
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -64,21 +64,19 @@ class Lock:
 def acquire(path: Path, name: str, report: Callable[[str], None]) -> Lock:
     """Wait until nobody else writes, then return the lock; `name` is what people call the thing locked."""
     told = False
-    said = json.dumps(
-        {"pid": os.getpid(), "host": socket.gethostname(), "born": _born(os.getpid()), "token": uuid.uuid4().hex}
-    )
+    said = json.dumps({**myself(), "token": uuid.uuid4().hex})
     while True:
         with _guard(path.parent):
             holder = _holder(path)
             stale = holder is not None and _stale(path, holder)
             if holder is None or stale:
                 if stale:
-                    report(f"{name}: taking over from {_who(holder)}, which ended without finishing")
+                    report(f"{name}: taking over from {who(holder)}, which ended without finishing")
                     path.unlink(missing_ok=True)
                 path.write_text(said)
                 return Lock(path, said)
         if not told:
-            report(f"{name}: waiting for {_who(holder)}, which is making it")
+            report(f"{name}: waiting for {who(holder)}, which is making it")
             told = True
         time.sleep(POLL)
 
@@ -102,10 +100,21 @@ def _holder(path: Path) -> dict[str, Any] | None:
 
 
 def _stale(path: Path, holder: dict[str, Any]) -> bool:
-    pid = holder.get("pid")
-    if holder.get("host") == socket.gethostname() and isinstance(pid, int):
-        return not _alive(pid) or _born(pid) != holder.get("born")
-    return time.time() - path.stat().st_mtime > DEAD
+    ended = gone(holder)
+    return time.time() - path.stat().st_mtime > DEAD if ended is None else ended
+
+
+def myself() -> dict[str, Any]:
+    """Return who this process is, as others can ask after it."""
+    return {"pid": os.getpid(), "host": socket.gethostname(), "born": _born(os.getpid())}
+
+
+def gone(process: Mapping[str, Any]) -> bool | None:
+    """Return whether a process has ended, None where it can't be told: it is on another machine."""
+    pid = process.get("pid")
+    if process.get("host") != socket.gethostname() or not isinstance(pid, int):
+        return None
+    return not _alive(pid) or _born(pid) != process.get("born")
 
 
 def _alive(pid: int) -> bool:
@@ -127,6 +136,7 @@ def _born(pid: int) -> str:
     return "Z" if state == "Z" else rest[18]
 
 
-def _who(holder: dict[str, Any] | None) -> str:
-    holder = holder or {}
-    return f"process {holder.get('pid', '?')} on {holder.get('host', '?')}"
+def who(process: Mapping[str, Any] | None) -> str:
+    """Return a process in words."""
+    process = process or {}
+    return f"process {process.get('pid', '?')} on {process.get('host', '?')}"

@@ -19,7 +19,7 @@ from mocapflow.io.keypoints import keypoint_files, people_at
 from mocapflow.io.lenses import View
 from mocapflow.io.plates import background
 from mocapflow.io.video import Video, read_frames
-from mocapflow.records import record
+from mocapflow.records import Watch, record, unwatched
 
 
 class FrameChange(Protocol):
@@ -46,6 +46,7 @@ class Recording:
     length: int  # frames in the videos
     warnings: tuple[str, ...] = ()  # what a user should know; also in run.json
     changes: tuple[FrameChange, ...] = ()  # to the frames as they are read, one after another
+    watch: Watch = unwatched  # told as `frames` goes on
 
     @cached_property
     def cameras(self) -> tuple[Camera, ...]:
@@ -101,9 +102,11 @@ class Recording:
         }
 
     def _read(self, indices: range) -> Iterator[Frame]:
-        if not self.changes:
-            return self._decode(indices)
-        return self.changes[-1].frames(replace(self, changes=self.changes[:-1]), indices)
+        source = replace(self, changes=self.changes[:-1], watch=unwatched)
+        frames = self.changes[-1].frames(source, indices) if self.changes else self._decode(indices)
+        for done, frame in enumerate(frames, 1):
+            yield frame
+            self.watch(done, len(indices))
 
     def _decode(self, indices: range) -> Iterator[Frame]:
         files = [None if folder is None else keypoint_files(folder) for folder in self.keypoint_folders]

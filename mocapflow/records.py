@@ -25,6 +25,11 @@ Bool = npt.NDArray[np.bool_]
 DTYPES = {"F64": "f8", "F32": "f4", "I32": "i4", "I16": "i2", "U8": "u1", "Bool": "?"}
 
 Class = TypeVar("Class", bound=type)
+Watch = Callable[[int, int], None]  # told how many frames are done, of how many
+
+
+def unwatched(done: int, of: int) -> None:
+    """Watch nothing."""
 
 
 class Axes(NamedTuple):

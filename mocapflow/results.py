@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mocapflow.data import Pose
-from mocapflow.records import F64, I16, I32, Bool, array, record
+from mocapflow.records import F64, I16, I32, Bool, Watch, array, record, unwatched
 
 
 @record
@@ -52,6 +52,7 @@ class RunFolder:
 
     path: Path
     recipe: Mapping[str, Any]  # pipeline, settings, versions, and per finished stage: key, cached, seconds
+    watch: Watch = unwatched  # to be told how many frames are written, of how many
 
 
 @record

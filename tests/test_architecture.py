@@ -54,6 +54,7 @@ LAYERS = (  # a module imports only from its own layer or an earlier one; `io` a
     "wiring",
     "recipes",
     "blame",
+    "progress",
     "execution",
     "runner",
     "testing",

@@ -1,12 +1,17 @@
-"""Progress on stderr: a bar on a terminal, plain lines elsewhere."""
+"""Progress on stderr: a bar on a terminal, plain lines elsewhere; the last line also in the run folder."""
 
 from __future__ import annotations
 
+import json
 import re
 import sys
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import TextIO
 
+FILE = "progress.json"
 COUNT = re.compile(r"^(\S+): (\d+) of (\d+) (frames.*)$")
 WIDTH = 30
 
@@ -15,6 +20,40 @@ def reporter(stream: TextIO | None = None) -> Callable[[str], None]:
     """Return a function that shows lines of progress."""
     out = stream or sys.stderr
     return _Bar(out).show if out.isatty() else lambda line: print(line, file=out, flush=True)
+
+
+@contextmanager
+def noted(report: Callable[[str], None], folder: Path) -> Iterator[Callable[[str], None]]:
+    """Give a reporter that also keeps its last line in the run folder as long as the run goes on."""
+    from mocapflow.locks import myself
+
+    path, part = folder / FILE, folder / f"{FILE}.part"
+
+    def show(line: str) -> None:
+        with suppress(OSError):  # a full disk is for the store to tell
+            part.write_text(json.dumps({**myself(), "at": time.time(), "said": line}), encoding="utf-8")
+            part.replace(path)
+        report(line)
+
+    try:
+        yield show
+    finally:
+        path.unlink(missing_ok=True)
+
+
+def last_word(folder: Path) -> str:
+    """Return what the run that is going on in a folder has told last, "" if there is none."""
+    from mocapflow.locks import gone, who
+    from mocapflow.progress import clock
+
+    try:
+        note = json.loads((folder / FILE).read_text(encoding="utf-8"))
+        ago, said, ended = clock(max(0.0, time.time() - note["at"])), note["said"], gone(note)
+    except (OSError, ValueError, LookupError, TypeError):
+        return ""
+    if ended:
+        return f"{who(note)} ended without finishing; run the same command to go on"
+    return f"{who(note)}, {ago} ago: {said}"
 
 
 class _Bar:

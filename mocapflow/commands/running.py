@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mocapflow.commands.again import Invocation, recall, remember
-from mocapflow.commands.progress import reporter
+from mocapflow.commands.progress import last_word, noted, reporter
 
 if TYPE_CHECKING:
     from mocapflow.runner import RunSummary
@@ -51,6 +51,8 @@ def plan(
 def status(run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")]) -> None:
     """Say how far a run is."""
     _print_plan(recall(run_folder))
+    if said := last_word(run_folder):
+        typer.echo(said)
 
 
 def demo(out: Annotated[Path, typer.Option(help="The run folder.")] = Path("runs/demo")) -> None:
@@ -68,7 +70,8 @@ def execute(invocation: Invocation, out: Path, fresh: bool) -> RunSummary:
     from mocapflow import runner
 
     remember(invocation, out)
-    return runner.run(pipeline, store=Path(invocation.store), out=out, fresh=fresh, report=reporter())
+    with noted(reporter(), out) as report:
+        return runner.run(pipeline, store=Path(invocation.store), out=out, fresh=fresh, report=report)
 
 
 def _print_plan(invocation: Invocation) -> None:

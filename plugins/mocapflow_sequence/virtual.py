@@ -37,4 +37,5 @@ class Virtual(Stage):
                 image = room.picture(scene.undressed.surface(track.pose(row), NO_CLOTH), track.cloth[row])
                 drawing.label(image, f"frame {track.frame[row]}   {track.time[row]:.2f} s")
                 video.write(image)
+                run_folder.watch(row + 1, len(track.frame))
         return Files(paths=(path,))

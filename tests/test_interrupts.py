@@ -1,0 +1,68 @@
+"""The real command line while it runs: asked from elsewhere, stopped by Ctrl-C, and gone on with."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mocapflow.commands.progress import FILE, last_word
+from tests.fixtures.stores import run_tiny, same, the_track, write_pipeline, write_recording
+
+MOCAPFLOW = Path(sys.executable).with_name("mocapflow")
+
+
+@pytest.fixture
+def path(tmp_path):
+    return write_pipeline(tmp_path, write_recording(tmp_path / "clip", frames=60))
+
+
+def started(words, folder, slow="0.2"):
+    environment = {**os.environ, "TINY_SLOW": slow}
+    return subprocess.Popen(
+        [MOCAPFLOW, *words], cwd=folder, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    )
+
+
+def status(folder):
+    done = subprocess.run([MOCAPFLOW, "status", "out"], cwd=folder, capture_output=True, text=True, check=True)
+    return done.stdout
+
+
+def test_a_run_is_asked_after_interrupted_and_gone_on_with(tmp_path, path):
+    words = ["run", path.name, "--out", "out", "--store", "store.zarr"]
+    with started(words, tmp_path) as run:
+        assert run.stderr is not None
+        lines = iter(run.stderr)
+        assert any(line.startswith("track: 1") for line in lines)
+        said = status(tmp_path)
+        run.send_signal(signal.SIGINT)
+        rest = "".join(lines)
+    assert re.search(r"^track +resume .* \d+ of 60 frames done", said, re.MULTILINE)
+    assert re.search(rf"^process {run.pid} on \S+, 0:\d\d ago: track: ", said, re.MULTILINE)
+    assert run.returncode == 130
+    assert rest.endswith(f"interrupted; finished frames are saved. To go on: mocapflow {' '.join(words)}\n")
+    assert "Traceback" not in rest
+    assert not (tmp_path / "out" / FILE).exists()
+    _, lines = run_tiny(path, tmp_path)
+    assert any(re.fullmatch(r"track: going on after \d+ frames", line) for line in lines)
+    whole = tmp_path / "whole"
+    run_tiny(path, whole)
+    assert same(the_track(tmp_path), the_track(whole))
+
+
+def test_a_killed_run_is_known_to_have_ended(tmp_path, path):
+    with started(["run", path.name, "--out", "out", "--store", "store.zarr"], tmp_path) as run:
+        assert run.stderr is not None
+        assert any(line.startswith("track: 1") for line in run.stderr)
+        run.kill()
+    assert last_word(tmp_path / "out").endswith("ended without finishing; run the same command to go on")
+
+
+def test_no_run_no_last_word(tmp_path):
+    assert last_word(tmp_path) == ""
+    (tmp_path / FILE).write_text("{")
+    assert last_word(tmp_path) == ""
