@@ -5,14 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from mocapflow_sequence import tables
+from mocapflow_sequence.uncertainty import measured
 
-from mocapflow.geometry import angles
 from mocapflow_formats.result import Result, library
 
 
 def write(result: Result, path: Path) -> None:
     """Write frame, time, and of every angle value, standard deviation (degrees) and observed share."""
     track = result.track
-    series = angles.measure(result.scene.body, track.root, track.angles, track.covariance, track.observed)
+    series = measured(track, result.scene)
     table = library("pyarrow", "parquet").table({**tables.angle_columns(track, series), "frame": track.frame})
     library("pyarrow.parquet", "parquet").write_table(table, path)

@@ -15,8 +15,9 @@ from mocapflow.records import F64
 from mocapflow.results import Evaluation, RunFolder, Track
 from mocapflow.scene import Scene
 from mocapflow_sequence import compare, layout, tables
-from mocapflow_sequence.export import before_smoothing, measured
+from mocapflow_sequence.export import before_smoothing
 from mocapflow_sequence.references import read_reference
+from mocapflow_sequence.uncertainty import measured
 
 SLACK = 0.001  # s
 

@@ -9,12 +9,12 @@ from typing import ClassVar, Literal
 from mocapflow_formats import Result, write
 
 from mocapflow.components import Stage
-from mocapflow.geometry import angles
 from mocapflow.io import markers
 from mocapflow.recording import Recording
 from mocapflow.results import Files, RunFolder, Track
 from mocapflow.scene import Scene
 from mocapflow_sequence import layout, opensim, runjson, tables
+from mocapflow_sequence.uncertainty import measured
 
 Format = Literal["csv", "mot", "trc", "bvh", "c3d", "gltf", "movement", "parquet", "rrd", "usd"]
 
@@ -23,7 +23,7 @@ class Export(Stage):
     """Writes results/angles.csv, angles_raw.csv and energy.csv, angles.mot, joints.trc and run.json.
 
     The csv of angles hold one row per frame: the angles between joint centres in degrees (`geometry.angles`), their
-    standard deviations, and as `_observed` the share of each that the images determined; energy.csv
+    calibrated standard deviations, and as `_observed` the share of each that the images determined; energy.csv
     one per turn of the loop: the terms of the functional. The mot holds signed joint angles by OpenSim's names
     (`opensim`), the trc joint centres.
     Other formats are written by `mocapflow_formats`.
@@ -78,8 +78,3 @@ def write_joints(result: Result, folder: Path) -> list[Path]:
     places = markers.opensim_from_world(result.places)
     markers.write_trc(path, result.scene.body.joint_names, places, track.frame_rate, start=float(track.time[0]))
     return [path]
-
-
-def measured(track: Track, scene: Scene) -> angles.AngleSeries:
-    """Return the angles of a track, how sure they are, and what was seen of them."""
-    return angles.measure(scene.body, track.root, track.angles, track.covariance, track.observed)

@@ -11,9 +11,9 @@ import numpy as np
 from mocapflow.records import F64, Bool
 from mocapflow.results import Evaluation, Track
 from mocapflow_sequence import tables
+from mocapflow_sequence.compare import NINETY
 from mocapflow_sequence.lost import unseen
 
-NINETY_FIVE = 1.96  # standard deviations
 OURS, RAW, TRUTH, HELD = "#1f5fbf", "#8fb4e8", "black", "#888888"
 
 
@@ -24,7 +24,7 @@ def plot_angles(
     reference: Mapping[str, F64],
     evaluation: Evaluation | None,
 ) -> Path:
-    """Write one panel per angle: ours with its 95 % band, unsmoothed thin, the reference black, the RMS in the title.
+    """Write one panel per angle: ours with its 90 % band, unsmoothed thin, the reference black, the RMS in the title.
 
     Frames in which no image shows the angle are shaded grey.
 
@@ -91,9 +91,9 @@ def plot_overlap(path: Path, track: Track, views: Sequence[str], lost: Bool) -> 
 def _panel(
     panel: Any, name: str, ours: Mapping[str, F64], raw: Mapping[str, F64], reference: Mapping[str, F64]
 ) -> None:
-    frame, value, half = ours["frame"], ours[name], NINETY_FIVE * ours[f"{name}_sd"]
+    frame, value, half = ours["frame"], ours[name], NINETY * ours[f"{name}_sd"]
     shown = np.where(np.isfinite(half), half, 0.0)
-    panel.fill_between(frame, value - shown, value + shown, color=OURS, alpha=0.18, linewidth=0, label="95 % interval")
+    panel.fill_between(frame, value - shown, value + shown, color=OURS, alpha=0.18, linewidth=0, label="90 % interval")
     for row in np.flatnonzero(unseen(ours[f"{name}_observed"])):
         panel.axvspan(frame[row] - 0.5, frame[row] + 0.5, color=HELD, alpha=0.25, linewidth=0)
     panel.plot(frame, raw[name], color=RAW, linewidth=0.8, label="unsmoothed")

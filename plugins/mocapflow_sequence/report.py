@@ -16,10 +16,11 @@ from mocapflow.results import Evaluation, Files, RunFolder, Track
 from mocapflow.scene import Scene
 from mocapflow_sequence import layout, page, plots, runjson, tables
 from mocapflow_sequence.evaluate import at_our_frames
-from mocapflow_sequence.export import before_smoothing, measured
+from mocapflow_sequence.export import before_smoothing
 from mocapflow_sequence.lost import lost_rows
 from mocapflow_sequence.overlay import Painter
 from mocapflow_sequence.references import read_reference
+from mocapflow_sequence.uncertainty import measured
 
 COLUMNS = (
     "angle", "frames", "rms_deg", "rms_low_deg", "rms_high_deg", "rms_without_offset_deg", "mae_deg", "offset_deg",
