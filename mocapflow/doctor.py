@@ -41,14 +41,22 @@ def examine(folder: Path) -> list[Finding]:
                 for f in _trial(static, own if own.exists() else calibration, rig=False)
             ]
     findings += examine_subject(folder)
-    if not (folder / "subject" / "body.obj").exists() and not (folder / "static").is_dir():
-        findings.append(
-            note(
-                "there is neither subject/body.obj nor a static trial",
-                "a body model has to be fitted to the person; a standing trial with keypoints makes that more exact",
-            )
-        )
+    findings += _missing(folder)
     return sorted(findings, key=lambda finding: ("error", "warning", "note").index(finding.severity))
+
+
+def _missing(folder: Path) -> Iterator[Finding]:
+    """Yield what a run will ask for, or do without."""
+    if not (folder / "subject" / "body.obj").exists() and not (folder / "static").is_dir():
+        yield note(
+            "there is neither subject/body.obj nor a static trial",
+            "a body model has to be fitted to the person; a standing trial with keypoints makes that more exact",
+        )
+    if not (folder / "init.json").exists() and not (folder / "keypoints").is_dir():
+        yield note(
+            "there is neither init.json nor keypoints/: nothing tells the pose of the first frame",
+            "a run needs one of them: the stage start_from_file or start_from_keypoints",
+        )
 
 
 def _trial(folder: Path, calibration: Path, rig: bool = True) -> list[Finding]:

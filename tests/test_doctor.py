@@ -70,6 +70,15 @@ def test_a_good_recording_is_healthy(good):
     assert examine(good) == []
 
 
+def test_no_first_pose_is_told_before_a_run_asks_for_it(good):
+    (good / "init.json").unlink()
+    assert messages(good, "note") == [
+        "there is neither init.json nor keypoints/: nothing tells the pose of the first frame"
+    ]
+    (good / "keypoints").mkdir()
+    assert messages(good, "note") == []
+
+
 def test_several_faults_are_found_at_once_errors_first(good):
     (good / "subject" / "skeleton.json").unlink()
     (good / "videos" / "cam02.mp4").write_bytes(b"hello")
