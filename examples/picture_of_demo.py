@@ -54,8 +54,10 @@ def main(run: Path, picture: Path) -> None:
     ours = read_columns(run / layout.ANGLES)
     truth = read_columns(shipped("examples", "data", "skirt_steps") / "truth" / "angles.csv")
     frame = int(ours["knee_flexion_l"].argmax())
-    films = [*(layout.overlay(view) for view in VIEWS), layout.VIRTUAL]
-    cv2.imwrite(str(picture), np.hstack([*(still(run / film, frame) for film in films), curves(ours, truth)]))
+    views = [still(run / layout.overlay(view), frame) for view in VIEWS]
+    room = still(run / layout.VIRTUAL, frame)
+    room = room[:, : room.shape[1] * 3 // 4]  # the rest is floor
+    cv2.imwrite(str(picture), np.hstack([*views, room, curves(ours, truth)]))
     print(picture)
 
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import ast
 import hashlib
-import importlib.util
 import json
 import os
 import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from mocapflow import sources
 from mocapflow.errors import RecordingError
 
 PARSER = threading.Lock()  # CPython 3.11 counts the parser's recursion across threads (python/cpython#106905)
@@ -36,7 +36,6 @@ CORE = (
     "scene",
     "track",
 )
-SHARED = ("io", "recording")  # counted where a component imports them
 PYTHON = f" {sys.version_info.major}.{sys.version_info.minor}"  # another minor version writes syntax trees otherwise
 
 
@@ -81,7 +80,7 @@ class Digests:
 
     def package(self, module: str) -> str:
         """Return the digest of a component's top package with the shared modules and plugins it imports."""
-        unit = _unit(module)
+        unit = sources.unit_of(module)
         if unit not in self._packages:
             self._packages[unit] = self._package(unit)
         return self._packages[unit]
@@ -91,16 +90,20 @@ class Digests:
         open_modules = {first}
         while open_modules:
             unit = open_modules.pop()
-            files = {name: self._source(path) for name, path in _sources(unit)}
+            files = {name: self._source(path) for name, path in sources.python_files(unit)}
             found.update({name: code for name, (code, _) in files.items()})
-            found.update({f"{unit}/{name}": self._content(path) for name, path in _data(unit)})
-            wanted = {_unit(name) for _, imports in files.values() for name in imports if _counts(name)}
+            found.update({f"{unit}/{name}": self._content(path) for name, path in sources.data_files(unit)})
+            wanted = {
+                sources.unit_of(name) for _, imports in files.values() for name in imports if sources.counts(name)
+            }
             open_modules |= {w for w in wanted if not any(name == w or name.startswith(w + ".") for name in found)}
         return digest(json.dumps(found, sort_keys=True).encode(), f"code of {first}")
 
     def core(self) -> str:
         """Return the digest of the framework code that every result depends on."""
-        found = {name: self._source(path)[0] for part in CORE for name, path in _sources(f"mocapflow.{part}")}
+        found = {
+            name: self._source(path)[0] for part in CORE for name, path in sources.python_files(f"mocapflow.{part}")
+        }
         return digest(json.dumps(found, sort_keys=True).encode(), "code of mocapflow")
 
     def _content(self, path: Path) -> str:
@@ -117,8 +120,8 @@ class Digests:
         def read() -> list[Any]:
             with PARSER:
                 tree = ast.parse(path.read_bytes())
-            imports = sorted(set(_imports(tree)))  # before `_meaning`, which cuts the tree
-            return [hashlib.blake2b(_meaning(tree).encode(), digest_size=16).hexdigest(), imports]
+            imports = sorted(set(sources.imports(tree)))  # before `meaning`, which cuts the tree
+            return [hashlib.blake2b(sources.meaning(tree).encode(), digest_size=16).hexdigest(), imports]
 
         code, imports = self._remembered(path, PYTHON, read)
         return code, imports
@@ -138,62 +141,3 @@ def _read(memory: Path | None) -> dict[str, list[Any]]:
     except (OSError, ValueError):
         return {}
     return known if isinstance(known, dict) else {}
-
-
-def _meaning(tree: ast.Module) -> str:
-    """Return the syntax tree as text, without docstrings: comments, documentation and layout are free."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and ast.get_docstring(
-            node, clean=False
-        ):
-            node.body = node.body[1:]
-    return ast.dump(tree)
-
-
-def _imports(tree: ast.Module) -> Iterator[str]:
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            yield node.module
-            yield from (f"{node.module}.{alias.name}" for alias in node.names if node.module == "mocapflow")
-
-
-def _counts(name: str) -> bool:
-    top, _, rest = name.partition(".")
-    return top.startswith("mocapflow_") or (top == "mocapflow" and rest.partition(".")[0] in SHARED)
-
-
-def _unit(module: str) -> str:
-    """Return what is digested as one: the top package, or one part of mocapflow itself."""
-    parts = module.split(".")
-    return ".".join(parts[:2] if parts[0] == "mocapflow" else parts[:1])
-
-
-def _data(unit: str) -> Iterable[tuple[str, Path]]:
-    """Yield the files of a plugin package that are no code, such as a template body."""
-    origin = _origin(unit)
-    if origin is None or origin.name != "__init__.py" or unit.startswith("mocapflow."):
-        return
-    for path in sorted(origin.parent.rglob("*")):
-        if path.is_file() and path.suffix != ".py" and "__pycache__" not in path.parts:
-            yield path.relative_to(origin.parent).as_posix(), path
-
-
-def _origin(unit: str) -> Path | None:
-    loaded = sys.modules.get(unit)
-    spec = loaded.__spec__ if loaded is not None else importlib.util.find_spec(unit)
-    return None if spec is None or spec.origin is None else Path(spec.origin)
-
-
-def _sources(unit: str) -> Iterable[tuple[str, Path]]:
-    """Yield dotted name and path of every Python file of a module or package."""
-    origin = _origin(unit)
-    if origin is None:
-        return
-    if origin.name != "__init__.py":
-        yield unit, origin
-        return
-    for path in sorted(origin.parent.rglob("*.py")):
-        parts = path.relative_to(origin.parent).with_suffix("").parts
-        yield ".".join((unit, *(part for part in parts if part != "__init__"))), path

@@ -118,8 +118,8 @@ class Execution:
         progress = Progress(step.label, self._report)
 
         def frame_done(frame: int, result: FrameResult) -> None:
-            rest = "at rest" if result.steady else "not at rest"
-            progress.tell(indices.index(frame) + 1, len(indices), f"{rest} after {result.iterations} turns")
+            end = "at rest" if result.steady else "left"  # as it is: `max_turns` are spent
+            progress.tell(indices.index(frame) + 1, len(indices), f"{end} after {result.iterations} turns")
             observers.frame_done(frame, result)
 
         return Checkpoint(

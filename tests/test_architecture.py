@@ -36,6 +36,7 @@ LAYERS = (  # a module imports only from its own layer or an earlier one; `io` a
     "observers",
     "vetting",
     "registry",
+    "sources",
     "digests",
     "keys",
     "rows",

@@ -31,7 +31,7 @@ def test_the_plugin_in_contributing_loads_and_conforms(tmp_path: Path) -> None:
     assert "10 passed" in run.stdout
 
 
-@pytest.mark.parametrize(("document", "least"), [("README.md", 5), ("CONTRIBUTING.md", 1)])
+@pytest.mark.parametrize(("document", "least"), [("README.md", 5), ("CONTRIBUTING.md", 1), ("docs/tutorial.md", 7)])
 def test_every_bash_block_is_run_by_ci(document: str, least: int) -> None:
     assert len(blocks(document, "bash")) >= least
     assert f"readme_commands.py {document}" in (ROOT / ".ci/run").read_text(encoding="utf-8")

@@ -12,6 +12,7 @@ import numpy as np
 
 from mocapflow.assets import Camera
 from mocapflow.data import CLOTH, Contour, Surface
+from mocapflow.geometry import boundary_kernels
 from mocapflow.geometry import silhouette_kernels as kernels
 from mocapflow.geometry.cameras import projection
 from mocapflow.records import F32, F64, I32, Bool, array, record
@@ -84,7 +85,7 @@ def intersection_over_union(one: Bool, other: Bool) -> float:
 def signed_distance(boundary: Outline, camera: Camera, band_px: float) -> F32:
     """Return the distance (H, W) to the boundary in px, exact to the segment, positive inside, clipped to the band."""
     distance = np.full((camera.size[1], camera.size[0]), -band_px, np.float32)
-    kernels.paint_distance(boundary.pixel, boundary.corner, boundary.cover, np.float32(band_px), distance)
+    boundary_kernels.paint_distance(boundary.pixel, boundary.corner, boundary.cover, np.float32(band_px), distance)
     return distance
 
 
@@ -105,7 +106,7 @@ def samples(boundary: Outline, surface: Surface, camera: Camera, spacing_px: flo
     are smoother than the short edges; at cloth, which has a rim, they are those of the edges.
     """
     matrix, cloth = projection(camera), surface.layer == CLOTH
-    vertex, anchor, pixel, normal = kernels.sample(
+    vertex, anchor, pixel, normal = boundary_kernels.sample(
         boundary.pixel,
         boundary.vertex,
         boundary.image,

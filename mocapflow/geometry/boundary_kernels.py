@@ -1,0 +1,126 @@
+"""Compiled kernels of `silhouettes` that read off a boundary made of segments: points along it, distances to it."""
+
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+
+
+@numba.njit(cache=True)
+def sample(ends, vertices, images, points, normals, cloth, matrix, size, spacing):  # type: ignore[no-untyped-def]
+    """Return points every `spacing` px of the total length of segments, where they lie in the image.
+
+    Args:
+        ends: (B, 2, 2) px, directed segments, the covered side on the same hand as in `occluding_edges`.
+        vertices: (B, 2) vertex index of the ends of the edges they are pieces of.
+        images: (B, 2, 2) px, where these project.
+        points: (N, 3) m, the vertices.
+        normals: (N, 3), theirs.
+        cloth: (N,) bool.
+        matrix: (3, 4), px from m.
+        size: (2,) px, width and height of the image.
+        spacing: px.
+
+    Returns:
+        nearer vertex (K,), its image (K, 2) px, the point (K, 2) px and its unit normal outward (K, 2).
+    """
+    total = 0.0
+    for s in range(len(ends)):
+        total += math.hypot(ends[s, 1, 0] - ends[s, 0, 0], ends[s, 1, 1] - ends[s, 0, 1])
+    most = int(total / spacing) + 1
+    vertex, anchor = np.empty(most, np.int32), np.empty((most, 2))
+    pixel, normal = np.empty((most, 2)), np.empty((most, 2))
+    count, passed, total = 0, 0, 0.0
+    for s in range(len(ends)):
+        dx, dy = ends[s, 1, 0] - ends[s, 0, 0], ends[s, 1, 1] - ends[s, 0, 1]
+        length = math.hypot(dx, dy)
+        while (passed + 0.5) * spacing < total + length:
+            share = ((passed + 0.5) * spacing - total) / length
+            passed += 1
+            x, y = ends[s, 0, 0] + share * dx, ends[s, 0, 1] + share * dy
+            if not (0 <= x <= size[0] - 1 and 0 <= y <= size[1] - 1):
+                continue
+            first = math.hypot(images[s, 0, 0] - x, images[s, 0, 1] - y)
+            near = 1 if math.hypot(images[s, 1, 0] - x, images[s, 1, 1] - y) < first else 0
+            v = vertices[s, near]
+            nx, ny = image_normal(points[v], normals[v], matrix)
+            if cloth[v] or ny * dx - nx * dy <= 0:  # a rim has no such normal; nor has a vertex that is turned away
+                nx, ny = -dy, dx
+            norm = math.hypot(nx, ny)
+            vertex[count] = v
+            anchor[count, 0], anchor[count, 1] = images[s, near, 0], images[s, near, 1]
+            pixel[count, 0], pixel[count, 1] = x, y
+            normal[count, 0], normal[count, 1] = nx / norm, ny / norm
+            count += 1
+        total += length
+    return vertex[:count], anchor[:count], pixel[:count], normal[:count]
+
+
+@numba.njit(cache=True)
+def image_normal(point, normal, matrix):  # type: ignore[no-untyped-def]
+    """Return how the image of a point moves with its surface normal: x and y, not of unit length."""
+    x, y, w = matrix[0, 3], matrix[1, 3], matrix[2, 3]
+    dx, dy, dw = 0.0, 0.0, 0.0
+    for axis in range(3):
+        x, dx = x + matrix[0, axis] * point[axis], dx + matrix[0, axis] * normal[axis]
+        y, dy = y + matrix[1, axis] * point[axis], dy + matrix[1, axis] * normal[axis]
+        w, dw = w + matrix[2, axis] * point[axis], dw + matrix[2, axis] * normal[axis]
+    return (dx - x / w * dw) / w, (dy - y / w * dw) / w
+
+
+@numba.njit(cache=True)
+def paint_distance(ends, corner, cover, band, distance):  # type: ignore[no-untyped-def]
+    """Write the signed distance to the nearest segment into a field of -band; the inside beyond reach is +band.
+
+    Args:
+        ends: (B, 2, 2) px, the segments.
+        corner: (2,) px, column and row of `cover` in the image.
+        cover: (h, w), positive inside.
+        band: px, as float32.
+        distance: (H, W) float32, all -band.
+    """
+    rows, columns = distance.shape
+    pad = int(math.ceil(band))
+    left, top = max(corner[0] - pad, 0), max(corner[1] - pad, 0)
+    right, bottom = min(corner[0] + cover.shape[1] + pad, columns), min(corner[1] + cover.shape[0] + pad, rows)
+    square = np.full((max(bottom - top, 0), max(right - left, 0)), band * band)
+    _lower_to_segments(ends, left, top, band, square)
+    for row in range(square.shape[0]):
+        for column in range(square.shape[1]):
+            y, x = row + top - corner[1], column + left - corner[0]
+            inside = 0 <= y < cover.shape[0] and 0 <= x < cover.shape[1] and cover[y, x] > 0
+            if inside or square[row, column] < band * band:
+                d = np.float32(math.sqrt(square[row, column]))
+                distance[row + top, column + left] = d if inside else -d
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _lower_to_segments(ends, left, top, band, square):  # type: ignore[no-untyped-def]
+    """Lower each element of `square` within the band to its squared distance from the segments (float32, SIMD).
+
+    Along a segment a pixel lies beyond its ends by what its distance from the middle exceeds half the length.
+    """
+    zero, one, half = np.float32(0), np.float32(1), np.float32(0.5)
+    columns = np.arange(square.shape[1]).astype(np.float32)
+    for s in range(len(ends)):
+        ax, ay = np.float32(ends[s, 0, 0] - left), np.float32(ends[s, 0, 1] - top)
+        bx, by = np.float32(ends[s, 1, 0] - left), np.float32(ends[s, 1, 1] - top)
+        length = np.sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay))
+        ux, uy = ((bx - ax) / length, (by - ay) / length) if length > zero else (one, zero)
+        mx, my, reach = half * (ax + bx), half * (ay + by), half * length
+        first = max(math.ceil(min(ay, by) - band), 0)
+        last = min(math.floor(max(ay, by) + band) + 1, square.shape[0])
+        begin = max(math.ceil(min(ax, bx) - band), 0)
+        end = min(math.floor(max(ax, bx) + band) + 1, square.shape[1])
+        for row in range(first, last):
+            line, place = square[row, begin:end], columns[begin:end]
+            py = np.float32(row) - my
+            along, across = py * uy - mx * ux, py * ux + mx * uy
+            for k in range(len(line)):
+                beyond = abs(along + place[k] * ux) - reach
+                beyond = beyond if beyond > zero else zero
+                off = across - place[k] * uy
+                d = off * off + beyond * beyond
+                line[k] = d if d < line[k] else line[k]

@@ -1,0 +1,72 @@
+"""Source code as cache keys see it: the units it is digested in, their files, what they mean and import."""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+import sys
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+SHARED = ("io", "recording")  # counted where a component imports them
+
+
+def meaning(tree: ast.Module) -> str:
+    """Return the syntax tree as text, without docstrings: comments, documentation and layout are free."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and ast.get_docstring(
+            node, clean=False
+        ):
+            node.body = node.body[1:]
+    return ast.dump(tree)
+
+
+def imports(tree: ast.Module) -> Iterator[str]:
+    """Yield the dotted names of what a module imports, anywhere in it."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names if node.module == "mocapflow")
+
+
+def counts(name: str) -> bool:
+    """True for an import whose code a component depends on besides the core's."""
+    top, _, rest = name.partition(".")
+    return top.startswith("mocapflow_") or (top == "mocapflow" and rest.partition(".")[0] in SHARED)
+
+
+def unit_of(module: str) -> str:
+    """Return what is digested as one: the top package, or one part of mocapflow itself."""
+    parts = module.split(".")
+    return ".".join(parts[:2] if parts[0] == "mocapflow" else parts[:1])
+
+
+def data_files(unit: str) -> Iterable[tuple[str, Path]]:
+    """Yield the files of a plugin package that are no code, such as a template body."""
+    origin = _origin(unit)
+    if origin is None or origin.name != "__init__.py" or unit.startswith("mocapflow."):
+        return
+    for path in sorted(origin.parent.rglob("*")):
+        if path.is_file() and path.suffix != ".py" and "__pycache__" not in path.parts:
+            yield path.relative_to(origin.parent).as_posix(), path
+
+
+def _origin(unit: str) -> Path | None:
+    loaded = sys.modules.get(unit)
+    spec = loaded.__spec__ if loaded is not None else importlib.util.find_spec(unit)
+    return None if spec is None or spec.origin is None else Path(spec.origin)
+
+
+def python_files(unit: str) -> Iterable[tuple[str, Path]]:
+    """Yield dotted name and path of every Python file of a module or package."""
+    origin = _origin(unit)
+    if origin is None:
+        return
+    if origin.name != "__init__.py":
+        yield unit, origin
+        return
+    for path in sorted(origin.parent.rglob("*.py")):
+        parts = path.relative_to(origin.parent).with_suffix("").parts
+        yield ".".join((unit, *(part for part in parts if part != "__init__"))), path
