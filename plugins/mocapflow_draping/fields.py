@@ -32,11 +32,6 @@ class BodyFields:
     values: F32 = array("X", unit="m, signed distance, negative inside")
     voxel: float  # m
 
-    @property
-    def solid(self) -> tuple[F64, I32, I32, F32, float, float]:
-        """The arrays a kernel reads, in its order."""
-        return self.radius, self.shape, self.offset, self.values, 1.0 / self.voxel, MARGIN
-
 
 def build_fields(body: Body, joints: I32, voxel: float) -> BodyFields:
     """Return the fields of the parts that move with `joints`.
@@ -70,21 +65,6 @@ def build_fields(body: Body, joints: I32, voxel: float) -> BodyFields:
         values=np.concatenate([values.ravel() for _, values in parts]).astype(np.float32),
         voxel=voxel,
     )
-
-
-def part_transforms(fields: BodyFields, chain: F64) -> tuple[F64, F64, F64]:
-    """Return how to reach the fields at posed joints (B, J, 4, 4).
-
-    Returns:
-        voxel_from_world (B, P, 3, 4), the least stretch of each part's transform (B, P), and the centres of the
-        balls around the parts in the world (B, P, 3).
-    """
-    posed = 0.5 * (chain[:, fields.joints[:, 0]] + chain[:, fields.joints[:, 1]])
-    stretch = np.linalg.svd(posed[..., :3, :3], compute_uv=False)[..., -1].clip(1e-3)
-    inverse = np.linalg.inv(posed)[..., :3, :]
-    centres = np.einsum("bpij,pj->bpi", posed[..., :3, :3], fields.centre) + posed[..., :3, 3]
-    inverse[..., 3] -= fields.origin
-    return np.ascontiguousarray(inverse / fields.voxel), stretch, centres
 
 
 def touchable_joints(body: Body, garment: GarmentMesh) -> I32:

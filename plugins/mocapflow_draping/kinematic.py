@@ -16,14 +16,13 @@ from mocapflow.errors import PluginError
 from mocapflow.geometry.kinematics import chain_batch
 from mocapflow.records import F64, Bool, record
 from mocapflow.scene import Scene
-from mocapflow_draping.fields import BodyFields, build_fields, part_transforms, touchable_joints
+from mocapflow_draping.fields import BodyFields, build_fields, touchable_joints
 from mocapflow_draping.forces import thickness, tilts, wind
 from mocapflow_draping.frames import hanging, riding, standing
+from mocapflow_draping.parts import posed_parts
 from mocapflow_draping.strands import Strands, roots, strands_of
 
 LOWER = 0.002  # m, step of a cloth that nothing holds
-
-Bodies = tuple[F64, F64, F64]
 
 
 @record
@@ -64,17 +63,17 @@ class Kinematic(Draper):
         fitting = self.fitting(garment, scene.body)
         strands = fitting.strands
         chain = chain_batch(scene.body, poses)
-        bodies = part_transforms(fitting.fields, chain)
+        parts = posed_parts(fitting.fields, chain)
         skin = self.skin_m + thickness(garment, parameters) / 2
         out, aside = tilts(garment, parameters, strands.azimuth)
         if self.rule == "literal":
-            grid = self._step(fitting, chain, parameters, garment, skin, bodies)
+            grid = self._step(fitting, chain, parameters, garment, skin, parts)
         elif strands.rides:
             grid = riding(strands, chain, out, aside)
         else:
-            grid = self._fall(fitting, chain, out, aside, skin, bodies)
+            grid = self._fall(fitting, chain, out, aside, skin, parts)
         if self.sweeps:
-            self._close(fitting, grid, skin, bodies)
+            self._close(fitting, grid, skin, parts)
         vertices = np.empty((len(chain), len(garment.vertices), 3))
         vertices[:, strands.vertex[strands.own]] = grid[:, strands.own]
         return vertices
@@ -102,7 +101,7 @@ class Kinematic(Draper):
             self._fittings[garment] = known
         return known
 
-    def _fall(self, fitting: Fitting, chain: F64, out: F64, aside: F64, skin: F64, bodies: Bodies) -> F64:
+    def _fall(self, fitting: Fitting, chain: F64, out: F64, aside: F64, skin: F64, parts: F64) -> F64:
         from mocapflow_draping.swing import swing_batch
 
         strands = fitting.strands
@@ -112,29 +111,27 @@ class Kinematic(Draper):
         start = np.full(out.shape, math.radians(self.start_deg))
         swing_batch(
             roots(strands, chain), facing, down, start, skin, strands.links, strands.first, strands.last,
-            bodies, fitting.fields.solid, grid, support,
+            parts, fitting.fields.values, grid, support,
         )  # fmt: skip
         return grid
 
-    def _step(
-        self, fitting: Fitting, chain: F64, parameters: F64, garment: GarmentMesh, skin: F64, bodies: Bodies
-    ) -> F64:
+    def _step(self, fitting: Fitting, chain: F64, parameters: F64, garment: GarmentMesh, skin: F64, parts: F64) -> F64:
         from mocapflow_draping.literal import blow_batch, settle_batch
 
-        strands, solid = fitting.strands, fitting.fields.solid
+        strands, values = fitting.strands, fitting.fields.values
         grid = standing(strands, chain)
         fixed = np.zeros(grid.shape[:3], bool)
         fixed[:, np.arange(len(strands.first)), strands.first] = True
         step, in_space = math.radians(self.step_deg), self.pivot == "space"
         settle_batch(
             grid, fixed, strands.first, strands.last, skin, step, self.iterations, self.limited, in_space,
-            LOWER, bodies, solid,
+            LOWER, parts, values,
         )  # fmt: skip
         force, amount = wind(garment, parameters, chain[:, strands.carrier[0], :3, :3])
-        blow_batch(grid, fixed, strands.first, strands.last, skin, force, amount, bodies, solid)
+        blow_batch(grid, fixed, strands.first, strands.last, skin, force, amount, parts, values)
         return grid
 
-    def _close(self, fitting: Fitting, grid: F64, skin: F64, bodies: Bodies) -> None:
+    def _close(self, fitting: Fitting, grid: F64, skin: F64, parts: F64) -> None:
         from mocapflow_draping.rings import close_batch
 
         strands = fitting.strands
@@ -144,5 +141,5 @@ class Kinematic(Draper):
             bend = np.exp(-strands.links / self.bending_m)
         close_batch(
             grid, strands.links, strands.first, strands.last, across, length, skin, self.longest, self.stiff, bend,
-            self.sweeps, bodies, fitting.fields.solid,
+            self.sweeps, parts, fitting.fields.values,
         )  # fmt: skip

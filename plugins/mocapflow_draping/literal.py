@@ -14,7 +14,7 @@ from mocapflow_draping.distance import body_distance
 
 
 @numba.njit(cache=True)
-def settle_batch(grid, fixed, first, last, skin, step, iterations, limited, in_space, lower, bodies, solid):  # type: ignore[no-untyped-def]
+def settle_batch(grid, fixed, first, last, skin, step, iterations, limited, in_space, lower, parts, values):  # type: ignore[no-untyped-def]
     """Lay B grids of particles on posed bodies, in place.
 
     Args:
@@ -28,31 +28,30 @@ def settle_batch(grid, fixed, first, last, skin, step, iterations, limited, in_s
         limited: True: never beyond straight down; False: it swings back in the next turn, as printed.
         in_space: True: the nearest fixed point anywhere; False: along the strand.
         lower: m, how far all particles sink at a time while none is fixed.
-        bodies: voxel_from_world (B, P, 3, 4), stretch (B, P) and ball centres (B, P, 3) of the parts.
-        solid: radius, shape, offset, values, 1/voxel and margin of the parts.
+        parts: (B, P, COLUMNS), the bodies, see `parts`.
+        values: their voxels.
 
     Source: Rosenhahn 2008, section 12.3
     """
-    maps, stretch, centres = bodies
     for b in range(len(grid)):
         while not fixed[b].any() and grid[b, :, :, 2].max() > FLOOR:
             grid[b, :, :, 2] -= lower
-            _touch(grid[b], fixed[b], first, last, skin[b], maps[b], stretch[b], centres[b], solid)
+            _touch(grid[b], fixed[b], first, last, skin[b], parts[b], values)
         for _ in range(iterations):
             _turn(grid[b], fixed[b], first, last, step, limited, in_space)
-            _touch(grid[b], fixed[b], first, last, skin[b], maps[b], stretch[b], centres[b], solid)
+            _touch(grid[b], fixed[b], first, last, skin[b], parts[b], values)
 
 
 FLOOR = -10.0  # m: what falls past everything stops here
 
 
 @numba.njit(cache=True)
-def _touch(grid, fixed, first, last, skin, maps, stretch, centres, solid):  # type: ignore[no-untyped-def]
+def _touch(grid, fixed, first, last, skin, parts, values):  # type: ignore[no-untyped-def]
     for n in range(grid.shape[0]):
         for k in range(first[n], last[n] + 1):
             if not fixed[n, k]:
                 p = grid[n, k]
-                d = body_distance(p[0], p[1], p[2], maps, stretch, centres, solid, 0)[0]
+                d = body_distance(p[0], p[1], p[2], 0, parts, values)[0]
                 fixed[n, k] = d < skin
 
 
@@ -99,12 +98,11 @@ def _nearest(grid, fixed, n, k, first, last, in_space):  # type: ignore[no-untyp
 
 
 @numba.njit(cache=True)
-def blow_batch(grid, fixed, first, last, skin, force, amount, bodies, solid):  # type: ignore[no-untyped-def]
+def blow_batch(grid, fixed, first, last, skin, force, amount, parts, values):  # type: ignore[no-untyped-def]
     """Turn the free tails of B draped grids towards forces (B, 3) by `amount` (B,) rad, until they touch, in place.
 
     Source: Rosenhahn 2008, section 12.3
     """
-    maps, stretch, centres = bodies
     trial = np.empty((grid.shape[2], 3))
     for b in range(len(grid)):
         for n in range(grid.shape[1]):
@@ -125,10 +123,8 @@ def blow_batch(grid, fixed, first, last, skin, force, amount, bodies, solid):  #
                         force[b],
                         angle,
                         skin[b],
-                        maps[b],
-                        stretch[b],
-                        centres[b],
-                        solid,
+                        parts[b],
+                        values,
                         trial,
                     ):
                         break
@@ -140,7 +136,7 @@ def blow_batch(grid, fixed, first, last, skin, force, amount, bodies, solid):  #
 
 
 @numba.njit(cache=True)
-def _blown(strand, pivot, last, force, angle, skin, maps, stretch, centres, solid, trial):  # type: ignore[no-untyped-def]
+def _blown(strand, pivot, last, force, angle, skin, parts, values, trial):  # type: ignore[no-untyped-def]
     """Write the tail turned towards the force and return True if it stays clear of the body or leaves it."""
     x = strand[pivot]
     d = strand[last] - x
@@ -160,9 +156,9 @@ def _blown(strand, pivot, last, force, angle, skin, maps, stretch, centres, soli
         trial[k, 0] = x[0] + c * q[0] + s * (axis[1] * q[2] - axis[2] * q[1]) + along * axis[0]
         trial[k, 1] = x[1] + c * q[1] + s * (axis[2] * q[0] - axis[0] * q[2]) + along * axis[1]
         trial[k, 2] = x[2] + c * q[2] + s * (axis[0] * q[1] - axis[1] * q[0]) + along * axis[2]
-        d1 = body_distance(trial[k, 0], trial[k, 1], trial[k, 2], maps, stretch, centres, solid, 0)[0]
+        d1 = body_distance(trial[k, 0], trial[k, 1], trial[k, 2], 0, parts, values)[0]
         if d1 < skin:
             p = strand[k]
-            if d1 < body_distance(p[0], p[1], p[2], maps, stretch, centres, solid, 0)[0]:
+            if d1 < body_distance(p[0], p[1], p[2], 0, parts, values)[0]:
                 return False
     return True

@@ -11,27 +11,27 @@ import math
 import numba
 import numpy as np
 
-from mocapflow_draping.distance import body_distance
+from mocapflow_draping.distance import body_distance, outwards
 
 CLEAR = 2e-4  # m beyond contact to which a particle is pushed, so that it need not be pushed again at once
 PUSHES = 5  # out of the body and back to the bar's length
 TURNS = 12  # of a bar that pushing did not free, towards straight out of the body
-PROBE = 1e-3  # m, for the direction out of the body
 
 
 @numba.njit(cache=True, error_model="numpy")
-def push_out(grid, n, row, link, seen, room, near, body):  # type: ignore[no-untyped-def]
+def push_out(grid, n, row, link, skin, seen, room, near, parts, values):  # type: ignore[no-untyped-def]
     """Move a particle that may be inside the body out of it, at the length of its bar."""
     p, above = grid[n, row], grid[n, row - 1]
     for _ in range(PUSHES):
         if room[n] >= way(p, seen[n]):
             return
-        _measure(p, n, seen, room, near, body)
+        _measure(p, n, skin, seen, room, near, parts, values)
         if room[n] >= 0.0:
             return
-        _move(p, CLEAR - room[n], _outwards(p, near[n], body))
+        _move(p, CLEAR - room[n], outwards(p[0], p[1], p[2], near[n], parts, values))
         to_length(p, above, link)
-    gx, gy, gz = _outwards(above, near[n], body)
+    part = body_distance(above[0], above[1], above[2], near[n], parts, values)[1]
+    gx, gy, gz = outwards(above[0], above[1], above[2], part, parts, values)
     ux, uy, uz = (p[0] - above[0]) / link, (p[1] - above[1]) / link, (p[2] - above[2]) / link
     for turn in range(TURNS + 1):  # from where it was left to straight away from the skin above
         w = turn / TURNS
@@ -39,15 +39,14 @@ def push_out(grid, n, row, link, seen, room, near, body):  # type: ignore[no-unt
         p[1] = above[1] + link * ((1.0 - w) * uy + w * gy)
         p[2] = above[2] + link * ((1.0 - w) * uz + w * gz)
         to_length(p, above, link)
-        _measure(p, n, seen, room, near, body)
+        _measure(p, n, skin, seen, room, near, parts, values)
         if room[n] >= 0.0:
             return
 
 
 @numba.njit(cache=True, error_model="numpy")
-def lift(grid, first, last, beside, row, seen, room, near, body):  # type: ignore[no-untyped-def]
+def lift(grid, first, last, beside, row, seen, room, near, parts, values):  # type: ignore[no-untyped-def]
     """Move both ends of a link out of the body where its middle is inside: no limb shall come between them."""
-    _, maps, stretch, centres, solid = body
     middle = np.empty(3)
     for n in range(grid.shape[0]):
         m = beside[n, row]
@@ -58,9 +57,9 @@ def lift(grid, first, last, beside, row, seen, room, near, body):  # type: ignor
             middle[a] = 0.5 * (p[a] + q[a])
         if room[n] > way(middle, seen[n]) or room[m] > way(middle, seen[m]):
             continue
-        d, part = body_distance(middle[0], middle[1], middle[2], maps, stretch, centres, solid, near[n])
+        d, part = body_distance(middle[0], middle[1], middle[2], near[n], parts, values)
         if d < 0.0:
-            out = _outwards(middle, part, body)
+            out = outwards(middle[0], middle[1], middle[2], part, parts, values)
             if row > first[n]:
                 _move(p, CLEAR - d, out)
             if row > first[m]:
@@ -82,9 +81,8 @@ def way(p, q):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _measure(p, n, seen, room, near, body):  # type: ignore[no-untyped-def]
-    skin, maps, stretch, centres, solid = body
-    d, near[n] = body_distance(p[0], p[1], p[2], maps, stretch, centres, solid, near[n])
+def _measure(p, n, skin, seen, room, near, parts, values):  # type: ignore[no-untyped-def]
+    d, near[n] = body_distance(p[0], p[1], p[2], near[n], parts, values)
     room[n] = d - skin
     seen[n, 0], seen[n, 1], seen[n, 2] = p[0], p[1], p[2]
 
@@ -92,19 +90,3 @@ def _measure(p, n, seen, room, near, body):  # type: ignore[no-untyped-def]
 @numba.njit(cache=True, error_model="numpy")
 def _move(p, amount, towards):  # type: ignore[no-untyped-def]
     p[0], p[1], p[2] = p[0] + amount * towards[0], p[1] + amount * towards[1], p[2] + amount * towards[2]
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _outwards(p, near, body):  # type: ignore[no-untyped-def]
-    """Return the unit direction out of the body at a point."""
-    gx = _distance(p[0] + PROBE, p[1], p[2], near, body) - _distance(p[0] - PROBE, p[1], p[2], near, body)
-    gy = _distance(p[0], p[1] + PROBE, p[2], near, body) - _distance(p[0], p[1] - PROBE, p[2], near, body)
-    gz = _distance(p[0], p[1], p[2] + PROBE, near, body) - _distance(p[0], p[1], p[2] - PROBE, near, body)
-    g = math.sqrt(gx * gx + gy * gy + gz * gz) + 1e-12
-    return gx / g, gy / g, gz / g
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _distance(x, y, z, near, body):  # type: ignore[no-untyped-def]
-    _, maps, stretch, centres, solid = body
-    return body_distance(x, y, z, maps, stretch, centres, solid, near)[0]

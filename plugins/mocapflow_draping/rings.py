@@ -23,7 +23,7 @@ STRIDE = 0.02  # m beyond its room that a particle may go in one sweep, so that 
 
 
 @numba.njit(cache=True, error_model="numpy")
-def close_batch(grid, links, first, last, across, length, skin, longest, stiff, bend, sweeps, bodies, solid):  # type: ignore[no-untyped-def]
+def close_batch(grid, links, first, last, across, length, skin, longest, stiff, bend, sweeps, parts, values):  # type: ignore[no-untyped-def]
     """Close the rings of B drapes in place.
 
     Args:
@@ -38,15 +38,13 @@ def close_batch(grid, links, first, last, across, length, skin, longest, stiff, 
         stiff: 0 to 1, the share of a shortened link's lack that one sweep makes good.
         bend: (N, L - 1) 0 to 1, how much each bar keeps the direction of the one above it.
         sweeps: passes over each row, at most.
-        bodies: voxel_from_world (B, P, 3, 4), stretch (B, P) and ball centres (B, P, 3) of the parts.
-        solid: radius, shape, offset, values, 1/voxel and margin of the parts.
+        parts: (B, P, COLUMNS), the bodies, see `parts`.
+        values: their voxels.
     """
-    maps, stretch, centres = bodies
     strands, rows = grid.shape[1], grid.shape[2]
     bars, seen = np.empty((strands, rows, 3)), np.empty((strands, 3))
     room, near = np.empty(strands), np.zeros(strands, np.int64)
     for b in range(len(grid)):
-        body = (skin[b], maps[b], stretch[b], centres[b], solid)
         seen[:], room[:] = grid[b, :, 0], -1.0
         _bars(grid[b], links, first, last, bars)
         for row in range(1, rows):
@@ -56,8 +54,8 @@ def close_batch(grid, links, first, last, across, length, skin, longest, stiff, 
                     _pull(grid[b], first, last, across[k], length[k], row, longest, 0.0, sweep % 2 == 1)
                 excess = _pull(grid[b], first, last, across[0], length[0], row, longest, stiff, sweep % 2 == 1)
                 if sweep > 0:
-                    lift(grid[b], first, last, across[0], row, seen, room, near, body)
-                _clear(grid[b], links, first, last, row, sweep > 0, seen, room, near, body)
+                    lift(grid[b], first, last, across[0], row, seen, room, near, parts[b], values)
+                _clear(grid[b], links, first, last, row, sweep > 0, skin[b], seen, room, near, parts[b], values)
                 if sweep + 1 >= LEAST and excess < ENOUGH:
                     break
 
@@ -123,7 +121,7 @@ def _draw(p, q, share, p_moves, q_moves):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _clear(grid, links, first, last, row, limited, seen, room, near, body):  # type: ignore[no-untyped-def]
+def _clear(grid, links, first, last, row, limited, skin, seen, room, near, parts, values):  # type: ignore[no-untyped-def]
     """Give every bar of a row its length, outside the body."""
     for n in range(grid.shape[0]):
         if first[n] < row <= last[n]:
@@ -133,4 +131,4 @@ def _clear(grid, links, first, last, row, limited, seen, room, near, body):  # t
                 for a in range(3):
                     p[a] = seen[n, a] + most / far * (p[a] - seen[n, a])
             to_length(p, grid[n, row - 1], link)
-            push_out(grid, n, row, link, seen, room, near, body)
+            push_out(grid, n, row, link, skin, seen, room, near, parts, values)

@@ -13,6 +13,7 @@ import numba
 import numpy as np
 
 from mocapflow_draping.distance import body_distance
+from mocapflow_draping.parts import PITCH
 
 GUARD = 0.4  # voxels: so much too far can a field read near a sharp edge
 DEEP = 5e-5  # m, deeper than this a tail turns back
@@ -21,7 +22,7 @@ TOUCH = 3e-4  # m, nearer than this to the contact distance counts as touching
 
 
 @numba.njit(cache=True, error_model="numpy")
-def swing_batch(roots, facing, down, start, skin, links, first, last, bodies, solid, out, support):  # type: ignore[no-untyped-def]
+def swing_batch(roots, facing, down, start, skin, links, first, last, parts, values, out, support):  # type: ignore[no-untyped-def]
     """Drape N strands of up to L particles on B posed bodies.
 
     Args:
@@ -33,31 +34,30 @@ def swing_batch(roots, facing, down, start, skin, links, first, last, bodies, so
         links: (N, L - 1) m, lengths of the bars.
         first: (N,) row of the first particle of each strand.
         last: (N,) row of the last one.
-        bodies: voxel_from_world (B, P, 3, 4), stretch (B, P) and ball centres (B, P, 3) of the parts.
-        solid: radius, shape, offset, values, 1/voxel and margin of the parts.
+        parts: (B, P, COLUMNS), the bodies, see `parts`.
+        values: their voxels.
         out: (B, N, L, 3) m, written.
         support: (B, N), written: the last supported particle of each strand.
     """
-    maps, stretch, centres = bodies
     rows = links.shape[1] + 1
     reach, room, near = np.empty(rows), np.empty(rows), np.zeros(rows, np.int64)
     for b in range(len(roots)):
         for n in range(roots.shape[1]):
             support[b, n] = _swing(
                 roots[b, n], facing[b, n], down[b, n], start[b, n], skin[b], links[n], first[n], last[n],
-                maps[b], stretch[b], centres[b], solid, out[b, n], reach, room, near,
+                parts[b], values, out[b, n], reach, room, near,
             )  # fmt: skip
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _swing(root, facing, down, start, skin, links, first, last, maps, stretch, centres, solid, out, reach, room, near):  # type: ignore[no-untyped-def]
+def _swing(root, facing, down, start, skin, links, first, last, parts, values, out, reach, room, near):  # type: ignore[no-untyped-def]
     """Drape one strand; `reach` is along the strand, `room` how far each particle may yet move untouched."""
     out[first] = root
     reach[first] = 0.0
     for k in range(first + 1, last + 1):
         reach[k], room[k] = reach[k - 1] + links[k - 1], 0.0
     pivot, angle, turn, backs = first, start, 0.0, 0
-    guard = GUARD / solid[4]
+    guard = GUARD * parts[0, PITCH]
     while pivot < last:
         x, base = out[pivot], reach[pivot]
         touched = -1
@@ -68,7 +68,7 @@ def _swing(root, facing, down, start, skin, links, first, last, maps, stretch, c
                 arm = reach[k] - base
                 if room[k] - guard < arm * turn:
                     room[k], near[k] = body_distance(
-                        x[0] + arm * bx, x[1] + arm * by, x[2] + arm * bz, maps, stretch, centres, solid, near[k]
+                        x[0] + arm * bx, x[1] + arm * by, x[2] + arm * bz, near[k], parts, values
                     )
                     room[k] -= skin
                     if room[k] < -DEEP and backs < BACKS and angle < math.pi:  # read too far at a sharp edge

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mocapflow.records import F64, I32, Bool
+from mocapflow.records import F32, F64, I32, Bool
 from mocapflow_physics.cloth import GRAVITY
 
 SPEED = 3.0  # m/s: no particle passes through a limb between two looks for contacts
@@ -18,7 +18,6 @@ ITERATIONS = 4  # of the solver, a step
 CALM = 0.1  # s in which speed falls to 1/e: near the critical damping of a hem that swings
 
 Links = tuple[I32, F64, F64]  # as `cloth.links_of` gives them
-Bodies = tuple[F64, F64, F64]  # as `mocapflow_draping.fields.part_transforms` gives them
 
 
 class Simulation:
@@ -51,15 +50,15 @@ class Simulation:
         self._moved, self._step, self._damping = ~pinned, step, np.exp(-step / CALM)
 
     def settle(
-        self, cloth: F64, pins: Sequence[F64], bodies: Sequence[Bodies], solid: Any, skin: F64, pull: F64, every: int
+        self, cloth: F64, pins: Sequence[F64], parts: Sequence[F64], values: F32, skin: F64, pull: F64, every: int
     ) -> F64:
         """Return the cloth (B, W, 3) m after it has been carried through a motion.
 
         Args:
             cloth: (B, W, 3) m, where it begins, at rest.
             pins: per moment (B, P, 3) m, where the pinned particles are.
-            bodies: per moment the transforms of the body's parts.
-            solid: the body's fields, as a kernel reads them.
+            parts: per moment (B, P, COLUMNS), the bodies, as `mocapflow_draping.parts` tells.
+            values: their voxels.
             skin: (B,) m, contact distance.
             pull: (B, W, 3) m/s^2, acceleration besides gravity.
             every: steps of the solver per moment.
@@ -77,11 +76,11 @@ class Simulation:
         for one in (state, after):
             one.particle_q.numpy()[:] = cloth.reshape(-1, 3)
             one.particle_f.numpy()[:] = pull.reshape(-1, 3)
-        for held, posed in zip(pins, bodies, strict=True):
+        for held, posed in zip(pins, parts, strict=True):
             place = state.particle_q.numpy().reshape(cloth.shape)
             place[:, ~self._moved] = held
             after.particle_q.numpy().reshape(cloth.shape)[:, ~self._moved] = held
-            count[0] = find_contacts(place, self._moved, skin, REACH, posed, solid, *written)
+            count[0] = find_contacts(place, self._moved, skin, REACH, posed, values, *written)
             for _ in range(every):
                 self._solver.step(state, after, control, contacts, self._step)
                 state, after = after, state

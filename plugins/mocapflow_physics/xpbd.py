@@ -6,9 +6,9 @@ from importlib.util import find_spec
 from typing import Annotated, ClassVar
 from weakref import WeakKeyDictionary
 
-from mocapflow_draping.fields import part_transforms
 from mocapflow_draping.forces import thickness
 from mocapflow_draping.kinematic import Fitting, Kinematic
+from mocapflow_draping.parts import posed_parts
 from pydantic import Field, PrivateAttr, model_validator
 
 from mocapflow.assets import GarmentMesh
@@ -58,12 +58,12 @@ class Xpbd(Draper):
         moving = max(round(self.move_s * self.rate_hz / EVERY), 1)
         chains = [chain_batch(scene.body, moment) for moment in between(start, end, moving)]
         resting = 1 + round(self.rest_s * self.rate_hz / EVERY)
-        bodies = [part_transforms(fitting.fields, chain) for chain in chains]
+        parts = [posed_parts(fitting.fields, chain) for chain in chains]
         settled = self._simulation(fitting, garment, len(cloth)).settle(
             cloth,
             [pins_at(strands, chain) for chain in chains] + [pins_at(strands, chains[-1])] * resting,
-            bodies + [bodies[-1]] * resting,
-            fitting.fields.solid,
+            parts + [parts[-1]] * resting,
+            fitting.fields.values,
             self.skin_m + thickness(garment, parameters) / 2,
             pull_of(strands, garment, parameters, chains[-1]),
             EVERY,

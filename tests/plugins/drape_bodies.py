@@ -6,7 +6,8 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 from mocapflow_draping.distance import body_distances
-from mocapflow_draping.fields import build_fields, part_transforms
+from mocapflow_draping.fields import build_fields
+from mocapflow_draping.parts import posed_parts
 from mocapflow_draping.swing import swing_batch
 
 from mocapflow.assets import Body
@@ -106,24 +107,24 @@ def leg_poses():
 
 
 def prepared(body, chain=EYE, voxel=VOXEL):
-    """Return fields and part transforms of a body."""
+    """Return the voxels of a body and its parts."""
     known = FIELDS.setdefault(body, {})
     if voxel not in known:
         known[voxel] = build_fields(body, np.arange(len(body.parents), dtype=np.int32), voxel)
     fields = known[voxel]
-    return fields, part_transforms(fields, np.broadcast_to(chain, (len(chain), len(body.parents), 4, 4)).copy())
+    return fields.values, posed_parts(fields, np.broadcast_to(chain, (len(chain), len(body.parents), 4, 4)).copy())
 
 
 def swing(body, roots, facing, count, link, down=(0.0, 0.0, -1.0), start=90.0, voxel=VOXEL):
     """Drape strands (N) on a resting body; return particles (N, L, 3) and the last supported one (N,)."""
-    fields, bodies = prepared(body, voxel=voxel)
+    values, parts = prepared(body, voxel=voxel)
     many = len(roots)
     out, support = np.empty((1, many, count, 3)), np.empty((1, many), np.int32)
     swing_batch(
         np.asarray(roots, float)[None], np.tile(np.asarray(facing, float), (1, many, 1)),
         np.tile(np.asarray(down, float), (1, many, 1)), np.full((1, many), np.radians(start)), np.array([SKIN]),
         np.full((many, count - 1), link), np.zeros(many, np.int32), np.full(many, count - 1, np.int32),
-        bodies, fields.solid, out, support,
+        parts, values, out, support,
     )  # fmt: skip
     return out[0], support[0]
 
@@ -131,8 +132,8 @@ def swing(body, roots, facing, count, link, down=(0.0, 0.0, -1.0), start=90.0, v
 def distances(body, points, poses=None, voxel=VOXEL):
     """Return the distance of points (B, N, 3) to the body at poses."""
     chain = EYE if poses is None else kinematics.chain_batch(body, poses)
-    fields, (maps, stretch, centres) = prepared(body, chain, voxel)
+    values, parts = prepared(body, chain, voxel)
     out = np.empty(points.shape[:2])
     for row, cloud in enumerate(points):
-        body_distances(np.ascontiguousarray(cloud), out[row], maps[row], stretch[row], centres[row], fields.solid)
+        body_distances(np.ascontiguousarray(cloud), out[row], parts[row], values)
     return out

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from drape_bodies import SKIN, VOXEL, box, distances, leg_poses, legs, lying_cylinder, prepared, swing
+from mocapflow_draping.distance import outwards
 from mocapflow_draping.kinematic import Kinematic
 from mocapflow_draping.literal import settle_batch
 from mocapflow_draping.strands import strands_of
@@ -19,11 +20,11 @@ SKIRT = dict(waist_height_m=1.08, waist_circumference_m=0.92, hem_circumference_
 
 def literal(body, grid, fixed, step=2.0, iterations=50, limited=True):
     """Return a grid (N, L, 3) laid step by step, and what is fixed."""
-    fields, bodies = prepared(body)
+    values, parts = prepared(body)
     grid, fixed = grid[None].copy(), fixed[None].copy()
     first, last = np.zeros(grid.shape[1], np.int32), np.full(grid.shape[1], grid.shape[2] - 1, np.int32)
     settle_batch(grid, fixed, first, last, np.array([SKIN]), np.radians(step), iterations, limited, False, 0.002,
-                 bodies, fields.solid)  # fmt: skip
+                 parts, values)  # fmt: skip
     return grid[0], fixed[0]
 
 
@@ -55,6 +56,13 @@ def test_fields_follow_the_joints(skirted):
     shins = scene.body.vertices[(scene.body.vertices[:, 2] > 0.15) & (scene.body.vertices[:, 2] < 0.4)]
     rest = distances(scene.body, np.tile(shins, (4, 1, 1)), leg_poses())[0]
     assert np.abs(rest).max() < 1.5e-3  # coarse facets of the capsule and coarse voxels
+
+
+def test_out_of_a_cylinder_is_away_from_its_axis():
+    values, parts = prepared(lying_cylinder(0.1))
+    for angle in np.linspace(0.3, 6.0, 12):
+        away = np.array([np.cos(angle), 0.0, np.sin(angle)])
+        np.testing.assert_allclose(outwards(*(0.097 * away), 0, parts[0], values), away, atol=0.03)
 
 
 def test_a_raised_thigh_does_not_come_out_behind_the_body(skirted):

@@ -39,14 +39,12 @@ def standing():
 
 
 def blown(body, grid, force, degrees, fixed=(0,)):
-    fields, bodies = prepared(body)
+    values, parts = prepared(body)
     pinned = np.zeros((1, *grid.shape[:2]), bool)
     pinned[..., list(fixed)] = True
     out = grid[None].copy()
     rows = np.zeros(len(grid), np.int32), np.full(len(grid), grid.shape[1] - 1, np.int32)
-    blow_batch(
-        out, pinned, *rows, np.array([SKIN]), np.array([force], float), np.radians([degrees]), bodies, fields.solid
-    )
+    blow_batch(out, pinned, *rows, np.array([SKIN]), np.array([force], float), np.radians([degrees]), parts, values)
     return out[0]
 
 

@@ -38,13 +38,13 @@ def test_every_edge_of_the_mesh_is_a_link_once():
 
 def test_a_contact_is_the_nearest_place_at_the_contact_distance():
     body = lying_cylinder(0.10)
-    fields, bodies = prepared(body)
+    values, parts = prepared(body)
     angle = np.linspace(0, 2 * np.pi, 40, endpoint=False)
     radius = np.where(np.arange(40) % 2, 0.115, 0.2)
     cloth = np.stack([radius * np.cos(angle), 0 * angle, radius * np.sin(angle)], axis=1)[None]
     particle, place, normal = np.empty(40, np.int32), np.empty((40, 3), np.float32), np.empty((40, 3), np.float32)
     moved = np.arange(40) != 1
-    count = find_contacts(cloth, moved, np.array([0.004]), 0.03, bodies, fields.solid, particle, place, normal)
+    count = find_contacts(cloth, moved, np.array([0.004]), 0.03, parts, values, particle, place, normal)
     assert particle[:count].tolist() == list(range(3, 40, 2))  # near ones; the first is pinned
     np.testing.assert_allclose(np.linalg.norm(place[:count], axis=1), 0.104, atol=1e-3)
     assert ((normal * cloth[0, [*particle[:count], *range(40 - count)]])[:count].sum(axis=1) > 0.114).all()

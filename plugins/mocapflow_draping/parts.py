@@ -1,0 +1,40 @@
+"""The parts of posed bodies as one table, for kernels: each array handed down costs a call as much as reading a voxel.
+
+A kernel takes a body as `parts` (P, COLUMNS), with the columns named here, and `values`, the voxels of all parts.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mocapflow.records import F64
+from mocapflow_draping.fields import MARGIN, BodyFields
+
+MAP = 0  # 12 columns: the rows of voxel_from_world
+SIDES = 12  # 3 columns: voxels along each axis
+PAD = 15  # voxels: so far inside its grid the part itself begins
+OFFSET = 16  # of its first voxel in values
+STRETCH = 17  # the least by which the pose stretches the part
+PITCH = 18  # m, a voxel's edge in the world, at least
+CENTRE = 19  # m, 3 columns: of a ball around the part, in the world
+RADIUS = 22  # m, of that ball
+COLUMNS = 23
+
+
+def posed_parts(fields: BodyFields, chain: F64) -> F64:
+    """Return the parts (B, P, COLUMNS) of a body at posed joints (B, J, 4, 4)."""
+    posed = 0.5 * (chain[:, fields.joints[:, 0]] + chain[:, fields.joints[:, 1]])
+    stretch = np.linalg.svd(posed[..., :3, :3], compute_uv=False)[..., -1].clip(1e-3)
+    inverse = np.linalg.inv(posed)[..., :3, :]
+    inverse[..., 3] -= fields.origin
+    parts = np.empty((*posed.shape[:2], COLUMNS))
+    parts[..., MAP:SIDES] = inverse.reshape(*posed.shape[:2], 12) / fields.voxel
+    parts[..., SIDES:PAD] = fields.shape
+    parts[..., PAD] = MARGIN / fields.voxel
+    parts[..., OFFSET] = fields.offset
+    parts[..., STRETCH] = stretch
+    parts[..., PITCH] = stretch * fields.voxel
+    centre = np.einsum("bpij,pj->bpi", posed[..., :3, :3], fields.centre) + posed[..., :3, 3]
+    parts[..., CENTRE:RADIUS] = centre
+    parts[..., RADIUS] = fields.radius
+    return parts
