@@ -12,7 +12,7 @@ parameters, M matches, T frames, S = 6 + D + Q unknowns of a frame.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import field, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -61,6 +61,25 @@ class Frame:
     reasons: tuple[str, ...] = ()  # why a view is not usable, "" where it is; empty: all usable
     flow: tuple[Flow, ...] | None = None  # from the previous frame, C x
     keypoints: tuple[F64, ...] | None = None  # C x (N people, K, 3) px, px, confidence; undistorted
+
+
+@record
+class ViewChecks:
+    """Pictures of a recording that are not what a camera saw at that moment."""
+
+    frame: I32 = array("P", unit="frame index, ascending")
+    camera: I16 = array("P", unit="camera index")
+    reasons: tuple[str, ...]  # P, for people
+
+    def passed(self, frame: Frame) -> Frame:
+        """Return a frame whose wrong views are not usable."""
+        first, last = np.searchsorted(self.frame, [frame.index, frame.index + 1])
+        if first == last:
+            return frame
+        usable, reasons = frame.usable.copy(), list(frame.reasons or [""] * len(frame.usable))
+        for camera, reason in zip(self.camera[first:last], self.reasons[first:last], strict=True):
+            usable[camera], reasons[camera] = False, reason
+        return replace(frame, usable=usable, reasons=tuple(reasons))
 
 
 @record

@@ -24,6 +24,7 @@ from mocapflow.data import (
     Pose,
     Segmentation,
     Start,
+    ViewChecks,
     empty_matches,
 )
 from mocapflow.errors import ComponentFailed
@@ -100,6 +101,7 @@ class CoupledLoop(Stage):
         checkpoint: Checkpoint,
         background: Background | None = None,
         flow: ImageFlow | None = None,
+        checks: ViewChecks | None = None,
     ) -> Track:
         """Return the track; frames that are already saved are not computed again."""
         model = ClothedModel(scene=scene.with_background(background), draper=self.draper)
@@ -107,7 +109,8 @@ class CoupledLoop(Stage):
             checkpoint.keep_turns(self.steady.max_turns)
         past, watch = checkpoint.past(), Stopwatch()
         for picture in recording.frames(since=checkpoint.next_index):
-            frame = replace(picture, flow=flow.into(picture.index)) if flow else picture
+            frame = checks.passed(picture) if checks else picture
+            frame = replace(frame, flow=flow.into(frame.index)) if flow else frame
             watch.lap("decode")
             state = self.begin(frame, past, start, model, watch)
             settled = settle if seen(frame) else lost

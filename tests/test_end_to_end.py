@@ -180,7 +180,7 @@ def test_a_killed_run_goes_on_to_the_same_result(few, tmp_path, after):
 
 
 @long
-@pytest.mark.parametrize("pipeline", ["paper", "bare", "large_motion", "disturbed"])
+@pytest.mark.parametrize("pipeline", ["paper", "bare", "large_motion", "disturbed", "corrupted"])
 def test_the_other_pipelines_run(tmp_path, pipeline):
     said = call("run", PIPELINES / f"{pipeline}.yaml", "--frames", "0:2", "--out", "out", *NO_PICTURES, cwd=tmp_path)
     assert "track: 2 of 2 frames" in said
@@ -190,7 +190,7 @@ def test_the_other_pipelines_run(tmp_path, pipeline):
 def test_every_pipeline_is_run_here_but_the_one_whose_recording_is_not_shipped(tmp_path):
     files = {path.stem for path in PIPELINES.glob("*.yaml") if "\nfactors:" not in path.read_text()}
     elsewhere = {"demo", "large_motion", "skirt_xpbd"}  # the last needs an extra
-    assert files == {*CLIPS, "paper", "bare", "balancing", "disturbed", *elsewhere}
+    assert files == {*CLIPS, "paper", "bare", "balancing", "disturbed", "corrupted", *elsewhere}
     said = call("plan", PIPELINES / "balancing.yaml", cwd=tmp_path, status=2)
     assert "--recording" in said
 

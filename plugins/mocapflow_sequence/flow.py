@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -10,7 +10,7 @@ from pydantic import Field
 
 from mocapflow.assets import Background
 from mocapflow.components import Stage
-from mocapflow.data import Flow, Frame, ImageFlow
+from mocapflow.data import Flow, Frame, ImageFlow, ViewChecks
 from mocapflow.recording import Recording
 from mocapflow.records import F32, U8, Bool
 
@@ -35,9 +35,12 @@ class FollowPoints(Stage):
     round_trip_px: Positive = 1.0  # how near a point has to come to where it was
     difference: Positive = 20.0  # grey levels from the empty scene
 
-    def run(self, recording: Recording, background: Background | None = None) -> ImageFlow:
+    def run(
+        self, recording: Recording, background: Background | None = None, checks: ViewChecks | None = None
+    ) -> ImageFlow:
         """Return the points followed into every frame but the first."""
-        parts = list(self._parts(recording, background))
+        frames = recording.frames() if checks is None else map(checks.passed, recording.frames())
+        parts = list(self._parts(frames, background))
         return ImageFlow(
             frame=np.concatenate([np.full(len(flow.pixel), index, np.int32) for index, _, flow in parts]),
             camera=np.concatenate([np.full(len(flow.pixel), camera, np.int16) for _, camera, flow in parts]),
@@ -46,11 +49,11 @@ class FollowPoints(Stage):
             cameras=len(recording.views),
         )
 
-    def _parts(self, recording: Recording, background: Background | None) -> Iterator[tuple[int, int, Flow]]:
+    def _parts(self, frames: Iterable[Frame], background: Background | None) -> Iterator[tuple[int, int, Flow]]:
         """Yield frame, camera and flow of every view that this frame and the one before it both have."""
         before: Frame | None = None
-        for frame in recording.frames():
-            for camera in range(len(recording.views)):
+        for frame in frames:
+            for camera in range(len(frame.usable)):
                 both = before is not None and before.usable[camera] and frame.usable[camera]
                 mean = None if background is None else background.mean[camera]
                 flow = self.follow(before.images[camera], frame.images[camera], mean) if both and before else NOTHING

@@ -1,0 +1,83 @@
+"""Stage `check_views`: finds pictures that can't be what a camera saw at that moment."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field
+
+from mocapflow.assets import Background
+from mocapflow.components import Stage
+from mocapflow.data import ViewChecks
+from mocapflow.recording import Recording
+from mocapflow.records import F32
+from mocapflow_robustness import doubts
+from mocapflow_robustness.thumbnails import Thumbnails, thumbnail, thumbnails
+
+LEAST_LONGEST = 4  # frames, where few of them make a second
+Factor = Annotated[float, Field(gt=1)]
+
+
+class CheckViews(Stage):
+    """Looks through the whole recording for pictures that are black, repeated, of another camera or of another moment.
+
+    It needs no pose, so a track that is lost can't make it distrust the images, and it looks ahead: what jumps away
+    and comes back within a few frames is no motion. The track goes without these pictures and says so. What stays
+    unnoticed: another moment that differs little from the true one or lasts long, and a repeated picture in all views.
+    """
+
+    name: ClassVar[str] = "check_views"
+    extent: ClassVar[Literal["all"]] = "all"  # so that a longer run finds the same
+    longest_s: Annotated[float, Field(gt=0)] = 0.17  # of a burst of wrong pictures
+    jump: Factor = 2.0  # how much larger than the motion around it a jump is, in the view that shows it best
+    joint_jump: Factor = 1.3  # and in a view that jumps together with that one
+
+    def run(self, recording: Recording, background: Background | None = None) -> ViewChecks:
+        """Return the pictures to do without, each with a reason."""
+        seen = thumbnails(recording)
+        names = [camera.name for camera in recording.cameras]
+        said = self.doubt(seen, rooms(seen, background), recording.frame_rate, names)
+        rows, cameras = np.nonzero(said != "")
+        return ViewChecks(
+            frame=rows.astype(np.int32),
+            camera=cameras.astype(np.int16),
+            reasons=tuple(said[rows, cameras].tolist()),
+        )
+
+    def doubt(self, seen: Thumbnails, room: F32, frame_rate: float, names: Sequence[str]) -> npt.NDArray[np.str_]:
+        """Return (T, C) why a picture is not to be trusted, "" where it is.
+
+        Args:
+            seen: all pictures.
+            room: (C, S, S) thumbnails of the empty scene.
+            frame_rate: per second.
+            names: of the cameras.
+        """
+        empty = doubts.blank(seen.grey, room)
+        foreign, like = doubts.lookalike(seen.grey, room)
+        old = doubts.repeated(np.where(empty | foreign, np.nan, seen.news))
+        settled = doubts.bridged(seen.grey, seen.there & ~(empty | foreign | old))
+        longest = max(round(self.longest_s * frame_rate), LEAST_LONGEST)
+        torn = doubts.bursts(settled, longest, self.jump, self.joint_jump)
+        said = np.full(empty.shape, "", "U64")
+        said[torn] = "the picture does not fit the ones before and after"
+        said[old] = "the picture repeats the one before"
+        said[foreign] = [f"the picture looks like one of {names[camera]}" for camera in like[foreign]]
+        said[empty] = "the picture shows nothing"
+        said[~seen.there] = ""  # already known to be missing
+        return said
+
+
+def rooms(seen: Thumbnails, background: Background | None) -> F32:
+    """Return (C, S, S) thumbnails of the empty scene; without one known, the median over the recording."""
+    if background is None:
+        return np.stack([median(seen.grey[seen.there[:, c], c]) for c in range(seen.grey.shape[1])])
+    return np.stack([thumbnail(np.clip(np.rint(mean), 0, 255).astype(np.uint8)) for mean in background.mean])
+
+
+def median(grey: F32) -> F32:
+    """Return the median (S, S) over thumbnails (N, S, S); a black one of none."""
+    return np.asarray(np.median(grey, axis=0) if len(grey) else np.zeros(grey.shape[1:]), np.float32)

@@ -1,0 +1,138 @@
+"""Wrong pictures among right ones: which are found, and that motion is not taken for one."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from mocapflow_robustness.check_views import CheckViews
+from mocapflow_robustness.corrupt import Corrupt
+from mocapflow_robustness.doubts import bridged, bursts
+from mocapflow_robustness.events import Event
+
+from mocapflow.data import Frame, ViewChecks
+from mocapflow.recording import open_recording
+from tests.fixtures.stores import STAGES, load, run_tiny, the_track, write_pipeline, write_recording
+
+FRAMES, CAMERAS, HEIGHT, WIDTH = 60, 3, 16, 24
+EVENTS = {
+    "black": "shows nothing",
+    "torn": "does not fit",
+    "frozen": "repeats the one before",
+    "other_time": "does not fit",
+    "other_camera": "looks like one of",
+}
+
+
+def rooms():
+    noise = np.random.default_rng(0).uniform(0, 255, (CAMERAS, HEIGHT, WIDTH)).astype(np.float32)
+    smooth = [128 + 6 * (cv2.GaussianBlur(room, (0, 0), 3) - 128) for room in noise]
+    return [np.repeat(room[..., None], 3, axis=2) for room in smooth]
+
+
+def picture(room, camera, index):
+    """A bright ball that goes round in a room, seen with a little noise."""
+    phase = 2 * np.pi * index / 40 + camera
+    row, column = np.mgrid[:HEIGHT, :WIDTH]
+    near = np.hypot(row - 8 - 5 * np.sin(phase), column - 12 - 8 * np.cos(phase / 2)) < 2.5
+    noise = np.random.default_rng([camera, index]).normal(0, 2, room.shape)
+    return np.clip(np.where(near[..., None], 230, room) + noise, 0, 255).astype(np.uint8)
+
+
+@pytest.fixture(scope="module")
+def clip(tmp_path_factory):
+    folder = write_recording(tmp_path_factory.mktemp("checks") / "clip", frames=FRAMES, cameras=CAMERAS)
+    for camera, room in enumerate(rooms()):
+        for index in range(FRAMES):
+            cv2.imwrite(str(folder / f"videos/cam{camera + 1:02}/{index:06}.png"), picture(room, camera, index))
+    return folder
+
+
+def found(clip, *events):
+    recording = Corrupt(events=tuple(Event(**event) for event in events)).run(open_recording(clip))
+    checks = CheckViews().run(recording)
+    return {(int(f), int(c)): why for f, c, why in zip(checks.frame, checks.camera, checks.reasons, strict=True)}
+
+
+def test_nothing_is_wrong_with_a_clean_recording(clip):
+    assert found(clip) == {}
+
+
+@pytest.mark.parametrize("what", EVENTS)
+@pytest.mark.parametrize("views", [("cam02",), ()], ids=["one view", "all views"])
+def test_wrong_pictures_are_found(clip, what, views):
+    if what == "frozen" and not views:
+        pytest.skip("nobody can tell that from a person who stands still")
+    told = found(clip, dict(what=what, first=25, count=3, views=views, by=13))
+    cameras = (1,) if views else range(CAMERAS)
+    assert set(told) == {(index, camera) for index in (25, 26, 27) for camera in cameras}
+    assert all(EVENTS[what] in why for why in told.values())
+
+
+def test_several_things_at_once(clip):
+    told = found(
+        clip,
+        dict(what="black", first=20, count=2, views=["cam01"]),
+        dict(what="torn", first=26, count=2, views=["cam01"]),
+        dict(what="other_camera", first=40, views=["cam03"]),
+        dict(what="dropped", first=10, count=5, views=["cam02"]),
+    )
+    assert {index for index, camera in told if camera == 0} == {20, 21, 26, 27}
+    assert {index for index, camera in told if camera == 2} == set(range(40, FRAMES))
+    assert {why for (_, camera), why in told.items() if camera == 2} == {"the picture looks like one of cam01"}
+    assert not any(camera == 1 for _, camera in told)
+
+
+def drifting(still, moving, later):
+    """Thumbnails of one view whose brightness stands still, grows, and stands still again."""
+    levels = np.cumsum(np.repeat([0.0, 1.0, 0.0], [still, moving, later])) + 50
+    return np.broadcast_to(levels[:, None, None, None], (len(levels), 1, 4, 4)).astype(np.float32)
+
+
+def test_motion_that_starts_and_stops_is_no_burst():
+    for moving in (1, 2, 3, 5, 10):
+        there = drifting(10, moving, 10)
+        assert not bursts(there, longest=5, strong=2, weak=1.3).any()
+        back = np.concatenate([there, there[::-1]])
+        assert not bursts(back, longest=5, strong=2, weak=1.3).any()
+    quick = np.concatenate([drifting(10, 2, 0), drifting(10, 2, 0)[::-1]])  # there and back again
+    assert not bursts(quick, longest=5, strong=2, weak=1.3).any()
+
+
+def test_a_burst_is_flagged_in_every_view_that_jumps_with_it():
+    grey = np.repeat(drifting(0, 30, 0), 3, axis=1)
+    grey = grey.copy()
+    grey[12:15] += np.array([20, 4, 0], np.float32)[:, None, None]
+    wrong = bursts(grey, longest=5, strong=3, weak=1.3)
+    assert np.argwhere(wrong).tolist() == [[row, view] for row in (12, 13, 14) for view in (0, 1)]
+
+
+def test_bad_thumbnails_are_interpolated():
+    grey = drifting(0, 6, 0)
+    spoiled, good = grey.copy(), np.ones((6, 1), bool)
+    spoiled[2:4], good[2:4] = 0, False
+    np.testing.assert_allclose(bridged(spoiled, good), grey, rtol=1e-6)
+
+
+def test_a_frame_passes_without_its_wrong_views():
+    checks = ViewChecks(
+        frame=np.array([3, 7], np.int32), camera=np.array([1, 0], np.int16), reasons=("shows nothing", "torn")
+    )
+    images = (np.zeros((2, 2, 3), np.uint8),) * 2
+    frame = Frame(index=7, time=0.1, images=images, usable=np.array([True, False]), reasons=("", "dropped"))
+    assert checks.passed(frame).usable.tolist() == [False, False]
+    assert checks.passed(frame).reasons == ("torn", "dropped")
+    good = replace(frame, index=4)
+    assert checks.passed(good) is good
+
+
+def test_the_track_goes_without_them_and_says_so(tmp_path, clip):
+    spoil = {"use": "corrupt", "events": [{"what": "black", "first": 2, "count": 1, "views": ["cam01"]}]}
+    path = write_pipeline(tmp_path, clip, stages={"corrupt": spoil, "checks": "check_views", **STAGES})
+    run_tiny(path, tmp_path, frames=4)
+    track = the_track(tmp_path)
+    assert track.usable[:, 0].tolist() == [True, True, False, True]
+    assert track.notes == ("frame 2: cam01 not usable: the picture shows nothing",)
+    _, lines = run_tiny(path, tmp_path, frames=6)
+    assert "track: going on after 4 frames" in lines  # what is found does not depend on how far the run goes
+    assert load(path)
