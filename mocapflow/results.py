@@ -68,4 +68,5 @@ class Evaluation:
 
     reference: str  # the file compared with, "" where there is none
     rows: tuple[Mapping[str, float | str], ...]
-    note: str = ""  # why there are no rows
+    notes: tuple[str, ...] = ()  # what a reader of the rows should know, or why there are none
+    pictures: tuple[Path, ...] = ()  # drawn of the comparison

@@ -13,7 +13,9 @@ from mocapflow.commands.again import recall
 from mocapflow.errors import RecordingError
 
 Run = Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")]
-Truth = Annotated[Path | None, typer.Option(help="Angles to compare with.  [default: those of the recording]")]
+Truth = Annotated[
+    Path | None, typer.Option(help="A .csv, .mot, .trc or .c3d to compare with.  [default: the recording's]")
+]
 Format = Annotated[
     list[str],
     typer.Option("--format", help="csv, mot, trc, bvh, c3d, gltf, movement, parquet, rrd or usd; repeatable."),
@@ -23,17 +25,19 @@ COLUMNS = ("angle", "frames", "rms_deg", "mae_deg", "offset_deg", "max_deg", "wo
 
 def evaluate(run: Run, truth: Truth = None) -> None:
     """Compare the joint angles of a run with known ones."""
-    reference = truth or recall(run).load().recording / "truth" / "angles.csv"
-    if not reference.is_file():
-        hint = "name a file of known angles with --truth"
-        raise RecordingError("there is nothing to compare with", where=str(reference), hint=hint)
-    from mocapflow_sequence.evaluate import evaluate_run
+    from mocapflow_sequence.evaluate import chosen, evaluate_run
 
+    reference, missing = (truth, "") if truth else chosen(recall(run).load().recording, "")
+    if reference is None or not reference.is_file():
+        hint = missing or "name a file of known angles with --truth"
+        raise RecordingError("there is nothing to compare with", where=str(reference or run), hint=hint)
     evaluation = evaluate_run(run, reference)
     if not evaluation.rows:
-        raise RecordingError(evaluation.note, where=str(reference))
+        raise RecordingError("; ".join(evaluation.notes), where=str(reference))
     typer.echo(f"compared with {evaluation.reference}")
     typer.echo(table([{name: row[name] for name in COLUMNS} for row in evaluation.rows]))
+    for note in evaluation.notes:
+        typer.echo(f"note: {note}")
     typer.echo("all figures: results/evaluation.csv in the run folder")
 
 

@@ -132,6 +132,8 @@ def read_mot(path: Path) -> tuple[dict[str, F64], F64]:
 def read_c3d(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
     """Read the markers of a C3D file; the result is that of `read_trc`, in the axes of the laboratory.
 
+    Times count from the start of the measurement, of which a file may hold a part.
+
     Raises:
         RecordingError: ezc3d is not installed, the file can't be read, or its unit is unknown.
     """
@@ -150,7 +152,8 @@ def read_c3d(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
         raise RecordingError(f"unknown unit '{unit}'", where=str(path), hint=f"known: {', '.join(METRES)}")
     rate = float(point["RATE"]["value"][0])
     positions = np.moveaxis(content["data"]["points"][:3], 0, -1).swapaxes(0, 1)[:, : len(names)] * METRES[unit]
-    return names, positions, np.arange(len(positions)) / rate, rate
+    first = int(content["header"]["points"]["first_frame"])
+    return names, positions, (first + np.arange(len(positions))) / rate, rate
 
 
 def _text(path: Path) -> str:

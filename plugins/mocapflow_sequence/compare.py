@@ -11,6 +11,7 @@ BLOCK = 20  # frames; errors within it hang together, so the bootstrap draws who
 DRAWS = 1000
 SEED = 0
 NINETY = 1.6449  # standard deviations
+NINETY_FIVE = 1.96  # standard deviations
 LONGEST_LAG = 6  # frames; more would leave too little of a short take to compare
 
 
@@ -43,7 +44,33 @@ def figures(ours: F64, truth: F64, sd: F64, frame: F64) -> dict[str, float]:
         "correlation": correlation(ours, truth),
         "lag_frames": lag(ours, truth),
         "coverage_90": float(np.mean(size[known] <= NINETY * sd[known])) if known.any() else np.nan,
+        **agreement(error),
+        "rom_deg": float(np.ptp(ours)),
+        "rom_reference_deg": float(np.ptp(truth)),
+        "cmc": cmc(np.stack([ours, truth])[None]),
     }
+
+
+def agreement(error: F64) -> dict[str, float]:
+    """Return the limits between which 95 % of the differences lie, deg: Bland & Altman, Lancet 327 (1986), 307."""
+    half = NINETY_FIVE * float(np.std(error, ddof=1)) if len(error) > 1 else np.nan
+    middle = float(np.mean(error))
+    return {"agreement_low_deg": middle - half, "agreement_high_deg": middle + half}
+
+
+def cmc(curves: F64) -> float:
+    """Return the coefficient of multiple correlation of two systems that saw the same motion: 1 where they agree.
+
+    Ferrari, Cutti, Cappello, Gait & Posture 31 (2010), 540: an offset or another gain between the systems lowers it.
+    NaN where they differ by more than the curves move.
+
+    Args:
+        curves: (G, P, F), of G cycles by P systems at F times.
+    """
+    cycles, systems, times = curves.shape
+    between = np.sum((curves - curves.mean(axis=1, keepdims=True)) ** 2) / (cycles * times * (systems - 1))
+    about = np.sum((curves - curves.mean(axis=(1, 2), keepdims=True)) ** 2) / (cycles * (systems * times - 1))
+    return float(np.sqrt(1 - between / about)) if 0 < about >= between else np.nan
 
 
 def rms(error: F64) -> float:

@@ -2,88 +2,113 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from pathlib import Path
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
+from pydantic import Field
 
 from mocapflow.components import Stage
-from mocapflow.errors import RecordingError
 from mocapflow.recording import Recording
 from mocapflow.records import F64
 from mocapflow.results import Evaluation, RunFolder, Track
 from mocapflow.scene import Scene
-from mocapflow_sequence import compare, layout, tables
-from mocapflow_sequence.export import before_smoothing
-from mocapflow_sequence.references import read_reference
-from mocapflow_sequence.uncertainty import measured
+from mocapflow_sequence import compare, comparison_plots, cycles, findings, layout, ours, runjson, tables
+from mocapflow_sequence.alignment import align, at_our_frames
+from mocapflow_sequence.cycles import Cycle
+from mocapflow_sequence.ours import Ours
+from mocapflow_sequence.references import SUFFIXES, read_reference
+from mocapflow_sequence.rigs import compare_rigs
 
-SLACK = 0.001  # s
+LONGEST_LAG = 0.5  # s
 
 
 class Evaluate(Stage):
-    """Compares with truth/angles.csv of the recording, or with another file; without either it says so.
+    """Compares with truth/angles.csv of the recording, with the one file in its reference/, or with another file.
 
-    `reference` is a .csv with our columns, an OpenSim .mot or a .trc of joint centres (relative to the recording).
-    Rows with frame numbers are matched by them, others interpolated at our times. Failures are not left out.
-    Writes results/evaluation.csv and, frame by frame, results/errors.csv.
+    `reference` is a .csv with our columns, an OpenSim .mot, or a .trc or .c3d of joint centres or of markers on bony
+    landmarks (relative to the recording). Rows with frame numbers are matched by them, others interpolated at our
+    times.
+    Failures are not left out. A lag up to `longest_lag_s` that all angles share, and curves that count the other way,
+    are reported, and taken out in `rms_aligned_deg` alone.
+    Writes results/evaluation.csv and .json and, frame by frame, errors.csv; cycles.csv where somebody walks; and
+    against joint centres or markers joint_distances.csv and the reference's stick model.
     """
 
     name: ClassVar[str] = "evaluate"
-    reference: str = ""  # a file, from the folder of the recording; empty: truth/angles.csv
+    reference: str = ""  # a file, from the folder of the recording; empty: truth/angles.csv, or the one in reference/
+    longest_lag_s: Annotated[float, Field(gt=0)] = LONGEST_LAG  # s, that is looked for
 
     def run(self, track: Track, scene: Scene, recording: Recording, run_folder: RunFolder) -> Evaluation:
         """Return the evaluation of the track."""
-        path = recording.folder / (self.reference or "truth/angles.csv")
-        if not self.reference and not path.is_file():
-            return Evaluation(
-                reference="", rows=(), note="the recording has no truth/angles.csv, and no reference is set"
-            )
-        ours = tables.angle_columns(track, measured(track, scene))
-        raw = tables.angle_columns(track, measured(before_smoothing(track), scene))
-        return evaluate(ours, raw, path, run_folder.path)
+        path, note = chosen(recording.folder, self.reference)
+        if path is None:
+            return Evaluation(reference="", rows=(), notes=(note,))
+        return evaluate(ours.of_track(track, scene), path, run_folder.path, self.longest_lag_s)
+
+
+def chosen(recording: Path, wanted: str) -> tuple[Path | None, str]:
+    """Return the file to compare with, or why there is none."""
+    truth = recording / "truth/angles.csv"
+    if wanted or truth.is_file():
+        return (recording / wanted if wanted else truth), ""
+    files = sorted((recording / "reference").glob("*"))
+    there = [path for path in files if path.suffix.lower() in SUFFIXES and path.name != layout.COMMON_POINTS]
+    if len(there) == 1:
+        return there[0], ""
+    if not there:
+        return None, "the recording has no truth/angles.csv and no reference/, and no reference is set"
+    names = ", ".join(path.name for path in there)
+    return None, f"reference/ holds {names}: name one, e.g. --set stages.evaluate.reference=reference/{there[0].name}"
 
 
 def evaluate_run(run_folder: Path, truth: Path) -> Evaluation:
-    """Compare results/angles.csv of a run folder with a reference file and write results/evaluation.csv.
+    """Compare the files of a run folder with a reference file; writes into the run folder.
 
     Raises:
         RecordingError: the run folder has no angles, or the reference can't be read.
     """
-    path = run_folder / layout.ANGLES
-    if not path.is_file():
-        raise RecordingError("no such run folder: it has no results/angles.csv", where=str(run_folder))
-    raw = run_folder / layout.RAW_ANGLES
-    return evaluate(tables.read_columns(path), tables.read_columns(raw if raw.is_file() else path), truth, run_folder)
+    return evaluate(ours.of_folder(run_folder), truth, run_folder)
 
 
-def evaluate(ours: Mapping[str, F64], raw: Mapping[str, F64], truth: Path, folder: Path) -> Evaluation:
-    """Compare tables of angles (smoothed and raw) with a reference file; writes evaluation.csv and errors.csv."""
-    reference = at_our_frames(read_reference(truth), ours)
-    shared = [name for name in tables.angle_names(ours) if name in reference]
-    rows: list[Mapping[str, float | str]] = []
-    for name in shared:
-        if not np.isfinite(reference[name]).any():
-            continue
-        sd = ours.get(f"{name}_sd", np.full(len(ours[name]), np.nan))
-        row = compare.figures(ours[name], reference[name], sd, ours["frame"])
-        unsmoothed = compare.figures(raw[name], reference[name], sd, ours["frame"])["rms_deg"]
-        rows.append({"angle": name, **row, "rms_unsmoothed_deg": unsmoothed})
-    note = "" if rows else "the reference shares no angle and frame with the track"
-    errors = {str(row["angle"]): ours[str(row["angle"])] - reference[str(row["angle"])] for row in rows}
+def evaluate(own: Ours, path: Path, folder: Path, longest_lag_s: float = LONGEST_LAG) -> Evaluation:
+    """Compare with a reference file; writes tables, what was found of both systems, and pictures into a run folder."""
+    reference = read_reference(path)
+    known = at_our_frames(reference, own.columns)
+    alignment = align(own.columns, reference, longest_lag_s)
+    aligned = at_our_frames(reference, own.columns, np.nan_to_num(alignment.lag))
+    strides = cycles.gait_cycles(own.stick.names, own.stick.places, own.frame_rate)
+    names = cycles.shared(own.columns, known)
+    rows = []
+    for name in names:
+        straight = alignment.signs[name] * aligned[name]
+        rows.append(_row(own, name, known[name], straight, strides) | {"sign": alignment.signs[name]})
+    rigs = compare_rigs(own.stick, reference, own.columns["time"], path.parent / layout.COMMON_POINTS)
+    notes = [*reference.notes, *rigs.notes, *findings.said(own, reference, alignment, strides, longest_lag_s)]
+    if not rows:
+        notes.append("the reference shares no angle and frame with the track")
+    errors = {name: own.columns[name] - known[name] for name in names}
     tables.write_rows(layout.place(folder, layout.EVALUATION), rows)
-    tables.write_columns(layout.place(folder, layout.ERRORS), {"frame": ours["frame"], **errors})
-    return Evaluation(reference=str(truth), rows=tuple(rows), note=note)
+    tables.write_columns(layout.place(folder, layout.ERRORS), {"frame": own.columns["frame"], **errors})
+    tables.write_rows_if_any(layout.place(folder, layout.CYCLES), cycles.rows(strides, own.columns, known))
+    found = {"reference": str(path), "lag_frames": alignment.lag, "signs": alignment.signs, "notes": notes}
+    runjson.write(layout.place(folder, layout.FINDINGS), runjson.plain({**found, "registration": rigs.figures}))
+    pictures = [*comparison_plots.draw(own.columns, known, strides, folder), *rigs.write(folder, own.frame_rate)]
+    return Evaluation(reference=str(path), rows=tuple(rows), notes=tuple(notes), pictures=tuple(pictures))
 
 
-def at_our_frames(reference: Mapping[str, F64], ours: Mapping[str, F64]) -> dict[str, F64]:
-    """Return the reference at our frames: by number, or interpolated in time; NaN where it has nothing."""
-    if "frame" not in reference:
-        time = reference["time"]
-        near = np.clip(ours["time"], time[0], time[-1])  # times are rounded, so the ends get a little slack
-        far = np.abs(near - ours["time"]) > SLACK
-        return {name: np.where(far, np.nan, np.interp(near, time, values)) for name, values in reference.items()}
-    rows = {int(frame): row for row, frame in enumerate(reference["frame"])}
-    row = np.array([rows.get(int(frame), -1) for frame in ours["frame"]])
-    return {name: np.where(row >= 0, values[row], np.nan) for name, values in reference.items()}
+def _row(own: Ours, name: str, known: F64, aligned: F64, strides: Sequence[Cycle]) -> dict[str, float | str]:
+    """Return the figures of one angle against its reference as it is, and as aligned with us."""
+    curve, frame = own.columns[name], own.columns["frame"]
+    unknown = np.full(len(curve), np.nan)
+    sd, raw = own.columns.get(f"{name}_sd", unknown), own.raw.get(name, unknown)
+    error = (curve - aligned)[np.isfinite(curve - aligned)]
+    return {
+        "angle": name,
+        **compare.figures(curve, known, sd, frame),
+        "rms_unsmoothed_deg": compare.rms((raw - known)[np.isfinite(raw - known)]),
+        "rms_aligned_deg": compare.rms(error - np.mean(error)) if len(error) else np.nan,
+        "cycles": len(cycles.own(strides, name)),
+        "cmc_cycles": cycles.across(strides, curve, known, name),
+    }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -9,72 +10,132 @@ import numpy as np
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import angles
 from mocapflow.io import markers
-from mocapflow.records import F64
-from mocapflow_sequence import tables
+from mocapflow.records import F64, array, record
+from mocapflow_sequence import marker_joints, tables
+from mocapflow_sequence.marker_names import FILE, landmarks
 
 MOTION = {"knee_angle": "knee_flexion", "hip_flexion": "hip_flexion", "ankle_angle": "ankle", "elbow_flex": "elbow"}
-MARKERS = {
-    "Hip": "hip",
-    "Knee": "knee",
-    "Ankle": "ankle",
-    "BigToe": "toe",
-    "Shoulder": "shoulder",
-    "Elbow": "elbow",
-    "Wrist": "wrist",
-}
+POSE2SIM = {
+    "Hip": "hip", "Knee": "knee", "Ankle": "ankle", "BigToe": "toe", "Heel": "heel",
+    "Shoulder": "shoulder", "Elbow": "elbow", "Wrist": "wrist",
+}  # fmt: skip
+SUFFIXES = (".csv", ".mot", ".sto", ".trc", ".c3d")
 
 
-def read_reference(path: Path) -> dict[str, F64]:
-    """Return reference curves (T,) in degrees by our names, with `frame` or `time` (s) beside them.
+@record
+class Reference:
+    """What another system has measured."""
 
-    A csv has our columns. Of a .mot the columns that mean the same are taken, by OpenSim's names; their zeros are
-    the model's own, so that only knees and elbows compare without an offset. Of a .trc with joint centres, named
-    as ours (hip_l) or as Pose2Sim's (LHip), the three-point angles are computed.
+    curves: Mapping[str, F64]  # (T,) deg by our names
+    at: F64 = array("T", unit="frames of the video or s, see by_frame")
+    by_frame: bool  # rows belong to frames; else to times
+    joint_names: tuple[str, ...] = ()
+    joints: F64 | None = array("T", "J", 3, unit="m, in the axes of its own rig, z up", default=None)
+    notes: tuple[str, ...] = ()  # how it was read, where that is not plain
+
+    @property
+    def step(self) -> float:
+        """From one sample to the next, in the unit of `at`; frames that are missing stay so."""
+        return 1.0 if self.by_frame or len(self.at) < 2 else float(np.median(np.diff(self.at)))
+
+
+def read_reference(path: Path) -> Reference:
+    """Return the reference in a file.
+
+    A csv has our columns, degrees, by frame or time. Of a .mot the columns that mean the same are taken, by OpenSim's
+    names; their zeros are the model's own, so that only knees and elbows compare without an offset. A .trc or .c3d
+    holds joint centres, named as ours (hip_l) or as Pose2Sim's (LHip), or markers on bony landmarks (`marker_names`),
+    from which joint centres and knee axes are found (`marker_joints`).
 
     Raises:
         RecordingError: the file is missing, of another kind, or has none of our angles.
     """
-    readers = {".csv": tables.read_columns, ".mot": _motion, ".sto": _motion, ".trc": _joint_centres}
+    readers = {".csv": _table, ".mot": _motion, ".sto": _motion, ".trc": _trc, ".c3d": _c3d}
     if path.suffix.lower() not in readers:
         raise RecordingError(
             f"can't compare with a {path.suffix or 'file without ending'}",
             where=str(path),
-            hint="use .csv, .mot or .trc",
+            hint=f"known: {', '.join(SUFFIXES)}",
         )
     if not path.is_file():
         raise RecordingError("no such reference", where=str(path))
-    curves = readers[path.suffix.lower()](path)
-    if not ({"frame", "time"} & set(curves)):
+    return readers[path.suffix.lower()](path)
+
+
+def _table(path: Path) -> Reference:
+    columns = tables.read_columns(path)
+    clock = next((name for name in ("frame", "time") if name in columns), None)
+    if clock is None:
         raise RecordingError("the reference has neither a column frame nor time", where=str(path))
-    return curves
+    curves = {name: values for name, values in columns.items() if name not in ("frame", "time")}
+    return Reference(curves=curves, at=columns[clock], by_frame=clock == "frame")
 
 
-def _motion(path: Path) -> dict[str, F64]:
+def _motion(path: Path) -> Reference:
     columns, time = markers.read_mot(path)
-    curves = {"time": from_zero(time)}
-    for theirs, ours in MOTION.items():
-        for side in ("l", "r"):
-            if f"{theirs}_{side}" in columns:
-                curves[f"{ours}_{side}"] = columns[f"{theirs}_{side}"]
-    for side in ("l", "r"):  # gait2392 counts knee flexion as negative
-        if np.mean(curves.get(f"knee_flexion_{side}", 0.0)) < 0:
-            curves[f"knee_flexion_{side}"] = -curves[f"knee_flexion_{side}"]
-    return curves
+    named = {f"{theirs}_{side}": f"{ours}_{side}" for theirs, ours in MOTION.items() for side in ("l", "r")}
+    curves = {ours: columns[theirs] for theirs, ours in named.items() if theirs in columns}
+    at, notes = from_zero(time)
+    return Reference(curves=curves, at=at, by_frame=False, notes=notes)
 
 
-def _joint_centres(path: Path) -> dict[str, F64]:
-    theirs, positions, time, _ = markers.read_trc(path)
-    known = {f"{s.upper()}{name}": f"{ours}_{s}" for name, ours in MARKERS.items() for s in ("l", "r")}
-    names = tuple(known.get(name, name) for name in theirs)
-    curves = {"time": from_zero(time)}
-    for wish in angles.definitions(names):
-        if len(wish.points) == 3:
-            points = positions[:, [names.index(p) for p in wish.points]]
-            curves[wish.name] = angles.three_point(points) + wish.offset
-    return curves
+def _trc(path: Path) -> Reference:
+    names, positions, time, _ = markers.read_trc(path)
+    return _positions(path, names, markers.world_from_opensim(positions), time)
 
 
-def from_zero(time: F64) -> F64:
-    """Return times (T,) s whose first video frame is at 0: some programs (Pose2Sim) put it at one sample."""
+def _c3d(path: Path) -> Reference:
+    names, positions, time, _ = markers.read_c3d(path)
+    return _positions(path, names, positions, time)
+
+
+def _positions(path: Path, labels: tuple[str, ...], positions: F64, time: F64) -> Reference:
+    """Return the angles between joint centres that a file has, or that its markers tell."""
+    known = {f"{s.upper()}{name}": f"{ours}_{s}" for name, ours in POSE2SIM.items() for s in ("l", "r")}
+    names = tuple(known.get(label, label) for label in labels)
+    at, notes = from_zero(time)
+    curves = _between(names, positions)
+    if not curves:
+        marks = {name: positions[:, index] for name, index in landmarks(labels, path.parent).items()}
+        centres = marker_joints.joint_centres(marks)
+        names = tuple(centres)
+        if not names:
+            hint = (
+                f'name the landmarks in {path.parent / FILE}: knee_lateral_l = "…"; the markers are {", ".join(labels)}'
+            )
+            raise RecordingError(
+                "these are neither joint centres nor markers that are known", where=str(path), hint=hint
+            )
+        positions = np.stack(list(centres.values()), axis=1)
+        curves = _between(names, positions) | _about_axes(marks, centres)
+        notes = (*notes, f"joint centres and knee axes from {len(marks)} markers: {', '.join(sorted(marks))}")
+    return Reference(curves=curves, at=at, by_frame=False, joint_names=names, joints=positions, notes=notes)
+
+
+def _between(names: tuple[str, ...], positions: F64) -> dict[str, F64]:
+    return {
+        wish.name: angles.three_point(positions[:, [names.index(p) for p in wish.points]]) + wish.offset
+        for wish in angles.definitions(names)
+        if len(wish.points) == 3
+    }
+
+
+def _about_axes(marks: Mapping[str, F64], centres: Mapping[str, F64]) -> dict[str, F64]:
+    """Return the angles that need more than joint centres: hip flexion, and the knee's turn about its own axis."""
+    found = {}
+    for side in ("l", "r"):
+        hip, knee, ankle = (centres.get(f"{joint}_{side}") for joint in ("hip", "knee", "ankle"))
+        if hip is not None and knee is not None:
+            found[f"hip_flexion_{side}"] = marker_joints.hip_flexion(hip, knee, marker_joints.pelvis_axes(marks))
+            if ankle is not None:
+                axis = marker_joints.knee_axis(marks, side)
+                found[f"knee_angle_{side}"] = marker_joints.signed_flexion(hip, knee, ankle, axis)
+    return found
+
+
+def from_zero(time: F64) -> tuple[F64, tuple[str, ...]]:
+    """Return times (T,) s, counted from 0 where they stood at one sample, as some programs write; and a note."""
     step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
-    return time - step if step > 0 and abs(time[0] - step) < 0.01 * step else time
+    if step > 0 and abs(time[0] - step) < 0.01 * step:
+        return time - step, (f"the reference counts time from {time[0]:.4f} s, one sample: taken as 0",)
+    return time, ()

@@ -15,7 +15,7 @@ from mocapflow.records import F64
 from mocapflow.results import Evaluation, Files, RunFolder, Track
 from mocapflow.scene import Scene
 from mocapflow_sequence import layout, page, plots, runjson, tables
-from mocapflow_sequence.evaluate import at_our_frames
+from mocapflow_sequence.alignment import at_our_frames
 from mocapflow_sequence.export import before_smoothing
 from mocapflow_sequence.lost import lost_rows
 from mocapflow_sequence.overlay import Painter
@@ -121,8 +121,7 @@ def _overlaps(track: Track, row: int) -> str:
 
 def _deviations(evaluation: Evaluation | None) -> str:
     if evaluation is None or not evaluation.rows:
-        note = evaluation.note if evaluation else ""
-        return page.listing([note]) if note else ""
+        return page.listing(evaluation.notes if evaluation else [])
     rows = [{column: row[column] for column in COLUMNS} for row in evaluation.rows]
     return page.table(rows) + page.listing(
         [f"compared with {Path(evaluation.reference).name}; all frames count, failures too"]

@@ -5,7 +5,9 @@ import numpy as np
 import pytest
 from mocapflow_sequence import compare, layout, tables
 from mocapflow_sequence.evaluate import Evaluate, evaluate, evaluate_run
+from mocapflow_sequence.ours import Ours
 from mocapflow_sequence.references import read_reference
+from mocapflow_sequence.stick import Stick
 from results_scene import DEMO, demo_scene, stepping
 
 from mocapflow.errors import RecordingError
@@ -62,10 +64,15 @@ def test_coverage_counts_our_own_intervals() -> None:
     assert row(3 * error, truth)["coverage_90"] < 0.6
 
 
+def columns_only(columns: dict[str, np.ndarray]) -> Ours:
+    """Return our side as it is in a run folder that has nothing but angles."""
+    return Ours(columns=columns, raw=columns, stick=Stick(names=(), places=np.empty((len(columns["frame"]), 0, 3))))
+
+
 def test_frames_are_matched_by_number(tmp_path: Path) -> None:
     tables.write_columns(tmp_path / "t.csv", {"frame": np.array([5.0, 7.0]), "knee_flexion_l": np.array([50.0, 70.0])})
     ours = {"frame": np.arange(10.0), "time": np.arange(10) / 30, "knee_flexion_l": 10 * np.arange(10.0) + 1}
-    got = evaluate(ours, ours, tmp_path / "t.csv", tmp_path).rows[0]
+    got = evaluate(columns_only(ours), tmp_path / "t.csv", tmp_path).rows[0]
     assert (got["frames"], got["rms_deg"]) == (2, 1.0)
     assert (tmp_path / layout.EVALUATION).read_text().startswith("angle,frames,rms_deg")
 
@@ -79,7 +86,7 @@ def test_without_reference_there_is_a_note_and_no_error(tmp_path: Path) -> None:
     recording = SimpleNamespace(folder=tmp_path)
     got = Evaluate().run(track=stepping(scene.body), scene=scene, recording=recording, run_folder=run_folder(tmp_path))
     assert (got.rows, got.reference) == ((), "")
-    assert "truth/angles.csv" in got.note
+    assert "truth/angles.csv" in got.notes[0]
 
 
 def test_demo_truth_is_found(tmp_path: Path) -> None:
@@ -113,7 +120,7 @@ def test_motion_file_in_time_is_interpolated(tmp_path: Path) -> None:
     markers.write_mot(tmp_path / "m.mot", columns, time)
     frames = np.arange(80.0)
     ours = {"frame": frames, "time": frames / 30, "knee_flexion_r": 30 + 20 * np.sin(5 * frames / 30)}
-    got = evaluate(ours, ours, tmp_path / "m.mot", tmp_path).rows
+    got = evaluate(columns_only(ours), tmp_path / "m.mot", tmp_path).rows
     assert [r["angle"] for r in got] == ["knee_flexion_r"]
     assert got[0]["rms_deg"] < 0.01
     assert got[0]["frames"] == np.sum(frames / 30 <= 1.99)
@@ -124,14 +131,21 @@ def test_times_that_count_from_one_sample_start_at_zero(tmp_path: Path) -> None:
     curve = 30 + 20 * np.sin(np.arange(50) / 5)
     markers.write_mot(tmp_path / "m.mot", {"knee_angle_r": curve}, time)
     ours = {"frame": np.arange(50.0), "time": np.arange(50) / 60, "knee_flexion_r": curve}
-    got = evaluate(ours, ours, tmp_path / "m.mot", tmp_path).rows[0]
+    got = evaluate(columns_only(ours), tmp_path / "m.mot", tmp_path).rows[0]
     assert (got["frames"], round(float(got["rms_deg"]), 3)) == (50, 0)
 
 
-def test_gait2392_knees_are_turned_round(tmp_path: Path) -> None:
-    time = np.arange(10) / 30
-    markers.write_mot(tmp_path / "m.mot", {"knee_angle_l": np.full(10, -40.0)}, time)
-    assert (read_reference(tmp_path / "m.mot")["knee_flexion_l"] == 40).all()
+def test_gait2392_counts_knees_the_other_way_which_is_told_and_not_changed(tmp_path: Path) -> None:
+    time = np.arange(50) / 30
+    curve = 40 + 20 * np.sin(5 * time)
+    markers.write_mot(tmp_path / "m.mot", {"knee_angle_l": -curve}, time)
+    ours = {"frame": np.arange(50.0), "time": time, "knee_flexion_l": curve}
+    got = evaluate(columns_only(ours), tmp_path / "m.mot", tmp_path)
+    (row,) = got.rows
+    assert row["sign"] == -1
+    assert float(row["rms_deg"]) > 80
+    assert row["rms_aligned_deg"] == pytest.approx(0, abs=1e-3)
+    assert any("counts the other way: knee_flexion_l" in note for note in got.notes)
 
 
 @pytest.mark.parametrize("style", ["ours", "Pose2Sim"])
@@ -142,7 +156,7 @@ def test_joint_centres_give_three_point_angles(tmp_path: Path, style: str) -> No
     shown = names if style == "ours" else [theirs.get(n, n) for n in names]
     markers.write_trc(tmp_path / "j.trc", shown, markers.opensim_from_world(places), 30.0)
     truth = tables.read_columns(DEMO / "truth" / "angles.csv")
-    assert np.abs(read_reference(tmp_path / "j.trc")["knee_flexion_l"] - truth["knee_flexion_l"]).max() < 0.01
+    assert np.abs(read_reference(tmp_path / "j.trc").curves["knee_flexion_l"] - truth["knee_flexion_l"]).max() < 0.01
 
 
 def test_unreadable_references_say_so(tmp_path: Path) -> None:

@@ -126,7 +126,7 @@ def test_report_holds_everything(scene: Scene, track: Track, recording: Recordin
 
 def test_report_without_reference(scene: Scene, track: Track, recording: Recording, tmp_path: Path) -> None:
     run_folder = RunFolder(path=tmp_path, recipe={})
-    nothing = Evaluation(reference="", rows=(), note="the recording has no truth/angles.csv")
+    nothing = Evaluation(reference="", rows=(), notes=("the recording has no truth/angles.csv",))
     Report().run(track=track, scene=scene, recording=recording, run_folder=run_folder, evaluation=nothing)
     assert "no truth/angles.csv" in (tmp_path / layout.REPORT).read_text()
     Report().run(track=track, scene=scene, recording=recording, run_folder=run_folder)

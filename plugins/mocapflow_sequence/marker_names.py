@@ -1,0 +1,68 @@
+"""What laboratories call the markers on bony landmarks."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from mocapflow.errors import RecordingError, alternatives
+
+# Landmark: its marker in Plug-in Gait and CGM2, CAST (van Sint Jan), OpenSim's gait models, OpenCap; s is the side.
+KNOWN: Mapping[str, tuple[str, ...]] = {
+    "asis": ("sASI", "s_IAS", "s.ASIS", "s.ASIS_study"),
+    "psis": ("sPSI", "s_IPS", "s.PSIS", "s.PSIS_study"),
+    "knee_lateral": ("sKNE", "s_FLE", "s.Knee.Lat", "s_knee_study"),
+    "knee_medial": ("sKNM", "s_FME", "s.Knee.Med", "s_mknee_study"),
+    "ankle_lateral": ("sANK", "s_FAL", "s.Ankle.Lat", "s_ankle_study"),
+    "ankle_medial": ("sMED", "s_TAM", "s.Ankle.Med", "s_mankle_study"),
+    "toe": ("sTOE", "s_FM2", "s.Toe.Tip", "s_toe_study"),
+    "heel": ("sHEE", "s_FCC", "s.Heel", "s_calc_study"),
+    "acromion": ("sSHO", "s_SAE", "s.Acromium", "s_shoulder_study"),
+    "elbow_lateral": ("sELB", "s_HLE", "s.Elbow.Lat", "s_lelbow_study"),
+    "elbow_medial": ("sELBM", "s_HME", "s.Elbow.Med", "s_melbow_study"),
+    "wrist_lateral": ("sWRA", "s_RSP", "s.Wrist.Lat", "s_lwrist_study"),
+    "wrist_medial": ("sWRB", "s_USP", "s.Wrist.Med", "s_mwrist_study"),
+}
+LANDMARKS = tuple(f"{name}_{side}" for name in KNOWN for side in ("l", "r"))
+FILE = "markers.toml"  # beside the reference: landmark = "name of the marker"
+
+
+def landmarks(labels: Sequence[str], folder: Path) -> dict[str, int]:
+    """Return which marker shows which landmark: by markers.toml in the folder, else by the names that are known.
+
+    Raises:
+        RecordingError: markers.toml can't be read, or names a landmark or a marker that is not there.
+    """
+    plain = {_plain(label): index for index, label in reversed(list(enumerate(labels)))}
+    found = {}
+    for name, patterns in KNOWN.items():
+        for side in ("l", "r"):
+            spelled = (_plain(re.sub("^s", side, pattern)) for pattern in patterns)
+            index = next((plain[each] for each in spelled if each in plain), None)
+            if index is not None:
+                found[f"{name}_{side}"] = index
+    return found | _told(labels, folder / FILE)
+
+
+def _told(labels: Sequence[str], path: Path) -> dict[str, int]:
+    if not path.is_file():
+        return {}
+    try:
+        told = tomllib.loads(path.read_text(encoding="utf-8"))
+    except tomllib.TOMLDecodeError as error:
+        raise RecordingError(str(error), where=str(path)) from None
+    for landmark, label in told.items():
+        if landmark not in LANDMARKS:
+            raise RecordingError(
+                f"unknown landmark '{landmark}'", where=str(path), hint=alternatives(landmark, LANDMARKS)
+            )
+        if label not in labels:
+            raise RecordingError(f"no marker '{label}'", where=str(path), hint=alternatives(str(label), labels))
+    return {landmark: list(labels).index(label) for landmark, label in told.items()}
+
+
+def _plain(label: str) -> str:
+    """Return a name without the subject before a colon, case, and what stands between words."""
+    return re.sub(r"[\s._-]", "", label.rpartition(":")[2]).lower()

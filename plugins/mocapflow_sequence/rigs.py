@@ -1,0 +1,89 @@
+"""Two rigs that saw one person: how they lie to each other, and how far apart the joint centres are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mocapflow.geometry.registration import Registration
+from mocapflow.io import markers
+from mocapflow.records import F64, record
+from mocapflow_sequence import comparison_plots, layout, stick, tables
+from mocapflow_sequence.alignment import resampled
+from mocapflow_sequence.references import Reference
+from mocapflow_sequence.stick import Stick
+
+ODD = 0.01  # of scale
+
+
+@record
+class Rigs:
+    """What was found; without joint centres in the reference there is nothing."""
+
+    ours: Stick
+    theirs: Stick | None = None  # in our world, at our frames
+    figures: Mapping[str, Any] | None = None
+    notes: tuple[str, ...] = ()
+
+    def write(self, folder: Path, frame_rate: float) -> list[Path]:
+        """Write the distances, the stick model as a .trc and as a picture into a run folder; return the pictures."""
+        rows = stick.distances(self.ours, self.theirs) if self.theirs is not None else []
+        tables.write_rows_if_any(layout.place(folder, layout.DISTANCES), rows)
+        if self.theirs is None:
+            return []
+        laid = stick.constant(self.theirs)
+        places = markers.opensim_from_world(laid.places)
+        markers.write_trc(layout.place(folder, layout.STICK), laid.names, places, frame_rate)
+        return [comparison_plots.draw_sticks(layout.place(folder, layout.STICK_PLOT), self.ours, laid)]
+
+
+def compare_rigs(ours: Stick, reference: Reference, time: F64, common_points: Path) -> Rigs:
+    """Return the registration of both rigs and the reference's joint centres in our world, at our times (T,) s.
+
+    It comes from a table of common points where there is one, else from the joint centres themselves.
+
+    Raises:
+        RecordingError: the table can't be read.
+        MocapflowError: its points don't tell.
+    """
+    if reference.joints is None:
+        return Rigs(ours=ours)
+    flat = reference.joints.reshape(len(reference.at), -1)
+    columns = [resampled(reference.at, column, time, reference.step) for column in flat.T]
+    places = np.stack(columns, axis=1).reshape(len(time), -1, 3)
+    theirs = Stick(names=reference.joint_names, places=places)
+    measured = common_points.is_file()
+    found = stick.between_points(common_points) if measured else stick.between_joints(ours, theirs)
+    if found is None:
+        return Rigs(ours=ours)
+    by = f"{len(found.residual)} points of {common_points.name}" if measured else "joint centres of both systems"
+    moved = Stick(names=theirs.names, places=found.apply(places))
+    return Rigs(ours=ours, theirs=moved, figures=_figures(found, by), notes=_notes(found, by))
+
+
+def _figures(found: Registration, by: str) -> dict[str, Any]:
+    return {
+        "by": by,
+        "rotation": found.rotation,
+        "translation_m": found.translation,
+        "scale": found.scale,
+        "residual_rms_mm": 1000 * _rms(found.residual),
+        "leave_one_out_rms_mm": 1000 * _rms(found.left_out),
+    }
+
+
+def _notes(found: Registration, by: str) -> tuple[str, ...]:
+    residual, left_out = 1000 * _rms(found.residual), 1000 * _rms(found.left_out)
+    said = (
+        f"rigs registered by {by}: residual {residual:.1f} mm, leave-one-out {left_out:.1f} mm, scale {found.scale:.4f}"
+    )
+    odd = "the scale is not applied: check units and calibrations of both" if abs(found.scale - 1) > ODD else ""
+    return (said, odd) if odd else (said,)
+
+
+def _rms(values: F64) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan

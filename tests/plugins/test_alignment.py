@@ -1,0 +1,61 @@
+"""Lag, sign and times of a reference."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mocapflow_sequence.alignment import Alignment, align, resampled
+from mocapflow_sequence.references import Reference
+
+TIME = np.arange(120) / 30
+
+
+def motion(time: np.ndarray) -> dict[str, np.ndarray]:
+    return {
+        "knee_flexion_l": 30 + 30 * np.sin(5 * time) + 10 * np.sin(11 * time + 1),
+        "knee_flexion_r": 30 - 30 * np.sin(5 * time) + 8 * np.sin(10 * time),
+        "hip_flexion_l": 20 * np.sin(5 * time + 0.5),
+    }
+
+
+def aligned(ours: dict, theirs: dict, at: np.ndarray, longest: float = 0.5) -> Alignment:
+    return align({"time": TIME, **ours}, Reference(curves=theirs, at=at, by_frame=False), longest)
+
+
+@pytest.mark.parametrize("lag", [-8.3, -0.5, 0.0, 0.25, 6.75])
+@pytest.mark.parametrize("noise", [0.0, 1.0])
+def test_a_common_lag_is_found_to_a_tenth_of_a_frame(lag: float, noise: float) -> None:
+    random = np.random.default_rng(1)
+    ours = {name: curve + random.normal(scale=noise, size=120) for name, curve in motion(TIME).items()}
+    at = np.arange(-1, 6, 0.01)
+    found = aligned(ours, motion(at + lag / 30), at)
+    assert found.lag == pytest.approx(lag, abs=0.1)
+    assert set(found.signs.values()) == {1}
+
+
+def test_what_counts_the_other_way_is_found_beside_a_lag() -> None:
+    theirs = motion(TIME + 3 / 30)
+    theirs["knee_flexion_r"] = -theirs["knee_flexion_r"]
+    found = aligned(motion(TIME), theirs, TIME)
+    assert found.lag == pytest.approx(3, abs=0.1)
+    assert found.signs == {"knee_flexion_l": 1, "knee_flexion_r": -1, "hip_flexion_l": 1}
+
+
+def test_a_lag_beyond_the_search_is_unknown() -> None:
+    assert np.isnan(aligned({"a": TIME**2}, {"a": (TIME - 3) ** 2}, TIME, 0.2).lag)
+
+
+@pytest.mark.parametrize("theirs", [{}, {"a": np.full(120, np.nan)}, {"a": np.ones(120)}])
+def test_nothing_to_align(theirs: dict[str, np.ndarray]) -> None:
+    found = aligned({"a": np.sin(TIME)}, theirs, TIME)
+    assert np.isnan(found.lag)
+    assert set(found.signs.values()) <= {1}
+
+
+def test_resampled_between_samples_and_not_across_gaps() -> None:
+    at = np.arange(10.0)
+    values = np.where((at > 3) & (at < 7), np.nan, 2 * at)
+    got = resampled(at, values, np.array([-1.0, 0.0, 1.5, 3.0, 3.5, 5.0, 7.0, 8.25, 9.01, 9.5]), 1.0)
+    np.testing.assert_allclose(got, [np.nan, 0, 3, 6, np.nan, np.nan, 14, 16.5, 18, np.nan])
+    assert np.isnan(resampled(at, np.full(10, np.nan), at, 1.0)).all()
+    np.testing.assert_array_equal(resampled(np.array([4.0]), np.array([1.0]), np.array([3.0, 4.0]), 1.0), [np.nan, 1])

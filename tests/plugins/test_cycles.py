@@ -1,0 +1,100 @@
+"""Strides, and figures over them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mocapflow_sequence import compare, cycles
+from mocapflow_sequence.cycles import Cycle, gait_cycles
+from results_scene import DEMO
+
+RATE = 60.0
+NAMES = tuple(f"{joint}_{side}" for joint in ("hip", "knee", "ankle") for side in ("l", "r"))
+
+
+def walking(speed: float, lift: float = 0.05, bearing: float = 0.0, seconds: float = 5.0) -> np.ndarray:
+    """Return joints of legs that swing once a second, the left heel striking at 0.25 s: (T, 6, 3) m."""
+    time = np.arange(int(seconds * RATE)) / RATE
+    forward, left = np.array([np.cos(bearing), np.sin(bearing), 0]), np.array([-np.sin(bearing), np.cos(bearing), 0])
+    places = []
+    for joint, reach, height in (("hip", 0.0, 0.9), ("knee", 0.15, 0.5), ("ankle", 0.3, 0.1)):
+        for sign in (1, -1):
+            swing = sign * reach * np.sin(2 * np.pi * time)
+            raised = lift * np.maximum(0, sign * np.cos(2 * np.pi * time)) if joint == "ankle" else 0 * time
+            up = np.array([0, 0, 1.0])
+            places.append(
+                (speed * time + swing)[:, None] * forward + sign * 0.1 * left + (height + raised)[:, None] * up
+            )
+    return np.stack(places, axis=1)
+
+
+@pytest.mark.parametrize("speed", [0.0, 1.3])
+@pytest.mark.parametrize("bearing", [0.0, 2.0])
+def test_heel_strikes_on_a_treadmill_and_over_ground(speed: float, bearing: float) -> None:
+    found = gait_cycles(NAMES, walking(speed, bearing=bearing), RATE)
+    left = [cycle.first for cycle in found if cycle.side == "l"]
+    right = [cycle.first for cycle in found if cycle.side == "r"]
+    np.testing.assert_allclose(np.array(left) / RATE, np.arange(4) + 0.25, atol=0.02)
+    np.testing.assert_allclose(np.array(right) / RATE, np.arange(4) + 0.75, atol=0.02)
+    assert all(cycle.last - cycle.first == RATE for cycle in found)
+
+
+def test_knees_raised_on_the_spot_are_no_strides() -> None:
+    found = np.load(DEMO / "truth" / "joints.npz")
+    assert gait_cycles([str(name) for name in found["names"]], found["positions"], 30.0) == []
+
+
+def test_joints_that_are_not_there_have_no_strides() -> None:
+    assert gait_cycles(("hip_l",), np.zeros((5, 1, 3)), RATE) == []
+
+
+def test_every_stride_of_its_own_side_has_a_row() -> None:
+    frame = np.arange(100.0)
+    curve = 30 * np.sin(frame / 8)
+    known = {"knee_flexion_l": np.where(frame < 90, curve - 2, np.nan), "knee_flexion_r": curve}
+    own = {"frame": frame + 7, "knee_flexion_l": curve, "knee_flexion_r": curve}
+    rows = cycles.rows([Cycle("l", 0, 50), Cycle("r", 25, 75), Cycle("l", 50, 99)], own, known)
+    assert [(row["angle"], row["cycle"], row["first_frame"], row["frames"]) for row in rows] == [
+        ("knee_flexion_l", 1, 7, 51), ("knee_flexion_l", 2, 57, 40), ("knee_flexion_r", 1, 32, 51),
+    ]  # fmt: skip
+    assert rows[0]["rms_deg"] == pytest.approx(2)
+    assert rows[0]["peak_deg"] - rows[0]["peak_reference_deg"] == pytest.approx(2)
+    assert rows[2]["cmc"] == pytest.approx(1)
+
+
+def test_a_stride_is_stretched_to_a_hundred_per_cent() -> None:
+    curve = np.arange(100.0)
+    (stretched,) = cycles.normalised([Cycle("l", 20, 70)], curve, "ankle_l")
+    np.testing.assert_allclose(stretched, np.linspace(20, 70, 101))
+    assert np.isnan(cycles.across([], curve, curve, "ankle_l"))
+
+
+def test_cmc_is_one_for_equal_curves_and_falls_with_an_offset() -> None:
+    curve = 20 * np.sin(np.arange(101) / 16)
+    values = [compare.cmc(np.stack([curve, curve + offset])[None]) for offset in (0.0, 2.0, 8.0)]
+    assert values[0] == pytest.approx(1)
+    assert values[0] > values[1] > values[2]
+    assert np.isnan(compare.cmc(np.stack([curve, -curve])[None]))
+
+
+def test_cmc_by_the_formula_written_out() -> None:
+    """Ferrari 2010, Eq. 4: for two systems, the variance about their mean over that about the mean of the cycle."""
+    random = np.random.default_rng(0)
+    curves = 20 * np.sin(np.arange(50) / 8) + random.normal(size=(3, 2, 50))
+    within = sum((curves[g, p, f] - curves[g, :, f].mean()) ** 2 for g in range(3) for p in range(2) for f in range(50))
+    about = sum((curves[g, p, f] - curves[g].mean()) ** 2 for g in range(3) for p in range(2) for f in range(50))
+    assert compare.cmc(curves) == pytest.approx(np.sqrt(1 - (within / (3 * 50)) / (about / (3 * (2 * 50 - 1)))))
+
+
+def test_limits_of_agreement_hold_95_per_cent() -> None:
+    error = np.random.default_rng(0).normal(1.0, 2.0, 5000)
+    low, high = compare.agreement(error).values()
+    assert (low, high) == (pytest.approx(1 - 3.92, abs=0.15), pytest.approx(1 + 3.92, abs=0.15))
+    assert np.mean((error > low) & (error < high)) == pytest.approx(0.95, abs=0.01)
+
+
+def test_shared_angles_are_those_that_both_have(tmp_path: Path) -> None:
+    curve, nothing = np.ones(3), np.full(3, np.nan)
+    assert cycles.shared({"frame": curve, "a": curve, "b": curve}, {"a": nothing, "b": curve}) == ["b"]

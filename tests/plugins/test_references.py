@@ -1,0 +1,199 @@
+"""Joint centres and angles from markers, and how two rigs lie to each other."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from marker_take import markers_of, write_c3d
+from mocapflow_sequence import layout, marker_joints, ours, tables
+from mocapflow_sequence.evaluate import chosen, evaluate
+from mocapflow_sequence.marker_names import landmarks
+from mocapflow_sequence.ours import Ours
+from mocapflow_sequence.references import Reference, read_reference
+from results_scene import demo_scene, stepping
+from scipy.spatial.transform import Rotation
+
+from mocapflow.errors import RecordingError
+from mocapflow.geometry import angles
+from mocapflow.io import markers
+
+SCENE = demo_scene()
+TRACK = stepping(SCENE.body, 60)
+RATE = 30.0
+LABELS, PLACES = markers_of(SCENE.body, TRACK)
+
+
+@pytest.fixture(scope="module")
+def own() -> Ours:
+    return ours.of_track(TRACK, SCENE)
+
+
+def read(path: Path, places: np.ndarray = PLACES, rate: float = RATE, first: int = 0) -> Reference:
+    pytest.importorskip("ezc3d")
+    return read_reference(write_c3d(path / "markers.c3d", LABELS, places, rate, first))
+
+
+def test_centres_lie_where_the_body_has_them(own: Ours, tmp_path: Path) -> None:
+    reference = read(tmp_path)
+    assert reference.joints is not None
+    for joint in ("hip", "knee", "ankle", "toe", "elbow", "wrist"):
+        for name in (f"{joint}_l", f"{joint}_r"):
+            got = reference.joints[:, reference.joint_names.index(name)]
+            expected = own.stick.places[:, own.stick.names.index(name)]
+            np.testing.assert_allclose(got, expected, atol=1e-6, err_msg=name)  # m; C3D holds single precision
+
+
+@pytest.mark.parametrize("name", ["knee_flexion", "hip_flexion", "ankle"])
+def test_angles_from_markers_are_ours(own: Ours, name: str, tmp_path: Path) -> None:
+    reference = read(tmp_path)
+    for side in ("l", "r"):
+        np.testing.assert_allclose(reference.curves[f"{name}_{side}"], own.columns[f"{name}_{side}"], atol=1e-3)
+
+
+def test_knee_about_its_axis_is_signed() -> None:
+    hip, knee = np.array([[0.0, 0, 1]]), np.array([[0.0, 0, 0.5]])
+    axis = np.array([[0.0, 1, 0]])  # to the left of a person who looks along x
+    bend = np.radians([-10.0, 0.0, 60.0])
+    for angle in bend:
+        ankle = knee + 0.5 * np.array([[-np.sin(angle), 0, -np.cos(angle)]])  # heel to the back
+        got = marker_joints.signed_flexion(hip, knee, ankle, axis)
+        assert got[0] == pytest.approx(np.degrees(angle))
+
+
+def test_knee_axes_of_both_sides_point_to_the_left(own: Ours) -> None:
+    marks = {name: PLACES[:, k] for name, k in landmarks(LABELS, Path()).items()}
+    left = own.stick.places[:, own.stick.names.index("hip_l")] - own.stick.places[:, own.stick.names.index("hip_r")]
+    for side in ("l", "r"):
+        assert (np.sum(marker_joints.knee_axis(marks, side) * left, axis=1) > 0).all()
+
+
+def test_names_of_other_laboratories_are_known(tmp_path: Path) -> None:
+    found = landmarks(["L_IAS", "R.Knee.Lat", "L_mknee_study", "r.ASIS_study", "*23", "LKNE", "SACR"], tmp_path)
+    assert found == {"asis_l": 0, "asis_r": 3, "knee_lateral_r": 1, "knee_lateral_l": 5, "knee_medial_l": 2}
+
+
+def test_names_can_be_told(tmp_path: Path) -> None:
+    (tmp_path / "markers.toml").write_text('knee_medial_l = "Inner"\n')
+    assert landmarks(["Inner", "LKNM"], tmp_path)["knee_medial_l"] == 0
+    with pytest.raises(RecordingError, match=r"no marker 'Inner'"):
+        landmarks(["LKNM"], tmp_path)
+    (tmp_path / "markers.toml").write_text('knee_inner_l = "Inner"\n')
+    with pytest.raises(RecordingError, match=r"unknown landmark 'knee_inner_l'(.|\n)*knee_"):
+        landmarks(["Inner"], tmp_path)
+
+
+def test_markers_that_tell_nothing_say_what_to_do(tmp_path: Path) -> None:
+    markers.write_trc(tmp_path / "m.trc", ["A", "B"], np.zeros((3, 2, 3)), 100.0)
+    with pytest.raises(RecordingError, match=r"neither joint centres nor markers(.|\n)*markers\.toml(.|\n)*A, B"):
+        read_reference(tmp_path / "m.trc")
+
+
+def test_a_knee_without_its_inner_marker_is_left_out(tmp_path: Path) -> None:
+    kept = [k for k, label in enumerate(LABELS) if not label.endswith("LKNM")]
+    markers.write_trc(tmp_path / "m.trc", [LABELS[k] for k in kept], markers.opensim_from_world(PLACES[:, kept]), RATE)
+    assert {"knee_flexion_r", "knee_angle_r"} <= set(read_reference(tmp_path / "m.trc").curves)
+    assert "knee_flexion_l" not in read_reference(tmp_path / "m.trc").curves
+
+
+def moved(places: np.ndarray) -> tuple[np.ndarray, Rotation, np.ndarray]:
+    """Return markers in a rig of their own, and where that lies."""
+    turn, shift = Rotation.from_euler("zyx", [70, -4, 8], degrees=True), np.array([3.0, -1.0, 0.2])
+    return turn.apply(places.reshape(-1, 3)).reshape(places.shape) + shift, turn, shift
+
+
+def test_two_rigs_are_brought_together_by_common_points(own: Ours, tmp_path: Path) -> None:
+    read(tmp_path, moved(PLACES)[0])
+    wand = np.random.default_rng(0).uniform(-1, 1, (20, 3))
+    noisy = moved(wand)[0] + np.random.default_rng(1).normal(scale=0.001, size=wand.shape)
+    names = ["x", "y", "z", "marker_x", "marker_y", "marker_z"]
+    table = {name: np.hstack([wand, noisy])[:, k] for k, name in enumerate(names)}
+    np.savetxt(
+        tmp_path / "registration.csv",
+        np.column_stack(list(table.values())),
+        delimiter=",",
+        header=",".join(names),
+        comments="",
+    )
+    got = evaluate(own, tmp_path / "markers.c3d", tmp_path / "run")
+    assert any("registered by 20 points of registration.csv: residual 1." in note for note in got.notes)
+    far = tables_of_words(tmp_path / "run" / layout.DISTANCES)
+    assert all(float(row["max_mm"]) < 5 for row in far if row["joint"] not in ("shoulder_l", "shoulder_r"))
+    assert all(
+        float(row["rms_deg"]) < 0.01 for row in got.rows if str(row["angle"]).startswith(("knee_flexion", "hip"))
+    )
+
+
+def test_without_common_points_joint_centres_do(own: Ours, tmp_path: Path) -> None:
+    read(tmp_path, moved(PLACES)[0])
+    got = evaluate(own, tmp_path / "markers.c3d", tmp_path)
+    assert any("registered by joint centres of both systems" in note for note in got.notes)
+    assert {path.name for path in got.pictures} == {"agreement.png", "stick_model.png"}
+    names, places, _, _ = markers.read_trc(tmp_path / layout.STICK)
+    knee = markers.world_from_opensim(places)[:, names.index("knee_l")]
+    assert np.linalg.norm(knee - own.stick.places[:, own.stick.names.index("knee_l")], axis=1).max() < 0.03
+
+
+def test_the_stick_model_keeps_its_lengths(own: Ours, tmp_path: Path) -> None:
+    loose = PLACES + np.random.default_rng(0).normal(scale=0.005, size=PLACES.shape)
+    read(tmp_path, loose)
+    evaluate(own, tmp_path / "markers.c3d", tmp_path)
+    names, places, _, _ = markers.read_trc(tmp_path / layout.STICK)
+    at = {name: places[:, k] for k, name in enumerate(names)}
+    for a, b in (("hip_l", "knee_l"), ("knee_r", "ankle_r")):
+        length = np.linalg.norm(at[b] - at[a], axis=1)
+        assert np.ptp(length) < 1e-6
+        body = np.linalg.norm(SCENE.body.positions[SCENE.body.joint(b)] - SCENE.body.positions[SCENE.body.joint(a)])
+        assert length[0] == pytest.approx(body, abs=0.003)
+
+
+def test_a_faster_marker_system_that_started_later(own: Ours, tmp_path: Path) -> None:
+    """Markers at 100 per second from 0.2 s on are met at our times; a lag of 2 frames is found and not applied."""
+    time = np.arange(0, 59 / RATE, 0.01)
+    fine = np.stack([np.interp(time - 2 / RATE, TRACK.time, column) for column in PLACES.reshape(60, -1).T], axis=1)
+    read(tmp_path, fine.reshape(len(time), -1, 3)[20:], rate=100.0, first=20)
+    got = evaluate(own, tmp_path / "markers.c3d", tmp_path)
+    knee = next(row for row in got.rows if row["angle"] == "knee_flexion_l")
+    assert knee["frames"] == 53  # ours from 0.2 to 1.93 s
+    assert float(knee["rms_aligned_deg"]) < 0.5
+    assert float(knee["rms_deg"]) > 2
+    assert any("we come 2.0 frames (67 ms) earlier than the reference" in note for note in got.notes)
+    assert any("reference at 100 per second, interpolated at our 30" in note for note in got.notes)
+
+
+def test_times_that_begin_at_one_sample_are_told(tmp_path: Path) -> None:
+    curve = 30 + np.arange(50.0)
+    markers.write_mot(tmp_path / "m.mot", {"knee_angle_r": curve}, np.arange(1, 51) / 60)
+    assert "counts time from 0.0167 s, one sample: taken as 0" in read_reference(tmp_path / "m.mot").notes[0]
+
+
+def test_the_file_in_reference_is_found(tmp_path: Path) -> None:
+    assert chosen(tmp_path, "")[0] is None
+    (tmp_path / "reference").mkdir()
+    (tmp_path / "reference/registration.csv").touch()
+    (tmp_path / "reference/walk.c3d").touch()
+    assert chosen(tmp_path, "") == (tmp_path / "reference/walk.c3d", "")
+    (tmp_path / "reference/walk.trc").touch()
+    path, note = chosen(tmp_path, "")
+    assert path is None
+    assert "reference/ holds walk.c3d, walk.trc: name one" in note
+
+
+def tables_of_words(path: Path) -> list[dict[str, str]]:
+    header, *rows = (line.split(",") for line in path.read_text().splitlines())
+    return [dict(zip(header, row, strict=True)) for row in rows]
+
+
+def test_our_side_from_files_is_that_from_the_track(own: Ours, tmp_path: Path) -> None:
+    angles_only = {n: v for n, v in own.columns.items() if n not in ours.SIGNED}
+    tables.write_columns(layout.place(tmp_path, layout.ANGLES), angles_only)
+    markers.write_trc(
+        layout.place(tmp_path, layout.JOINTS), own.stick.names, markers.opensim_from_world(own.stick.places), RATE
+    )
+    markers.write_mot(layout.place(tmp_path, layout.MOTION), {n: own.columns[n] for n in ours.SIGNED}, TRACK.time)
+    got = ours.of_folder(tmp_path)
+    assert set(got.columns) == set(own.columns)
+    np.testing.assert_allclose(got.stick.places, own.stick.places, atol=1e-7)
+    assert got.frame_rate == pytest.approx(RATE, abs=0.01)
+    assert len(angles.definitions(got.stick.names)) == 8
