@@ -11,11 +11,12 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
+from mocapflow.documents import Document
 from mocapflow.errors import PipelineError
 from mocapflow.pipeline import Strict
 from mocapflow.registry import Registry
 from mocapflow.resolve import Resolver
-from mocapflow.yamlfile import Document, read
+from mocapflow.yamlfile import read
 
 PIPELINE = "pipeline"  # in a level: another pipeline file instead of a change
 

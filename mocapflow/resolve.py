@@ -11,9 +11,9 @@ from pydantic import BaseModel, ValidationError
 from pydantic.errors import PydanticUserError
 
 from mocapflow.components import Component
+from mocapflow.documents import Document, Steps, dotted
 from mocapflow.errors import MocapflowError, PipelineError, alternatives
 from mocapflow.registry import Registry
-from mocapflow.yamlfile import Document, Steps, dotted
 
 
 class Resolver:

@@ -34,7 +34,7 @@ class PlanLine:
             if source not in supplied and source != name
         )
         text = f"{self.label:<12}{self.action:<8}{self.key[:4]}…  {self.why}"
-        return f"{text:<64}{f'({wiring})' if wiring else ''}".rstrip()
+        return f"{text:<63} {f'({wiring})' if wiring else ''}".rstrip()
 
 
 @dataclass(frozen=True)

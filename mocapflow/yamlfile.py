@@ -3,43 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Hashable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Hashable, Iterable
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from mocapflow.documents import Document, Place, Steps, changed, dotted
 from mocapflow.errors import PipelineError, alternatives
-
-Steps = tuple[str | int, ...]  # the way to a value: keys of mappings, indices of lists
-
-
-@dataclass(frozen=True)
-class Place:
-    """Where a value was written; relative paths in it start at `folder`."""
-
-    text: str  # file:line:column, or the option of the command line
-    folder: Path
-
-
-@dataclass(frozen=True)
-class Document:
-    """The values of a file with the place of each."""
-
-    values: dict[str, Any]
-    places: Mapping[Steps, Place]
-
-    def place(self, steps: Steps) -> Place:
-        """Return where a value stands, or the nearest one that contains it."""
-        while steps not in self.places:
-            steps = steps[:-1]
-        return self.places[steps]
-
-
-def dotted(steps: Steps) -> str:
-    """Return the path of a value as people write it."""
-    return ".".join(map(str, steps))
 
 
 def read(path: Path, changes: Iterable[str] = ()) -> Document:
@@ -57,7 +28,7 @@ def read(path: Path, changes: Iterable[str] = ()) -> Document:
         if not equals:
             raise PipelineError("a change is written PATH=VALUE", where=place.text)
         value = _parse(text, place.text, None)
-        document = _changed(document, target, Document(value.values, dict.fromkeys(value.places, place)))
+        document = changed(document, target, Document(value.values, dict.fromkeys(value.places, place)))
     return document
 
 
@@ -133,46 +104,5 @@ def _extended(child: Document, path: Path) -> Document:
     for target, value in changes.items():
         steps: Steps = ("change", target)
         places = {at[2:]: place for at, place in child.places.items() if at[:2] == steps}
-        base = _changed(base, target, Document(value, places))
+        base = changed(base, target, Document(value, places))
     return base
-
-
-def _changed(document: Document, target: str, new: Document) -> Document:
-    """Return the document with the value at a dotted path replaced."""
-    parts = target.split(".")
-    values = holder = _copy(document.values)
-    steps: Steps = ()
-    for part in parts:
-        if steps:
-            holder = _opened(holder, steps[-1])
-        key = int(part) if isinstance(holder, list) and part.isdecimal() else part
-        if not _may_hold(holder, key, last=len(steps) == len(parts) - 1):
-            known = (
-                holder if isinstance(holder, dict) else map(str, range(len(holder) if isinstance(holder, list) else 0))
-            )
-            hint = alternatives(part, known)
-            raise PipelineError(f"there is no '{dotted((*steps, part))}'", where=new.place(()).text, hint=hint)
-        steps = (*steps, key)
-    holder[steps[-1]] = new.values
-    kept = {at: place for at, place in document.places.items() if at[: len(steps)] != steps}
-    return Document(values, {**kept, **{(*steps, *at): place for at, place in new.places.items()}})
-
-
-def _opened(holder: Any, key: str | int) -> Any:
-    """Return the value of a key, to be written into: a bare name gets settings, a group left out is made."""
-    value = holder.get(key, {}) if isinstance(holder, dict) else holder[key]
-    holder[key] = {"use": value} if isinstance(value, str) else value
-    return holder[key]
-
-
-def _may_hold(holder: Any, key: str | int, last: bool) -> bool:
-    """True where a path can go on at a key: it is there, or may be new as a setting of a component."""
-    if isinstance(holder, list):
-        return isinstance(key, int) and key < len(holder)
-    return isinstance(holder, dict) and (key in holder or last or "use" in holder)
-
-
-def _copy(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _copy(inner) for key, inner in value.items()}
-    return [_copy(inner) for inner in value] if isinstance(value, list) else value

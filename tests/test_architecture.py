@@ -47,6 +47,7 @@ LAYERS = (  # a module imports only from its own layer or an earlier one; `io` a
     "sealing",
     "checkpoint",
     "track",
+    "documents",
     "yamlfile",
     "resolve",
     "measures",

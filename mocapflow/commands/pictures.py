@@ -10,6 +10,7 @@ import numpy as np
 
 from mocapflow.components import Draper, Garment
 from mocapflow.data import Past, Pose
+from mocapflow.documents import Document, Place
 from mocapflow.measures import garment_of
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64, U8
@@ -17,7 +18,6 @@ from mocapflow.registry import Registry
 from mocapflow.resolve import Resolver
 from mocapflow.scene import Scene
 from mocapflow.shipped import shipped
-from mocapflow.yamlfile import Document, Place
 
 CLIPS = ("skirt_steps", "shorts_steps")
 RAISED = {"hip_l.flexion": 65.0, "knee_l.flexion": 70.0}  # deg

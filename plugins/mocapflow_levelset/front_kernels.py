@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from mocapflow_levelset.statistics import STEP_BINS, STEP_RANGE
+from mocapflow_levelset.statistics_kernels import STEP_BINS, STEP_RANGE
 
 
 @numba.njit(cache=True, error_model="numpy")

@@ -5,10 +5,10 @@ from importlib.util import find_spec
 import pytest
 
 from mocapflow import testing
+from mocapflow.documents import Document, Place
 from mocapflow.registry import PROVIDERS, load_registry
 from mocapflow.resolve import Resolver
 from mocapflow.shipped import shipped
-from mocapflow.yamlfile import Document, Place
 
 REGISTRY = load_registry()
 CLIP = shipped("examples", "data", "skirt_steps")

@@ -6,7 +6,8 @@ from mocapflow_levelset.channels import features
 from mocapflow_levelset.energy import heaviside
 from mocapflow_levelset.evidence import from_features
 from mocapflow_levelset.evolve import Weights, log_ratio, near
-from mocapflow_levelset.statistics import FAINT, Window, local_gaussians, totals
+from mocapflow_levelset.statistics import Window, local_gaussians, totals
+from mocapflow_levelset.statistics_kernels import FAINT
 
 SIGMA = 1.5
 ONES = np.ones((160, 160), np.float32)
