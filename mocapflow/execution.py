@@ -18,6 +18,7 @@ from mocapflow.pipeline import Pipeline
 from mocapflow.progress import Progress
 from mocapflow.recipes import Step
 from mocapflow.recording import Recording
+from mocapflow.records import unwatched
 from mocapflow.results import RunFolder
 from mocapflow.rows import Corrupted
 from mocapflow.scene import Scene
@@ -137,18 +138,19 @@ class Execution:
         return value
 
     def _input(self, step: Step, source: str | None, checkpoint: Checkpoint | None) -> Any:
-        watch = Progress(step.label, self._report, brief=True).tell
+        silent = checkpoint is not None or step.passes_frames
+        watch = unwatched if silent else Progress(step.label, self._report, brief=True).tell
         supplied: dict[str | None, Callable[[], Any]] = {
             None: lambda: None,
             "scene": lambda: self._scene(step),
-            "recording": lambda: step.recording if checkpoint else replace(step.recording, watch=watch),
+            "recording": lambda: replace(step.recording, watch=watch),
             "checkpoint": lambda: checkpoint,
             "run folder": lambda: RunFolder(path=self._out, recipe=self._recipe(), watch=watch),
         }
         if source in supplied:
             return supplied[source]()
         made = self._result(str(source))
-        return replace(made, indices=step.recording.indices) if isinstance(made, Recording) else made
+        return replace(made, indices=step.recording.indices, watch=watch) if isinstance(made, Recording) else made
 
     def _scene(self, step: Step) -> Scene:
         """Return the cameras and the body that hold at this place in the pipeline, and the garment sewn to it."""

@@ -105,6 +105,8 @@ def log_ratio(runs: I32, evidence: Evidence, gaussians: F32, cell_px: int, strid
 
     Outside, the empty scene speaks where it is known, else the local statistics.
     """
+    if not len(runs):  # the contour has left the image
+        return
     values = evidence.along(runs)
     known = evidence.outside is not None
     outside = evidence.outside(runs, values) if evidence.outside is not None else np.empty(0, np.float32)

@@ -12,6 +12,7 @@ FAINT = 0.1  # share of the usual contrast below which nothing is shown
 NEARER = 0.5  # a picture is of another camera if it differs from that one's room by less than this share
 NO_NEWS = 0.1  # share of the usual news in a picture that repeats the one before
 SOME_NEWS = 0.5  # share that other cameras then have, or the person just stands still
+FAST = 4  # times the usual step: no body moves much faster than that, from frame to frame
 NEIGHBOURS = 4  # steps before and after a burst that say how fast things move
 
 
@@ -63,7 +64,8 @@ def _candidates(grey: F32, steps: F64, longest: int, strong: float) -> list[tupl
     found: list[tuple[float, int, int, F64]] = []
     if len(steps) < 4:
         return found
-    slow, fast = np.maximum(np.median(steps, axis=0) / 4, 1e-6), np.percentile(steps, 90, axis=0)
+    usual = np.maximum(np.median(steps, axis=0), 1e-6)
+    slow, fast = usual / 4, np.minimum(np.percentile(steps, 90, axis=0), FAST * usual)  # wrong pictures count in both
     for enter in range(1, len(steps) - 1):
         before = steps[max(0, enter - NEIGHBOURS) : enter].max(axis=0)
         for leave in range(enter + 1, min(enter + longest, len(steps) - 2) + 1):
