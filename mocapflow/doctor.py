@@ -15,9 +15,11 @@ from mocapflow.io.lenses import View
 from mocapflow.io.plates import background
 from mocapflow.io.rigs import examine_rig
 from mocapflow.io.subjects import examine_subject
+from mocapflow.io.timing import TIMING, late_frames, timing_text, write_late_frames
 from mocapflow.io.video import Video, lost_frames, name_frames, open_video
+from mocapflow.synchrony import measure
 
-__all__ = ["Finding", "examine"]
+__all__ = ["Finding", "examine", "examine_timing"]
 
 
 def examine(folder: Path) -> list[Finding]:
@@ -43,6 +45,31 @@ def examine(folder: Path) -> list[Finding]:
     findings += examine_subject(folder)
     findings += _missing(folder)
     return sorted(findings, key=lambda finding: ("error", "warning", "note").index(finding.severity))
+
+
+def examine_timing(folder: Path, write: bool = False) -> list[Finding]:
+    """Return which cameras are late against the others; every video is decoded.
+
+    Args:
+        folder: the recording, without errors.
+        write: put it into recording.json, which every run then heeds.
+    """
+    findings: list[Finding] = []
+    measured = attempt(lambda: measure(folder), findings)
+    if measured is None:
+        return findings
+    findings.append(note(", ".join(f"{m.camera} {m.frames:+.1f} ± {m.sd:.1f}" for m in measured) + " frames late"))
+    known = late_frames(folder, [m.camera for m in measured])
+    late = {m.camera: before + m.frames for m, before in zip(measured, known, strict=True) if before or m.sure}
+    if not any(m.sure for m in measured):
+        return findings
+    if write:
+        path = attempt(lambda: write_late_frames(folder, late), findings)
+        return findings if path is None else [*findings, note("written; from now on runs heed it", where=path)]
+    found = [(m.camera, abs(m.frames), "late" if m.frames > 0 else "early") for m in measured if m.sure]
+    said = ", ".join(f"{camera} is {frames:.1f} frames {which}" for camera, frames, which in found)
+    hint = f"write {timing_text(late)} there, or let --write do so: each frame is then taken at the same moment"
+    return [*findings, warning(said, hint, folder / TIMING)]
 
 
 def _missing(folder: Path) -> Iterator[Finding]:

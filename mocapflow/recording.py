@@ -18,8 +18,9 @@ from mocapflow.io.cameras import calibration_files
 from mocapflow.io.keypoints import keypoint_files, people_at
 from mocapflow.io.lenses import View
 from mocapflow.io.plates import background
+from mocapflow.io.timing import TIMING
 from mocapflow.io.video import Video, read_frames
-from mocapflow.records import Watch, record, unwatched
+from mocapflow.records import F64, Watch, record, unwatched
 
 
 class FrameChange(Protocol):
@@ -90,10 +91,22 @@ class Recording:
             return None
         return open_recording(self.folder / "static", scale=self.views[0].scale, calibration=self.calibration)
 
+    def people(self, index: int) -> tuple[F64, ...]:
+        """Return who is detected in a frame, per camera (N, K, 3) px, px, confidence, undistorted; decodes no image."""
+        return tuple(
+            view.points(people_at(files, index + video.late))
+            for view, files, video in zip(self.views, self._keypoint_files, self.videos, strict=True)
+        )
+
+    @cached_property
+    def _keypoint_files(self) -> tuple[dict[int, Path] | None, ...]:
+        return tuple(None if folder is None else keypoint_files(folder) for folder in self.keypoint_folders)
+
     @cached_property
     def content(self) -> Mapping[str, Path]:
         """Every file and folder that `frames` and `background` read, by its name within the recording."""
         paths = [*calibration_files(self.calibration), *(video.path for video in self.videos)]
+        paths += [path for path in (self.folder / TIMING,) if path.exists()]
         paths += [folder for folder in self.keypoint_folders if folder is not None]
         paths += [plate for view in self.views for plate in folders.plates(self.folder, view.lens.name)]
         return {
@@ -109,18 +122,16 @@ class Recording:
             self.watch(done, len(indices))
 
     def _decode(self, indices: range) -> Iterator[Frame]:
-        files = [None if folder is None else keypoint_files(folder) for folder in self.keypoint_folders]
         pictures = zip(*(read_frames(video, indices) for video in self.videos), strict=True)
         for index, row in zip(indices, pictures, strict=True):
             usable = np.array([image is not None for image, _ in row])
-            people = tuple(view.points(people_at(f, index)) for view, f in zip(self.views, files, strict=True))
             yield Frame(
                 index=index,
                 time=index / self.frame_rate,
                 images=tuple(view.image(image) for view, (image, _) in zip(self.views, row, strict=True)),
                 usable=usable,
                 reasons=() if usable.all() else tuple(reason for _, reason in row),
-                keypoints=people if any(self.keypoint_folders) else None,
+                keypoints=self.people(index) if any(self.keypoint_folders) else None,
             )
 
 

@@ -25,6 +25,8 @@ LAYERS = (  # a module imports only from its own layer or an earlier one; `io` a
     "scene",
     "io",
     "recording",
+    "paired_views",
+    "synchrony",
     "doctor",
     "components",
     "model",

@@ -74,11 +74,17 @@ def equations(
             typer.echo(f"{row.number:<12} {row.what:<50} {row.place()}")
 
 
-def doctor(recording: Annotated[Path, typer.Argument(metavar="DIR", help="A recording folder.")]) -> None:
+def doctor(
+    recording: Annotated[Path, typer.Argument(metavar="DIR", help="A recording folder.")],
+    sync: Annotated[bool, typer.Option("--sync", help="Also measure whether cameras are late.")] = False,
+    write: Annotated[bool, typer.Option("--write", help="Put what --sync finds into recording.json.")] = False,
+) -> None:
     """Check a recording folder and say what to mend."""
-    from mocapflow.doctor import examine
+    from mocapflow.doctor import examine, examine_timing
 
     findings = examine(recording)
+    if (sync or write) and not any(finding.severity == "error" for finding in findings):
+        findings += examine_timing(recording, write)
     for finding in findings:
         place = f"{finding.where}  " if finding.where else ""
         typer.echo("\n       ".join([f"{finding.severity}: {place}{finding.message}", *finding.hint.splitlines()]))

@@ -13,6 +13,7 @@ from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.io.cameras import find_calibration, metadata, read_cameras
 from mocapflow.io.keypoints import odd_keypoints
+from mocapflow.io.timing import late_frames
 from mocapflow.io.video import IMAGES, VIDEOS, Video, name_frames, open_video
 from mocapflow.records import record
 
@@ -46,7 +47,8 @@ def gather(folder: Path, calibration: Path | None = None) -> Parts:
         calibration = find_calibration(folder)
     cameras = read_cameras(calibration)
     paths = match_videos(folder, [camera.name for camera in cameras], calibration)
-    videos = tuple(open_video(path) for path in paths)
+    late = late_frames(folder, [camera.name for camera in cameras])
+    videos = tuple(replace(open_video(path), late=frames) for path, frames in zip(paths, late, strict=True))
     lenses, cut = fit_sizes(cameras, videos, calibration)
     length, broken = agree_on_length(cameras, videos, folder)
     gaps = gap_warnings(cameras, videos)

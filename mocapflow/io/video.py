@@ -34,6 +34,7 @@ class Video:
     declared: int  # frames, as the file says; more than `frames` where it breaks off
     stamps: F64 = array("N", unit="ms, time of each frame in the file, ascending; counted for images")
     numbers: I32 = array("N", unit="frame number of each stamp")
+    late: int = 0  # frames by which its pictures come after those of the other cameras
 
     @property
     def frames(self) -> int:
@@ -74,7 +75,11 @@ def open_video(path: Path) -> Video:
 
 
 def read_frames(video: Video, indices: range) -> Iterator[tuple[U8 | None, str]]:
-    """Yield exactly one image (H, W, 3) BGR per index, or None and why it is lost; memory stays bounded."""
+    """Yield exactly one image (H, W, 3) BGR per index, or None and why it is lost; memory stays bounded.
+
+    Index 0 is the first frame of a punctual camera; a late camera's pictures are taken from further on.
+    """
+    indices = range(indices.start + video.late, indices.stop + video.late, indices.step)
     pictures = _folder_pictures(video, indices) if video.path.is_dir() else _file_pictures(video, indices)
     for image, reason in pictures:
         if image is not None and image.shape != (video.height, video.width, 3):
@@ -106,6 +111,8 @@ def _file_pictures(video: Video, indices: range) -> Iterator[tuple[U8 | None, st
 
 
 def _why(video: Video, index: int) -> str:
+    if index < 0:
+        return "the video starts later"
     if index >= video.frames:
         return f"the video breaks off after frame {video.frames - 1}"
     if index not in video.numbers:

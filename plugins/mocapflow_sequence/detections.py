@@ -8,9 +8,7 @@ import numpy as np
 
 from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
-from mocapflow.io.keypoints import keypoint_files, people_at
 from mocapflow.recording import Recording
-from mocapflow.records import F64
 from mocapflow_sequence.keypoint_fit import Seen
 from mocapflow_sequence.keypoint_layouts import LAYOUTS, Layout, layout_of
 from mocapflow_sequence.person import Person, find_person
@@ -34,17 +32,9 @@ def need_keypoints(recording: Recording) -> None:
     )  # fmt: skip
 
 
-def people(recording: Recording, index: int) -> tuple[F64, ...]:
-    """Return all detections of a frame, per camera (N, K, 3) px, px, confidence, undistorted; no image is decoded."""
-    return tuple(
-        view.points(people_at(None if folder is None else keypoint_files(folder), index))
-        for view, folder in zip(recording.views, recording.keypoint_folders, strict=True)
-    )
-
-
 def person_at(recording: Recording, index: int, cameras: Sequence[Camera]) -> Person | None:
     """Return the person in a frame; None where too few keypoints can be triangulated."""
-    person = find_person(people(recording, index), cameras)
+    person = find_person(recording.people(index), cameras)
     found = 0 if person is None else np.isfinite(person.points.position).all(axis=1).sum()
     return person if found >= LEAST_POINTS else None
 
@@ -72,7 +62,7 @@ def persons(recording: Recording, indices: Sequence[int], cameras: Sequence[Came
 
 def layout(recording: Recording, indices: Sequence[int], wanted: Layout | None) -> tuple[str, ...]:
     """Return the names of the keypoints, in the order of the files."""
-    detections = [points for index in indices for view in people(recording, index) for points in view]
+    detections = [points for index in indices for view in recording.people(index) for points in view]
     return LAYOUTS[wanted or layout_of(detections)]
 
 

@@ -95,7 +95,8 @@ def test_motion_that_starts_and_stops_is_no_burst():
         assert not bursts(there, longest=5, strong=2, weak=1.3).any()
         back = np.concatenate([there, there[::-1]])
         assert not bursts(back, longest=5, strong=2, weak=1.3).any()
-    quick = np.concatenate([drifting(10, 2, 0), drifting(10, 2, 0)[::-1]])  # there and back again
+    gesture = np.concatenate([drifting(8, 2, 0), drifting(8, 2, 0)[::-1]])  # there and back, as fast as other motion
+    quick = np.concatenate([gesture, drifting(0, 30, 0)])
     assert not bursts(quick, longest=5, strong=2, weak=1.3).any()
 
 

@@ -1,0 +1,51 @@
+"""recording.json: which cameras of a recording are late."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from mocapflow.errors import RecordingError, alternatives
+
+TIMING = "recording.json"
+FORM = 'expected {"late_frames": {"cam03": 2.8}}: by how many frames its pictures come after those of the others'
+
+
+def late_frames(folder: Path, names: Sequence[str]) -> tuple[int, ...]:
+    """Return by how many whole frames each camera is late; 0 where nothing is said.
+
+    Raises:
+        RecordingError: the file is not in its form, or names a camera that is not there.
+    """
+    path = folder / TIMING
+    if not path.exists():
+        return (0,) * len(names)
+    try:
+        late = {name: round(float(frames)) for name, frames in json.loads(path.read_text())["late_frames"].items()}
+    except (ValueError, TypeError, KeyError, AttributeError, OverflowError) as error:
+        raise RecordingError(f"can't be read: {error!r}", where=str(path), hint=FORM) from error
+    if unknown := sorted(set(late) - set(names)):
+        raise RecordingError(
+            f"there is no camera '{unknown[0]}'", where=str(path), hint=alternatives(unknown[0], names)
+        )
+    return tuple(late.get(name, 0) for name in names)
+
+
+def timing_text(late: Mapping[str, float]) -> str:
+    """Return what recording.json says, to a tenth of a frame."""
+    return json.dumps({"late_frames": {name: round(frames, 1) for name, frames in late.items()}})
+
+
+def write_late_frames(folder: Path, late: Mapping[str, float]) -> Path:
+    """Write which cameras are late.
+
+    Raises:
+        RecordingError: the folder can't be written.
+    """
+    path = folder / TIMING
+    try:
+        path.write_text(timing_text(late) + "\n")
+    except OSError as error:
+        raise RecordingError(f"can't be written: {error.strerror}", where=str(path)) from error
+    return path

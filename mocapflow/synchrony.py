@@ -1,0 +1,121 @@
+"""How late each camera is against the others, from what they see of the person."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+
+from mocapflow.errors import RecordingError
+from mocapflow.paired_views import Signals, keypoint_signals, outline_signals
+from mocapflow.recording import open_recording
+from mocapflow.records import F64, record
+
+FRAMES = 600  # at most, that are looked at
+WIDTH = 480  # px, to which larger images are shrunk
+SECONDS = 0.5  # the largest lag that is looked for
+LEAST = 0.5  # frames; less than that can't be mended by taking another frame
+SURE = 3.0  # standard deviations
+SHARED = 0.5  # share of the frames that two cameras must both have at a lag
+CLIP = 3.0  # standard deviations at the best lag, beyond which an error counts no more
+ALIKE = 5  # frames in a row whose errors are alike: they count as one
+
+
+@record
+class Lateness:
+    """How many frames a camera's pictures come after those of the others, and its standard deviation."""
+
+    camera: str
+    frames: float
+    sd: float
+
+    @property
+    def sure(self) -> bool:
+        """True where it is more than chance, and more than whole frames can mend."""
+        return abs(self.frames) > max(LEAST, SURE * self.sd)
+
+
+def measure(folder: Path) -> list[Lateness]:
+    """Return how late each camera of a recording is, on top of what its recording.json says.
+
+    Keypoints tell where there are any, else the person's outlines.
+
+    Raises:
+        RecordingError: the recording can't be opened, or too little is seen by two cameras at once.
+    """
+    whole = open_recording(folder)
+    scale = min(1.0, WIDTH / max(int(lens.size[0]) for lens in whole.lenses))
+    recording = replace(open_recording(folder, scale=scale), indices=whole.indices[:FRAMES])
+    signals = keypoint_signals if sum(place is not None for place in whole.keypoint_folders) > 1 else outline_signals
+    reach = max(min(round(SECONDS * whole.frame_rate), len(recording.indices) // 3), 2)
+    return lateness([camera.name for camera in recording.cameras], signals(recording), reach)
+
+
+def lateness(names: Sequence[str], signals: Signals, reach: int) -> list[Lateness]:
+    """Return how late each camera is; the middle one counts as punctual.
+
+    Args:
+        names: of the cameras.
+        signals: what two of them agree on.
+        reach: largest lag between two cameras that is looked for, frames.
+
+    Raises:
+        RecordingError: too little is seen by two cameras at once.
+    """
+    pairs = list(combinations(range(len(names)), 2))
+    found = [best_lag(*signals(*pair), reach) for pair in pairs]
+    known = [(pair, lag, information) for pair, (lag, information) in zip(pairs, found, strict=True) if information > 0]
+    matrix = np.zeros((len(known), len(names)))
+    for row, ((one, other), _, _) in enumerate(known):
+        matrix[row, one], matrix[row, other] = -1, 1
+    if len(known) < len(names) - 1 or np.linalg.matrix_rank(matrix) < len(names) - 1:
+        raise RecordingError("the cameras see too little of the same person at the same time to be compared")
+    lags, weights = (np.array([row[k] for row in known]) for k in (1, 2))
+    weighted = matrix * weights[:, None]
+    covariance = np.linalg.pinv(matrix.T @ weighted)
+    late = covariance @ weighted.T @ lags
+    late = (late - np.sort(late)[(len(late) - 1) // 2]).tolist()
+    sd = np.sqrt(np.diagonal(covariance)).tolist()
+    return [Lateness(camera=name, frames=late[k], sd=sd[k]) for k, name in enumerate(names)]
+
+
+def best_lag(one: F64, other: F64, reach: int) -> tuple[float, float]:
+    """Return by how many frames signals (T, K) of another camera are late against those of one, and the information.
+
+    The information is one over the variance; 0 where nothing moves or too little is known.
+    """
+    lags = range(-reach, reach + 1)
+    errors = [_centred(*_overlapping(one, other, lag)) for lag in lags]
+    most = max(np.isfinite(error).sum() for error in errors)
+    enough = np.array([np.isfinite(error).sum() >= max(SHARED * most, 2) for error in errors])
+    raw = np.array([np.nanmedian(np.abs(e)) if ok else np.inf for e, ok in zip(errors, enough, strict=True)])
+    if not np.isfinite(raw).any():
+        return 0.0, 0.0
+    scale = max(1.4826 * float(raw.min()), 1e-9)
+    clipped = [np.minimum((e / scale) ** 2, CLIP**2) for e in errors]
+    cost = np.array([np.nanmean(c) if ok else np.inf for c, ok in zip(clipped, enough, strict=True)])
+    at = int(np.argmin(cost))
+    if not 0 < at < len(lags) - 1 or not np.isfinite(cost[at - 1 : at + 2]).all():
+        return 0.0, 0.0
+    before, least, after = cost[at - 1 : at + 2]
+    bend = before - 2 * least + after
+    independent = np.isfinite(errors[at]).any(axis=1).sum() / ALIKE
+    return float(lags[at] + (before - after) / (2 * bend)), float(bend / (2 * least) * independent)
+
+
+def _overlapping(one: F64, other: F64, lag: int) -> tuple[F64, F64]:
+    """Return the rows of two signals that show the same moments if the other is late by `lag` frames."""
+    count = len(one) - abs(lag)
+    return one[max(0, -lag) :][:count], other[max(0, lag) :][:count]
+
+
+def _centred(one: F64, other: F64) -> F64:
+    """Return the difference of two signals less its median: a calibration that is a little off makes no lag."""
+    difference = one - other
+    known = np.isfinite(difference).any(axis=0)
+    middle = np.zeros(difference.shape[1])
+    middle[known] = np.nanmedian(difference[:, known], axis=0)
+    return difference - middle

@@ -1,0 +1,126 @@
+"""Cameras that are late against the others: measured, written down, heeded."""
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+
+from mocapflow import paired_views, synchrony
+from mocapflow.doctor import examine_timing
+from mocapflow.errors import RecordingError
+from mocapflow.geometry.cameras import project
+from mocapflow.geometry.pencils import pencil_axes, plane_angles
+from mocapflow.io.cameras import write_cameras
+from mocapflow.recording import open_recording
+from tests.fixtures.recordings import look_at
+
+PLACES = [(3, 0.5, 1.4), (0.3, 3, 1.0), (-2, -2, 1.8)]
+SIZE, FRAMES, RADIUS = (160, 120), 60, 0.3
+NAMES = ("cam01", "cam02", "cam03")
+
+
+def cameras():
+    return [look_at(n, np.array(p), SIZE, focal=150.0) for n, p in zip(NAMES, PLACES, strict=True)]
+
+
+def ball(moment):
+    t = np.asarray(moment, float) / 8
+    return np.stack([0.3 * np.sin(t), 0.25 * np.cos(1.3 * t), 1 + 0.2 * np.sin(0.7 * t)], axis=-1)
+
+
+def picture(camera, moment):
+    image = np.full((SIZE[1], SIZE[0], 3), 60, np.uint8)
+    there = ball(moment)[None]
+    x, y = project(there, camera)[0]
+    away = (camera.camera_from_world @ np.append(there, 1))[2]
+    cv2.circle(
+        image, (round(16 * x), round(16 * y)), round(16 * 150 * RADIUS / away), (200, 220, 240), -1, cv2.LINE_AA, 4
+    )
+    return image
+
+
+def write(folder, late):
+    """A ball seen by three cameras; pictures of each come so many frames after the moment they should show."""
+    (folder / "background").mkdir(parents=True)
+    write_cameras(folder / "cameras.toml", cameras())
+    for camera in cameras():
+        place = folder / "videos" / camera.name
+        place.mkdir(parents=True)
+        cv2.imwrite(str(folder / "background" / f"{camera.name}.png"), np.full((SIZE[1], SIZE[0], 3), 60, np.uint8))
+        for index in range(FRAMES):
+            cv2.imwrite(str(place / f"{index:06}.png"), picture(camera, index - late.get(camera.name, 0)))
+    return folder
+
+
+def test_two_cameras_see_a_point_in_the_same_plane():
+    points = ball(np.arange(60))
+    one, other, _ = cameras()
+    axes = pencil_axes(one, other)
+    np.testing.assert_allclose(axes @ axes.T, np.eye(2), atol=1e-12)
+    angles = [plane_angles(project(points, camera), camera, axes) for camera in (one, other)]
+    np.testing.assert_allclose(angles[0], angles[1], atol=1e-9)
+    assert np.ptp(angles[0]) > 0.1
+
+
+@pytest.mark.parametrize("lag", [0, 3, -2.4])
+def test_a_lag_between_signals_is_found_between_frames(lag):
+    moments, rng = np.arange(80)[:, None], np.random.default_rng(0)
+    one = np.sin(moments / [7, 11]) + 0.02 * rng.normal(size=(80, 2))
+    other = np.sin((moments - lag) / [7, 11]) + 0.3 + 0.02 * rng.normal(size=(80, 2))  # and a bias
+    other[10:20, 0] = np.nan
+    found, information = synchrony.best_lag(one, other, 10)
+    assert found == pytest.approx(lag, abs=0.2)
+    assert information > 1
+    assert synchrony.best_lag(np.ones((80, 1)), np.ones((80, 1)), 10)[1] == 0  # nothing moves
+
+
+def test_a_late_camera_is_measured_and_heeded(tmp_path):
+    folder = write(tmp_path / "clip", {"cam02": 3})
+    measured = {m.camera: m for m in synchrony.measure(folder)}
+    assert measured["cam02"].frames == pytest.approx(3, abs=0.3)
+    assert [measured[name].sure for name in NAMES] == [False, True, False]
+    told = examine_timing(folder)
+    assert "cam02 is 3.0 frames late" in told[-1].message
+    assert 'write {"late_frames": {"cam02": 3.0}}' in told[-1].hint
+    examine_timing(folder, write=True)
+    assert json.loads((folder / "recording.json").read_text()) == {"late_frames": {"cam02": 3.0}}
+    assert not any(m.sure for m in synchrony.measure(folder))
+    recording = open_recording(folder)
+    assert "recording.json" in recording.content
+    first, last = recording.frame(0), recording.frame(FRAMES - 1)
+    assert (first.images[1] == picture(cameras()[1], 0)).all()
+    assert last.usable.tolist() == [True, False, True]
+    assert last.reasons[1] == "there is no image of this frame"
+
+
+def test_keypoints_tell_too(tmp_path):
+    folder = write(tmp_path / "clip", {})
+    for camera in cameras():
+        place = folder / "keypoints" / f"{camera.name}_json"
+        place.mkdir(parents=True)
+        for index in range(FRAMES):
+            moments = index - 3 * (camera.name == "cam03") + np.array([0, 40, 90])
+            rows = np.column_stack([project(ball(moments), camera), np.ones(3)])
+            people = {"people": [{"pose_keypoints_2d": rows.ravel().tolist()}]}
+            (place / f"{index:06}.json").write_text(json.dumps(people))
+    signals = paired_views.keypoint_signals(open_recording(folder))
+    assert signals(0, 1)[0].shape == (FRAMES, 3)
+    late = {m.camera: m.frames for m in synchrony.measure(folder)}
+    assert late == pytest.approx({"cam01": 0, "cam02": 0, "cam03": 3}, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{", "can't be read"),
+        ('{"late": {}}', "can't be read"),
+        ('{"late_frames": {"cam01": "much"}}', "can't be read"),
+        ('{"late_frames": {"cam1": 3}}', "there is no camera 'cam1'"),
+    ],
+)
+def test_a_wrong_recording_json_is_explained(tmp_path, text, said):
+    folder = write(tmp_path / "clip", {})
+    (folder / "recording.json").write_text(text)
+    with pytest.raises(RecordingError, match=said):
+        open_recording(folder)
