@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mocapflow.commands.again import Invocation
 from mocapflow.commands.results import table
 from mocapflow.commands.running import execute
-from mocapflow.errors import MocapflowError, PipelineError
+from mocapflow.commands.workers import Scheduler, Workers, finished
+from mocapflow.errors import MocapflowError
 
 if TYPE_CHECKING:
     from mocapflow.experiment import Cell
 
-RETRIES = 3  # of a run whose worker was lost: it goes on from the last frame committed
 SHOWN = ("recording", "variant", "angle", "rms_deg", "difference_deg", "difference_low_deg", "difference_high_deg")
 
 
@@ -27,10 +27,8 @@ def compare(
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Where to write.  [default: runs/NAME_OF_EXPERIMENT]")] = None,
     store: Annotated[Path | None, typer.Option(help="Cached results.  [default: store.zarr beside it]")] = None,
-    workers: Annotated[int, typer.Option(min=1, help="Processes on this machine.")] = 1,
-    scheduler: Annotated[
-        str | None, typer.Option(help="tcp://… of a running dask scheduler whose workers see the same files.")
-    ] = None,
+    workers: Workers = 1,
+    scheduler: Scheduler = None,
 ) -> None:
     """Run variants of a pipeline on recordings and compare them; stages they share are computed once."""
     from mocapflow.experiment import load_experiment
@@ -41,9 +39,8 @@ def compare(
     invocations = {place(folder, cell): invocation(cell, kept) for cell in cells}
     for each in invocations.values():
         each.load()  # tells what is wrong with any variant before the first one runs
-    several = scheduler is not None or workers > 1
-    done = on_workers(invocations, workers, scheduler) if several else one_by_one(invocations)
-    for number, (run, said) in enumerate(done, 1):
+    tasks = {run: partial(finish, each, run.absolute()) for run, each in invocations.items()}
+    for number, (run, said) in enumerate(finished(tasks, workers, scheduler), 1):
         typer.echo(f"{number} of {len(cells)}  {run.relative_to(folder)}  {said}", err=True)
     from mocapflow_sequence import variants
 
@@ -67,38 +64,6 @@ def invocation(cell: Cell, store: Path) -> Invocation:
         frames=cell.frames,
         store=str(store.absolute()),
     )
-
-
-def one_by_one(invocations: Mapping[Path, Invocation]) -> Iterator[tuple[Path, str]]:
-    """Run all in this process."""
-    for out, each in invocations.items():
-        yield out, finish(each, out)
-
-
-def on_workers(
-    invocations: Mapping[Path, Invocation], workers: int, scheduler: str | None
-) -> Iterator[tuple[Path, str]]:
-    """Run all on dask workers: one at a time each, of one thread; the store's locks keep them out of each other's way.
-
-    Raises:
-        PipelineError: dask is not installed.
-    """
-    try:
-        from dask import distributed
-    except ImportError as error:
-        raise PipelineError("several workers need dask", hint="pip install 'mocapflow[cluster]'") from error
-    with connected(distributed, workers, scheduler) as client:
-        futures = {client.submit(finish, each, out.absolute(), retries=RETRIES, pure=False): out
-                   for out, each in invocations.items()}  # fmt: skip
-        for future in distributed.as_completed(list(futures)):  # type: ignore[no-untyped-call]
-            yield futures[future], future.result()
-
-
-def connected(distributed: Any, workers: int, scheduler: str | None) -> Any:
-    """Return a client of a running scheduler, or of workers of our own."""
-    if scheduler is not None:
-        return distributed.Client(scheduler)
-    return distributed.Client(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None)
 
 
 def finish(invocation: Invocation, out: Path) -> str:

@@ -1,0 +1,52 @@
+"""Runs many tasks: in this process, on processes of its own, or on the workers of a dask scheduler."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Annotated, Any, TypeVar
+
+import typer
+
+from mocapflow.errors import PipelineError
+
+Workers = Annotated[int, typer.Option(min=1, help="Processes on this machine.")]
+Scheduler = Annotated[
+    str | None, typer.Option(help="tcp://… of a running dask scheduler whose workers see the same files.")
+]
+Key = TypeVar("Key")
+Result = TypeVar("Result")
+
+
+def finished(
+    tasks: Mapping[Key, Callable[[], Result]], workers: int, scheduler: str | None
+) -> Iterator[tuple[Key, Result]]:
+    """Run all tasks and yield each with its result when it is done.
+
+    The locks of the store keep the workers out of each other's way. dask gives the task of a lost worker to another,
+    where it goes on from the last frame committed; a task that kills three workers is given up.
+
+    Raises:
+        PipelineError: dask is not installed, or no scheduler answers.
+    """
+    if scheduler is None and workers == 1:
+        yield from ((key, task()) for key, task in tasks.items())
+        return
+    try:
+        from dask import distributed
+    except ImportError as error:
+        raise PipelineError("several workers need dask", hint="pip install 'mocapflow[cluster]'") from error
+    with connected(distributed, workers, scheduler) as client:
+        futures = {client.submit(task, pure=False): key for key, task in tasks.items()}
+        for future in distributed.as_completed(list(futures)):  # type: ignore[no-untyped-call]
+            yield futures[future], future.result()
+
+
+def connected(distributed: Any, workers: int, scheduler: str | None) -> Any:
+    """Return a client of a running scheduler, or of workers of our own, one thread each."""
+    if scheduler is None:
+        return distributed.Client(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None)
+    try:
+        return distributed.Client(scheduler)
+    except (OSError, ValueError) as error:
+        hint = f"start one with `dask scheduler`, and on every machine `dask worker --nthreads 1 {scheduler}`"
+        raise PipelineError(f"no dask scheduler answers at {scheduler}", hint=hint) from error
