@@ -64,7 +64,9 @@ app.add_typer(new.app, name="new")
 def main() -> None:
     """Run the command line; warnings go to stderr, one line each."""
     warnings.showwarning = _show_warning
-    logging.basicConfig(format="warning: %(message)s", level=logging.WARNING, stream=sys.stderr)
+    warned = logging.StreamHandler(sys.stderr)
+    warned.setLevel(logging.WARNING)  # of the handler: libraries lower that of their own loggers
+    logging.basicConfig(format="warning: %(message)s", handlers=[warned])
     app(prog_name="mocapflow")
 
 

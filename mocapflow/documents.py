@@ -10,6 +10,7 @@ from typing import Any
 from mocapflow.errors import PipelineError, alternatives
 
 Steps = tuple[str | int, ...]  # the way to a value: keys of mappings, indices of lists
+GROUPS = {"frames", "parts"}  # of plain settings, which a file may leave out
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ def _may_hold(holder: Any, key: str | int, last: bool) -> bool:
     """True where a path can go on at a key: it is there, or may be new as a setting of a component."""
     if isinstance(holder, list):
         return isinstance(key, int) and key < len(holder)
-    return isinstance(holder, dict) and (key in holder or last or "use" in holder)
+    return isinstance(holder, dict) and (key in holder or last or "use" in holder or key in GROUPS)
 
 
 def _copy(value: Any) -> Any:

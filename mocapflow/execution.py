@@ -23,6 +23,7 @@ from mocapflow.results import RunFolder
 from mocapflow.rows import Corrupted
 from mocapflow.scene import Scene
 from mocapflow.store import Artifact, Report, Store, remove, versions, with_versions
+from mocapflow.wiring import Source
 
 Value = TypeVar("Value")
 
@@ -137,7 +138,9 @@ class Execution:
         self._entered(step, None, time.process_time() - cpu, time.perf_counter() - wall)
         return value
 
-    def _input(self, step: Step, source: str | None, checkpoint: Checkpoint | None) -> Any:
+    def _input(self, step: Step, source: Source, checkpoint: Checkpoint | None) -> Any:
+        if isinstance(source, tuple):
+            return tuple(self._result(label) for label in source)
         silent = checkpoint is not None or step.passes_frames
         watch = unwatched if silent else Progress(step.label, self._report, brief=True).tell
         supplied: dict[str | None, Callable[[], Any]] = {

@@ -31,6 +31,15 @@ class Frames(Strict):
     step: Annotated[int, Field(ge=1)] = 1  # takes every so many-th frame
 
 
+class PartsFile(Strict):
+    """A long recording in parts that are tracked each from a start of its own, and joined."""
+
+    count: Annotated[int, Field(ge=1)] = 1  # how many; they can be tracked side by side
+    overlap: Annotated[int, Field(ge=1)] = 30  # frames that neighbours both track
+    start: Any = None  # a component `stage`: starts the later parts; null: the one that starts the first
+    join: Any = "join"  # a component `stage`
+
+
 class PipelineFile(Strict):
     """What a pipeline file may say at its top level, besides `extends: FILE` and `change: {PATH: value}`."""
 
@@ -41,6 +50,7 @@ class PipelineFile(Strict):
     body: Any = "scanned"  # a component `body`
     garment: Any = None  # a component `garment`
     frames: Frames = Frames()
+    parts: PartsFile = PartsFile()
     scale: Annotated[float, Field(gt=0, le=1)] = 1.0  # of the images
     stages: dict[str, Any]  # label: component `stage`, in their order
 
@@ -53,6 +63,17 @@ class NamedStage:
     stage: Stage
     wiring: Mapping[str, str]
     where: str
+    part: range | None = None  # the frames it is for; None: those of the run
+
+
+@dataclass(frozen=True)
+class Parts:
+    """How a recording is tracked in parts."""
+
+    count: int = 1
+    overlap: int = 1  # frames
+    start: Stage | None = None
+    join: Stage | None = None
 
 
 @dataclass(frozen=True)
@@ -70,6 +91,7 @@ class Pipeline:
     stop: int | None = None
     step: int = 1
     scale: float = 1.0  # of the images
+    parts: Parts = Parts()
 
 
 def load_pipeline(
@@ -115,6 +137,7 @@ def load_pipeline(
         stop=part.stop,
         step=part.step,
         scale=said.scale,
+        parts=_parts(said.parts, resolver),
     )
 
 
@@ -136,6 +159,14 @@ def _recording(said: PipelineFile, resolver: Resolver) -> Path:
 
 def _frames(part: slice) -> Frames:
     return Frames(start=part.start or 0, stop=part.stop, step=part.step or 1)
+
+
+def _parts(said: PartsFile, resolver: Resolver) -> Parts:
+    if said.count == 1:
+        return Parts()
+    start = None if said.start is None else resolver.component("stage", said.start, ("parts", "start"))
+    join = resolver.component("stage", said.join, ("parts", "join"))
+    return Parts(count=said.count, overlap=said.overlap, start=start, join=join)
 
 
 def _stage(label: str, value: Any, resolver: Resolver) -> NamedStage:

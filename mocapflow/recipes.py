@@ -12,10 +12,11 @@ from mocapflow.components import Component
 from mocapflow.data import Start
 from mocapflow.digests import Digests, digest_array
 from mocapflow.keys import FORMAT, Recipe, component_recipe, key_of
+from mocapflow.parts import in_parts
 from mocapflow.pipeline import NamedStage, Pipeline
 from mocapflow.recording import Recording, open_recording
 from mocapflow.results import Evaluation, Files
-from mocapflow.wiring import body_source, makes, rig_source, wire
+from mocapflow.wiring import Source, body_source, makes, rig_source, wire
 
 SEEN = {Start: "first", Background: "all", Rig: "all", Body: "all", Recording: "all"}  # of a stage that says none
 
@@ -25,7 +26,7 @@ class Step:
     """One stage, ready to be looked up in the store or run."""
 
     named: NamedStage
-    sources: Mapping[str, str | None]  # parameter -> label of a stage, or who supplies it
+    sources: Mapping[str, Source]  # parameter -> label of a stage, or who supplies it
     body: str | None  # the stage whose Body replaces the pipeline's
     rig: str | None  # the stage whose Rig replaces the recording's cameras
     recording: Recording  # as this stage sees it
@@ -63,19 +64,19 @@ def steps_of(pipeline: Pipeline, digests: Digests) -> list[Step]:
     recording = open_recording(
         pipeline.recording, start=pipeline.start, stop=pipeline.stop, step=pipeline.step, scale=pipeline.scale
     )
+    pipeline = in_parts(pipeline, recording.indices)
     wiring, steps, core = wire(pipeline), dict[str, Step](), digests.core()
     for named in pipeline.stages:
         sources = wiring[named.label]
         body, rig = body_source(pipeline, named.label), rig_source(pipeline, named.label)
         chain = "checkpoint" in sources.values()
-        part = replace(recording, indices=_extent(named, recording))
+        whole = recording if named.part is None else replace(recording, indices=named.part)
+        part = replace(whole, indices=_extent(named, whole))
         recipe: dict[str, Any] = {
             "format": FORMAT,
             "core": core,
             "component": component_recipe(named.stage, pipeline.registry, digests),
-            "inputs": {
-                name: _input(steps[label], chain) if label in steps else None for name, label in sources.items()
-            },
+            "inputs": {name: _inputs(steps, source, chain) for name, source in sources.items()},
         }
         changed = [label for label, step in steps.items() if step.passes_frames]
         if {"recording", *changed} & set(sources.values()):
@@ -97,6 +98,12 @@ def _extent(named: NamedStage, recording: Recording) -> range:
 def _makes(named: NamedStage, wanted: type | UnionType) -> bool:
     made = makes(named.stage)
     return isinstance(made, type) and issubclass(made, wanted)
+
+
+def _inputs(steps: Mapping[str, Step], source: Source, of_chain: bool) -> Any:
+    if isinstance(source, tuple):
+        return [_input(steps[label], of_chain) for label in source]
+    return _input(steps[source], of_chain) if source is not None and source in steps else None
 
 
 def _input(step: Step, of_chain: bool = False) -> dict[str, Any]:

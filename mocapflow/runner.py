@@ -13,7 +13,7 @@ from mocapflow.keys import explain
 from mocapflow.pipeline import Pipeline
 from mocapflow.recipes import Step, steps_of
 from mocapflow.store import Report, Store
-from mocapflow.wiring import SUPPLIED
+from mocapflow.wiring import SUPPLIED, Source
 
 
 @dataclass(frozen=True)
@@ -24,12 +24,12 @@ class PlanLine:
     action: str  # hit, resume or run
     key: str
     why: str
-    sources: Mapping[str, str | None]  # parameter -> the stage it comes from
+    sources: Mapping[str, Source]  # parameter -> the stage it comes from
 
     def __str__(self) -> str:
         supplied = set(SUPPLIED.values())
         wiring = ", ".join(
-            f"{name} ← {source or 'nothing'}"
+            f"{name} ← {' '.join(source) if isinstance(source, tuple) else source or 'nothing'}"
             for name, source in self.sources.items()
             if source not in supplied and source != name
         )
@@ -59,8 +59,19 @@ def plan(pipeline: Pipeline, *, store: Path) -> list[PlanLine]:
     return lines
 
 
+def tracks(pipeline: Pipeline, *, store: Path) -> list[str]:
+    """Return the labels of the stages that go on frame by frame; none needs another's result."""
+    return [step.label for step in steps_of(pipeline, Store(store).digests) if step.chain]
+
+
 def run(
-    pipeline: Pipeline, *, store: Path, out: Path, fresh: bool = False, report: Report = lambda line: None
+    pipeline: Pipeline,
+    *,
+    store: Path,
+    out: Path,
+    fresh: bool = False,
+    only: str | None = None,
+    report: Report = lambda line: None,
 ) -> RunSummary:
     """Run a pipeline and return what was done.
 
@@ -69,6 +80,7 @@ def run(
         store: the folder of cached results.
         out: the run folder.
         fresh: compute everything anew.
+        only: the label of one stage: make that and what it needs.
         report: told lines of progress.
 
     Raises:
@@ -87,7 +99,8 @@ def run(
         raise StoreError(f"can't write the run folder: {error.strerror}", where=str(out), hint=hint) from error
     execution = Execution(pipeline, kept, out, steps, fresh=fresh, report=report)
     for step in steps:
-        execution.finish(step)
+        if only is None or step.label == only:
+            execution.finish(step)
     return RunSummary(out=out, store=store, stages=tuple(execution.entries.values()))
 
 

@@ -15,12 +15,15 @@ from mocapflow.pipeline import NamedStage, Pipeline
 SUPPLIED = {"Scene": "scene", "Recording": "recording", "Checkpoint": "checkpoint", "RunFolder": "run folder"}
 
 
-def wire(pipeline: Pipeline) -> dict[str, dict[str, str | None]]:
+Source = str | tuple[str, ...] | None
+
+
+def wire(pipeline: Pipeline) -> dict[str, dict[str, Source]]:
     """Return, for each stage, where each parameter of its `run` comes from.
 
-    A source is the label of an earlier stage, `scene`, `recording`, `checkpoint` or `run folder` (supplied by the
-    runner where no earlier stage makes one), or None for an optional input that nobody makes. See also `body_source`
-    and `rig_source`.
+    A source is the label of an earlier stage (a tuple of all that make the type, where `run` takes a tuple), `scene`,
+    `recording`, `checkpoint` or `run folder` (supplied by the runner where no earlier stage makes one), or None for an
+    optional input that nobody makes. See also `body_source` and `rig_source`.
 
     Raises:
         PipelineError: no earlier stage makes what a stage needs, or `from` names a wrong one.
@@ -48,7 +51,7 @@ def _before(pipeline: Pipeline, label: str) -> Sequence[NamedStage]:
     return pipeline.stages[: labels.index(label)]
 
 
-def _wire_stage(named: NamedStage, earlier: Sequence[NamedStage]) -> dict[str, str | None]:
+def _wire_stage(named: NamedStage, earlier: Sequence[NamedStage]) -> dict[str, Source]:
     if named.label in SUPPLIED.values():
         raise PipelineError(f"no stage can be called '{named.label}': inputs have that name", where=named.where)
     hints = {name: hint for name, hint in _told(named, _hints, named.stage).items() if name != "return"}
@@ -59,8 +62,11 @@ def _wire_stage(named: NamedStage, earlier: Sequence[NamedStage]) -> dict[str, s
     return {name: _source(named, name, hint, earlier) for name, hint in hints.items()}
 
 
-def _source(named: NamedStage, parameter: str, hint: Any, earlier: Sequence[NamedStage]) -> str | None:
+def _source(named: NamedStage, parameter: str, hint: Any, earlier: Sequence[NamedStage]) -> Source:
+    if get_origin(hint) is tuple:
+        return tuple(other.label for other in earlier if _fits(_told(other, makes, other.stage), get_args(hint)[0]))
     wanted, optional = _without_none(hint)
+    earlier = [other for other in earlier if other.part in {None, named.part}]
     if parameter in named.wiring:
         return _chosen(named, parameter, wanted, earlier)
     supplied = SUPPLIED.get(wanted.__name__) if wanted.__module__.startswith("mocapflow.") else None

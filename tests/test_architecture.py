@@ -56,6 +56,7 @@ LAYERS = (  # a module imports only from its own layer or an earlier one; `io` a
     "pipeline",
     "experiment",
     "wiring",
+    "parts",
     "recipes",
     "blame",
     "progress",

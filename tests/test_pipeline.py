@@ -133,8 +133,8 @@ def test_a_plugin_file_named_by_the_pipeline(folder):
         ("recording: clip\n", "",
          "skirt.yaml:1:1  no recording: write `recording: DIR`, or give --recording DIR"),
         ("recording: clip", "recording: clip\nspeed: 3",
-         "skirt.yaml:2:1  speed: unknown setting of a pipeline (body, frames, garment, mocapflow, plugins, recording, "
-         "scale, stages)"),
+         "skirt.yaml:2:1  speed: unknown setting of a pipeline (body, frames, garment, mocapflow, parts, plugins, "
+         "recording, scale, stages)"),
         ("recording: clip", "recording: clip\nframes: {start: 9, stop: 2}",
          "skirt.yaml:2:1  frames: 9:2 holds no frame"),
     ],

@@ -33,6 +33,15 @@ class Invocation:
         frames = parse_frames(self.frames)
         return load_pipeline(Path(self.pipeline), recording=recording, changes=self.changes, frames=frames)
 
+    def absolute(self) -> Invocation:
+        """Return the same for any working directory."""
+        return replace(
+            self,
+            pipeline=str(Path(self.pipeline).absolute()),
+            recording=self.recording and str(Path(self.recording).absolute()),
+            store=str(Path(self.store).absolute()),
+        )
+
     def changed(self, *changes: str) -> Invocation:
         """Return the same with more changes on top."""
         return replace(self, changes=(*self.changes, *changes))
@@ -40,15 +49,9 @@ class Invocation:
 
 def remember(invocation: Invocation, out: Path) -> None:
     """Write an invocation into its run folder."""
-    absolute = replace(
-        invocation,
-        pipeline=str(Path(invocation.pipeline).absolute()),
-        recording=invocation.recording and str(Path(invocation.recording).absolute()),
-        store=str(Path(invocation.store).absolute()),
-    )
     try:
         out.mkdir(parents=True, exist_ok=True)
-        (out / FILE).write_text(json.dumps(asdict(absolute), indent=1) + "\n", encoding="utf-8")
+        (out / FILE).write_text(json.dumps(asdict(invocation.absolute()), indent=1) + "\n", encoding="utf-8")
     except OSError as error:
         hint = "name another with --out"
         raise StoreError(f"can't write the run folder: {error.strerror}", where=str(out), hint=hint) from None

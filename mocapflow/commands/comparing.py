@@ -58,12 +58,12 @@ def place(folder: Path, cell: Cell) -> Path:
 def invocation(cell: Cell, store: Path) -> Invocation:
     """Return a cell as the command that runs it."""
     return Invocation(
-        pipeline=str(cell.pipeline.absolute()),
-        recording=str(cell.recording.absolute()),
+        pipeline=str(cell.pipeline),
+        recording=str(cell.recording),
         changes=cell.changes,
         frames=cell.frames,
-        store=str(store.absolute()),
-    )
+        store=str(store),
+    ).absolute()
 
 
 def finish(invocation: Invocation, out: Path) -> str:

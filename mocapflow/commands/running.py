@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,6 +10,8 @@ import typer
 
 from mocapflow.commands.again import Invocation, recall, remember
 from mocapflow.commands.progress import last_word, noted, reporter
+from mocapflow.commands.workers import Scheduler, Workers, finished
+from mocapflow.errors import PipelineError
 
 if TYPE_CHECKING:
     from mocapflow.runner import RunSummary
@@ -19,6 +22,7 @@ Out = Annotated[Path | None, typer.Option(help="The run folder.  [default: runs/
 Store = Annotated[Path | None, typer.Option(help="Cached results.  [default: store.zarr beside the run folder]")]
 Set = Annotated[list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Change a value; repeatable.")]
 Frames = Annotated[str | None, typer.Option(metavar="A:B", help="Only frames A up to, without, B.")]
+Parts = Annotated[int | None, typer.Option(min=1, metavar="N", help="Track in N parts, and join them.")]
 Fresh = Annotated[bool, typer.Option("--fresh", help="Compute everything anew.")]
 
 
@@ -29,11 +33,21 @@ def run(
     store: Store = None,
     changes: Set = None,
     frames: Frames = None,
+    parts: Parts = None,
+    workers: Workers = 1,
+    scheduler: Scheduler = None,
     fresh: Fresh = False,
 ) -> None:
-    """Run a pipeline; what is already in the store is not computed again."""
+    """Run a pipeline; what is already in the store is not computed again.
+
+    With several workers the parts of a long recording are tracked side by side.
+    """
     folder = _out(pipeline, out)
-    typer.echo(execute(_invocation(pipeline, recording, folder, store, changes, frames), folder, fresh))
+    split = [f"parts.count={parts}"] if parts else []
+    invocation = _invocation(pipeline, recording, folder, store, [*(changes or []), *split], frames)
+    if scheduler is not None or workers > 1:
+        side_by_side(invocation, folder, workers, scheduler, fresh)
+    typer.echo(execute(invocation, folder, fresh))
 
 
 def plan(
@@ -62,6 +76,32 @@ def demo(out: Annotated[Path, typer.Option(help="The run folder.")] = Path("runs
     execute(_invocation(shipped("pipelines", "demo.yaml"), None, out, None, None, None), out, fresh=False)
     typer.echo(f"overlay videos  {out / 'overlay'}")
     typer.echo(f"joint angles    {out / 'results' / 'angles.csv'}")
+
+
+def side_by_side(invocation: Invocation, out: Path, workers: int, scheduler: str | None, fresh: bool) -> None:
+    """Make the parts of a track on workers; a run finds them in the store.
+
+    Raises:
+        PipelineError: there are no parts, or all is to be made anew.
+    """
+    if fresh:
+        raise PipelineError("--fresh does not go with several workers", hint="name a new store with --store")
+    from mocapflow import runner
+
+    labels = runner.tracks(invocation.load(), store=Path(invocation.store))
+    if len(labels) < 2:
+        raise PipelineError("there is nothing for several workers to do", hint="--parts N tracks in N parts")
+    remember(invocation, out)
+    tasks = {label: partial(track, invocation.absolute(), out.absolute(), label) for label in labels}
+    for number, (label, _) in enumerate(finished(tasks, workers, scheduler), 1):
+        typer.echo(f"{number} of {len(labels)}  {label}", err=True)
+
+
+def track(invocation: Invocation, out: Path, label: str) -> None:
+    """Make one stage and what it needs."""
+    from mocapflow import runner
+
+    runner.run(invocation.load(), store=Path(invocation.store), out=out, only=label, report=reporter())
 
 
 def execute(invocation: Invocation, out: Path, fresh: bool) -> RunSummary:

@@ -17,6 +17,7 @@ def mocapflow_stages() -> list[type[Stage]]:
     from mocapflow_sequence.export import Export
     from mocapflow_sequence.fit_subject import FitSubject
     from mocapflow_sequence.flow import FollowPoints
+    from mocapflow_sequence.join import Join
     from mocapflow_sequence.overlay import Overlay
     from mocapflow_sequence.report import Report
     from mocapflow_sequence.smooth import Smooth
@@ -35,6 +36,7 @@ def mocapflow_stages() -> list[type[Stage]]:
         FollowPoints,
         Evaluate,
         Export,
+        Join,
         Overlay,
         Report,
         Smooth,

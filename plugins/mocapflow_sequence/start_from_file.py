@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, ClassVar
@@ -19,6 +20,7 @@ from mocapflow.recording import Recording
 from mocapflow.records import F64
 from mocapflow.scene import Scene
 
+LOG = logging.getLogger("mocapflow")
 FORM = (
     'expected {"root_rotation": [3], "root_translation": [3] (m, the root joint in the world), '
     '"joint_rotations": {name: [3]}}, rotation vectors in radians, relative to the parent'
@@ -26,14 +28,18 @@ FORM = (
 
 
 class StartFromFile(Stage):
-    """Reads the pose of the first frame from `init.json` of the recording."""
+    """Reads the pose of the first frame from `init.json` of the recording.
+
+    A run or a part of one that begins at frame 1200 reads `init_001200.json`, if there is one.
+    """
 
     name: ClassVar[str] = "start_from_file"
     file: str = "init.json"  # from the folder of the recording
 
     def inputs(self, recording: Path) -> Sequence[Path]:
         """Return the files that are read: their content is part of the cache key."""
-        return [recording / self.file]
+        path = recording / self.file
+        return [path, *sorted(recording.glob(f"{path.stem}_*{path.suffix}"))]
 
     def run(self, recording: Recording, scene: Scene) -> Start:
         """Return the pose in the file; the cloth starts without forces.
@@ -41,7 +47,12 @@ class StartFromFile(Stage):
         Raises:
             RecordingError: the file is missing or malformed, or names a joint the body lacks.
         """
-        path = recording.folder / self.file
+        first, path = recording.indices[0], recording.folder / self.file
+        own = path.with_name(f"{path.stem}_{first:06}{path.suffix}")
+        if own.is_file():
+            path = own
+        elif first:
+            LOG.warning("%s is taken for the pose of frame %d; %s would come before it", path.name, first, own.name)
         if not path.is_file():
             there = ", ".join(sorted(p.name for p in recording.folder.iterdir()))
             hint = f"the recording has: {there}\nwithout a start pose, use the stage start_from_keypoints"

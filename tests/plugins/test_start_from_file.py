@@ -95,3 +95,18 @@ def test_missing_file(recording, scene):
     (recording / "init.json").unlink()
     with pytest.raises(RecordingError, match="the recording has: .*cameras.toml(.|\n)*start_from_keypoints"):
         StartFromFile().run(open_recording(recording), scene)
+
+
+def test_a_later_part_has_a_file_of_its_own(recording, scene, caplog):
+    later = open_recording(recording, start=12)
+    assert StartFromFile().run(later, scene).pose.root[0, 3] == pytest.approx(
+        StartFromFile().run(open_recording(recording), scene).pose.root[0, 3]
+    )
+    assert caplog.messages == ["init.json is taken for the pose of frame 12; init_000012.json would come before it"]
+    content = json.loads((recording / "init.json").read_text())
+    content["root_translation"][0] += 0.25
+    (recording / "init_000012.json").write_text(json.dumps(content))
+    whole = open_recording(recording)
+    moved = StartFromFile().run(later, scene).pose.root - StartFromFile().run(whole, scene).pose.root
+    assert moved[0, 3] == pytest.approx(0.25)
+    assert recording / "init_000012.json" in StartFromFile().inputs(recording)

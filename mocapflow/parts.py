@@ -1,0 +1,59 @@
+"""A long recording tracked in parts: each from a start of its own, some frames shared with its neighbours, and joined.
+
+The stages of a part have the label of the whole's with their number: `start_2`, `track_2`. Other stages see only what
+the parts are joined to, which has the label of the whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from mocapflow.data import Start
+from mocapflow.errors import PipelineError
+from mocapflow.pipeline import NamedStage, Pipeline
+from mocapflow.wiring import makes, wire
+
+
+def in_parts(pipeline: Pipeline, indices: range) -> Pipeline:
+    """Return a pipeline whose tracks are made in as many parts as it wants.
+
+    Raises:
+        PipelineError: the parts would be shorter than what they share.
+    """
+    if pipeline.parts.count == 1:
+        return pipeline
+    stages = [part for named in pipeline.stages for part in _parts(named, pipeline, indices)]
+    return replace(pipeline, stages=tuple(stages))
+
+
+def split(indices: range, count: int, overlap: int) -> list[range]:
+    """Return the frames of each part; all but the first begin `overlap` frames before the one before them ends.
+
+    Raises:
+        PipelineError: the parts would be shorter than what they share.
+    """
+    ends = [round(len(indices) * part / count) for part in range(count + 1)]
+    pairs = list(zip(ends, ends[1:], strict=False))
+    if min(b - a for a, b in pairs) <= overlap:
+        hint = "set a smaller parts.count or parts.overlap"
+        raise PipelineError(f"{len(indices)} frames are too few for {count} parts that share {overlap}", hint=hint)
+    return [indices[max(a - overlap, 0) : b] for a, b in pairs]
+
+
+def _parts(named: NamedStage, pipeline: Pipeline, indices: range) -> Iterator[NamedStage]:
+    """Yield what a stage becomes: itself, or if it goes on frame by frame, its parts and their join."""
+    sources = set(wire(pipeline)[named.label].values())
+    if "checkpoint" not in sources:
+        yield named
+        return
+    start = next((other for other in pipeline.stages if other.label in sources and makes(other.stage) is Start), None)
+    for number, part in enumerate(split(indices, pipeline.parts.count, pipeline.parts.overlap), 1):
+        wiring = named.wiring
+        if start is not None and number > 1:
+            label = f"{start.label}_{number}"
+            wiring = {name: label if source == start.label else source for name, source in wiring.items()}
+            yield replace(start, label=label, stage=pipeline.parts.start or start.stage, part=part)
+        yield replace(named, label=f"{named.label}_{number}", wiring=wiring, part=part)
+    assert pipeline.parts.join is not None
+    yield NamedStage(named.label, pipeline.parts.join, {}, named.where)

@@ -1,0 +1,100 @@
+"""Stage `join`: the parts of a track as one."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from mocapflow.components import Stage
+from mocapflow.data import PoseBatch
+from mocapflow.errors import PipelineError
+from mocapflow.geometry import kinematics
+from mocapflow.records import F64, I32, Bool, array_fields
+from mocapflow.results import Track
+from mocapflow.scene import Scene
+from mocapflow_sequence.runjson import FRAME
+
+LOG = logging.getLogger("mocapflow")
+
+
+class Join(Stage):
+    """Goes over from each part to the next at the frame in which they agree best.
+
+    How far apart they are there, and in all frames that both have, is noted at that frame: the mean distance of
+    their joint centres. Nothing is blended: every frame stays one that the loop came to.
+    """
+
+    name: ClassVar[str] = "join"
+    tolerance_mm: Annotated[float, Field(gt=0)] = 20.0  # parts further apart where they are joined: a warning
+
+    def run(self, parts: tuple[Track, ...], scene: Scene) -> Track:
+        """Return the joined track.
+
+        Raises:
+            PipelineError: two parts have no frame in common.
+        """
+        joined = parts[0]
+        for later in parts[1:]:
+            common, apart = disagreement(joined, later, scene)
+            best = int(np.argmin(apart))
+            seam = int(common[best])
+            note = self._note(seam, 1000 * apart, best)
+            before, after = cut(joined, joined.frame < seam), cut(later, later.frame >= seam)
+            joined = together(before, replace(after, notes=(note, *after.notes)))
+        return joined
+
+    def _note(self, seam: int, apart_mm: F64, best: int) -> str:
+        far = apart_mm[best] > self.tolerance_mm
+        said = (
+            f"frame {seam}: parts {'that disagree are ' if far else ''}joined, {apart_mm[best]:.1f} mm apart; in the "
+            f"{len(apart_mm)} frames of both {np.median(apart_mm):.1f} mm in the median, {apart_mm.max():.1f} at most"
+        )
+        if far:
+            LOG.warning(said)
+        return said
+
+
+def disagreement(one: Track, other: Track, scene: Scene) -> tuple[I32, F64]:
+    """Return the frames (K,) that two tracks share and how far apart they are (K,) m: the mean over joint centres.
+
+    Raises:
+        PipelineError: they share none.
+    """
+    common = np.intersect1d(one.frame, other.frame)
+    if not len(common):
+        hint = "parts that are joined need frames in common: parts.overlap says how many"
+        raise PipelineError(f"frames {one.frame[-1]} and {other.frame[0]} have nothing between them", hint=hint)
+    places = [_places(cut(track, np.isin(track.frame, common)), scene) for track in (one, other)]
+    return common.astype(np.int32), np.linalg.norm(places[0] - places[1], axis=2).mean(axis=1)
+
+
+def cut(track: Track, rows: Bool) -> Track:
+    """Return some rows (T,) of a track, with the notes on them."""
+    kept = set(track.frame[rows].tolist())
+    notes = tuple(note for note in track.notes if (m := FRAME.match(note)) and int(m[1]) in kept)
+    values: dict[str, Any] = {name: getattr(track, name)[rows] for name in _by_frame(track)}
+    return replace(track, notes=notes, **values)
+
+
+def together(first: Track, second: Track) -> Track:
+    """Return two tracks one after the other."""
+    both: dict[str, Any] = {
+        name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in _by_frame(first)
+    }
+    return replace(first, notes=first.notes + second.notes, **both)
+
+
+def _by_frame(track: Track) -> list[str]:
+    """Return the names of the arrays with a row per frame."""
+    declared = array_fields(Track).items()
+    return [name for name, field in declared if field.axes[0] == "T" and getattr(track, name) is not None]
+
+
+def _places(track: Track, scene: Scene) -> F64:
+    """Return the joint centres: (T, J, 3) m."""
+    poses = PoseBatch(root=track.root, angles=track.angles)
+    return kinematics.joint_positions(scene.body, kinematics.chain_batch(scene.body, poses))

@@ -1,0 +1,85 @@
+"""A long recording in parts: which frames each has, how they are wired, what is kept and what is made."""
+
+import numpy as np
+import pytest
+
+from mocapflow.errors import PipelineError
+from mocapflow.parts import in_parts, split
+from mocapflow.runner import plan, run, tracks
+from mocapflow.wiring import wire
+from tests.fixtures.stores import actions, load, run_tiny, write_pipeline, write_recording
+
+IN_TWO = ("parts.count=2", "parts.overlap=3")
+
+
+@pytest.fixture
+def path(tmp_path):
+    return write_pipeline(tmp_path, write_recording(tmp_path / "clip", frames=20))
+
+
+def test_parts_cover_the_recording_and_share_frames():
+    parts = split(range(10, 1010, 2), 4, 30)
+    assert parts == [range(10, 260, 2), range(200, 510, 2), range(450, 760, 2), range(700, 1010, 2)]
+    assert split(range(7), 2, 2) == [range(4), range(2, 7)]
+    with pytest.raises(PipelineError, match="100 frames are too few for 4 parts that share 25"):
+        split(range(100), 4, 25)
+
+
+def test_a_part_has_its_own_start_and_others_see_the_whole(path):
+    pipeline = in_parts(load(path, *IN_TWO), range(20))
+    assert [named.label for named in pipeline.stages] == [
+        "background", "start", "track_1", "start_2", "track_2", "track", "smooth", "export",
+    ]  # fmt: skip
+    wiring = wire(pipeline)
+    assert wiring["track_1"]["start"] == "start"
+    assert wiring["track_2"]["start"] == "start_2"
+    assert wiring["track_2"]["background"] == "background"
+    assert wiring["track"] == {"parts": ("track_1", "track_2"), "scene": "scene"}
+    assert wiring["smooth"]["track"] == "track"
+
+
+def test_another_stage_starts_the_later_parts(path):
+    pipeline = in_parts(load(path, *IN_TWO, "parts.start={use: tiny_start, angle_rad: 1.0}"), range(20))
+    assert [named.stage.angle_rad for named in pipeline.stages if named.label.startswith("start")] == [0.0, 1.0]
+
+
+def test_one_part_is_the_whole(path):
+    pipeline = load(path, "parts.count=1", "parts.overlap=50")
+    assert in_parts(pipeline, range(20)) is pipeline
+
+
+def test_parts_are_made_resumed_and_joined(tmp_path, path):
+    store = tmp_path / "store.zarr"
+    whole, _ = run_tiny(path, tmp_path, frames=13)  # the first part of the whole: its frames serve both
+    pipeline = load(path, *IN_TWO)
+    assert tracks(pipeline, store=store) == ["track_1", "track_2"]
+    assert {line.label: line.action for line in plan(pipeline, store=store)}["track_1"] == "hit"
+    only = run(pipeline, store=store, out=tmp_path / "out", only="track_2")
+    assert actions(only) == {"background": "hit", "start_2": "run", "track_2": "run"}
+    summary, _ = run_tiny(path, tmp_path, *IN_TWO)
+    assert actions(summary) == {
+        "background": "hit", "start": "hit", "track_1": "hit", "start_2": "hit", "track_2": "hit",
+        "track": "run", "smooth": "run", "export": "run",
+    }  # fmt: skip
+    again, _ = run_tiny(path, tmp_path, *IN_TWO)
+    assert actions(again)["track"] == "hit"
+    assert "track_1 track_2" in str(next(line for line in plan(pipeline, store=store) if line.label == "track"))
+
+
+def test_frames_of_a_part_are_those_of_its_own_track(tmp_path, path):
+    pipeline = load(path, *IN_TWO)
+    run(pipeline, store=tmp_path / "store.zarr", out=tmp_path / "out")
+    from mocapflow.store import Store
+
+    store = Store(tmp_path / "store.zarr")
+    found = {
+        a.path.name.rpartition("-")[0]: store.load(a) for a in store.artifacts() if a.path.name.startswith("track")
+    }
+    joined, first, second = found["track"], found["track_1"], found["track_2"]
+    assert joined.frame.tolist() == list(range(20))
+    assert (first.frame.tolist(), second.frame.tolist()) == (list(range(10)), list(range(7, 20)))
+    (note,) = [note for note in joined.notes if "joined" in note]
+    seam = int(note.split()[1].rstrip(":"))
+    assert 7 <= seam <= 9
+    np.testing.assert_array_equal(joined.angles[:seam], first.angles[:seam])
+    np.testing.assert_array_equal(joined.angles[seam:], second.angles[seam - 7 :])
