@@ -15,6 +15,7 @@ SLACK = 0.03  # of a sample: times in files are rounded
 GAP = 1.5  # samples; across a longer one nothing is interpolated
 STILL = 0.5  # deg, standard deviation; what moves less tells no time
 LEAST = 0.5  # of our frames must have a counterpart at every shift that is tried
+LIKE = 0.5  # mean correlation below which two systems show no common lag
 FLIP = 0.1  # by how much the correlation must gain for a curve to be taken as counted the other way
 
 
@@ -63,6 +64,8 @@ def align(columns: Mapping[str, F64], reference: Reference, longest_lag_s: float
     total = np.where(flipped, -table - FLIP, np.where(known, table, 0.0)).sum(axis=1)
     score = np.where(known.any(axis=1), total / np.maximum(1, known.sum(axis=1)), -np.inf)
     best = int(np.argmax(score))
+    if score[best] < LIKE:
+        return Alignment(np.nan, dict.fromkeys(names, 1))
     signs = {name: -1 if each else 1 for name, each in zip(names, flipped[best], strict=True)}
     return Alignment(_summit(score, shifts, best), signs)
 

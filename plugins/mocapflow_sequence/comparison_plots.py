@@ -11,7 +11,7 @@ import numpy as np
 from mocapflow.records import F64
 from mocapflow_sequence import compare, cycles, layout
 from mocapflow_sequence.cycles import PERCENT, Cycle
-from mocapflow_sequence.panels import OURS, TRUTH, legend, panels, save
+from mocapflow_sequence.panels import OURS, TRUTH, legend, panels, save, title
 from mocapflow_sequence.stick import Stick
 
 MOMENTS = 6  # in which the stick models are drawn
@@ -20,14 +20,13 @@ MOMENTS = 6  # in which the stick models are drawn
 def draw(ours: Mapping[str, F64], reference: Mapping[str, F64], strides: Sequence[Cycle], folder: Path) -> list[Path]:
     """Draw agreement, and strides where there are some, into a run folder and return the files."""
     names = cycles.shared(ours, reference)
-    walked = [name for name in names if len(_common_strides(strides, ours[name], reference[name], name)[0])]
-    paths = [layout.place(folder, part) for part in (layout.AGREEMENT_PLOT, layout.CYCLES_PLOT)]
-    for path in paths:
+    both = {name: _common_strides(strides, ours[name], reference[name], name) for name in names}
+    walked = {name: pair for name, pair in both.items() if len(pair["mocapflow"])}
+    agreement, cycle = (layout.place(folder, part) for part in (layout.AGREEMENT_PLOT, layout.CYCLES_PLOT))
+    for path in (agreement, cycle):
         path.unlink(missing_ok=True)
-    drawn = [draw_agreement(paths[0], {name: (ours[name], reference[name]) for name in names})] if names else []
-    if walked:
-        drawn.append(draw_cycles(paths[1], {n: _common_strides(strides, ours[n], reference[n], n) for n in walked}))
-    return drawn
+    drawn = [draw_agreement(agreement, {name: (ours[name], reference[name]) for name in names})] if names else []
+    return [*drawn, draw_cycles(cycle, walked)] if walked else drawn
 
 
 def draw_agreement(path: Path, pairs: Mapping[str, tuple[F64, F64]]) -> Path:
@@ -42,22 +41,23 @@ def draw_agreement(path: Path, pairs: Mapping[str, tuple[F64, F64]]) -> Path:
             panel.annotate(
                 f"{value:+.1f}", (1, value), xycoords=("axes fraction", "data"), fontsize=8, va="bottom", ha="right"
             )
-        panel.set_title(name, fontsize=10, loc="left")
+        panel.set_title(title(name), fontsize=10, loc="left")
         panel.margins(y=0.15)
     figure.supxlabel("mean of both, deg", fontsize=10)
     figure.supylabel("mocapflow − reference, deg", fontsize=10)
     return save(figure, path)
 
 
-def draw_cycles(path: Path, strides: Mapping[str, tuple[F64, F64]]) -> Path:
-    """Draw every angle over the cycle: strides thin, their mean thick."""
+def draw_cycles(path: Path, strides: Mapping[str, Mapping[str, F64]]) -> Path:
+    """Draw every angle over the cycle, of each system (G, 101): strides thin, their mean thick."""
     figure, every = panels(len(strides), 4, 2.2, sharex=True)
-    for panel, (name, (ours, reference)) in zip(every, strides.items(), strict=True):
-        for curves, colour, label in ((reference, TRUTH, "reference"), (ours, OURS, "mocapflow")):
+    for panel, (name, systems) in zip(every, strides.items(), strict=True):
+        for label, curves in systems.items():
+            colour = TRUTH if label == "reference" else OURS
             panel.plot(PERCENT, curves.T, color=colour, linewidth=0.5, alpha=0.4)
             panel.plot(PERCENT, curves.mean(axis=0), color=colour, linewidth=1.8, label=label)
-        panel.set_title(f"{name}   {len(ours)} strides", fontsize=10, loc="left")
-    legend(figure, every[0])
+            panel.set_title(f"{title(name)}   {len(curves)} strides", fontsize=10, loc="left")
+    legend(figure, every)
     figure.supxlabel("% of the gait cycle, from heel strike to heel strike", fontsize=10)
     figure.supylabel("deg", fontsize=10)
     return save(figure, path)
@@ -79,7 +79,7 @@ def draw_sticks(path: Path, ours: Stick, theirs: Stick) -> Path:
                 _draw_bones(panel, stick, stick.places[row] @ np.stack([axis, [0.0, 0.0, 1.0]], axis=1), colour, label)
         every[column].set_title(f"row {row}", fontsize=9)
     if len(rows):
-        legend(figure, every[0])
+        legend(figure, every)
     return save(figure, path)
 
 
@@ -99,8 +99,8 @@ def _across(stick: Stick, row: int) -> F64:
     return level
 
 
-def _common_strides(strides: Sequence[Cycle], ours: F64, reference: F64, name: str) -> tuple[F64, F64]:
-    """Return the strides (G, 101) that both have."""
+def _common_strides(strides: Sequence[Cycle], ours: F64, reference: F64, name: str) -> dict[str, F64]:
+    """Return the strides (G, 101) that both systems have."""
     a, b = cycles.normalised(strides, ours, name), cycles.normalised(strides, reference, name)
     both = np.isfinite(a + b).all(axis=1)
-    return a[both], b[both]
+    return {"reference": b[both], "mocapflow": a[both]}

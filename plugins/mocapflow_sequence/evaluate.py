@@ -38,7 +38,7 @@ class Evaluate(Stage):
 
     name: ClassVar[str] = "evaluate"
     reference: str = ""  # a file, from the folder of the recording; empty: truth/angles.csv, or the one in reference/
-    longest_lag_s: Annotated[float, Field(gt=0)] = LONGEST_LAG  # s, that is looked for
+    longest_lag_s: Annotated[float, Field(gt=0)] = LONGEST_LAG  # of one system behind the other, that is looked for
 
     def run(self, track: Track, scene: Scene, recording: Recording, run_folder: RunFolder) -> Evaluation:
         """Return the evaluation of the track."""

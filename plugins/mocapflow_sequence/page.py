@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import math
 from collections.abc import Mapping, Sequence
 from html import escape
 from string import Template
@@ -13,11 +14,16 @@ PAGE = Template("""<!doctype html>
 <style>
 body { font: 15px/1.5 system-ui, sans-serif; color: #222; max-width: 1200px; margin: 2rem auto; padding: 0 1rem }
 h1 { font-size: 1.6rem; margin-bottom: 0 } h2 { font-size: 1.15rem; margin-top: 2.2rem }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums } figure { margin: 1rem 0 }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: 14px } figure { margin: 1rem 0 }
 td, th { padding: .25rem .8rem .25rem 0; text-align: right; border-bottom: 1px solid #e5e5e5 }
-td:first-child, th:first-child { text-align: left } th { vertical-align: bottom }
-img { max-width: 100% } figcaption, .quiet { color: #666 }
-pre { background: #f6f6f6; padding: .8rem; overflow-x: auto; font-size: 13px }
+td:first-child, th:first-child { text-align: left; white-space: nowrap } th { vertical-align: bottom; font-weight: 600 }
+img { max-width: 100% } figcaption, .quiet { color: #666 } ul { padding-left: 1.2rem }
+pre { background: #f6f6f6; padding: .8rem; overflow-x: auto; font-size: 12px; line-height: 1.35; white-space: pre-wrap }
+@page { size: A4; margin: 14mm }
+@media print {
+  body { font-size: 10pt; margin: 0; padding: 0 } table { font-size: 8.5pt } pre { font-size: 7pt }
+  figure, tr { break-inside: avoid } h2 { break-after: avoid }
+}
 </style></head><body>
 <h1>$title</h1><p class="quiet">$subtitle</p>
 $sections
@@ -43,7 +49,8 @@ def table(rows: Sequence[Mapping[str, Any]]) -> str:
 def picture(content: bytes, kind: str, caption: str = "") -> str:
     """Return an image held in the page itself; kind is png or jpeg."""
     data = base64.b64encode(content).decode()
-    return f'<figure><img src="data:image/{kind};base64,{data}"><figcaption>{escape(caption)}</figcaption></figure>'
+    image = f'<img src="data:image/{kind};base64,{data}" alt="{escape(caption)}">'
+    return f"<figure>{image}<figcaption>{escape(caption)}</figcaption></figure>"
 
 
 def listing(lines: Sequence[str]) -> str:
@@ -57,4 +64,6 @@ def code(text: str) -> str:
 
 
 def _cell(value: Any) -> str:
-    return f"{value:.2f}" if isinstance(value, float) else str(value)
+    if isinstance(value, float):
+        return f"{value:.2f}" if math.isfinite(value) else "–"
+    return str(value)

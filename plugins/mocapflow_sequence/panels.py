@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 OURS, RAW, TRUTH = "#1f5fbf", "#8fb4e8", "black"
+HELD, LOST = "#888888", "#d62728"
 DOTS_PER_INCH = 110
+SIDES = {"l": "left", "r": "right"}
 
 
 def panels(count: int, columns: int, height: float, width: float = 12.0, **shared: Any) -> tuple[Any, list[Any]]:
@@ -26,13 +29,22 @@ def panels(count: int, columns: int, height: float, width: float = 12.0, **share
     return figure, every[:count]
 
 
-def legend(figure: Any, panel: Any) -> None:
-    """Explain the lines of a panel once, above all."""
-    handles, labels = panel.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper right", ncols=len(labels), frameon=False, fontsize=9)
+def legend(figure: Any, every: Sequence[Any]) -> None:
+    """Explain what is drawn in any panel, once, above all."""
+    pairs = (zip(*panel.get_legend_handles_labels(), strict=True) for panel in every)
+    known = {label: handle for pair in pairs for handle, label in pair}
+    if known:
+        figure.legend(known.values(), known, loc="outside upper right", ncols=len(known), frameon=False, fontsize=9)
 
 
 def save(figure: Any, path: Path) -> Path:
     """Write a figure and return its path."""
     figure.savefig(path, dpi=DOTS_PER_INCH)
     return path
+
+
+def title(angle: str) -> str:
+    """Return the name of an angle in words: knee_flexion_l is knee flexion, left."""
+    name, _, side = angle.rpartition("_")
+    words = name.replace("_", " ")
+    return f"{words}, {SIDES[side]}" if side in SIDES else angle.replace("_", " ")

@@ -1,8 +1,8 @@
-"""Angle curves over time, with the reference where there is one."""
+"""Curves over time: angles, with the reference where there is one, and the overlap of model and image."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +13,7 @@ from mocapflow.results import Evaluation, Track
 from mocapflow_sequence import tables
 from mocapflow_sequence.compare import NINETY
 from mocapflow_sequence.lost import unseen
-
-OURS, RAW, TRUTH, HELD = "#1f5fbf", "#8fb4e8", "black", "#888888"
+from mocapflow_sequence.panels import HELD, LOST, OURS, RAW, TRUTH, legend, panels, save, title
 
 
 def plot_angles(
@@ -23,10 +22,11 @@ def plot_angles(
     raw: Mapping[str, F64],
     reference: Mapping[str, F64],
     evaluation: Evaluation | None,
+    lost: Bool,
 ) -> Path:
     """Write one panel per angle: ours with its 90 % band, unsmoothed thin, the reference black, the RMS in the title.
 
-    Frames in which no image shows the angle are shaded grey.
+    Frames in which no image shows the angle are shaded grey, frames that were lost red.
 
     Args:
         path: the png.
@@ -34,35 +34,28 @@ def plot_angles(
         raw: columns of angles_raw.csv.
         reference: curves (T,) in degrees at our frames, by the same names; may be empty.
         evaluation: where the RMS comes from.
+        lost: (T,), True where a frame was bridged.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     names = tables.angle_names(ours)
-    rows = max(1, -(-len(names) // 2))
-    figure = Figure(figsize=(12, 0.6 + 2.3 * rows), layout="constrained")
-    FigureCanvasAgg(figure)
-    panels = figure.subplots(rows, 2, squeeze=False, sharex=True).ravel()
+    figure, every = panels(len(names), 2, 2.3, sharex=True)
     deviations = {str(row["angle"]): float(row["rms_deg"]) for row in (evaluation.rows if evaluation else ())}
-    for panel, name in zip(panels, names, strict=False):
-        _panel(panel, name, ours, raw, reference)
-        panel.set_title(
-            f"{name}   RMS {deviations[name]:.2f}°" if name in deviations else name, fontsize=10, loc="left"
-        )
-    for panel in panels[len(names) :]:
-        panel.set_axis_off()
-    for panel in panels[max(0, len(names) - 2) : len(names)]:
+    for panel, name in zip(every, names, strict=True):
+        _curves(panel, name, ours, raw, reference)
+        shade(panel, ours["frame"], unseen(ours[f"{name}_observed"]) & ~lost, HELD, "no image shows it")
+        shade(panel, ours["frame"], lost, LOST, "lost, bridged")
+        deviation = f"   RMS {deviations[name]:.2f}°" if name in deviations else ""
+        panel.set_title(title(name) + deviation, fontsize=10, loc="left")
+    for panel in every[-2:]:
         panel.set_xlabel("frame")
         panel.tick_params(labelbottom=True)
-    if names:
-        handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper right", ncols=4, frameon=False, fontsize=9)
-    figure.savefig(path, dpi=110)
-    return path
+    legend(figure, every)
+    return save(figure, path)
 
 
 def plot_overlap(path: Path, track: Track, views: Sequence[str], lost: Bool) -> Path:
-    """Write how much of each view's silhouette the model covers, frame by frame; frames lost are shaded.
+    """Write how much of each view's silhouette the model covers, frame by frame.
+
+    Frames lost are shaded; a cross at the foot says that a view could not be used.
 
     Args:
         path: the png.
@@ -70,32 +63,40 @@ def plot_overlap(path: Path, track: Track, views: Sequence[str], lost: Bool) -> 
         views: names of the cameras.
         lost: (T,), True where a frame was bridged.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(12, 2.6), layout="constrained")
-    FigureCanvasAgg(figure)
-    panel = figure.subplots()
-    for view, overlap in zip(views, track.overlap.T, strict=True):
-        panel.plot(track.frame, overlap, linewidth=1.2, label=view)
-    for frame in track.frame[lost]:
-        panel.axvspan(frame - 0.5, frame + 0.5, color="#d62728", alpha=0.25, linewidth=0)
+    figure, (panel,) = panels(1, 1, 2.2)
+    for number, (view, overlap, usable) in enumerate(zip(views, track.overlap.T, track.usable.T, strict=True)):
+        (line,) = panel.plot(track.frame, overlap, linewidth=1.2, label=view)
+        foot = np.full((~usable).sum(), 0.03 + 0.05 * number)
+        panel.plot(
+            track.frame[~usable], foot, "x", color=line.get_color(), markersize=4, transform=panel.get_xaxis_transform()
+        )
+    shade(panel, track.frame.astype(np.float64), lost, LOST, "lost, bridged")
     panel.set_xlabel("frame")
     panel.set_ylabel("intersection over union")
-    panel.grid(color="0.9", linewidth=0.6)
-    panel.legend(loc="lower left", ncols=len(views), frameon=False, fontsize=9)
-    figure.savefig(path, dpi=110)
-    return path
+    legend(figure, [panel])
+    return save(figure, path)
 
 
-def _panel(
+def shade(panel: Any, frame: F64, where: Bool, colour: str, label: str) -> None:
+    """Shade the runs of frames (T,) where something is True (T,)."""
+    for number, (first, last) in enumerate(runs(where)):
+        panel.axvspan(
+            frame[first] - 0.5, frame[last] + 0.5, color=colour, alpha=0.25, linewidth=0, label="" if number else label
+        )
+
+
+def runs(where: Bool) -> Iterator[tuple[int, int]]:
+    """Yield first and last row of every run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]]).astype(np.int8)))
+    yield from ((int(first), int(after) - 1) for first, after in edges.reshape(-1, 2))
+
+
+def _curves(
     panel: Any, name: str, ours: Mapping[str, F64], raw: Mapping[str, F64], reference: Mapping[str, F64]
 ) -> None:
     frame, value, half = ours["frame"], ours[name], NINETY * ours[f"{name}_sd"]
     shown = np.where(np.isfinite(half), half, 0.0)
     panel.fill_between(frame, value - shown, value + shown, color=OURS, alpha=0.18, linewidth=0, label="90 % interval")
-    for row in np.flatnonzero(unseen(ours[f"{name}_observed"])):
-        panel.axvspan(frame[row] - 0.5, frame[row] + 0.5, color=HELD, alpha=0.25, linewidth=0)
     panel.plot(frame, raw[name], color=RAW, linewidth=0.8, label="unsmoothed")
     if name in reference:
         panel.plot(frame, reference[name], color=TRUTH, linewidth=1.3, label="reference")
@@ -105,6 +106,3 @@ def _panel(
     margin = max(2.0, 0.12 * (high - low))  # the band of a lost frame must not flatten the curves
     panel.set_ylim(low - margin, high + margin)
     panel.set_ylabel("deg")
-    panel.grid(color="0.9", linewidth=0.6)
-    for side in ("top", "right"):
-        panel.spines[side].set_visible(False)

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from html.parser import HTMLParser
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -8,8 +9,9 @@ import pytest
 from mocapflow_sequence import drawing, layout, raster
 from mocapflow_sequence.evaluate import Evaluate
 from mocapflow_sequence.overlay import Overlay, Painter
-from mocapflow_sequence.report import Report, chosen_rows
+from mocapflow_sequence.report import Report
 from mocapflow_sequence.smooth import Smooth
+from mocapflow_sequence.stills import chosen_rows
 from mocapflow_sequence.virtual import Virtual
 from results_scene import DEMO, demo_scene, stepping
 
@@ -112,16 +114,42 @@ def test_nearest_triangle_is_seen_and_a_veil_shines_through() -> None:
 
 def test_report_holds_everything(scene: Scene, track: Track, recording: Recording, tmp_path: Path) -> None:
     run_folder = RunFolder(path=tmp_path, recipe={"pipeline": "<skirt>", "versions": {"numpy": "2"}})
-    noted = Smooth().run(track=replace(track, notes=("frame 2: cam02 black",)))
+    observed = track.observed.copy()
+    observed[2, scene.body.screw_joint == scene.body.joint("hip_r")] = 0.1
+    noted = Smooth().run(track=replace(track, notes=("frame 2: cam02 black",), observed=observed))
     evaluation = Evaluate().run(track=noted, scene=scene, recording=recording, run_folder=run_folder)
     files = Report().run(track=noted, scene=scene, recording=recording, run_folder=run_folder, evaluation=evaluation)
     page = (tmp_path / layout.REPORT).read_text()
     assert set(files.paths) == {tmp_path / part for part in (layout.REPORT, layout.PLOT, layout.OVERLAP)}
-    for text in ("knee_flexion_l", "frame 2: cam02 black", "&lt;skirt&gt;", "best: frame", "worst: frame", "segment"):
+    said = ("knee flexion, left", "frame 2: cam02 black", "&lt;skirt&gt;", "numpy 2", "best: frame", "worst: frame")
+    for text in (*said, "segment", "hip flexion, right: no image shows it in 1 frames"):
         assert text in page
     assert page.count("data:image/jpeg;base64") == 3
-    assert page.count("data:image/png;base64") == 2
-    assert "://" not in page and 'src="/' not in page  # no address: pictures are inside (base64 may spell http)
+    assert page.count("data:image/png;base64") == 3  # angles, overlap, agreement
+
+
+class Links(HTMLParser):
+    """Collects whatever a page would fetch."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.fetched: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag in ("script", "link", "iframe", "object", "embed"):
+            self.fetched.append(tag)
+        self.fetched += [str(value) for name, value in attrs if name in ("src", "href", "srcset", "style", "data")]
+
+
+def test_report_fetches_nothing(scene: Scene, track: Track, recording: Recording, tmp_path: Path) -> None:
+    Report().run(track=track, scene=scene, recording=recording, run_folder=RunFolder(path=tmp_path, recipe={}))
+    page = (tmp_path / layout.REPORT).read_text()
+    links = Links()
+    links.feed(page)
+    assert len(links.fetched) == 5
+    assert all(link.startswith("data:image/") for link in links.fetched)
+    style = page[page.index("<style>") : page.index("</style>")]
+    assert "url(" not in style and "@import" not in style
 
 
 def test_report_without_reference(scene: Scene, track: Track, recording: Recording, tmp_path: Path) -> None:
