@@ -94,6 +94,50 @@ def test_knees_under_cloth_within_three_degrees(whole, clip, side):
     assert np.sqrt(np.mean(error**2)) <= 3.0
 
 
+@pytest.fixture(scope="module")
+def upper_half(home):
+    """The recording of the shorts as cameras see it that look higher: shanks and feet are in no view."""
+    folder, size = home / "upper_half", (320, 200)
+    shutil.copytree(CLIPS["shorts"], folder, ignore=shutil.ignore_patterns("videos", "background"))
+    told = (folder / "cameras.toml").read_text()
+    (folder / "cameras.toml").write_text(told.replace("[320, 400]", str([*size])))
+    (folder / "background").mkdir()
+    for plate in (CLIPS["shorts"] / "background").iterdir():
+        cv2.imwrite(str(folder / "background" / plate.name), cv2.imread(str(plate))[: size[1]])
+    for video in (CLIPS["shorts"] / "videos").iterdir():
+        (folder / "videos" / video.stem).mkdir(parents=True)
+        pictures = cv2.VideoCapture(str(video))
+        for frame in range(8):
+            cv2.imwrite(str(folder / "videos" / video.stem / f"{frame:06d}.png"), pictures.read()[1][: size[1]])
+    return folder
+
+
+@long
+def test_a_leg_out_of_all_views_rests_on_the_prior_and_is_told(home, upper_half):
+    priors = "stages.track.priors=[joint_limits, rest_pose, spine_coupling, smooth_motion, parzen]"
+    out = home / "unseen"
+    call(
+        "run",
+        PIPELINES / "shorts.yaml",
+        "--recording",
+        upper_half,
+        "--set",
+        priors,
+        "--out",
+        out,
+        *NO_PICTURES,
+        cwd=home,
+    )
+    ours, truth = table(out / "results/angles.csv"), table(CLIPS["shorts"] / "truth/angles.csv")
+    for name in ("knee_flexion_l", "ankle_l"):
+        assert (ours[f"{name}_observed"] < 0.1).all()
+        assert np.abs(ours[name] - truth[name][:8]).max() < 10
+    for name in ("elbow_l", "elbow_r"):
+        assert (ours[f"{name}_observed"] > 0.5).all()
+    held = json.loads((out / "run.json").read_text())["frames"]["held_by_priors"]
+    assert held["knee_flexion_l"] == held["ankle_l"] == 8 and "elbow_l" not in held
+
+
 @long
 def test_the_interval_of_ninety_per_cent_holds_the_truth_as_often(whole):
     """Both clips are of the takes that the deviations were calibrated on, and kinder than most: they hold more."""
