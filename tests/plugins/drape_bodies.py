@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+from functools import cache
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from mocapflow_draping.distance import body_distances
 from mocapflow_draping.fields import build_fields
+from mocapflow_draping.kinematic import Kinematic
 from mocapflow_draping.parts import posed_parts
 from mocapflow_draping.swing import swing_batch
+from mocapflow_garments.skirt import Skirt
 
 from mocapflow.assets import Body
 from mocapflow.data import PoseBatch
 from mocapflow.geometry import kinematics, twists
+from mocapflow.scene import Scene
 
 SKIN = 0.004
 VOXEL = 0.005
 FIELDS: WeakKeyDictionary = WeakKeyDictionary()  # bodies do not change
 EYE = np.eye(4)[None, None]
+SKIRT = dict(waist_height_m=1.08, waist_circumference_m=0.92, hem_circumference_m=1.7, length_m=0.6)
+DRAPER = Kinematic(skin_m=SKIN, voxel_m=VOXEL)
 
 
 def rigid(vertices, faces):
@@ -58,6 +64,7 @@ def tube(points, radii, around=48):
     return np.concatenate([vertices, ends]), np.concatenate([sides, *caps])
 
 
+@cache
 def lying_cylinder(radius, half_length=0.15):
     """Return a cylinder along y through the origin."""
     vertices, faces = tube(np.linspace(-half_length, half_length, 13), np.full(13, radius), 180)
@@ -76,6 +83,7 @@ def capsule(top, bottom, radius):
     return tube(height, radii, 32)
 
 
+@cache
 def legs():
     """Return a pelvis with two legs of two capsules each; hips and knees flex. Faces -y, left is +x."""
     joints = ("pelvis", "hip_l", "knee_l", "hip_r", "knee_r")
@@ -98,6 +106,17 @@ def legs():
         limits=np.tile([-0.9, 2.8], (4, 1)), rest_spread=np.full(4, np.inf),
         skin_joint=np.tile(owner[:, None], (1, 5)).astype(np.int32), skin_weight=one.skin_weight, cut=one.cut,
     )  # fmt: skip
+
+
+@cache
+def skirted():
+    """Return a skirt on legs of capsules."""
+    return Scene(cameras=(), body=legs(), garment=Skirt(**SKIRT).sew(legs()))
+
+
+def draper(**settings):
+    """Return a kinematic draper; all of them share what they have measured of a garment."""
+    return DRAPER.model_copy(update=settings)
 
 
 def leg_poses():

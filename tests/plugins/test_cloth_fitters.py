@@ -1,20 +1,19 @@
 """Forces and thickness found again from silhouettes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from drape_bodies import legs
+from drape_bodies import skirted
 from mocapflow_draping import samples
 from mocapflow_draping.kinematic import Kinematic
 from mocapflow_draping.sampled_forces import SampledForces
-from mocapflow_garments.skirt import Skirt
 from mocapflow_twist.gauss_newton import GaussNewton, Task
-from test_draping import SKIRT
 
 from mocapflow.data import Estimate, Frame, Moment, Past, Pose, Segmentation, Silhouette, Turn
 from mocapflow.geometry.misfit import misfit
 from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.model import ClothedModel
-from mocapflow.scene import Scene
 from mocapflow.testing.views import SIZE, tiny_camera
 
 STEP = np.radians(10.0)  # between the amounts that are tried first
@@ -25,10 +24,8 @@ STANDING = Pose(root=np.eye(4), angles=np.zeros(4))
 @pytest.fixture(scope="module")
 def model():
     """A skirt on legs of capsules before four cameras."""
-    body = legs()
     cameras = tuple(tiny_camera(index, 2 * np.pi * (index + 0.3) / 4) for index in range(4))
-    garment = Skirt(**SKIRT, force_orders=(0, 1, 2)).sew(body)
-    return ClothedModel(scene=Scene(cameras=cameras, body=body, garment=garment), draper=Kinematic(sweeps=0))
+    return ClothedModel(scene=replace(skirted(), cameras=cameras), draper=Kinematic(sweeps=0))
 
 
 def parameters(model, **values):

@@ -1,8 +1,9 @@
 """The drape on analytic bodies: T-CL1 to T-CL3, and the distance fields under it."""
 
+import drape_bodies
 import numpy as np
 import pytest
-from drape_bodies import SKIN, VOXEL, box, distances, leg_poses, legs, lying_cylinder, prepared, swing
+from drape_bodies import SKIN, box, distances, draper, leg_poses, lying_cylinder, prepared, swing
 from mocapflow_draping.distance import outwards
 from mocapflow_draping.kinematic import Kinematic
 from mocapflow_draping.literal import settle_batch
@@ -14,8 +15,6 @@ from mocapflow.data import Past, PoseBatch
 from mocapflow.errors import PluginError
 from mocapflow.scene import Scene
 from mocapflow.testing.bodies import tiny_body
-
-SKIRT = dict(waist_height_m=1.08, waist_circumference_m=0.92, hem_circumference_m=1.7, length_m=0.6)
 
 
 def literal(body, grid, fixed, step=2.0, iterations=50, limited=True):
@@ -37,8 +36,7 @@ def strand(count, link, height):
 @pytest.fixture(scope="module")
 def skirted():
     """A skirt on legs of capsules, and four poses."""
-    body = legs()
-    return Scene(cameras=(), body=body, garment=Skirt(**SKIRT).sew(body)), leg_poses()
+    return drape_bodies.skirted(), leg_poses()
 
 
 def test_distances_of_a_box_are_exact():
@@ -127,7 +125,7 @@ def test_a_strand_over_a_cylinder_is_taut(link):
 
 def test_a_skirt_keeps_its_strands_and_stays_outside(skirted):
     scene, poses = skirted
-    draped = Kinematic(sweeps=0, skin_m=SKIN, voxel_m=VOXEL).drape(poses, np.zeros((4, 6)), Past(), scene)
+    draped = draper(sweeps=0).drape(poses, np.zeros((4, 6)), Past(), scene)
     strands = strands_of(scene.garment, scene.body)
     lengths = np.linalg.norm(np.diff(draped[:, strands.vertex], axis=2), axis=-1)
     assert np.abs(lengths / strands.links - 1).max() < 1e-9
@@ -137,39 +135,37 @@ def test_a_skirt_keeps_its_strands_and_stays_outside(skirted):
 
 def test_the_chapters_steps_end_near_the_taut_drape(skirted):
     scene, poses = skirted
-    taut = Kinematic(sweeps=0, skin_m=SKIN).drape(poses, np.zeros((4, 6)), Past(), scene)
-    stepped = Kinematic(sweeps=0, skin_m=SKIN, rule="literal", limited=True)
-    steps = stepped.drape(poses, np.zeros((4, 6)), Past(), scene)
+    taut = draper(sweeps=0).drape(poses, np.zeros((4, 6)), Past(), scene)
+    steps = draper(sweeps=0, rule="literal", limited=True).drape(poses, np.zeros((4, 6)), Past(), scene)
     assert np.linalg.norm(taut - steps, axis=-1)[0].mean() < 0.01
 
 
 def test_a_batch_is_its_drapes_one_by_one(skirted):
     scene, poses = skirted
-    draper = Kinematic()
     parameters = np.random.default_rng(0).uniform(-0.1, 0.1, (4, 6))
-    together = draper.drape(poses, parameters, Past(), scene)
+    together = draper().drape(poses, parameters, Past(), scene)
     for row in range(4):
         one = type(poses)(root=poses.root[row : row + 1].copy(), angles=poses.angles[row : row + 1].copy())
-        np.testing.assert_array_equal(draper.drape(one, parameters[row : row + 1], Past(), scene)[0], together[row])
+        np.testing.assert_array_equal(draper().drape(one, parameters[row : row + 1], Past(), scene)[0], together[row])
 
 
 def test_a_draper_without_a_garment_says_so(skirted):
     scene, poses = skirted
     with pytest.raises(PluginError, match="no garment to drape"):
-        Kinematic().drape(poses, np.zeros((4, 6)), Past(), Scene(cameras=(), body=scene.body))
+        draper().drape(poses, np.zeros((4, 6)), Past(), Scene(cameras=(), body=scene.body))
 
 
 def test_joints_that_it_can_not_touch_do_not_move_the_cloth():
     body = tiny_body()
     measures = dict(waist_height_m=1.05, waist_circumference_m=1.05, hem_circumference_m=1.1, length_m=0.15)
     scene = Scene(cameras=(), body=body, garment=Skirt(**measures).sew(body))
-    draper = Kinematic()
-    touchable = draper.touchable(scene)
+    kinematic = Kinematic()
+    touchable = kinematic.touchable(scene)
     assert touchable[[body.joint("pelvis"), body.joint("hip_l"), body.joint("hip_r")]].all()
     below = np.flatnonzero(~touchable[body.screw_joint])
     assert len(below)
     angles = np.zeros((2, len(body.twists)))
     angles[1, below] = 0.3
     poses = PoseBatch(root=np.tile(np.eye(4), (2, 1, 1)), angles=angles)
-    still, moved = draper.drape(poses, np.zeros((2, 6)), Past(), scene)
+    still, moved = kinematic.drape(poses, np.zeros((2, 6)), Past(), scene)
     np.testing.assert_array_equal(still, moved)

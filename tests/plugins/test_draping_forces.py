@@ -1,18 +1,15 @@
 """Forces and thickness: T-CL6, T-CL7 and what the parameters of a garment mean."""
 
+import drape_bodies
 import numpy as np
 import pytest
-from drape_bodies import SKIN, VOXEL, box, distances, leg_poses, legs, lying_cylinder, prepared, swing
+from drape_bodies import SKIN, box, distances, leg_poses, lying_cylinder, prepared, swing
 from mocapflow_draping.forces import thickness, tilts
 from mocapflow_draping.frames import tilted
-from mocapflow_draping.kinematic import Kinematic
 from mocapflow_draping.literal import blow_batch
-from mocapflow_garments.skirt import Skirt
-from test_draping import SKIRT
 
 from mocapflow.data import Past, PoseBatch
 from mocapflow.errors import PluginError
-from mocapflow.scene import Scene
 
 DOWN = np.array([0.0, 0.0, -1.0])
 
@@ -20,14 +17,13 @@ DOWN = np.array([0.0, 0.0, -1.0])
 @pytest.fixture(scope="module")
 def skirted():
     """A skirt on legs of capsules."""
-    body = legs()
-    return Scene(cameras=(), body=body, garment=Skirt(**SKIRT).sew(body))
+    return drape_bodies.skirted()
 
 
 @pytest.fixture(scope="module")
 def draper():
     """Strands alone, at the contact distance of these tests."""
-    return Kinematic(sweeps=0, skin_m=SKIN, voxel_m=VOXEL)
+    return drape_bodies.draper(sweeps=0)
 
 
 def parameters(garment, **values):
@@ -115,7 +111,7 @@ def test_wind_turns_with_the_person(skirted):
     turn = np.eye(4)
     turn[:2, :2] = [[0, -1], [1, 0]]
     wind = parameters(skirted.garment, wind_cos_rad=0.2)
-    draper = Kinematic()
+    draper = drape_bodies.draper()
     ahead = draper.drape(standing(), wind, Past(), skirted)[0]
     turned = draper.drape(PoseBatch(root=turn[None], angles=np.zeros((1, 4))), wind, Past(), skirted)[0]
     np.testing.assert_allclose(turned, ahead @ turn[:3, :3].T, atol=1e-6)

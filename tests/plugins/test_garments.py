@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drape_bodies import legs
+from drape_bodies import SKIRT, legs
 from mocapflow_garments import sections
 from mocapflow_garments.cylinder import Cylinder
 from mocapflow_garments.shorts import Shorts
@@ -14,7 +14,6 @@ from mocapflow.errors import GarmentError, MocapflowError
 from mocapflow.scene import Scene
 
 BODY = legs()
-SKIRT = dict(waist_height_m=1.08, waist_circumference_m=0.92, hem_circumference_m=1.7, length_m=0.6)
 SHORTS = dict(
     waist_height_m=1.08, waist_circumference_m=0.92, hip_circumference_m=1.1, leg_opening_circumference_m=0.65,
     inseam_m=0.18, length_m=0.52,
