@@ -20,6 +20,7 @@ if TYPE_CHECKING:
         PoseSolver,
         Predictor,
         Prior,
+        Recovery,
         Segmenter,
         Stage,
     )
@@ -52,7 +53,8 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "assets": "Background Body Camera GarmentMesh",
-    "components": "BodyModel ClothFitter Component Draper Garment Matcher PoseSolver Predictor Prior Segmenter Stage",
+    "components": "BodyModel ClothFitter Component Draper Garment Matcher PoseSolver Predictor Prior "
+    "Recovery Segmenter Stage",
     "data": "Cloth Estimate Frame FrameResult FrameState Matches Past Pose PoseBatch Residual Segmentation Silhouette "
     "Start Surface Turn",
     "errors": "GarmentError MocapflowError PipelineError PluginError",
@@ -96,6 +98,7 @@ __all__ = [  # noqa: PLE0604
     "PoseSolver",
     "Predictor",
     "Prior",
+    "Recovery",
     "Recording",
     "Registry",
     "Residual",

@@ -18,6 +18,7 @@ from mocapflow.data import (
     Cloth,
     Estimate,
     Frame,
+    FrameResult,
     FrameState,
     Matches,
     Past,
@@ -151,6 +152,28 @@ class Prior(Component):
     @abstractmethod
     def residual(self, pose: Pose, past: Past, scene: Scene) -> Residual:
         """Return the whitened error at `pose` with its Jacobian; an increment of the root is (omega, v)."""
+
+
+class Recovery(Component):
+    """Notices that a fit is lost, and finds the person again."""
+
+    role: ClassVar[str] = "recovery"
+
+    @abstractmethod
+    def recover(
+        self,
+        frame: Frame,
+        state: FrameState,
+        result: FrameResult,
+        past: Past,
+        model: ClothedModel,
+        settle: Callable[[Pose, F64], FrameResult],
+    ) -> FrameResult:
+        """Return the result of the loop, or a better one that `settle` has reached from elsewhere.
+
+        `settle` takes a pose and cloth parameters; `state` is what was believed before looking. What was found
+        wrong, and what became of it, goes into `notes`.
+        """
 
 
 class Garment(Component):

@@ -249,6 +249,7 @@ class FrameResult:
     overlap: F64 = array("C", unit="1, intersection over union of model and image silhouette; NaN where unseen")
     energy: F64 = array("U", "E", unit="terms of the functional after each of at most U turns; NaN where there is none")
     energy_terms: tuple[str, ...]  # their E names
+    notes: tuple[str, ...] = ()  # what a user should know of the frame
     seconds: Mapping[str, float] = field(default_factory=dict)  # CPU time of each step; never part of a result
 
 

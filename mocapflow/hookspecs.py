@@ -1,4 +1,4 @@
-"""The extension points: ten providers return component classes, three observers look on."""
+"""The extension points: eleven providers return component classes, three observers look on."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from mocapflow.components import (
     PoseSolver,
     Predictor,
     Prior,
+    Recovery,
     Segmenter,
     Stage,
 )
@@ -52,6 +53,11 @@ def mocapflow_drapers() -> Iterable[type[Draper]]:  # type: ignore[empty-body]
 @hookspec
 def mocapflow_cloth_fitters() -> Iterable[type[ClothFitter]]:  # type: ignore[empty-body]
     """Ways to choose the cloth parameters and forces that explain the images."""
+
+
+@hookspec
+def mocapflow_recoveries() -> Iterable[type[Recovery]]:  # type: ignore[empty-body]
+    """Ways to notice that a fit is lost, and to find the person again."""
 
 
 @hookspec

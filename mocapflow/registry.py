@@ -30,6 +30,7 @@ PROVIDERS: Mapping[str, tuple[str, type[Component]]] = {
     "pose_solver": ("mocapflow_pose_solvers", components.PoseSolver),
     "draper": ("mocapflow_drapers", components.Draper),
     "cloth_fitter": ("mocapflow_cloth_fitters", components.ClothFitter),
+    "recovery": ("mocapflow_recoveries", components.Recovery),
     "prior": ("mocapflow_priors", components.Prior),
     "garment": ("mocapflow_garments", components.Garment),
     "body": ("mocapflow_bodies", components.BodyModel),

@@ -11,7 +11,18 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from mocapflow.assets import Background
 from mocapflow.checkpoint import Checkpoint
-from mocapflow.components import ClothFitter, Draper, Matcher, Observe, PoseSolver, Predictor, Prior, Segmenter, Stage
+from mocapflow.components import (
+    ClothFitter,
+    Draper,
+    Matcher,
+    Observe,
+    PoseSolver,
+    Predictor,
+    Prior,
+    Recovery,
+    Segmenter,
+    Stage,
+)
 from mocapflow.data import (
     Change,
     Cloth,
@@ -39,7 +50,7 @@ from mocapflow.results import Track
 from mocapflow.scene import Scene
 from mocapflow.timing import Stopwatch
 
-STEPS = ("decode", "predict", "drape", "segment", "solve", "cloth", "match")
+STEPS = ("decode", "predict", "drape", "segment", "solve", "cloth", "match", "recover")
 VIEWS = 2  # fewer than these do not fix a pose in space
 UNKNOWN = np.pi**2  # rad^2 and m^2, the variance where nothing was seen
 
@@ -83,6 +94,7 @@ class CoupledLoop(Stage):
     draper: Draper | None = None  # needed with a garment
     cloth_fitter: ClothFitter | None = None  # needed with a garment
     priors: tuple[Prior, ...] = ()  # added to the matches
+    recovery: Recovery | None = None  # looks again where a fit is lost
     steady: SteadyState = SteadyState()
     keep: Annotated[Literal["final", "trace"], FREE] = "final"  # trace: also the pose of every turn
     on_unsteady: Annotated[Literal["go_on", "stop"], FREE] = "go_on"  # after a frame that did not come to rest
@@ -115,8 +127,13 @@ class CoupledLoop(Stage):
             state = self.begin(frame, past, start, model, watch)
             settled = settle if seen(frame) else lost
             result = settled(frame, state, past, self.steps, model, checkpoint.observe)
-            seconds = {step: watch.seconds.get(step, 0.0) + result.seconds.get(step, 0.0) for step in STEPS}
-            past = checkpoint.commit(frame, past, replace(result, seconds=seconds), notes_on(frame, scene))
+            spent = result.seconds
+            watch.lap("loop")
+            result = self.recovered(frame, state, result, past, model)
+            watch.lap("recover")
+            seconds = {step: watch.seconds.get(step, 0.0) + spent.get(step, 0.0) for step in STEPS}
+            notes = [*notes_on(frame, scene), *result.notes]
+            past = checkpoint.commit(frame, past, replace(result, seconds=seconds), notes)
             self.complain(frame, result)
             watch = Stopwatch()
         return checkpoint.track()
@@ -153,6 +170,19 @@ class CoupledLoop(Stage):
         steps = replace(self.steps, segmenter=self.first_segmenter)
         near = settle(frame, state, past, steps, model, lambda *_: None).state
         return believed(near.estimate.pose, near.cloth.parameters, near.cloth)
+
+    def recovered(
+        self, frame: Frame, state: FrameState, result: FrameResult, past: Past, model: ClothedModel
+    ) -> FrameResult:
+        """Return the result of the loop, or a better one if the loop was lost."""
+        if self.recovery is None or not seen(frame):
+            return result
+
+        def settle_from(pose: Pose, parameters: F64) -> FrameResult:
+            begun = believed(pose, parameters, model.drape(pose, parameters, past))
+            return settle(frame, begun, past, self.steps, model, lambda *_: None)
+
+        return self.recovery.recover(frame, state, result, past, model, settle_from)
 
     def complain(self, frame: Frame, result: FrameResult) -> None:
         """Stop at a frame that did not settle, if that is wanted."""

@@ -22,6 +22,7 @@ from mocapflow.testing.steps import (
     PoseSolverConformance,
     PredictorConformance,
     PriorConformance,
+    RecoveryConformance,
     SegmenterConformance,
     StageConformance,
 )
@@ -35,6 +36,7 @@ __all__ = [
     "PoseSolverConformance",
     "PredictorConformance",
     "PriorConformance",
+    "RecoveryConformance",
     "SegmenterConformance",
     "StageConformance",
     "assert_pure",

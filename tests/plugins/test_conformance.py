@@ -19,6 +19,7 @@ CONFORMANCE = {
     "pose_solver": testing.PoseSolverConformance,
     "draper": testing.DraperConformance,
     "cloth_fitter": testing.ClothFitterConformance,
+    "recovery": testing.RecoveryConformance,
     "prior": testing.PriorConformance,
     "garment": testing.GarmentConformance,
     "body": testing.BodyConformance,

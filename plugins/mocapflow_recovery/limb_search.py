@@ -1,0 +1,141 @@
+"""Recovery `limb_search`: where person and model are apart, look for the pose part by part."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Annotated, ClassVar, NamedTuple
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from mocapflow_levelset.plates import Plate
+from pydantic import Field, PrivateAttr
+
+from mocapflow.assets import Background, Body, Camera
+from mocapflow.components import Recovery
+from mocapflow.data import Cloth, Frame, FrameResult, FrameState, Past, Pose, PoseBatch
+from mocapflow.model import ClothedModel
+from mocapflow.records import F64
+from mocapflow_recovery.certain import View, empty_room, shrunk, views
+from mocapflow_recovery.coarse import coarse_body
+from mocapflow_recovery.disagreement import distance, stray_area
+from mocapflow_recovery.sampling import Spread, search
+
+Positive = Annotated[float, Field(gt=0)]
+Count = Annotated[int, Field(ge=1)]
+
+
+class Room(NamedTuple):
+    """The empty scene at the size the search works at."""
+
+    cameras: tuple[Camera, ...]
+    empty: tuple[Plate, ...]
+
+
+class LimbSearch(Recovery):
+    """Compares the fitted model with what the images surely show, which does not depend on the model.
+
+    A level set that starts from the model can't find a limb the model has lost, so the two agree in their error.
+    Where large parts of person and model lie far apart, poses are sampled part by part around the fitted pose, the
+    one that was believed before and that of the frame before, and the loop settles again from the best of them.
+    It needs the empty scene; without one every fit is taken as it is.
+    """
+
+    name: ClassVar[str] = "limb_search"
+    stray_cm2: Positive = 250.0  # area in all views together from which a fit is doubted
+    reach_m: Positive = 0.06  # what lies nearer than this does not count: cloth, and edges of two sizes of pixel
+    gain: Annotated[float, Field(ge=0, lt=1)] = 0.1  # by which share another fit must be nearer to be taken
+    rows: Annotated[int, Field(ge=50)] = 200  # images are shrunk to about this height
+    faces: Annotated[int, Field(ge=200)] = 2600  # of the body that is searched with
+    near_m: Positive = 0.35  # changes further than this from the model are somebody else
+    cap_m: Positive = 0.2  # beyond, it does not matter how far
+    samples: Count = 60  # of each part in a round
+    shares: Annotated[tuple[Positive, ...], Field(min_length=1)] = (
+        1.0,
+        0.6,
+        0.4,
+        0.25,
+        0.12,
+    )  # of the spread, per round
+    spread_deg: Positive = 25.0
+    root_spread_deg: Positive = 8.0
+    root_spread_m: Positive = 0.06
+    _bodies: WeakKeyDictionary[Body, Body] = PrivateAttr(default_factory=WeakKeyDictionary)
+    _rooms: WeakKeyDictionary[Background, Room] = PrivateAttr(default_factory=WeakKeyDictionary)
+
+    def recover(
+        self,
+        frame: Frame,
+        state: FrameState,
+        result: FrameResult,
+        past: Past,
+        model: ClothedModel,
+        settle: Callable[[Pose, F64], FrameResult],
+    ) -> FrameResult:
+        """Return the result, or a better one; see the class."""
+        background = model.scene.background
+        if background is None:
+            return result
+        room = self._room(background, model.scene.cameras)
+        surface = model.surface(result.state.estimate.pose, result.state.cloth)
+        seen = views(frame, surface, room.cameras, room.empty, self.near_m)
+        stray = self._stray(model, seen, result.state)
+        if 1e4 * stray <= self.stray_cm2:
+            return result
+        found = self._search(frame, state, result.state, seen, past, model)
+        other = settle(found, result.state.cloth.parameters)
+        before, after = (self._distance(model, seen, each.state) for each in (result, other))
+        better = other if after < (1 - self.gain) * before else result
+        left = self._stray(model, seen, better.state)
+        said = "found again by search" if better is other else "search found nothing better"
+        note = f"{1e4 * stray:.0f} cm² of person and model were apart, {said}: {1e4 * left:.0f} cm²"
+        return replace(better, notes=(*better.notes, note))
+
+    def _search(
+        self, frame: Frame, state: FrameState, settled: FrameState, seen: Sequence[View], past: Past,
+        model: ClothedModel,
+    ) -> Pose:  # fmt: skip
+        """Return the pose that agrees best with the views, sampled around those at hand."""
+        parameters, body = settled.cloth.parameters, model.scene.body
+        coarse = replace(model.scene, body=self._coarse(body))
+
+        def cost(poses: Sequence[Pose]) -> F64:
+            clothes = drapes(model, poses, parameters, past)
+            return np.array([
+                distance(coarse.surface(pose, cloth), seen, self.cap_m)
+                for pose, cloth in zip(poses, clothes, strict=True)
+            ])  # fmt: skip
+
+        begins = [settled.estimate.pose, state.estimate.pose, *(moment.pose for moment in past.moments[-1:])]
+        begin = begins[int(cost(begins).argmin())]
+        spread = Spread(np.radians(self.spread_deg), np.radians(self.root_spread_deg), self.root_spread_m)
+        rng = np.random.default_rng(frame.index)
+        return search(cost, begin, body, spread, self.shares, self.samples, rng)
+
+    def _stray(self, model: ClothedModel, seen: Sequence[View], state: FrameState) -> float:
+        return stray_area(model.surface(state.estimate.pose, state.cloth), seen, self.reach_m)
+
+    def _distance(self, model: ClothedModel, seen: Sequence[View], state: FrameState) -> float:
+        return distance(model.surface(state.estimate.pose, state.cloth), seen, self.cap_m)
+
+    def _room(self, background: Background, cameras: tuple[Camera, ...]) -> Room:
+        """Return the small empty scene; made once, forgotten with the background."""
+        if background not in self._rooms:
+            small = tuple(shrunk(camera, max(round(camera.size[1] / self.rows), 1)) for camera in cameras)
+            self._rooms[background] = Room(small, empty_room(background, small))
+        return self._rooms[background]
+
+    def _coarse(self, body: Body) -> Body:
+        """Return the body to search with; made once, forgotten with the body."""
+        if body not in self._bodies:
+            self._bodies[body] = coarse_body(body, self.faces) if len(body.faces) > self.faces else body
+        return self._bodies[body]
+
+
+def drapes(model: ClothedModel, poses: Sequence[Pose], parameters: F64, past: Past) -> list[Cloth]:
+    """Return the garment laid on each of several poses."""
+    batch = PoseBatch(root=np.stack([p.root for p in poses]), angles=np.stack([p.angles for p in poses]))
+    if model.draper is None or not model.clothed:
+        return [Cloth(vertices=np.empty((0, 3)), parameters=parameters)] * len(poses)
+    vertices = model.draper.drape(batch, np.repeat(parameters[None], len(poses), axis=0), past, model.scene)
+    return [Cloth(vertices=each, parameters=parameters) for each in vertices]

@@ -1,0 +1,90 @@
+"""Search by sampling, part by part of the body: the root, the trunk, then each limb from the trunk outward.
+
+A limb has six to ten angles and its cost hardly depends on the others, so a few dozen samples of one limb do what
+all at once would need millions for (annealed and partitioned sampling; Deutscher and Reid 2005, Gall et al. 2010).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from mocapflow.assets import Body
+from mocapflow.data import Pose
+from mocapflow.geometry.kinematics import descendants
+from mocapflow.model import moved
+from mocapflow.records import F64, I32, Bool
+
+Cost = Callable[[Sequence[Pose]], F64]  # of poses (B,): (B,), the less the better
+
+
+class Spread(NamedTuple):
+    """Standard deviations of the first samples; those of later ones are a share of it."""
+
+    angle: float  # rad, of a joint that nothing holds; of others at most that of their rest
+    turn: float  # rad, the root
+    shift: float  # m, the root
+
+
+def search(
+    cost: Cost, pose: Pose, body: Body, spread: Spread, shares: Sequence[float], count: int, rng: np.random.Generator
+) -> Pose:
+    """Return the best pose found around a pose, never a worse one.
+
+    Args:
+        cost: what is made small.
+        pose: where the search begins.
+        body: whose parts are tried one after the other.
+        spread: how far samples lie from the best pose so far.
+        shares: of the spread, round by round.
+        count: samples of each part in a round.
+        rng: of the samples.
+    """
+    best, least = pose, float(cost([pose])[0])
+    for share in shares:
+        for part in parts(body):
+            tries = list(samples(best, part, body, spread, share, count, rng))
+            costs = cost(tries)
+            if costs.min() < least:
+                best, least = tries[int(costs.argmin())], float(costs.min())
+    return best
+
+
+def parts(body: Body) -> list[I32 | None]:
+    """Return the screws of each part, the root (None) and the trunk before the limbs.
+
+    A limb is a chain of joints without a fork; what carries several of them is the trunk.
+    """
+    forks = np.bincount(body.parents[body.parents >= 0], minlength=len(body.parents)) > 1
+    below = descendants(body.parents)
+    simple: Bool = ~np.any(below & forks, axis=1)  # no fork at or below the joint
+    starts = [
+        joint for joint, parent in enumerate(body.parents) if simple[joint] and (parent < 0 or not simple[parent])
+    ]
+    limbs = [np.flatnonzero(below[joint][body.screw_joint]).astype(np.int32) for joint in starts]
+    trunk = np.setdiff1d(np.arange(len(body.twists), dtype=np.int32), np.concatenate([[], *limbs]).astype(np.int32))
+    return [None, *(part for part in (trunk, *limbs) if len(part))]
+
+
+def samples(
+    pose: Pose, part: I32 | None, body: Body, spread: Spread, share: float, count: int, rng: np.random.Generator
+) -> Iterator[Pose]:
+    """Yield poses around a pose that differ from it in one part, within the limits of the joints."""
+    angles = len(pose.angles)
+    if part is None:
+        middle = pose.root[:3, :3] @ body.positions[0] + pose.root[:3, 3]
+        turns, shifts = (
+            share * spread.turn * rng.normal(size=(count, 3)),
+            share * spread.shift * rng.normal(size=(count, 3)),
+        )
+        for turn, shift in zip(turns, shifts, strict=True):  # about the root joint
+            increment = np.concatenate([turn, shift - np.cross(turn, middle), np.zeros(angles)])
+            yield moved(pose, increment)
+        return
+    deviation = share * np.minimum(body.rest_spread[part], spread.angle)
+    for change in rng.normal(size=(count, len(part))):
+        bent = pose.angles.copy()
+        bent[part] = np.clip(bent[part] + deviation * change, *body.limits[part].T)
+        yield Pose(root=pose.root, angles=bent)

@@ -1,0 +1,129 @@
+"""A limb that is lost is seen to be lost, and found again, whatever shadows and colours there are."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mocapflow_recovery.certain import empty_room, pixel_size, shrunk, views
+from mocapflow_recovery.coarse import coarse_body
+from mocapflow_recovery.disagreement import distance, stray_area
+from mocapflow_recovery.sampling import Spread, parts, samples, search
+
+from mocapflow.data import NO_CLOTH, Pose
+from mocapflow.geometry.cameras import project
+from mocapflow.testing import pictures, scenes, template_body
+
+SCENE = scenes.tiny_scene()
+POSE = scenes.tiny_pose(SCENE, 3, 0.1)
+FRAME = pictures.tiny_frame(SCENE, POSE)
+CAMERAS = tuple(shrunk(camera, 2) for camera in SCENE.cameras)
+ROOM = empty_room(SCENE.background, CAMERAS)
+SPREAD = Spread(np.radians(25), np.radians(8), 0.06)
+
+
+def astray(angle: float) -> Pose:
+    """The pose with the left leg spread."""
+    change = np.zeros(len(POSE.angles))
+    change[SCENE.body.screw_names.index("hip_l.abduction")] = angle
+    return Pose(root=POSE.root, angles=POSE.angles + change)
+
+
+def surface(pose: Pose):
+    return SCENE.surface(pose, NO_CLOTH)
+
+
+def seen(frame=FRAME):
+    return views(frame, surface(POSE), CAMERAS, ROOM, 0.35)
+
+
+def test_a_small_camera_sees_the_same() -> None:
+    points = surface(POSE).vertices[::50]
+    for camera in SCENE.cameras:
+        small = project(points, shrunk(camera, 4))
+        np.testing.assert_allclose(4 * small + 1.5, project(points, camera), atol=1e-9)  # centres of 4 x 4 squares
+
+
+def test_person_and_room_are_certain_where_the_truth_says_so() -> None:
+    for view, truth in zip(seen(), pictures.tiny_masks(SCENE, POSE), strict=True):
+        quarters = truth.reshape(120, 2, 160, 2)
+        whole, part = quarters.all(axis=(1, 3)), quarters.any(axis=(1, 3))
+        assert np.mean(part[view.person]) > 0.98
+        assert np.mean(view.person[whole]) > 0.95
+        assert np.mean(view.away[~part] > 0) > 0.9
+
+
+def test_a_shadow_is_neither() -> None:
+    dark = replace(FRAME, images=tuple(image.copy() for image in FRAME.images))
+    spot = np.zeros(FRAME.images[0].shape[:2], bool)
+    spot[205:225, 20:60] = True  # on the floor beside the person
+    shadowed = tuple(np.where(spot[..., None], (0.75 * image).astype(np.uint8), image) for image in dark.images)
+    lit, dim = seen(), seen(replace(FRAME, images=shadowed))
+    part = spot[::2, ::2]
+    for before, after in zip(lit, dim, strict=True):
+        assert np.mean(after.person[part]) < 0.05  # not the person
+        assert np.mean(after.away[part] == 0) > np.mean(before.away[part] == 0) + 0.5  # nor surely the room
+
+
+def test_somebody_far_away_is_not_the_person() -> None:
+    other = tuple(image.copy() for image in FRAME.images)
+    for image in other:
+        image[60:200, 5:30] = 240
+    for view in seen(replace(FRAME, images=other)):
+        assert not view.person[30:100, 3:15].any()
+
+
+@pytest.mark.parametrize("angle", [0.4, 0.8])
+def test_a_leg_astray_counts_by_its_area_and_by_its_way(angle) -> None:
+    assert stray_area(surface(POSE), seen(), 0.06) < 20e-4
+    assert stray_area(surface(astray(angle)), seen(), 0.06) > 250e-4
+    ways = [distance(surface(astray(part * angle)), seen(), 0.2) for part in (0, 0.5, 1)]
+    assert ways == sorted(ways)
+    assert ways[2] > 3 * ways[0]
+
+
+def test_a_pixel_has_a_size() -> None:
+    camera = SCENE.cameras[0]
+    assert pixel_size(camera, surface(POSE)) == pytest.approx(3 / 400, rel=0.1)
+    assert pixel_size(shrunk(camera, 4), surface(POSE)) == pytest.approx(4 * pixel_size(camera, surface(POSE)))
+
+
+def test_parts_of_a_person() -> None:
+    body = template_body()
+    root, trunk, *limbs = parts(body)
+    assert root is None
+    first = {body.joint_names[body.screw_joint[limb[0]]] for limb in limbs}
+    assert {"hip_l", "hip_r", "shoulder_l", "shoulder_r"} <= first
+    assert {body.joint_names[joint] for joint in body.screw_joint[trunk]} >= {"spine", "chest"}
+    together = np.concatenate([trunk, *limbs])
+    assert sorted(together) == list(range(len(body.twists)))
+
+
+def test_samples_differ_in_their_part_and_keep_the_limits() -> None:
+    body, rng = SCENE.body, np.random.default_rng(0)
+    part = parts(body)[1]
+    for pose in samples(POSE, part, body, SPREAD, 4.0, 50, rng):
+        assert ((pose.angles >= body.limits[:, 0]) & (pose.angles <= body.limits[:, 1])).all()
+        np.testing.assert_array_equal(np.delete(pose.angles, part), np.delete(POSE.angles, part))
+    centre = [pose.root[:3, :3] @ body.positions[0] + pose.root[:3, 3] for pose in
+              samples(POSE, None, body, SPREAD, 1.0, 400, rng)]  # fmt: skip
+    np.testing.assert_allclose(np.std(centre, axis=0), SPREAD.shift, rtol=0.15)  # the root turns about its joint
+
+
+def test_search_finds_a_leg() -> None:
+    def cost(poses):
+        return np.array([distance(surface(pose), seen_now, 0.2) for pose in poses])
+
+    seen_now = seen()
+    found = search(cost, astray(0.8), SCENE.body, SPREAD, (1.0, 0.5, 0.25), 40, np.random.default_rng(1))
+    hip = SCENE.body.screw_names.index("hip_l.abduction")
+    assert abs(found.angles[hip] - POSE.angles[hip]) < 0.1
+
+
+def test_a_coarse_body_moves_like_the_full_one() -> None:
+    body = template_body()
+    few = coarse_body(body, 2600)
+    assert len(few.faces) < 3000
+    np.testing.assert_allclose(few.vertices.max(axis=0), body.vertices.max(axis=0), atol=0.01)
+    np.testing.assert_allclose(few.skin_weight.sum(axis=1), 1.0)
