@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mocapflow.data import Surface
+from mocapflow.data import CLOTH, Surface
+from mocapflow.geometry.cameras import project
 from mocapflow.geometry.silhouettes import mask, outline
-from mocapflow.records import F32, Bool
+from mocapflow.records import F32, F64, Bool
 from mocapflow_recovery.certain import View
 
 
@@ -27,15 +28,53 @@ def distance(surface: Surface, views: Sequence[View], cap_m: float) -> float:
     return total / max(len(views), 1)
 
 
-def stray_area(surface: Surface, views: Sequence[View], reach_m: float) -> float:
-    """Return the area (m²), all views together, where person or model is further than `reach_m` from the other."""
+def uncovered_area(surface: Surface, views: Sequence[View], reach_m: float, cloth_m: float) -> float:
+    """Return the area (m²), all views together, of the person further than `reach_m` from the model.
+
+    Cloth may fly: what is within `cloth_m` of the garment does not count.
+    """
     total = 0.0
     for view in views:
-        covered, off = _of(surface, view)
-        reach = reach_m / view.pixel_m
-        stray = np.count_nonzero(off[view.person] > reach) + np.count_nonzero(view.away[covered] > reach)
-        total += stray * view.pixel_m**2
+        stray = view.person & (_of(surface, view)[1] > reach_m / view.pixel_m)
+        stray &= _from_cloth(surface, view) > cloth_m / view.pixel_m
+        total += np.count_nonzero(stray) * view.pixel_m**2
     return total
+
+
+def floating_area(bare: Surface, views: Sequence[View], reach_m: float) -> float:
+    """Return the area (m²) of skin that at least two views show to be in empty space, `reach_m` from the person.
+
+    One view alone may be deceived: by clothes of the colour of the wall behind.
+    """
+    empty = np.zeros(len(bare.vertices), int)
+    for view in views:
+        empty += _at(view.away, project(bare.vertices, view.camera)) > reach_m / view.pixel_m
+    corners = bare.vertices[bare.faces]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    return float(area[(empty[bare.faces] >= 2).all(axis=1)].sum())
+
+
+def _from_cloth(surface: Surface, view: View) -> F32:
+    """Return the distance (h, w) px of every pixel from the garment's vertices; far where there is no garment."""
+    import cv2
+
+    shape = view.person.shape
+    free = np.ones(shape, np.uint8)
+    column, row = np.rint(project(surface.vertices[surface.layer == CLOTH], view.camera)).astype(int).reshape(-1, 2).T
+    inside = (column >= 0) & (column < shape[1]) & (row >= 0) & (row < shape[0])
+    free[row[inside], column[inside]] = 0
+    if free.all():
+        return np.full(shape, np.inf, np.float32)
+    return np.asarray(cv2.distanceTransform(free, cv2.DIST_L2, 3), np.float32)
+
+
+def _at(field: F32, pixels: F64) -> F64:
+    """Return a field (h, w) at the pixels nearest to (K, 2), 0 outside the image."""
+    column, row = np.rint(pixels).astype(int).T
+    inside = (column >= 0) & (column < field.shape[1]) & (row >= 0) & (row < field.shape[0])
+    values = np.zeros(len(pixels))
+    values[inside] = field[row[inside], column[inside]]
+    return values
 
 
 def _of(surface: Surface, view: View) -> tuple[Bool, F32]:

@@ -13,12 +13,12 @@ from pydantic import Field, PrivateAttr
 
 from mocapflow.assets import Background, Body, Camera
 from mocapflow.components import Recovery
-from mocapflow.data import Cloth, Frame, FrameResult, FrameState, Past, Pose, PoseBatch
+from mocapflow.data import NO_CLOTH, Cloth, Frame, FrameResult, FrameState, Past, Pose, PoseBatch, Surface
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow_recovery.certain import View, empty_room, shrunk, views
 from mocapflow_recovery.coarse import coarse_body
-from mocapflow_recovery.disagreement import distance, stray_area
+from mocapflow_recovery.disagreement import distance, floating_area, uncovered_area
 from mocapflow_recovery.sampling import Spread, search
 
 Positive = Annotated[float, Field(gt=0)]
@@ -42,21 +42,16 @@ class LimbSearch(Recovery):
     """
 
     name: ClassVar[str] = "limb_search"
-    stray_cm2: Positive = 250.0  # area in all views together from which a fit is doubted
-    reach_m: Positive = 0.06  # what lies nearer than this does not count: cloth, and edges of two sizes of pixel
+    stray_cm2: Positive = 150.0  # of the person off the model in all views, and of skin in the air, to doubt a fit
+    reach_m: Positive = 0.06  # what lies nearer to the other does not count
+    cloth_m: Positive = 0.2  # what lies so near to the garment may be the garment, wherever it swings
     gain: Annotated[float, Field(ge=0, lt=1)] = 0.1  # by which share another fit must be nearer to be taken
-    rows: Annotated[int, Field(ge=50)] = 200  # images are shrunk to about this height
+    rows: Annotated[int, Field(ge=50)] = 160  # images are shrunk to about this height
     faces: Annotated[int, Field(ge=200)] = 2600  # of the body that is searched with
     near_m: Positive = 0.35  # changes further than this from the model are somebody else
     cap_m: Positive = 0.2  # beyond, it does not matter how far
-    samples: Count = 60  # of each part in a round
-    shares: Annotated[tuple[Positive, ...], Field(min_length=1)] = (
-        1.0,
-        0.6,
-        0.4,
-        0.25,
-        0.12,
-    )  # of the spread, per round
+    samples: Count = 40  # of each part in a round
+    shares: Annotated[tuple[Positive, ...], Field(min_length=1)] = (1.0, 0.6, 0.4, 0.25, 0.12)  # per round
     spread_deg: Positive = 25.0
     root_spread_deg: Positive = 8.0
     root_spread_m: Positive = 0.06
@@ -77,16 +72,15 @@ class LimbSearch(Recovery):
         if background is None:
             return result
         room = self._room(background, model.scene.cameras)
-        surface = model.surface(result.state.estimate.pose, result.state.cloth)
-        seen = views(frame, surface, room.cameras, room.empty, self.near_m)
-        stray = self._stray(model, seen, result.state)
+        seen = views(frame, surface_of(model, result), room.cameras, room.empty, self.near_m)
+        stray = self._stray(model, seen, result)
         if 1e4 * stray <= self.stray_cm2:
             return result
         found = self._search(frame, state, result.state, seen, past, model)
         other = settle(found, result.state.cloth.parameters)
-        before, after = (self._distance(model, seen, each.state) for each in (result, other))
+        before, after = (distance(surface_of(model, each), seen, self.cap_m) for each in (result, other))
         better = other if after < (1 - self.gain) * before else result
-        left = self._stray(model, seen, better.state)
+        left = self._stray(model, seen, better)
         said = "found again by search" if better is other else "search found nothing better"
         note = f"{1e4 * stray:.0f} cm² of person and model were apart, {said}: {1e4 * left:.0f} cm²"
         return replace(better, notes=(*better.notes, note))
@@ -112,11 +106,10 @@ class LimbSearch(Recovery):
         rng = np.random.default_rng(frame.index)
         return search(cost, begin, body, spread, self.shares, self.samples, rng)
 
-    def _stray(self, model: ClothedModel, seen: Sequence[View], state: FrameState) -> float:
-        return stray_area(model.surface(state.estimate.pose, state.cloth), seen, self.reach_m)
-
-    def _distance(self, model: ClothedModel, seen: Sequence[View], state: FrameState) -> float:
-        return distance(model.surface(state.estimate.pose, state.cloth), seen, self.cap_m)
+    def _stray(self, model: ClothedModel, seen: Sequence[View], result: FrameResult) -> float:
+        surface = surface_of(model, result)
+        uncovered = uncovered_area(surface, seen, self.reach_m, self.cloth_m)
+        return uncovered + floating_area(model.scene.bare(surface), seen, self.reach_m)
 
     def _room(self, background: Background, cameras: tuple[Camera, ...]) -> Room:
         """Return the small empty scene; made once, forgotten with the background."""
@@ -132,10 +125,19 @@ class LimbSearch(Recovery):
         return self._bodies[body]
 
 
+def surface_of(model: ClothedModel, result: FrameResult) -> Surface:
+    """Return the surface that a result believes in."""
+    return model.surface(result.state.estimate.pose, result.state.cloth)
+
+
 def drapes(model: ClothedModel, poses: Sequence[Pose], parameters: F64, past: Past) -> list[Cloth]:
-    """Return the garment laid on each of several poses."""
-    batch = PoseBatch(root=np.stack([p.root for p in poses]), angles=np.stack([p.angles for p in poses]))
+    """Return the garment laid on each of several poses; poses that lay it alike are draped once."""
     if model.draper is None or not model.clothed:
-        return [Cloth(vertices=np.empty((0, 3)), parameters=parameters)] * len(poses)
-    vertices = model.draper.drape(batch, np.repeat(parameters[None], len(poses), axis=0), past, model.scene)
-    return [Cloth(vertices=each, parameters=parameters) for each in vertices]
+        return [NO_CLOTH] * len(poses)
+    lays = model.draper.touchable(model.scene)[model.scene.body.screw_joint]
+    root, angles = np.stack([pose.root for pose in poses]), np.stack([pose.angles for pose in poses])
+    told_apart = np.concatenate([root.reshape(len(poses), -1), angles[:, lays]], axis=1)
+    _, first, same = np.unique(told_apart, axis=0, return_index=True, return_inverse=True)
+    batch = PoseBatch(root=root[first], angles=angles[first])
+    vertices = model.draper.drape(batch, np.repeat(parameters[None], len(first), axis=0), past, model.scene)
+    return [Cloth(vertices=vertices[row], parameters=parameters) for row in same.ravel()]

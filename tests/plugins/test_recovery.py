@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mocapflow_recovery.certain import empty_room, pixel_size, shrunk, views
 from mocapflow_recovery.coarse import coarse_body
-from mocapflow_recovery.disagreement import distance, stray_area
+from mocapflow_recovery.disagreement import distance, floating_area, uncovered_area
 from mocapflow_recovery.sampling import Spread, parts, samples, search
 
 from mocapflow.data import NO_CLOTH, Pose
@@ -76,8 +76,11 @@ def test_somebody_far_away_is_not_the_person() -> None:
 
 @pytest.mark.parametrize("angle", [0.4, 0.8])
 def test_a_leg_astray_counts_by_its_area_and_by_its_way(angle) -> None:
-    assert stray_area(surface(POSE), seen(), 0.06) < 20e-4
-    assert stray_area(surface(astray(angle)), seen(), 0.06) > 250e-4
+    wrong = surface(astray(angle))
+    assert uncovered_area(surface(POSE), seen(), 0.06, 0.2) < 20e-4
+    assert uncovered_area(wrong, seen(), 0.06, 0.2) > 150e-4
+    assert floating_area(surface(POSE), seen(), 0.06) < 20e-4
+    assert 150e-4 < floating_area(wrong, seen(), 0.06) < 0.25  # m², the skin of a leg
     ways = [distance(surface(astray(part * angle)), seen(), 0.2) for part in (0, 0.5, 1)]
     assert ways == sorted(ways)
     assert ways[2] > 3 * ways[0]
