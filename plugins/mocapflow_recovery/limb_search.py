@@ -42,7 +42,7 @@ class LimbSearch(Recovery):
     """
 
     name: ClassVar[str] = "limb_search"
-    stray_cm2: Positive = 150.0  # of the person off the model in all views, and of skin in the air, to doubt a fit
+    stray_cm2: Positive = 60.0  # of the person off the model in all views, and of skin in the air, to doubt a fit
     reach_m: Positive = 0.06  # what lies nearer to the other does not count
     cloth_m: Positive = 0.2  # what lies so near to the garment may be the garment, wherever it swings
     gain: Annotated[float, Field(ge=0, lt=1)] = 0.1  # by which share another fit must be nearer to be taken
