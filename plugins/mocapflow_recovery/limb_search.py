@@ -51,10 +51,10 @@ class LimbSearch(Recovery):
     near_m: Positive = 0.35  # changes further than this from the model are somebody else
     cap_m: Positive = 0.2  # beyond, it does not matter how far
     samples: Count = 40  # of each part in a round
-    shares: Annotated[tuple[Positive, ...], Field(min_length=1)] = (1.0, 0.6, 0.4, 0.25, 0.12)  # per round
-    spread_deg: Positive = 25.0
-    root_spread_deg: Positive = 8.0
-    root_spread_m: Positive = 0.06
+    shares: Annotated[tuple[Positive, ...], Field(min_length=1)] = (1.0, 0.6, 0.4, 0.25, 0.12)  # of the spread
+    spread_deg: Positive = 25.0  # standard deviation of the first samples; less where a joint at rest hardly bends
+    root_spread_deg: Positive = 8.0  # likewise, of the root's turn
+    root_spread_m: Positive = 0.06  # likewise, of its place
     _bodies: WeakKeyDictionary[Body, Body] = PrivateAttr(default_factory=WeakKeyDictionary)
     _rooms: WeakKeyDictionary[Background, Room] = PrivateAttr(default_factory=WeakKeyDictionary)
 
