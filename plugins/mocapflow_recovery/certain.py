@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from mocapflow_levelset import crops
 from mocapflow_levelset.channels import ChannelName, features
+from mocapflow_levelset.evidence import without_outliers
 from mocapflow_levelset.plates import Plate, Shadow, density_of, plate_of
 from mocapflow_levelset.shadows import floor_around
 
@@ -21,6 +22,7 @@ SHADOW = Shadow(floor=0.012, share=0.2, darkest=0.5, chroma=0.005, stranger=-6.0
 EMPTY = 3.0  # standard deviations within which a pixel is that of the empty room
 FLOOR_REACH = 2.0  # m, from the person, where their shadow may fall
 SPECK = 0.01  # of the largest part's area: smaller parts are noise
+MOST = 3.0  # of the model's area: more can't be the person
 SEAM = np.ones((5, 5), np.uint8)  # gaps in the person so narrow are the person's
 
 
@@ -34,9 +36,16 @@ class View(NamedTuple):
 
 
 def views(
-    frame: Frame, surface: Surface, cameras: tuple[Camera, ...], room: tuple[Plate, ...], near_m: float
+    frame: Frame,
+    surface: Surface,
+    cameras: tuple[Camera, ...],
+    room: tuple[Plate, ...],
+    near_m: float,
+    median_px: int = 0,
 ) -> list[View]:
     """Return what the usable views of a frame surely show, each at the size of its camera.
+
+    A view that is unlike the empty room nearly everywhere shows nothing surely and is left out.
 
     Args:
         frame: the images, in full size.
@@ -44,9 +53,15 @@ def views(
         cameras: those of the scene, shrunk.
         room: the empty room at the same size.
         near_m: see `surface`.
+        median_px: width of a median filter of the images, against pixels of no meaning; 0 for none.
     """
-    seen = [index for index in range(len(cameras)) if frame.usable[index]]
-    return [_view(frame.images[index], surface, cameras[index], room[index], near_m) for index in seen]
+    found = []
+    for camera, plate, image, usable in zip(cameras, room, frame.images, frame.usable, strict=True):
+        model = mask(outline(surface, camera), camera)
+        view = _view(image, surface, model, camera, plate, near_m, median_px) if usable else None
+        if view is not None and np.count_nonzero(view.person) < MOST * np.count_nonzero(model):
+            found.append(view)
+    return found
 
 
 def empty_room(background: Background, cameras: tuple[Camera, ...]) -> tuple[Plate, ...]:
@@ -67,16 +82,16 @@ def pixel_size(camera: Camera, surface: Surface) -> float:
     return float(depth / camera.intrinsics[0, 0])
 
 
-def _view(image: U8, surface: Surface, camera: Camera, room: Plate, near_m: float) -> View:
+def _view(image: U8, surface: Surface, model: Bool, camera: Camera, room: Plate, near_m: float, median_px: int) -> View:
     import cv2
 
-    values = features(crops.shrink(image, image.shape[1] // int(camera.size[0])), CHANNELS)
+    values = features(crops.shrink(without_outliers(image, median_px), image.shape[1] // int(camera.size[0])), CHANNELS)
     floor = floor_around(surface, camera, FLOOR_REACH)
     flat, expected, spread = values.reshape(len(values), -1), room.planes.reshape(len(values), -1), room.spread.ravel()
     density = density_of(flat, expected, spread, floor.ravel(), CHANNELS, SHADOW).reshape(floor.shape)
     off = np.sum((values - room.planes) ** 2, axis=0) / np.maximum(room.spread, SHADOW.floor) ** 2
     size = pixel_size(camera, surface)
-    person = _near(density < 0, mask(outline(surface, camera), camera), near_m / size)
+    person = _near(density < 0, model, near_m / size)
     closed = cv2.morphologyEx(person.view(np.uint8), cv2.MORPH_CLOSE, SEAM)
     empty = (off < EMPTY**2) & (closed == 0)
     away = cv2.distanceTransform(empty.view(np.uint8), cv2.DIST_L2, 3)

@@ -32,6 +32,20 @@ class Room(NamedTuple):
     empty: tuple[Plate, ...]
 
 
+class Stray(NamedTuple):
+    """How much of person and model lie apart, cm²."""
+
+    uncovered: float
+    floating: float
+
+    def doubtful(self, uncovered: float, floating: float) -> bool:
+        """True where one of the two is larger than it may be."""
+        return self.uncovered > uncovered or self.floating > floating
+
+    def __str__(self) -> str:
+        return f"{self.uncovered:.0f} cm² of the person uncovered, {self.floating:.0f} cm² of skin in empty space"
+
+
 class LimbSearch(Recovery):
     """Compares the fitted model with what the images surely show, which does not depend on the model.
 
@@ -42,11 +56,13 @@ class LimbSearch(Recovery):
     """
 
     name: ClassVar[str] = "limb_search"
-    stray_cm2: Positive = 60.0  # of the person off the model in all views, and of skin in the air, to doubt a fit
+    uncovered_cm2: Positive = 60.0  # of the person off the model, in all views: more, and the fit is doubted
+    floating_cm2: Positive = 60.0  # likewise, of skin in empty space
     reach_m: Positive = 0.06  # what lies nearer to the other does not count
     cloth_m: Positive = 0.2  # what lies so near to the garment may be the garment, wherever it swings
     gain: Annotated[float, Field(ge=0, lt=1)] = 0.1  # by which share another fit must be nearer to be taken
     rows: Annotated[int, Field(ge=50)] = 160  # images are shrunk to about this height
+    median_px: Annotated[int, Field(ge=0)] = 0  # median filter against pixels of no meaning, e.g. 9; 0: none
     faces: Annotated[int, Field(ge=200)] = 2600  # of the body that is searched with
     near_m: Positive = 0.35  # changes further than this from the model are somebody else
     cap_m: Positive = 0.2  # beyond, it does not matter how far
@@ -72,17 +88,16 @@ class LimbSearch(Recovery):
         if background is None:
             return result
         room = self._room(background, model.scene.cameras)
-        seen = views(frame, surface_of(model, result), room.cameras, room.empty, self.near_m)
+        seen = views(frame, surface_of(model, result), room.cameras, room.empty, self.near_m, self.median_px)
         stray = self._stray(model, seen, result)
-        if 1e4 * stray <= self.stray_cm2:
+        if not stray.doubtful(self.uncovered_cm2, self.floating_cm2):
             return result
         found = self._search(frame, state, result.state, seen, past, model)
         other = settle(found, result.state.cloth.parameters)
         before, after = (distance(surface_of(model, each), seen, self.cap_m) for each in (result, other))
         better = other if after < (1 - self.gain) * before else result
-        left = self._stray(model, seen, better)
-        said = "found again by search" if better is other else "search found nothing better"
-        note = f"{1e4 * stray:.0f} cm² of person and model were apart, {said}: {1e4 * left:.0f} cm²"
+        said = f"found again by search; then {self._stray(model, seen, better)}"
+        note = f"fit doubted, {stray}: {said if better is other else 'search found nothing better'}"
         return replace(better, notes=(*better.notes, note))
 
     def _search(
@@ -106,10 +121,12 @@ class LimbSearch(Recovery):
         rng = np.random.default_rng(frame.index)
         return search(cost, begin, body, spread, self.shares, self.samples, rng)
 
-    def _stray(self, model: ClothedModel, seen: Sequence[View], result: FrameResult) -> float:
+    def _stray(self, model: ClothedModel, seen: Sequence[View], result: FrameResult) -> Stray:
         surface = surface_of(model, result)
-        uncovered = uncovered_area(surface, seen, self.reach_m, self.cloth_m)
-        return uncovered + floating_area(model.scene.bare(surface), seen, self.reach_m)
+        return Stray(
+            uncovered=1e4 * uncovered_area(surface, seen, self.reach_m, self.cloth_m),
+            floating=1e4 * floating_area(model.scene.bare(surface), seen, self.reach_m),
+        )
 
     def _room(self, background: Background, cameras: tuple[Camera, ...]) -> Room:
         """Return the small empty scene; made once, forgotten with the background."""

@@ -130,3 +130,8 @@ def test_a_coarse_body_moves_like_the_full_one() -> None:
     assert len(few.faces) < 3000
     np.testing.assert_allclose(few.vertices.max(axis=0), body.vertices.max(axis=0), atol=0.01)
     np.testing.assert_allclose(few.skin_weight.sum(axis=1), 1.0)
+
+
+def test_a_view_without_the_room_shows_nothing_surely() -> None:
+    noise = np.random.default_rng(0).integers(0, 255, FRAME.images[0].shape, np.uint8)
+    assert len(seen(replace(FRAME, images=(noise, *FRAME.images[1:])))) == len(seen()) - 1
