@@ -9,7 +9,7 @@ import numpy as np
 from mocapflow.assets import Body
 from mocapflow.data import Pose, PoseBatch
 from mocapflow.geometry import twists
-from mocapflow.records import F64, Bool
+from mocapflow.records import F64, I32, Bool
 
 ANGLE_STEP = np.radians(1.0)  # rad; averages over changes of contact (method: finite differences of the drape)
 PARAMETER_STEP = 0.02  # share of the parameter's range
@@ -20,8 +20,7 @@ Drape = Callable[[PoseBatch, F64], F64]
 def drape_differences(drape: Drape, body: Body, touching: Bool, bounds: F64, pose: Pose, parameters: F64) -> F64:
     """Return velocities (M, 3, 6 + D + Q) of cloth vertices for unit changes of pose and parameters.
 
-    The root carries the garment rigidly: exact for shifts and for turns about the vertical, and nearly so for the
-    small tilts of one step. Only angles that move what the garment can touch are tried.
+    Only angles that move what the garment can touch are tried.
 
     Args:
         drape: returns cloth vertices (B, M, 3) m in the world for B poses and parameters (B, Q).
@@ -31,21 +30,54 @@ def drape_differences(drape: Drape, body: Body, touching: Bool, bounds: F64, pos
         pose: where the velocities hold.
         parameters: (Q,), likewise.
     """
+    tried = tried_columns(body, touching, len(parameters))
+    poses, values, steps = neighbours(tried, bounds, pose, parameters, ANGLE_STEP, PARAMETER_STEP)
+    draped = drape(poses, values)
+    rates = np.moveaxis(draped[:-1] - draped[-1], 0, -1) / steps
+    return all_columns(draped[-1], rates, tried, 6 + len(pose.angles) + len(parameters))
+
+
+def tried_columns(body: Body, touching: Bool, parameters: int) -> I32:
+    """Return the columns of all unknowns that change how the garment lies: angles, then parameters."""
     from mocapflow.geometry import kinematics  # compiled code, loaded where it is used
 
-    angles, unknowns = len(pose.angles), 6 + len(pose.angles) + len(parameters)
     moving = kinematics.descendants(body.parents)[body.screw_joint] @ touching
-    tried = np.concatenate([6 + np.flatnonzero(moving), np.arange(6 + angles, unknowns)])
+    first = 6 + len(moving)
+    return np.concatenate([6 + np.flatnonzero(moving), np.arange(first, first + parameters)]).astype(np.int32)
+
+
+def neighbours(
+    tried: I32, bounds: F64, pose: Pose, parameters: F64, angle: float, share: float
+) -> tuple[PoseBatch, F64, F64]:
+    """Return poses and parameters (S + 1, Q) one step along each of S columns and, last, none; and the steps (S,).
+
+    Args:
+        tried: the columns, of angles and of parameters.
+        bounds: of the parameters (Q, 2).
+        pose: where the steps begin.
+        parameters: (Q,), likewise.
+        angle: rad, of a step along an angle.
+        share: of a parameter's range, of a step along it; never beyond its bounds.
+    """
+    first = 6 + len(pose.angles)
     lower, upper = bounds.T
-    inward = np.where(parameters > 0.5 * (lower + upper), -1.0, 1.0)  # never a step beyond the bounds
-    steps = np.concatenate([np.full(6 + angles, ANGLE_STEP), PARAMETER_STEP * (upper - lower) * inward])[tried]
-    moves = np.zeros((len(tried) + 1, unknowns))
+    inward = np.where(parameters > 0.5 * (lower + upper), -1.0, 1.0)
+    steps = np.concatenate([np.full(first, angle), share * (upper - lower) * inward])[tried]
+    moves = np.zeros((len(tried) + 1, first + len(parameters)))
     moves[np.arange(len(tried)), tried] = steps
     root = np.repeat(pose.root[None], len(moves), axis=0)
-    batch = PoseBatch(root=root, angles=pose.angles + moves[:, 6 : 6 + angles])
-    draped = drape(batch, parameters + moves[:, 6 + angles :])
-    velocity = np.zeros((draped.shape[1], 3, unknowns))
-    velocity[..., :3] = -twists.hat(draped[-1])
+    poses = PoseBatch(root=root, angles=pose.angles + moves[:, 6:first])
+    return poses, parameters + moves[:, first:], np.where(steps == 0, 1.0, steps)
+
+
+def all_columns(draped: F64, rates: F64, tried: I32, unknowns: int) -> F64:
+    """Return the velocities (M, 3, unknowns) of cloth (M, 3) m with given rates (M, 3, S) along the tried columns.
+
+    The root carries the garment rigidly: exact for shifts and for turns about the vertical, and nearly so for the
+    small tilts of one step.
+    """
+    velocity = np.zeros((len(draped), 3, unknowns))
+    velocity[..., :3] = -twists.hat(draped)
     velocity[..., 3:6] = np.eye(3)
-    velocity[..., tried] = np.moveaxis(draped[:-1] - draped[-1], 0, -1) / np.where(steps == 0, 1.0, steps)
+    velocity[..., tried] = rates
     return velocity

@@ -11,18 +11,23 @@ from pydantic import Field, PrivateAttr
 
 from mocapflow.assets import Body, GarmentMesh
 from mocapflow.components import Draper
-from mocapflow.data import Past, PoseBatch
+from mocapflow.data import Past, Pose, PoseBatch
 from mocapflow.errors import PluginError
+from mocapflow.geometry.differences import all_columns, neighbours, tried_columns
 from mocapflow.geometry.kinematics import chain_batch
-from mocapflow.records import F64, Bool, record
+from mocapflow.records import F64, I32, Bool, record
 from mocapflow.scene import Scene
 from mocapflow_draping.fields import BodyFields, build_fields, touchable_joints
 from mocapflow_draping.forces import thickness, tilts, wind
-from mocapflow_draping.frames import hanging, riding, standing
-from mocapflow_draping.parts import posed_parts
-from mocapflow_draping.strands import Strands, roots, strands_of
+from mocapflow_draping.frames import riding, standing
+from mocapflow_draping.laying import fall, follow, moving, placed
+from mocapflow_draping.parts import posed_parts, rates
+from mocapflow_draping.strands import Strands, strands_of
 
 LOWER = 0.002  # m, step of a cloth that nothing holds
+TINY = 1e-6  # rad, and share of a parameter's range: what the drape starts from is differentiated by steps
+
+Motion = tuple[F64, F64, F64, F64]  # what `rings.close` needs to bring rates along
 
 
 @record
@@ -71,12 +76,39 @@ class Kinematic(Draper):
         elif strands.rides:
             grid = riding(strands, chain, out, aside)
         else:
-            grid = self._fall(fitting, chain, out, aside, skin, parts)
+            where = placed(strands, chain, out, aside)
+            grid, _ = fall(strands, fitting.fields, where, skin, parts, math.radians(self.start_deg))
         if self.sweeps:
             self._close(fitting, grid, skin, parts)
-        vertices = np.empty((len(chain), len(garment.vertices), 3))
-        vertices[:, strands.vertex[strands.own]] = grid[:, strands.own]
+        vertices: F64 = grid.reshape(len(grid), -1, 3)[:, strands.place]
         return vertices
+
+    def velocity(self, pose: Pose, parameters: F64, vertices: I32, past: Past, scene: Scene) -> F64:
+        """Return the velocities (M, 3, 6 + D + Q) of cloth vertices (M,); contacts and taut links stay as they are."""
+        garment = scene.garment
+        if garment is None or self.rule == "literal":
+            return super().velocity(pose, parameters, vertices, past, scene)
+        tried = tried_columns(scene.body, self.touchable(scene), len(parameters))
+        poses, values, steps = neighbours(tried, garment.parameter_bounds, pose, parameters, TINY, TINY)
+        fitting = self.fitting(garment, scene.body)
+        strands = fitting.strands
+        chain = chain_batch(scene.body, poses)
+        parts = posed_parts(fitting.fields, chain[-1:])
+        skin = self.skin_m + thickness(garment, values) / 2
+        moved = moving(fitting.fields, chain, skin, steps)
+        laid = tilts(garment, values, strands.azimuth)
+        if strands.rides:
+            ridden = riding(strands, chain, *laid)
+            grid, rate = ridden[-1:], rates(ridden, steps)
+        else:
+            near = placed(strands, chain, *laid)
+            here = near[0][-1:], near[1][-1:], near[2][-1:]
+            grid, held = fall(strands, fitting.fields, here, skin[-1:], parts, math.radians(self.start_deg))
+            rate = follow(strands, fitting.fields, near, grid, held, parts, moved)
+        if self.sweeps:
+            self._close(fitting, grid, skin[-1:], parts, (rate, np.zeros_like(rate), moved.carry, moved.swell))
+        row, unknowns = strands.place[vertices], 6 + len(pose.angles) + len(parameters)
+        return all_columns(grid.reshape(-1, 3)[row], rate.reshape(-1, 3, len(steps))[row], tried, unknowns)
 
     def touchable(self, scene: Scene) -> Bool:
         """Return which joints (J,) move what the garment hangs from or can touch."""
@@ -101,20 +133,6 @@ class Kinematic(Draper):
             self._fittings[garment] = known
         return known
 
-    def _fall(self, fitting: Fitting, chain: F64, out: F64, aside: F64, skin: F64, parts: F64) -> F64:
-        from mocapflow_draping.swing import swing_batch
-
-        strands = fitting.strands
-        facing, down = hanging(strands, chain, out, aside)
-        grid = np.empty((*out.shape, strands.vertex.shape[1], 3))
-        support = np.empty(out.shape, np.int32)
-        start = np.full(out.shape, math.radians(self.start_deg))
-        swing_batch(
-            roots(strands, chain), facing, down, start, skin, strands.links, strands.first, strands.last,
-            parts, fitting.fields.values, grid, support,
-        )  # fmt: skip
-        return grid
-
     def _step(self, fitting: Fitting, chain: F64, parameters: F64, garment: GarmentMesh, skin: F64, parts: F64) -> F64:
         from mocapflow_draping.literal import blow_batch, settle_batch
 
@@ -131,7 +149,7 @@ class Kinematic(Draper):
         blow_batch(grid, fixed, strands.first, strands.last, skin, force, amount, parts, values)
         return grid
 
-    def _close(self, fitting: Fitting, grid: F64, skin: F64, parts: F64) -> None:
+    def _close(self, fitting: Fitting, grid: F64, skin: F64, parts: F64, motion: Motion | None = None) -> None:
         from mocapflow_draping.rings import close_batch
 
         strands = fitting.strands
@@ -141,5 +159,5 @@ class Kinematic(Draper):
             bend = np.exp(-strands.links / self.bending_m)
         close_batch(
             grid, strands.links, strands.first, strands.last, across, length, skin, self.longest, self.stiff, bend,
-            self.sweeps, parts, fitting.fields.values,
+            self.sweeps, parts, fitting.fields.values, motion,
         )  # fmt: skip

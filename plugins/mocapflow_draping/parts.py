@@ -38,3 +38,20 @@ def posed_parts(fields: BodyFields, chain: F64) -> F64:
     parts[..., CENTRE:RADIUS] = centre
     parts[..., RADIUS] = fields.radius
     return parts
+
+
+def carried_rates(fields: BodyFields, chain: F64, steps: F64) -> F64:
+    """Return how the points of each part move: (P, 3, 4, S), affine in their place in the world.
+
+    Args:
+        fields: the parts.
+        chain: (S + 1, J, 4, 4) posed joints, one small step along each of S unknowns and, last, none.
+        steps: (S,) of the unknowns.
+    """
+    posed = 0.5 * (chain[:, fields.joints[:, 0]] + chain[:, fields.joints[:, 1]])
+    return rates((posed @ np.linalg.inv(posed[-1]))[..., :3, :], steps)
+
+
+def rates(values: F64, steps: F64) -> F64:
+    """Return rates (..., S) of values (S + 1, ...), one small step (S,) along each unknown and, last, none."""
+    return np.ascontiguousarray(np.moveaxis(values[:-1] - values[-1], 0, -1) / steps)

@@ -12,6 +12,7 @@ import numba
 import numpy as np
 
 from mocapflow_draping.distance import body_distance, outwards
+from mocapflow_draping.following import follow_length, follow_move, lack
 
 CLEAR = 2e-4  # m beyond contact to which a particle is pushed, so that it need not be pushed again at once
 PUSHES = 5  # out of the body and back to the bar's length
@@ -19,7 +20,7 @@ TURNS = 12  # of a bar that pushing did not free, towards straight out of the bo
 
 
 @numba.njit(cache=True, error_model="numpy")
-def push_out(grid, n, row, link, skin, seen, room, near, parts, values):  # type: ignore[no-untyped-def]
+def push_out(grid, n, row, link, skin, seen, room, near, parts, values, motion):  # type: ignore[no-untyped-def]
     """Move a particle that may be inside the body out of it, at the length of its bar."""
     p, above = grid[n, row], grid[n, row - 1]
     for _ in range(PUSHES):
@@ -28,7 +29,13 @@ def push_out(grid, n, row, link, skin, seen, room, near, parts, values):  # type
         _measure(p, n, skin, seen, room, near, parts, values)
         if room[n] >= 0.0:
             return
-        _move(p, CLEAR - room[n], outwards(p[0], p[1], p[2], near[n], parts, values))
+        out = outwards(p[0], p[1], p[2], near[n], parts, values)
+        if motion is not None:
+            rate, _, carry, swell = motion
+            follow_move(rate[n, row], lack(out, p, rate[n, row], carry[near[n]], swell), out)
+        _move(p, CLEAR - room[n], out)
+        if motion is not None:
+            follow_length(motion[0][n, row], motion[0][n, row - 1], p, above, link)
         to_length(p, above, link)
     part = body_distance(above[0], above[1], above[2], near[n], parts, values)[1]
     gx, gy, gz = outwards(above[0], above[1], above[2], part, parts, values)
@@ -38,6 +45,8 @@ def push_out(grid, n, row, link, skin, seen, room, near, parts, values):  # type
         p[0] = above[0] + link * ((1.0 - w) * ux + w * gx)
         p[1] = above[1] + link * ((1.0 - w) * uy + w * gy)
         p[2] = above[2] + link * ((1.0 - w) * uz + w * gz)
+        if motion is not None:  # its own turn is not followed: it ends where the skin lets it
+            follow_length(motion[0][n, row], motion[0][n, row - 1], p, above, link)
         to_length(p, above, link)
         _measure(p, n, skin, seen, room, near, parts, values)
         if room[n] >= 0.0:
@@ -45,7 +54,7 @@ def push_out(grid, n, row, link, skin, seen, room, near, parts, values):  # type
 
 
 @numba.njit(cache=True, error_model="numpy")
-def lift(grid, first, last, beside, row, seen, room, near, parts, values):  # type: ignore[no-untyped-def]
+def lift(grid, first, last, beside, row, seen, room, near, parts, values, motion):  # type: ignore[no-untyped-def]
     """Move both ends of a link out of the body where its middle is inside: no limb shall come between them."""
     middle = np.empty(3)
     for n in range(grid.shape[0]):
@@ -60,6 +69,13 @@ def lift(grid, first, last, beside, row, seen, room, near, parts, values):  # ty
         d, part = body_distance(middle[0], middle[1], middle[2], near[n], parts, values)
         if d < 0.0:
             out = outwards(middle[0], middle[1], middle[2], part, parts, values)
+            if motion is not None:
+                rate, _, carry, swell = motion
+                amount = lack(out, middle, 0.5 * (rate[n, row] + rate[m, row]), carry[part], 0.0 * swell)
+                if row > first[n]:
+                    follow_move(rate[n, row], amount, out)
+                if row > first[m]:
+                    follow_move(rate[m, row], amount, out)
             if row > first[n]:
                 _move(p, CLEAR - d, out)
             if row > first[m]:

@@ -15,6 +15,7 @@ import math
 import numba
 import numpy as np
 
+from mocapflow_draping.following import follow_draw, follow_length
 from mocapflow_draping.pushes import lift, push_out, to_length, way
 
 ENOUGH = 0.03  # of its length: a ring none of whose links is longer by more than that is let be
@@ -23,7 +24,7 @@ STRIDE = 0.02  # m beyond its room that a particle may go in one sweep, so that 
 
 
 @numba.njit(cache=True, error_model="numpy")
-def close_batch(grid, links, first, last, across, length, skin, longest, stiff, bend, sweeps, parts, values):  # type: ignore[no-untyped-def]
+def close_batch(grid, links, first, last, across, length, skin, longest, stiff, bend, sweeps, parts, values, motion):  # type: ignore[no-untyped-def]
     """Close the rings of B drapes in place.
 
     Args:
@@ -40,24 +41,35 @@ def close_batch(grid, links, first, last, across, length, skin, longest, stiff, 
         sweeps: passes over each row, at most.
         parts: (B, P, COLUMNS), the bodies, see `parts`.
         values: their voxels.
+        motion: None or, for one drape, what is brought along in place: rates (N, L, 3, S) of the particles, as much
+            room for those of the bars, those of the body's parts (P, 3, 4, S) and of the contact distance (S,).
     """
-    strands, rows = grid.shape[1], grid.shape[2]
-    bars, seen = np.empty((strands, rows, 3)), np.empty((strands, 3))
-    room, near = np.empty(strands), np.zeros(strands, np.int64)
     for b in range(len(grid)):
-        seen[:], room[:] = grid[b, :, 0], -1.0
-        _bars(grid[b], links, first, last, bars)
-        for row in range(1, rows):
-            _place(grid[b], bars, links, first, last, row, bend)
-            for sweep in range(sweeps):
-                for k in range(len(across) - 1, 0, -1):
-                    _pull(grid[b], first, last, across[k], length[k], row, longest, 0.0, sweep % 2 == 1)
-                excess = _pull(grid[b], first, last, across[0], length[0], row, longest, stiff, sweep % 2 == 1)
-                if sweep > 0:
-                    lift(grid[b], first, last, across[0], row, seen, room, near, parts[b], values)
-                _clear(grid[b], links, first, last, row, sweep > 0, skin[b], seen, room, near, parts[b], values)
-                if sweep + 1 >= LEAST and excess < ENOUGH:
-                    break
+        _close(
+            grid[b], links, first, last, across, length, skin[b], longest, stiff, bend, sweeps, parts[b], values, motion
+        )  # fmt: skip
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _close(grid, links, first, last, across, length, skin, longest, stiff, bend, sweeps, parts, values, motion):  # type: ignore[no-untyped-def]
+    strands, rows = grid.shape[0], grid.shape[1]
+    bars, seen = np.empty((strands, rows, 3)), grid[:, 0].copy()
+    room, near = np.full(strands, -1.0), np.zeros(strands, np.int64)
+    _bars(grid, links, first, last, bars)
+    if motion is not None:
+        _bars(motion[0], links, first, last, motion[1])
+    for row in range(1, rows):
+        _place(grid, bars, links, first, last, row, bend, motion)
+        for sweep in range(sweeps):
+            back = sweep % 2 == 1
+            for k in range(len(across) - 1, 0, -1):
+                _pull(grid, first, last, across[k], length[k], row, longest, 0.0, back, motion)
+            excess = _pull(grid, first, last, across[0], length[0], row, longest, stiff, back, motion)
+            if sweep > 0:
+                lift(grid, first, last, across[0], row, seen, room, near, parts, values, motion)
+            _clear(grid, links, first, last, row, sweep > 0, skin, seen, room, near, parts, values, motion)
+            if sweep + 1 >= LEAST and excess < ENOUGH:
+                break
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -69,7 +81,7 @@ def _bars(grid, links, first, last, bars):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _place(grid, bars, links, first, last, row, bend):  # type: ignore[no-untyped-def]
+def _place(grid, bars, links, first, last, row, bend, motion):  # type: ignore[no-untyped-def]
     """Hang a row from the one above it: as it fell, but for the direction it keeps of the bar above."""
     for n in range(grid.shape[0]):
         if first[n] < row <= last[n]:
@@ -78,11 +90,18 @@ def _place(grid, bars, links, first, last, row, bend):  # type: ignore[no-untype
             for a in range(3):
                 kept = (above[a] - grid[n, row - 2, a]) / links[n, row - 2] if share > 0.0 else 0.0
                 p[a] = above[a] + link * (share * kept + (1.0 - share) * bars[n, row, a])
+            if motion is not None:
+                rate = motion[0][n]
+                turn = (1.0 - share) * motion[1][n, row]
+                if share > 0.0:
+                    turn += share / links[n, row - 2] * (rate[row - 1] - rate[row - 2])
+                rate[row] = rate[row - 1] + link * turn
+                follow_length(rate[row], rate[row - 1], p, above, link)
             to_length(p, above, link)
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _pull(grid, first, last, across, length, row, longest, stiff, backwards):  # type: ignore[no-untyped-def]
+def _pull(grid, first, last, across, length, row, longest, stiff, backwards, motion):  # type: ignore[no-untyped-def]
     """Draw together what is too far apart; return the largest such excess, as a share of the distance."""
     strands, worst = grid.shape[0], 0.0
     for step in range(strands):
@@ -94,12 +113,14 @@ def _pull(grid, first, last, across, length, row, longest, stiff, backwards):  #
         dx, dy, dz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
         square, most, rest = dx * dx + dy * dy + dz * dz, longest * length[n, row], length[n, row]
         if square > most * most:
-            share = 1.0 - most / math.sqrt(square)
+            share, limit = 1.0 - most / math.sqrt(square), 1.0
             worst = max(worst, share)
         elif stiff > 0.0 and 0.0 < square < rest * rest:
-            share = stiff * (1.0 - rest / math.sqrt(square))
+            share, limit = stiff * (1.0 - rest / math.sqrt(square)), stiff
         else:
             continue
+        if motion is not None:
+            follow_draw(motion[0][n, row], motion[0][m, row], p, q, share, limit, row > first[n], row > first[m])
         _draw(p, q, share, row > first[n], row > first[m])
     return worst
 
@@ -121,7 +142,7 @@ def _draw(p, q, share, p_moves, q_moves):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _clear(grid, links, first, last, row, limited, skin, seen, room, near, parts, values):  # type: ignore[no-untyped-def]
+def _clear(grid, links, first, last, row, limited, skin, seen, room, near, parts, values, motion):  # type: ignore[no-untyped-def]
     """Give every bar of a row its length, outside the body."""
     for n in range(grid.shape[0]):
         if first[n] < row <= last[n]:
@@ -130,5 +151,7 @@ def _clear(grid, links, first, last, row, limited, skin, seen, room, near, parts
             if limited and far > most:
                 for a in range(3):
                     p[a] = seen[n, a] + most / far * (p[a] - seen[n, a])
+            if motion is not None:
+                follow_length(motion[0][n, row], motion[0][n, row - 1], p, grid[n, row - 1], link)
             to_length(p, grid[n, row - 1], link)
-            push_out(grid, n, row, link, skin, seen, room, near, parts, values)
+            push_out(grid, n, row, link, skin, seen, room, near, parts, values, motion)

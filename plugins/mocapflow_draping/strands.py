@@ -47,6 +47,13 @@ class Strands:
         return _own(self.first, self.last, self.vertex.shape[1])
 
     @cached_property
+    def place(self) -> I32:
+        """(W,), where each cloth vertex stands among the N x L particles."""
+        place = np.zeros(self.vertex.max() + 1, np.int32)
+        place[self.vertex[self.own]] = np.flatnonzero(self.own)
+        return place
+
+    @cached_property
     def spans(self) -> tuple[I32, F64]:
         """Strands (K, N, L) that lie 1, 2, 4, ... links to the left within a row, or -1, and the cloth between in m."""
         across, length = [self.beside], [self.ring_length]

@@ -22,7 +22,7 @@ TOUCH = 3e-4  # m, nearer than this to the contact distance counts as touching
 
 
 @numba.njit(cache=True, error_model="numpy")
-def swing_batch(roots, facing, down, start, skin, links, first, last, parts, values, out, support):  # type: ignore[no-untyped-def]
+def swing_batch(roots, facing, down, start, skin, links, first, last, parts, values, out, held):  # type: ignore[no-untyped-def]
     """Drape N strands of up to L particles on B posed bodies.
 
     Args:
@@ -37,20 +37,21 @@ def swing_batch(roots, facing, down, start, skin, links, first, last, parts, val
         parts: (B, P, COLUMNS), the bodies, see `parts`.
         values: their voxels.
         out: (B, N, L, 3) m, written.
-        support: (B, N), written: the last supported particle of each strand.
+        held: (B, N, L), written: the part that each particle touches, plus one; 0 where it touches none.
     """
     rows = links.shape[1] + 1
     reach, room, near = np.empty(rows), np.empty(rows), np.zeros(rows, np.int64)
     for b in range(len(roots)):
         for n in range(roots.shape[1]):
-            support[b, n] = _swing(
+            held[b, n] = 0
+            _swing(
                 roots[b, n], facing[b, n], down[b, n], start[b, n], skin[b], links[n], first[n], last[n],
-                parts[b], values, out[b, n], reach, room, near,
+                parts[b], values, out[b, n], held[b, n], reach, room, near,
             )  # fmt: skip
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _swing(root, facing, down, start, skin, links, first, last, parts, values, out, reach, room, near):  # type: ignore[no-untyped-def]
+def _swing(root, facing, down, start, skin, links, first, last, parts, values, out, held, reach, room, near):  # type: ignore[no-untyped-def]
     """Drape one strand; `reach` is along the strand, `room` how far each particle may yet move untouched."""
     out[first] = root
     reach[first] = 0.0
@@ -90,9 +91,9 @@ def _swing(root, facing, down, start, skin, links, first, last, parts, values, o
             arm = reach[k] - base
             out[k, 0], out[k, 1], out[k, 2] = x[0] + arm * bx, x[1] + arm * by, x[2] + arm * bz
         if touched < 0:
-            return pivot
+            return
+        held[touched] = near[touched] + 1
         pivot = touched
-    return pivot
 
 
 @numba.njit(cache=True, error_model="numpy")

@@ -138,14 +138,14 @@ def swing(body, roots, facing, count, link, down=(0.0, 0.0, -1.0), start=90.0, v
     """Drape strands (N) on a resting body; return particles (N, L, 3) and the last supported one (N,)."""
     values, parts = prepared(body, voxel=voxel)
     many = len(roots)
-    out, support = np.empty((1, many, count, 3)), np.empty((1, many), np.int32)
+    out, held = np.empty((1, many, count, 3)), np.empty((1, many, count), np.int32)
     swing_batch(
         np.asarray(roots, float)[None], np.tile(np.asarray(facing, float), (1, many, 1)),
         np.tile(np.asarray(down, float), (1, many, 1)), np.full((1, many), np.radians(start)), np.array([SKIN]),
         np.full((many, count - 1), link), np.zeros(many, np.int32), np.full(many, count - 1, np.int32),
-        parts, values, out, support,
+        parts, values, out, held,
     )  # fmt: skip
-    return out[0], support[0]
+    return out[0], np.where(held[0] > 0, np.arange(count), 0).max(axis=1)
 
 
 def distances(body, points, poses=None, voxel=VOXEL):

@@ -1,0 +1,133 @@
+"""How a drape moves: the rates of its particles through each step of draping, contacts held as they are (numba).
+
+Rates are per column of unknowns, (..., 3, S), columns side by side for the processor's wide registers. A particle that
+touches a part of the body goes along its normal as that part does, and is free to slide.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numba
+
+from mocapflow_draping.distance import outwards
+
+GRAZING = 0.2  # least slope at which a bar is said to meet the skin: below, its turn would be without bounds
+
+
+@numba.njit(cache=True, error_model="numpy")
+def follow_swing(  # type: ignore[no-untyped-def]
+    grid, held, facing, down, roots, facing_rate, down_rate, links, first, last, parts, values, carry, swell, rate
+):
+    """Write the rates of strands as they fell on one body.
+
+    Args:
+        grid: (N, L, 3) m, draped strands.
+        held: (N, L) part that a particle touches, plus one; 0 where it hangs free.
+        facing: (N, 3) unit directions in which strands stand out.
+        down: (N, 3) unit directions in which they come to hang.
+        roots: (N, 3, S) rates of the pinned particles.
+        facing_rate: (N, 3, S).
+        down_rate: (N, 3, S).
+        links: (N, L - 1) m, lengths of the bars.
+        first: (N,) row of the first particle of each strand.
+        last: (N,) row of the last one.
+        parts: (P, COLUMNS), the body, see `parts`.
+        values: its voxels.
+        carry: (P, 3, 4, S) rates of a part's points, affine in their place in the world.
+        swell: (S,) rate of the contact distance.
+        rate: (N, L, 3, S), written.
+    """
+    for n in range(len(grid)):
+        pivot = first[n]
+        rate[n, pivot] = roots[n]
+        while pivot < last[n]:
+            end, arm = pivot + 1, links[n, pivot]
+            while end < last[n] and held[n, end] == 0:
+                arm += links[n, end]
+                end += 1
+            x, p = grid[n, pivot], grid[n, end]
+            ux, uy, uz = (p[0] - x[0]) / arm, (p[1] - x[1]) / arm, (p[2] - x[2]) / arm
+            f, d = facing[n], down[n]
+            sine, cosine = ux * f[0] + uy * f[1] + uz * f[2], ux * d[0] + uy * d[1] + uz * d[2]
+            bar = sine * facing_rate[n] + cosine * down_rate[n]
+            if held[n, end] > 0:
+                part = held[n, end] - 1
+                gx, gy, gz = outwards(p[0], p[1], p[2], part, parts, values)
+                tx, ty, tz = cosine * f[0] - sine * d[0], cosine * f[1] - sine * d[1], cosine * f[2] - sine * d[2]
+                slope = arm * max(gx * tx + gy * ty + gz * tz, GRAZING)
+                reached = rate[n, pivot] + arm * bar
+                turn = lack((gx, gy, gz), p, reached, carry[part], swell) / slope
+                bar[0] += turn * tx
+                bar[1] += turn * ty
+                bar[2] += turn * tz
+            away = 0.0
+            for k in range(pivot + 1, end + 1):
+                away += links[n, k - 1]
+                rate[n, k] = rate[n, pivot] + away * bar
+            pivot = end
+
+
+@numba.njit(cache=True, error_model="numpy")
+def lack(normal, p, rate, carry, swell):  # type: ignore[no-untyped-def]
+    """Return how much faster (S,) a particle at p with rates (3, S) would have to leave the body to stay in contact."""
+    gx, gy, gz = normal
+    wanted = swell.copy()
+    for s in range(len(wanted)):
+        vx = carry[0, 0, s] * p[0] + carry[0, 1, s] * p[1] + carry[0, 2, s] * p[2] + carry[0, 3, s]
+        vy = carry[1, 0, s] * p[0] + carry[1, 1, s] * p[1] + carry[1, 2, s] * p[2] + carry[1, 3, s]
+        vz = carry[2, 0, s] * p[0] + carry[2, 1, s] * p[1] + carry[2, 2, s] * p[2] + carry[2, 3, s]
+        wanted[s] += gx * (vx - rate[0, s]) + gy * (vy - rate[1, s]) + gz * (vz - rate[2, s])
+    return wanted
+
+
+@numba.njit(cache=True, error_model="numpy")
+def follow_move(rate, amount, towards):  # type: ignore[no-untyped-def]
+    """Add amounts (S,) along a direction to rates (3, S)."""
+    for a in range(3):
+        for s in range(len(amount)):
+            rate[a, s] += towards[a] * amount[s]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def follow_length(rate, above, p, x, link):  # type: ignore[no-untyped-def]
+    """Change the rates (3, S) of a bar's lower end, on its way from p to its length from x, which has `above`."""
+    dx, dy, dz = p[0] - x[0], p[1] - x[1], p[2] - x[2]
+    r = max(math.sqrt(dx * dx + dy * dy + dz * dz), 1e-9)
+    ux, uy, uz, scale = dx / r, dy / r, dz / r, link / r
+    for s in range(rate.shape[1]):
+        ex, ey, ez = rate[0, s] - above[0, s], rate[1, s] - above[1, s], rate[2, s] - above[2, s]
+        along = ux * ex + uy * ey + uz * ez
+        rate[0, s] = above[0, s] + scale * (ex - along * ux)
+        rate[1, s] = above[1, s] + scale * (ey - along * uy)
+        rate[2, s] = above[2, s] + scale * (ez - along * uz)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def follow_draw(rate, other, p, q, share, most, p_moves, q_moves):  # type: ignore[no-untyped-def]
+    """Change the rates (3, S) of two particles that are drawn together by a share of the way between them.
+
+    Args:
+        rate: of p.
+        other: of q.
+        p: (3,) m, before.
+        q: (3,) m, before.
+        share: of the way; it grows with the way, up to `most` for an endless one.
+        most: see there.
+        p_moves: p is not pinned.
+        q_moves: q is not pinned.
+    """
+    dx, dy, dz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+    half = 0.5 if p_moves and q_moves else 1.0
+    keep, grow = half * share, half * (most - share) / (dx * dx + dy * dy + dz * dz)
+    here, there = (1.0 if p_moves else 0.0), (1.0 if q_moves else 0.0)
+    for s in range(rate.shape[1]):
+        ex, ey, ez = other[0, s] - rate[0, s], other[1, s] - rate[1, s], other[2, s] - rate[2, s]
+        apart = grow * (dx * ex + dy * ey + dz * ez)
+        mx, my, mz = keep * ex + apart * dx, keep * ey + apart * dy, keep * ez + apart * dz
+        rate[0, s] += here * mx
+        rate[1, s] += here * my
+        rate[2, s] += here * mz
+        other[0, s] -= there * mx
+        other[1, s] -= there * my
+        other[2, s] -= there * mz
