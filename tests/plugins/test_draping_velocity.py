@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from drape_bodies import SKIN, leg_poses, legs
+from drape_bodies import SKIN, SKIRT, leg_poses, legs
 from mocapflow_draping.kinematic import Kinematic
 from mocapflow_garments.cylinder import Cylinder
 from mocapflow_garments.skirt import Skirt
-from test_draping import SKIRT
 
 from mocapflow.components import Draper
 from mocapflow.data import Past, Pose
