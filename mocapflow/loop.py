@@ -89,8 +89,8 @@ def pool_matches(
     turn: Turn,
     surface: Surface,
 ) -> Matches:
-    """Return the matches of all matchers together, each with its share."""
-    return pool([(m.share, m.match(frame, segmentation, surface, past, scene, turn)) for m in matchers])
+    """Return the matches of all matchers together, each with its share, where nothing hides the person."""
+    return scene.unhidden(pool([(m.share, m.match(frame, segmentation, surface, past, scene, turn)) for m in matchers]))
 
 
 def overlaps(surface: Surface, segmentation: Segmentation, cameras: Sequence[Camera]) -> F64:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cached_property
 
 import numpy as np
 
 from mocapflow.assets import Background, Body, Camera, GarmentMesh
-from mocapflow.data import BODY, CLOTH, Cloth, Pose, Surface
+from mocapflow.data import BODY, CLOTH, Cloth, Matches, Pose, Surface
 from mocapflow.geometry import kinematics, meshes
 from mocapflow.records import F64, I32, U8, Bool, record
 
@@ -84,6 +84,17 @@ class Scene:
             edges=self.undressed.edges,
             layer=surface.layer[:count],
         )
+
+    def unhidden(self, matches: Matches) -> Matches:
+        """Return the matches whose pixel is not hidden by what stands before the person."""
+        if self.background is None or not self.background.hidden:
+            return matches
+        seen = np.ones(len(matches.camera), bool)
+        for camera, hidden in enumerate(self.background.hidden):
+            rows = np.flatnonzero(matches.camera == camera)
+            x, y = np.rint(matches.pixel[rows].T).astype(int)
+            seen[rows] = ~hidden[np.clip(y, 0, len(hidden) - 1), np.clip(x, 0, hidden.shape[1] - 1)]
+        return replace(matches, **{f.name: getattr(matches, f.name)[seen] for f in fields(matches)})
 
     def surface(self, pose: Pose, cloth: Cloth) -> Surface:
         """Return body and garment posed in the world."""

@@ -17,7 +17,7 @@ from mocapflow.scene import Scene
 from mocapflow_levelset.channels import ChannelName, features
 from mocapflow_levelset.evidence import calmed, without_outliers
 from mocapflow_levelset.evolve import Rhythm, Weights
-from mocapflow_levelset.masks import counted
+from mocapflow_levelset.masks import counted, hidden_in
 from mocapflow_levelset.plates import Plate, Shadow, density_of, plate_of
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.shadows import floor_around
@@ -91,15 +91,16 @@ class BackgroundDifference(Segmenter):
         """
         plate = plate_of(background.mean[camera], background.spread[camera], CHANNELS)
         image = without_outliers(image, self.median_px)
-        start = self._start(image, model, plate, floor)
+        hidden = hidden_in(background, camera)
+        start = self._start(image, model, plate, floor, hidden)
         if not self.refine_steps:
             return redistance(start, self.band_px)
-        view = View(image, start, start, counted(start.shape, 0), Empty({1: plate}, floor))
+        view = View(image, start, start, counted(start.shape, 0, hidden), Empty({1: plate}, floor))
         against_plate = Level(1, Rhythm(self.refine_steps, 3, 3), Window(12.0, 8, 0.02))
         levels = [against_plate, against_plate._replace(use_plate=False)]
         return find(view, levels, self._method(), self.band_px).level
 
-    def _start(self, image: U8, model: F32, plate: Plate, floor: F32) -> F32:
+    def _start(self, image: U8, model: F32, plate: Plate, floor: F32, hidden: Bool | None) -> F32:
         """Return a level set (H, W), not a distance: positive where the image is unlike the plate."""
         import cv2
 
@@ -107,6 +108,8 @@ class BackgroundDifference(Segmenter):
         values, expected = calm.reshape(len(calm), -1), plate.planes.reshape(len(calm), -1)
         density = density_of(values, expected, plate.spread.ravel(), floor.ravel(), CHANNELS, self._shadow())
         change = cv2.GaussianBlur(np.clip(-density.reshape(model.shape), -6, 6), (0, 0), self.smooth_px)
+        if hidden is not None:
+            change[hidden] = np.clip(model[hidden], -1, 1)  # nothing else tells
         kept = self._person(change > 0, model)
         return np.where(kept, np.maximum(change, 0.1), np.minimum(change, -0.1)).astype(np.float32)
 

@@ -15,7 +15,7 @@ from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.scene import Scene
 from mocapflow_levelset.channels import ChannelName
 from mocapflow_levelset.evolve import Rhythm, Weights
-from mocapflow_levelset.masks import counted, without_cut
+from mocapflow_levelset.masks import counted, hidden_in, without_cut
 from mocapflow_levelset.plates import Plate, Shadow, plate_of
 from mocapflow_levelset.shadows import floor_around
 from mocapflow_levelset.statistics import Window
@@ -94,11 +94,12 @@ class LevelSet(Segmenter):
             model = model_distance(surface, camera, self.band_px)
             warm = turn.index > 0 and c in last
             levels = self._levels(warm)
+            weight = counted(model.shape, self.border_px, hidden_in(scene.background, c))
             view = View(
                 image=frame.images[c],
                 start=last[c] if warm else model,
                 prior=model,
-                counted=without_cut(counted(model.shape, self.border_px), model, scene.body, surface, camera),
+                counted=without_cut(weight, model, scene.body, surface, camera),
                 empty=self._empty(scene, surface, c, levels),
             )
             found = find(view, levels, self._method(), self.band_px)

@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import numpy as np
 
-from mocapflow.assets import Body, Camera
+from mocapflow.assets import Background, Body, Camera
 from mocapflow.data import Surface
 from mocapflow.geometry.cameras import project
-from mocapflow.records import F32
+from mocapflow.records import F32, Bool
 
 RIM_TOLERANCE_PX = 1.5  # a pixel whose distances to rim and outline agree this well lies beyond the rim
 
 
-def counted(shape: tuple[int, int], border_px: int) -> F32:
-    """Return 1 for the pixels of an image (H, W) that count and 0 for its border."""
+def counted(shape: tuple[int, int], border_px: int, hidden: Bool | None = None) -> F32:
+    """Return 1 for the pixels of an image (H, W) that count and 0 for its border and where the person is hidden."""
     weight = np.zeros(shape, np.float32)
     weight[border_px : shape[0] - border_px, border_px : shape[1] - border_px] = 1
+    if hidden is not None:
+        weight[hidden] = 0
     return weight
+
+
+def hidden_in(background: Background | None, camera: int) -> Bool | None:
+    """Return where a view (H, W) is hidden, None where nowhere."""
+    return background.hidden[camera] if background is not None and background.hidden else None
 
 
 def without_cut(weight: F32, model: F32, body: Body, surface: Surface, camera: Camera) -> F32:

@@ -12,10 +12,13 @@ from mocapflow.assets import Background
 from mocapflow.components import Stage
 from mocapflow.errors import RecordingError
 from mocapflow.recording import Recording
-from mocapflow.records import F32, U8
+from mocapflow.records import F32, U8, Bool
 
 ROWS = 64  # of the images at a time: the median's working memory
 LEAST_SPREAD = 1.0  # grey levels; the rounding of 8-bit pictures alone makes 0.3
+SAME = 8  # grey levels, over all samples
+UNLIKE = 20.0  # grey levels from the plate
+OPENED, WIDENED = 5, 11  # px: smaller occluders are noise; around them pictures are mixed
 NORMAL = 1.4826  # standard deviation of a normal variable over its median absolute deviation
 
 
@@ -30,6 +33,7 @@ class EmptyScene(Stage):
     name: ClassVar[str] = "background"
     source: Literal["auto", "plates", "median"] = "auto"  # auto: the plates where there are any
     samples: Annotated[int, Field(ge=3)] = 25  # frames the median is taken over
+    occluders: bool = False  # with plates: find what stands before the person in the whole recording
 
     def run(self, recording: Recording) -> Background:
         """Return mean and spread of every pixel of the empty scene.
@@ -39,7 +43,7 @@ class EmptyScene(Stage):
         """
         plates = None if self.source == "median" else recording.background()
         if plates is not None:
-            return plates
+            return self._with_occluders(plates, recording) if self.occluders else plates
         if self.source == "plates":
             raise RecordingError(
                 "there are no clean plates",
@@ -48,6 +52,10 @@ class EmptyScene(Stage):
             )
         pairs = [temporal_median(self._pictures(recording, c)) for c in range(len(recording.views))]
         return Background(mean=tuple(mean for mean, _ in pairs), spread=tuple(spread for _, spread in pairs))
+
+    def _with_occluders(self, plates: Background, recording: Recording) -> Background:
+        hidden = [unmoved(self._pictures(recording, c), plates.mean[c]) for c in range(len(recording.views))]
+        return replace(plates, hidden=tuple(hidden))
 
     def _pictures(self, recording: Recording, camera: int) -> U8:
         """Return pictures (N, H, W, 3) of one camera, spread over the recording."""
@@ -61,6 +69,16 @@ class EmptyScene(Stage):
                 hint="give a clean plate in background/, or a longer recording",
             )
         return np.stack(pictures)
+
+
+def unmoved(pictures: U8, plate: F32) -> Bool:
+    """Return where pictures (N, H, W, 3) all look the same and unlike the clean plate (H, W, 3): no person does."""
+    import cv2
+
+    same = (pictures.max(axis=0) - pictures.min(axis=0)).max(axis=2) <= SAME
+    unlike = np.abs(pictures[0] - plate).max(axis=2) > UNLIKE
+    whole = cv2.morphologyEx((same & unlike).astype(np.uint8), cv2.MORPH_OPEN, np.ones((OPENED, OPENED), np.uint8))
+    return np.asarray(cv2.dilate(whole, np.ones((WIDENED, WIDENED), np.uint8)), bool)
 
 
 def temporal_median(pictures: U8) -> tuple[F32, F32]:
