@@ -59,6 +59,7 @@ class Frame:
     images: tuple[U8, ...]  # C x (H, W, 3) BGR, undistorted
     usable: Bool = array("C", unit="False: lost or corrupted view")
     reasons: tuple[str, ...] = ()  # why a view is not usable, "" where it is; empty: all usable
+    hidden: tuple[Bool, ...] = ()  # C x (H, W) True where a picture shows nothing of the scene; empty: nowhere
     flow: tuple[Flow, ...] | None = None  # from the previous frame, C x
     keypoints: tuple[F64, ...] | None = None  # C x (N people, K, 3) px, px, confidence; undistorted
 

@@ -90,7 +90,8 @@ def pool_matches(
     surface: Surface,
 ) -> Matches:
     """Return the matches of all matchers together, each with its share, where nothing hides the person."""
-    return scene.unhidden(pool([(m.share, m.match(frame, segmentation, surface, past, scene, turn)) for m in matchers]))
+    found = pool([(m.share, m.match(frame, segmentation, surface, past, scene, turn)) for m in matchers])
+    return scene.unhidden(found, frame)
 
 
 def overlaps(surface: Surface, segmentation: Segmentation, cameras: Sequence[Camera]) -> F64:

@@ -27,10 +27,14 @@ def hiding(scene, rows):
 def test_a_match_behind_what_hides_the_person_is_left_out():
     scene = scenes.tiny_scene()
     found = matches([[10, 99], [10, 100.4], [12, 120], [400, -3]], 0)
-    assert scene.unhidden(found) is found
+    frame = pictures.tiny_frame(scene, scenes.tiny_pose(scene))
+    assert scene.unhidden(found, frame) is found
     behind = hiding(scene, slice(100, 110))
-    assert behind.unhidden(found).vertex.tolist() == [0, 2, 3]
-    assert len(behind.unhidden(matches([[10, 105]], 1)).vertex) == 1
+    assert behind.unhidden(found, frame).vertex.tolist() == [0, 2, 3]
+    assert len(behind.unhidden(matches([[10, 105]], 1), frame).vertex) == 1
+    dark = replace(frame, hidden=tuple(np.repeat([[[True]]], SIZE[1], axis=1).repeat(SIZE[0], axis=2)) * 4)
+    assert len(scene.unhidden(found, dark).vertex) == 0
+    assert behind.hidden(dark, 0).all() and scene.hidden(frame, 0) is None
 
 
 def test_segmenters_keep_to_the_model_where_the_person_is_hidden():

@@ -17,7 +17,7 @@ from mocapflow.scene import Scene
 from mocapflow_levelset.channels import ChannelName, features
 from mocapflow_levelset.evidence import calmed, without_outliers
 from mocapflow_levelset.evolve import Rhythm, Weights
-from mocapflow_levelset.masks import counted, hidden_in
+from mocapflow_levelset.masks import counted
 from mocapflow_levelset.plates import Plate, Shadow, density_of, plate_of
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.shadows import floor_around
@@ -75,11 +75,13 @@ class BackgroundDifference(Segmenter):
                 continue
             model = model_distance(surface, camera, self.band_px)
             floor = floor_around(surface, camera, self.shadow_reach_m)
-            distance = self.find(frame.images[c], model, floor, scene.background, c)
+            distance = self.find(frame.images[c], model, floor, scene.background, c, scene.hidden(frame, c))
             silhouettes.append(Silhouette(camera=c, layer=PERSON, distance=distance))
         return Segmentation(silhouettes=tuple(silhouettes))
 
-    def find(self, image: U8, model: F32, floor: F32, background: Background, camera: int) -> F32:
+    def find(
+        self, image: U8, model: F32, floor: F32, background: Background, camera: int, hidden: Bool | None = None
+    ) -> F32:
         """Return the signed distance (H, W) px to the person's outline in one image.
 
         Args:
@@ -88,10 +90,10 @@ class BackgroundDifference(Segmenter):
             floor: (H, W) 1 where a shadow may fall.
             background: the empty scene.
             camera: which of its views.
+            hidden: (H, W) True where the picture shows nothing of the person; None: nowhere.
         """
         plate = plate_of(background.mean[camera], background.spread[camera], CHANNELS)
         image = without_outliers(image, self.median_px)
-        hidden = hidden_in(background, camera)
         start = self._start(image, model, plate, floor, hidden)
         if not self.refine_steps:
             return redistance(start, self.band_px)

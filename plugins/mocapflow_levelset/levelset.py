@@ -15,7 +15,7 @@ from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.scene import Scene
 from mocapflow_levelset.channels import ChannelName
 from mocapflow_levelset.evolve import Rhythm, Weights
-from mocapflow_levelset.masks import counted, hidden_in, without_cut
+from mocapflow_levelset.masks import counted, without_cut
 from mocapflow_levelset.plates import Plate, Shadow, plate_of
 from mocapflow_levelset.shadows import floor_around
 from mocapflow_levelset.statistics import Window
@@ -94,7 +94,7 @@ class LevelSet(Segmenter):
             model = model_distance(surface, camera, self.band_px)
             warm = turn.index > 0 and c in last
             levels = self._levels(warm)
-            weight = counted(model.shape, self.border_px, hidden_in(scene.background, c))
+            weight = counted(model.shape, self.border_px, scene.hidden(frame, c))
             view = View(
                 image=frame.images[c],
                 start=last[c] if warm else model,

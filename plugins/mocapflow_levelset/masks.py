@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mocapflow.assets import Background, Body, Camera
+from mocapflow.assets import Body, Camera
 from mocapflow.data import Surface
 from mocapflow.geometry.cameras import project
 from mocapflow.records import F32, Bool
@@ -19,11 +19,6 @@ def counted(shape: tuple[int, int], border_px: int, hidden: Bool | None = None) 
     if hidden is not None:
         weight[hidden] = 0
     return weight
-
-
-def hidden_in(background: Background | None, camera: int) -> Bool | None:
-    """Return where a view (H, W) is hidden, None where nowhere."""
-    return background.hidden[camera] if background is not None and background.hidden else None
 
 
 def without_cut(weight: F32, model: F32, body: Body, surface: Surface, camera: Camera) -> F32:

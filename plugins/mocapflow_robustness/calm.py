@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -50,14 +49,17 @@ class Medians:
         if not self.settings.across_time:
             yield from map(self._filtered, replace(source, indices=indices).frames())
             return
-        first, last = max(indices[0] - 1, 0), min(indices[-1] + 2, source.length)
-        window: list[Frame | None] = [None, None]
-        every = map(self._filtered, replace(source, indices=range(first, last)).frames())
-        for after in chain(every, [None]):
-            before, now = window
-            if now is not None and now.index in indices:
-                yield in_time(before, now, after)
-            window = [now, after]
+        # at its ends the recording has no neighbour on one side: there the next but one takes the place
+        first, last = max(min(indices[0], source.length - 2) - 1, 0), min(max(indices[-1], 1) + 2, source.length)
+        window: list[Frame] = []
+        for frame in map(self._filtered, replace(source, indices=range(first, last)).frames()):
+            window = [*window[-2:], frame]
+            if len(window) == 3:
+                ends = (first == 0 and frame.index == 2, True, frame.index == source.length - 1)
+                wanted = [k for k, end in enumerate(ends) if end and window[k].index in indices]
+                yield from (in_time(window, k) for k in wanted)
+        if len(window) < 3:  # a recording of one or two frames
+            yield from (frame for frame in window if frame.index in indices)
 
     def _filtered(self, frame: Frame) -> Frame:
         import cv2
@@ -68,16 +70,14 @@ class Medians:
         return replace(frame, images=tuple(np.asarray(cv2.medianBlur(i, width), np.uint8) for i in frame.images))
 
 
-def in_time(before: Frame | None, now: Frame, after: Frame | None) -> Frame:
-    """Return a frame whose pictures are medians with those before and after, in views that all three have."""
-    if before is None or after is None:
-        return now
-    all_three = before.usable & now.usable & after.usable
+def in_time(window: Sequence[Frame], which: int) -> Frame:
+    """Return one of three frames with the median of all three for pictures, in views that all three have."""
+    all_three = np.all([frame.usable for frame in window], axis=0)
     images = [
-        middle(*three) if usable else three[1]
-        for three, usable in zip(zip(before.images, now.images, after.images, strict=True), all_three, strict=True)
+        middle(*views) if usable else views[which]
+        for views, usable in zip(zip(*(frame.images for frame in window), strict=True), all_three, strict=True)
     ]
-    return replace(now, images=tuple(images))
+    return replace(window[which], images=tuple(images))
 
 
 def middle(one: U8, two: U8, three: U8) -> U8:

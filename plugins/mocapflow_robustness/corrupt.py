@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, Literal
 from zlib import crc32
@@ -14,7 +14,7 @@ from mocapflow.components import Stage
 from mocapflow.data import Frame
 from mocapflow.errors import RecordingError, alternatives
 from mocapflow.recording import Recording
-from mocapflow.records import U8
+from mocapflow.records import U8, Bool
 from mocapflow_robustness import pixels
 from mocapflow_robustness.events import Event
 from mocapflow_robustness.tape import Tape
@@ -77,16 +77,15 @@ class Corruption:
         images, usable = list(frame.images), frame.usable.copy()
         reasons = list(frame.reasons or [""] * len(names))
         keypoints = None if frame.keypoints is None else list(frame.keypoints)
-        for camera, view in enumerate(names):
-            event = next((e for e in reversed(self.settings.events) if e.holds(frame.index, view)), None)
+        events = [self._event(frame.index, view) for view in names]
+        for camera, (view, event) in enumerate(zip(names, events, strict=True)):
             if event is not None and event.what == "dropped":
                 usable[camera], reasons[camera] = False, "dropped"
                 images[camera] = np.zeros_like(images[camera])
             elif usable[camera]:
                 rng = np.random.default_rng([self.settings.seed, crc32(view.encode()), frame.index])
-                image = (
-                    images[camera] if event is None else self._instead(event, images[camera], frame, view, rng, tapes)
-                )
+                image = images[camera]
+                image = image if event is None else self._instead(event, image, frame, view, rng, tapes)
                 images[camera] = self._spoiled(image, rng)
             if event is not None and keypoints is not None:
                 keypoints[camera] = keypoints[camera][:0]
@@ -95,8 +94,13 @@ class Corruption:
             images=tuple(images),
             usable=usable,
             reasons=() if usable.all() else tuple(reasons),
+            hidden=masks(events, images) or frame.hidden,
             keypoints=None if keypoints is None else tuple(keypoints),
         )
+
+    def _event(self, index: int, view: str) -> Event | None:
+        """Return what happens to a frame of a view."""
+        return next((event for event in reversed(self.settings.events) if event.holds(index, view)), None)
 
     def _spoiled(self, image: U8, rng: np.random.Generator) -> U8:
         """Return a picture with what covers every picture."""
@@ -114,11 +118,22 @@ class Corruption:
         if event.what == "torn":
             return pixels.torn(image, rng)
         if event.what == "covered":
-            return pixels.covered(image, round(len(image) * (1 - event.share)), len(image))
+            return pixels.covered(image, event.first_covered(len(image)), len(image))
         names = [v.lens.name for v in self.whole.views]
         camera = (names.index(view) + (event.what == "other_camera")) % len(names)
         tape = tapes.setdefault((event, view), Tape(self.whole.seen_by(camera)))
         return fitted(tape.at(event.source(frame.index, self.whole.length)).images[0], image)
+
+
+def masks(events: Sequence[Event | None], images: Sequence[U8]) -> tuple[Bool, ...]:
+    """Return where pictures (H, W, 3) are covered, (H, W) each; nothing where none is."""
+    if not any(event is not None and event.what == "covered" for event in events):
+        return ()
+    hidden = [np.zeros(image.shape[:2], bool) for image in images]
+    for event, mask in zip(events, hidden, strict=True):
+        if event is not None and event.what == "covered":
+            mask[event.first_covered(len(mask)) :] = True
+    return tuple(hidden)
 
 
 def fitted(image: U8, like: U8) -> U8:

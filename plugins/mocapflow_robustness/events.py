@@ -20,12 +20,16 @@ class Event(BaseModel):
     count: Count | None = None  # frames; none: for good
     views: tuple[str, ...] = ()  # names of cameras; none: all of them
     by: Count = 3  # late: so many frames; other_time: so many frames ahead, or back where there are none
-    share: Annotated[float, Field(gt=0, le=1)] = 0.5  # covered: the lower part of the picture
+    share: Annotated[float, Field(gt=0, le=1)] = 0.5  # covered, and known to be: the lower part of the picture
 
     def holds(self, index: int, view: str) -> bool:
         """Return whether it happens to a frame of a view."""
         last = index if self.count is None else self.first + self.count - 1
         return self.first <= index <= last and (not self.views or view in self.views)
+
+    def first_covered(self, height: int) -> int:
+        """Return the first row that is covered, in a picture so high."""
+        return round(height * (1 - self.share))
 
     def source(self, index: int, length: int) -> int:
         """Return which frame, of `length`, stands in the place of a frame."""

@@ -37,7 +37,16 @@ def test_the_middle_one_of_three():
 
 def test_a_moving_edge_stays_where_it_is(clip):
     calm = Calm(width_px=0).run(open_recording(clip))
-    assert all((frame.images[0] == scene(frame.index)).all() for frame in calm.frames())
+    assert all((frame.images[0] == scene(frame.index)).all() for frame in list(calm.frames())[1:-1])
+    assert [frame.index for frame in calm.frames()] == list(range(FRAMES))
+    assert (calm.frame(0).images[0] == scene(1)).all()  # the first has no neighbour before it
+
+
+@pytest.mark.parametrize("frames", [1, 2, 3])
+def test_a_recording_of_few_frames(tmp_path, frames):
+    recording = Calm().run(open_recording(write_recording(tmp_path / "clip", frames=frames)))
+    assert [frame.index for frame in recording.frames()] == list(range(frames))
+    assert recording.frame(frames - 1).index == frames - 1
 
 
 def test_what_lasts_for_a_frame_is_gone(clip):

@@ -94,6 +94,8 @@ def test_a_picture_that_is_spoiled_or_missing(clip):
     half = len(plain[4][0]) // 2
     assert (frames[4].images[0][:half] == plain[4][0][:half]).all()
     assert not frames[4].images[0][half:].any()
+    assert frames[4].hidden[0][half:].all() and not frames[4].hidden[0][:half].any() and not frames[4].hidden[1].any()
+    assert frames[2].hidden == ()
     assert frames[6].usable.tolist() == [False, True]
     assert frames[6].reasons == ("dropped", "")
     assert frames[8].usable.all()
