@@ -52,7 +52,8 @@ class Tracker:
             frame = checks.passed(picture)
             state = self.stage.begin(frame, past, start, self.model, Stopwatch())
             settled = settle if seen(frame) else lost
-            found = settled(frame, state, past, self.stage.steps, self.model, lambda *_: None).state
+            result = settled(frame, state, past, self.stage.steps, self.model, lambda *_: None)
+            found = self.stage.recovered(frame, state, result, past, self.model).state
             moment = Moment(time=frame.time, pose=found.estimate.pose, cloth=found.cloth)
             past = past.after(moment, found.segmentation.appearance or past.appearance)
             yield past, self.error(frame.index, moment.pose)
