@@ -74,8 +74,8 @@ def cmc(curves: F64) -> float:
 
 
 def rms(error: F64) -> float:
-    """Return the root of the mean square."""
-    return float(np.sqrt(np.mean(error**2)))
+    """Return the root of the mean square, NaN of nothing."""
+    return float(np.sqrt(np.mean(error**2))) if len(error) else np.nan
 
 
 def rms_interval(error: F64) -> tuple[float, float]:

@@ -63,8 +63,8 @@ def draw_cycles(path: Path, strides: Mapping[str, Mapping[str, F64]]) -> Path:
     return save(figure, path)
 
 
-def draw_sticks(path: Path, ours: Stick, theirs: Stick) -> Path:
-    """Draw both stick models at a few moments, seen from the front and from the side."""
+def draw_sticks(path: Path, ours: Stick, theirs: Stick, frame: F64) -> Path:
+    """Draw both stick models in a few of the frames (T,), seen from the front and from the side."""
     known = np.flatnonzero(np.isfinite(theirs.places).all(axis=(1, 2)))
     rows = known[np.linspace(0, len(known) - 1, MOMENTS).round().astype(int)] if len(known) else np.array([], int)
     figure, every = panels(2 * MOMENTS, MOMENTS, 3.0, subplot_kw={"aspect": "equal"})
@@ -77,7 +77,7 @@ def draw_sticks(path: Path, ours: Stick, theirs: Stick) -> Path:
             panel = every[view * MOMENTS + column]
             for stick, colour, label in ((theirs, TRUTH, "reference"), (ours, OURS, "mocapflow")):
                 _draw_bones(panel, stick, stick.places[row] @ np.stack([axis, [0.0, 0.0, 1.0]], axis=1), colour, label)
-        every[column].set_title(f"row {row}", fontsize=9)
+        every[column].set_title(f"frame {frame[row]:.0f}", fontsize=9)
     if len(rows):
         legend(figure, every)
     return save(figure, path)

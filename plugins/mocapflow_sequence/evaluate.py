@@ -84,7 +84,7 @@ def evaluate(own: Ours, path: Path, folder: Path, longest_lag_s: float = LONGEST
     for name in names:
         straight = alignment.signs[name] * aligned[name]
         rows.append(_row(own, name, known[name], straight, strides) | {"sign": alignment.signs[name]})
-    rigs = compare_rigs(own.stick, reference, own.columns["time"], path.parent / layout.COMMON_POINTS)
+    rigs = compare_rigs(own, reference, float(np.nan_to_num(alignment.lag)), path.parent / layout.COMMON_POINTS)
     notes = [*reference.notes, *rigs.notes, *findings.said(own, reference, alignment, strides, longest_lag_s)]
     if not rows:
         notes.append("the reference shares no angle and frame with the track")

@@ -108,7 +108,7 @@ def _positions(path: Path, labels: tuple[str, ...], positions: F64, time: F64) -
             )
         positions = np.stack(list(centres.values()), axis=1)
         curves = _between(names, positions) | _about_axes(marks, centres)
-        notes = (*notes, f"joint centres and knee axes from {len(marks)} markers: {', '.join(sorted(marks))}")
+        notes = (*notes, f"joint centres and knee axes from {len(marks)} markers on bony landmarks")
     return Reference(curves=curves, at=at, by_frame=False, joint_names=names, joints=positions, notes=notes)
 
 

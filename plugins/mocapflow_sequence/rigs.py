@@ -10,9 +10,10 @@ import numpy as np
 
 from mocapflow.geometry.registration import Registration
 from mocapflow.io import markers
-from mocapflow.records import F64, record
+from mocapflow.records import F64, array, record
 from mocapflow_sequence import comparison_plots, layout, stick, tables
 from mocapflow_sequence.alignment import resampled
+from mocapflow_sequence.ours import Ours
 from mocapflow_sequence.references import Reference
 from mocapflow_sequence.stick import Stick
 
@@ -24,44 +25,56 @@ class Rigs:
     """What was found; without joint centres in the reference there is nothing."""
 
     ours: Stick
+    frame: F64 = array("T", unit="frame index in the videos")
     theirs: Stick | None = None  # in our world, at our frames
+    aligned: Stick | None = None  # the same without the lag between both
     figures: Mapping[str, Any] | None = None
     notes: tuple[str, ...] = ()
 
     def write(self, folder: Path, frame_rate: float) -> list[Path]:
         """Write the distances, the stick model as a .trc and as a picture into a run folder; return the pictures."""
-        rows = stick.distances(self.ours, self.theirs) if self.theirs is not None else []
-        tables.write_rows_if_any(layout.place(folder, layout.DISTANCES), rows)
-        if self.theirs is None:
+        if self.theirs is None or self.aligned is None:
+            layout.place(folder, layout.DISTANCES).unlink(missing_ok=True)
             return []
+        rows = stick.distances(self.ours, self.theirs, self.aligned)
+        tables.write_rows(layout.place(folder, layout.DISTANCES), rows)
         laid = stick.constant(self.theirs)
         places = markers.opensim_from_world(laid.places)
         markers.write_trc(layout.place(folder, layout.STICK), laid.names, places, frame_rate)
-        return [comparison_plots.draw_sticks(layout.place(folder, layout.STICK_PLOT), self.ours, laid)]
+        return [comparison_plots.draw_sticks(layout.place(folder, layout.STICK_PLOT), self.ours, laid, self.frame)]
 
 
-def compare_rigs(ours: Stick, reference: Reference, time: F64, common_points: Path) -> Rigs:
-    """Return the registration of both rigs and the reference's joint centres in our world, at our times (T,) s.
+def compare_rigs(own: Ours, reference: Reference, lag: float, common_points: Path) -> Rigs:
+    """Return the registration of both rigs and the reference's joint centres in our world, at our frames.
 
-    It comes from a table of common points where there is one, else from the joint centres themselves.
+    It comes from a table of common points where there is one, else from the joint centres themselves, as they are
+    without the lag (frames) between both.
 
     Raises:
         RecordingError: the table can't be read.
         MocapflowError: its points don't tell.
     """
+    ours, frame = own.stick, own.columns["frame"]
     if reference.joints is None:
-        return Rigs(ours=ours)
-    flat = reference.joints.reshape(len(reference.at), -1)
-    columns = [resampled(reference.at, column, time, reference.step) for column in flat.T]
-    places = np.stack(columns, axis=1).reshape(len(time), -1, 3)
-    theirs = Stick(names=reference.joint_names, places=places)
+        return Rigs(ours=ours, frame=frame)
+    theirs, aligned = (_sampled(reference, own.columns["time"] - late / own.frame_rate) for late in (0.0, lag))
     measured = common_points.is_file()
-    found = stick.between_points(common_points) if measured else stick.between_joints(ours, theirs)
+    found = stick.between_points(common_points) if measured else stick.between_joints(ours, aligned)
     if found is None:
-        return Rigs(ours=ours)
+        return Rigs(ours=ours, frame=frame)
+    theirs, aligned = (Stick(names=each.names, places=found.apply(each.places)) for each in (theirs, aligned))
     by = f"{len(found.residual)} points of {common_points.name}" if measured else "joint centres of both systems"
-    moved = Stick(names=theirs.names, places=found.apply(places))
-    return Rigs(ours=ours, theirs=moved, figures=_figures(found, by), notes=_notes(found, by))
+    return Rigs(
+        ours=ours, frame=frame, theirs=theirs, aligned=aligned, figures=_figures(found, by), notes=_notes(found, by)
+    )
+
+
+def _sampled(reference: Reference, time: F64) -> Stick:
+    """Return the joint centres of a reference at times (T,) s."""
+    assert reference.joints is not None
+    columns = reference.joints.reshape(len(reference.at), -1).T
+    flat = np.stack([resampled(reference.at, column, time, reference.step) for column in columns], axis=1)
+    return Stick(names=reference.joint_names, places=flat.reshape(len(time), -1, 3))
 
 
 def _figures(found: Registration, by: str) -> dict[str, Any]:

@@ -76,19 +76,25 @@ def between_joints(ours: Stick, theirs: Stick) -> Registration | None:
         return None
 
 
-def distances(ours: Stick, theirs: Stick) -> list[dict[str, float | str]]:
-    """Return the rows of joint_distances.csv: how far apart the centres of a joint are (mm), in one world."""
+def distances(ours: Stick, theirs: Stick, aligned: Stick) -> list[dict[str, float | str]]:
+    """Return the rows of joint_distances.csv: how far apart the centres of a joint are (mm), also without a lag."""
     rows: list[dict[str, float | str]] = []
     for name in common(ours, theirs):
-        apart = 1000 * np.linalg.norm(_picked(ours, [name]) - _picked(theirs, [name]), axis=2)[:, 0]
-        known = apart[np.isfinite(apart)]
-        if len(known):
+        apart, without_lag = _apart(ours, theirs, name), _apart(ours, aligned, name)
+        if len(apart):
             rows.append({
-                "joint": name, "frames": len(known), "mean_mm": float(np.mean(known)),
-                "median_mm": float(np.median(known)), "p95_mm": float(np.percentile(known, 95)),
-                "max_mm": float(np.max(known)),
+                "joint": name, "frames": len(apart), "mean_mm": float(np.mean(apart)),
+                "median_mm": float(np.median(apart)), "p95_mm": float(np.percentile(apart, 95)),
+                "max_mm": float(np.max(apart)),
+                "mean_aligned_mm": float(np.mean(without_lag)) if len(without_lag) else np.nan,
             })  # fmt: skip
     return rows
+
+
+def _apart(ours: Stick, theirs: Stick, name: str) -> F64:
+    apart = 1000 * np.linalg.norm(_picked(ours, [name]) - _picked(theirs, [name]), axis=2)[:, 0]
+    known: F64 = apart[np.isfinite(apart)]
+    return known
 
 
 def common(ours: Stick, theirs: Stick) -> list[str]:

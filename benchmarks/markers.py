@@ -1,0 +1,139 @@
+"""What a comparison with a marker system would say of a run, beside what the truth says.
+
+python benchmarks/markers.py RECORDING RUN: markers are put on the true joints of a rendered recording, with 1 mm of
+noise and 5 to 10 mm that skin and flesh slide with the bend of the nearest joint, low-passed at 6 Hz, 100 per second,
+in a rig of their own that lies elsewhere and starts 50 ms late. They are written as a C3D file and a table of common
+points into RUN/markers, and compared with the run as any such file is.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+from mocapflow_sequence import layout, tables
+from mocapflow_sequence.evaluate import evaluate, evaluate_run
+from mocapflow_sequence.ours import Ours
+from mocapflow_sequence.stick import Stick
+from scipy.interpolate import CubicSpline
+from scipy.signal import butter, filtfilt
+from scipy.spatial.transform import Rotation
+
+from mocapflow.geometry import angles
+from mocapflow.geometry.registration import register
+from mocapflow.records import F64
+
+NOISE, SKIN, DELAY = 0.001, (0.005, 0.010), 0.05  # m, m, s
+RATE, LOWPASS = 100.0, 6.0  # per second, Hz
+DEPTH = 0.15  # m, of the pelvis
+ACROSS = {"knee": 0.05, "ankle": 0.035, "elbow": 0.035, "wrist": 0.025}  # m, from the centre to either marker
+BESIDE = {"knee": ("hip", "knee", "ankle"), "elbow": ("shoulder", "elbow", "wrist")}
+CGM2 = {
+    "asis": "ASI", "psis": "PSI", "knee_lateral": "KNE", "knee_medial": "KNM", "ankle_lateral": "ANK",
+    "ankle_medial": "MED", "toe": "TOE", "acromion": "SHO", "elbow_lateral": "ELB", "elbow_medial": "ELBM",
+    "wrist_lateral": "WRA", "wrist_medial": "WRB",
+}  # fmt: skip
+
+
+def main() -> None:
+    recording, run = Path(sys.argv[1]), Path(sys.argv[2])
+    truth = tables.read_columns(recording / "truth/angles.csv")
+    archive = np.load(recording / "truth/joints.npz")
+    at = {str(name): archive["positions"][:, k].astype(float) for k, name in enumerate(archive["names"])}
+    time = np.arange(len(truth["frame"])) / 30.0
+    folder = run / "markers"
+    folder.mkdir(exist_ok=True)
+    path = write(folder, time, measured(landmarks(at, pelvis(recording, at)), at, time))
+    known = {**truth, "time": time}
+    nothing = Stick(names=(), places=np.empty((len(time), 0, 3)))
+    columns = {
+        "markers, truth": evaluate(Ours(columns=known, raw=known, stick=nothing), path, folder / "truth").rows,
+        "ours, markers": evaluate_run(run, path).rows,
+        "ours, truth": evaluate_run(run, recording / "truth/angles.csv").rows,
+    }
+    print(f"{'RMS °  (without offset and lag)':36}" + "".join(f"{name:>18}" for name in columns))
+    for name in (row["angle"] for row in columns["ours, truth"]):
+        rows = [next((row for row in each if row["angle"] == name), None) for each in columns.values()]
+        cells = [f"{row['rms_deg']:.1f} ({row['rms_aligned_deg']:.1f})" if row else "" for row in rows]
+        print(f"{name:36}" + "".join(f"{cell:>18}" for cell in cells))
+    evaluate_run(run, path)  # what stays in the run folder
+    print((run / layout.FINDINGS).read_text())
+
+
+def pelvis(recording: Path, at: dict[str, F64]) -> F64:
+    """Return how the pelvis is turned from its rest in every frame (T, 3, 3); at rest it looks along -y."""
+    rest = {e["name"]: e["position"] for e in json.loads((recording / "subject/skeleton.json").read_text())["joints"]}
+    corners = ("hip_l", "hip_r", "spine")
+    still, moving = np.array([rest[name] for name in corners]), np.stack([at[name] for name in corners], axis=1)
+    return np.stack([register(still, places).rotation for places in moving])
+
+
+def landmarks(at: dict[str, F64], turned: F64) -> dict[str, F64]:
+    """Return where the landmarks (T, 3) m of joints are that lie where the regressions expect them."""
+    right, forward, up = (turned @ axis for axis in ([-1.0, 0, 0], [0, -1.0, 0], [0, 0, 1.0]))
+    hips = (at["hip_l"] + at["hip_r"]) / 2
+    width = (np.median(np.linalg.norm(at["hip_r"] - at["hip_l"], axis=1)) / 2 - 0.0073) / 0.33
+    front = hips + (0.24 * DEPTH + 0.0099) * forward + (0.30 * width + 0.0109) * up
+    raised = at["shoulder_l"] + at["shoulder_r"] - at["hip_l"] - at["hip_r"]
+    shoulders = np.linalg.norm(at["shoulder_r"] - at["shoulder_l"], axis=1, keepdims=True)
+    found = {}
+    for side, sign in (("l", -1), ("r", 1)):
+        found[f"asis_{side}"] = front + sign * width / 2 * right
+        found[f"psis_{side}"] = front - DEPTH * forward + sign * 0.04 * right
+        found[f"toe_{side}"] = at[f"toe_{side}"]
+        found[f"acromion_{side}"] = at[f"shoulder_{side}"] + 0.17 * shoulders * unit(raised)
+        for joint, above in (("knee", "hip"), ("ankle", "knee"), ("elbow", "shoulder"), ("wrist", "elbow")):
+            along = unit(at[f"{joint}_{side}"] - at[f"{above}_{side}"])
+            aside = sign * unit(right - np.sum(right * along, axis=1, keepdims=True) * along)
+            found[f"{joint}_lateral_{side}"] = at[f"{joint}_{side}"] + ACROSS[joint] * aside
+            found[f"{joint}_medial_{side}"] = at[f"{joint}_{side}"] - ACROSS[joint] * aside
+    return found
+
+
+def measured(marks: dict[str, F64], at: dict[str, F64], time: F64) -> dict[str, F64]:
+    """Return markers as a system measures them: they slide with the bend of the limb they are on, and are filtered."""
+    random, seen = np.random.default_rng(0), {}
+    b, a = butter(2, LOWPASS / (RATE / 2))
+    fine = np.arange(0, time[-1], 1 / RATE)
+    for name, places in marks.items():
+        side = name[-1]
+        limb = BESIDE["elbow" if name.startswith(("elbow", "wrist", "acromion")) else "knee"]
+        bend = angles.three_point(np.stack([at[f"{joint}_{side}"] for joint in limb], axis=1))
+        slide = (bend - bend.mean()) / max(float(bend.std()), 1e-9)
+        way = unit(random.normal(size=3)) * random.uniform(*SKIN)
+        at_rate = CubicSpline(time, places + slide[:, None] * way)(fine) + random.normal(
+            scale=NOISE, size=(len(fine), 3)
+        )
+        seen[name] = filtfilt(b, a, at_rate, axis=0)
+    return seen
+
+
+def write(folder: Path, time: F64, marks: dict[str, F64]) -> Path:
+    """Write markers.c3d and the points that both rigs have measured."""
+    import ezc3d
+
+    turn, shift = Rotation.from_euler("zyx", [130, 3, -2], degrees=True), np.array([2.0, -0.5, 0.1])
+    file, late = ezc3d.c3d(), round(DELAY * RATE)
+    points = np.ones((4, len(marks), len(next(iter(marks.values()))) - late))
+    points[:3] = 1000 * np.stack([turn.apply(places[late:]) + shift for places in marks.values()]).transpose(2, 0, 1)
+    point = file["parameters"]["POINT"]
+    point["LABELS"]["value"] = [f"{name[-1].upper()}{CGM2[name[:-2]]}" for name in marks]
+    point["RATE"]["value"], point["UNITS"]["value"] = [RATE], ["mm"]
+    file["data"]["points"] = points
+    file.write(str(folder / "markers.c3d"))
+    wand = np.random.default_rng(1).uniform([-1, -1, 0], [1, 1, 2], (12, 3))
+    other = turn.apply(wand) + shift + np.random.default_rng(2).normal(scale=NOISE, size=wand.shape)
+    header = "x,y,z,marker_x,marker_y,marker_z"
+    np.savetxt(folder / layout.COMMON_POINTS, np.hstack([wand, other]), delimiter=",", header=header, comments="")
+    return folder / "markers.c3d"
+
+
+def unit(vectors: F64) -> F64:
+    """Return vectors (..., 3) of length one."""
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+if __name__ == "__main__":
+    main()
