@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -42,6 +43,7 @@ def views(
     room: tuple[Plate, ...],
     near_m: float,
     median_px: int = 0,
+    hidden: Sequence[Bool | None] | None = None,
 ) -> list[View]:
     """Return what the usable views of a frame surely show, each at the size of its camera.
 
@@ -54,11 +56,13 @@ def views(
         room: the empty room at the same size.
         near_m: see `surface`.
         median_px: width of a median filter of the images, against pixels of no meaning; 0 for none.
+        hidden: per view where it shows neither room nor person, in full size; None: nowhere.
     """
     found = []
-    for camera, plate, image, usable in zip(cameras, room, frame.images, frame.usable, strict=True):
+    for camera, plate, c in zip(cameras, room, range(len(cameras)), strict=True):
         model = mask(outline(surface, camera), camera)
-        view = _view(image, surface, model, camera, plate, near_m, median_px) if usable else None
+        image, cover = frame.images[c], None if hidden is None else hidden[c]
+        view = _view(image, surface, model, camera, plate, near_m, median_px, cover) if frame.usable[c] else None
         if view is not None and np.count_nonzero(view.person) < MOST * np.count_nonzero(model):
             found.append(view)
     return found
@@ -82,18 +86,29 @@ def pixel_size(camera: Camera, surface: Surface) -> float:
     return float(depth / camera.intrinsics[0, 0])
 
 
-def _view(image: U8, surface: Surface, model: Bool, camera: Camera, room: Plate, near_m: float, median_px: int) -> View:
+def _view(
+    image: U8,
+    surface: Surface,
+    model: Bool,
+    camera: Camera,
+    room: Plate,
+    near_m: float,
+    median_px: int,
+    hidden: Bool | None,
+) -> View:
     import cv2
 
-    values = features(crops.shrink(without_outliers(image, median_px), image.shape[1] // int(camera.size[0])), CHANNELS)
+    factor = image.shape[1] // int(camera.size[0])
+    values = features(crops.shrink(without_outliers(image, median_px), factor), CHANNELS)
     floor = floor_around(surface, camera, FLOOR_REACH)
     flat, expected, spread = values.reshape(len(values), -1), room.planes.reshape(len(values), -1), room.spread.ravel()
     density = density_of(flat, expected, spread, floor.ravel(), CHANNELS, SHADOW).reshape(floor.shape)
     off = np.sum((values - room.planes) ** 2, axis=0) / np.maximum(room.spread, SHADOW.floor) ** 2
     size = pixel_size(camera, surface)
-    person = _near(density < 0, model, near_m / size)
+    told = np.ones(model.shape, bool) if hidden is None else crops.shrink_values(hidden.astype(np.float32), factor) == 0
+    person = _near((density < 0) & told, model, near_m / size)
     closed = cv2.morphologyEx(person.view(np.uint8), cv2.MORPH_CLOSE, SEAM)
-    empty = (off < EMPTY**2) & (closed == 0)
+    empty = (off < EMPTY**2) & (closed == 0) & told
     away = cv2.distanceTransform(empty.view(np.uint8), cv2.DIST_L2, 3)
     return View(camera, person, np.asarray(away, np.float32), size)
 

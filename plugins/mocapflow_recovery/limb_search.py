@@ -88,7 +88,8 @@ class LimbSearch(Recovery):
         if background is None:
             return result
         room = self._room(background, model.scene.cameras)
-        seen = views(frame, surface_of(model, result), room.cameras, room.empty, self.near_m, self.median_px)
+        hidden = [model.scene.hidden(frame, camera) for camera in range(len(room.cameras))]
+        seen = views(frame, surface_of(model, result), room.cameras, room.empty, self.near_m, self.median_px, hidden)
         stray = self._stray(model, seen, result)
         if not stray.doubtful(self.uncovered_cm2, self.floating_cm2):
             return result

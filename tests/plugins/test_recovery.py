@@ -66,6 +66,15 @@ def test_a_shadow_is_neither() -> None:
         assert np.mean(after.away[part] == 0) > np.mean(before.away[part] == 0) + 0.5  # nor surely the room
 
 
+def test_what_hides_the_person_is_neither() -> None:
+    bar = np.zeros(FRAME.images[0].shape[:2], bool)
+    bar[100:130] = True
+    barred = replace(FRAME, images=tuple(np.where(bar[..., None], np.uint8(0), image) for image in FRAME.images))
+    for view in views(barred, surface(POSE), CAMERAS, ROOM, 0.35, 0, [bar] * len(CAMERAS)):
+        assert not view.person[50:65].any()
+        assert not view.away[50:65].any()
+
+
 def test_somebody_far_away_is_not_the_person() -> None:
     other = tuple(image.copy() for image in FRAME.images)
     for image in other:
