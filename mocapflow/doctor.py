@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from mocapflow.assets import Camera
-from mocapflow.io import folders
+from mocapflow.io import agreement, folders
 from mocapflow.io.cameras import find_calibration, read_cameras
 from mocapflow.io.findings import Finding, attempt, error, note, warning
 from mocapflow.io.lenses import View
@@ -97,9 +97,9 @@ def _trial(folder: Path, calibration: Path, rig: bool = True) -> list[Finding]:
     if videos is None or any(video is None for video in videos):
         return findings + (list(examine_rig(cameras)) if rig and all(c.size.all() for c in cameras) else [])
     whole = [video for video in videos if video is not None]
-    fitted = attempt(lambda: folders.fit_sizes(cameras, whole, calibration), findings)
-    agreed = attempt(lambda: folders.agree_on_length(cameras, whole, folder), findings)
-    rate = attempt(lambda: folders.common_rate(cameras, whole, calibration), findings)
+    fitted = attempt(lambda: agreement.fit_sizes(cameras, whole, calibration), findings)
+    agreed = attempt(lambda: agreement.agree_on_length(cameras, whole, folder), findings)
+    rate = attempt(lambda: agreement.common_rate(cameras, whole, calibration), findings)
     findings += [warning(text, where=folder) for part in (fitted, agreed, rate) if part is not None for text in part[1]]
     lenses = cameras if fitted is None else fitted[0]
     findings += examine_rig(lenses) if rig else []

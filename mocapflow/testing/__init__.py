@@ -12,20 +12,14 @@ from __future__ import annotations
 
 from mocapflow.testing.assets import BodyConformance, DraperConformance, GarmentConformance
 from mocapflow.testing.bodies import template_body, tiny_body, tiny_garment
+from mocapflow.testing.fits import ClothFitterConformance, PoseSolverConformance, PriorConformance
+from mocapflow.testing.images import MatcherConformance, PredictorConformance, SegmenterConformance
 from mocapflow.testing.jacobians import check_jacobian
 from mocapflow.testing.pictures import tiny_frame, tiny_segmentation, tiny_state
+from mocapflow.testing.recovery import RecoveryConformance
 from mocapflow.testing.same import assert_pure, same
 from mocapflow.testing.scenes import tiny_cloth, tiny_past, tiny_pose, tiny_scene
-from mocapflow.testing.steps import (
-    ClothFitterConformance,
-    MatcherConformance,
-    PoseSolverConformance,
-    PredictorConformance,
-    PriorConformance,
-    RecoveryConformance,
-    SegmenterConformance,
-    StageConformance,
-)
+from mocapflow.testing.stages import StageConformance
 
 __all__ = [
     "BodyConformance",
