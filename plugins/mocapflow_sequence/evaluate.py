@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, ClassVar
 
@@ -22,6 +22,7 @@ from mocapflow_sequence.references import SUFFIXES, read_reference
 from mocapflow_sequence.rigs import compare_rigs
 
 LONGEST_LAG = 0.5  # s
+Row = Mapping[str, float | str]
 
 
 class Evaluate(Stage):
@@ -79,23 +80,29 @@ def evaluate(own: Ours, path: Path, folder: Path, longest_lag_s: float = LONGEST
     alignment = align(own.columns, reference, longest_lag_s)
     aligned = at_our_frames(reference, own.columns, np.nan_to_num(alignment.lag))
     strides = cycles.gait_cycles(own.stick.names, own.stick.places, own.frame_rate)
-    names = cycles.shared(own.columns, known)
-    rows = []
-    for name in names:
-        straight = alignment.signs[name] * aligned[name]
-        rows.append(_row(own, name, known[name], straight, strides) | {"sign": alignment.signs[name]})
+    rows = [
+        _row(own, name, known[name], alignment.signs[name] * aligned[name], strides) | {"sign": alignment.signs[name]}
+        for name in cycles.shared(own.columns, known)
+    ]
     rigs = compare_rigs(own, reference, float(np.nan_to_num(alignment.lag)), path.parent / layout.COMMON_POINTS)
     notes = [*reference.notes, *rigs.notes, *findings.said(own, reference, alignment, strides, longest_lag_s)]
     if not rows:
         notes.append("the reference shares no angle and frame with the track")
-    errors = {name: own.columns[name] - known[name] for name in names}
-    tables.write_rows(layout.place(folder, layout.EVALUATION), rows)
-    tables.write_columns(layout.place(folder, layout.ERRORS), {"frame": own.columns["frame"], **errors})
-    tables.write_rows_if_any(layout.place(folder, layout.CYCLES), cycles.rows(strides, own.columns, known))
+    _write_tables(folder, own.columns, known, rows, strides)
     found = {"reference": str(path), "lag_frames": alignment.lag, "signs": alignment.signs, "notes": notes}
-    runjson.write(layout.place(folder, layout.FINDINGS), runjson.plain({**found, "registration": rigs.figures}))
+    runjson.write(layout.place(folder, layout.FINDINGS), {**found, "registration": rigs.figures})
     pictures = [*comparison_plots.draw(own.columns, known, strides, folder), *rigs.write(folder, own.frame_rate)]
     return Evaluation(reference=str(path), rows=tuple(rows), notes=tuple(notes), pictures=tuple(pictures))
+
+
+def _write_tables(
+    folder: Path, columns: Mapping[str, F64], known: Mapping[str, F64], rows: Sequence[Row], strides: Sequence[Cycle]
+) -> None:
+    """Write the figures of each angle, its errors frame by frame, and the figures of each stride."""
+    errors = {name: columns[name] - known[name] for name in cycles.shared(columns, known)}
+    tables.write_rows(layout.place(folder, layout.EVALUATION), rows)
+    tables.write_columns(layout.place(folder, layout.ERRORS), {"frame": columns["frame"], **errors})
+    tables.write_rows_if_any(layout.place(folder, layout.CYCLES), cycles.rows(strides, columns, known))
 
 
 def _row(own: Ours, name: str, known: F64, aligned: F64, strides: Sequence[Cycle]) -> dict[str, float | str]:

@@ -22,7 +22,7 @@ pre { background: #f6f6f6; padding: .8rem; overflow-x: auto; font-size: 12px; li
 @page { size: A4; margin: 14mm }
 @media print {
   body { font-size: 10pt; margin: 0; padding: 0 } table { font-size: 8.5pt } pre { font-size: 7pt }
-  figure, tr { break-inside: avoid } h2 { break-after: avoid }
+  figure, tr { break-inside: avoid } h2 { break-after: avoid } pre { columns: 2 }
 }
 </style></head><body>
 <h1>$title</h1><p class="quiet">$subtitle</p>

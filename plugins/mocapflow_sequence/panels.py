@@ -26,6 +26,8 @@ def panels(count: int, columns: int, height: float, width: float = 12.0, **share
     for panel in every[:count]:
         panel.grid(color="0.9", linewidth=0.6)
         panel.spines[["top", "right"]].set_visible(False)
+    for panel in every[:count][-columns:]:
+        panel.tick_params(labelbottom=True)  # the last of its column, where those below are left out
     return figure, every[:count]
 
 

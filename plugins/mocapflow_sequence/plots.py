@@ -47,7 +47,6 @@ def plot_angles(
         panel.set_title(title(name) + deviation, fontsize=10, loc="left")
     for panel in every[-2:]:
         panel.set_xlabel("frame")
-        panel.tick_params(labelbottom=True)
     legend(figure, every)
     return save(figure, path)
 

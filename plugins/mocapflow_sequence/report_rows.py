@@ -25,8 +25,12 @@ DEVIATIONS = {  # column of evaluation.csv: its heading
 def glance(track: Track, evaluation: Evaluation | None) -> list[str]:
     """Return what matters most."""
     lost, overlap = int(lost_rows(track).sum()), track.overlap[np.isfinite(track.overlap)]
-    rms = {str(row["angle"]): float(row["rms_deg"]) for row in (evaluation.rows if evaluation else ())}
-    knees = [f"{title(name)} {rms[name]:.1f}°" for name in ("knee_flexion_l", "knee_flexion_r") if name in rms]
+    rows = {str(row["angle"]): row for row in (evaluation.rows if evaluation else ())}
+    knees = [
+        f"{title(name)} {rows[name]['rms_deg']:.1f}° ({rows[name]['rms_aligned_deg']:.1f}° without lag and offset)"
+        for name in ("knee_flexion_l", "knee_flexion_r")
+        if name in rows
+    ]
     said = [f"RMS deviation from the reference: {'; '.join(knees)}"] if knees else []
     if len(overlap):
         said.append(f"overlap of model and image: {np.median(overlap):.3f} in the median of all frames and views")

@@ -34,7 +34,8 @@ class Rigs:
     def write(self, folder: Path, frame_rate: float) -> list[Path]:
         """Write the distances, the stick model as a .trc and as a picture into a run folder; return the pictures."""
         if self.theirs is None or self.aligned is None:
-            layout.place(folder, layout.DISTANCES).unlink(missing_ok=True)
+            for part in (layout.DISTANCES, layout.STICK, layout.STICK_PLOT):
+                (folder / part).unlink(missing_ok=True)  # of another reference
             return []
         rows = stick.distances(self.ours, self.theirs, self.aligned)
         tables.write_rows(layout.place(folder, layout.DISTANCES), rows)
