@@ -13,9 +13,9 @@ from mocapflow_sequence.references import Reference
 
 SLACK = 0.03  # of a sample: times in files are rounded
 GAP = 1.5  # samples; across a longer one nothing is interpolated
-STILL = 0.5  # deg, standard deviation; what moves less tells no time
 LEAST = 0.5  # of our frames must have a counterpart at every shift that is tried
-LIKE = 0.5  # mean correlation below which two systems show no common lag
+HALF = 0.5  # frames; a smaller lag is lost in the resampling
+LIKE = 0.5  # correlation below which two systems show no common lag
 FLIP = 0.1  # by how much the correlation must gain for a curve to be taken as counted the other way
 
 
@@ -24,6 +24,11 @@ class Alignment(NamedTuple):
 
     lag: float  # our samples by which ours come later, the same for all angles; NaN where none fits best
     signs: Mapping[str, int]  # -1 where the reference counts the other way
+
+    @property
+    def worth(self) -> float:
+        """The lag, where it is worth taking out, else 0."""
+        return self.lag if abs(self.lag) >= HALF else 0.0
 
 
 def resampled(at: F64, values: F64, wanted: F64, step: float) -> F64:
@@ -50,8 +55,8 @@ def at_our_frames(reference: Reference, columns: Mapping[str, F64], lag: float =
 def align(columns: Mapping[str, F64], reference: Reference, longest_lag_s: float) -> Alignment:
     """Return the lag that all angles share and the sign of each.
 
-    Every whole frame within the longest lag is tried; the correlations with the shifted reference, in the mean over the
-    angles, are greatest at the lag. A parabola through that shift and its neighbours gives the fraction.
+    Every whole frame within the longest lag is tried; the correlation with the shifted reference, of all angles in one,
+    is greatest at the lag. A parabola through that shift and its neighbours gives the fraction.
     """
     time = columns["time"]
     step = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
@@ -59,10 +64,13 @@ def align(columns: Mapping[str, F64], reference: Reference, longest_lag_s: float
     shifts = np.arange(-reach, reach + 1)
     names = [name for name in columns if name in reference.curves]
     shifted = [at_our_frames(reference, columns, float(shift)) for shift in shifts]
-    table = np.array([[_correlation(columns[name], each[name]) for name in names] for each in shifted])
-    known, flipped = np.isfinite(table), -table - FLIP > table
-    total = np.where(flipped, -table - FLIP, np.where(known, table, 0.0)).sum(axis=1)
-    score = np.where(known.any(axis=1), total / np.maximum(1, known.sum(axis=1)), -np.inf)
+    table = np.array([[_products(columns[name], each[name]) for name in names] for each in shifted])
+    table = table.reshape(len(shifts), len(names), 3)
+    together, ours, theirs = np.moveaxis(table, 2, 0)
+    cost = FLIP * np.sqrt(ours * theirs)
+    flipped = -together - cost > together
+    total, size = np.where(flipped, -together - cost, together).sum(axis=1), ours.sum(axis=1) * theirs.sum(axis=1)
+    score = np.where(size > 0, total / np.sqrt(np.where(size > 0, size, 1.0)), -np.inf)
     best = int(np.argmax(score))
     if score[best] < LIKE:
         return Alignment(np.nan, dict.fromkeys(names, 1))
@@ -80,11 +88,10 @@ def _summit(score: F64, shifts: npt.NDArray[np.intp], best: int) -> float:
     return float(shifts[best] + fraction)
 
 
-def _correlation(ours: F64, theirs: F64) -> float:
-    """Return the correlation over the frames that both have; 0 where a curve stands still, NaN where too few have."""
+def _products(ours: F64, theirs: F64) -> tuple[float, float, float]:
+    """Return the products of two curves about their means: of both, of ours, of theirs; 0 where too few have both."""
     both = np.isfinite(ours) & np.isfinite(theirs)
     if both.sum() < max(3, LEAST * len(ours)):
-        return np.nan
+        return 0.0, 0.0, 0.0
     a, b = ours[both] - ours[both].mean(), theirs[both] - theirs[both].mean()
-    moves = min(a.std(), b.std()) > STILL
-    return float(a @ b / (np.linalg.norm(a) * np.linalg.norm(b))) if moves else 0.0
+    return float(a @ b), float(a @ a), float(b @ b)

@@ -78,13 +78,13 @@ def evaluate(own: Ours, path: Path, folder: Path, longest_lag_s: float = LONGEST
     reference = read_reference(path)
     known = at_our_frames(reference, own.columns)
     alignment = align(own.columns, reference, longest_lag_s)
-    aligned = at_our_frames(reference, own.columns, np.nan_to_num(alignment.lag))
+    aligned = at_our_frames(reference, own.columns, alignment.worth)
     strides = cycles.gait_cycles(own.stick.names, own.stick.places, own.frame_rate)
     rows = [
         _row(own, name, known[name], alignment.signs[name] * aligned[name], strides) | {"sign": alignment.signs[name]}
         for name in cycles.shared(own.columns, known)
     ]
-    rigs = compare_rigs(own, reference, float(np.nan_to_num(alignment.lag)), path.parent / layout.COMMON_POINTS)
+    rigs = compare_rigs(own, reference, alignment.worth, path.parent / layout.COMMON_POINTS)
     notes = [*reference.notes, *rigs.notes, *findings.said(own, reference, alignment, strides, longest_lag_s)]
     if not rows:
         notes.append("the reference shares no angle and frame with the track")

@@ -11,8 +11,6 @@ from mocapflow_sequence.cycles import Cycle
 from mocapflow_sequence.ours import Ours
 from mocapflow_sequence.references import Reference
 
-EARLY = 0.5  # frames; a smaller lag is not worth a word
-
 
 def said(
     own: Ours, reference: Reference, found: Alignment, strides: Sequence[Cycle], longest_lag_s: float
@@ -23,7 +21,7 @@ def said(
         notes.append(f"reference at {1 / reference.step:.4g} per second, interpolated at our {own.frame_rate:.4g}")
     if np.isnan(found.lag):
         notes.append(f"no lag within {longest_lag_s:g} s fits best; see longest_lag_s of stage evaluate")
-    elif abs(found.lag) >= EARLY:
+    elif found.worth:
         when = "later" if found.lag > 0 else "earlier"
         shift, late = abs(found.lag), 1000 * abs(found.lag) / own.frame_rate
         notes.append(
