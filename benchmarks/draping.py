@@ -18,7 +18,8 @@ from mocapflow_bodies.scanned import Scanned
 from mocapflow_draping.kinematic import Kinematic
 from mocapflow_garments.skirt import Skirt
 
-from mocapflow.data import Past, PoseBatch
+from mocapflow.components import Draper
+from mocapflow.data import Past, Pose, PoseBatch
 from mocapflow.scene import Scene
 
 ROUNDS = 7
@@ -44,12 +45,15 @@ def report(scene: Scene, title: str) -> None:
     winds[:, 2:4] = np.random.default_rng(0).uniform(-0.3, 0.3, (25, 2))
     fall, closed = Kinematic(sweeps=0), Kinematic()
     steps = Kinematic(rule="literal", sweeps=0)
+    asked = Pose(root=one.root[0], angles=one.angles[0]), free[0], np.arange(len(scene.garment.vertices)), Past(), scene
     jobs: dict[str, tuple[Callable[[], object], int]] = {
         "event-driven, strands alone": (lambda: fall.drape(poses, free, Past(), scene), POSES),
         "event-driven, with rings": (lambda: closed.drape(poses, free, Past(), scene), POSES),
         "literal, 50 x 2 degrees": (lambda: steps.drape(poses, free, Past(), scene), POSES),
         "one drape alone": (lambda: fall.drape(one, free[:1], Past(), scene), 1),
         "25 winds of one pose, all of them": (lambda: fall.drape(same, winds, Past(), scene), 1),
+        "rates of all unknowns, carried along": (lambda: closed.velocity(*asked), 1),
+        "the same by differences": (lambda: Draper.velocity(closed, *asked), 1),
     }
     if find_spec("newton"):  # the extra `physics`
         from mocapflow_physics.xpbd import Xpbd

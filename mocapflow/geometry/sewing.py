@@ -13,6 +13,7 @@ HARMONICS: tuple[tuple[str, ...], ...] = (
     ("flare_rad",),
     ("wind_cos_rad", "wind_sin_rad"),
     ("two_cos_rad", "two_sin_rad"),
+    ("three_cos_rad", "three_sin_rad"),
 )
 LARGEST_TILT = math.radians(40)
 LARGEST_THICKNESS = 0.010  # m
@@ -24,7 +25,8 @@ Parameters = tuple[tuple[str, ...], F64]
 def force_parameters(orders: tuple[int, ...]) -> Parameters:
     """Return names and bounds (Q, 2) of the cloth's thickness and of its tail-angle harmonics of the given orders.
 
-    Order 0 is a flare, order 1 a wind, order 2 two legs inside one ring; drapers know what they mean.
+    Order 0 is a flare, order 1 a wind, order 2 two legs inside one ring, order 3 a ring that one leg
+    leaves; drapers know what they mean.
     """
     tilts = [name for order in orders for name in HARMONICS[order]]
     bounds = [[0.0, LARGEST_THICKNESS], *([-LARGEST_TILT, LARGEST_TILT] for _ in tilts)]

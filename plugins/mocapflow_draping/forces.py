@@ -1,22 +1,22 @@
 """What a garment's parameters mean: thickness, and a tail angle per azimuth as a low Fourier series.
 
 Order 0 is a flare, order 1 the wind of the chapter (its direction and amount as two components), order 2 two legs
-inside one ring. Azimuths are those of the rest garment, so the series turns with the joint that carries it.
+inside one ring, order 3 a ring that one leg leaves. Azimuths are those of the rest garment, so the series turns with
+the joint that carries it.
 """
 
 from __future__ import annotations
 
-import re
+from itertools import chain
 
 import numpy as np
 
 from mocapflow.assets import GarmentMesh
 from mocapflow.errors import PluginError, alternatives
+from mocapflow.geometry.sewing import HARMONICS
 from mocapflow.records import F64
 
-HARMONICS = {"flare": 0, "wind": 1, "two": 2}
 STEEPEST = np.radians(80.0)  # a tail tilted further would rise above its support
-MEANING = re.compile(r"(?P<force>flare|wind|two)(_(?P<part>cos|sin))?_rad")
 
 
 def tilts(garment: GarmentMesh, parameters: F64, azimuth: F64) -> tuple[F64, F64]:
@@ -47,14 +47,13 @@ def tilts(garment: GarmentMesh, parameters: F64, azimuth: F64) -> tuple[F64, F64
 
 
 def _meaning(garment: GarmentMesh, name: str) -> tuple[int, str]:
-    found = MEANING.fullmatch(name)
-    if found is None:
-        known = ["thickness_m", "flare_rad", "wind_cos_rad", "wind_sin_rad", "two_cos_rad", "two_sin_rad"]
-        raise PluginError(
-            f"garment {garment.name} has a parameter '{name}' that draper kinematic does not know",
-            hint=alternatives(name, known),
-        )
-    return HARMONICS[found["force"]], found["part"] or "cos"
+    for order, names in enumerate(HARMONICS):
+        if name in names:
+            return order, "sin" if name.endswith("_sin_rad") else "cos"
+    raise PluginError(
+        f"garment {garment.name} has a parameter '{name}' that draper kinematic does not know",
+        hint=alternatives(name, ["thickness_m", *chain.from_iterable(HARMONICS)]),
+    )
 
 
 def wind(garment: GarmentMesh, parameters: F64, turn: F64) -> tuple[F64, F64]:

@@ -27,7 +27,7 @@ class Cylinder(Garment):
     length_m: float = 0.40  # along the cloth
     strands: Annotated[int, Field(ge=8)] = 32  # columns of particles
     rings: Annotated[int, Field(ge=3)] = 16  # rows of particles
-    force_orders: tuple[Literal[0, 1, 2], ...] = (0, 1)  # harmonics of the tail angle; 1 alone is a wind
+    force_orders: tuple[Literal[0, 1, 2, 3], ...] = (0, 1)  # harmonics of the tail angle; 1 alone is a wind
 
     def sew(self, body: Body) -> GarmentMesh:
         """Return the tube on the rest body."""

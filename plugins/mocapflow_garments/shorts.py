@@ -32,7 +32,7 @@ class Shorts(Garment):
     length_m: float  # along the cloth, outside of the leg
     strands: Annotated[int, Field(ge=8, multiple_of=4)] = 32  # columns of particles of each leg
     rings: Annotated[int, Field(ge=6)] = 20  # rows of particles
-    force_orders: tuple[Literal[0, 1, 2], ...] = (0, 1, 2)  # harmonics of the tail angle; 1 alone is a wind
+    force_orders: tuple[Literal[0, 1, 2, 3], ...] = (0, 1, 2)  # harmonics of the tail angle; 1 alone is a wind
 
     def sew(self, body: Body) -> GarmentMesh:
         """Return the shorts on the rest body."""

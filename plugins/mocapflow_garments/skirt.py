@@ -26,7 +26,7 @@ class Skirt(Garment):
     length_m: float  # along the cloth
     strands: Annotated[int, Field(ge=8)] = 48  # columns of particles
     rings: Annotated[int, Field(ge=3)] = 24  # rows of particles
-    force_orders: tuple[Literal[0, 1, 2], ...] = (0, 1, 2)  # harmonics of the tail angle; 1 alone is a wind
+    force_orders: tuple[Literal[0, 1, 2, 3], ...] = (0, 1, 2)  # harmonics of the tail angle; 1 alone is a wind
 
     def sew(self, body: Body) -> GarmentMesh:
         """Return the skirt around the rest body, spread as its pattern allows."""
