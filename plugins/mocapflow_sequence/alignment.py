@@ -16,6 +16,8 @@ GAP = 1.5  # samples; across a longer one nothing is interpolated
 LEAST = 0.5  # of our frames must have a counterpart at every shift that is tried
 HALF = 0.5  # frames; a smaller lag is lost in the resampling
 LIKE = 0.5  # correlation below which two systems show no common lag
+GAIN = 0.2  # of what is unlike without a lag; a lag that explains less may be chance
+TURNED = -0.8  # correlation; what is less opposed may be chance
 FLIP = 0.1  # by how much the correlation must gain for a curve to be taken as counted the other way
 
 
@@ -24,11 +26,12 @@ class Alignment(NamedTuple):
 
     lag: float  # our samples by which ours come later, the same for all angles; NaN where none fits best
     signs: Mapping[str, int]  # -1 where the reference counts the other way
+    gain: float = 0.0  # share of what is unlike without the lag that it explains
 
     @property
     def worth(self) -> float:
         """The lag, where it is worth taking out, else 0."""
-        return self.lag if abs(self.lag) >= HALF else 0.0
+        return self.lag if abs(self.lag) >= HALF and self.gain >= GAIN else 0.0
 
 
 def resampled(at: F64, values: F64, wanted: F64, step: float) -> F64:
@@ -67,15 +70,18 @@ def align(columns: Mapping[str, F64], reference: Reference, longest_lag_s: float
     table = np.array([[_products(columns[name], each[name]) for name in names] for each in shifted])
     table = table.reshape(len(shifts), len(names), 3)
     together, ours, theirs = np.moveaxis(table, 2, 0)
-    cost = FLIP * np.sqrt(ours * theirs)
-    flipped = -together - cost > together
-    total, size = np.where(flipped, -together - cost, together).sum(axis=1), ours.sum(axis=1) * theirs.sum(axis=1)
+    most = np.sqrt(ours * theirs)
+    flipped = (together < TURNED * most) & (most > 0)
+    total = np.where(flipped, -together - FLIP * most, together).sum(axis=1)
+    size = ours.sum(axis=1) * theirs.sum(axis=1)
     score = np.where(size > 0, total / np.sqrt(np.where(size > 0, size, 1.0)), -np.inf)
     best = int(np.argmax(score))
     if score[best] < LIKE:
         return Alignment(np.nan, dict.fromkeys(names, 1))
     signs = {name: -1 if each else 1 for name, each in zip(names, flipped[best], strict=True)}
-    return Alignment(_summit(score, shifts, best), signs)
+    unlike = 1 - score[reach]  # without a lag; infinite where too few frames have both then
+    gain = float((score[best] - score[reach]) / unlike) if 0 < unlike < np.inf else float(unlike > 0)
+    return Alignment(_summit(score, shifts, best), signs, gain)
 
 
 def _summit(score: F64, shifts: npt.NDArray[np.intp], best: int) -> float:

@@ -66,7 +66,12 @@ def compare_rigs(own: Ours, reference: Reference, lag: float, common_points: Pat
     theirs, aligned = (Stick(names=each.names, places=found.apply(each.places)) for each in (theirs, aligned))
     by = f"{len(found.residual)} points of {common_points.name}" if measured else "joint centres of both systems"
     return Rigs(
-        ours=ours, frame=frame, theirs=theirs, aligned=aligned, figures=_figures(found, by), notes=_notes(found, by)
+        ours=ours,
+        frame=frame,
+        theirs=theirs,
+        aligned=aligned,
+        figures=_figures(found, by),
+        notes=_notes(found, by, measured),
     )
 
 
@@ -89,12 +94,16 @@ def _figures(found: Registration, by: str) -> dict[str, Any]:
     }
 
 
-def _notes(found: Registration, by: str) -> tuple[str, ...]:
+def _notes(found: Registration, by: str, measured: bool) -> tuple[str, ...]:
     residual, left_out = 1000 * _rms(found.residual), 1000 * _rms(found.left_out)
     said = (
         f"rigs registered by {by}: residual {residual:.1f} mm, leave-one-out {left_out:.1f} mm, scale {found.scale:.4f}"
     )
-    odd = "the scale is not applied: check units and calibrations of both" if abs(found.scale - 1) > ODD else ""
+    odd = (
+        "the scale is not applied: check units and calibrations of both"
+        if measured and abs(found.scale - 1) > ODD
+        else ""
+    )
     return (said, odd) if odd else (said,)
 
 

@@ -41,6 +41,24 @@ def test_what_counts_the_other_way_is_found_beside_a_lag() -> None:
     assert found.signs == {"knee_flexion_l": 1, "knee_flexion_r": -1, "hip_flexion_l": 1}
 
 
+def test_what_may_be_chance_is_not_taken_out() -> None:
+    random = np.random.default_rng(0)
+    ours = motion(TIME) | {"elbow_l": np.cumsum(random.normal(size=120))}
+    theirs = {name: curve + np.cumsum(random.normal(size=120)) for name, curve in motion(TIME).items()}
+    theirs["elbow_l"] = -0.5 * ours["elbow_l"] + 3 * np.cumsum(random.normal(size=120))
+    found = aligned(ours, theirs, TIME)
+    assert set(found.signs.values()) == {1}
+    assert found.worth == 0
+    late = aligned(motion(TIME), motion(TIME + 3 / 30), TIME)
+    assert late.worth == late.lag
+
+
+def test_a_lag_without_which_too_few_frames_have_both() -> None:
+    at = np.arange(66, 240) / 30  # of our 120 frames 54 without the lag, 63 with it
+    found = aligned(motion(TIME), motion(at - 9 / 30), at)
+    assert found.worth == pytest.approx(-9, abs=0.1)
+
+
 def test_a_lag_beyond_the_search_is_unknown() -> None:
     assert np.isnan(aligned({"a": TIME**2}, {"a": (TIME - 3) ** 2}, TIME, 0.2).lag)
 
