@@ -36,7 +36,8 @@ def minimise(covariance: F64, acceleration: F64, limits: F64, time: F64, wanted:
     weights, precision = difference_weights(time), 1 / limits**2
     bands = np.zeros((2 * size + 1, count, size))  # upper form, unknowns frame by frame
     row, column = np.triu_indices(size)
-    information = np.linalg.inv(covariance + FLOOR * np.eye(size))
+    variance, axes = np.linalg.eigh(covariance)  # rounding may leave a variance just below zero
+    information = (axes / (np.maximum(variance, 0) + FLOOR)[:, None]) @ np.swapaxes(axes, 1, 2)
     bands[2 * size + row - column, :, column] = information[:, row, column].T
     pull = np.zeros((count, size))
     for i in range(3):

@@ -117,3 +117,13 @@ def test_two_frames_are_returned_as_they_are() -> None:
     pose = start_pose(body)
     track = make_track(np.tile(pose.root, (2, 1, 1)), np.tile(pose.angles, (2, 1)))
     assert (Smooth().run(track=track).angles == track.angles).all()
+
+
+def test_a_variance_that_rounding_left_below_zero_is_no_hindrance() -> None:
+    curves = true_curves("skirt_steps")[:20]
+    track = make_track(np.tile(np.eye(4), (20, 1, 1)), curves, sd=np.radians(1.0))
+    covariance = track.covariance.copy()
+    covariance[7, -1, -1] = -1e-6
+    smoothed = Smooth().run(track=replace(track, covariance=covariance))
+    assert np.isfinite(smoothed.angles).all()
+    assert np.degrees(np.abs(smoothed.angles - curves)).max() < 1
