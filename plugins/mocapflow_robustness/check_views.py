@@ -47,6 +47,10 @@ class CheckViews(Stage):
             reasons=tuple(said[rows, cameras].tolist()),
         )
 
+    def longest(self, frame_rate: float) -> int:
+        """Return of how many frames a burst may be."""
+        return max(round(self.longest_s * frame_rate), LEAST_LONGEST)
+
     def doubt(self, seen: Thumbnails, room: F32, frame_rate: float, names: Sequence[str]) -> npt.NDArray[np.str_]:
         """Return (T, C) why a picture is not to be trusted, "" where it is.
 
@@ -60,8 +64,7 @@ class CheckViews(Stage):
         foreign, like = doubts.lookalike(seen.grey, room)
         old = doubts.repeated(np.where(empty | foreign, np.nan, seen.news))
         settled = doubts.bridged(seen.grey, seen.there & ~(empty | foreign | old))
-        longest = max(round(self.longest_s * frame_rate), LEAST_LONGEST)
-        torn = doubts.bursts(settled, longest, self.jump, self.joint_jump)
+        torn = doubts.bursts(settled, self.longest(frame_rate), self.jump, self.joint_jump)
         said = np.full(empty.shape, "", "U64")
         said[torn] = "the picture does not fit the ones before and after"
         said[old] = "the picture repeats the one before"

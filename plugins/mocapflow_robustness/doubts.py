@@ -50,7 +50,7 @@ def bursts(grey: F32, longest: int, strong: float, weak: float) -> Bool:
     others that jump with it. Motion starts and ends over several frames; it does not do that.
     """
     steps = distance(np.diff(grey, axis=0))  # step s leads from frame s to s + 1
-    found = sorted(_candidates(grey, steps, longest, strong), key=lambda burst: -burst[0])
+    found = sorted(candidates(grey, steps, longest, strong), key=lambda burst: -burst[0])
     wrong, taken = np.zeros(grey.shape[:2], bool), np.zeros(len(steps), bool)
     for _, enter, leave, size in found:
         if not taken[enter : leave + 1].any():
@@ -59,7 +59,7 @@ def bursts(grey: F32, longest: int, strong: float, weak: float) -> Bool:
     return wrong
 
 
-def _candidates(grey: F32, steps: F64, longest: int, strong: float) -> list[tuple[float, int, int, F64]]:
+def candidates(grey: F32, steps: F64, longest: int, strong: float) -> list[tuple[float, int, int, F64]]:
     """Return the strength of each possible burst, the steps into and out of it, and its strength in each view."""
     found: list[tuple[float, int, int, F64]] = []
     if len(steps) < 4:
