@@ -12,6 +12,7 @@ from mocapflow.execution import Execution, is_hit
 from mocapflow.keys import explain
 from mocapflow.pipeline import Pipeline
 from mocapflow.recipes import Step, steps_of
+from mocapflow.shared import open_store
 from mocapflow.store import Report, Store
 from mocapflow.wiring import SUPPLIED, Source
 
@@ -51,9 +52,9 @@ class RunSummary:
         return "\n".join([*lines, f"results: {self.out}"])
 
 
-def plan(pipeline: Pipeline, *, store: Path) -> list[PlanLine]:
+def plan(pipeline: Pipeline, *, store: Path, url: str | None = None) -> list[PlanLine]:
     """Return for each stage whether its result is there, can be continued, or has to be made, and why."""
-    kept = Store(store)
+    kept = open_store(store, url)
     lines = [_plan_line(step, kept) for step in steps_of(pipeline, kept.digests)]
     kept.digests.save()
     return lines
@@ -69,6 +70,7 @@ def run(
     *,
     store: Path,
     out: Path,
+    url: str | None = None,
     fresh: bool = False,
     only: str | None = None,
     report: Report = lambda line: None,
@@ -79,6 +81,7 @@ def run(
         pipeline: what to run.
         store: the folder of cached results.
         out: the run folder.
+        url: where the results in that folder are shared with others.
         fresh: compute everything anew.
         only: the label of one stage: make that and what it needs.
         report: told lines of progress.
@@ -88,7 +91,7 @@ def run(
         StoreError: the store is full or can't be written; committed frames are kept.
         MocapflowError: the pipeline or an input is wrong.
     """
-    kept = Store(store)
+    kept = open_store(store, url)
     steps = steps_of(pipeline, kept.digests)
     kept.create()
     kept.digests.save()

@@ -68,7 +68,9 @@ class Store:
 
     def __init__(self, path: Path) -> None:
         if "://" in str(path) or ":/" in str(path):
-            raise StoreError(f"the store has to be a folder, not {path}", hint="give --store a path on this machine")
+            raise StoreError(
+                f"the store has to be a folder, not {path}", hint="a URL is for --store of run, plan and compare"
+            )
         self.path = path
         self._state = path / ".state"
         self.digests = Digests(self._state / "digests.json")

@@ -46,6 +46,8 @@ LAYERS = (  # a module imports only from its own layer or an earlier one; `io` a
     "archive",
     "locks",
     "store",
+    "copies",
+    "shared",
     "sealing",
     "checkpoint",
     "track",

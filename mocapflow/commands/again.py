@@ -23,7 +23,8 @@ class Invocation:
     recording: str | None
     changes: tuple[str, ...]
     frames: str | None
-    store: str
+    store: str  # a folder
+    url: str | None = None  # where its results are shared
 
     def load(self) -> Pipeline:
         """Return the pipeline."""
@@ -45,6 +46,11 @@ class Invocation:
     def changed(self, *changes: str) -> Invocation:
         """Return the same with more changes on top."""
         return replace(self, changes=(*self.changes, *changes))
+
+
+def placed(store: str | None, default: Path) -> tuple[str, str | None]:
+    """Return the folder of a store that is named by its folder or its URL, and the URL."""
+    return (str(default), store) if store and "://" in store else (store or str(default), None)
 
 
 def remember(invocation: Invocation, out: Path) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mocapflow.commands.again import Invocation
+from mocapflow.commands.again import Invocation, placed
 from mocapflow.commands.results import table
 from mocapflow.commands.running import execute
 from mocapflow.commands.workers import Scheduler, Workers, finished
@@ -26,7 +26,9 @@ def compare(
         list[Path] | None, typer.Option("--recording", help="Instead of those of the file; repeatable.")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Where to write.  [default: runs/NAME_OF_EXPERIMENT]")] = None,
-    store: Annotated[Path | None, typer.Option(help="Cached results.  [default: store.zarr beside it]")] = None,
+    store: Annotated[
+        str | None, typer.Option(help="Cached results, or a URL to share them.  [default: store.zarr beside it]")
+    ] = None,
     workers: Workers = 1,
     scheduler: Scheduler = None,
 ) -> None:
@@ -35,8 +37,8 @@ def compare(
 
     folder = out or Path("runs") / experiment.stem
     cells = load_experiment(experiment, recordings or ())
-    kept = store or folder.parent / "store.zarr"
-    invocations = {place(folder, cell): invocation(cell, kept) for cell in cells}
+    kept, url = placed(store, folder.parent / "store.zarr")
+    invocations = {place(folder, cell): invocation(cell, kept, url) for cell in cells}
     for each in invocations.values():
         each.load()  # tells what is wrong with any variant before the first one runs
     tasks = {run: partial(finish, each, run.absolute()) for run, each in invocations.items()}
@@ -55,14 +57,15 @@ def place(folder: Path, cell: Cell) -> Path:
     return folder / cell.variant / cell.name
 
 
-def invocation(cell: Cell, store: Path) -> Invocation:
+def invocation(cell: Cell, store: str, url: str | None = None) -> Invocation:
     """Return a cell as the command that runs it."""
     return Invocation(
         pipeline=str(cell.pipeline),
         recording=str(cell.recording),
         changes=cell.changes,
         frames=cell.frames,
-        store=str(store),
+        store=store,
+        url=url,
     ).absolute()
 
 

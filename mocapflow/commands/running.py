@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mocapflow.commands.again import Invocation, recall, remember
+from mocapflow.commands.again import Invocation, placed, recall, remember
 from mocapflow.commands.progress import last_word, noted, reporter
 from mocapflow.commands.workers import Scheduler, Workers, finished
 from mocapflow.errors import PipelineError
@@ -19,7 +19,13 @@ if TYPE_CHECKING:
 File = Annotated[Path, typer.Argument(metavar="PIPELINE", help="A pipeline file (.yaml).")]
 Recording = Annotated[Path | None, typer.Option(help="Use this recording folder instead of the file's.")]
 Out = Annotated[Path | None, typer.Option(help="The run folder.  [default: runs/NAME_OF_PIPELINE]")]
-Store = Annotated[Path | None, typer.Option(help="Cached results.  [default: store.zarr beside the run folder]")]
+Store = Annotated[
+    str | None,
+    typer.Option(
+        metavar="PATH|URL",
+        help="Cached results, or a URL (s3://…) to share them.  [default: store.zarr beside the run folder]",
+    ),
+]
 Set = Annotated[list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Change a value; repeatable.")]
 Frames = Annotated[str | None, typer.Option(metavar="A:B", help="Only frames A up to, without, B.")]
 Parts = Annotated[int | None, typer.Option(min=1, metavar="N", help="Track in N parts, and join them.")]
@@ -101,7 +107,8 @@ def track(invocation: Invocation, out: Path, label: str) -> None:
     """Make one stage and what it needs."""
     from mocapflow import runner
 
-    runner.run(invocation.load(), store=Path(invocation.store), out=out, only=label, report=reporter())
+    pipeline, store = invocation.load(), Path(invocation.store)
+    runner.run(pipeline, store=store, url=invocation.url, out=out, only=label, report=reporter())
 
 
 def execute(invocation: Invocation, out: Path, fresh: bool) -> RunSummary:
@@ -111,26 +118,29 @@ def execute(invocation: Invocation, out: Path, fresh: bool) -> RunSummary:
 
     remember(invocation, out)
     with noted(reporter(), out) as report:
-        return runner.run(pipeline, store=Path(invocation.store), out=out, fresh=fresh, report=report)
+        store = Path(invocation.store)
+        return runner.run(pipeline, store=store, url=invocation.url, out=out, fresh=fresh, report=report)
 
 
 def _print_plan(invocation: Invocation) -> None:
     pipeline = invocation.load()
     from mocapflow import runner
 
-    for line in runner.plan(pipeline, store=Path(invocation.store)):
+    for line in runner.plan(pipeline, store=Path(invocation.store), url=invocation.url):
         typer.echo(line)
 
 
 def _invocation(
-    pipeline: Path, recording: Path | None, out: Path, store: Path | None, changes: list[str] | None, frames: str | None
+    pipeline: Path, recording: Path | None, out: Path, store: str | None, changes: list[str] | None, frames: str | None
 ) -> Invocation:
+    kept, url = placed(store, out.parent / "store.zarr")
     return Invocation(
         pipeline=str(pipeline),
         recording=str(recording) if recording else None,
         changes=tuple(changes or ()),
         frames=frames,
-        store=str(store or out.parent / "store.zarr"),
+        store=kept,
+        url=url,
     )
 
 

@@ -1,0 +1,86 @@
+"""A store whose results are shared over the net: a folder to work in, with copies at a URL.
+
+Locks, commits frame by frame and exact resuming need a file system; object stores have none of it. So a run works in
+its own folder as ever, fetches what it finds at the URL, and sends there what it has made: results that are finished,
+and the frames of a track when the run stops. What has to be shared frame by frame, and made only once, belongs in a
+folder that all machines mount: the locks hold there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from mocapflow.copies import Copies, further
+from mocapflow.errors import StoreError
+from mocapflow.locks import Lock
+from mocapflow.store import Artifact, Report, Store, remove
+
+
+def open_store(path: Path, url: str | None = None) -> Store:
+    """Return the store of a folder; with a URL, one whose results are shared there."""
+    return Store(path) if url is None else SharedStore(path, Copies(url))
+
+
+class SharedStore(Store):
+    """A folder of artifacts with copies at a URL."""
+
+    def __init__(self, path: Path, copies: Copies) -> None:
+        super().__init__(path)
+        self._copies = copies
+
+    def find(self, key: str) -> Artifact | None:
+        """Return the artifact made under a key, here or at the URL: whichever is further."""
+        here = super().find(key)
+        if here is not None and here.complete and not here.frames:
+            return here
+        there = self._copies.find(key)
+        if there is None or (here is not None and not further(there.attributes, here.attributes)):
+            return here
+        return Artifact(self.path / there.group, there.attributes)
+
+    def load(self, artifact: Artifact, frames: int | None = None) -> Any:
+        """Return the record of an artifact, fetched first if it is not here; see `Store.load`."""
+        here = super().find(artifact.key)
+        if here is None or further(artifact.attributes, here.attributes):
+            with super().writer(artifact.key, artifact.path.name, lambda _: None):
+                self._fetch(artifact.key)
+        return super().load(artifact, frames)
+
+    @contextmanager
+    def writer(self, key: str, name: str, report: Report) -> Iterator[Lock]:
+        """Hold the right to write the artifact of a key in this folder; what was made is sent to the URL at the end."""
+        with super().writer(key, name, report) as lock:
+            self._fetch(key)
+            try:
+                yield lock
+            except BaseException:
+                try:
+                    self._send(key)
+                except StoreError as error:  # all is saved here, and why the run ends matters more
+                    report(f"warning: {error.message}")
+                raise
+            self._send(key)
+
+    def set_aside(self, path: Path) -> Path:
+        """Move a damaged group out of the way; its copies go, too."""
+        self._copies.remove(path.name.rpartition("-")[2])
+        return super().set_aside(path)
+
+    def _fetch(self, key: str) -> None:
+        """Bring the furthest copy here, if it is further; only with the right to write."""
+        here, there = super().find(key), self._copies.find(key)
+        if there is None or (here is not None and not further(there.attributes, here.attributes)):
+            return
+        if here is not None:
+            remove(here.path)
+        self._copies.fetch(there, self.path / there.group)
+
+    def _send(self, key: str) -> None:
+        here, there = super().find(key), self._copies.find(key)
+        if here is None or not (here.complete or here.frames):
+            return
+        if there is None or further(here.attributes, there.attributes):
+            self._copies.send(here.path)

@@ -1,0 +1,137 @@
+"""A store shared at a URL: fetched when somebody else has made it, sent when it is done, whole or not at all."""
+
+import json
+from pathlib import Path
+
+import fsspec
+import numpy as np
+import pytest
+import zarr
+
+from mocapflow.commands.again import placed
+from mocapflow.copies import Copies
+from mocapflow.errors import ComponentFailed, StoreError
+from mocapflow.runner import plan, run
+from mocapflow.store import Store
+from tests.fixtures.stores import actions, load, run_tiny, same, the_track, write_pipeline, write_recording
+
+MADE = {"background": "hit", "start": "hit", "track": "hit", "smooth": "hit", "export": "run"}
+
+
+@pytest.fixture(params=["memory", "file"])
+def url(request, tmp_path):
+    if request.param == "file":
+        return (tmp_path / "far").as_uri()
+    return f"memory://{tmp_path.name}/store"  # of the whole process
+
+
+@pytest.fixture
+def path(tmp_path):
+    return write_pipeline(tmp_path, write_recording(tmp_path / "clip"))
+
+
+def shared(path, folder, url, *changes, frames=None):
+    """Run a pipeline in a folder of its own, its results shared; return the summary and the lines reported."""
+    lines = []
+    pipeline = load(path, *changes, frames=frames)
+    return run(pipeline, store=folder / "store.zarr", out=folder / "out", url=url, report=lines.append), lines
+
+
+def copies(url):
+    """The names of the copies at a URL."""
+    files, root = fsspec.core.url_to_fs(url)
+    return sorted(Path(p).name for p in files.ls(root, detail=False) if not p.endswith("zarr.json"))
+
+
+def test_what_one_has_made_another_finds(tmp_path, path, url):
+    shared(path, tmp_path / "one", url)
+    actions_of_plan = {line.label: line.action for line in plan(load(path), store=tmp_path / "two/store.zarr", url=url)}
+    assert actions_of_plan == MADE
+    summary, _ = shared(path, tmp_path / "two", url)
+    assert actions(summary) == MADE
+    here = {a.path.name.rpartition("-")[0] for a in Store(tmp_path / "two" / "store.zarr").artifacts()}
+    assert here == {"smooth"}  # what export reads; the rest is not even fetched
+    changed, _ = shared(path, tmp_path / "two", url, "stages.smooth={use: tiny_smooth, width: 5}")
+    assert actions(changed) == MADE | {"smooth": "run"}
+    assert same(the_track(tmp_path / "one"), the_track(tmp_path / "two"))
+
+
+def test_a_copy_is_plain_zarr(tmp_path, path, url):
+    shared(path, tmp_path / "one", url)
+    group = zarr.open_group(url, mode="r")
+    (name,) = [name for name in copies(url) if name.startswith("track-")]
+    track = the_track(tmp_path / "one")
+    np.testing.assert_array_equal(group[f"{name}/angles"][:], track.angles)
+    assert group[name].attrs["complete"] is True
+
+
+def test_a_run_that_stopped_goes_on_elsewhere(tmp_path, path, url, monkeypatch):
+    monkeypatch.setenv("TINY_RAISE_AT", "7")
+    with pytest.raises(ComponentFailed, match="failed at frame 7"):
+        shared(path, tmp_path / "one", url)
+    monkeypatch.delenv("TINY_RAISE_AT")
+    _, lines = shared(path, tmp_path / "two", url)
+    assert "track: going on after 7 frames" in lines
+    run_tiny(path, tmp_path / "alone")
+    assert same(the_track(tmp_path / "two"), the_track(tmp_path / "alone"))
+    assert len([name for name in copies(url) if name.startswith("track-")]) == 1  # the finished one
+
+
+def test_a_copy_that_never_arrived_is_not_seen(tmp_path, path, url, monkeypatch):
+    def broken(self, path, value, **options):
+        if path.endswith("zarr.json") and "track-" in path:
+            raise OSError("the line is cut")
+        return real(self, path, value, **options)
+
+    files, _ = fsspec.core.url_to_fs(url)
+    real = type(files).pipe_file
+    monkeypatch.setattr(type(files), "pipe_file", broken)
+    with pytest.raises(StoreError, match="can't reach the store at .*the line is cut"):
+        shared(path, tmp_path / "one", url)
+    monkeypatch.setattr(type(files), "pipe_file", real)
+    assert any(name.startswith("track-") for name in copies(url))
+    key = the_track_key(tmp_path / "one")
+    assert Copies(url).find(key) is None
+    summary, _ = shared(path, tmp_path / "two", url)
+    assert actions(summary)["track"] == "run"
+    assert Copies(url).find(key) is not None
+
+
+def the_track_key(folder):
+    return next(a.key for a in Store(folder / "store.zarr").artifacts() if a.path.name.startswith("track-"))
+
+
+def test_two_that_make_the_same_leave_one_copy(tmp_path, path, url):
+    run_tiny(path, tmp_path)
+    (artifact,) = [a for a in Store(tmp_path / "store.zarr").artifacts() if a.path.name.startswith("track-")]
+    here, there = Copies(url), Copies(url)
+    here.send(artifact.path)
+    there.send(artifact.path)
+    assert len(copies(url)) == 1
+    assert here.find(artifact.key) == there.find(artifact.key)
+    assert json.loads((artifact.path / "zarr.json").read_text())["attributes"] == here.find(artifact.key).attributes
+
+
+def test_a_damaged_copy_is_made_anew(tmp_path, path, url):
+    shared(path, tmp_path / "one", url)
+    files, root = fsspec.core.url_to_fs(url)
+    (name,) = [name for name in copies(url) if name.startswith("smooth-")]
+    for file in files.find(f"{root}/{name}/angles"):
+        if "/c" in file.removeprefix(root):
+            files.pipe_file(file, b"nonsense")
+    summary, lines = shared(path, tmp_path / "two", url)
+    assert actions(summary)["smooth"] == "run"
+    assert any("is damaged and made anew" in line for line in lines)
+    assert actions(shared(path, tmp_path / "three", url)[0]) == MADE
+
+
+def test_what_cannot_be_reached_is_told(tmp_path, path):
+    with pytest.raises(StoreError, match=r"can't reach the store at nowhere://lab: .*nowhere") as caught:
+        shared(path, tmp_path, "nowhere://lab")
+    assert "without --store" in caught.value.hint
+
+
+def test_a_store_is_named_by_folder_or_url(tmp_path):
+    assert placed(None, tmp_path) == (str(tmp_path), None)
+    assert placed("elsewhere", tmp_path) == ("elsewhere", None)
+    assert placed("s3://lab/store", tmp_path) == (str(tmp_path), "s3://lab/store")
