@@ -45,7 +45,10 @@ class Copies:
         with self._reaching():
             from fsspec.core import url_to_fs
 
-            self._files, root = url_to_fs(url)
+            local = (
+                {"auto_mkdir": True} if url.startswith(("file:", "local:")) else {}
+            )  # elsewhere there are no folders
+            self._files, root = url_to_fs(url, **local)
         self._root = root.rstrip("/")
 
     def find(self, key: str) -> Copy | None:
@@ -69,8 +72,6 @@ class Copies:
         target = f"{self._root}/{path.name}-{uuid.uuid4().hex[:8]}"
         parts = [file for file in sorted(path.rglob("*")) if file.is_file() and file != path / META]
         with self._reaching():
-            for folder in {path, *(part.parent for part in parts)}:
-                self._files.makedirs(f"{target}/{folder.relative_to(path).as_posix()}", exist_ok=True)
             self._files.put(
                 [str(part) for part in parts], [f"{target}/{part.relative_to(path).as_posix()}" for part in parts]
             )
