@@ -12,6 +12,7 @@ import numba
 
 from mocapflow_draping.distance import outwards
 
+FASTEST = 2.0  # m per rad, or per m of thickness: more than a reach; a ring about to buckle would move without bounds
 GRAZING = 0.2  # least slope at which a bar is said to meet the skin: below, its turn would be without bounds
 
 
@@ -98,9 +99,11 @@ def follow_length(rate, above, p, x, link):  # type: ignore[no-untyped-def]
     for s in range(rate.shape[1]):
         ex, ey, ez = rate[0, s] - above[0, s], rate[1, s] - above[1, s], rate[2, s] - above[2, s]
         along = ux * ex + uy * ey + uz * ez
-        rate[0, s] = above[0, s] + scale * (ex - along * ux)
-        rate[1, s] = above[1, s] + scale * (ey - along * uy)
-        rate[2, s] = above[2, s] + scale * (ez - along * uz)
+        mx = above[0, s] + scale * (ex - along * ux)
+        my = above[1, s] + scale * (ey - along * uy)
+        mz = above[2, s] + scale * (ez - along * uz)
+        share = FASTEST / math.sqrt(max(mx * mx + my * my + mz * mz, FASTEST * FASTEST))
+        rate[0, s], rate[1, s], rate[2, s] = share * mx, share * my, share * mz
 
 
 @numba.njit(cache=True, error_model="numpy")

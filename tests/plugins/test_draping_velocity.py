@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from drape_bodies import SKIN, SKIRT, leg_poses, legs
+from mocapflow_draping.following import FASTEST
 from mocapflow_draping.kinematic import Kinematic
 from mocapflow_garments.cylinder import Cylinder
 from mocapflow_garments.skirt import Skirt
@@ -34,3 +35,14 @@ def test_velocities_are_the_slopes_of_the_drape(clothed, sweeps, monkeypatch):
         off = np.linalg.norm(rates - measured, axis=1)
         assert np.median(off) < 2e-3  # m/rad; single contacts come and go, and normals turn along the skin
         assert np.quantile(off, 0.8) < 0.03
+
+
+def test_rings_that_buckle_move_no_faster_than_a_reach():
+    tight = Cylinder(**(TUBE | dict(start=0.05, upper_circumference_m=0.75, lower_circumference_m=0.75)))
+    scene, reach = Scene(cameras=(), body=legs(), garment=tight.sew(legs())), np.arange(0.0, 1.6, 0.2)
+    draper, calm = Kinematic(skin_m=SKIN, sweeps=20), np.zeros(len(scene.garment.parameter_names))
+    every = np.arange(len(scene.garment.vertices))
+    for flexion in reach:
+        pose = Pose(root=np.eye(4), angles=np.array([flexion, 0.0, 0.5 * flexion, 0.0]))
+        rates = draper.velocity(pose, calm, every, Past(), scene)[..., 6:]
+        assert np.linalg.norm(rates, axis=1).max() <= FASTEST + 1e-9
