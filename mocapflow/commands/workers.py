@@ -49,7 +49,9 @@ def connected(distributed: Any, workers: int, scheduler: str | None) -> Any:
     try:
         return distributed.Client(scheduler)
     except (OSError, ValueError) as error:
-        hint = f"start one with `dask scheduler`, and on every machine `dask worker --nthreads 1 {scheduler}`"
+        hint = (
+            f"start one with `dask scheduler`, and on every machine `dask worker --nthreads 1 --no-nanny {scheduler}`"
+        )
         raise PipelineError(f"no dask scheduler answers at {scheduler}", hint=hint) from error
 
 
