@@ -207,14 +207,14 @@ class Stage(Component):
     earlier stage that makes its type; `Scene`, `Recording`, `Checkpoint` and `RunFolder` come from the runner;
     `X | None = None` makes an input optional. A stage that returns a `Recording` changes how later stages see it.
 
-    `extent` says which frames of the recording it sees, and its cache key names: the "first" one of the run, those
-    of the "run", or "all" there are; None: the first for a Start, all for a Background, Body, Rig or Recording, else
-    the run's.
+    `extent` says which frames of the recording it sees, and its cache key names: the "first" one of the run, its
+    "beginning" (ten frames, however short the run), those of the "run", or "all" there are; None: the first for a
+    Start, all for a Background, Body, Rig or Recording, else the run's.
     What a `causal` stage says of a frame depends on no later frame: a track made with it can go on when the run grows.
     """
 
     role: ClassVar[str] = "stage"
-    extent: ClassVar[Literal["first", "run", "all"] | None] = None
+    extent: ClassVar[Literal["first", "beginning", "run", "all"] | None] = None
     causal: ClassVar[bool] = False
     run: ClassVar[Callable[..., Any]]
 

@@ -18,6 +18,7 @@ from mocapflow.recording import Recording, open_recording
 from mocapflow.results import Evaluation, Files
 from mocapflow.wiring import Source, body_source, makes, rig_source, wire
 
+BEGINNING = 10  # frames
 SEEN = {Start: "first", Background: "all", Rig: "all", Body: "all", Recording: "all"}  # of a stage that says none
 
 
@@ -92,7 +93,9 @@ def steps_of(pipeline: Pipeline, digests: Digests) -> list[Step]:
 def _extent(named: NamedStage, recording: Recording) -> range:
     kinds = [extent for cls, extent in SEEN.items() if _makes(named, cls)]
     extent = named.stage.extent or (kinds[0] if kinds else "run")
-    return {"first": recording.indices[:1], "all": range(recording.length), "run": recording.indices}[extent]
+    run = recording.indices
+    onward = range(run.start, recording.length, run.step)
+    return {"first": run[:1], "beginning": onward[:BEGINNING], "run": run, "all": range(recording.length)}[extent]
 
 
 def _makes(named: NamedStage, wanted: type | UnionType) -> bool:

@@ -7,7 +7,8 @@ import sys
 import numpy as np
 import pytest
 
-from mocapflow import digests
+from mocapflow import digests, recipes
+from mocapflow.data import Start
 from mocapflow.digests import Digests
 from mocapflow.keys import explain, key_of
 from mocapflow.recipes import steps_of
@@ -60,6 +61,14 @@ def test_settings(tmp_path, clip, change, expected):
 
 def test_stop_is_only_in_the_key_of_what_reads_the_whole_sequence(tmp_path, clip):
     assert changed(keys(tmp_path, clip), keys(tmp_path, clip, frames=3)) == {"smooth", "export"}
+
+
+def test_a_stage_that_looks_at_the_beginning_sees_it_however_short_the_run(tmp_path, clip, monkeypatch):
+    monkeypatch.setitem(recipes.SEEN, Start, "beginning")
+    path = write_pipeline(tmp_path, clip, frames={"start": 1})
+    for change in ("frames.stop=2", "frames.stop=4"):
+        (start,) = (step for step in steps_of(load(path, change), SHARED) if step.label == "start")
+        assert list(start.recording.indices) == [1, 2, 3]
 
 
 def test_start_and_step_are_in_the_key(tmp_path, clip):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from mocapflow.components import Stage
 from mocapflow.data import Start
@@ -19,12 +19,12 @@ from mocapflow_sequence.start_from_file import calm
 class StartFromKeypoints(Stage):
     """Finds the person whose detections reproject best, and the pose of the body that explains them.
 
-    Only the first frame is used; where keypoints of fewer than two cameras agree, the next one.
+    Only the first frame is used; where keypoints of fewer than two cameras agree, the next one of the first ten.
     """
 
     name: ClassVar[str] = "start_from_keypoints"
+    extent: ClassVar[Literal["beginning"]] = "beginning"
     layout: Layout | None = None  # order of the keypoints; null: told by their number
-    search_frames: int = 10  # how far to look for a usable frame
 
     def run(self, recording: Recording, scene: Scene) -> Start:
         """Return the pose of the first usable frame; the cloth starts without forces.
@@ -34,13 +34,13 @@ class StartFromKeypoints(Stage):
         """
         need_keypoints(recording)
         names = landmarks(scene.body).names
-        for index in recording.indices[: self.search_frames]:
+        for index in recording.indices:
             person = person_at(recording, index, scene.cameras)
             if person is not None:
                 points = seen(person, layout(recording, [index], self.layout), names)
                 _, (pose,) = fit(scene.body, [points], scene.cameras)
                 return Start(pose=pose, parameters=calm(scene.garment))
-        first, last = recording.indices[0], recording.indices[: self.search_frames][-1]
+        first, last = recording.indices[0], recording.indices[-1]
         raise RecordingError(
             f"in frames {first} to {last} no two cameras see the same person",
             where=str(recording.folder / "keypoints"),

@@ -143,7 +143,7 @@ def test_frames_without_people_are_passed_over(body, pose, recording, tmp_path):
     start = StartFromKeypoints().run(open_recording(folder), scene)
     assert np.linalg.norm(start.pose.root[:3, 3] - pose.root[:3, 3]) < 0.1
     with pytest.raises(RecordingError, match="in frames 0 to 0 no two cameras see the same person"):
-        StartFromKeypoints(search_frames=1).run(open_recording(folder), scene)
+        StartFromKeypoints().run(open_recording(folder, stop=1), scene)
 
 
 def test_no_keypoints(body, cameras):
