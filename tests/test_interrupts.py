@@ -15,6 +15,14 @@ from tests.fixtures.stores import run_tiny, same, the_track, write_pipeline, wri
 MOCAPFLOW = Path(sys.executable).with_name("mocapflow")
 
 
+@pytest.fixture(autouse=True)
+def heard():
+    """Let children hear Ctrl-C: what runs in the background ignores it, and so would they."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.fixture
 def path(tmp_path):
     return write_pipeline(tmp_path, write_recording(tmp_path / "clip", frames=60))

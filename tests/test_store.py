@@ -91,7 +91,7 @@ def test_a_track_is_read_by_xarray(tmp_path, path):
     run_tiny(path, tmp_path)
     (folder,) = (tmp_path / "store.zarr").glob("track-*")
     data = xarray.open_zarr(str(folder), consolidated=False, zarr_format=3)
-    assert dict(data.sizes) | {"T": 12, "D": 2, "W": 4, "Q": 1, "C": 2, "K": 7} == dict(data.sizes)
+    assert dict(data.sizes) | {"T": 12, "D": 2, "W": 4, "Q": 1, "C": 2, "K": 8} == dict(data.sizes)
     assert data["angles"].attrs["unit"] == "rad"
     assert np.array_equal(data["angles"].values, the_track(tmp_path).angles)
 
