@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 from figures import write
-from mocapflow_draping.fields import build_fields, part_transforms
+from mocapflow_draping.fields import build_fields
 from mocapflow_draping.literal import settle_batch
+from mocapflow_draping.parts import posed_parts
 from mocapflow_sequence.portrait import portrait
 
 from mocapflow import Body, GarmentMesh, Pose, Scene
@@ -45,11 +46,11 @@ def cloth(body: Body) -> GarmentMesh:
 def fallen(body: Body, sheet: GarmentMesh, steps: int) -> F64:
     """Return the cloth's vertices (W, 3) m after it has touched the table and then turned for some steps."""
     fields = build_fields(body, np.array([0], np.int32), 0.01)
-    bodies = part_transforms(fields, np.eye(4)[None, None])
+    parts = posed_parts(fields, np.eye(4)[None, None])
     grid = sheet.vertices[sheet.strands][None].copy()
     first, last = np.zeros(COUNT, np.int32), np.full(COUNT, COUNT - 1, np.int32)
     fixed, skin = np.zeros(grid.shape[:3], bool), np.array([SKIN])
-    settle_batch(grid, fixed, first, last, skin, np.radians(2), steps, True, True, 0.002, bodies, fields.solid)
+    settle_batch(grid, fixed, first, last, skin, np.radians(2), steps, True, True, 0.002, parts, fields.values)
     vertices: F64 = grid.reshape(-1, 3)
     return vertices
 
