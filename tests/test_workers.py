@@ -104,14 +104,15 @@ def frames_of(worker, store):
 
 
 def kill_while_it_tracks(worker, store):
-    while not 2 <= frames_of(worker, store) <= 7:
+    deadline = time.monotonic() + 60
+    while not 2 <= frames_of(worker, store) <= 7 and time.monotonic() < deadline:
         time.sleep(0.02)
     worker.kill()
 
 
 @pytest.mark.long
 def test_a_lost_worker_costs_only_the_frame_in_flight(clips):
-    with cluster(clips, slow="0.05") as (address, workers):
+    with cluster(clips, slow="0.2") as (address, workers):
         killer = threading.Thread(target=kill_while_it_tracks, args=(workers[0], clips / "shared"))
         killer.start()
         assert len(dict(finished(grid(clips, "shared"), 1, address))) == 8
