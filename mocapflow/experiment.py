@@ -48,12 +48,13 @@ class Cell:
     frames: str | None
 
 
-def load_experiment(path: Path, recordings: Sequence[Path] = ()) -> tuple[Cell, ...]:
+def load_experiment(path: Path, recordings: Sequence[Path] = (), frames: str | None = None) -> tuple[Cell, ...]:
     """Return the runs of an experiment: every combination of levels on every recording, the first one the baseline.
 
     Args:
         path: the YAML file; paths in it start at its folder.
         recordings: instead of those of the file.
+        frames: instead of those of the file.
 
     Raises:
         PipelineError: the file says something else than an experiment does; with its line.
@@ -74,7 +75,7 @@ def load_experiment(path: Path, recordings: Sequence[Path] = ()) -> tuple[Cell, 
         pipeline = str(changes.pop(PIPELINE, said.pipeline))
         written = tuple(f"{target}={json.dumps(value)}" for target, value in changes.items())
         cells += [
-            Cell(variant, name, resolver.file(pipeline, (PIPELINE,)), folder, written, said.frames)
+            Cell(variant, name, resolver.file(pipeline, (PIPELINE,)), folder, written, frames or said.frames)
             for name, folder in zip(names, folders, strict=True)
         ]
     return tuple(cells)

@@ -26,6 +26,11 @@ DRAPERS, GAINS, CLIPS = ("tiny_draper", "other_draper"), (0.9, 0.5), ("one", "tw
 DASK = (sys.executable, "-m", "dask")
 
 
+def results(tasks, workers, scheduler):
+    """What all tasks return, by key."""
+    return {key: result() for key, result in finished(tasks, workers, scheduler)}
+
+
 def grid(folder, store):
     """Two drapers by two pose solvers by two recordings, as tasks by run folder."""
     tasks = {}
@@ -75,7 +80,7 @@ def tracks(store):
 def clips(tmp_path):
     for count, clip in enumerate(CLIPS, 10):
         write_recording(tmp_path / clip, frames=count)
-    dict(finished(grid(tmp_path, "alone"), 1, None))
+    results(grid(tmp_path, "alone"), 1, None)
     return tmp_path
 
 
@@ -88,7 +93,7 @@ def equal(folder):
 @pytest.mark.long
 def test_a_grid_on_a_scheduler_shares_what_its_variants_share(clips):
     with cluster(clips) as (address, _):
-        said = dict(finished(grid(clips, "shared"), 1, address))
+        said = results(grid(clips, "shared"), 1, address)
     for stage, times in {"background": 2, "start": 2, "track": 8}.items():
         assert sum(stage in line for line in said.values()) == times, said
     assert equal(clips)
@@ -115,7 +120,7 @@ def test_a_lost_worker_costs_only_the_frame_in_flight(clips):
     with cluster(clips, slow="0.2") as (address, workers):
         killer = threading.Thread(target=kill_while_it_tracks, args=(workers[0], clips / "shared"))
         killer.start()
-        assert len(dict(finished(grid(clips, "shared"), 1, address))) == 8
+        assert len(results(grid(clips, "shared"), 1, address)) == 8
         killer.join()
         assert workers[0].poll() == -signal.SIGKILL
     log = (clips / "worker1.log").read_text()
@@ -129,4 +134,4 @@ def test_no_scheduler():
         dask.config.set({"distributed.comm.timeouts.connect": "1s"}),
         pytest.raises(PipelineError, match=r"no dask scheduler answers at tcp://127\.0\.0\.1:1\n.*`dask scheduler`"),
     ):
-        dict(finished({"task": str}, 1, "tcp://127.0.0.1:1"))
+        results({"task": str}, 1, "tcp://127.0.0.1:1")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,7 +11,7 @@ import typer
 
 from mocapflow.commands.again import Invocation, placed
 from mocapflow.commands.results import table
-from mocapflow.commands.running import execute
+from mocapflow.commands.running import Frames, execute
 from mocapflow.commands.workers import Scheduler, Workers, finished
 from mocapflow.errors import MocapflowError
 
@@ -25,6 +26,7 @@ def compare(
     recordings: Annotated[
         list[Path] | None, typer.Option("--recording", help="Instead of those of the file; repeatable.")
     ] = None,
+    frames: Frames = None,
     out: Annotated[Path | None, typer.Option(help="Where to write.  [default: runs/NAME_OF_EXPERIMENT]")] = None,
     store: Annotated[
         str | None, typer.Option(help="Cached results, or a URL to share them.  [default: store.zarr beside it]")
@@ -32,23 +34,42 @@ def compare(
     workers: Workers = 1,
     scheduler: Scheduler = None,
 ) -> None:
-    """Run variants of a pipeline on recordings and compare them; stages they share are computed once."""
+    """Run variants of a pipeline on recordings and compare them; stages they share are computed once.
+
+    A run that fails is told at the end, with an exit status of 1; the others go on.
+    """
     from mocapflow.experiment import load_experiment
 
     folder = out or Path("runs") / experiment.stem
-    cells = load_experiment(experiment, recordings or ())
+    cells = load_experiment(experiment, recordings or (), frames)
     kept, url = placed(store, folder.parent / "store.zarr")
-    invocations = {place(folder, cell): invocation(cell, kept, url) for cell in cells}
+    invocations = {cell: invocation(cell, kept, url) for cell in cells}
     for each in invocations.values():
         each.load()  # tells what is wrong with any variant before the first one runs
-    tasks = {run: partial(finish, each, run.absolute()) for run, each in invocations.items()}
-    for number, (run, said) in enumerate(finished(tasks, workers, scheduler), 1):
-        typer.echo(f"{number} of {len(cells)}  {run.relative_to(folder)}  {said}", err=True)
+    tasks = {cell: partial(finish, each, place(folder, cell).absolute()) for cell, each in invocations.items()}
+    failed = {}
+    for number, (cell, result) in enumerate(finished(tasks, workers, scheduler), 1):
+        try:
+            said = result()
+        except MocapflowError as error:
+            failed[cell], said = error.message, f"failed: {error}"
+        typer.echo(f"{number} of {len(cells)}  {cell.variant}/{cell.name}  {said}", err=True)
+    show(folder, cells, failed)
+    if failed:
+        raise typer.Exit(1)
+
+
+def show(folder: Path, cells: Sequence[Cell], failed: Mapping[Cell, str]) -> None:
+    """Compare what has run, and print it with what has not."""
     from mocapflow_sequence import variants
 
-    rows = variants.compare([(cell.variant, cell.name, place(folder, cell)) for cell in cells], folder)
+    runs = [(cell.variant, cell.name, failed.get(cell) or place(folder, cell)) for cell in cells]
+    rows = [{name: row[name] for name in SHOWN} for row in variants.compare(runs, folder)]
+    rows += [{**dict.fromkeys(SHOWN, ""), "recording": c.name, "variant": c.variant, "angle": "failed"} for c in failed]
     if rows:
-        typer.echo(table([{name: row[name] for name in SHOWN} for row in rows]))
+        typer.echo(table(rows))
+    for cell, message in failed.items():
+        typer.echo(f"failed: {cell.variant} on {cell.name}: {message}")
     typer.echo(f"all figures: {folder}/compare.csv, runs.csv and compare.png")
 
 
@@ -71,10 +92,6 @@ def invocation(cell: Cell, store: str, url: str | None = None) -> Invocation:
 
 def finish(invocation: Invocation, out: Path) -> str:
     """Run one cell and say which stages were computed."""
-    try:
-        summary = execute(invocation, out, fresh=False)
-    except MocapflowError as error:
-        message = f"{out.parent.name} on {out.name}: {error.message}"
-        raise type(error)(message, where=error.where, hint=error.hint) from None
+    summary = execute(invocation, out, fresh=False)
     computed = [stage["label"] for stage in summary.stages if not stage["cached"]]
     return f"computed: {', '.join(computed) or 'nothing'}"

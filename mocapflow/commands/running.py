@@ -99,7 +99,8 @@ def side_by_side(invocation: Invocation, out: Path, workers: int, scheduler: str
         raise PipelineError("there is nothing for several workers to do", hint="--parts N tracks in N parts")
     remember(invocation, out)
     tasks = {label: partial(track, invocation.absolute(), out.absolute(), label) for label in labels}
-    for number, (label, _) in enumerate(finished(tasks, workers, scheduler), 1):
+    for number, (label, result) in enumerate(finished(tasks, workers, scheduler), 1):
+        result()
         typer.echo(f"{number} of {len(labels)}  {label}", err=True)
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import Annotated, Any, TypeVar
 
 import typer
 
-from mocapflow.errors import PipelineError
+from mocapflow.errors import ComponentFailed, PipelineError
 
 Workers = Annotated[int, typer.Option(min=1, help="Processes on this machine.")]
 Scheduler = Annotated[
@@ -19,17 +20,18 @@ Result = TypeVar("Result")
 
 def finished(
     tasks: Mapping[Key, Callable[[], Result]], workers: int, scheduler: str | None
-) -> Iterator[tuple[Key, Result]]:
-    """Run all tasks and yield each with its result when it is done.
+) -> Iterator[tuple[Key, Callable[[], Result]]]:
+    """Run all tasks and yield each, when it is done, with a call that returns its result or raises what it raised.
 
-    The locks of the store keep the workers out of each other's way. dask gives the task of a lost worker to another,
-    where it goes on from the last frame committed; a task that kills three workers is given up.
+    In this process it is the call that runs the task. The locks of the store keep the workers out of each other's way.
+    dask gives the task of a lost worker to another, where it goes on from the last frame committed; a task that kills
+    three workers is given up.
 
     Raises:
         PipelineError: dask is not installed, or no scheduler answers.
     """
     if scheduler is None and workers == 1:
-        yield from ((key, task()) for key, task in tasks.items())
+        yield from tasks.items()
         return
     try:
         from dask import distributed
@@ -38,7 +40,16 @@ def finished(
     with connected(distributed, workers, scheduler) as client:
         futures = {client.submit(task, pure=False): key for key, task in tasks.items()}
         for future in distributed.as_completed(list(futures)):  # type: ignore[no-untyped-call]
-            yield futures[future], future.result()
+            yield futures[future], partial(result_of, future, distributed.KilledWorker)
+
+
+def result_of(future: Any, killed: type[Exception]) -> Any:
+    """Return the result of a task that dask has run, or raise what it raised."""
+    try:
+        return future.result()
+    except killed as error:
+        hint = "workers that run out of memory end so: start fewer at a time"
+        raise ComponentFailed(f"every worker that tried it was lost: {error}", hint=hint) from None
 
 
 def connected(distributed: Any, workers: int, scheduler: str | None) -> Any:

@@ -12,14 +12,16 @@ from mocapflow.records import F64
 from mocapflow_sequence import layout, tables
 from mocapflow_sequence.compare import drawn_blocks, rms, rms_interval
 
-Run = tuple[str, str, Path]  # variant, recording, run folder
+Run = tuple[str, str, Path | str]  # variant, recording, run folder or why it failed
 Row = dict[str, float | str]
+WENT = ("overlap", "cpu_seconds_per_frame", "iterations", "lost", "not_at_rest")
 
 
 def compare(runs: Sequence[Run], folder: Path) -> list[Row]:
-    """Write compare.csv, runs.csv and compare.png of finished runs and return the rows of the first.
+    """Write compare.csv, runs.csv and compare.png of runs and return the rows of the first.
 
     The first variant is the baseline. Differences of RMS are paired: the same blocks of frames are drawn from both.
+    A run that failed has a row in runs.csv that says why.
     """
     folder.mkdir(parents=True, exist_ok=True)
     rows, baseline = [], runs[0][0]
@@ -37,9 +39,9 @@ def compare(runs: Sequence[Run], folder: Path) -> list[Row]:
     return rows
 
 
-def angle_errors(run: Path) -> dict[str, F64]:
+def angle_errors(run: Path | str) -> dict[str, F64]:
     """Return the errors (T,) in degrees of each angle that was compared in a run; none without a reference."""
-    if not (run / layout.ERRORS).is_file():
+    if isinstance(run, str) or not (run / layout.ERRORS).is_file():
         return {}
     return {name: error for name, error in tables.read_columns(run / layout.ERRORS).items() if name != "frame"}
 
@@ -65,19 +67,21 @@ def paired_difference(error: F64, base: F64) -> tuple[float, float, float]:
     return rms(error) - rms(base), float(low), float(high)
 
 
-def run_figures(run: Path) -> Row:
-    """Return how a run went: overlap, CPU time, turns, shares of frames lost and not at rest."""
+def run_figures(run: Path | str) -> Row:
+    """Return how a run went: overlap, CPU time, turns, shares of frames lost and not at rest; or why it failed."""
+    if isinstance(run, str):
+        return {"frames": 0, **dict.fromkeys(WENT, ""), "failed": run}
     said = json.loads((run / layout.RUN).read_text(encoding="utf-8"))
     frames = said["per_frame"]
     overlaps = [value for value in said["overlap_median"] if value is not None]
-    return {
-        "frames": len(frames),
-        "overlap": float(np.mean(overlaps)) if overlaps else np.nan,
-        "cpu_seconds_per_frame": float(np.median([frame["cpu_seconds"] for frame in frames])),
-        "iterations": float(np.mean([frame["iterations"] for frame in frames])),
-        "lost": float(np.mean([frame.get("lost", False) for frame in frames])),
-        "not_at_rest": float(np.mean([not frame["steady"] for frame in frames])),
-    }
+    went = (
+        float(np.mean(overlaps)) if overlaps else np.nan,
+        float(np.median([frame["cpu_seconds"] for frame in frames])),
+        float(np.mean([frame["iterations"] for frame in frames])),
+        float(np.mean([frame.get("lost", False) for frame in frames])),
+        float(np.mean([not frame["steady"] for frame in frames])),
+    )
+    return {"frames": len(frames), **dict(zip(WENT, went, strict=True)), "failed": ""}
 
 
 def plot(path: Path, rows: Sequence[Row]) -> None:

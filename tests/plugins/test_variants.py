@@ -53,3 +53,21 @@ def test_runs_without_a_reference_have_no_angles(tmp_path: Path) -> None:
     (run / layout.ERRORS).unlink()
     assert variants.compare([("only", "take", run)], tmp_path) == []
     assert (tmp_path / "runs.csv").is_file()
+
+
+def test_a_run_that_failed_is_a_row_and_the_others_are_compared(tmp_path: Path) -> None:
+    base, good = finished(tmp_path / "base", SHARED), finished(tmp_path / "good", SHARED)
+    why = "draper 'tiny' failed at frame 3, badly"
+    rows = variants.compare([("base", "take", base), ("bad", "take", why), ("good", "take", good)], tmp_path)
+    assert [row["variant"] for row in rows] == ["base", "good"]
+    with (tmp_path / "runs.csv").open() as file:
+        said = {run["variant"]: (run["frames"], run["overlap"], run["failed"]) for run in csv.DictReader(file)}
+    assert said["bad"] == ("0", "", why)
+    assert said["good"] == ("90", "0.8500", "")
+
+
+def test_without_the_baseline_there_are_errors_but_no_differences(tmp_path: Path) -> None:
+    good = finished(tmp_path / "good", SHARED)
+    (row,) = variants.compare([("base", "take", "lost"), ("good", "take", good)], tmp_path)
+    assert row["rms_deg"] == pytest.approx(rms(SHARED), abs=1e-4)
+    assert np.isnan(float(row["difference_deg"]))

@@ -1,0 +1,63 @@
+"""The command `compare`: a cell that fails is told, and the others go on."""
+
+import csv
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+from typer.testing import CliRunner
+
+from mocapflow import cli
+from tests.fixtures.stores import STAGES, write_pipeline, write_recording
+
+
+@pytest.fixture
+def compare(tmp_path, monkeypatch):
+    """Call `compare` on a short and a longer recording."""
+    monkeypatch.chdir(tmp_path)
+    for name, frames in {"short": 3, "long": 7}.items():
+        write_recording(tmp_path / name, frames=frames)
+    write_pipeline(tmp_path, "short", stages={**STAGES, "export": "export"})
+    grid = {"mocapflow": 1, "pipeline": "tiny.yaml", "recordings": ["long", "short"]}
+    grid["factors"] = {"draper": {"one": None, "other": {"stages.track.draper": "other_draper"}}}
+    Path("grid.yaml").write_text(yaml.safe_dump(grid))
+
+    def invoke(*words):
+        words = ("compare", "grid.yaml", "--out", "grid", *words)
+        monkeypatch.setattr(sys, "argv", ["mocapflow", *words])
+        return CliRunner().invoke(cli.app, words, prog_name="mocapflow")
+
+    return invoke
+
+
+def runs():
+    with Path("grid/runs.csv").open() as file:
+        return {(run["variant"], run["recording"]): (int(run["frames"]), run["failed"]) for run in csv.DictReader(file)}
+
+
+def test_all_cells(compare):
+    done = compare("--frames", "0:2")
+    assert done.exit_code == 0, done.output
+    assert runs() == {(variant, clip): (2, "") for variant in ("one", "other") for clip in ("long", "short")}
+
+
+def test_a_cell_that_fails_does_not_end_the_others(compare, monkeypatch):
+    monkeypatch.setenv("TINY_RAISE_AT", "5")
+    done = compare()
+    assert done.exit_code == 1
+    assert [run for run, (frames, _) in runs().items() if frames == 3] == [("one", "short"), ("other", "short")]
+    why = runs()["one", "long"][1]
+    assert "tiny_segmenter" in why and "failed at frame 5" in why and "spring force overflow" in why
+    assert f"failed: one on long: {why}" in done.stdout.splitlines()
+    assert "run the same command to continue at 5" in done.stderr
+    monkeypatch.delenv("TINY_RAISE_AT")
+    assert compare().exit_code == 0
+    assert runs()["one", "long"] == (7, "")
+
+
+def test_what_cannot_be_loaded_is_told_before_anything_runs(compare):
+    text = Path("grid.yaml").read_text().replace("other_draper", "no_draper")
+    Path("grid.yaml").write_text(text)
+    assert compare().exit_code == 2
+    assert not Path("grid").exists()
