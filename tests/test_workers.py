@@ -66,7 +66,7 @@ def cluster(folder, workers=2, slow="0"):
         yield json.loads(address.read_text())["address"], running[1:]
     finally:
         for process in running:
-            process.terminate()
+            process.kill()  # asked to end, a worker that has lost its scheduler may wait for ever
         for process in running:
             process.wait()
 
