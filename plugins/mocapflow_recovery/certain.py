@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -15,8 +14,10 @@ from mocapflow_levelset.shadows import floor_around
 
 from mocapflow.assets import Background, Camera
 from mocapflow.data import Frame, Surface
+from mocapflow.geometry.cameras import scaled
 from mocapflow.geometry.silhouettes import mask, outline
 from mocapflow.records import F32, U8, Bool
+from mocapflow.scene import Scene
 
 CHANNELS: tuple[ChannelName, ...] = ("lab",)
 SHADOW = Shadow(floor=0.012, share=0.2, darkest=0.5, chroma=0.005, stranger=-6.0)
@@ -25,6 +26,13 @@ FLOOR_REACH = 2.0  # m, from the person, where their shadow may fall
 SPECK = 0.01  # of the largest part's area: smaller parts are noise
 MOST = 3.0  # of the model's area: more can't be the person
 SEAM = np.ones((5, 5), np.uint8)  # gaps in the person so narrow are the person's
+
+
+class Room(NamedTuple):
+    """The empty room as small cameras see it."""
+
+    cameras: tuple[Camera, ...]
+    plates: tuple[Plate, ...]
 
 
 class View(NamedTuple):
@@ -36,48 +44,45 @@ class View(NamedTuple):
     pixel_m: float  # how large a pixel is where the person stands
 
 
-def views(
-    frame: Frame,
-    surface: Surface,
-    cameras: tuple[Camera, ...],
-    room: tuple[Plate, ...],
-    near_m: float,
-    median_px: int = 0,
-    hidden: Sequence[Bool | None] | None = None,
-) -> list[View]:
+def small_room(background: Background, cameras: tuple[Camera, ...], rows: int) -> Room:
+    """Return the empty room in images of about so many rows."""
+    factors = [max(round(camera.size[1] / rows), 1) for camera in cameras]
+    small = tuple(map(shrunk, cameras, factors))
+    plates = map(plate_of, background.mean, background.spread, [CHANNELS] * len(cameras), factors)
+    return Room(small, tuple(plates))
+
+
+def shrunk(camera: Camera, factor: int) -> Camera:
+    """Return a camera whose pixels are the means of squares of another's; what is left over is dropped."""
+    return scaled(replace(camera, size=camera.size // factor * factor), 1 / factor)
+
+
+def views(frame: Frame, scene: Scene, surface: Surface, room: Room, near_m: float, median_px: int = 0) -> list[View]:
     """Return what the usable views of a frame surely show, each at the size of its camera.
 
     A view that is unlike the empty room nearly everywhere shows nothing surely and is left out.
 
     Args:
         frame: the images, in full size.
+        scene: which knows what hides the person.
         surface: the person as believed: parts further away than `near_m` in the image are somebody else.
-        cameras: those of the scene, shrunk.
-        room: the empty room at the same size.
+        room: the empty room, small.
         near_m: see `surface`.
         median_px: width of a median filter of the images, against pixels of no meaning; 0 for none.
-        hidden: per view where it shows neither room nor person, in full size; None: nowhere.
     """
     found = []
-    for camera, plate, c in zip(cameras, room, range(len(cameras)), strict=True):
-        model = mask(outline(surface, camera), camera)
-        image, cover = frame.images[c], None if hidden is None else hidden[c]
-        view = _view(image, surface, model, camera, plate, near_m, median_px, cover) if frame.usable[c] else None
-        if view is not None and np.count_nonzero(view.person) < MOST * np.count_nonzero(model):
-            found.append(view)
+    for number in np.flatnonzero(frame.usable):
+        camera, plate = room.cameras[number], room.plates[number]
+        model, size = mask(outline(surface, camera), camera), pixel_size(camera, surface)
+        image = without_outliers(frame.images[number], median_px)
+        factor = image.shape[1] // int(camera.size[0])
+        changed, same = _compared(crops.shrink(image, factor), plate, floor_around(surface, camera, FLOOR_REACH))
+        hidden = scene.hidden(frame, int(number))
+        told = True if hidden is None else crops.shrink_values(hidden.astype(np.float32), factor) == 0
+        person = _near(changed & told, model, near_m / size)
+        if np.count_nonzero(person) < MOST * np.count_nonzero(model):
+            found.append(View(camera, person, _away(same & told, person), size))
     return found
-
-
-def empty_room(background: Background, cameras: tuple[Camera, ...]) -> tuple[Plate, ...]:
-    """Return the empty room as the small cameras see it."""
-    shrunk = zip(background.mean, background.spread, cameras, strict=True)
-    return tuple(plate_of(mean, spread, CHANNELS, mean.shape[1] // camera.size[0]) for mean, spread, camera in shrunk)
-
-
-def shrunk(camera: Camera, factor: int) -> Camera:
-    """Return a camera whose pixels are the means of squares of another's."""
-    to_small = np.array([[1, 0, 0.5 - factor / 2], [0, 1, 0.5 - factor / 2], [0, 0, factor]]) / factor
-    return replace(camera, intrinsics=to_small @ camera.intrinsics, size=(camera.size // factor).astype(np.int32))
 
 
 def pixel_size(camera: Camera, surface: Surface) -> float:
@@ -86,31 +91,21 @@ def pixel_size(camera: Camera, surface: Surface) -> float:
     return float(depth / camera.intrinsics[0, 0])
 
 
-def _view(
-    image: U8,
-    surface: Surface,
-    model: Bool,
-    camera: Camera,
-    room: Plate,
-    near_m: float,
-    median_px: int,
-    hidden: Bool | None,
-) -> View:
+def _compared(image: U8, plate: Plate, floor: F32) -> tuple[Bool, Bool]:
+    """Return where an image (h, w, 3) is not the empty room, lit or shaded, and where it looks just like it."""
+    values = features(image, CHANNELS)
+    flat, expected, spread = values.reshape(len(values), -1), plate.planes.reshape(len(values), -1), plate.spread
+    density = density_of(flat, expected, spread.ravel(), floor.ravel(), CHANNELS, SHADOW).reshape(floor.shape)
+    off = np.sum((values - plate.planes) ** 2, axis=0) / np.maximum(spread, SHADOW.floor) ** 2
+    return density < 0, off < EMPTY**2
+
+
+def _away(empty: Bool, person: Bool) -> F32:
+    """Return the distance (h, w) px of every pixel from what may be the person: that is not empty, or in a gap."""
     import cv2
 
-    factor = image.shape[1] // int(camera.size[0])
-    values = features(crops.shrink(without_outliers(image, median_px), factor), CHANNELS)
-    floor = floor_around(surface, camera, FLOOR_REACH)
-    flat, expected, spread = values.reshape(len(values), -1), room.planes.reshape(len(values), -1), room.spread.ravel()
-    density = density_of(flat, expected, spread, floor.ravel(), CHANNELS, SHADOW).reshape(floor.shape)
-    off = np.sum((values - room.planes) ** 2, axis=0) / np.maximum(room.spread, SHADOW.floor) ** 2
-    size = pixel_size(camera, surface)
-    told = np.ones(model.shape, bool) if hidden is None else crops.shrink_values(hidden.astype(np.float32), factor) == 0
-    person = _near((density < 0) & told, model, near_m / size)
     closed = cv2.morphologyEx(person.view(np.uint8), cv2.MORPH_CLOSE, SEAM)
-    empty = (off < EMPTY**2) & (closed == 0) & told
-    away = cv2.distanceTransform(empty.view(np.uint8), cv2.DIST_L2, 3)
-    return View(camera, person, np.asarray(away, np.float32), size)
+    return np.asarray(cv2.distanceTransform((empty & (closed == 0)).view(np.uint8), cv2.DIST_L2, 3), np.float32)
 
 
 def _near(changed: Bool, model: Bool, near_px: float) -> Bool:

@@ -9,7 +9,7 @@ import numpy as np
 from mocapflow.data import CLOTH, Surface
 from mocapflow.geometry.cameras import project
 from mocapflow.geometry.silhouettes import mask, outline
-from mocapflow.records import F32, F64, Bool
+from mocapflow.records import F32, F64, I32, Bool
 from mocapflow_recovery.certain import View
 
 
@@ -48,33 +48,32 @@ def floating_area(bare: Surface, views: Sequence[View], reach_m: float) -> float
     """
     empty = np.zeros(len(bare.vertices), int)
     for view in views:
-        empty += _at(view.away, project(bare.vertices, view.camera)) > reach_m / view.pixel_m
-    corners = bare.vertices[bare.faces]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-    return float(area[(empty[bare.faces] >= 2).all(axis=1)].sum())
+        rows, column, row = _pixels(bare.vertices, view)
+        empty[rows] += view.away[row, column] > reach_m / view.pixel_m
+    corners = bare.vertices[bare.faces[(empty >= 2)[bare.faces].all(axis=1)]]
+    return float(
+        np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
+    )
 
 
 def _from_cloth(surface: Surface, view: View) -> F32:
     """Return the distance (h, w) px of every pixel from the garment's vertices; far where there is no garment."""
     import cv2
 
-    shape = view.person.shape
-    free = np.ones(shape, np.uint8)
-    column, row = np.rint(project(surface.vertices[surface.layer == CLOTH], view.camera)).astype(int).reshape(-1, 2).T
-    inside = (column >= 0) & (column < shape[1]) & (row >= 0) & (row < shape[0])
-    free[row[inside], column[inside]] = 0
-    if free.all():
-        return np.full(shape, np.inf, np.float32)
+    free = np.ones(view.person.shape, np.uint8)
+    _, column, row = _pixels(surface.vertices[surface.layer == CLOTH], view)
+    if not len(row):
+        return np.full(free.shape, np.inf, np.float32)
+    free[row, column] = 0
     return np.asarray(cv2.distanceTransform(free, cv2.DIST_L2, 3), np.float32)
 
 
-def _at(field: F32, pixels: F64) -> F64:
-    """Return a field (h, w) at the pixels nearest to (K, 2), 0 outside the image."""
-    column, row = np.rint(pixels).astype(int).T
-    inside = (column >= 0) & (column < field.shape[1]) & (row >= 0) & (row < field.shape[0])
-    values = np.zeros(len(pixels))
-    values[inside] = field[row[inside], column[inside]]
-    return values
+def _pixels(points: F64, view: View) -> tuple[I32, I32, I32]:
+    """Return which of the points (K, 3) lie in the image, and the column and row of the pixels nearest to them."""
+    pixels = np.rint(project(points, view.camera))
+    rows = np.flatnonzero(((pixels >= 0) & (pixels < view.person.shape[::-1])).all(axis=1)).astype(np.int32)
+    column, row = pixels[rows].astype(np.int32).T
+    return rows, column, row
 
 
 def _of(surface: Surface, view: View) -> tuple[Bool, F32]:

@@ -8,7 +8,6 @@ from typing import Annotated, ClassVar, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from mocapflow_levelset.plates import Plate
 from pydantic import Field, PrivateAttr
 
 from mocapflow.assets import Background, Body, Camera
@@ -16,20 +15,13 @@ from mocapflow.components import Recovery
 from mocapflow.data import NO_CLOTH, Cloth, Frame, FrameResult, FrameState, Past, Pose, PoseBatch, Surface
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
-from mocapflow_recovery.certain import View, empty_room, shrunk, views
+from mocapflow_recovery.certain import Room, View, small_room, views
 from mocapflow_recovery.coarse import coarse_body
 from mocapflow_recovery.disagreement import distance, floating_area, uncovered_area
 from mocapflow_recovery.sampling import Spread, search
 
 Positive = Annotated[float, Field(gt=0)]
 Count = Annotated[int, Field(ge=1)]
-
-
-class Room(NamedTuple):
-    """The empty scene at the size the search works at."""
-
-    cameras: tuple[Camera, ...]
-    empty: tuple[Plate, ...]
 
 
 class Stray(NamedTuple):
@@ -87,19 +79,17 @@ class LimbSearch(Recovery):
         background = model.scene.background
         if background is None:
             return result
-        room = self._room(background, model.scene.cameras)
-        hidden = [model.scene.hidden(frame, camera) for camera in range(len(room.cameras))]
-        seen = views(frame, surface_of(model, result), room.cameras, room.empty, self.near_m, self.median_px, hidden)
-        stray = self._stray(model, seen, result)
+        room, surface = self._room(background, model.scene.cameras), surface_of(model, result)
+        seen = views(frame, model.scene, surface, room, self.near_m, self.median_px)
+        stray = self._stray(model, seen, surface)
         if not stray.doubtful(self.uncovered_cm2, self.floating_cm2):
             return result
         found = self._search(frame, state, result.state, seen, past, model)
         other = settle(found, result.state.cloth.parameters)
-        before, after = (distance(surface_of(model, each), seen, self.cap_m) for each in (result, other))
-        better = other if after < (1 - self.gain) * before else result
-        said = f"found again by search; then {self._stray(model, seen, better)}"
-        note = f"fit doubted, {stray}: {said if better is other else 'search found nothing better'}"
-        return replace(better, notes=(*better.notes, note))
+        again = surface_of(model, other)
+        if distance(again, seen, self.cap_m) < (1 - self.gain) * distance(surface, seen, self.cap_m):
+            return noted(other, f"fit doubted, {stray}: found again by search; then {self._stray(model, seen, again)}")
+        return noted(result, f"fit doubted, {stray}: search found nothing better")
 
     def _search(
         self, frame: Frame, state: FrameState, settled: FrameState, seen: Sequence[View], past: Past,
@@ -122,8 +112,7 @@ class LimbSearch(Recovery):
         rng = np.random.default_rng(frame.index)
         return search(cost, begin, body, spread, self.shares, self.samples, rng)
 
-    def _stray(self, model: ClothedModel, seen: Sequence[View], result: FrameResult) -> Stray:
-        surface = surface_of(model, result)
+    def _stray(self, model: ClothedModel, seen: Sequence[View], surface: Surface) -> Stray:
         return Stray(
             uncovered=1e4 * uncovered_area(surface, seen, self.reach_m, self.cloth_m),
             floating=1e4 * floating_area(model.scene.bare(surface), seen, self.reach_m),
@@ -132,8 +121,7 @@ class LimbSearch(Recovery):
     def _room(self, background: Background, cameras: tuple[Camera, ...]) -> Room:
         """Return the small empty scene; made once, forgotten with the background."""
         if background not in self._rooms:
-            small = tuple(shrunk(camera, max(round(camera.size[1] / self.rows), 1)) for camera in cameras)
-            self._rooms[background] = Room(small, empty_room(background, small))
+            self._rooms[background] = small_room(background, cameras, self.rows)
         return self._rooms[background]
 
     def _coarse(self, body: Body) -> Body:
@@ -146,6 +134,11 @@ class LimbSearch(Recovery):
 def surface_of(model: ClothedModel, result: FrameResult) -> Surface:
     """Return the surface that a result believes in."""
     return model.surface(result.state.estimate.pose, result.state.cloth)
+
+
+def noted(result: FrameResult, note: str) -> FrameResult:
+    """Return a result with one more note."""
+    return replace(result, notes=(*result.notes, note))
 
 
 def drapes(model: ClothedModel, poses: Sequence[Pose], parameters: F64, past: Past) -> list[Cloth]:

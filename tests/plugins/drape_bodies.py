@@ -10,6 +10,7 @@ from mocapflow_draping.distance import body_distances
 from mocapflow_draping.fields import build_fields
 from mocapflow_draping.kinematic import Kinematic
 from mocapflow_draping.parts import posed_parts
+from mocapflow_draping.strands import strands_of
 from mocapflow_draping.swing import swing_batch
 from mocapflow_garments.skirt import Skirt
 
@@ -156,3 +157,12 @@ def distances(body, points, poses=None, voxel=VOXEL):
     for row, cloud in enumerate(points):
         body_distances(np.ascontiguousarray(cloud), out[row], parts[row], values)
     return out
+
+
+def check_whole_and_outside(scene, draped, poses):
+    """Strands (B, N, 3) keep their length, and no free particle is nearer to the body than the skin's thickness."""
+    strands = strands_of(scene.garment, scene.body)
+    lengths = np.linalg.norm(np.diff(draped[:, strands.vertex], axis=2), axis=-1)
+    assert np.abs(lengths / strands.links - 1).max() < 1e-9
+    free = np.setdiff1d(np.arange(draped.shape[1]), scene.garment.pinned)
+    assert distances(scene.body, draped[:, free], poses).min() > SKIN - 1e-4

@@ -3,11 +3,20 @@
 import drape_bodies
 import numpy as np
 import pytest
-from drape_bodies import SKIN, box, distances, draper, leg_poses, lying_cylinder, prepared, swing
+from drape_bodies import (
+    SKIN,
+    box,
+    check_whole_and_outside,
+    distances,
+    draper,
+    leg_poses,
+    lying_cylinder,
+    prepared,
+    swing,
+)
 from mocapflow_draping.distance import outwards
 from mocapflow_draping.kinematic import Kinematic
 from mocapflow_draping.literal import settle_batch
-from mocapflow_draping.strands import strands_of
 from mocapflow_draping.voxels import signed_distance
 from mocapflow_garments.skirt import Skirt
 
@@ -126,11 +135,7 @@ def test_a_strand_over_a_cylinder_is_taut(link):
 def test_a_skirt_keeps_its_strands_and_stays_outside(skirted):
     scene, poses = skirted
     draped = draper(sweeps=0).drape(poses, np.zeros((4, 6)), Past(), scene)
-    strands = strands_of(scene.garment, scene.body)
-    lengths = np.linalg.norm(np.diff(draped[:, strands.vertex], axis=2), axis=-1)
-    assert np.abs(lengths / strands.links - 1).max() < 1e-9
-    free = np.setdiff1d(np.arange(draped.shape[1]), scene.garment.pinned)
-    assert distances(scene.body, draped[:, free], poses).min() > SKIN - 1e-4
+    check_whole_and_outside(scene, draped, poses)
 
 
 def test_the_chapters_steps_end_near_the_taut_drape(skirted):

@@ -3,7 +3,7 @@
 import drape_bodies
 import numpy as np
 import pytest
-from drape_bodies import SKIN, distances, draper, leg_poses, legs
+from drape_bodies import SKIN, check_whole_and_outside, distances, draper, leg_poses, legs
 from mocapflow_draping.strands import strands_of
 from mocapflow_garments.cylinder import Cylinder
 
@@ -50,11 +50,7 @@ def test_rings_come_back_to_their_length(skirted):
 def test_strands_keep_their_length_and_particles_stay_outside(skirted):
     poses = leg_poses()
     draped = drape(skirted, poses, sweeps=40)
-    strands = strands_of(skirted.garment, skirted.body)
-    lengths = np.linalg.norm(np.diff(draped[:, strands.vertex], axis=2), axis=-1)
-    assert np.abs(lengths / strands.links - 1).max() < 1e-9
-    free = np.setdiff1d(np.arange(draped.shape[1]), skirted.garment.pinned)
-    assert distances(skirted.body, draped[:, free], poses).min() > SKIN - 1e-4
+    check_whole_and_outside(skirted, draped, poses)
 
 
 def test_no_ring_parts_around_a_raised_thigh(skirted):
@@ -64,11 +60,7 @@ def test_no_ring_parts_around_a_raised_thigh(skirted):
     a, b = skirted.garment.rings.T
     middles = (draped[:, a] + draped[:, b]) / 2
     assert distances(skirted.body, middles, poses).min() > -0.03  # no limb between neighbours
-    strands = strands_of(skirted.garment, skirted.body)
-    lengths = np.linalg.norm(np.diff(draped[:, strands.vertex], axis=2), axis=-1)
-    assert np.abs(lengths / strands.links - 1).max() < 1e-9
-    free = np.setdiff1d(np.arange(draped.shape[1]), skirted.garment.pinned)
-    assert distances(skirted.body, draped[:, free], poses).min() > SKIN - 1e-4
+    check_whole_and_outside(skirted, draped, poses)
 
 
 def test_a_strand_takes_up_a_new_direction_gradually(skirted):

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mocapflow_recovery.certain import empty_room, pixel_size, shrunk, views
+from mocapflow_recovery.certain import pixel_size, shrunk, small_room, views
 from mocapflow_recovery.coarse import coarse_body
 from mocapflow_recovery.disagreement import distance, floating_area, uncovered_area
 from mocapflow_recovery.sampling import Spread, parts, samples, search
@@ -18,8 +18,7 @@ from mocapflow.testing import pictures, scenes, template_body
 SCENE = scenes.tiny_scene()
 POSE = scenes.tiny_pose(SCENE, 3, 0.1)
 FRAME = pictures.tiny_frame(SCENE, POSE)
-CAMERAS = tuple(shrunk(camera, 2) for camera in SCENE.cameras)
-ROOM = empty_room(SCENE.background, CAMERAS)
+ROOM = small_room(SCENE.background, SCENE.cameras, 120)
 SPREAD = Spread(np.radians(25), np.radians(8), 0.06)
 
 
@@ -35,7 +34,7 @@ def surface(pose: Pose):
 
 
 def seen(frame=FRAME):
-    return views(frame, surface(POSE), CAMERAS, ROOM, 0.35)
+    return views(frame, SCENE, surface(POSE), ROOM, 0.35)
 
 
 def test_a_small_camera_sees_the_same() -> None:
@@ -69,8 +68,8 @@ def test_a_shadow_is_neither() -> None:
 def test_what_hides_the_person_is_neither() -> None:
     bar = np.zeros(FRAME.images[0].shape[:2], bool)
     bar[100:130] = True
-    barred = replace(FRAME, images=tuple(np.where(bar[..., None], np.uint8(0), image) for image in FRAME.images))
-    for view in views(barred, surface(POSE), CAMERAS, ROOM, 0.35, 0, [bar] * len(CAMERAS)):
+    images = tuple(np.where(bar[..., None], np.uint8(0), image) for image in FRAME.images)
+    for view in seen(replace(FRAME, images=images, hidden=(bar,) * len(images))):
         assert not view.person[50:65].any()
         assert not view.away[50:65].any()
 
