@@ -107,4 +107,3 @@ class Background:
 
     mean: tuple[F32, ...]  # C x (H, W, 3) grey levels
     spread: tuple[F32, ...]  # C x (H, W, 3) grey levels, standard deviation
-    hidden: tuple[Bool, ...] = ()  # C x (H, W) True where something stands before the person; empty: nowhere

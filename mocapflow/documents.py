@@ -11,6 +11,7 @@ from mocapflow.errors import PipelineError, alternatives
 
 Steps = tuple[str | int, ...]  # the way to a value: keys of mappings, indices of lists
 GROUPS = {"frames", "parts"}  # of plain settings, which a file may leave out
+BEFORE = " before "  # between a path and the name that its value is put before
 
 
 @dataclass(frozen=True)
@@ -45,13 +46,14 @@ def changed(document: Document, target: str, new: Document) -> Document:
 
     Args:
         document: as it was; it is left alone.
-        target: the path, as `stages.track.draper`.
+        target: the path, as `stages.track.draper`, or with its place: `stages.corrupt before background`.
         new: the value, and where it was written.
 
     Raises:
         PipelineError: the document has no such path; with the place of the new value.
     """
-    parts = target.split(".")
+    path, _, successor = target.partition(BEFORE)
+    parts = path.split(".")
     values = holder = _copy(document.values)
     steps: Steps = ()
     for part in parts:
@@ -66,8 +68,21 @@ def changed(document: Document, target: str, new: Document) -> Document:
             raise PipelineError(f"there is no '{dotted((*steps, part))}'", where=new.place(()).text, hint=hint)
         steps = (*steps, key)
     holder[steps[-1]] = new.values
+    if successor and not _moved(holder, steps[-1], successor):
+        message = f"there is no '{dotted((*steps[:-1], successor))}' to put '{parts[-1]}' before"
+        raise PipelineError(message, where=new.place(()).text, hint=alternatives(successor, map(str, holder)))
     kept = {at: place for at, place in document.places.items() if at[: len(steps)] != steps}
     return Document(values, {**kept, **{(*steps, *at): place for at, place in new.places.items()}})
+
+
+def _moved(holder: Any, key: str | int, successor: str) -> bool:
+    """Put a key right before another of its mapping, in place; False where there is no such place."""
+    if not isinstance(holder, dict) or key == successor or successor not in holder:
+        return False
+    names = [name for name in holder if name != key]
+    for name in (key, *names[names.index(successor) :]):
+        holder[name] = holder.pop(name)
+    return True
 
 
 def _opened(holder: Any, key: str | int) -> Any:

@@ -91,7 +91,7 @@ def pool_matches(
 ) -> Matches:
     """Return the matches of all matchers together, each with its share, where nothing hides the person."""
     found = pool([(m.share, m.match(frame, segmentation, surface, past, scene, turn)) for m in matchers])
-    return scene.unhidden(found, frame)
+    return found.unhidden(frame)
 
 
 def overlaps(surface: Surface, segmentation: Segmentation, cameras: Sequence[Camera]) -> F64:

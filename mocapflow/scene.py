@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from mocapflow.assets import Background, Body, Camera, GarmentMesh
-from mocapflow.data import BODY, CLOTH, Cloth, Frame, Matches, Pose, Surface
+from mocapflow.data import BODY, CLOTH, Cloth, Pose, Surface
 from mocapflow.geometry import kinematics, meshes
 from mocapflow.records import F64, I32, U8, Bool, record
 
@@ -84,25 +84,6 @@ class Scene:
             edges=self.undressed.edges,
             layer=surface.layer[:count],
         )
-
-    def hidden(self, frame: Frame, camera: int) -> Bool | None:
-        """Return where a view (H, W) shows nothing of the person, whatever stands there; None: it may anywhere."""
-        known = [] if self.background is None else [self.background.hidden]
-        parts = [views[camera] for views in (*known, frame.hidden) if views]
-        return np.logical_or.reduce(parts) if parts else None
-
-    def unhidden(self, matches: Matches, frame: Frame) -> Matches:
-        """Return the matches whose pixel is not hidden."""
-        seen = np.ones(len(matches.camera), bool)
-        for camera in range(len(self.cameras)):
-            hidden = self.hidden(frame, camera)
-            if hidden is not None:
-                rows = np.flatnonzero(matches.camera == camera)
-                x, y = np.rint(matches.pixel[rows].T).astype(int)
-                seen[rows] = ~hidden[np.clip(y, 0, len(hidden) - 1), np.clip(x, 0, hidden.shape[1] - 1)]
-        if seen.all():
-            return matches
-        return replace(matches, **{field.name: getattr(matches, field.name)[seen] for field in fields(matches)})
 
     def surface(self, pose: Pose, cloth: Cloth) -> Surface:
         """Return body and garment posed in the world."""

@@ -46,7 +46,7 @@ def test_wrong_frames_are_named_and_the_pose_is_right_soon_after(tmp_path):
 @pytest.mark.long
 def test_legs_that_nobody_sees_do_not_jump_and_are_found_where_they_are(tmp_path):
     """A knee is raised by 100 degrees meanwhile."""
-    covered = "stages.corrupt={use: corrupt, events: [{what: covered, first: 4, count: 10}]}"
+    covered = "stages.corrupt before background={use: corrupt, events: [{what: covered, first: 4, count: 10}]}"
     words = ("--frames", "0:18", "--set", covered, "--set", f"stages.track.priors={PRIORS}")
     errors, legs, _ = tracked(tmp_path / "run", "skirt.yaml", *words)
     assert np.abs(np.diff(legs[3:14], axis=0)).max() < 30

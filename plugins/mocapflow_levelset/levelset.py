@@ -94,7 +94,7 @@ class LevelSet(Segmenter):
             model = model_distance(surface, camera, self.band_px)
             warm = turn.index > 0 and c in last
             levels = self._levels(warm)
-            weight = counted(model.shape, self.border_px, scene.hidden(frame, c))
+            weight = counted(model.shape, self.border_px, frame.cover(c))
             view = View(
                 image=frame.images[c],
                 start=last[c] if warm else model,

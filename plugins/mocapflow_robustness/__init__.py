@@ -9,8 +9,8 @@ from mocapflow.hookspecs import hookimpl
 @hookimpl
 def mocapflow_stages() -> list[type[Stage]]:
     """Return the stages of this package."""
-    from mocapflow_robustness.calm import Calm
     from mocapflow_robustness.check_views import CheckViews
     from mocapflow_robustness.corrupt import Corrupt
+    from mocapflow_robustness.denoise import Denoise
 
-    return [Calm, CheckViews, Corrupt]
+    return [CheckViews, Corrupt, Denoise]

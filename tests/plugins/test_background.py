@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mocapflow_levelset.background import BackgroundDifference
 from mocapflow_levelset.shadows import floor_around
-from mocapflow_sequence.background import EmptyScene, as_shown, temporal_median, unmoved
+from mocapflow_sequence.background import EmptyScene, temporal_median
 
 from mocapflow.assets import Background
 from mocapflow.data import Past, Turn
@@ -150,27 +150,3 @@ def test_shadows_may_fall_around_the_feet_only():
         column, row = np.clip(np.rint(project(feet[None], camera)[0]).astype(int), 0, [319, 239])
         assert floor[row, column] == 1
         assert floor[:100].sum() == 0
-
-
-def test_what_stands_before_the_person_all_the_time_is_found():
-    rng = np.random.default_rng(0)
-    plate = np.full((60, 80, 3), 120, np.float32)
-    pictures = np.clip(plate + rng.integers(-3, 4, (9, 60, 80, 3)), 0, 255).astype(np.uint8)
-    for index in range(9):
-        pictures[index, 10:50, 5 * index : 5 * index + 30] = 200  # a person walks by
-    pictures[:, 40:48] = 0  # behind a bar
-    hidden = unmoved(pictures, plate)
-    assert hidden[40:48].all()
-    assert not hidden[:30].any() and not hidden[56:].any()
-    assert not unmoved(np.repeat(plate[None].astype(np.uint8), 3, axis=0), plate).any()
-
-
-def test_the_room_is_taken_as_the_pictures_show_it():
-    rng = np.random.default_rng(0)
-    plate = np.full((60, 80, 3), 120, np.float32)
-    pictures = np.clip(plate - 7 + rng.normal(0, 5, (9, 60, 80, 3)), 0, 255).astype(np.uint8)
-    pictures[:, 20:40, 30:50] = 220  # someone who never moves
-    usual, noise = as_shown(pictures, plate)
-    assert np.abs(usual[:20] - 113).mean() < 2
-    assert (usual[20:40, 30:50] == 120).all()
-    np.testing.assert_allclose(noise, 5, rtol=0.2)

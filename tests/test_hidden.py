@@ -1,10 +1,12 @@
-"""What a scene knows beside the person: what stands before them."""
+"""What stands before the scene is no evidence for either side."""
 
 from dataclasses import replace
 
 import numpy as np
+from mocapflow_levelset.background import BackgroundDifference
+from mocapflow_levelset.levelset import LevelSet
 
-from mocapflow.data import Matches
+from mocapflow.data import Matches, Past, Turn
 from mocapflow.testing import pictures, scenes
 from mocapflow.testing.views import SIZE
 
@@ -17,32 +19,25 @@ def matches(pixels, camera):
     )  # fmt: skip
 
 
-def hiding(scene, rows):
-    """The scene behind a bar in its first view."""
-    hidden = [np.zeros(SIZE[::-1], bool) for _ in scene.cameras]
+def behind_bar(frame, rows):
+    """The frame with a bar before its first view."""
+    hidden = [np.zeros(SIZE[::-1], bool) for _ in frame.images]
     hidden[0][rows] = True
-    return scene.with_background(replace(scene.background, hidden=tuple(hidden)))
+    return replace(frame, hidden=tuple(hidden))
 
 
-def test_a_match_behind_what_hides_the_person_is_left_out():
+def test_a_match_behind_what_hides_the_scene_is_left_out():
     scene = scenes.tiny_scene()
     found = matches([[10, 99], [10, 100.4], [12, 120], [400, -3]], 0)
     frame = pictures.tiny_frame(scene, scenes.tiny_pose(scene))
-    assert scene.unhidden(found, frame) is found
-    behind = hiding(scene, slice(100, 110))
-    assert behind.unhidden(found, frame).vertex.tolist() == [0, 2, 3]
-    assert len(behind.unhidden(matches([[10, 105]], 1), frame).vertex) == 1
-    dark = replace(frame, hidden=tuple(np.repeat([[[True]]], SIZE[1], axis=1).repeat(SIZE[0], axis=2)) * 4)
-    assert len(scene.unhidden(found, dark).vertex) == 0
-    assert behind.hidden(dark, 0).all() and scene.hidden(frame, 0) is None
+    assert found.unhidden(frame) is found and frame.cover(0) is None
+    barred = behind_bar(frame, slice(100, 110))
+    assert found.unhidden(barred).vertex.tolist() == [0, 2, 3]
+    assert len(matches([[10, 105]], 1).unhidden(barred).vertex) == 1
+    assert barred.cover(0)[100:110].all() and not barred.cover(1).any()
 
 
 def test_segmenters_keep_to_the_model_where_the_person_is_hidden():
-    from mocapflow_levelset.background import BackgroundDifference
-    from mocapflow_levelset.levelset import LevelSet
-
-    from mocapflow.data import Past, Turn
-
     scene, rows = scenes.tiny_scene(), slice(110, 140)
     pose = scenes.tiny_pose(scene, 3, 0.1)
     frame, state, truth = (
@@ -55,8 +50,8 @@ def test_segmenters_keep_to_the_model_where_the_person_is_hidden():
     spoiled = replace(frame, images=(barred, *frame.images[1:]))
     for segmenter in (BackgroundDifference(), LevelSet()):
         off = []
-        for known in (scene, hiding(scene, rows)):
-            found = segmenter.segment(spoiled, state, Past(), known, Turn(index=0, cap=8)).of("person")[0]
+        for given in (spoiled, behind_bar(spoiled, rows)):
+            found = segmenter.segment(given, state, Past(), scene, Turn(index=0, cap=8)).of("person")[0]
             off.append(np.count_nonzero((found.distance > 0)[rows] != truth[0][rows]))
         assert off[1] < 0.2 * off[0]
         assert off[1] < 0.1 * np.count_nonzero(truth[0][rows])

@@ -1,0 +1,115 @@
+"""Stage `denoise`: takes noise that replaces pixels out of the pictures, and marks what hides the scene from a camera."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Annotated, ClassVar
+
+import numba
+import numpy as np
+from pydantic import Field
+
+from mocapflow.components import Stage
+from mocapflow.data import Frame
+from mocapflow.recording import Recording
+from mocapflow.records import U8, Bool
+
+BLOCK_PX = 16  # noise is everywhere alike: its share is the median over blocks of the picture
+LEAST_NOISE = 0.02  # share of lonely pixels; fine texture makes 0.004 at most on the recordings that we have
+CHANCE = 1e-9  # that noise spares a whole neighbourhood
+
+Count = Annotated[int, Field(ge=1)]
+
+
+class Denoise(Stage):
+    """Fills pixels whose colour no neighbours share from those around them that have company.
+
+    Random colours do not agree, so an intact pixel is known by its company however few are left: of 60 % noise, ten in
+    a neighbourhood of 25 agree. Nothing is averaged over time or over colours that are right, so thin limbs stay sharp
+    however fast they move. Where a picture full of noise has none, it does not show the scene: what has been put
+    before it (rectangles, stripes, a logo) is hidden and counts neither way. A picture without noise stays as it is.
+    """
+
+    name: ClassVar[str] = "denoise"
+    radius_px: Count = 2  # of the square of neighbours that are asked
+    alike: Count = 16  # grey levels: neighbours agree that are so near in every colour
+    company: Count = 2  # neighbours that have to agree with a pixel
+    fill_px: Annotated[float, Field(gt=0)] = 1.0  # standard deviation of the window a lonely pixel is filled from
+
+    def run(self, recording: Recording) -> Recording:
+        """Return the recording as it looks without noise."""
+        return replace(recording, changes=(*recording.changes, Denoised(self)))
+
+    def restore(self, image: U8) -> tuple[U8, Bool]:
+        """Return an image (H, W, 3) without its noise, and where (H, W) it does not show the scene."""
+        kept = in_company(image, self.radius_px, self.alike, self.company)
+        share = noise_share(kept)
+        if share < LEAST_NOISE:
+            return image, np.zeros(kept.shape, bool)
+        hidden = spared(kept, share)
+        return filled(image, kept & ~hidden, ~kept, self.fill_px), hidden
+
+
+@dataclass(frozen=True)
+class Denoised:
+    """Frames restored by the settings of a stage."""
+
+    settings: Denoise
+
+    def frames(self, source: Recording, indices: range) -> Iterator[Frame]:
+        """Yield the restored frames."""
+        for frame in replace(source, indices=indices).frames():
+            found = [self.settings.restore(image) for image in frame.images]
+            images, hidden = zip(*found, strict=True)
+            known = frame.hidden or hidden
+            yield replace(frame, images=images, hidden=tuple(a | b for a, b in zip(known, hidden, strict=True)))
+
+
+def noise_share(kept: Bool) -> float:
+    """Return the share of lonely pixels, those not `kept` (H, W), in most of a picture."""
+    import cv2
+
+    height, width = (max(length // BLOCK_PX, 1) for length in kept.shape)
+    return float(np.median(cv2.resize(1 - kept.astype(np.float32), (width, height), interpolation=cv2.INTER_AREA)))
+
+
+def spared(kept: Bool, share: float) -> Bool:
+    """Return the pixels (H, W) in squares without a lonely pixel that are larger than noise of this share leaves."""
+    import cv2
+
+    side = int(np.ceil(np.sqrt(np.log(CHANCE) / np.log(max(1 - share, CHANCE))))) | 1  # odd, so that it has a middle
+    return np.asarray(cv2.morphologyEx(kept.astype(np.uint8), cv2.MORPH_OPEN, np.ones((side, side), np.uint8)), bool)
+
+
+def filled(image: U8, known: Bool, wanted: Bool, sigma_px: float) -> U8:
+    """Return an image (H, W, 3) with its `wanted` pixels (H, W) the Gaussian mean of the `known` ones around."""
+    import cv2
+
+    weight = known.astype(np.float32)
+    total = cv2.GaussianBlur(weight, (0, 0), sigma_px)
+    mean = cv2.GaussianBlur(image * weight[..., None], (0, 0), sigma_px) / np.maximum(total, 1e-12)[..., None]
+    near = wanted & (total > 0)
+    return np.where(near[..., None], np.rint(mean), image).astype(np.uint8)
+
+
+@numba.njit(cache=True)
+def in_company(image, radius, alike, company):  # type: ignore[no-untyped-def]
+    """Return which pixels (H, W) have at least so many neighbours of their colour in an image (H, W, 3)."""
+    height, width, _ = image.shape
+    kept = np.zeros((height, width), np.bool_)
+    for y in range(height):
+        for x in range(width):
+            blue, green, red = np.int32(image[y, x, 0]), np.int32(image[y, x, 1]), np.int32(image[y, x, 2])
+            agree = -1  # with itself it does
+            for v in range(max(y - radius, 0), min(y + radius + 1, height)):
+                for u in range(max(x - radius, 0), min(x + radius + 1, width)):
+                    agree += (
+                        abs(np.int32(image[v, u, 0]) - blue) <= alike
+                        and abs(np.int32(image[v, u, 1]) - green) <= alike
+                        and abs(np.int32(image[v, u, 2]) - red) <= alike
+                    )
+                if agree >= company:
+                    kept[y, x] = True
+                    break
+    return kept

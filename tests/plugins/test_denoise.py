@@ -1,0 +1,90 @@
+"""Lonely pixels are filled, thin things stay, what no noise reaches is hidden, and clean pictures are left alone."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from mocapflow_robustness import pixels
+from mocapflow_robustness.corrupt import Corrupt
+from mocapflow_robustness.denoise import Denoise, filled, in_company, noise_share
+
+from mocapflow.recording import open_recording
+from mocapflow.shipped import shipped
+from tests.fixtures.stores import write_recording
+
+SHAPE = (96, 128)
+
+
+def scene():
+    """A room in two colours with a dark limb eight pixels wide, seen with a little noise."""
+    rng = np.random.default_rng(1)
+    image = np.full((*SHAPE, 3), (120, 140, 160), np.uint8)
+    image[:, 70:] = (90, 70, 60)
+    cv2.line(image, (20, 10), (60, 80), (30, 50, 110), 8)
+    return np.clip(image + rng.normal(0, 2, image.shape), 0, 255).astype(np.uint8)
+
+
+def off(one, other):
+    """Pixels that differ visibly."""
+    return np.abs(one.astype(int) - other).max(axis=2) > 20
+
+
+@pytest.mark.parametrize("share", [0.1, 0.3, 0.6])
+def test_noise_goes_and_thin_things_stay(share):
+    clean = scene()
+    noisy = pixels.noisy(clean, share, "replaced", np.random.default_rng(0))
+    image, hidden = Denoise().restore(noisy)
+    assert off(noisy, clean).mean() > 0.9 * share
+    assert off(image, clean).mean() < 0.05  # edges, mostly
+    limb = off(clean, np.broadcast_to(np.array([120, 140, 160]), clean.shape)) & (np.arange(SHAPE[1]) < 65)
+    assert off(image, clean)[limb].mean() < 0.15
+    assert share < 0.6 or off(cv2.medianBlur(noisy, 5), clean)[limb].mean() > 0.3
+    assert hidden.mean() < 0.01
+
+
+def test_most_intact_pixels_are_known_and_random_ones_are_not():
+    clean = scene()
+    noisy = pixels.noisy(clean, 0.6, "replaced", np.random.default_rng(0))
+    kept, replaced = in_company(noisy, 2, 16, 2), off(noisy, clean)
+    assert kept[~replaced].mean() > 0.97
+    assert kept[replaced].mean() < 0.03
+    assert noise_share(kept) == pytest.approx(0.6, abs=0.03)
+
+
+def test_what_noise_does_not_reach_is_hidden():
+    noisy = pixels.noisy(scene(), 0.6, "replaced", np.random.default_rng(0))
+    noisy[20:44, 30:60] = 77
+    noisy[60:70] = 0
+    _, hidden = Denoise().restore(noisy)
+    assert hidden[20:44, 30:60].all() and hidden[60:70].all()
+    hidden[19:45, 29:61] = hidden[59:71] = False
+    assert not hidden.any()
+
+
+def test_pictures_without_noise_stay_as_they_are():
+    recording = open_recording(shipped("examples", "data", "skirt_steps"))
+    first = replace(recording, indices=range(1))
+    clean, same = first.frame(0), Denoise().run(first).frame(0)
+    assert all((one == other).all() for one, other in zip(clean.images, same.images, strict=True))
+    assert not any(hidden.any() for hidden in same.hidden)
+
+
+def test_a_pixel_is_filled_from_those_that_are_known():
+    image = np.zeros((9, 9, 3), np.uint8)
+    image[:, :4], image[4, 4] = 100, 255
+    known = np.ones((9, 9), bool)
+    known[4, 4] = False
+    mean = filled(image, known, ~known, 1.0)
+    assert 30 < mean[4, 4, 0] < 50
+    assert (mean[known] == image[known]).all()
+    assert (filled(image, ~known & False, ~known, 1.0) == image).all()  # nothing is known
+
+
+def test_what_was_hidden_stays_hidden(tmp_path):
+    recording = open_recording(write_recording(tmp_path / "clip", frames=3))
+    covered = Corrupt(events=({"what": "covered", "first": 1, "count": 1},)).run(recording)
+    before, after = (list(each.frames()) for each in (covered, Denoise().run(covered)))
+    assert all((after[1].hidden[c] | ~before[1].hidden[c]).all() for c in range(2))
+    assert before[1].hidden[0].any()
+    assert [frame.index for frame in after] == [0, 1, 2]
