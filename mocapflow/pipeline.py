@@ -41,7 +41,7 @@ class PartsFile(Strict):
 
 
 class PipelineFile(Strict):
-    """What a pipeline file may say at its top level, besides `extends: FILE` and `change: {PATH: value}`."""
+    """What a pipeline file may say beside `extends: FILE` and `change: {PATH: value, stages.NEW before OLD: stage}`."""
 
     name: ClassVar[str] = "a pipeline"
     mocapflow: Literal[1] = 1  # version of the format

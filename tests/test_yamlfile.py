@@ -122,8 +122,8 @@ def test_what_is_wrong_is_told_with_line_and_column(folder, text, message):
         ("a=[1", "--set a=[1  not YAML: expected ',' or ']', but got '<stream end>' (while parsing a flow sequence)"),
         ("stages.track.matchers.7=x", "--set stages.track.matchers.7=x  there is no 'stages.track.matchers.7'\n"
          "       available: 0, 1"),
-        ("stages.corrupt before trak=x", "--set stages.corrupt before trak=x  there is no 'stages.trak' to put 'corrupt' "
-         "before\n       available: corrupt, track — did you mean 'track'?"),
+        ("stages.corrupt before trak=x", "--set stages.corrupt before trak=x  "
+         "there is no 'stages.trak' to put 'corrupt' before\n       available: corrupt, track — did you mean 'track'?"),
         ("garment.length_m=1", "--set garment.length_m=1  there is no 'garment'\n       available: recording, stages"),
     ],
 )  # fmt: skip

@@ -15,7 +15,7 @@ from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.records import F32, U8, Bool
 from mocapflow.scene import Scene
 from mocapflow_levelset.channels import ChannelName, features
-from mocapflow_levelset.evidence import calmed, without_outliers
+from mocapflow_levelset.evidence import calmed
 from mocapflow_levelset.evolve import Rhythm, Weights
 from mocapflow_levelset.masks import counted
 from mocapflow_levelset.plates import Plate, Shadow, density_of, plate_of
@@ -48,7 +48,6 @@ class BackgroundDifference(Segmenter):
     shadow_reach_m: Positive = 2.0  # shadows fall on the floor within this distance of the person
     darkest_shadow: Annotated[float, Field(gt=0, lt=1)] = 0.5  # factor of L + 16, a and b in the deepest shadow
     shadow_chroma: Positive = 0.005  # how far a shadow may be off the plate's chromaticity, share of the range
-    median_px: Count = 0  # median filter against pixels of no meaning, e.g. 9; 0: none
     smooth_px: Positive = 1.0  # of the evidence before it is cut
     hole_px: Count = 120  # holes up to this area are filled, in square px
     reach_px: NonNegative = 60.0  # parts further from the projected model than this are someone else; 0: keep all
@@ -93,7 +92,6 @@ class BackgroundDifference(Segmenter):
             hidden: (H, W) True where the picture shows nothing of the person; None: nowhere.
         """
         plate = plate_of(background.mean[camera], background.spread[camera], CHANNELS)
-        image = without_outliers(image, self.median_px)
         start = self._start(image, model, plate, floor, hidden)
         if not self.refine_steps:
             return redistance(start, self.band_px)
@@ -142,7 +140,6 @@ class BackgroundDifference(Segmenter):
     def _method(self) -> Method:
         return Method(
             channels=CHANNELS,
-            median_px=0,  # already applied to the whole image
             weights=Weights(1.5, self.length_weight, 0.0, 6.0, 1.0, INNER_BAND_PX),
             shadow=self._shadow(),
             calm_px=self.smooth_px,

@@ -85,13 +85,6 @@ def calmed(image: U8, smooth_px: float) -> U8:
     return np.asarray(cv2.GaussianBlur(image, (0, 0), smooth_px), np.uint8) if smooth_px > 0.3 else image
 
 
-def without_outliers(image: U8, median_px: int) -> U8:
-    """Return an image (H, W, 3) after a median filter of odd width, against pixels of no meaning; 0: as it is."""
-    import cv2
-
-    return np.asarray(cv2.medianBlur(np.ascontiguousarray(image), median_px), np.uint8) if median_px > 1 else image
-
-
 def gather(image: U8, runs: I32) -> U8:
     """Return the pixels (N, 3) of an image (H, W, 3) along runs, rows of (y, first x, last x + 1)."""
     pixels: U8 = _gather(image, runs, np.empty((int((runs[:, 2] - runs[:, 1]).sum()), 3), np.uint8))

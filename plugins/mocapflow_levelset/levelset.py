@@ -64,7 +64,6 @@ class LevelSet(Segmenter):
     statistics_every: Count = 4  # steps between estimates of the colours
     redistance_every: Count = 4  # steps between repairs of the distance function
     band_px: Annotated[float, Field(ge=8)] = 12.0  # half width of the band in which the distance is computed
-    median_px: NonNegativeCount = 0  # median filter against pixels of no meaning, e.g. 9; 0: none
     border_px: NonNegativeCount = 3  # left out at the image's border
     margin_px: Count = 40  # of the crop around the start contour
     use_background: bool = True  # take the outside's density from the empty scene, where it is known
@@ -137,7 +136,6 @@ class LevelSet(Segmenter):
     def _method(self) -> Method:
         return Method(
             channels=self.channels,
-            median_px=self.median_px,
             weights=Weights(
                 self.sigma_px, self.length_weight, self.shape_weight, self.ratio_clip, self.time_step, INNER_BAND_PX
             ),

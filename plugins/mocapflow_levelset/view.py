@@ -11,7 +11,7 @@ from mocapflow.records import F32, U8
 from mocapflow_levelset import crops
 from mocapflow_levelset.channels import ChannelName
 from mocapflow_levelset.crops import Crop
-from mocapflow_levelset.evidence import Evidence, from_image, without_outliers
+from mocapflow_levelset.evidence import Evidence, from_image
 from mocapflow_levelset.evolve import Costs, Rhythm, Weights, costs, settle
 from mocapflow_levelset.plates import Plate, Shadow
 from mocapflow_levelset.redistance import redistance
@@ -48,7 +48,6 @@ class Method(NamedTuple):
     """How to find a silhouette."""
 
     channels: Sequence[ChannelName]
-    median_px: int  # of the full image, before all else: the mean over pixels would spread what it takes out
     weights: Weights
     shadow: Shadow
     decorrelate: bool
@@ -71,7 +70,7 @@ def find(view: View, levels: Sequence[Level], method: Method, band_px: float) ->
     if crop is None:
         return Found(outside, Costs(0.0, 0.0, 0.0))
     front, factor = crop.of(view.start), 1
-    image = without_outliers(crop.of_grey_levels(view.image), method.median_px)
+    image = crop.of_grey_levels(view.image)
     for level in levels:
         prior = crops.shrink_values(crop.of(view.prior), level.factor) / np.float32(level.factor)
         front = _brought(front, factor, level.factor, method.weights.band_px)

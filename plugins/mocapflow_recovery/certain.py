@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from mocapflow_levelset import crops
 from mocapflow_levelset.channels import ChannelName, features
-from mocapflow_levelset.evidence import without_outliers
 from mocapflow_levelset.plates import Plate, Shadow, density_of, plate_of
 from mocapflow_levelset.shadows import floor_around
 
@@ -17,7 +16,6 @@ from mocapflow.data import Frame, Surface
 from mocapflow.geometry.cameras import scaled
 from mocapflow.geometry.silhouettes import mask, outline
 from mocapflow.records import F32, U8, Bool
-from mocapflow.scene import Scene
 
 CHANNELS: tuple[ChannelName, ...] = ("lab",)
 SHADOW = Shadow(floor=0.012, share=0.2, darkest=0.5, chroma=0.005, stranger=-6.0)
@@ -57,27 +55,24 @@ def shrunk(camera: Camera, factor: int) -> Camera:
     return scaled(replace(camera, size=camera.size // factor * factor), 1 / factor)
 
 
-def views(frame: Frame, scene: Scene, surface: Surface, room: Room, near_m: float, median_px: int = 0) -> list[View]:
+def views(frame: Frame, surface: Surface, room: Room, near_m: float) -> list[View]:
     """Return what the usable views of a frame surely show, each at the size of its camera.
 
     A view that is unlike the empty room nearly everywhere shows nothing surely and is left out.
 
     Args:
         frame: the images, in full size.
-        scene: which knows what hides the person.
         surface: the person as believed: parts further away than `near_m` in the image are somebody else.
         room: the empty room, small.
         near_m: see `surface`.
-        median_px: width of a median filter of the images, against pixels of no meaning; 0 for none.
     """
     found = []
     for number in np.flatnonzero(frame.usable):
         camera, plate = room.cameras[number], room.plates[number]
         model, size = mask(outline(surface, camera), camera), pixel_size(camera, surface)
-        image = without_outliers(frame.images[number], median_px)
+        image, hidden = frame.images[number], frame.cover(int(number))
         factor = image.shape[1] // int(camera.size[0])
         changed, same = _compared(crops.shrink(image, factor), plate, floor_around(surface, camera, FLOOR_REACH))
-        hidden = scene.hidden(frame, int(number))
         told = True if hidden is None else crops.shrink_values(hidden.astype(np.float32), factor) == 0
         person = _near(changed & told, model, near_m / size)
         if np.count_nonzero(person) < MOST * np.count_nonzero(model):

@@ -54,7 +54,6 @@ class LimbSearch(Recovery):
     cloth_m: Positive = 0.2  # what lies so near to the garment may be the garment, wherever it swings
     gain: Annotated[float, Field(ge=0, lt=1)] = 0.1  # by which share another fit must be nearer to be taken
     rows: Annotated[int, Field(ge=50)] = 160  # images are shrunk to about this height
-    median_px: Annotated[int, Field(ge=0)] = 0  # median filter against pixels of no meaning, e.g. 9; 0: none
     faces: Annotated[int, Field(ge=200)] = 2600  # of the body that is searched with
     near_m: Positive = 0.35  # changes further than this from the model are somebody else
     cap_m: Positive = 0.2  # beyond, it does not matter how far
@@ -80,7 +79,7 @@ class LimbSearch(Recovery):
         if background is None:
             return result
         room, surface = self._room(background, model.scene.cameras), surface_of(model, result)
-        seen = views(frame, model.scene, surface, room, self.near_m, self.median_px)
+        seen = views(frame, surface, room, self.near_m)
         stray = self._stray(model, seen, surface)
         if not stray.doubtful(self.uncovered_cm2, self.floating_cm2):
             return result

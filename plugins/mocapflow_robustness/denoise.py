@@ -1,4 +1,4 @@
-"""Stage `denoise`: takes noise that replaces pixels out of the pictures, and marks what hides the scene from a camera."""
+"""Stage `denoise`: fills pixels that noise has replaced, and marks what has been put before the scene."""
 
 from __future__ import annotations
 

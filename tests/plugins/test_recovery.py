@@ -34,7 +34,7 @@ def surface(pose: Pose):
 
 
 def seen(frame=FRAME):
-    return views(frame, SCENE, surface(POSE), ROOM, 0.35)
+    return views(frame, surface(POSE), ROOM, 0.35)
 
 
 def test_a_small_camera_sees_the_same() -> None:
