@@ -123,7 +123,7 @@ def report(whole: Path, short: Path, memory: list[tuple[int, float]], block: int
     print(f"at most in the stages after the track: {max(later):.0f} MB")
     files = [file for artifact in Store(whole).artifacts() for file in artifact.path.rglob("*") if file.is_file()]
     print(f"store: {sum(file.stat().st_size for file in files) / 1e6 / frames:.3f} MB a frame, {len(files)} files")
-    same = all(getattr(first, field).tobytes() == getattr(reference, field).tobytes() for field in SAME)
+    same = all(np.array_equal(getattr(first, name), getattr(reference, name), equal_nan=True) for name in SAME)
     print(f"killed at {KILLED_AT}; first {COMPARED} frames {'are' if same else 'are NOT'} those of an undisturbed run")
     print(f"not at rest: {np.mean(~track.steady):.1%}, overlap {np.nanmedian(track.overlap):.3f}")
 

@@ -8,14 +8,16 @@ from __future__ import annotations
 import importlib
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mocapflow.errors import StoreError
-from mocapflow.records import array_fields
+from mocapflow.records import F64, array_fields
 from mocapflow.rows import Corrupted
+from mocapflow.series import BLOCK, Numbers, Series, blocks
 
 if TYPE_CHECKING:
     import zarr
@@ -30,10 +32,10 @@ def save_record(group: zarr.Group, value: Any) -> None:
     plain: dict[str, Any] = {}
     for field in fields(value):
         inner = getattr(value, field.name)
-        if isinstance(inner, np.ndarray):
+        if isinstance(inner, np.ndarray | Series):
             axes = declared[field.name].axes if field.name in declared else ()
             unit = declared[field.name].unit if field.name in declared else ""
-            save_array(group, field.name, inner, axis_names(field.name, axes, inner.ndim), unit)
+            save_array(group, field.name, inner, axis_names(field.name, axes, len(inner.shape)), unit)
         elif _is_nested(inner):
             _save_nested(group.create_group(field.name), inner)
         else:
@@ -56,8 +58,9 @@ def load_record(group: zarr.Group, rows: int | None = None) -> Any:
             if field.name in plain:
                 values[field.name] = _untyped(plain[field.name], str(field.type))
             elif field.name in array_fields(cls):
-                axes = array_fields(cls)[field.name].axes
-                values[field.name] = _array(group, field.name, rows if axes[:1] == ("T",) else None)
+                declared = array_fields(cls)[field.name]
+                read = _series if declared.wide else _array
+                values[field.name] = read(group, field.name, rows if declared.axes[:1] == ("T",) else None)
             elif field.name in group:
                 values[field.name] = _load_nested(group[field.name])
         return cls(**values)
@@ -68,15 +71,18 @@ def load_record(group: zarr.Group, rows: int | None = None) -> Any:
 
 
 def save_array(group: zarr.Group, name: str, values: Any, axes: list[str], unit: str) -> None:
-    """Write one array; long first axes are cut into chunks of 64."""
+    """Write one array, a block at a time; long first axes are cut into chunks."""
     from zarr.codecs import ZstdCodec
 
-    chunks = tuple(max(1, min(64, n) if axes[:1] == ["T"] and not i else n) for i, n in enumerate(values.shape))
+    chunks = tuple(max(1, min(BLOCK, n) if axes[:1] == ["T"] and not i else n) for i, n in enumerate(values.shape))
     made = group.create_array(
         name, shape=values.shape, chunks=chunks or (), dtype=values.dtype, dimension_names=axes,
         compressors=[ZstdCodec(level=1, checksum=True)], attributes={"unit": unit} if unit else {},
     )  # fmt: skip
-    if values.size:
+    if isinstance(values, Series):
+        for part in blocks(len(values)):
+            made[part] = values[part]
+    elif values.size:
         made[...] = values
 
 
@@ -131,6 +137,35 @@ def _array(group: Any, name: str, rows: int | None) -> Any:
     if name not in group:
         return None
     return np.asarray(group[name][:rows] if rows is not None else group[name][...])
+
+
+def _series(group: Any, name: str, rows: int | None) -> Series:
+    """Return an array whose rows stay in the store until they are asked for; all of them are looked at once."""
+    import zarr
+
+    kept = group[name]
+
+    def block(number: int) -> F64:
+        try:
+            values = np.asarray(kept[number * BLOCK : (number + 1) * BLOCK])
+            zarr.open_group(group.store_path, mode="r")  # removed meanwhile, it would read as zeros
+            return values
+        except Exception as error:  # as in `load_record`
+            raise Corrupted(f"{name} of {group.path or group.store} can't be read back: {error}") from error
+
+    latest = lru_cache(maxsize=1)(block)
+
+    def read(numbers: Numbers) -> F64:
+        values = np.empty((len(numbers), *kept.shape[1:]))
+        for number in np.unique(numbers // BLOCK):
+            here = numbers // BLOCK == number
+            values[here] = latest(int(number))[numbers[here] % BLOCK]
+        return values
+
+    series = Series((len(range(kept.shape[0])[:rows]), *kept.shape[1:]), read)
+    for part in blocks(len(series)):
+        block(part.start // BLOCK)  # damaged rows are found now, and made anew
+    return series
 
 
 def _record_class(name: str) -> type:

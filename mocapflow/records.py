@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mocapflow.errors import ShapeError
+from mocapflow.series import Series
 
 F64 = npt.NDArray[np.float64]
 F32 = npt.NDArray[np.float32]
@@ -22,7 +23,7 @@ I16 = npt.NDArray[np.int16]
 U8 = npt.NDArray[np.uint8]
 Bool = npt.NDArray[np.bool_]
 
-DTYPES = {"F64": "f8", "F32": "f4", "I32": "i4", "I16": "i2", "U8": "u1", "Bool": "?"}
+DTYPES = {"F64": "f8", "Wide": "f8", "F32": "f4", "I32": "i4", "I16": "i2", "U8": "u1", "Bool": "?"}
 
 Class = TypeVar("Class", bound=type)
 Watch = Callable[[int, int], None]  # told how many frames are done, of how many
@@ -33,12 +34,13 @@ def unwatched(done: int, of: int) -> None:
 
 
 class Axes(NamedTuple):
-    """What an array field promises: named or fixed axes, unit and dtype."""
+    """What an array field promises: named or fixed axes, unit and dtype; a wide one may be a series."""
 
     axes: tuple[str | int, ...]
     unit: str
     dtype: np.dtype[Any] | None
     optional: bool
+    wide: bool
 
 
 def array(*axes: str | int, unit: str, default: Any = dataclasses.MISSING) -> Any:
@@ -55,7 +57,7 @@ def array_fields(record_class: type) -> dict[str, Axes]:
 
 def _axes(field: dataclasses.Field[Any]) -> Axes:
     name, _, rest = str(field.type).partition(" | ")
-    return Axes(field.metadata["axes"], field.metadata["unit"], np.dtype(DTYPES[name]), rest == "None")
+    return Axes(field.metadata["axes"], field.metadata["unit"], np.dtype(DTYPES[name]), rest == "None", name == "Wide")
 
 
 def check_arrays(record: Any) -> None:
@@ -69,13 +71,14 @@ def check_arrays(record: Any) -> None:
         value = getattr(record, name)
         if value is None and declared.optional:
             continue
-        if not isinstance(value, np.ndarray):
+        if not isinstance(value, (np.ndarray, Series) if declared.wide else np.ndarray):
             raise ShapeError(f"{type(record).__name__}.{name} is {type(value).__name__}, not a numpy array")
         if value.dtype != declared.dtype:
             raise ShapeError(f"{type(record).__name__}.{name} has dtype {value.dtype}; expected {declared.dtype}")
         if not _fits(value.shape, declared.axes, lengths):
             _complain(f"{type(record).__name__}.{name}", value.shape, declared.axes, lengths)
-        value.flags.writeable = False
+        if isinstance(value, np.ndarray):
+            value.flags.writeable = False
 
 
 def _fits(shape: tuple[int, ...], axes: tuple[str | int, ...], lengths: dict[str, int]) -> bool:

@@ -10,19 +10,20 @@ import numpy as np
 
 from mocapflow.data import Pose
 from mocapflow.records import F64, I16, I32, Bool, Watch, array, record, unwatched
+from mocapflow.series import Wide
 
 
 @record
 class Track:
-    """The result over T frames."""
+    """The result over T frames; what is wide may be read from the store only when it is asked for."""
 
     frame: I32 = array("T", unit="frame index in the videos")
     time: F64 = array("T", unit="s")
     root: F64 = array("T", 4, 4, unit="m, world_from_body")
     angles: F64 = array("T", "D", unit="rad")
-    covariance: F64 = array("T", "R", "R", unit="of (omega, v, angles)")
+    covariance: Wide = array("T", "R", "R", unit="of (omega, v, angles)")
     observed: F64 = array("T", "D", unit="1, share of the priors' variance of each angle that the images took away")
-    cloth: F64 = array("T", "W", 3, unit="m")
+    cloth: Wide = array("T", "W", 3, unit="m")
     cloth_parameters: F64 = array("T", "Q", unit="by name")
     iterations: I16 = array("T", unit="turns of the loop")
     steady: Bool = array("T", unit="True where the loop came to rest")

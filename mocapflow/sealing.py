@@ -13,9 +13,8 @@ from mocapflow.packing import Columns, column
 from mocapflow.records import array_fields
 from mocapflow.results import Track
 from mocapflow.rows import Corrupted, Rows, write_json
+from mocapflow.series import BLOCK
 from mocapflow.store import group_meta
-
-BLOCK = 64  # rows per chunk, and in memory at a time
 
 
 def seal(

@@ -19,7 +19,8 @@ from mocapflow.data import Frame, Past, Pose, Silhouette, Start
 from mocapflow.errors import ComponentFailed, StoreError
 from mocapflow.packing import FINE, distance_of, match_row, matches_of, quantised
 from mocapflow.rows import Corrupted, Rows
-from mocapflow.store import Store
+from mocapflow.series import Series
+from mocapflow.store import Store, remove
 from tests.fixtures.stores import run_tiny, same, the_track, write_pipeline, write_recording
 from tests.fixtures.tiny_plugin import TinyMatcher, tiny_body
 
@@ -217,6 +218,19 @@ def test_a_damaged_group_is_set_aside_and_made_anew(tmp_path, path, damage):
     assert warning.startswith(f"warning: {group.name} is damaged and made anew: ")
     assert len(list((tmp_path / "store.zarr").glob(f"damaged-{group.name}-*"))) == 1
     assert same(whole, the_track(tmp_path))
+
+
+def test_what_is_wide_stays_in_the_store_and_is_missed_when_it_is_removed(tmp_path, path):
+    run_tiny(path, tmp_path)
+    kept = Store(tmp_path / "store.zarr")
+    (found,) = [a for a in kept.artifacts() if a.path.name.startswith("track-")]
+    track = kept.load(found, 5)
+    assert isinstance(track.cloth, Series) and track.cloth.shape == (5, 4, 3)
+    assert np.isfinite(track.covariance[4]).all()
+    other = kept.load(found)
+    remove(found.path)
+    with pytest.raises(Corrupted, match="cloth of .* can't be read back"):
+        other.cloth[0]
 
 
 def test_a_damaged_frame_of_a_half_done_track_is_noticed(tmp_path, path):

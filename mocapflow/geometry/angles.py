@@ -14,6 +14,7 @@ from mocapflow.assets import Body
 from mocapflow.data import Pose
 from mocapflow.geometry import kinematics, twists
 from mocapflow.records import F64, Bool, array, record
+from mocapflow.series import Wide
 
 
 class Definition(NamedTuple):
@@ -70,7 +71,7 @@ def anatomical_axes(body: Body) -> F64:
 
 
 def measure(
-    body: Body, root: F64, angles: F64, covariance: F64 | None = None, observed: F64 | None = None
+    body: Body, root: F64, angles: F64, covariance: Wide | None = None, observed: F64 | None = None
 ) -> AngleSeries:
     """Return the angles of a track, by first-order propagation their standard deviations, and what was seen of them.
 
@@ -91,6 +92,7 @@ def measure(
         joints, screws = kinematics.chain(body, Pose(root=root[row].copy(), angles=angles[row].copy()))
         places = kinematics.joint_positions(body, joints)
         moves = _velocities(places, screws, below)
+        spread = None if covariance is None else covariance[row]
         for column, (wish, index) in enumerate(zip(wanted, indices, strict=True)):
             if len(index) == 3:
                 value[row, column] = three_point(places[index]) + wish.offset
@@ -100,8 +102,8 @@ def measure(
                 turn = np.hstack([np.eye(3), np.zeros((3, 3)), np.where(below[:, pelvis], screws[:, :3].T, 0.0)])
                 seen_from = axes[:2] @ joints[pelvis, :3, :3].T  # the pelvis' forward and up, in the world
                 value[row, column], gradient = _flexion(places[index], moves[index], seen_from, turn)
-            if covariance is not None:
-                variance = gradient @ covariance[row] @ gradient
+            if spread is not None:
+                variance = float(gradient @ spread @ gradient)
                 sd[row, column] = np.degrees(np.sqrt(max(variance, 0.0)))
             if observed is not None:
                 share[row, column] = np.average(observed[row], weights=gradient[6:] ** 2)

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from mocapflow.geometry import meshes
 from mocapflow.records import F64, I32
+from mocapflow.series import Wide
 from mocapflow_formats.result import Result, library
 
 Z_UP = [-np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]  # quaternion x y z w, to glTF's y up
@@ -85,7 +86,7 @@ class Author:
         primitive = lib.Primitive(attributes=attributes, indices=self._indices(body.faces), material=0)
         self._add_mesh("body", lib.Mesh(primitives=[primitive]), skin=0)
 
-    def _add_garment(self, faces: I32, cloth: F64) -> None:
+    def _add_garment(self, faces: I32, cloth: Wide) -> None:
         """Add the garment as its first shape and displacements from it, one switched on after the other."""
         lib = self._lib
         rows = np.unique(np.linspace(0, len(cloth) - 1, min(SHAPES, len(cloth))).round().astype(int))

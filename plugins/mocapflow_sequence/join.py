@@ -16,6 +16,7 @@ from mocapflow.geometry import kinematics
 from mocapflow.records import F64, I32, Bool, array_fields
 from mocapflow.results import Track
 from mocapflow.scene import Scene
+from mocapflow.series import Series, joined, picked
 from mocapflow_sequence.runjson import FRAME
 
 LOG = logging.getLogger("mocapflow")
@@ -76,16 +77,21 @@ def cut(track: Track, rows: Bool) -> Track:
     """Return some rows (T,) of a track, with the notes on them."""
     kept = set(track.frame[rows].tolist())
     notes = tuple(note for note in track.notes if (m := FRAME.match(note)) and int(m[1]) in kept)
-    values: dict[str, Any] = {name: getattr(track, name)[rows] for name in _by_frame(track)}
+    values: dict[str, Any] = {name: picked(getattr(track, name), rows) for name in _by_frame(track)}
     return replace(track, notes=notes, **values)
 
 
 def together(first: Track, second: Track) -> Track:
     """Return two tracks one after the other."""
-    both: dict[str, Any] = {
-        name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in _by_frame(first)
-    }
+    both: dict[str, Any] = {name: end_to_end(getattr(first, name), getattr(second, name)) for name in _by_frame(first)}
     return replace(first, notes=first.notes + second.notes, **both)
+
+
+def end_to_end(first: Any, second: Any) -> Any:
+    """Return the rows of two arrays, or of two series, one after the other."""
+    if isinstance(first, Series) or isinstance(second, Series):
+        return joined(first, second)
+    return np.concatenate([first, second])
 
 
 def _by_frame(track: Track) -> list[str]:

@@ -11,11 +11,14 @@ HALF = 0.5  # of an angle's variance: where the images take away less, the prior
 
 
 def lost_rows(track: Track) -> Bool:
-    """Return (T,) True where nothing was fitted: the loop made no turn, no view was usable, or nothing is known."""
-    blind = ~track.usable.any(axis=1) if track.usable.shape[1] else np.zeros(len(track.frame), bool)
-    unknown = ~np.isfinite(track.covariance).all((1, 2))
-    lost: Bool = (track.iterations == 0) | blind | unknown
-    return lost
+    """Return (T,) True where nothing was fitted."""
+    return np.array([is_lost(track, row) for row in range(len(track.frame))], bool)
+
+
+def is_lost(track: Track, row: int) -> bool:
+    """Return True where nothing was fitted: the loop made no turn, no view was usable, or nothing is known."""
+    usable, known = track.usable[row], np.isfinite(track.covariance[row])
+    return bool(track.iterations[row] == 0 or (len(usable) and not usable.any()) or not known.all())
 
 
 def unseen(observed: F64) -> Bool:

@@ -15,7 +15,7 @@ from mocapflow.records import F64, I32, U8
 from mocapflow.results import Files, RunFolder, Track
 from mocapflow.scene import Scene
 from mocapflow_sequence import drawing, layout
-from mocapflow_sequence.lost import lost_rows
+from mocapflow_sequence.lost import is_lost
 
 LEAST_HEIGHT = 600  # px; smaller images are enlarged so that lines can be told apart
 
@@ -93,6 +93,6 @@ def _remarks(frame: Frame, track: Track, row: int, view: int) -> list[str]:
     said = []
     if not frame.usable[view]:
         said.append(f"no image: {frame.reasons[view]}" if frame.reasons else "no image")
-    if lost_rows(track)[row]:
+    if is_lost(track, row):
         said.append("frame lost, bridged")
     return said

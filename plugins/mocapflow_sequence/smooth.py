@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -10,8 +11,9 @@ from pydantic import Field
 
 from mocapflow.components import Stage
 from mocapflow.geometry import twists
-from mocapflow.records import F64
+from mocapflow.records import F64, Bool
 from mocapflow.results import Track
+from mocapflow.series import Numbers, changed
 from mocapflow_sequence.banded import difference_weights, minimise
 from mocapflow_sequence.lost import lost_rows
 
@@ -42,19 +44,18 @@ class Smooth(Stage):
         if len(track.frame) < 3:
             return replace(track, raw_root=track.root, raw_angles=track.angles)
         lost = lost_rows(track)
-        about_pelvis = _about(track.root[:, :3, 3], track.covariance.shape[1])
-        spread = about_pelvis @ track.covariance @ np.swapaxes(about_pelvis, 1, 2)
-        spread[lost] = LOST * np.eye(spread.shape[1])
+        spread = changed(track.covariance, partial(_about_pelvis, track.root, lost))
         change, bridged = minimise(spread, _second_differences(track), self._limits(track), track.time, lost)
         root = track.root.copy()
         root[:, :3, :3] = twists.exp(np.pad(change[:, :3], ((0, 0), (0, 3))))[:, :3, :3] @ root[:, :3, :3]
         root[:, :3, 3] += change[:, 3:6]
-        covariance = track.covariance.copy()
-        back = np.linalg.inv(about_pelvis[lost])
-        covariance[lost] = back @ bridged @ np.swapaxes(back, 1, 2)
+        back = np.linalg.inv(_about(track.root[lost, :3, 3], spread.shape[1]))
+        bridged = back @ bridged @ np.swapaxes(back, 1, 2)
         return replace(
-            track, root=root, angles=track.angles + change[:, 6:], covariance=covariance,
-            cloth=_carried(track.cloth, track.root, root), raw_root=track.root, raw_angles=track.angles,
+            track, root=root, angles=track.angles + change[:, 6:],
+            covariance=changed(track.covariance, partial(_bridged, lost, bridged)),
+            cloth=changed(track.cloth, partial(_carried, track.root, root)),
+            raw_root=track.root, raw_angles=track.angles,
         )  # fmt: skip
 
     def _limits(self, track: Track) -> F64:
@@ -82,7 +83,22 @@ def _second_differences(track: Track) -> F64:
     return np.concatenate([turning, moving], axis=1)
 
 
-def _carried(cloth: F64, before: F64, after: F64) -> F64:
-    """Return cloth vertices (T, W, 3) moved along with the root."""
-    motion = after @ twists.inverse(before)
+def _about_pelvis(root: F64, lost: Bool, covariance: F64, rows: Numbers) -> F64:
+    """Return covariances of rows (K,) as of increments that turn about the pelvis; lost frames are not sure of any."""
+    turned = _about(root[rows, :3, 3], covariance.shape[1])
+    spread = turned @ covariance @ np.swapaxes(turned, 1, 2)
+    spread[lost[rows]] = LOST * np.eye(spread.shape[1])
+    return spread
+
+
+def _bridged(lost: Bool, bridged: F64, covariance: F64, rows: Numbers) -> F64:
+    """Return the covariances of rows (K,), of lost frames those of the bridge, which are given in their order."""
+    place, result = np.cumsum(lost) - 1, covariance.copy()
+    result[lost[rows]] = bridged[place[rows[lost[rows]]]]
+    return result
+
+
+def _carried(before: F64, after: F64, cloth: F64, rows: Numbers) -> F64:
+    """Return cloth vertices (K, W, 3) of rows (K,) moved along with the root."""
+    motion = after[rows] @ twists.inverse(before[rows])
     return cloth @ np.swapaxes(motion[:, :3, :3], 1, 2) + motion[:, None, :3, 3]

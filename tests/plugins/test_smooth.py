@@ -8,6 +8,8 @@ from mocapflow_sequence.smooth import Smooth
 from results_scene import ball_body, make_track, start_pose, stepping
 
 from mocapflow.geometry import angles, twists
+from mocapflow.records import F64
+from mocapflow.series import BLOCK, Numbers, Series, blocks
 
 DEMO = Path(__file__).parents[2] / "examples" / "data"
 
@@ -112,6 +114,21 @@ def test_solution_is_the_least_squares_minimum_and_its_covariance() -> None:
     assert np.allclose(bridged[0], np.linalg.inv(hessian)[9:12, 9:12], atol=1e-7)
 
 
+@pytest.mark.parametrize(("count", "block"), [(3, 2), (7, 2), (7, 3), (7, 6), (12, 4), (13, 4)])
+def test_blocks_on_their_own_give_what_the_whole_gives(count: int, block: int) -> None:
+    rng = np.random.default_rng(count + block)
+    factors = rng.normal(size=(count, 3, 3))
+    known = (
+        factors @ np.swapaxes(factors, 1, 2) + 0.1 * np.eye(3),
+        rng.normal(size=(count - 2, 3)),
+        rng.uniform(0.5, 2, 3),
+    )
+    time, wanted = np.cumsum(rng.uniform(0.5, 1.5, count)), rng.random(count) < 0.5
+    whole, parts = (minimise(*known, time, wanted, block=size) for size in (count, block))
+    np.testing.assert_allclose(parts[0], whole[0], atol=1e-11)
+    np.testing.assert_allclose(parts[1], whole[1], atol=1e-11)
+
+
 def test_two_frames_are_returned_as_they_are() -> None:
     body = ball_body(("pelvis", "hip_l", "knee_l", "ankle_l"))
     pose = start_pose(body)
@@ -127,3 +144,25 @@ def test_a_variance_that_rounding_left_below_zero_is_no_hindrance() -> None:
     smoothed = Smooth().run(track=replace(track, covariance=covariance))
     assert np.isfinite(smoothed.angles).all()
     assert np.degrees(np.abs(smoothed.angles - curves)).max() < 1
+
+
+def test_what_is_wide_is_never_in_memory_as_a_whole() -> None:
+    curves = true_curves("skirt_steps")[np.arange(3 * BLOCK) % 60]
+    track = make_track(np.tile(np.eye(4), (len(curves), 1, 1)), curves, sd=np.radians(1.0), cloth=5)
+    turns = track.iterations.copy()
+    turns[[70, 71]] = 0  # lost
+
+    def block_by_block(values: F64) -> Series:
+        def rows(numbers: Numbers) -> F64:
+            assert len(numbers) <= BLOCK + 1
+            return values[numbers]
+
+        return Series(values.shape, rows)
+
+    plain = replace(track, iterations=turns)
+    wide = replace(plain, covariance=block_by_block(track.covariance), cloth=block_by_block(track.cloth))
+    expected, smoothed = Smooth().run(track=plain), Smooth().run(track=wide)
+    np.testing.assert_array_equal(smoothed.angles, expected.angles)
+    for part in blocks(len(curves)):
+        np.testing.assert_array_equal(smoothed.covariance[part], expected.covariance[part])
+        np.testing.assert_array_equal(smoothed.cloth[part], expected.cloth[part])
