@@ -13,6 +13,7 @@ from mocapflow_levelset.channels import ChannelName
 from mocapflow_levelset.crops import Crop
 from mocapflow_levelset.evidence import Evidence, from_image
 from mocapflow_levelset.evolve import Costs, Rhythm, Weights, costs, settle
+from mocapflow_levelset.islands import without_islands
 from mocapflow_levelset.plates import Plate, Shadow
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.statistics import Window
@@ -75,7 +76,7 @@ def find(view: View, levels: Sequence[Level], method: Method, band_px: float) ->
         prior = crops.shrink_values(crop.of(view.prior), level.factor) / np.float32(level.factor)
         front = _brought(front, factor, level.factor, method.weights.band_px)
         evidence = _evidence(image, view, crop, level, method)
-        settled = settle(front, prior, evidence, level.window, method.weights, level.rhythm)
+        settled = settle(without_islands(front, evidence), prior, evidence, level.window, method.weights, level.rhythm)
         front, factor = settled.level, level.factor
     crop.of(outside)[:] = _brought(front, factor, 1, band_px)
     return Found(outside, costs(settled, prior, method.weights))

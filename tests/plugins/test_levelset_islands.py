@@ -1,0 +1,47 @@
+"""Islands of a silhouette: what the empty scene explains goes, what it does not stays."""
+
+import numpy as np
+from levelset_scenes import ellipse
+from mocapflow_levelset.evidence import from_image
+from mocapflow_levelset.islands import runs_of, without_islands
+from mocapflow_levelset.plates import Shadow, plate_of
+
+SHADOW = Shadow(floor=0.012, share=0.2, darkest=0.5, chroma=0.005, stranger=-6.0)
+
+
+def evidence(image, known=True):
+    grey = np.full((160, 160, 3), 120, np.float32)
+    plate = (plate_of(grey, np.full_like(grey, 3), ("lab",)), np.ones((160, 160), np.float32)) if known else None
+    return from_image(image, np.ones((160, 160), np.float32), ("lab",), 1, plate, SHADOW, decorrelate=False)
+
+
+def scene():
+    """Return an image with a person and a hand in other colours than the room, and a level set with a stray island."""
+    image = np.random.default_rng(0).normal(120, 3, (160, 160, 3)).clip(0, 255).astype(np.uint8)
+    person, hand, stray = ellipse(60, 80, 25, 50), ellipse(120, 40, 10, 14), ellipse(120, 120, 10, 14)
+    image[(person > 0) | (hand > 0)] = (40, 60, 180)
+    return image, person, hand, stray
+
+
+def test_only_the_island_in_the_empty_room_goes():
+    image, person, hand, stray = scene()
+    level = np.maximum(np.maximum(person, hand), stray)
+    found = without_islands(level, evidence(image))
+    np.testing.assert_array_equal(found > 0, (person > 0) | (hand > 0))
+    np.testing.assert_array_equal(found[stray <= 0], level[stray <= 0])
+
+
+def test_all_stay_where_the_room_is_not_known_or_there_is_one_part():
+    image, person, _, stray = scene()
+    level = np.maximum(person, stray)
+    assert without_islands(level, evidence(image, known=False)) is level
+    assert without_islands(stray, evidence(image)) is stray  # a person lost altogether is no island
+
+
+def test_runs_cover_a_mask():
+    mask = np.random.default_rng(1).random((9, 13)) < 0.5
+    painted = np.zeros_like(mask)
+    for row, first, last in runs_of(mask):
+        assert last > first
+        painted[row, first:last] = True
+    np.testing.assert_array_equal(painted, mask)
