@@ -1,8 +1,14 @@
-"""Exported files read back by libraries that did not write them: joint names, and centres (T, J, 3) in m, z up."""
+"""Exported files read back by libraries that did not write them: joint names, and centres (T, J, 3) in m, z up.
+
+Where there is only one library, glTF is read by its specification; Rerun's own reader has to do for `.rrd`.
+"""
 
 from __future__ import annotations
 
+import json
+import struct
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -39,11 +45,12 @@ def gltf(path: Path) -> Joints:
 
 
 def movement(path: Path) -> Joints:
-    import xarray
+    import netCDF4
 
-    with xarray.open_dataset(path, engine="h5netcdf") as dataset:
-        places = dataset.position.sel(individuals="person").transpose("time", "keypoints", "space")
-        return [str(name) for name in dataset.keypoints.values], places.values
+    with netCDF4.Dataset(path) as dataset:
+        names, position = dataset["keypoints"][:], dataset["position"]
+        assert position.dimensions == ("time", "space", "keypoints", "individuals")
+        return [str(name) for name in names], np.asarray(position[:, :, :, 0]).swapaxes(1, 2)
 
 
 def trc(path: Path) -> Joints:
@@ -73,6 +80,14 @@ def rrd(path: Path) -> Joints:
 JOINTS = {"bvh": bvh, "c3d": c3d, "gltf": gltf, "movement": movement, "rrd": rrd, "trc": trc, "usd": usd}
 
 
+def parquet(path: Path) -> dict[str, np.ndarray]:
+    """Return the columns of a table."""
+    import duckdb
+
+    columns: dict[str, np.ndarray] = duckdb.read_parquet(str(path)).fetchnumpy()
+    return columns
+
+
 def rerun_entities(path: Path) -> dict[str, dict[str, list[Any]]]:
     """Return what a Rerun recording holds: per entity and component its values in the order of the timeline `frame`."""
     reader = pytest.importorskip("rerun.chunk").RrdReader(path)
@@ -98,10 +113,11 @@ class Gltf:
     """A glTF file played by the rules of the format; frames are those of the first animation."""
 
     def __init__(self, path: Path) -> None:
-        import pygltflib
-
-        self.file = pygltflib.GLTF2.load_binary(str(path))
-        self._blob = self.file.binary_blob()
+        content = path.read_bytes()
+        magic, version, length, count, kind = struct.unpack("<4sIII4s", content[:20])
+        assert (magic, version, length, kind) == (b"glTF", 2, len(content), b"JSON")
+        self.file = json.loads(content[20 : 20 + count], object_hook=lambda found: SimpleNamespace(**found))
+        self._blob = content[20 + count + 8 :]
         self.frames = len(self._values(self.file.animations[0].samplers[0].input))
 
     def joints(self, row: int) -> np.ndarray:
@@ -121,7 +137,7 @@ class Gltf:
     def garment(self, row: int) -> np.ndarray:
         """Return the vertices of the garment in a frame: (W, 3) m, z up; the node above turns them y up."""
         (primitive,) = self._mesh("garment").primitives
-        shapes = np.stack([self._values(target["POSITION"]) for target in primitive.targets])
+        shapes = np.stack([self._values(target.POSITION) for target in primitive.targets])
         weights = self._played("weights")[1].reshape(self.frames, -1)[row]
         local = self._values(primitive.attributes.POSITION) + np.einsum("k,kva->va", weights, shapes)
         node = next(k for k, each in enumerate(self.file.nodes) if each.name == "garment")
@@ -138,11 +154,13 @@ class Gltf:
         def visit(index: int, parent: np.ndarray) -> None:
             node = self.file.nodes[index]
             local = np.eye(4)
-            turn = self._sampled(moving.get((index, "rotation")), row, node.rotation or [0, 0, 0, 1])
+            turn = self._sampled(moving.get((index, "rotation")), row, getattr(node, "rotation", [0, 0, 0, 1]))
             local[:3, :3] = Rotation.from_quat(turn).as_matrix()
-            local[:3, 3] = self._sampled(moving.get((index, "translation")), row, node.translation or [0, 0, 0])
+            local[:3, 3] = self._sampled(
+                moving.get((index, "translation")), row, getattr(node, "translation", [0, 0, 0])
+            )
             world[index] = parent @ local
-            for child in node.children:
+            for child in getattr(node, "children", []):
                 visit(child, world[index])
 
         visit(0, np.eye(4))

@@ -64,11 +64,9 @@ def test_joint_centres_agree_to_a_tenth_of_a_millimetre(run: Path, name: str) ->
 
 
 def test_tables_hold_the_angles_between_these_joints(run: Path) -> None:
-    import pyarrow.parquet as pq
-
     known, places = joints(run, "movement")
     csv = table(run / "results/angles.csv")
-    parquet = pq.read_table(run / "results/angles.parquet").to_pydict()
+    parquet = readers.parquet(run / "results/angles.parquet")
     for wish in angles.definitions(tuple(known)):
         np.testing.assert_allclose(parquet[wish.name], csv[wish.name], atol=1e-4)
         if len(wish.points) == 3:
