@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 from mocapflow_bodies.scanned import Scanned
 from mocapflow_draping.kinematic import Kinematic
+from mocapflow_draping.samples import in_all_directions
 from mocapflow_garments.skirt import Skirt
 
 from mocapflow.components import Draper
@@ -42,7 +43,7 @@ def report(scene: Scene, title: str) -> None:
     free = np.zeros((POSES, len(scene.garment.parameter_names)))
     same = PoseBatch(root=np.repeat(one.root, 25, axis=0), angles=np.repeat(one.angles, 25, axis=0))
     winds = np.zeros((25, free.shape[1]))
-    winds[:, 2:4] = np.random.default_rng(0).uniform(-0.3, 0.3, (25, 2))
+    winds[:, 2:4] = in_all_directions(2, 8, np.radians([5.0, 10.0, 20.0]))
     fall, closed = Kinematic(sweeps=0), Kinematic()
     steps = Kinematic(rule="literal", sweeps=0)
     asked = Pose(root=one.root[0], angles=one.angles[0]), free[0], np.arange(len(scene.garment.vertices)), Past(), scene
@@ -50,8 +51,9 @@ def report(scene: Scene, title: str) -> None:
         "event-driven, strands alone": (lambda: fall.drape(poses, free, Past(), scene), POSES),
         "event-driven, with rings": (lambda: closed.drape(poses, free, Past(), scene), POSES),
         "literal, 50 x 2 degrees": (lambda: steps.drape(poses, free, Past(), scene), POSES),
-        "one drape alone": (lambda: fall.drape(one, free[:1], Past(), scene), 1),
+        "one wind": (lambda: fall.drape(one, winds[-1:], Past(), scene), 1),
         "25 winds of one pose, all of them": (lambda: fall.drape(same, winds, Past(), scene), 1),
+        "25 winds, literal": (lambda: steps.drape(same, winds, Past(), scene), 1),
         "rates of all unknowns, carried along": (lambda: closed.velocity(*asked), 1),
         "the same by differences": (lambda: Draper.velocity(closed, *asked), 1),
     }

@@ -1,4 +1,4 @@
-"""The direction in which each strand comes to hang, and the one in which it stands before it falls."""
+"""The directions in which strands stand before they fall and to which winds turn them, and strands that ride."""
 
 from __future__ import annotations
 
@@ -10,19 +10,30 @@ from mocapflow_draping.strands import Strands, carried, roots
 DOWN = np.array([0.0, 0.0, -1.0])
 
 
-def hanging(strands: Strands, chain: F64, out: F64, aside: F64) -> tuple[F64, F64]:
-    """Return `facing` and `down` (B, N, 3), perpendicular unit directions, of strands that hang by gravity.
-
-    Args:
-        strands: the garment's strands.
-        chain: (B, J, 4, 4) posed joints.
-        out: (B, N) rad, tilt of the tail outwards.
-        aside: (B, N) rad, tilt to the left seen from inside the garment.
-    """
+def standing_out(strands: Strands, chain: F64) -> F64:
+    """Return the horizontal unit directions (B, N, 3) in which strands stand out, at posed joints (B, J, 4, 4)."""
     facing = np.einsum("bnij,nj->bni", chain[:, strands.carrier, :3, :3], strands.facing)
     facing[..., 2] = 0.0
-    facing /= np.maximum(np.linalg.norm(facing, axis=-1, keepdims=True), 1e-9)
-    return perpendicular(facing, tilted(np.broadcast_to(DOWN, facing.shape), facing, out, aside))
+    level: F64 = facing / np.maximum(np.linalg.norm(facing, axis=-1, keepdims=True), 1e-9)
+    return level
+
+
+def blown(facing: F64, out: F64, aside: F64) -> tuple[F64, F64, F64]:
+    """Return how hanging tails are turned: the plane of each turn, two unit directions (B, N, 3), and its angle.
+
+    Args:
+        facing: (B, N, 3) horizontal unit directions in which strands stand out.
+        out: (B, N) rad, tilt of the tail outwards.
+        aside: (B, N) rad, tilt to the left seen from inside the garment.
+
+    Returns:
+        back, towards, amount: a tail that hangs straight down stands `amount` (B, N) rad from `towards`, on the side of
+        `back`, which is perpendicular to it.
+    """
+    towards, amount = tilted(np.broadcast_to(DOWN, facing.shape), facing, out, aside), np.hypot(out, aside)
+    sine, cosine = np.sin(amount)[..., None], np.cos(amount)[..., None]
+    level = np.where(sine > 0, towards - cosine * DOWN, facing) / np.where(sine > 0, sine, 1.0)
+    return sine * DOWN - cosine * level, towards, amount
 
 
 def tilted(down: F64, facing: F64, out: F64, aside: F64) -> F64:
@@ -35,12 +46,6 @@ def tilted(down: F64, facing: F64, out: F64, aside: F64) -> F64:
     sideways = out[..., None] * facing + aside[..., None] * left
     turned: F64 = np.cos(amount) * down + np.sinc(amount / np.pi) * sideways
     return turned
-
-
-def perpendicular(facing: F64, down: F64) -> tuple[F64, F64]:
-    """Return `facing` made perpendicular to `down`, and `down`."""
-    across = facing - (facing * down).sum(axis=-1, keepdims=True) * down
-    return across / np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-9), down
 
 
 def riding(strands: Strands, chain: F64, out: F64, aside: F64) -> F64:
@@ -64,10 +69,9 @@ def riding(strands: Strands, chain: F64, out: F64, aside: F64) -> F64:
 
 def standing(strands: Strands, chain: F64) -> F64:
     """Return strands (B, N, L, 3) m before they fall: level, or where a limb has carried them."""
-    still = np.zeros((len(chain), len(strands.facing)))
     if strands.rides:
+        still = np.zeros((len(chain), len(strands.facing)))
         return riding(strands, chain, still, still)
-    facing, _ = hanging(strands, chain, still, still)
     reach = np.concatenate([np.zeros((len(strands.links), 1)), np.cumsum(strands.links, axis=1)], axis=1)
-    grid: F64 = roots(strands, chain)[:, :, None] + reach[..., None] * facing[:, :, None]
+    grid: F64 = roots(strands, chain)[:, :, None] + reach[..., None] * standing_out(strands, chain)[:, :, None]
     return grid

@@ -19,10 +19,10 @@ from mocapflow.records import F64, I32, Bool, record
 from mocapflow.scene import Scene
 from mocapflow_draping.fields import BodyFields, build_fields, touchable_joints
 from mocapflow_draping.forces import thickness, tilts, wind
-from mocapflow_draping.frames import riding, standing
-from mocapflow_draping.laying import fall, follow, moving, placed
+from mocapflow_draping.frames import riding, standing, standing_out
+from mocapflow_draping.laying import distinct, follow, lay, moving
 from mocapflow_draping.parts import posed_parts, rates
-from mocapflow_draping.strands import Strands, strands_of
+from mocapflow_draping.strands import Strands, roots, strands_of
 
 LOWER = 0.002  # m, step of a cloth that nothing holds
 TINY = 1e-6  # rad, and share of a parameter's range: what the drape starts from is differentiated by steps
@@ -67,19 +67,20 @@ class Kinematic(Draper):
             raise PluginError("the draper has no garment to drape", hint="name a garment in the pipeline's scene")
         fitting = self.fitting(garment, scene.body)
         strands = fitting.strands
-        chain = chain_batch(scene.body, poses)
-        parts = posed_parts(fitting.fields, chain)
         skin = self.skin_m + thickness(garment, parameters) / 2
-        out, aside = tilts(garment, parameters, strands.azimuth)
+        kept, source = distinct(poses, skin)
+        chain, skin = chain_batch(scene.body, PoseBatch(root=poses.root[kept], angles=poses.angles[kept])), skin[kept]
+        parts = posed_parts(fitting.fields, chain)
+        winds = tilts(garment, parameters, strands.azimuth)
         if self.rule == "literal":
-            grid = self._step(fitting, chain, parameters, garment, skin, parts)
+            grid = self._step(fitting, chain, source, parameters, garment, skin, parts)
         elif strands.rides:
-            grid = riding(strands, chain, out, aside)
+            grid = riding(strands, chain[source], *winds)
         else:
-            where = placed(strands, chain, out, aside)
-            grid, _ = fall(strands, fitting.fields, where, skin, parts, math.radians(self.start_deg))
+            where = roots(strands, chain), standing_out(strands, chain)
+            grid = lay(strands, fitting.fields, where, winds, source, skin, parts, math.radians(self.start_deg)).grid
         if self.sweeps:
-            self._close(fitting, grid, skin, parts)
+            self._close(fitting, grid, skin[source], parts[source])
         vertices: F64 = grid.reshape(len(grid), -1, 3)[:, strands.place]
         return vertices
 
@@ -96,15 +97,16 @@ class Kinematic(Draper):
         parts = posed_parts(fitting.fields, chain[-1:])
         skin = self.skin_m + thickness(garment, values) / 2
         moved = moving(fitting.fields, chain, skin, steps)
-        laid = tilts(garment, values, strands.azimuth)
+        winds = tilts(garment, values, strands.azimuth)
         if strands.rides:
-            ridden = riding(strands, chain, *laid)
+            ridden = riding(strands, chain, *winds)
             grid, rate = ridden[-1:], rates(ridden, steps)
         else:
-            near = placed(strands, chain, *laid)
-            here = near[0][-1:], near[1][-1:], near[2][-1:]
-            grid, held = fall(strands, fitting.fields, here, skin[-1:], parts, math.radians(self.start_deg))
-            rate = follow(strands, fitting.fields, near, grid, held, parts, moved)
+            near = roots(strands, chain), standing_out(strands, chain)
+            here, still = (near[0][-1:], near[1][-1:]), (winds[0][-1:], winds[1][-1:])
+            alone, start = np.zeros(1, np.int32), math.radians(self.start_deg)
+            laid = lay(strands, fitting.fields, here, still, alone, skin[-1:], parts, start)
+            grid, rate = laid.grid, follow(strands, fitting.fields, near, winds, laid, parts, moved)
         if self.sweeps:
             self._close(fitting, grid, skin[-1:], parts, (rate, np.zeros_like(rate), moved.carry, moved.swell))
         row, unknowns = strands.place[vertices], 6 + len(pose.angles) + len(parameters)
@@ -133,7 +135,9 @@ class Kinematic(Draper):
             self._fittings[garment] = known
         return known
 
-    def _step(self, fitting: Fitting, chain: F64, parameters: F64, garment: GarmentMesh, skin: F64, parts: F64) -> F64:
+    def _step(
+        self, fitting: Fitting, chain: F64, source: I32, parameters: F64, garment: GarmentMesh, skin: F64, parts: F64
+    ) -> F64:
         from mocapflow_draping.literal import blow_batch, settle_batch
 
         strands, values = fitting.strands, fitting.fields.values
@@ -145,8 +149,9 @@ class Kinematic(Draper):
             grid, fixed, strands.first, strands.last, skin, step, self.iterations, self.limited, in_space,
             LOWER, parts, values,
         )  # fmt: skip
-        force, amount = wind(garment, parameters, chain[:, strands.carrier[0], :3, :3])
-        blow_batch(grid, fixed, strands.first, strands.last, skin, force, amount, parts, values)
+        grid, fixed = grid[source], fixed[source]
+        force, amount = wind(garment, parameters, chain[source, strands.carrier[0], :3, :3])
+        blow_batch(grid, fixed, strands.first, strands.last, skin[source], force, amount, parts[source], values)
         return grid
 
     def _close(self, fitting: Fitting, grid: F64, skin: F64, parts: F64, motion: Motion | None = None) -> None:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from mocapflow.data import PoseBatch
 from mocapflow.records import F64, I32, record
 from mocapflow_draping.fields import BodyFields
-from mocapflow_draping.frames import hanging
+from mocapflow_draping.frames import DOWN, blown
 from mocapflow_draping.parts import carried_rates, rates
 from mocapflow_draping.strands import Strands
-from mocapflow_draping.strands import roots as roots_of
 
-Placed = tuple[F64, F64, F64]  # per body and strand: root (B, N, 3) m, directions `facing` and `down` (B, N, 3)
+Placed = tuple[F64, F64]  # per body and strand: root (B, N, 3) m, horizontal direction `facing` (B, N, 3)
+Winds = tuple[F64, F64]  # rad, per drape and strand: tilts (B, N) of its tail, outwards and to its left
 
 
 @record
@@ -23,9 +26,19 @@ class Rates:
     swell: F64  # (S,) of the contact distance
 
 
-def placed(strands: Strands, chain: F64, out: F64, aside: F64) -> Placed:
-    """Return where strands begin and how they stand, at posed joints (B, J, 4, 4) and tilts (B, N) rad."""
-    return roots_of(strands, chain), *hanging(strands, chain, out, aside)
+class Laid(NamedTuple):
+    """B drapes of N strands with L particles."""
+
+    grid: F64  # (B, N, L, 3) m
+    held: I32  # (B, N, L) part that a particle touches, plus one; 0 where it touches none
+    pivot: I32  # (B, N) row of the last particle on which a strand lay when it had fallen
+
+
+def distinct(poses: PoseBatch, skin: F64) -> tuple[I32, I32]:
+    """Return the rows (D,) of different neighbours in a batch of B bodies with contact distances, and which each is."""
+    known = np.concatenate([poses.root.reshape(len(skin), -1), poses.angles, skin[:, None]], axis=1)
+    new = np.append(True, np.any(known[1:] != known[:-1], axis=1))
+    return np.flatnonzero(new).astype(np.int32), (np.cumsum(new) - 1).astype(np.int32)
 
 
 def moving(fields: BodyFields, chain: F64, skin: F64, steps: F64) -> Rates:
@@ -40,31 +53,54 @@ def moving(fields: BodyFields, chain: F64, skin: F64, steps: F64) -> Rates:
     return Rates(steps=steps, carry=carried_rates(fields, chain, steps), swell=rates(skin, steps))
 
 
-def fall(strands: Strands, fields: BodyFields, where: Placed, skin: F64, parts: F64, start: float) -> tuple[F64, I32]:
-    """Return strands as they fall (B, N, L, 3) m, and what they touch (B, N, L), see `swing_batch`."""
-    from mocapflow_draping.swing import swing_batch
+def lay(
+    strands: Strands, fields: BodyFields, where: Placed, winds: Winds, source: I32, skin: F64, parts: F64, start: float
+) -> Laid:
+    """Return B drapes on D bodies: strands fall once on each body, then winds turn the tails that are left.
 
-    grid = np.empty((len(parts), *strands.vertex.shape, 3))
-    held = np.zeros(grid.shape[:3], np.int32)
-    standing = np.full(grid.shape[:2], start)
-    roots, facing, down = where
-    swing_batch(
-        roots, facing, down, standing, skin, strands.links, strands.first, strands.last,
-        parts, fields.values, grid, held,
+    Args:
+        strands: the garment's strands.
+        fields: the body's parts.
+        where: where strands begin and stand on each body.
+        winds: of each drape.
+        source: (B,) body of each drape.
+        skin: (D,) m, contact distance.
+        parts: (D, P, COLUMNS), the bodies.
+        start: rad, how far from straight down strands stand before they fall.
+    """
+    from mocapflow_draping.swing import blow_batch, fall_batch
+
+    roots, facing = where
+    shape = strands.vertex.shape
+    fallen, lying = np.empty((len(parts), *shape, 3)), np.empty((len(parts), *shape), np.int32)
+    fall_batch(
+        roots, facing, start, skin, strands.links, strands.first, strands.last, parts, fields.values,
+        fallen, lying,
     )  # fmt: skip
-    return grid, held
+    pivot = np.where(lying > 0, np.arange(shape[1], dtype=np.int32), strands.first[:, None]).max(axis=2)
+    grid, held = np.empty((len(source), *shape, 3)), np.empty((len(source), *shape), np.int32)
+    back, towards, amount = blown(facing[source], *winds)
+    blow_batch(
+        source, back, towards, amount, skin, strands.links, pivot, strands.last, parts, fields.values,
+        fallen, lying, grid, held,
+    )  # fmt: skip
+    return Laid(grid, held, pivot[source])
 
 
 def follow(
-    strands: Strands, fields: BodyFields, near: Placed, grid: F64, held: I32, parts: F64, moved: Rates
-) -> F64:  # fmt: skip
-    """Return the rates (N, L, 3, S) of fallen strands (1, N, L, 3) m that begin at the last of `near` (S + 1)."""
+    strands: Strands, fields: BodyFields, near: Placed, winds: Winds, laid: Laid, parts: F64, moved: Rates
+) -> F64:
+    """Return the rates (N, L, 3, S) of one drape: `near` and `winds` (S + 1) with a small step along each unknown."""
     from mocapflow_draping.following import follow_swing
 
-    rate = np.zeros((*grid.shape[1:], len(moved.steps)))
-    root_rate, facing_rate, down_rate = (rates(one, moved.steps) for one in near)
-    follow_swing(
-        grid[0], held[0], near[1][-1], near[2][-1], root_rate, facing_rate, down_rate, strands.links, strands.first,
-        strands.last, parts[0], fields.values, moved.carry, moved.swell, rate,
-    )  # fmt: skip
+    rate = np.zeros((*laid.grid.shape[1:], len(moved.steps)))
+    (roots, facing), (back, towards, _) = near, blown(near[1], *winds)
+    begin, down = rates(roots, moved.steps), np.broadcast_to(DOWN, facing.shape)
+    for first, out, to in ((strands.first, facing, down), (laid.pivot[0], back, towards)):
+        follow_swing(
+            laid.grid[0], laid.held[0], out[-1], np.ascontiguousarray(to[-1]), begin, rates(out, moved.steps),
+            rates(to, moved.steps), strands.links, first, strands.last, parts[0], fields.values, moved.carry,
+            moved.swell, rate,
+        )  # fmt: skip
+        begin = rate[np.arange(len(rate)), laid.pivot[0]]
     return rate

@@ -1,8 +1,9 @@
-"""The drape itself: strands as chains of bars that swing down about their last support, contact by contact (numba).
+"""The drape itself: strands as chains of bars that swing about their last support, contact by contact (numba).
 
-A strand stays in one vertical plane and its free tail is a straight ray. So the tail may turn at once by the least
+A strand falls in one vertical plane and its free tail is a straight ray. So the tail may turn at once by the least
 distance over lever arm of its particles: none of them can touch before (method: conservative advancement). Where
-a particle touches, it becomes the next support and the rest goes on turning.
+a particle touches, it becomes the next support and the rest goes on turning. Wind then turns the tail that is left,
+in the plane of its own direction and by the same rule; many winds go on from one fall.
 """
 
 from __future__ import annotations
@@ -18,60 +19,136 @@ from mocapflow_draping.parts import PITCH
 GUARD = 0.4  # voxels: so much too far can a field read near a sharp edge
 DEEP = 5e-5  # m, deeper than this a tail turns back
 BACKS = 64  # turns back of one strand, so that one that begins inside the body comes to an end
+SAME = 1.0 - 1e-12  # cosine between directions that are the same
 TOUCH = 3e-4  # m, nearer than this to the contact distance counts as touching
 
 
 @numba.njit(cache=True, error_model="numpy")
-def swing_batch(roots, facing, down, start, skin, links, first, last, parts, values, out, held):  # type: ignore[no-untyped-def]
-    """Drape N strands of up to L particles on B posed bodies.
+def fall_batch(roots, facing, start, skin, links, first, last, parts, values, grid, held):  # type: ignore[no-untyped-def]
+    """Let N strands of up to L particles fall on B posed bodies until they hang straight down or lie.
 
     Args:
         roots: (B, N, 3) m, where each strand is pinned.
-        facing: (B, N, 3), unit direction in which each strand stands out, perpendicular to its `down`.
-        down: (B, N, 3), unit direction in which each strand comes to hang: gravity, tilted by forces.
-        start: (B, N) rad, how far from `down` each strand stands before it falls.
+        facing: (B, N, 3), horizontal unit direction in which each strand stands out.
+        start: rad, how far from straight down each strand stands before it falls.
         skin: (B,) m, contact distance.
         links: (N, L - 1) m, lengths of the bars.
         first: (N,) row of the first particle of each strand.
         last: (N,) row of the last one.
         parts: (B, P, COLUMNS), the bodies, see `parts`.
         values: their voxels.
-        out: (B, N, L, 3) m, written.
+        grid: (B, N, L, 3) m, written.
         held: (B, N, L), written: the part that each particle touches, plus one; 0 where it touches none.
     """
-    rows = links.shape[1] + 1
-    reach, room, near = np.empty(rows), np.empty(rows), np.zeros(rows, np.int64)
+    rows, down = links.shape[1] + 1, np.array([0.0, 0.0, -1.0])
+    room, near, fresh = np.empty(rows), np.zeros(rows, np.int64), np.empty(rows, np.bool_)
     for b in range(len(roots)):
         for n in range(roots.shape[1]):
-            held[b, n] = 0
+            held[b, n], grid[b, n, first[n]] = 0, roots[b, n]
+            room[:], fresh[:] = 0.0, False
             _swing(
-                roots[b, n], facing[b, n], down[b, n], start[b, n], skin[b], links[n], first[n], last[n],
-                parts[b], values, out[b, n], held[b, n], reach, room, near,
+                first[n], facing[b, n], down, start, skin[b], links[n], last[n], parts[b], values,
+                grid[b, n], held[b, n], room, near, fresh,
             )  # fmt: skip
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _swing(root, facing, down, start, skin, links, first, last, parts, values, out, held, reach, room, near):  # type: ignore[no-untyped-def]
-    """Drape one strand; `reach` is along the strand, `room` how far each particle may yet move untouched."""
-    out[first] = root
-    reach[first] = 0.0
-    for k in range(first + 1, last + 1):
-        reach[k], room[k] = reach[k - 1] + links[k - 1], 0.0
-    pivot, angle, turn, backs = first, start, 0.0, 0
+def blow_batch(  # type: ignore[no-untyped-def]
+    source, back, towards, amount, skin, links, pivot, last, parts, values, fallen, lying, grid, held
+):
+    """Turn the hanging tails of D fallen drapes by B winds until they reach a direction or lie.
+
+    Winds of one drape share what is measured where its tails hang, and one that blows as another before it, only
+    harder, goes on where that one has left the tail.
+
+    Args:
+        source: (B,) drape that each wind turns, the winds of one drape side by side.
+        back: (B, N, 3), unit direction perpendicular to `towards`, in the plane of that and straight down.
+        towards: (B, N, 3), unit direction in which each tail comes to hang.
+        amount: (B, N) rad, between straight down and `towards`.
+        skin: (D,) m, contact distance on each body.
+        links: (N, L - 1) m, lengths of the bars.
+        pivot: (D, N) row of the last supported particle.
+        last: (N,) row of the last particle.
+        parts: (D, P, COLUMNS), the bodies, see `parts`.
+        values: their voxels.
+        fallen: (D, N, L, 3) m, `grid` of `fall_batch`.
+        lying: (D, N, L), its `held`.
+        grid: (B, N, L, 3) m, written.
+        held: (B, N, L), written: as `lying`, with what is touched now.
+
+    Source: Rosenhahn 2008, section 12.3
+    """
+    many, rows = len(source), links.shape[1] + 1  # the last row of what is known of tails: as they hang
+    room, near = np.empty((many + 1, rows)), np.zeros((many + 1, rows), np.int64)
+    fresh, ended = np.ones((many + 1, rows), np.bool_), np.empty(many + 1, np.int64)
+    for n in range(len(last)):
+        measured = -1
+        for b in range(many):
+            d, angle = source[b], amount[b, n]
+            if angle <= 0.0 or pivot[d, n] == last[n]:
+                grid[b, n], held[b, n] = fallen[d, n], lying[d, n]
+                continue
+            if measured != d:
+                _measure(pivot[d, n], last[n], fallen[d, n], skin[d], parts[d], values, room[many], near[many])
+                measured, ended[many] = d, pivot[d, n]
+            a = _weaker(b, n, source, towards, amount)
+            if a == many:
+                grid[b, n], held[b, n] = fallen[d, n], lying[d, n]
+            else:
+                grid[b, n], held[b, n] = grid[a, n], held[a, n]
+                angle -= amount[a, n]
+            room[b], near[b], fresh[b] = room[a], near[a], fresh[a]
+            ended[b] = _swing(
+                ended[a], back[b, n], towards[b, n], angle, skin[d], links[n], last[n], parts[d], values,
+                grid[b, n], held[b, n], room[b], near[b], fresh[b],
+            )  # fmt: skip
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _weaker(b, n, source, towards, amount):  # type: ignore[no-untyped-def]
+    """Return the strongest wind before b that blows as it does but no harder; how many there are if none does."""
+    found, most = len(source), 0.0
+    for a in range(b):
+        if source[a] == source[b] and most < amount[a, n] <= amount[b, n]:
+            along = towards[a, n, 0] * towards[b, n, 0] + towards[a, n, 1] * towards[b, n, 1]
+            if along > SAME * math.sin(amount[a, n]) * math.sin(amount[b, n]):
+                found, most = a, amount[a, n]
+    return found
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _measure(pivot, last, strand, skin, parts, values, room, near):  # type: ignore[no-untyped-def]
+    """Write how far each particle of a tail is from contact, and the part that it is nearest to."""
+    part = 0
+    for k in range(pivot + 1, last + 1):
+        p = strand[k]
+        distance, part = body_distance(p[0], p[1], p[2], part, parts, values)
+        room[k], near[k] = distance - skin, part
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _swing(pivot, facing, down, angle, skin, links, last, parts, values, out, held, room, near, fresh):  # type: ignore[no-untyped-def]
+    """Turn the tail below `pivot` from `angle` to `down`; return the row of the last supported particle.
+
+    `room` is how far each particle may yet move untouched, `fresh` where it was measured right here.
+    """
+    turn, backs = 0.0, 0
     guard = GUARD * parts[0, PITCH]
     while pivot < last:
-        x, base = out[pivot], reach[pivot]
+        x = out[pivot]
         touched = -1
         while touched < 0:
             bx, by, bz = _bar(facing, down, angle)
-            turn = angle
+            turn, arm = angle, 0.0
             for k in range(pivot + 1, last + 1):  # measure only where the room left could end the turn
-                arm = reach[k] - base
+                arm += links[k - 1]
                 if room[k] - guard < arm * turn:
-                    room[k], near[k] = body_distance(
-                        x[0] + arm * bx, x[1] + arm * by, x[2] + arm * bz, near[k], parts, values
-                    )
-                    room[k] -= skin
+                    if not fresh[k]:
+                        distance, near[k] = body_distance(
+                            x[0] + arm * bx, x[1] + arm * by, x[2] + arm * bz, near[k], parts, values
+                        )
+                        room[k], fresh[k] = distance - skin, True
                     if room[k] < -DEEP and backs < BACKS and angle < math.pi:  # read too far at a sharp edge
                         turn = 2.0 * room[k] / arm
                         backs += 1
@@ -83,17 +160,21 @@ def _swing(root, facing, down, start, skin, links, first, last, parts, values, o
             if touched >= 0 or turn == 0.0:
                 break
             angle -= turn
+            arm = 0.0
             for k in range(pivot + 1, last + 1):
-                room[k] -= (reach[k] - base) * abs(turn)
+                arm += links[k - 1]
+                room[k] -= arm * abs(turn)
+                fresh[k] = False
         bx, by, bz = _bar(facing, down, angle)
-        end = touched if touched >= 0 else last
-        for k in range(pivot + 1, end + 1):
-            arm = reach[k] - base
+        arm = 0.0
+        for k in range(pivot + 1, (touched if touched >= 0 else last) + 1):
+            arm += links[k - 1]
             out[k, 0], out[k, 1], out[k, 2] = x[0] + arm * bx, x[1] + arm * by, x[2] + arm * bz
         if touched < 0:
-            return
+            break
         held[touched] = near[touched] + 1
         pivot = touched
+    return pivot
 
 
 @numba.njit(cache=True, error_model="numpy")

@@ -8,10 +8,11 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from mocapflow_draping.distance import body_distances
 from mocapflow_draping.fields import build_fields
+from mocapflow_draping.frames import blown
 from mocapflow_draping.kinematic import Kinematic
 from mocapflow_draping.parts import posed_parts
 from mocapflow_draping.strands import strands_of
-from mocapflow_draping.swing import swing_batch
+from mocapflow_draping.swing import blow_batch, fall_batch
 from mocapflow_garments.skirt import Skirt
 
 from mocapflow.assets import Body
@@ -135,18 +136,28 @@ def prepared(body, chain=EYE, voxel=VOXEL):
     return fields.values, posed_parts(fields, np.broadcast_to(chain, (len(chain), len(body.parents), 4, 4)).copy())
 
 
-def swing(body, roots, facing, count, link, down=(0.0, 0.0, -1.0), start=90.0, voxel=VOXEL):
-    """Drape strands (N) on a resting body; return particles (N, L, 3) and the last supported one (N,)."""
+def swing(body, roots, facing, count, link, start=90.0, tilts=(0.0,), voxel=VOXEL):
+    """Drape strands (N) on a resting body, tilted outwards; return (B, N, L, 3) m and the last supported rows (B, N).
+
+    Tilts (B,) are in degrees.
+    """
     values, parts = prepared(body, voxel=voxel)
-    many = len(roots)
-    out, held = np.empty((1, many, count, 3)), np.empty((1, many, count), np.int32)
-    swing_batch(
-        np.asarray(roots, float)[None], np.tile(np.asarray(facing, float), (1, many, 1)),
-        np.tile(np.asarray(down, float), (1, many, 1)), np.full((1, many), np.radians(start)), np.array([SKIN]),
-        np.full((many, count - 1), link), np.zeros(many, np.int32), np.full(many, count - 1, np.int32),
-        parts, values, out, held,
-    )  # fmt: skip
-    return out[0], np.where(held[0] > 0, np.arange(count), 0).max(axis=1)
+    shape, many = (1, len(roots), count), len(tilts)
+    fallen, lying = np.empty((*shape, 3)), np.empty(shape, np.int32)
+    links, last = np.full((len(roots), count - 1), link), np.full(len(roots), count - 1, np.int32)
+    facing = np.tile(np.asarray(facing, float), (1, len(roots), 1))
+    fall_batch(np.asarray(roots, float)[None], facing, np.radians(start), np.array([SKIN]), links, 0 * last, last,
+               parts, values, fallen, lying)  # fmt: skip
+    grid, held = np.empty((many, *shape[1:], 3)), np.empty((many, *shape[1:]), np.int32)
+    out = np.tile(np.radians(tilts)[:, None], (1, len(roots)))
+    blow_batch(np.zeros(many, np.int32), *blown(facing[[0] * many], out, 0 * out), np.array([SKIN]), links,
+               supported(lying), last, parts, values, fallen, lying, grid, held)  # fmt: skip
+    return grid, supported(held)
+
+
+def supported(held):
+    """Return the last row that is held, the first where none is."""
+    return np.where(held > 0, np.arange(held.shape[-1], dtype=np.int32), np.int32(0)).max(axis=-1)
 
 
 def distances(body, points, poses=None, voxel=VOXEL):

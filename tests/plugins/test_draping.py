@@ -92,7 +92,7 @@ def test_a_flat_cloth_lies_on_a_plane_undeformed():
 
 def test_an_overhang_hangs_straight_down_and_keeps_its_length():
     table = box([-0.3, -0.3, -0.1], [0.105, 0.3, 0.0])
-    (laid,), (supported,) = swing(table, [[0.0, 0.0, SKIN]], [1.0, 0.0, 0.0], 31, 0.01)
+    ((laid,),), ((supported,),) = swing(table, [[0.0, 0.0, SKIN]], [1.0, 0.0, 0.0], 31, 0.01)
     assert 11 <= supported <= 22
     straight = laid[supported] - np.outer(0.01 * np.arange(31 - supported), [0, 0, 1])
     assert np.abs(laid[supported:] - straight).max() < 1e-4
@@ -125,11 +125,11 @@ def test_a_strand_over_a_cylinder_is_taut(link):
     count = round(length / link) + 1
     laid, _ = swing(lying_cylinder(radius), [[0.0, 0.0, radius + SKIN]], [1.0, 0.0, 0.0], count, link)
     away = radius + SKIN
-    chords = np.linalg.norm(np.diff(laid[0], axis=0), axis=1)
+    chords = np.linalg.norm(np.diff(laid[0, 0], axis=0), axis=1)
     assert np.abs(chords - link).max() < 1e-12
     tip = np.array([away, 0.0, -(length - np.pi / 2 * away)])
     sag = link**2 / (8 * away)  # a chain of bars cuts corners
-    assert np.linalg.norm(laid[0, -1] - tip) < 5e-4 + 2 * sag
+    assert np.linalg.norm(laid[0, 0, -1] - tip) < 5e-4 + 2 * sag
 
 
 def test_a_skirt_keeps_its_strands_and_stays_outside(skirted):
