@@ -64,6 +64,11 @@ class Recording:
         done = 0 if since is None else len(range(self.indices.start, since, self.indices.step))
         return self._read(self.indices[done:])
 
+    def until(self, last: int) -> Recording:
+        """Return the recording up to a frame, given by its number in the videos."""
+        count = len(range(self.indices.start, last + 1, self.indices.step))
+        return replace(self, indices=self.indices[:count])
+
     def frame(self, index: int) -> Frame:
         """Return one frame by its number in the videos; it decodes all before it.
 

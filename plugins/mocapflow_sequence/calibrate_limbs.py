@@ -96,14 +96,12 @@ class CalibrateLimbs(Stage):
         """Return the silhouettes of the chosen frames; the images are let go at once."""
         views = []
         wanted = {index: (pose, cloth) for index, pose, cloth in zip(indices, poses, clothes, strict=True)}
-        for frame in recording.frames(since=min(indices)):
+        for frame in recording.until(max(indices)).frames(since=min(indices)):
             if frame.index in wanted:
                 pose, cloth = wanted[frame.index]
                 state = believed(pose, cloth.parameters, cloth)
                 found = self.segmenter.segment(frame, state, Past(), scene, Turn(index=0, cap=1))
                 views.append((replace(frame, images=(), flow=None), found, cloth))
-            if frame.index >= max(indices):
-                break
         return views
 
     def _match(

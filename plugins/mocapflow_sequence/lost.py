@@ -1,4 +1,4 @@
-"""What is a guess: frames of a track that were lost, angles that no image shows."""
+"""What is a guess: frames of a track that were lost, angles that the priors hold."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ def plot_angles(
 ) -> Path:
     """Write one panel per angle: ours with its 90 % band, unsmoothed thin, the reference black, the RMS in the title.
 
-    Frames in which no image shows the angle are shaded grey, frames that were lost red.
+    Frames in which the priors hold the angle are shaded grey, frames that were lost red.
 
     Args:
         path: the png.
@@ -41,7 +41,7 @@ def plot_angles(
     deviations = {str(row["angle"]): float(row["rms_deg"]) for row in (evaluation.rows if evaluation else ())}
     for panel, name in zip(every, names, strict=True):
         _curves(panel, name, ours, raw, reference)
-        shade(panel, ours["frame"], unseen(ours[f"{name}_observed"]) & ~lost, HELD, "no image shows it")
+        shade(panel, ours["frame"], unseen(ours[f"{name}_observed"]) & ~lost, HELD, "held by the priors")
         shade(panel, ours["frame"], lost, LOST, "lost, bridged")
         deviation = f"   RMS {deviations[name]:.2f}°" if name in deviations else ""
         panel.set_title(title(name) + deviation, fontsize=10, loc="left")

@@ -48,7 +48,7 @@ def ranges(columns: Mapping[str, F64]) -> list[dict[str, Any]]:
         rows.append({
             "degrees": title(name), "least": float(np.min(curve)), "greatest": float(np.max(curve)),
             "range": float(np.ptp(curve)), "± of the 90 % interval, median": float(np.median(half)),
-            "frames no image shows it": int(np.sum(unseen(columns[f"{name}_observed"]))),
+            "frames held by the priors": int(np.sum(unseen(columns[f"{name}_observed"]))),
         })  # fmt: skip
     return rows
 
@@ -72,7 +72,7 @@ def mishaps(track: Track, held: Mapping[str, int]) -> list[str]:
     said = [f"frames lost and bridged: {_spans(track, lost)}"] if lost.any() else []
     if restless.any():
         said.append(f"{restless.sum()} of {len(restless)} frames did not come to rest: {_spans(track, restless)}")
-    return said + [f"{title(name)}: no image shows it in {n} frames; the priors hold it" for name, n in held.items()]
+    return said + [f"{title(name)}: held by the priors in {n} frames" for name, n in held.items()]
 
 
 def times(track: Track) -> list[dict[str, Any]]:

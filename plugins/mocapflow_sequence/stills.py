@@ -20,9 +20,7 @@ def stills(track: Track, scene: Scene, recording: Recording) -> list[tuple[str, 
     chosen = chosen_rows(track)
     painter, found = Painter(scene), {}
     last = max((int(track.frame[row]) for row in chosen.values()), default=-1)
-    for frame in recording.frames():
-        if frame.index > last:
-            break
+    for frame in recording.until(last).frames():
         for what, row in chosen.items():
             if track.frame[row] == frame.index:
                 wall = _side_by_side([painter.paint(frame, track, row, view) for view in range(len(scene.cameras))])

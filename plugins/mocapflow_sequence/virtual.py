@@ -33,9 +33,10 @@ class Virtual(Stage):
         path = layout.place(run_folder.path, layout.VIRTUAL)
         room = Room(scene, track.root, (self.width_px, self.height_px))
         with drawing.videos([path], track.frame_rate / self.every, self.codec) as (video,):
-            for row in range(0, len(track.frame), self.every):
+            rows = range(0, len(track.frame), self.every)
+            for done, row in enumerate(rows, 1):
                 image = room.picture(scene.undressed.surface(track.pose(row), NO_CLOTH), track.cloth[row])
                 drawing.label(image, f"frame {track.frame[row]}   {track.time[row]:.2f} s")
                 video.write(image)
-                run_folder.watch(row + 1, len(track.frame))
+                run_folder.watch(done, len(rows))
         return Files(paths=(path,))

@@ -25,7 +25,7 @@ pytestmark = [pytest.mark.long, pytest.mark.skipif(BROWSER is None, reason="no c
 
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the report of a track with everything in it: a reference, a lost frame, an angle that no image shows."""
+    """Return the report of a track with everything in it: a reference, a lost frame, an angle that the priors hold."""
     folder, scene, recording = tmp_path_factory.mktemp("report"), demo_scene(), open_recording(DEMO, stop=12)
     run_folder = RunFolder(path=folder, recipe={"versions": {"numpy": "2"}})
     track = stepping(scene.body, 12)

@@ -11,7 +11,7 @@ from mocapflow_sequence.evaluate import Evaluate
 from mocapflow_sequence.overlay import Overlay, Painter
 from mocapflow_sequence.report import Report
 from mocapflow_sequence.smooth import Smooth
-from mocapflow_sequence.stills import chosen_rows
+from mocapflow_sequence.stills import chosen_rows, stills
 from mocapflow_sequence.virtual import Virtual
 from results_scene import DEMO, demo_scene, stepping
 
@@ -122,7 +122,7 @@ def test_report_holds_everything(scene: Scene, track: Track, recording: Recordin
     page = (tmp_path / layout.REPORT).read_text()
     assert set(files.paths) == {tmp_path / part for part in (layout.REPORT, layout.PLOT, layout.OVERLAP)}
     said = ("knee flexion, left", "frame 2: cam02 black", "&lt;skirt&gt;", "numpy 2", "best: frame", "worst: frame")
-    for text in (*said, "segment", "hip flexion, right: no image shows it in 1 frames"):
+    for text in (*said, "segment", "hip flexion, right: held by the priors in 1 frames"):
         assert text in page
     assert page.count("data:image/jpeg;base64") == 3
     assert page.count("data:image/png;base64") == 3  # angles, overlap, agreement
@@ -170,6 +170,13 @@ def test_shown_frames_are_best_median_and_worst(track: Track) -> None:
     }
     unknown = replace(track, overlap=np.full((4, 4), np.nan))
     assert chosen_rows(unknown) == {"first": 0, "middle": 2, "last": 3}
+
+
+def test_progress_ends_with_the_last_frame_shown(scene: Scene, track: Track, recording: Recording) -> None:
+    told: list[tuple[int, int]] = []
+    overlap = np.array([[0.7], [0.9], [0.8], [np.nan]]) * np.ones((1, 4))
+    stills(replace(track, overlap=overlap), scene, replace(recording, watch=lambda *count: told.append(count)))
+    assert told == [(1, 3), (2, 3), (3, 3)]
 
 
 def test_unwritable_video_is_an_error_for_people(tmp_path: Path) -> None:
