@@ -55,7 +55,7 @@ class Report(Stage):
             ("Deviation from the reference", _deviations(evaluation)),
             ("Overlay", "\n".join(page.picture(jpeg, "jpeg", said) for said, jpeg in stills(track, scene, recording))),
             ("Overlap of model and image", _shown(pictures[1:2])),
-            ("What happened", page.listing([*summary["warnings"], *mishaps, *summary["notes"]])),
+            ("What happened", page.listing([*summary["warnings"], *mishaps, *report_rows.notes(track)])),
             ("CPU time", page.table(report_rows.times(track))),
             ("Versions", page.listing([f"{name} {version}" for name, version in recipe.get("versions", {}).items()])),
             ("Settings and recipe", page.code(json.dumps(recipe, indent=1, ensure_ascii=False))),

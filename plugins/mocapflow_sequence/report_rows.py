@@ -10,7 +10,7 @@ import numpy as np
 
 from mocapflow.records import F64, Bool
 from mocapflow.results import Evaluation, Track
-from mocapflow_sequence import plots, tables
+from mocapflow_sequence import plots, runjson, tables
 from mocapflow_sequence.compare import NINETY
 from mocapflow_sequence.lost import lost_rows, unseen
 from mocapflow_sequence.panels import title
@@ -73,6 +73,16 @@ def mishaps(track: Track, held: Mapping[str, int]) -> list[str]:
     if restless.any():
         said.append(f"{restless.sum()} of {len(restless)} frames did not come to rest: {_spans(track, restless)}")
     return said + [f"{title(name)}: held by the priors in {n} frames" for name, n in held.items()]
+
+
+def notes(track: Track) -> list[str]:
+    """Return the notes of a track, each once, with the frames that it is of."""
+    said: dict[str, list[int]] = {}
+    for frame, lines in runjson.by_frame(track.notes).items():
+        for line in lines:
+            said.setdefault(line, []).append(frame)
+    spans = {line: _spans(track, np.isin(track.frame, frames)) for line, frames in said.items()}
+    return [f"{'frame' if where.isdecimal() else 'frames'} {where}: {line}" for line, where in spans.items()]
 
 
 def times(track: Track) -> list[dict[str, Any]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ FRAME = re.compile(r"^frame (\d+): ?(.*)$")
 def summary(track: Track, series: AngleSeries, run_folder: RunFolder, warnings: tuple[str, ...] = ()) -> dict[str, Any]:
     """Return what run.json says: recipe, seconds per step, and per frame iterations, rest, overlap and mishaps."""
     seconds = track.seconds
-    lost = lost_rows(track)
+    lost, said = lost_rows(track), by_frame(track.notes)
     return {
         "recipe": run_folder.recipe,
         "warnings": list(warnings),
@@ -41,8 +41,16 @@ def summary(track: Track, series: AngleSeries, run_folder: RunFolder, warnings: 
         },
         "overlap_median": _medians(track),
         "notes": list(track.notes),
-        "per_frame": [_frame(track, row, bool(lost[row])) for row in range(len(track.frame))],
+        "per_frame": [_frame(track, row, bool(lost[row]), said) for row in range(len(track.frame))],
     }
+
+
+def by_frame(notes: Sequence[str]) -> Mapping[int, list[str]]:
+    """Return what the notes of a track say of each frame."""
+    said: dict[int, list[str]] = {}
+    for found in filter(None, map(FRAME.match, notes)):
+        said.setdefault(int(found[1]), []).append(found[2])
+    return said
 
 
 def held_by_priors(series: AngleSeries) -> dict[str, int]:
@@ -57,9 +65,8 @@ def write(path: Path, content: Mapping[str, Any]) -> Path:
     return path
 
 
-def _frame(track: Track, row: int, lost: bool) -> dict[str, Any]:
+def _frame(track: Track, row: int, lost: bool, said: Mapping[int, list[str]]) -> dict[str, Any]:
     index = int(track.frame[row])
-    said = [m[2] for note in track.notes if (m := FRAME.match(note)) and int(m[1]) == index]
     return {
         "frame": index,
         "time": round(float(track.time[row]), 6),
@@ -69,7 +76,7 @@ def _frame(track: Track, row: int, lost: bool) -> dict[str, Any]:
         "cpu_seconds": round(float(np.nansum(track.seconds[row])), 4),
         **({"lost": True} if lost else {}),
         **({"unusable_views": np.flatnonzero(~track.usable[row])} if not track.usable[row].all() else {}),
-        **({"notes": said} if said else {}),
+        **({"notes": said[index]} if index in said else {}),
     }
 
 

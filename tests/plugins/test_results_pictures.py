@@ -116,12 +116,24 @@ def test_report_holds_everything(scene: Scene, track: Track, recording: Recordin
     run_folder = RunFolder(path=tmp_path, recipe={"pipeline": "<skirt>", "versions": {"numpy": "2"}})
     observed = track.observed.copy()
     observed[2, scene.body.screw_joint == scene.body.joint("hip_r")] = 0.1
-    noted = Smooth().run(track=replace(track, notes=("frame 2: cam02 black",), observed=observed))
+    noted = Smooth().run(
+        track=replace(
+            track, notes=("frame 1: cam02 black", "frame 2: cam02 black", "frame 2: fit doubted"), observed=observed
+        )
+    )
     evaluation = Evaluate().run(track=noted, scene=scene, recording=recording, run_folder=run_folder)
     files = Report().run(track=noted, scene=scene, recording=recording, run_folder=run_folder, evaluation=evaluation)
     page = (tmp_path / layout.REPORT).read_text()
     assert set(files.paths) == {tmp_path / part for part in (layout.REPORT, layout.PLOT, layout.OVERLAP)}
-    said = ("knee flexion, left", "frame 2: cam02 black", "&lt;skirt&gt;", "numpy 2", "best: frame", "worst: frame")
+    said = (
+        "knee flexion, left",
+        "frames 1–2: cam02 black",
+        "frame 2: fit doubted",
+        "&lt;skirt&gt;",
+        "numpy 2",
+        "best: frame",
+        "worst: frame",
+    )
     for text in (*said, "segment", "hip flexion, right: held by the priors in 1 frames"):
         assert text in page
     assert page.count("data:image/jpeg;base64") == 3
