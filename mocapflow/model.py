@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from weakref import ref
+
 import numpy as np
 
 from mocapflow.components import Draper
 from mocapflow.data import NO_CLOTH, Cloth, Past, Pose, PoseBatch, Surface
 from mocapflow.geometry import twists
+from mocapflow.geometry.once import once
 from mocapflow.records import F64, I32, record
 from mocapflow.scene import Scene
 
@@ -27,7 +30,7 @@ class ClothedModel:
         """Return the garment laid on one pose."""
         if not self.clothed:
             return NO_CLOTH
-        return Cloth(vertices=self.drapes(pose, parameters[None], past)[0], parameters=parameters)
+        return _laid(pose, tuple(parameters.tolist()), ref(past), self)
 
     def drapes(self, pose: Pose, parameters: F64, past: Past) -> F64:
         """Return the garment's vertices (B, W, 3) laid on one pose with parameters (B, Q)."""
@@ -48,6 +51,14 @@ class ClothedModel:
         if self.draper is None:
             return np.zeros((len(vertices), 3, 6 + len(pose.angles)))
         return self.draper.velocity(pose, cloth.parameters, vertices, past, self.scene)
+
+
+@once
+def _laid(pose: Pose, parameters: tuple[float, ...], past: ref[Past], model: ClothedModel) -> Cloth:
+    """Return the garment laid on a pose; the past holds earlier poses, which are to be forgotten, so it is weak."""
+    values, known = np.array(parameters, float), past()
+    assert known is not None
+    return Cloth(vertices=model.drapes(pose, values[None], known)[0], parameters=values)
 
 
 def moved(pose: Pose, increment: F64) -> Pose:

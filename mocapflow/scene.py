@@ -10,6 +10,7 @@ import numpy as np
 from mocapflow.assets import Background, Body, Camera, GarmentMesh
 from mocapflow.data import BODY, CLOTH, Cloth, Pose, Surface
 from mocapflow.geometry import kinematics, meshes
+from mocapflow.geometry.once import once
 from mocapflow.records import F64, I32, U8, Bool, record
 
 HEM_REACH = 0.15  # m from the garment, at rest: skin that its edge can come to cover or lay bare
@@ -87,10 +88,15 @@ class Scene:
 
     def surface(self, pose: Pose, cloth: Cloth) -> Surface:
         """Return body and garment posed in the world."""
-        joints, screws = kinematics.chain(self.body, pose)
-        vertices = kinematics.skin(self.body, joints, pose.angles)
-        if len(cloth.vertices):
-            vertices = np.concatenate([vertices, cloth.vertices])
-        return Surface(
-            vertices=vertices, faces=self.faces, edges=self.edges, layer=self.layer, joints=joints, screws=screws
-        )
+        return _posed(pose, cloth, self)
+
+
+@once
+def _posed(pose: Pose, cloth: Cloth, scene: Scene) -> Surface:
+    joints, screws = kinematics.chain(scene.body, pose)
+    vertices = kinematics.skin(scene.body, joints, pose.angles)
+    if len(cloth.vertices):
+        vertices = np.concatenate([vertices, cloth.vertices])
+    return Surface(
+        vertices=vertices, faces=scene.faces, edges=scene.edges, layer=scene.layer, joints=joints, screws=screws
+    )

@@ -9,13 +9,14 @@ import numpy as np
 
 
 @numba.njit(cache=True)
-def sample(ends, vertices, images, points, normals, cloth, matrix, size, spacing):  # type: ignore[no-untyped-def]
+def sample(ends, edges, vertices, images, points, normals, cloth, matrix, size, spacing):  # type: ignore[no-untyped-def]
     """Return points every `spacing` px of the total length of segments, where they lie in the image.
 
     Args:
         ends: (B, 2, 2) px, directed segments, the covered side on the same hand as in `occluding_edges`.
-        vertices: (B, 2) vertex index of the ends of the edges they are pieces of.
-        images: (B, 2, 2) px, where these project.
+        edges: (B,) which edges they are pieces of.
+        vertices: (E, 2) vertex index of the ends of the edges.
+        images: (E, 2, 2) px, where these project.
         points: (N, 3) m, the vertices.
         normals: (N, 3), theirs.
         cloth: (N,) bool.
@@ -26,31 +27,32 @@ def sample(ends, vertices, images, points, normals, cloth, matrix, size, spacing
     Returns:
         nearer vertex (K,), its image (K, 2) px, the point (K, 2) px and its unit normal outward (K, 2).
     """
-    total = 0.0
+    lengths = np.empty(len(ends))
     for s in range(len(ends)):
-        total += math.hypot(ends[s, 1, 0] - ends[s, 0, 0], ends[s, 1, 1] - ends[s, 0, 1])
+        dx, dy = ends[s, 1, 0] - ends[s, 0, 0], ends[s, 1, 1] - ends[s, 0, 1]
+        lengths[s] = math.sqrt(dx * dx + dy * dy)
+    total = lengths.sum()
     most = int(total / spacing) + 1
     vertex, anchor = np.empty(most, np.int32), np.empty((most, 2))
     pixel, normal = np.empty((most, 2)), np.empty((most, 2))
     count, passed, total = 0, 0, 0.0
     for s in range(len(ends)):
-        dx, dy = ends[s, 1, 0] - ends[s, 0, 0], ends[s, 1, 1] - ends[s, 0, 1]
-        length = math.hypot(dx, dy)
+        dx, dy, length, e = ends[s, 1, 0] - ends[s, 0, 0], ends[s, 1, 1] - ends[s, 0, 1], lengths[s], edges[s]
         while (passed + 0.5) * spacing < total + length:
             share = ((passed + 0.5) * spacing - total) / length
             passed += 1
             x, y = ends[s, 0, 0] + share * dx, ends[s, 0, 1] + share * dy
             if not (0 <= x <= size[0] - 1 and 0 <= y <= size[1] - 1):
                 continue
-            first = math.hypot(images[s, 0, 0] - x, images[s, 0, 1] - y)
-            near = 1 if math.hypot(images[s, 1, 0] - x, images[s, 1, 1] - y) < first else 0
-            v = vertices[s, near]
+            first = (images[e, 0, 0] - x) ** 2 + (images[e, 0, 1] - y) ** 2
+            near = 1 if (images[e, 1, 0] - x) ** 2 + (images[e, 1, 1] - y) ** 2 < first else 0
+            v = vertices[e, near]
             nx, ny = image_normal(points[v], normals[v], matrix)
             if cloth[v] or ny * dx - nx * dy <= 0:  # a rim has no such normal; nor has a vertex that is turned away
                 nx, ny = -dy, dx
-            norm = math.hypot(nx, ny)
+            norm = math.sqrt(nx * nx + ny * ny)
             vertex[count] = v
-            anchor[count, 0], anchor[count, 1] = images[s, near, 0], images[s, near, 1]
+            anchor[count, 0], anchor[count, 1] = images[e, near, 0], images[e, near, 1]
             pixel[count, 0], pixel[count, 1] = x, y
             normal[count, 0], normal[count, 1] = nx / norm, ny / norm
             count += 1
@@ -70,7 +72,7 @@ def image_normal(point, normal, matrix):  # type: ignore[no-untyped-def]
     return (dx - x / w * dw) / w, (dy - y / w * dw) / w
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def paint_distance(ends, corner, cover, band, distance):  # type: ignore[no-untyped-def]
     """Write the signed distance to the nearest segment into a field of -band; the inside beyond reach is +band.
 
@@ -88,12 +90,13 @@ def paint_distance(ends, corner, cover, band, distance):  # type: ignore[no-unty
     square = np.full((max(bottom - top, 0), max(right - left, 0)), band * band)
     _lower_to_segments(ends, left, top, band, square)
     for row in range(square.shape[0]):
-        for column in range(square.shape[1]):
-            y, x = row + top - corner[1], column + left - corner[0]
-            inside = 0 <= y < cover.shape[0] and 0 <= x < cover.shape[1] and cover[y, x] > 0
-            if inside or square[row, column] < band * band:
-                d = np.float32(math.sqrt(square[row, column]))
-                distance[row + top, column + left] = d if inside else -d
+        line, away = distance[top + row, left:right], square[row]
+        for k in range(line.size):
+            line[k] = -min(np.sqrt(away[k]), band)
+    for row in range(cover.shape[0]):
+        line, layers = distance[corner[1] + row, corner[0] : corner[0] + cover.shape[1]], cover[row]
+        for k in range(line.size):
+            line[k] = -line[k] if layers[k] > 0 else line[k]
 
 
 @numba.njit(cache=True, error_model="numpy")

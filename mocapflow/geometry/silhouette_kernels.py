@@ -9,6 +9,7 @@ import numpy as np
 
 REACH = 1.0  # px beyond a segment at which its outside is looked up
 MOST_PIECES = 2048  # of one edge: at 4 px, longer than the diagonal of any image
+MOST_COLUMNS = 1e6  # of an image
 NEAREST = 1e-6  # m, depth of what still counts as before the camera
 
 index = numba.uint64  # of an array: unsigned, so that nothing is checked for counting from the end; twice as fast
@@ -64,26 +65,46 @@ def occluding_edges(edges, facing, cloth):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def wind(ends, times, corner, cover):  # type: ignore[no-untyped-def]
-    """Add up directed segments to the number of layers over each pixel of the crop."""
-    height, width = cover.shape
+def crossings(ends, times, height):  # type: ignore[no-untyped-def]
+    """Return where directed segments cross the rows of an image: the first column behind, and how many layers begin.
+
+    Those of a row are the elements first[row] to first[row + 1], in no order.
+    """
+    first = np.zeros(height + 2, np.int64)
     for s in range(len(ends)):
-        x0, y0 = ends[s, 0, 0] - corner[0], ends[s, 0, 1] - corner[1]
-        x1, y1 = ends[s, 1, 0] - corner[0], ends[s, 1, 1] - corner[1]
-        sign = times[s]
-        if y0 > y1:
-            x0, y0, x1, y1, sign = x1, y1, x0, y0, -sign
-        first, last = max(math.ceil(y0), 0), min(math.ceil(y1), height)
-        slope = (x1 - x0) / (y1 - y0) if y1 > y0 else 0.0
-        for row in range(first, last):
-            column = max(math.ceil(x0 + slope * (row - y0)), 0)
-            if column < width:
-                cover[row, column] += sign
-    for row in range(height):
-        layers = 0
-        for column in range(width):
-            layers += cover[row, column]
-            cover[row, column] = layers
+        for row in range(*_rows(ends[s, 0, 1], ends[s, 1, 1], height)):
+            first[row + 2] += 1
+    first = np.cumsum(first)
+    column, layers = np.empty(first[-1], np.int32), np.empty(first[-1], np.int32)
+    for s in range(len(ends)):
+        x0, y0, x1, y1 = ends[s, 0, 0], ends[s, 0, 1], ends[s, 1, 0], ends[s, 1, 1]
+        slope = (x1 - x0) / (y1 - y0) if y1 != y0 else 0.0
+        for row in range(*_rows(y0, y1, height)):
+            c = first[row + 1]
+            first[row + 1] += 1
+            column[c] = math.ceil(min(max(x0 + slope * (row - y0), 0.0), MOST_COLUMNS))
+            layers[c] = times[s] if y1 > y0 else -times[s]
+    return first[:-1], column, layers
+
+
+@numba.njit(cache=True)
+def _rows(one, other, height):  # type: ignore[no-untyped-def]
+    """Return the first and last-but-one row of an image between two heights."""
+    return max(math.ceil(min(one, other)), 0), min(math.ceil(max(one, other)), height)
+
+
+@numba.njit(cache=True)
+def wind(first, column, layers, corner, cover):  # type: ignore[no-untyped-def]
+    """Write the number of layers over each pixel of a crop, all zero before."""
+    for row in range(cover.shape[0]):
+        for c in range(first[corner[1] + row], first[corner[1] + row + 1]):
+            at = max(column[c] - corner[0], 0)
+            if at < cover.shape[1]:
+                cover[row, at] += layers[c]
+        over = 0
+        for at in range(cover.shape[1]):
+            over += cover[row, at]
+            cover[row, at] = over
 
 
 @numba.njit(cache=True)
@@ -98,41 +119,37 @@ def bounds(ends):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def split(ends, longest):  # type: ignore[no-untyped-def]
-    """Return segments cut into equal pieces no longer than `longest` px: their segment (P,) and ends (P, 2, 2).
+def boundary(ends, times, size, longest):  # type: ignore[no-untyped-def]
+    """Return the pieces of directed segments with nothing beyond them: their segment (B,) and their ends (B, 2, 2).
 
-    An edge that all but touches the plane of a camera is cut into no more than MOST_PIECES.
+    Segments are judged in equal pieces no longer than `longest` px; one that all but touches the plane of a camera
+    is cut into no more than MOST_PIECES. Nothing is drawn: layers are counted where they are asked for.
     """
     counts = np.empty(len(ends), np.int64)
     for s in range(len(ends)):
-        length = math.hypot(ends[s, 1, 0] - ends[s, 0, 0], ends[s, 1, 1] - ends[s, 0, 1])
-        counts[s] = max(math.ceil(min(length / longest, MOST_PIECES)), 1)
-    total = counts.sum()
-    whole, pieces = np.empty(total, np.int64), np.empty((total, 2, 2))
-    piece = 0
-    for s in range(len(ends)):
-        for k in range(counts[s]):
-            whole[piece] = s
-            for axis in range(2):
-                reach = ends[s, 1, axis] - ends[s, 0, axis]
-                pieces[piece, 0, axis] = ends[s, 0, axis] + reach * k / counts[s]
-                pieces[piece, 1, axis] = ends[s, 0, axis] + reach * (k + 1) / counts[s]
-            piece += 1
-    return whole, pieces
-
-
-@numba.njit(cache=True)
-def on_boundary(ends, corner, cover):  # type: ignore[no-untyped-def]
-    """Return which segments have nothing beyond them: the boundary of the covered region."""
-    height, width = cover.shape
-    outer = np.zeros(len(ends), np.bool_)
-    for s in range(len(ends)):
         dx, dy = ends[s, 1, 0] - ends[s, 0, 0], ends[s, 1, 1] - ends[s, 0, 1]
+        counts[s] = max(math.ceil(min(math.sqrt(dx * dx + dy * dy) / longest, MOST_PIECES)), 1)
+    whole, pieces = np.empty(counts.sum(), np.int32), np.empty((counts.sum(), 2, 2))
+    first, column, layers = crossings(ends, times, size[1])
+    count = 0
+    for s in range(len(ends)):
+        x, y = ends[s, 0, 0], ends[s, 0, 1]
+        dx, dy = (ends[s, 1, 0] - x) / counts[s], (ends[s, 1, 1] - y) / counts[s]
         length = math.sqrt(dx * dx + dy * dy)
         if length == 0.0:
             continue
-        x = 0.5 * (ends[s, 0, 0] + ends[s, 1, 0]) - REACH * dy / length - corner[0]
-        y = 0.5 * (ends[s, 0, 1] + ends[s, 1, 1]) + REACH * dx / length - corner[1]
-        column, row = int(round(x)), int(round(y))
-        outer[s] = not (0 <= column < width and 0 <= row < height) or cover[row, column] == 0
-    return outer
+        for k in range(counts[s]):
+            beyond_x, beyond_y = x + (k + 0.5) * dx - REACH * dy / length, y + (k + 0.5) * dy + REACH * dx / length
+            at, row = math.floor(beyond_x + 0.5), math.floor(beyond_y + 0.5)
+            covered = np.int32(0)
+            if 0 <= at < size[0] and 0 <= row < size[1]:
+                begin, end = first[row], first[row + 1]
+                places, ending = column[begin:end], layers[begin:end]
+                for c in range(places.size):
+                    covered += ending[c] if places[c] <= np.int32(at) else np.int32(0)
+            if covered == 0:
+                whole[count] = s
+                pieces[count, 0, 0], pieces[count, 0, 1] = x + k * dx, y + k * dy
+                pieces[count, 1, 0], pieces[count, 1, 1] = x + (k + 1) * dx, y + (k + 1) * dy
+                count += 1
+    return whole[:count], pieces[:count]

@@ -8,6 +8,9 @@ triangles. Cloth is two-sided: both its sides cover.
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import NamedTuple
+
 import numpy as np
 
 from mocapflow.assets import Camera
@@ -15,6 +18,7 @@ from mocapflow.data import CLOTH, Contour, Surface
 from mocapflow.geometry import boundary_kernels
 from mocapflow.geometry import silhouette_kernels as kernels
 from mocapflow.geometry.cameras import projection
+from mocapflow.geometry.once import once
 from mocapflow.records import F32, F64, I32, Bool, array, record
 
 PIECE = 4.0  # px; longer edges are judged piece by piece, for a part of one may be hidden
@@ -23,15 +27,27 @@ MARGIN = 2  # px around the silhouette, so that the outside of its boundary is s
 
 @record
 class Outline:
-    """The boundary of a silhouette in one view, as directed segments, and how often each pixel is covered."""
+    """The occluding edges of a surface in one view, directed, and the pieces of them that bound its silhouette."""
 
-    vertex: I32 = array("B", 2, unit="surface vertex index of the two ends of the edge that a segment is a piece of")
-    image: F64 = array("B", 2, 2, unit="px, where these project")
-    pixel: F64 = array("B", 2, 2, unit="px, the two ends of the segment")
-    corner: I32 = array(2, unit="px, column and row of cover[0, 0]")
-    cover: I32 = array("H", "W", unit="number of surface layers over each pixel, within the crop")
+    vertex: I32 = array("E", 2, unit="surface vertex index of the two ends of an edge")
+    image: F64 = array("E", 2, 2, unit="px, where these project")
+    layers: I32 = array("E", unit="how many layers of the surface end there")
+    edge: I32 = array("B", unit="index of the edge that a piece belongs to")
+    pixel: F64 = array("B", 2, 2, unit="px, the two ends of the piece")
+
+    def whole(self, edges: I32) -> Outline:
+        """Return the same edges, with some of them, whole, for the pieces."""
+        return replace(self, edge=edges, pixel=self.image.take(edges, axis=0))
 
 
+class Cover(NamedTuple):
+    """How many layers of a surface lie over each pixel, within a crop."""
+
+    corner: I32  # (2,) px, column and row of layers[0, 0]
+    layers: I32  # (h, w)
+
+
+@once
 def outline(surface: Surface, camera: Camera) -> Outline:
     """Return the boundary of the silhouette of a surface, parts outside the image included.
 
@@ -41,21 +57,19 @@ def outline(surface: Surface, camera: Camera) -> Outline:
     kernels.project(surface.vertices, projection(camera), pixels, depth)
     facing = np.empty(len(surface.faces), np.int8)
     kernels.face_directions(pixels, surface.faces, facing)
-    segments, times = kernels.occluding_edges(surface.edges, facing, surface.layer == CLOTH)
-    ends = pixels.take(segments, axis=0)  # several times faster than pixels[segments]
-    low, high = _crop(ends, camera)
-    cover = np.zeros((high[1] - low[1], high[0] - low[0]), np.int32)
-    kernels.wind(ends, times, low, cover)
-    whole, pieces = kernels.split(ends, PIECE)
-    outer = np.flatnonzero(kernels.on_boundary(pieces, low, cover))
-    whole = whole.take(outer)
-    return Outline(
-        vertex=segments.take(whole, axis=0),
-        image=ends.take(whole, axis=0),
-        pixel=pieces.take(outer, axis=0),
-        corner=low,
-        cover=cover,
-    )
+    vertex, layers = kernels.occluding_edges(surface.edges, facing, surface.layer == CLOTH)
+    image = pixels.take(vertex, axis=0)  # several times faster than pixels[vertex]
+    edge, pieces = kernels.boundary(image, layers, camera.size, PIECE)
+    return Outline(vertex=vertex, image=image, layers=layers, edge=edge, pixel=pieces)
+
+
+def cover(boundary: Outline, camera: Camera) -> Cover:
+    """Return how many layers of a surface lie over each pixel around its silhouette."""
+    low, high = _crop(boundary.image, camera)
+    layers = np.zeros((high[1] - low[1], high[0] - low[0]), np.int32)
+    first, column, begun = kernels.crossings(boundary.image, boundary.layers, camera.size[1])
+    kernels.wind(first, column, begun, low, layers)
+    return Cover(low, layers)
 
 
 def _crop(ends: F64, camera: Camera) -> tuple[I32, I32]:
@@ -71,8 +85,8 @@ def _crop(ends: F64, camera: Camera) -> tuple[I32, I32]:
 def mask(boundary: Outline, camera: Camera) -> Bool:
     """Return the silhouette as a mask (H, W)."""
     full = np.zeros((camera.size[1], camera.size[0]), bool)
-    (x, y), (h, w) = boundary.corner, boundary.cover.shape
-    full[y : y + h, x : x + w] = boundary.cover > 0
+    (x, y), layers = cover(boundary, camera)
+    full[y : y + layers.shape[0], x : x + layers.shape[1]] = layers > 0
     return full
 
 
@@ -85,10 +99,12 @@ def intersection_over_union(one: Bool, other: Bool) -> float:
 def signed_distance(boundary: Outline, camera: Camera, band_px: float) -> F32:
     """Return the distance (H, W) to the boundary in px, exact to the segment, positive inside, clipped to the band."""
     distance = np.full((camera.size[1], camera.size[0]), -band_px, np.float32)
-    boundary_kernels.paint_distance(boundary.pixel, boundary.corner, boundary.cover, np.float32(band_px), distance)
+    boundary_kernels.paint_distance(boundary.pixel, *cover(boundary, camera), np.float32(band_px), distance)
+    distance.flags.writeable = False
     return distance
 
 
+@once
 def model_distance(surface: Surface, camera: Camera, band_px: float) -> F32:
     """Return the signed distance (H, W) px to the silhouette of a surface, positive inside, clipped to the band."""
     return signed_distance(outline(surface, camera), camera, band_px)
@@ -108,6 +124,7 @@ def samples(boundary: Outline, surface: Surface, camera: Camera, spacing_px: flo
     matrix, cloth = projection(camera), surface.layer == CLOTH
     vertex, anchor, pixel, normal = boundary_kernels.sample(
         boundary.pixel,
+        boundary.edge,
         boundary.vertex,
         boundary.image,
         surface.vertices,

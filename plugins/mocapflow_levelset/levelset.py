@@ -40,7 +40,7 @@ class LevelSet(Segmenter):
     of an empty scene takes it for the person.
 
     The chapter's own settings: `use_background: false`, `coarse_steps: 0`, `half_steps: 0`, `cell_px: 1`,
-    `stride_px: 1`, `steps: 50`, `statistics_every: 1`; `shape_weight: 0` uncouples it from the model.
+    `stride_px: 1`, `steps: 50`, `statistics_every: 1`, `keep_mm: 0`; `shape_weight: 0` uncouples it from the model.
     """
 
     name: ClassVar[str] = "levelset"
@@ -61,6 +61,7 @@ class LevelSet(Segmenter):
     half_steps: NonNegativeCount = 4  # at half the size
     steps: Count = 3  # at full size
     later_steps: Count = 3  # at full size on later turns, which start from the last turn's contour
+    keep_mm: NonNegative = 10.0  # change of the body in a turn below which the silhouettes stay; 0: always found anew
     statistics_every: Count = 4  # steps between estimates of the colours
     redistance_every: Count = 4  # steps between repairs of the distance function
     band_px: Annotated[float, Field(ge=8)] = 12.0  # half width of the band in which the distance is computed
@@ -81,8 +82,11 @@ class LevelSet(Segmenter):
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
         """Return the person's silhouette in each usable view.
 
-        The first turn starts from the projected model, later turns from the last turn's silhouettes.
+        The first turn starts from the projected model, later turns from the last turn's silhouettes. A model that
+        hardly moves would leave them as they are: then they stay.
         """
+        if turn.change is not None and turn.change.body < self.keep_mm / 1000:
+            return state.segmentation
         surface = scene.surface(state.estimate.pose, state.cloth)
         last = {s.camera: s.distance for s in state.segmentation.of(PERSON)}
         silhouettes: list[Silhouette] = []

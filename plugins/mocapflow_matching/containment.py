@@ -9,9 +9,9 @@ from pydantic import Field
 
 from mocapflow.assets import Camera
 from mocapflow.components import Matcher, pool
-from mocapflow.data import Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn, empty_matches
+from mocapflow.data import BODY, Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn, empty_matches
+from mocapflow.geometry import silhouettes
 from mocapflow.geometry.contours import nearest_compatible
-from mocapflow.geometry.silhouettes import occluding_contour
 from mocapflow.records import F64
 from mocapflow.scene import Scene
 from mocapflow_matching.robust import robust_weights
@@ -21,10 +21,11 @@ Positive = Annotated[float, Field(gt=0)]
 
 
 class Containment(Matcher):
-    """Pairs points of the bare body's contour that stick out of the image silhouette with the image contour.
+    """Pairs points of the body's occluding edges that stick out of the image silhouette with the image contour.
 
-    One-sided: a limb inside the silhouette is left alone, so nothing pulls it to the cloth. It reaches further than
-    nearest contours may: an arm that has strayed is brought back although no contour looks like it.
+    Edges count that cloth or the body itself hides, too. One-sided: a limb inside the silhouette is left alone, so
+    nothing pulls it to the cloth. It reaches further than nearest contours may: an arm that has strayed is brought back
+    although no contour looks like it.
     """
 
     name: ClassVar[str] = "containment"
@@ -38,27 +39,28 @@ class Containment(Matcher):
         self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn
     ) -> Matches:
         """Return the pairs of every view; see the class."""
-        bare = scene.bare(surface)
-        parts = [(1.0, self.match_view(scene.cameras[s.camera], s, bare)) for s in segmentation.of("person")]
+        parts = [(1.0, self.match_view(scene.cameras[s.camera], s, surface)) for s in segmentation.of("person")]
         return pool(parts) if parts else empty_matches()
 
-    def match_view(self, camera: Camera, silhouette: Silhouette, bare: Surface) -> Matches:
+    def match_view(self, camera: Camera, silhouette: Silhouette, surface: Surface) -> Matches:
         """Return the pairs of one view."""
-        model = occluding_contour(bare, camera, self.spacing_px)
-        outside = inside_px(silhouette, model.pixel) < self.margin_px
+        outline = silhouettes.outline(surface, camera)
+        skin = np.flatnonzero(surface.layer[outline.vertex[:, 0]] == BODY).astype(np.int32)
+        model = silhouettes.samples(outline.whole(skin), surface, camera, self.spacing_px)
+        outside = np.flatnonzero(inside_px(silhouette, model.pixel) < self.margin_px)
+        place, facing = model.pixel.take(outside, axis=0), model.normal.take(outside, axis=0)
         pixel, normal = silhouette.zero_level
-        found = nearest_compatible(
-            model.pixel[outside], model.normal[outside], pixel, normal, self.reach_px, ANY_DIRECTION
-        )
-        out, target = np.flatnonzero(outside)[found >= 0], found[found >= 0]
-        direction = normal[target]
-        goal = pixel[target] - self.margin_px * direction
-        distance = np.abs(np.sum((model.pixel[out] - goal) * direction, axis=1))
+        found = nearest_compatible(place, facing, pixel, normal, self.reach_px, ANY_DIRECTION)
+        paired = np.flatnonzero(found >= 0)
+        direction = normal.take(found[paired], axis=0)
+        goal = pixel.take(found[paired], axis=0) - self.margin_px * direction
+        off, stray = place.take(paired, axis=0) - goal, outside[paired]
+        distance = np.abs(np.einsum("ma,ma->m", off, direction))
         return Matches(
-            camera=np.full(len(out), silhouette.camera, np.int16),
-            pixel=goal - (model.pixel - model.anchor)[out],
+            camera=np.full(len(stray), silhouette.camera, np.int16),
+            pixel=model.anchor.take(stray, axis=0) - off,
             direction=direction,
-            vertex=model.vertex[out],
+            vertex=model.vertex.take(stray),
             weight=robust_weights(distance / self.sigma_px, "huber", self.scale) / self.sigma_px**2,
         )
 
@@ -66,7 +68,6 @@ class Containment(Matcher):
 def inside_px(silhouette: Silhouette, pixels: F64) -> F64:
     """Return the signed distance (K,) px at the pixels nearest to (K, 2), a smooth field."""
     height, width = silhouette.distance.shape
-    column = np.clip(np.round(pixels[:, 0]).astype(int), 0, width - 1)
-    row = np.clip(np.round(pixels[:, 1]).astype(int), 0, height - 1)
-    inside: F64 = silhouette.distance[row, column].astype(np.float64)
-    return inside
+    column, row = np.rint(pixels).astype(np.intp).T
+    inside = silhouette.distance[np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)]
+    return inside.astype(np.float64)

@@ -107,7 +107,7 @@ class ContourIcp(Matcher):
         self, silhouette: Silhouette, surface: Surface, scene: Scene, turn: Turn
     ) -> tuple[ImageContour, ModelContour]:
         """Return the contours of one view that are to be paired."""
-        pixel, normal = (rows[:: self.stride] for rows in silhouette.zero_level)
+        pixel, normal = (np.ascontiguousarray(rows[:: self.stride]) for rows in silhouette.zero_level)
         model = occluding_contour(surface, scene.cameras[silhouette.camera], self.spacing_px)
         return ImageContour(pixel, normal, np.zeros(len(pixel))), sorted_by_row(model, np.zeros(len(model.pixel)))
 
@@ -119,10 +119,11 @@ class ContourIcp(Matcher):
         self, index: int, image: ImageContour, model: Contour, seen: I32, shown: I32, sigma: F64, turn: Turn
     ) -> Matches:
         """Return pairs of image points `seen` (M,) and model points `shown` (M,), of error `sigma` (M,) px."""
-        offset = model.pixel[shown] - image.pixel[seen]
+        pixel, drawn = image.pixel.take(seen, axis=0), model.pixel.take(shown, axis=0)
+        offset = drawn - pixel
         if self.residual == "normal":
-            direction = image.normal[seen]
-            distance = np.abs(np.sum(offset * direction, axis=1))
+            direction = image.normal.take(seen, axis=0)
+            distance = np.abs(np.einsum("ma,ma->m", offset, direction))
         else:
             direction = np.zeros_like(offset)
             distance = np.linalg.norm(offset, axis=1)
@@ -130,9 +131,9 @@ class ContourIcp(Matcher):
         return Matches(
             camera=np.full(len(seen), index, np.int16),
             # a model point lies between vertices: moving the target by as much makes the vertex stand for it
-            pixel=image.pixel[seen] - (model.pixel - model.anchor)[shown],
+            pixel=pixel - drawn + model.anchor.take(shown, axis=0),
             direction=direction,
-            vertex=model.vertex[shown],
+            vertex=model.vertex.take(shown),
             weight=robust_weights(distance / sigma, loss, self.scale) / sigma**2,
         )
 
@@ -141,9 +142,9 @@ def sorted_by_row(contour: Contour, curvature: F64) -> ModelContour:
     """Return the points of a model's contour in the order of their rows."""
     order = np.argsort(contour.pixel[:, 1], kind="stable")
     ordered = Contour(
-        vertex=contour.vertex[order],
-        anchor=contour.anchor[order],
-        pixel=contour.pixel[order],
-        normal=contour.normal[order],
+        vertex=contour.vertex.take(order),
+        anchor=contour.anchor.take(order, axis=0),
+        pixel=contour.pixel.take(order, axis=0),
+        normal=contour.normal.take(order, axis=0),
     )
-    return ModelContour(ordered, curvature[order])
+    return ModelContour(ordered, curvature.take(order))

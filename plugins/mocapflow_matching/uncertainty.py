@@ -26,9 +26,7 @@ def contour_sigma(
     skin = np.flatnonzero(surface.layer[model.vertex] == BODY)
     skin = skin[scene.near_garment[model.vertex[skin]]]
     if len(cloth) and len(skin) and hem_guard_px:
-        beside = nearest_compatible(
-            *(model.pixel[skin], model.normal[skin], model.pixel[cloth], model.normal[cloth]),
-            *(hem_guard_px, ANY_DIRECTION),
-        )
+        one, other = ((model.pixel.take(k, axis=0), model.normal.take(k, axis=0)) for k in (skin, cloth))
+        beside = nearest_compatible(*one, *other, hem_guard_px, ANY_DIRECTION)
         sigma[skin[beside >= 0]] = sigma[cloth[beside[beside >= 0]]]
     return sigma

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,8 @@ from scipy.spatial import KDTree
 
 from mocapflow.errors import PipelineError
 from mocapflow.records import F64, array, record
-
-TURN = 2 * np.pi
+from mocapflow_priors import density_kernels
+from mocapflow_priors.density_kernels import TURN
 
 
 @record
@@ -27,6 +28,11 @@ class Density:
         """Return the largest value that log p could have: all poses at one place."""
         return float(-0.5 * self.poses.shape[1] * np.log(TURN * self.bandwidth**2))
 
+    @cached_property
+    def columns(self) -> F64:
+        """The poses angle by angle: (K, N), for compiled code."""
+        return np.ascontiguousarray(self.poses.T)
+
     def of(self, names: Sequence[str]) -> Density:
         """Return the density of some of the angles, whatever the others are."""
         chosen = [self.names.index(name) for name in names]
@@ -41,11 +47,9 @@ def log_density(density: Density, angles: F64) -> tuple[float, F64]:
 
     Source: Rosenhahn 2008, section 12.5.1
     """
-    away = wrapped(density.poses - angles)
-    exponent = -0.5 * np.einsum("nk,nk->n", away, away) / density.bandwidth**2
-    weight = np.exp(exponent - exponent.max())
-    log_p = np.log(weight.mean()) + exponent.max() + density.peak
-    return float(log_p), angles + weight @ away / weight.sum()
+    mean = np.empty(len(angles))
+    log_p: float = density_kernels.log_mean(density.columns, angles, density.bandwidth, mean)
+    return log_p + density.peak, mean
 
 
 def bandwidth(poses: F64, percentile: float = 100.0) -> float:
@@ -57,11 +61,6 @@ def bandwidth(poses: F64, percentile: float = 100.0) -> float:
     """
     distance = np.asarray(KDTree(poses).query(poses, 2)[0])  # to itself and to the nearest other
     return float(np.percentile(distance[:, 1], percentile))
-
-
-def wrapped(difference: F64) -> F64:
-    """Return differences of angles in [-pi, pi)."""
-    return np.mod(difference + np.pi, TURN) - np.pi
 
 
 def write(path: Path, density: Density) -> None:

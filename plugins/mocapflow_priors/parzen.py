@@ -7,9 +7,12 @@ from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
+import numpy.typing as npt
 
+from mocapflow.assets import Body
 from mocapflow.components import Prior
 from mocapflow.data import Past, Pose, Residual
+from mocapflow.geometry.once import once
 from mocapflow.scene import Scene
 from mocapflow_priors.density import Density, log_density, read
 
@@ -30,9 +33,8 @@ class Parzen(Prior):
 
     def residual(self, pose: Pose, past: Past, scene: Scene) -> Residual:
         """Return one row for each trained angle the body has; the energy is -log p above the least it can be."""
-        names, sharpness = scene.body.screw_names, 1 / self.density.bandwidth
-        screws = np.array([k for k, name in enumerate(names) if name in self.density.names], np.intp)
-        density = self.density.of(tuple(names[k] for k in screws))
+        density, screws = _known(scene.body, self.density)
+        sharpness = 1 / density.bandwidth
         log_p, mean = log_density(density, pose.angles[screws])
         jacobian = np.zeros((len(screws), 6 + len(pose.angles)))
         jacobian[np.arange(len(screws)), 6 + screws] = sharpness
@@ -43,3 +45,10 @@ class Parzen(Prior):
     def density(self) -> Density:
         """The training poses."""
         return read(self.poses)
+
+
+@once
+def _known(body: Body, density: Density) -> tuple[Density, npt.NDArray[np.intp]]:
+    """Return the density of the angles that a body has, and their screws (K,)."""
+    screws = [k for k, name in enumerate(body.screw_names) if name in density.names]
+    return density.of([body.screw_names[k] for k in screws]), np.array(screws, np.intp)

@@ -80,7 +80,7 @@ def test_a_sphere_covers_its_disc_once() -> None:
     mask = silhouettes.mask(boundary, camera())
     expected = circle_distance() > 0
     assert (mask ^ expected).sum() < 0.002 * expected.sum()
-    assert set(np.unique(boundary.cover)) == {0, 1}
+    assert set(np.unique(silhouettes.cover(boundary, camera()).layers)) == {0, 1}
 
 
 def test_the_distance_to_the_outline_is_subpixel() -> None:
@@ -114,7 +114,7 @@ def test_an_open_sheet_of_cloth_is_seen_from_both_sides() -> None:
     for turned in (faces, faces[:, ::-1].copy()):
         boundary = silhouettes.outline(surface(grid, turned, CLOTH), camera())
         assert silhouettes.mask(boundary, camera()).sum() == pytest.approx((0.6 * FOCAL / DISTANCE) ** 2, rel=0.03)
-        assert len(np.unique(boundary.vertex, axis=0)) == 24
+        assert len(np.unique(boundary.vertex[boundary.edge], axis=0)) == 24
 
 
 def test_a_folded_sheet_ends_at_its_fold() -> None:
@@ -123,7 +123,7 @@ def test_a_folded_sheet_ends_at_its_fold() -> None:
     grid = np.array([[x[k], y[k], z[row]] for row in range(5) for k in range(5)])
     boundary = silhouettes.outline(surface(grid, meshes.grid_faces(5, 5, closed=False), CLOTH), camera())
     assert boundary.pixel[..., 0].max() == pytest.approx(159.5 + FOCAL * 0.2 / (DISTANCE + 0.05), abs=1e-6)
-    assert boundary.cover.max() == 2
+    assert silhouettes.cover(boundary, camera()).layers.max() == 2
 
 
 def test_a_surface_behind_the_camera_has_no_outline() -> None:
@@ -150,6 +150,45 @@ def test_the_visible_part_of_a_long_half_hidden_edge_stays() -> None:
 
 def test_an_edge_that_runs_away_takes_no_memory():
     ends = np.array([[[0.0, 0.0], [1e12, 5.0]], [[0.0, 0.0], [8.0, 0.0]]])
-    whole, pieces = kernels.split(ends, 4.0)
-    assert np.bincount(whole).tolist() == [kernels.MOST_PIECES, 2]
+    edge, pieces = kernels.boundary(ends, np.ones(2, np.int32), np.array([320, 240], np.int32), 4.0)
+    assert np.bincount(edge).tolist() == [kernels.MOST_PIECES, 2]
     np.testing.assert_allclose(pieces[kernels.MOST_PIECES - 1, 1], ends[0, 1])
+
+
+def test_the_boundary_is_where_a_drawn_cover_ends():
+    """Counting layers at points is what drawing them all and looking up gives; some lie outside the image."""
+    rng = np.random.default_rng(3)
+    corners = rng.uniform(-60, 380, (40, 3, 2))
+    ends = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2, 2)
+    layers = np.ones(len(ends), np.int32)
+    size = np.array([320, 240], np.int32)
+    cover = np.zeros((240, 320), np.int32)
+    kernels.wind(*kernels.crossings(ends, layers, 240), np.zeros(2, np.int32), cover)
+    x, y = np.meshgrid(np.arange(320), np.arange(240))
+    turns = sum(winding(triangle, x, y) for triangle in corners)
+    np.testing.assert_array_equal(cover, turns)
+
+    edge, pieces = kernels.boundary(ends, layers, size, 1e9)  # in one piece each
+    way = ends[:, 1] - ends[:, 0]
+    length = np.linalg.norm(way, axis=1, keepdims=True)
+    column, row = np.rint(ends.mean(axis=1) + kernels.REACH * way[:, ::-1] * [-1, 1] / length).astype(int).T
+    inside = (column >= 0) & (column < 320) & (row >= 0) & (row < 240)
+    free = ~inside | (cover[np.clip(row, 0, 239), np.clip(column, 0, 319)] == 0)
+    assert 10 < free.sum() < 110
+    np.testing.assert_array_equal(edge, np.flatnonzero(free))
+    np.testing.assert_allclose(pieces, ends[edge])
+
+
+def winding(triangle: F64, x: I32, y: I32) -> I32:
+    """Return how often a directed triangle winds about each pixel, by the signs of its sides."""
+    ends = zip(triangle, np.roll(triangle, -1, axis=0), strict=True)
+    sides = [(b - a)[0] * (y - a[1]) - (b - a)[1] * (x - a[0]) for a, b in ends]
+    return np.all([s < 0 for s in sides], axis=0).astype(int) - np.all([s > 0 for s in sides], axis=0)
+
+
+def test_a_surface_is_looked_at_once() -> None:
+    seen = surface(*sphere((0, DISTANCE, 0)))
+    view = camera()
+    assert silhouettes.outline(seen, view) is silhouettes.outline(seen, view)
+    assert silhouettes.outline(seen, view) is not silhouettes.outline(seen, camera())
+    assert silhouettes.model_distance(seen, view, 8.0).max() < silhouettes.model_distance(seen, view, 12.0).max()

@@ -12,7 +12,7 @@ from mocapflow_levelset.plates import plate_of
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.view import Empty, View, find
 
-from mocapflow.data import Past, Turn
+from mocapflow.data import Change, Past, Turn
 from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.model import moved
 from mocapflow.testing import pictures, scenes
@@ -60,6 +60,16 @@ def test_later_turns_start_from_the_last_silhouettes(scene, pose):
     first = segmenter.segment(frame, state, Past(), scene, FIRST)
     second = segmenter.segment(frame, replace(state, segmentation=first), Past(), scene, LATER)
     assert np.mean(overlaps(second, scene, pose)) > np.mean(overlaps(first, scene, pose)) - 0.01
+
+
+def test_silhouettes_stay_while_the_model_rests(scene, pose):
+    frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, believed(pose))
+
+    def again(segmenter, body):
+        turn = replace(LATER, change=Change(body=body, cloth=0.1, angles=0.1))
+        return segmenter.segment(frame, state, Past(), scene, turn) is state.segmentation
+
+    assert again(LevelSet(), 0.009) and not again(LevelSet(), 0.011) and not again(LevelSet(keep_mm=0), 0.0)
 
 
 def test_energies_are_named_by_view_and_term(scene, pose):
