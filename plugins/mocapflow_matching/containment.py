@@ -69,5 +69,5 @@ def inside_px(silhouette: Silhouette, pixels: F64) -> F64:
     """Return the signed distance (K,) px at the pixels nearest to (K, 2), a smooth field."""
     height, width = silhouette.distance.shape
     column, row = np.rint(pixels).astype(np.intp).T
-    inside = silhouette.distance[np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)]
-    return inside.astype(np.float64)
+    inside: F64 = silhouette.distance[np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)].astype(np.float64)
+    return inside

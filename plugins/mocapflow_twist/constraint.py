@@ -32,12 +32,13 @@ class Rows:
 
     def part(self, chosen: Bool, weight: F64, first_vertex: int = 0) -> Rows:
         """Return the chosen rows with new weights and vertices counted from `first_vertex`."""
+        rows = np.flatnonzero(chosen)
         return Rows(
-            plane=self.plane[chosen],
-            divisor=self.divisor[chosen],
-            vertex=self.vertex[chosen] - np.int32(first_vertex),
-            weight=weight[chosen],
-            match=self.match[chosen],
+            plane=self.plane.take(rows, axis=0),
+            divisor=self.divisor.take(rows, axis=0),
+            vertex=self.vertex.take(rows) - np.int32(first_vertex),
+            weight=weight.take(rows),
+            match=self.match.take(rows),
         )
 
 
@@ -51,20 +52,14 @@ def image_rows(matches: Matches, cameras: Sequence[Camera]) -> Rows:
     Returns:
         One row per match with a direction, two for the others; errors in px.
     """
-    free: Bool = np.all(matches.direction == 0, axis=1)
-    match = np.concatenate([np.arange(len(free)), np.flatnonzero(free)])
-    direction = matches.direction[match].copy()
-    direction[: len(free)][free] = [1.0, 0.0]
-    direction[len(free) :] = [0.0, 1.0]
     matrices = np.array([pinhole.projection(camera) for camera in cameras]).reshape(-1, 3, 4)
-    plane, divisor = np.empty((len(match), 4)), np.empty((len(match), 4))
-    kernels.image_planes(matches.camera[match], matches.pixel[match], direction, matrices, plane, divisor)
+    plane, divisor, match = kernels.image_planes(matches.camera, matches.pixel, matches.direction, matrices)
     return Rows(
         plane=plane,
         divisor=divisor,
-        vertex=matches.vertex[match],
-        weight=matches.weight[match],
-        match=match.astype(np.int32),
+        vertex=matches.vertex.take(match),
+        weight=matches.weight.take(match),
+        match=match,
     )
 
 

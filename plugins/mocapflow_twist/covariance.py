@@ -20,20 +20,13 @@ def effective_share(matches: Matches, correlation_px: float) -> F64:
     where they lie apart, the contour's length over the cell's (to 20 %) where they lie dense. The mean of two grids,
     half a cell apart, makes it independent of where the contour lies.
     """
-    share = np.ones(len(matches.camera))
     used = matches.weight > 0
     if correlation_px <= 0 or not used.any():
-        return share
-    camera, pixel, weight = matches.camera[used].astype(np.int64), matches.pixel[used], matches.weight[used]
-    views = int(camera.max()) + 1
-    clustered = np.zeros(views)
-    for shift in (0.0, 0.5):
-        cells = np.zeros((views, CELLS, CELLS))
-        kernels.add_to_cells(camera, pixel, weight, correlation_px, shift, cells)
-        clustered += 0.5 * np.einsum("vyx,vyx->v", cells, cells)
-    alone = np.bincount(camera, weight**2, views)
-    share[used] = (alone / np.where(clustered > 0, clustered, 1.0))[camera]
-    return share
+        return np.ones(len(used))
+    weight = np.where(used, matches.weight, 0.0)
+    alone, clustered = kernels.clustering(matches.camera, matches.pixel, weight, correlation_px, CELLS)
+    share = alone / np.where(clustered > 0, clustered, 1.0)
+    return np.where(used, share.take(matches.camera), 1.0)
 
 
 def view_balance(matches: Matches, share: F64) -> F64:

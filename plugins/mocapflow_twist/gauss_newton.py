@@ -98,9 +98,7 @@ class Task(NamedTuple):
         matches = self._matches(dressed(self.surface, cloth.vertices))
         rows = image_rows(matches, cameras)
         worn = rows.part(rows.vertex >= first, rows.weight, first)
-        hessian, gradient, energy = dense_equations(
-            worn, cloth.vertices[worn.vertex], self._velocity(cloth)[worn.vertex]
-        )
+        hessian, gradient, energy = dense_equations(worn, cloth.vertices, self._velocity(cloth))
         pull = self.precision * self._from_calm(cloth)
         return Equations(hessian + np.diag(self.precision), gradient + pull, energy)
 

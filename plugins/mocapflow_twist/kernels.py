@@ -150,20 +150,66 @@ def energy(plane, divisor, vertex, weight, rest, skin_joint, skin_weight, joints
 
 
 @numba.njit(cache=True)
-def image_planes(camera, pixel, direction, matrices, plane, divisor):  # type: ignore[no-untyped-def]
-    """Write the plane through each image line across `direction` at `pixel`, and the plane of its depth."""
-    for row in range(len(camera)):
-        matrix, dx, dy = matrices[camera[row]], direction[row, 0], direction[row, 1]
-        offset = dx * pixel[row, 0] + dy * pixel[row, 1]
-        for k in range(4):
-            plane[row, k] = dx * matrix[0, k] + dy * matrix[1, k] - offset * matrix[2, k]
-            divisor[row, k] = matrix[2, k]
+def image_planes(camera, pixel, direction, matrices):  # type: ignore[no-untyped-def]
+    """Return the plane (R, 4) through each image line across `direction` at `pixel`, that of its depth, and its match.
+
+    Matches without direction have a second line, after all others: first across x, then across y.
+    """
+    free = 0
+    for m in range(len(camera)):
+        free += direction[m, 0] == 0.0 and direction[m, 1] == 0.0
+    plane, divisor = np.empty((len(camera) + free, 4)), np.empty((len(camera) + free, 4))
+    match = np.arange(len(camera) + free).astype(np.int32)
+    second = len(camera)
+    for m in range(len(camera)):
+        dx, dy, matrix = direction[m, 0], direction[m, 1], matrices[camera[m]]
+        if dx == 0.0 and dy == 0.0:
+            _image_plane(pixel[m], 0.0, 1.0, matrix, plane[second], divisor[second])
+            match[second] = m
+            second += 1
+            dx = 1.0
+        _image_plane(pixel[m], dx, dy, matrix, plane[m], divisor[m])
+    return plane, divisor, match
 
 
 @numba.njit(cache=True)
-def add_to_cells(camera, pixel, weight, size, shift, cells):  # type: ignore[no-untyped-def]
-    """Add weights (M,) to the square cell of their view (C, N, N) that each pixel (M, 2) lies in."""
-    count = cells.shape[1]
-    for m in range(len(camera)):
-        column = math.floor(pixel[m, 0] / size + shift) % count
-        cells[camera[m], math.floor(pixel[m, 1] / size) % count, column] += weight[m]
+def _image_plane(pixel, dx, dy, matrix, plane, divisor):  # type: ignore[no-untyped-def]
+    offset = dx * pixel[0] + dy * pixel[1]
+    for k in range(4):
+        plane[k] = dx * matrix[0, k] + dy * matrix[1, k] - offset * matrix[2, k]
+        divisor[k] = matrix[2, k]
+
+
+@numba.njit(cache=True)
+def clustering(camera, pixel, weight, size, cells):  # type: ignore[no-untyped-def]
+    """Return per view (V,) the sum of squared weights, and of squared sums in square cells, the mean of two grids.
+
+    There are `cells` of `size` px along an axis of a grid, then they repeat.
+    """
+    views = camera.max() + 1 if len(camera) else 0
+    alone, clustered = np.zeros(views), np.zeros(views)
+    for shift in (0.0, 0.5):
+        sums = np.zeros((views, cells, cells))
+        for m in range(len(camera)):
+            view, here = camera[m], weight[m]
+            column = math.floor(pixel[m, 0] / size + shift) % cells
+            row = math.floor(pixel[m, 1] / size) % cells
+            before = sums[view, row, column]
+            sums[view, row, column] = before + here
+            clustered[view] += 0.5 * here * (2.0 * before + here)  # half of what the square grows by
+            alone[view] += 0.5 * here * here
+    return alone, clustered
+
+
+@numba.njit(cache=True)
+def jacobian(gradient, velocity, vertex, out):  # type: ignore[no-untyped-def]
+    """Write the derivatives (R, S) of rows by the unknowns.
+
+    From gradients (R, 3) by the place of the vertices (R,), and what these move by (W, 3, S).
+    """
+    for row in range(len(vertex)):
+        x, y, z = gradient[row]
+        vx, vy, vz = velocity[vertex[row], 0], velocity[vertex[row], 1], velocity[vertex[row], 2]
+        line = out[row]
+        for s in range(line.size):
+            line[s] = x * vx[s] + y * vy[s] + z * vz[s]

@@ -8,7 +8,7 @@ import numpy as np
 
 from mocapflow.data import Cloth, Past
 from mocapflow.model import ClothedModel, moved
-from mocapflow.records import F64, I32
+from mocapflow.records import F64
 from mocapflow_twist.normal_equations import Equations
 from mocapflow_twist.problem import Guess
 
@@ -18,7 +18,7 @@ class ClothMotion:
     """Moves pose and cloth together; lives as long as one call of the solver.
 
     Measuring the motion of the cloth takes many drapes, so it is done only when a match needs it and, with
-    `measure_once`, for all vertices together.
+    `measure_once`, only where the first one did.
     """
 
     model: ClothedModel
@@ -26,15 +26,16 @@ class ClothMotion:
     unknowns: bool  # the cloth parameters are solved for
     redrape: bool  # drape at every new pose; else move the cloth linearly
     measure_once: bool
-    _measured: list[F64] = field(default_factory=list)
+    _measured: list[tuple[Guess, F64]] = field(default_factory=list)
 
-    def velocity(self, guess: Guess, vertices: I32) -> F64 | None:
-        """Return velocities (R, 3, S) of cloth vertices (R,) for increments about the origin; None without any."""
-        if not len(vertices):
-            return None
-        if self.measure_once:
-            return self._all(guess)[vertices]
-        return self._columns(self.model.velocity(guess.pose, guess.cloth, vertices, self.past), guess)
+    def velocity(self, guess: Guess) -> F64:
+        """Return velocities (W, 3, S) of the cloth for increments about the origin."""
+        if not self._measured or not (self.measure_once or self._measured[0][0] is guess):
+            every = np.arange(len(guess.cloth.vertices), dtype=np.int32)
+            velocity = self.model.velocity(guess.pose, guess.cloth, every, self.past)
+            columns = velocity.shape[2] if self.unknowns else 6 + len(guess.pose.angles)
+            self._measured[:] = [(guess, np.ascontiguousarray(velocity[..., :columns]))]
+        return self._measured[0][1]
 
     def moved(self, guess: Guess, increment: F64) -> Guess:
         """Return the guess after an increment (S,) about the origin."""
@@ -48,7 +49,7 @@ class ClothMotion:
         if self.redrape:
             return Guess(pose, self.model.drape(pose, parameters, self.past))
         taken = np.concatenate([increment[: 6 + len(pose.angles)], parameters - guess.cloth.parameters])
-        velocity = self._all(guess)
+        velocity = self.velocity(guess)
         vertices = guess.cloth.vertices + velocity @ taken[: velocity.shape[2]]
         return Guess(pose, Cloth(vertices=vertices, parameters=parameters))
 
@@ -71,13 +72,3 @@ class ClothMotion:
     def _bounds(self) -> F64:
         assert self.model.scene.garment is not None
         return self.model.scene.garment.parameter_bounds
-
-    def _all(self, guess: Guess) -> F64:
-        if not self._measured:
-            every = np.arange(len(guess.cloth.vertices), dtype=np.int32)
-            velocity = self.model.velocity(guess.pose, guess.cloth, every, self.past)
-            self._measured.append(self._columns(velocity, guess))
-        return self._measured[0]
-
-    def _columns(self, velocity: F64, guess: Guess) -> F64:
-        return velocity if self.unknowns else velocity[..., : 6 + len(guess.pose.angles)]

@@ -61,17 +61,18 @@ def body_energy(rows: Rows, body: Body, pose: Pose) -> float:
 
 def point_errors(rows: Rows, points: F64) -> tuple[F64, F64]:
     """Return errors (R,) and gradients (R, 3) by the position of points (R, 3) m; zero behind a camera."""
-    divisor = np.sum(rows.divisor[:, :3] * points, axis=1) + rows.divisor[:, 3]
+    divisor = np.einsum("ra,ra->r", rows.divisor[:, :3], points) + rows.divisor[:, 3]
     front = divisor >= kernels.BEHIND
     scale = np.where(front, 1.0 / np.where(front, divisor, 1.0), 0.0)
-    error = (np.sum(rows.plane[:, :3] * points, axis=1) + rows.plane[:, 3]) * scale
+    error = (np.einsum("ra,ra->r", rows.plane[:, :3], points) + rows.plane[:, 3]) * scale
     gradient = (rows.plane[:, :3] - error[:, None] * rows.divisor[:, :3]) * scale[:, None]
     return error, gradient
 
 
-def dense_equations(rows: Rows, points: F64, velocities: F64) -> Equations:
-    """Return the normal equations of rows whose points (R, 3) move with velocities (R, 3, S)."""
-    error, gradient = point_errors(rows, points)
-    jacobian = np.einsum("ra,ras->rs", gradient, velocities)
+def dense_equations(rows: Rows, places: F64, velocities: F64) -> Equations:
+    """Return the normal equations of rows whose vertices are at places (W, 3) and move with velocities (W, 3, S)."""
+    error, gradient = point_errors(rows, places.take(rows.vertex, axis=0))
+    jacobian = np.empty((len(error), velocities.shape[2]))
+    kernels.jacobian(gradient, velocities, rows.vertex, jacobian)
     weighted = rows.weight[:, None] * jacobian
     return Equations(weighted.T @ jacobian, weighted.T @ error, 0.5 * float(rows.weight @ error**2))

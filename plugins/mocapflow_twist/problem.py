@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mocapflow.components import Prior
-from mocapflow.data import Cloth, Past, Pose, Residual
+from mocapflow.data import Cloth, Past, Pose
 from mocapflow.geometry import twists
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
@@ -86,12 +86,13 @@ class Problem(NamedTuple):
         """Return each term of the energy at a guess."""
         body = self.model.scene.body
         data = normal_equations.body_energy(self.data.body, body, guess.pose)
-        if len(self.data.cloth.vertex):
-            error, _ = normal_equations.point_errors(self.data.cloth, guess.cloth.vertices[self.data.cloth.vertex])
-            data += 0.5 * float(self.data.cloth.weight @ error**2)
+        worn = self.data.cloth
+        if len(worn.vertex):
+            error, _ = normal_equations.point_errors(worn, guess.cloth.vertices.take(worn.vertex, axis=0))
+            data += 0.5 * float(worn.weight @ error**2)
         terms = {"data": data, "damping": self.anchor.equations(guess).energy}
         for prior in self.priors:
-            energy = prior.weight * self._residual(prior, guess).energy
+            energy = prior.weight * prior.residual(guess.pose, self.past, self.model.scene).energy
             terms[prior.name] = terms.get(prior.name, 0.0) + energy
         return terms
 
@@ -100,7 +101,7 @@ class Problem(NamedTuple):
 
         Args:
             guess: the pose and cloth to linearise at.
-            velocity: (R, 3, S) of the points of the cloth rows for unit increments about the world's origin.
+            velocity: (W, 3, S) of the cloth for unit increments about the world's origin; None where it has no rows.
         """
         return Quadratic(self._data_equations(guess, velocity), self._prior_equations(guess))
 
@@ -111,23 +112,23 @@ class Problem(NamedTuple):
         hessian[:moved, :moved], gradient[:moved] = skin.hessian, skin.gradient
         if velocity is None:
             return Equations(hessian, gradient, skin.energy)
-        points = guess.cloth.vertices[self.data.cloth.vertex]
-        worn = normal_equations.dense_equations(self.data.cloth, points, velocity[..., : self.unknowns])
+        worn = normal_equations.dense_equations(self.data.cloth, guess.cloth.vertices, velocity)
         move = about_origin(guess.centre, self.unknowns)
         hessian += move.T @ worn.hessian @ move
         return Equations(hessian, gradient + move.T @ worn.gradient, skin.energy + worn.energy)
 
     def _prior_equations(self, guess: Guess) -> Equations:
         hessian, gradient, energy = self.anchor.equations(guess)
-        move = about_origin(guess.centre, self.unknowns)
-        for prior in self.priors:
-            residual = self._residual(prior, guess)
+        residuals = [prior.residual(guess.pose, self.past, self.model.scene) for prior in self.priors]
+        rows = np.zeros((sum(len(residual.error) for residual in residuals), self.unknowns))
+        error, weight = np.empty(len(rows)), np.empty(len(rows))
+        first = 0
+        for prior, residual in zip(self.priors, residuals, strict=True):
+            here = slice(first, first := first + len(residual.error))
             columns = min(residual.jacobian.shape[1], self.unknowns)
-            jacobian = residual.jacobian[:, :columns] @ move[:columns]
-            hessian = hessian + prior.weight * jacobian.T @ jacobian
-            gradient = gradient + prior.weight * jacobian.T @ residual.error
+            rows[here, :columns] = residual.jacobian[:, :columns]
+            error[here], weight[here] = residual.error, prior.weight
             energy += prior.weight * residual.energy
-        return Equations(hessian, gradient, energy)
-
-    def _residual(self, prior: Prior, guess: Guess) -> Residual:
-        return prior.residual(guess.pose, self.past, self.model.scene)
+        rows[:, :3] += rows[:, 3:6] @ twists.hat(guess.centre)  # about the root
+        pulling = (weight[:, None] * rows).T
+        return Equations(hessian + pulling @ rows, gradient + pulling @ error, energy)

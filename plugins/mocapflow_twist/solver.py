@@ -17,7 +17,7 @@ from mocapflow_twist import solve
 from mocapflow_twist.constraint import image_rows, line_rows
 from mocapflow_twist.covariance import covariance, effective_share, observed, view_balance
 from mocapflow_twist.motion import ClothMotion
-from mocapflow_twist.problem import Anchor, Data, Guess, Problem
+from mocapflow_twist.problem import Anchor, Data, Guess, Problem, Quadratic
 
 Positive = Annotated[float, Field(gt=0)]
 TRIALS = 8  # times that the damping is raised before a step is given up
@@ -87,14 +87,14 @@ class TwistGaussNewton(PoseSolver):
         rows = line_rows(matches, cameras, self.line_sigma_mm / 1000) if line else image_rows(matches, cameras)
         share = effective_share(matches, self.correlation_px)
         balance = view_balance(matches, share) if self.balance_views else np.ones(len(share))
-        weight = rows.weight * (share * balance)[rows.match]
+        weight = rows.weight * (share * balance).take(rows.match)
         used = np.isfinite(weight) & (weight > 0)
         components = 2 / 3 if line else 1.0  # of the three components of X x n - m, two are independent
         body = len(model.scene.body.vertices)
         return Data(
             body=rows.part(used & (rows.vertex < body), weight),
             cloth=rows.part(used & (rows.vertex >= body), weight, body),
-            measurements=components * float(share[rows.match[used]].sum()),
+            measurements=components * float(share.take(rows.match)[used].sum()),
         )
 
     def _least_damping(self, turn: Turn) -> float:
@@ -111,7 +111,7 @@ class TwistGaussNewton(PoseSolver):
 
     def _descend(self, problem: Problem, guess: Guess, motion: ClothMotion, damping: float) -> tuple[Guess, float]:
         """Return a guess of lower energy for the same matches, or the same guess where there is none."""
-        equations = problem.quadratic(guess, motion.velocity(guess, problem.data.cloth.vertex)).total
+        equations = quadratic(problem, guess, motion).total
         equations = motion.within_bounds(equations, guess)
         angles = len(guess.pose.angles)
         ranges = parameter_ranges(problem.model) if problem.unknowns > 6 + angles else np.empty(0)
@@ -134,8 +134,7 @@ class TwistGaussNewton(PoseSolver):
         return bool(angles <= np.radians(self.stop_angle_deg) and surface <= self.stop_surface_mm / 1000)
 
     def _estimate(self, problem: Problem, guess: Guess, motion: ClothMotion) -> Estimate:
-        quadratic = problem.quadratic(guess, motion.velocity(guess, problem.data.cloth.vertex))
-        data, prior = quadratic.data, quadratic.prior
+        data, prior = quadratic(problem, guess, motion)
         about_root = covariance(data.hessian, prior.hessian, data.energy, problem.data.measurements)
         to_origin = solve.about_origin(guess.centre, problem.unknowns)
         return Estimate(
@@ -145,6 +144,11 @@ class TwistGaussNewton(PoseSolver):
             observed=observed(about_root, prior.hessian)[6 : 6 + len(guess.pose.angles)],
             energies=problem.energies(guess),
         )
+
+
+def quadratic(problem: Problem, guess: Guess, motion: ClothMotion) -> Quadratic:
+    """Return the quadratic models at a guess; how the cloth moves is measured only if it has a match."""
+    return problem.quadratic(guess, motion.velocity(guess) if len(problem.data.cloth.vertex) else None)
 
 
 def calmed(guess: Guess, model: ClothedModel) -> Guess:
