@@ -8,7 +8,6 @@ triangles. Cloth is two-sided: both its sides cover.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -35,10 +34,6 @@ class Outline:
     edge: I32 = array("B", unit="index of the edge that a piece belongs to")
     pixel: F64 = array("B", 2, 2, unit="px, the two ends of the piece")
 
-    def whole(self, edges: I32) -> Outline:
-        """Return the same edges, with some of them, whole, for the pieces."""
-        return replace(self, edge=edges, pixel=self.image.take(edges, axis=0))
-
 
 class Cover(NamedTuple):
     """How many layers of a surface lie over each pixel, within a crop."""
@@ -58,7 +53,19 @@ def outline(surface: Surface, camera: Camera) -> Outline:
     facing = np.empty(len(surface.faces), np.int8)
     kernels.face_directions(pixels, surface.faces, facing)
     vertex, layers = kernels.occluding_edges(surface.edges, facing, surface.layer == CLOTH)
-    image = pixels.take(vertex, axis=0)  # several times faster than pixels[vertex]
+    return _bounded(vertex, pixels.take(vertex, axis=0), layers, camera)  # several times faster than pixels[vertex]
+
+
+@once
+def skin_outline(surface: Surface, camera: Camera) -> Outline:
+    """Return the boundary of the silhouette that the body of a surface has without its cloth."""
+    whole = outline(surface, camera)
+    skin = np.flatnonzero(surface.layer.take(whole.vertex[:, 0]) != CLOTH)
+    edges = whole.vertex.take(skin, axis=0), whole.image.take(skin, axis=0), whole.layers.take(skin)
+    return _bounded(*edges, camera)
+
+
+def _bounded(vertex: I32, image: F64, layers: I32, camera: Camera) -> Outline:
     edge, pieces = kernels.boundary(image, layers, camera.size, PIECE)
     return Outline(vertex=vertex, image=image, layers=layers, edge=edge, pixel=pieces)
 

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from mocapflow.assets import Camera
 from mocapflow.components import Matcher, pool
-from mocapflow.data import BODY, Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn, empty_matches
+from mocapflow.data import Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn, empty_matches
 from mocapflow.geometry import silhouettes
 from mocapflow.geometry.contours import nearest_compatible
 from mocapflow.records import F64
@@ -21,11 +21,10 @@ Positive = Annotated[float, Field(gt=0)]
 
 
 class Containment(Matcher):
-    """Pairs points of the body's occluding edges that stick out of the image silhouette with the image contour.
+    """Pairs points of the bare body's contour that stick out of the image silhouette with the image contour.
 
-    Edges count that cloth or the body itself hides, too. One-sided: a limb inside the silhouette is left alone, so
-    nothing pulls it to the cloth. It reaches further than nearest contours may: an arm that has strayed is brought back
-    although no contour looks like it.
+    One-sided: a limb inside the silhouette is left alone, so nothing pulls it to the cloth. It reaches further than
+    nearest contours may: an arm that has strayed is brought back although no contour looks like it.
     """
 
     name: ClassVar[str] = "containment"
@@ -44,9 +43,7 @@ class Containment(Matcher):
 
     def match_view(self, camera: Camera, silhouette: Silhouette, surface: Surface) -> Matches:
         """Return the pairs of one view."""
-        outline = silhouettes.outline(surface, camera)
-        skin = np.flatnonzero(surface.layer[outline.vertex[:, 0]] == BODY).astype(np.int32)
-        model = silhouettes.samples(outline.whole(skin), surface, camera, self.spacing_px)
+        model = silhouettes.samples(silhouettes.skin_outline(surface, camera), surface, camera, self.spacing_px)
         outside = np.flatnonzero(inside_px(silhouette, model.pixel) < self.margin_px)
         place, facing = model.pixel.take(outside, axis=0), model.normal.take(outside, axis=0)
         pixel, normal = silhouette.zero_level

@@ -10,6 +10,7 @@ from mocapflow.data import BODY, CLOTH, Surface
 from mocapflow.geometry import meshes, silhouettes
 from mocapflow.geometry import silhouette_kernels as kernels
 from mocapflow.records import F64, I32
+from mocapflow.testing import tiny_cloth, tiny_pose, tiny_scene
 
 FOCAL, DISTANCE, RADIUS = 500.0, 3.0, 0.5
 
@@ -184,6 +185,16 @@ def winding(triangle: F64, x: I32, y: I32) -> I32:
     ends = zip(triangle, np.roll(triangle, -1, axis=0), strict=True)
     sides = [(b - a)[0] * (y - a[1]) - (b - a)[1] * (x - a[0]) for a, b in ends]
     return np.all([s < 0 for s in sides], axis=0).astype(int) - np.all([s > 0 for s in sides], axis=0)
+
+
+def test_the_skin_has_the_outline_of_the_bare_body() -> None:
+    scene = tiny_scene(clothed=True)
+    pose = tiny_pose(scene)
+    dressed = scene.surface(pose, tiny_cloth(scene, pose))
+    bare = scene.bare(dressed)
+    for view in scene.cameras:
+        one, other = silhouettes.skin_outline(dressed, view), silhouettes.outline(bare, view)
+        np.testing.assert_array_equal(np.unique(one.pixel, axis=0), np.unique(other.pixel, axis=0))
 
 
 def test_a_surface_is_looked_at_once() -> None:

@@ -57,7 +57,7 @@ def test_a_leg_within_the_cloth_is_not_drawn_to_it(truth):
     matches = match(surface_at(pose), shown)
     for camera in range(4):
         view = SCENE.cameras[camera]
-        contour = occluding_contour(bare, view, 6.0)  # a part of what is looked at
+        contour = occluding_contour(bare, view, 6.0)
         inside = contour.vertex[inside_px(shown.silhouettes[camera], contour.pixel) > 2]
         out = contour.vertex[inside_px(shown.silhouettes[camera], contour.pixel) <= 2]
         touched = set(matches.vertex[matches.camera == camera].tolist())
