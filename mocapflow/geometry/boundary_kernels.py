@@ -72,31 +72,44 @@ def image_normal(point, normal, matrix):  # type: ignore[no-untyped-def]
     return (dx - x / w * dw) / w, (dy - y / w * dw) / w
 
 
+@numba.njit(cache=True)
+def fill(first, spans, mask):  # type: ignore[no-untyped-def]
+    """Set the pixels of a mask (H, W) that spans cover, see `silhouette_kernels.covered`."""
+    for row in range(len(mask)):
+        for k in range(first[row], first[row + 1]):
+            mask[row, spans[k, 0] : spans[k, 1]] = True
+
+
 @numba.njit(cache=True, error_model="numpy")
-def paint_distance(ends, corner, cover, band, distance):  # type: ignore[no-untyped-def]
+def paint_distance(ends, first, spans, band, distance):  # type: ignore[no-untyped-def]
     """Write the signed distance to the nearest segment into a field of -band; the inside beyond reach is +band.
 
     Args:
         ends: (B, 2, 2) px, the segments.
-        corner: (2,) px, column and row of `cover` in the image.
-        cover: (h, w), positive inside.
+        first: (H + 1,), with the spans: the inside, see `silhouette_kernels.covered`.
+        spans: (S, 2) px.
         band: px, as float32.
         distance: (H, W) float32, all -band.
     """
-    rows, columns = distance.shape
-    pad = int(math.ceil(band))
-    left, top = max(corner[0] - pad, 0), max(corner[1] - pad, 0)
-    right, bottom = min(corner[0] + cover.shape[1] + pad, columns), min(corner[1] + cover.shape[0] + pad, rows)
-    square = np.full((max(bottom - top, 0), max(right - left, 0)), band * band)
+    if not len(ends):
+        return
+    left, right = _reached(ends[:, :, 0], band, distance.shape[1])
+    top, bottom = _reached(ends[:, :, 1], band, distance.shape[0])
+    square = np.full((bottom - top, right - left), band * band)
     _lower_to_segments(ends, left, top, band, square)
-    for row in range(square.shape[0]):
-        line, away = distance[top + row, left:right], square[row]
+    for row in range(top, bottom):
+        line, away = distance[row, left:right], square[row - top]
         for k in range(line.size):
             line[k] = -min(np.sqrt(away[k]), band)
-    for row in range(cover.shape[0]):
-        line, layers = distance[corner[1] + row, corner[0] : corner[0] + cover.shape[1]], cover[row]
-        for k in range(line.size):
-            line[k] = -line[k] if layers[k] > 0 else line[k]
+        for k in range(first[row], first[row + 1]):
+            distance[row, spans[k, 0] : spans[k, 1]] *= np.float32(-1)
+
+
+@numba.njit(cache=True)
+def _reached(places, band, size):  # type: ignore[no-untyped-def]
+    """Return the first and last-but-one pixel of `size` within the band around places (B, 2) along an axis."""
+    low = min(max(math.floor(max(places.min() - band, 0.0)), 0), size)
+    return low, max(math.ceil(min(places.max() + band + 1.0, size)), low)
 
 
 @numba.njit(cache=True, error_model="numpy")

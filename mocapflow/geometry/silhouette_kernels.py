@@ -9,7 +9,6 @@ import numpy as np
 
 REACH = 1.0  # px beyond a segment at which its outside is looked up
 MOST_PIECES = 2048  # of one edge: at 4 px, longer than the diagonal of any image
-MOST_COLUMNS = 1e6  # of an image
 NEAREST = 1e-6  # m, depth of what still counts as before the camera
 
 index = numba.uint64  # of an array: unsigned, so that nothing is checked for counting from the end; twice as fast
@@ -65,72 +64,21 @@ def occluding_edges(edges, facing, cloth):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def crossings(ends, times, height):  # type: ignore[no-untyped-def]
-    """Return where directed segments cross the rows of an image: the first column behind, and how many layers begin.
-
-    Those of a row are the elements first[row] to first[row + 1], in no order.
-    """
-    first = np.zeros(height + 2, np.int64)
-    for s in range(len(ends)):
-        for row in range(*_rows(ends[s, 0, 1], ends[s, 1, 1], height)):
-            first[row + 2] += 1
-    first = np.cumsum(first)
-    column, layers = np.empty(first[-1], np.int32), np.empty(first[-1], np.int32)
-    for s in range(len(ends)):
-        x0, y0, x1, y1 = ends[s, 0, 0], ends[s, 0, 1], ends[s, 1, 0], ends[s, 1, 1]
-        slope = (x1 - x0) / (y1 - y0) if y1 != y0 else 0.0
-        for row in range(*_rows(y0, y1, height)):
-            c = first[row + 1]
-            first[row + 1] += 1
-            column[c] = math.ceil(min(max(x0 + slope * (row - y0), 0.0), MOST_COLUMNS))
-            layers[c] = times[s] if y1 > y0 else -times[s]
-    return first[:-1], column, layers
-
-
-@numba.njit(cache=True)
-def _rows(one, other, height):  # type: ignore[no-untyped-def]
-    """Return the first and last-but-one row of an image between two heights."""
-    return max(math.ceil(min(one, other)), 0), min(math.ceil(max(one, other)), height)
-
-
-@numba.njit(cache=True)
-def wind(first, column, layers, corner, cover):  # type: ignore[no-untyped-def]
-    """Write the number of layers over each pixel of a crop, all zero before."""
-    for row in range(cover.shape[0]):
-        for c in range(first[corner[1] + row], first[corner[1] + row + 1]):
-            at = max(column[c] - corner[0], 0)
-            if at < cover.shape[1]:
-                cover[row, at] += layers[c]
-        over = 0
-        for at in range(cover.shape[1]):
-            over += cover[row, at]
-            cover[row, at] = over
-
-
-@numba.njit(cache=True)
-def bounds(ends):  # type: ignore[no-untyped-def]
-    """Return the least and greatest x and y of segments: ((x, y), (x, y)) px."""
-    low, high = np.full(2, np.inf), np.full(2, -np.inf)
-    for s in range(len(ends)):
-        for axis in range(2):
-            low[axis] = min(low[axis], ends[s, 0, axis], ends[s, 1, axis])
-            high[axis] = max(high[axis], ends[s, 0, axis], ends[s, 1, axis])
-    return low, high
-
-
-@numba.njit(cache=True)
 def boundary(ends, times, size, longest):  # type: ignore[no-untyped-def]
-    """Return the pieces of directed segments with nothing beyond them: their segment (B,) and their ends (B, 2, 2).
+    """Return what directed segments cover, row by row, and the pieces of them with nothing beyond.
 
     Segments are judged in equal pieces no longer than `longest` px; one that all but touches the plane of a camera
-    is cut into no more than MOST_PIECES. Nothing is drawn: layers are counted where they are asked for.
+    is cut into no more than MOST_PIECES.
+
+    Returns:
+        first (height + 1,) and spans (S, 2): see `covered`; the segment (B,) and the ends (B, 2, 2) of the pieces.
     """
     counts = np.empty(len(ends), np.int64)
     for s in range(len(ends)):
         dx, dy = ends[s, 1, 0] - ends[s, 0, 0], ends[s, 1, 1] - ends[s, 0, 1]
         counts[s] = max(math.ceil(min(math.sqrt(dx * dx + dy * dy) / longest, MOST_PIECES)), 1)
     whole, pieces = np.empty(counts.sum(), np.int32), np.empty((counts.sum(), 2, 2))
-    first, column, layers = crossings(ends, times, size[1])
+    first, spans = covered(ends, times, size)
     count = 0
     for s in range(len(ends)):
         x, y = ends[s, 0, 0], ends[s, 0, 1]
@@ -139,17 +87,79 @@ def boundary(ends, times, size, longest):  # type: ignore[no-untyped-def]
         if length == 0.0:
             continue
         for k in range(counts[s]):
-            beyond_x, beyond_y = x + (k + 0.5) * dx - REACH * dy / length, y + (k + 0.5) * dy + REACH * dx / length
-            at, row = math.floor(beyond_x + 0.5), math.floor(beyond_y + 0.5)
-            covered = np.int32(0)
-            if 0 <= at < size[0] and 0 <= row < size[1]:
-                begin, end = first[row], first[row + 1]
-                places, ending = column[begin:end], layers[begin:end]
-                for c in range(places.size):
-                    covered += ending[c] if places[c] <= np.int32(at) else np.int32(0)
-            if covered == 0:
+            column = math.floor(x + (k + 0.5) * dx - REACH * dy / length + 0.5)
+            row = math.floor(y + (k + 0.5) * dy + REACH * dx / length + 0.5)
+            if not (0 <= row < size[1] and _within(column, spans, first[row], first[row + 1])):
                 whole[count] = s
                 pieces[count, 0, 0], pieces[count, 0, 1] = x + k * dx, y + k * dy
                 pieces[count, 1, 0], pieces[count, 1, 1] = x + (k + 1) * dx, y + (k + 1) * dy
                 count += 1
-    return whole[:count], pieces[:count]
+    return first, spans, whole[:count].copy(), pieces[:count].copy()
+
+
+@numba.njit(cache=True)
+def _within(column, spans, begin, end):  # type: ignore[no-untyped-def]
+    inside = False
+    for k in range(begin, end):
+        inside |= spans[k, 0] <= column < spans[k, 1]
+    return inside
+
+
+@numba.njit(cache=True)
+def covered(ends, times, size):  # type: ignore[no-untyped-def]
+    """Return the pixels of an image that directed segments wind about, row by row.
+
+    Returns:
+        first (height + 1,) and spans (S, 2): those of a row are the elements first[row] to first[row + 1], each a
+        first column and the one after the last.
+    """
+    begin, column, layers = _crossings(ends, times, size)
+    first, spans, count = np.zeros(size[1] + 1, np.int32), np.empty((len(column), 2), np.int32), 0
+    for row in range(size[1]):
+        over = 0
+        for c in range(begin[row], begin[row + 1]):
+            before, over = over, over + layers[c]
+            if before <= 0 < over:
+                spans[count, 0] = column[c]
+            elif over <= 0 < before and column[c] > spans[count, 0]:
+                spans[count, 1] = column[c]
+                count += 1
+        if over > 0:  # what ends behind the camera is open
+            spans[count, 1] = size[0]
+            count += 1
+        first[row + 1] = count
+    return first, spans[:count].copy()
+
+
+@numba.njit(cache=True)
+def _crossings(ends, times, size):  # type: ignore[no-untyped-def]
+    """Return where directed segments cross the rows of an image: the column behind, and how many layers begin there.
+
+    Those of a row are the elements begin[row] to begin[row + 1], in the order of their columns.
+    """
+    begin = np.zeros(size[1] + 1, np.int64)
+    for s in range(len(ends)):
+        for row in range(*_rows(ends[s, 0, 1], ends[s, 1, 1], size[1])):
+            begin[row + 1] += 1
+    begin = np.cumsum(begin)
+    end = begin[:-1].copy()  # of what is there so far
+    column, layers = np.empty(begin[-1], np.int32), np.empty(begin[-1], np.int32)
+    right = float(size[0])
+    for s in range(len(ends)):
+        x0, y0, x1, y1 = ends[s, 0, 0], ends[s, 0, 1], ends[s, 1, 0], ends[s, 1, 1]
+        slope = (x1 - x0) / (y1 - y0) if y1 != y0 else 0.0
+        for row in range(*_rows(y0, y1, size[1])):
+            at = math.ceil(min(max(x0 + slope * (row - y0), 0.0), right))
+            last = end[row]
+            while last > begin[row] and column[last - 1] > at:
+                column[last], layers[last] = column[last - 1], layers[last - 1]
+                last -= 1
+            column[last], layers[last] = at, times[s] if y1 > y0 else -times[s]
+            end[row] += 1
+    return begin, column, layers
+
+
+@numba.njit(cache=True)
+def _rows(one, other, height):  # type: ignore[no-untyped-def]
+    """Return the first and last-but-one row of an image between two heights."""
+    return max(math.ceil(min(one, other)), 0), min(math.ceil(max(one, other)), height)

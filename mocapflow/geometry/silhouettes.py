@@ -8,8 +8,6 @@ triangles. Cloth is two-sided: both its sides cover.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from mocapflow.assets import Camera
@@ -21,25 +19,19 @@ from mocapflow.geometry.once import once
 from mocapflow.records import F32, F64, I32, Bool, array, record
 
 PIECE = 4.0  # px; longer edges are judged piece by piece, for a part of one may be hidden
-MARGIN = 2  # px around the silhouette, so that the outside of its boundary is seen
 
 
 @record
 class Outline:
-    """The occluding edges of a surface in one view, directed, and the pieces of them that bound its silhouette."""
+    """The silhouette of a surface in one view: its directed occluding edges, what they cover, and where that ends."""
 
     vertex: I32 = array("E", 2, unit="surface vertex index of the two ends of an edge")
     image: F64 = array("E", 2, 2, unit="px, where these project")
     layers: I32 = array("E", unit="how many layers of the surface end there")
     edge: I32 = array("B", unit="index of the edge that a piece belongs to")
     pixel: F64 = array("B", 2, 2, unit="px, the two ends of the piece")
-
-
-class Cover(NamedTuple):
-    """How many layers of a surface lie over each pixel, within a crop."""
-
-    corner: I32  # (2,) px, column and row of layers[0, 0]
-    layers: I32  # (h, w)
+    first: I32 = array("H", unit="index of the first span in each row of the image, then how many there are")
+    span: I32 = array("S", 2, unit="px, covered in a row: the first column, and the one after the last")
 
 
 @once
@@ -66,34 +58,14 @@ def skin_outline(surface: Surface, camera: Camera) -> Outline:
 
 
 def _bounded(vertex: I32, image: F64, layers: I32, camera: Camera) -> Outline:
-    edge, pieces = kernels.boundary(image, layers, camera.size, PIECE)
-    return Outline(vertex=vertex, image=image, layers=layers, edge=edge, pixel=pieces)
-
-
-def cover(boundary: Outline, camera: Camera) -> Cover:
-    """Return how many layers of a surface lie over each pixel around its silhouette."""
-    low, high = _crop(boundary.image, camera)
-    layers = np.zeros((high[1] - low[1], high[0] - low[0]), np.int32)
-    first, column, begun = kernels.crossings(boundary.image, boundary.layers, camera.size[1])
-    kernels.wind(first, column, begun, low, layers)
-    return Cover(low, layers)
-
-
-def _crop(ends: F64, camera: Camera) -> tuple[I32, I32]:
-    """Return the first and last-but-one column and row that a silhouette can cover."""
-    if not len(ends):
-        return np.zeros(2, np.int32), np.zeros(2, np.int32)
-    low, high = kernels.bounds(ends)
-    first = np.clip(np.floor(low) - MARGIN, 0, camera.size).astype(np.int32)
-    last = np.clip(np.ceil(high) + MARGIN + 1, first, camera.size).astype(np.int32)
-    return first, last
+    first, spans, edge, pieces = kernels.boundary(image, layers, camera.size, PIECE)
+    return Outline(vertex=vertex, image=image, layers=layers, edge=edge, pixel=pieces, first=first, span=spans)
 
 
 def mask(boundary: Outline, camera: Camera) -> Bool:
     """Return the silhouette as a mask (H, W)."""
     full = np.zeros((camera.size[1], camera.size[0]), bool)
-    (x, y), layers = cover(boundary, camera)
-    full[y : y + layers.shape[0], x : x + layers.shape[1]] = layers > 0
+    boundary_kernels.fill(boundary.first, boundary.span, full)
     return full
 
 
@@ -106,7 +78,7 @@ def intersection_over_union(one: Bool, other: Bool) -> float:
 def signed_distance(boundary: Outline, camera: Camera, band_px: float) -> F32:
     """Return the distance (H, W) to the boundary in px, exact to the segment, positive inside, clipped to the band."""
     distance = np.full((camera.size[1], camera.size[0]), -band_px, np.float32)
-    boundary_kernels.paint_distance(boundary.pixel, *cover(boundary, camera), np.float32(band_px), distance)
+    boundary_kernels.paint_distance(boundary.pixel, boundary.first, boundary.span, np.float32(band_px), distance)
     distance.flags.writeable = False
     return distance
 

@@ -9,7 +9,7 @@ from mocapflow.assets import Camera
 from mocapflow.data import BODY, CLOTH, Surface
 from mocapflow.geometry import meshes, silhouettes
 from mocapflow.geometry import silhouette_kernels as kernels
-from mocapflow.records import F64, I32
+from mocapflow.records import F64, I32, Bool
 from mocapflow.testing import tiny_cloth, tiny_pose, tiny_scene
 
 FOCAL, DISTANCE, RADIUS = 500.0, 3.0, 0.5
@@ -81,7 +81,6 @@ def test_a_sphere_covers_its_disc_once() -> None:
     mask = silhouettes.mask(boundary, camera())
     expected = circle_distance() > 0
     assert (mask ^ expected).sum() < 0.002 * expected.sum()
-    assert set(np.unique(silhouettes.cover(boundary, camera()).layers)) == {0, 1}
 
 
 def test_the_distance_to_the_outline_is_subpixel() -> None:
@@ -124,7 +123,6 @@ def test_a_folded_sheet_ends_at_its_fold() -> None:
     grid = np.array([[x[k], y[k], z[row]] for row in range(5) for k in range(5)])
     boundary = silhouettes.outline(surface(grid, meshes.grid_faces(5, 5, closed=False), CLOTH), camera())
     assert boundary.pixel[..., 0].max() == pytest.approx(159.5 + FOCAL * 0.2 / (DISTANCE + 0.05), abs=1e-6)
-    assert silhouettes.cover(boundary, camera()).layers.max() == 2
 
 
 def test_a_surface_behind_the_camera_has_no_outline() -> None:
@@ -151,40 +149,45 @@ def test_the_visible_part_of_a_long_half_hidden_edge_stays() -> None:
 
 def test_an_edge_that_runs_away_takes_no_memory():
     ends = np.array([[[0.0, 0.0], [1e12, 5.0]], [[0.0, 0.0], [8.0, 0.0]]])
-    edge, pieces = kernels.boundary(ends, np.ones(2, np.int32), np.array([320, 240], np.int32), 4.0)
+    _, _, edge, pieces = kernels.boundary(ends, np.ones(2, np.int32), np.array([320, 240], np.int32), 4.0)
     assert np.bincount(edge).tolist() == [kernels.MOST_PIECES, 2]
     np.testing.assert_allclose(pieces[kernels.MOST_PIECES - 1, 1], ends[0, 1])
 
 
-def test_the_boundary_is_where_a_drawn_cover_ends():
-    """Counting layers at points is what drawing them all and looking up gives; some lie outside the image."""
+def test_what_overlapping_triangles_cover_and_where_it_ends() -> None:
+    """Against signs of sides at every pixel, and looking up what lies beyond; some lie outside the image."""
     rng = np.random.default_rng(3)
-    corners = rng.uniform(-60, 380, (40, 3, 2))
-    ends = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2, 2)
-    layers = np.ones(len(ends), np.int32)
-    size = np.array([320, 240], np.int32)
-    cover = np.zeros((240, 320), np.int32)
-    kernels.wind(*kernels.crossings(ends, layers, 240), np.zeros(2, np.int32), cover)
+    corners = rng.uniform(-60, 380, (12, 3, 2))
     x, y = np.meshgrid(np.arange(320), np.arange(240))
-    turns = sum(winding(triangle, x, y) for triangle in corners)
-    np.testing.assert_array_equal(cover, turns)
+    turned = np.linalg.det(corners[:, 1:] - corners[:, :1]) > 0
+    corners[turned] = corners[turned, ::-1]  # all one way round
+    ends = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2, 2)
+    inside = np.any([winding(triangle, x, y) for triangle in corners], axis=0)
 
-    edge, pieces = kernels.boundary(ends, layers, size, 1e9)  # in one piece each
+    size = np.array([320, 240], np.int32)
+    first, spans, edge, pieces = kernels.boundary(ends, np.ones(len(ends), np.int32), size, 1e9)  # in one piece each
+    drawn = np.zeros((240, 320), bool)
+    for row in range(240):
+        for begin, end in spans[first[row] : first[row + 1]]:
+            assert not drawn[row, begin:end].any()
+            drawn[row, begin:end] = True
+    np.testing.assert_array_equal(drawn, inside)
+
     way = ends[:, 1] - ends[:, 0]
     length = np.linalg.norm(way, axis=1, keepdims=True)
-    column, row = np.rint(ends.mean(axis=1) + kernels.REACH * way[:, ::-1] * [-1, 1] / length).astype(int).T
-    inside = (column >= 0) & (column < 320) & (row >= 0) & (row < 240)
-    free = ~inside | (cover[np.clip(row, 0, 239), np.clip(column, 0, 319)] == 0)
-    assert 10 < free.sum() < 110
+    beyond = ends.mean(axis=1) + kernels.REACH * way[:, ::-1] * [-1, 1] / length
+    column, row = np.floor(beyond + 0.5).astype(int).T
+    shown = (column >= 0) & (column < 320) & (row >= 0) & (row < 240)
+    free = ~shown | ~inside[np.clip(row, 0, 239), np.clip(column, 0, 319)]
+    assert 5 < free.sum() < 30
     np.testing.assert_array_equal(edge, np.flatnonzero(free))
     np.testing.assert_allclose(pieces, ends[edge])
 
 
-def winding(triangle: F64, x: I32, y: I32) -> I32:
-    """Return how often a directed triangle winds about each pixel, by the signs of its sides."""
+def winding(triangle: F64, x: I32, y: I32) -> Bool:
+    """Return which pixels lie within a triangle that winds about them, by the signs of its sides."""
     ends = zip(triangle, np.roll(triangle, -1, axis=0), strict=True)
-    sides = [(b - a)[0] * (y - a[1]) - (b - a)[1] * (x - a[0]) for a, b in ends]
-    return np.all([s < 0 for s in sides], axis=0).astype(int) - np.all([s > 0 for s in sides], axis=0)
+    return np.all([(b - a)[0] * (y - a[1]) < (b - a)[1] * (x - a[0]) for a, b in ends], axis=0)
 
 
 def test_the_skin_has_the_outline_of_the_bare_body() -> None:
