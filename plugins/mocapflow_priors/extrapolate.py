@@ -6,6 +6,7 @@ import numpy as np
 
 from mocapflow.data import Past, Pose
 from mocapflow.geometry import twists
+from mocapflow.geometry.once import once
 
 
 def interval(past: Past) -> float:
@@ -15,6 +16,7 @@ def interval(past: Past) -> float:
     return max(past.moments[-1].time - past.moments[-2].time, 0.0)
 
 
+@once
 def continued(past: Past, steps: float) -> Pose:
     """Return the last pose moved on by `steps` times its last motion: the root by its twist, the angles linearly.
 

@@ -10,6 +10,7 @@ from pydantic import Field
 from mocapflow.assets import Body
 from mocapflow.components import Prior
 from mocapflow.data import Past, Pose, Residual
+from mocapflow.geometry.once import once
 from mocapflow.scene import Scene
 from mocapflow_priors.rows import whitened
 
@@ -28,15 +29,17 @@ class SpineCoupling(Prior):
 
     def residual(self, pose: Pose, past: Past, scene: Scene) -> Residual:
         """Return one row for each pair of angles of the same name."""
-        pairs = self.pairs(scene.body)
+        pairs = _namesakes(scene.body, self.lower, self.upper)
         jacobian = np.zeros((len(pairs), 6 + len(pose.angles)))
         sharpness = 1.0 / np.radians(self.sd_deg)
         for row, (below, above) in enumerate(pairs):
             jacobian[row, 6 + below], jacobian[row, 6 + above] = sharpness, -sharpness
         return whitened(jacobian[:, 6:] @ pose.angles, jacobian)
 
-    def pairs(self, body: Body) -> list[tuple[int, int]]:
-        """Return the screws of the lower and of the upper joint that have the same name, e.g. flexion."""
-        number = {name: index for index, name in enumerate(body.screw_names)}
-        namesakes = [(name, f"{self.upper}.{name.partition('.')[2]}") for name in body.screw_names]
-        return [(number[a], number[b]) for a, b in namesakes if a.startswith(f"{self.lower}.") and b in number]
+
+@once
+def _namesakes(body: Body, lower: str, upper: str) -> list[tuple[int, int]]:
+    """Return the screws of the lower and of the upper joint that have the same name, e.g. flexion."""
+    number = {name: index for index, name in enumerate(body.screw_names)}
+    both = [(name, f"{upper}.{name.partition('.')[2]}") for name in body.screw_names]
+    return [(number[a], number[b]) for a, b in both if a.startswith(f"{lower}.") and b in number]
