@@ -18,7 +18,6 @@ BACK = 3  # frames after wrong ones, by which the pose is right again
 
 
 LEGS = [f"{joint}_{side}" for joint in ("knee_flexion", "hip_flexion", "ankle") for side in "lr"]
-PRIORS = "[joint_limits, rest_pose, spine_coupling, {use: smooth_motion, angle_sd_deg: 10}, parzen]"
 
 
 def tracked(out, pipeline, *more):
@@ -47,7 +46,6 @@ def test_wrong_frames_are_named_and_the_pose_is_right_soon_after(tmp_path):
 def test_legs_that_nobody_sees_do_not_jump_and_are_found_where_they_are(tmp_path):
     """A knee is raised by 100 degrees meanwhile."""
     covered = "stages.corrupt before background={use: corrupt, events: [{what: covered, first: 4, count: 10}]}"
-    words = ("--frames", "0:18", "--set", covered, "--set", f"stages.track.priors={PRIORS}")
-    errors, legs, _ = tracked(tmp_path / "run", "skirt.yaml", *words)
+    errors, legs, _ = tracked(tmp_path / "run", "skirt.yaml", "--frames", "0:18", "--set", covered)
     assert np.abs(np.diff(legs[3:14], axis=0)).max() < 30
     assert errors[14 + BACK].max() < 10

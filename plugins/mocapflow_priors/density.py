@@ -38,6 +38,14 @@ class Density:
         chosen = [self.names.index(name) for name in names]
         return Density(names=tuple(names), poses=self.poses[:, chosen], bandwidth=self.bandwidth)
 
+    def on(self, names: Sequence[str]) -> F64:
+        """Return the training poses (N, D) as angles of a body's screws; NaN where nothing was trained."""
+        poses = np.full((len(self.poses), len(names)), np.nan)
+        for column, name in enumerate(names):
+            if name in self.names:
+                poses[:, column] = self.poses[:, self.names.index(name)]
+        return poses
+
 
 def log_density(density: Density, angles: F64) -> tuple[float, F64]:
     """Return log p (rad^-K) of a pose (K,) rad and the mean (K,) rad of the training poses, weighted by nearness.

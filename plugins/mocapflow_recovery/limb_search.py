@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Annotated, ClassVar, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from mocapflow_priors.density import read
+from mocapflow_priors.parzen import SHIPPED
 from pydantic import Field, PrivateAttr
 
 from mocapflow.assets import Background, Body, Camera
@@ -18,7 +21,7 @@ from mocapflow.records import F64
 from mocapflow_recovery.certain import Room, View, small_room, views
 from mocapflow_recovery.coarse import coarse_body
 from mocapflow_recovery.disagreement import distance, floating_area, uncovered_area
-from mocapflow_recovery.sampling import Spread, search
+from mocapflow_recovery.sampling import Plan, Spread, search, seen_samples
 
 Positive = Annotated[float, Field(gt=0)]
 Count = Annotated[int, Field(ge=1)]
@@ -43,7 +46,8 @@ class LimbSearch(Recovery):
 
     A level set that starts from the model can't find a limb the model has lost, so the two agree in their error.
     Where large parts of person and model lie far apart, poses are sampled part by part around the fitted pose, the
-    one that was believed before and that of the frame before, and the loop settles again from the best of them.
+    one that was believed before or that of the frame before, and limbs as people were seen to hold them; the loop
+    settles again from the best of them.
     It needs the empty scene; without one every fit is taken as it is.
     """
 
@@ -58,6 +62,8 @@ class LimbSearch(Recovery):
     near_m: Positive = 0.35  # changes further than this from the model are somebody else
     cap_m: Positive = 0.2  # beyond, it does not matter how far
     samples: Count = 40  # of each part in a round
+    poses: Path = SHIPPED  # that people were seen in, made by `mocapflow prior fit`: limbs are tried as they are there
+    seen_samples: Annotated[int, Field(ge=0)] = 100  # of each limb in the first round, from `poses`
     shares: Annotated[tuple[Positive, ...], Field(min_length=1)] = (1.0, 0.6, 0.4, 0.25, 0.12)  # of the spread
     spread_deg: Positive = 25.0  # standard deviation of the first samples; less where a joint at rest hardly bends
     root_spread_deg: Positive = 8.0  # likewise, of the root's turn
@@ -105,11 +111,15 @@ class LimbSearch(Recovery):
                 for pose, cloth in zip(poses, clothes, strict=True)
             ])  # fmt: skip
 
+        plan, rng = self._plan(body), np.random.default_rng(frame.index)
+        at_rest, every = np.zeros(len(body.twists)), np.arange(len(body.twists), dtype=np.int32)
         begins = [settled.estimate.pose, state.estimate.pose, *(moment.pose for moment in past.moments[-1:])]
-        begin = begins[int(cost(begins).argmin())]
+        begins += seen_samples(Pose(root=state.estimate.pose.root, angles=at_rest), every, body, plan, rng)
+        return search(cost, begins[int(cost(begins).argmin())], body, plan, rng)
+
+    def _plan(self, body: Body) -> Plan:
         spread = Spread(np.radians(self.spread_deg), np.radians(self.root_spread_deg), self.root_spread_m)
-        rng = np.random.default_rng(frame.index)
-        return search(cost, begin, body, spread, self.shares, self.samples, rng)
+        return Plan(spread, self.shares, self.samples, read(self.poses).on(body.screw_names), self.seen_samples)
 
     def _stray(self, model: ClothedModel, seen: Sequence[View], surface: Surface) -> Stray:
         return Stray(

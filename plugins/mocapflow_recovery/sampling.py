@@ -28,28 +28,53 @@ class Spread(NamedTuple):
     shift: float  # m, the root
 
 
-def search(
-    cost: Cost, pose: Pose, body: Body, spread: Spread, shares: Sequence[float], count: int, rng: np.random.Generator
-) -> Pose:
-    """Return the best pose found around a pose, never a worse one.
+class Plan(NamedTuple):
+    """How to sample."""
+
+    spread: Spread
+    shares: Sequence[float]  # of the spread, round by round
+    samples: int  # of each part in a round
+    seen: F64  # (N, D) rad, poses that people were seen in, NaN where an angle is not known; N may be 0
+    seen_samples: int  # of each limb among those, in the first round
+
+
+def search(cost: Cost, pose: Pose, body: Body, plan: Plan, rng: np.random.Generator) -> Pose:
+    """Return the best pose found around a pose, or among those that people were seen in; never a worse one.
+
+    In each round every part is tried from the same pose, then the parts move, the one that gains most first, as far
+    as that still helps: two legs may want the same place, and the wrong one must not come first.
 
     Args:
         cost: what is made small.
         pose: where the search begins.
-        body: whose parts are tried one after the other.
-        spread: how far samples lie from the best pose so far.
-        shares: of the spread, round by round.
-        count: samples of each part in a round.
+        body: whose parts are tried.
+        plan: how to sample.
         rng: of the samples.
     """
     best, least = pose, float(cost([pose])[0])
-    for share in shares:
+    for turn, share in enumerate(plan.shares):
+        moves = []
         for part in parts(body):
-            tries = list(samples(best, part, body, spread, share, count, rng))
+            tries = list(samples(best, part, body, plan.spread, share, plan.samples, rng))
+            if turn == 0 and part is not None:
+                tries += seen_samples(best, part, body, plan, rng)
             costs = cost(tries)
-            if costs.min() < least:
-                best, least = tries[int(costs.argmin())], float(costs.min())
+            moves.append((float(costs.min()), part, tries[int(costs.argmin())]))
+        for _, part, other in sorted(moves, key=lambda move: move[0]):
+            there = with_part(best, part, other)
+            value = float(cost([there])[0])
+            if value < least:
+                best, least = there, value
     return best
+
+
+def with_part(pose: Pose, part: I32 | None, other: Pose) -> Pose:
+    """Return a pose with one part of another."""
+    if part is None:
+        return Pose(root=other.root, angles=pose.angles)
+    angles = pose.angles.copy()
+    angles[part] = other.angles[part]
+    return Pose(root=pose.root, angles=angles)
 
 
 def parts(body: Body) -> list[I32 | None]:
@@ -88,3 +113,15 @@ def samples(
         bent = pose.angles.copy()
         bent[part] = np.clip(bent[part] + deviation * change, *body.limits[part].T)
         yield Pose(root=pose.root, angles=bent)
+
+
+def seen_samples(pose: Pose, part: I32, body: Body, plan: Plan, rng: np.random.Generator) -> list[Pose]:
+    """Return poses with one part as people were seen to hold it; what is not known of it stays."""
+    seen = plan.seen[:, part]
+    rows = np.flatnonzero(~np.isnan(seen).all(axis=1))
+    found = []
+    for row in rng.choice(rows, min(plan.seen_samples, len(rows)), replace=False):
+        bent = pose.angles.copy()
+        bent[part] = np.clip(np.where(np.isnan(seen[row]), bent[part], seen[row]), *body.limits[part].T)
+        found.append(Pose(root=pose.root, angles=bent))
+    return found

@@ -9,7 +9,7 @@ import pytest
 from mocapflow_recovery.certain import pixel_size, shrunk, small_room, views
 from mocapflow_recovery.coarse import coarse_body
 from mocapflow_recovery.disagreement import distance, floating_area, uncovered_area
-from mocapflow_recovery.sampling import Spread, parts, samples, search
+from mocapflow_recovery.sampling import Plan, Spread, parts, samples, search, seen_samples
 
 from mocapflow.data import NO_CLOTH, Pose
 from mocapflow.geometry.cameras import project
@@ -20,6 +20,7 @@ POSE = scenes.tiny_pose(SCENE, 3, 0.1)
 FRAME = pictures.tiny_frame(SCENE, POSE)
 ROOM = small_room(SCENE.background, SCENE.cameras, 120)
 SPREAD = Spread(np.radians(25), np.radians(8), 0.06)
+PLAN = Plan(SPREAD, (1.0, 0.5, 0.25), 40, np.empty((0, len(POSE.angles))), 0)
 
 
 def astray(angle: float) -> Pose:
@@ -127,9 +128,36 @@ def test_search_finds_a_leg() -> None:
         return np.array([distance(surface(pose), seen_now, 0.2) for pose in poses])
 
     seen_now = seen()
-    found = search(cost, astray(0.8), SCENE.body, SPREAD, (1.0, 0.5, 0.25), 40, np.random.default_rng(1))
+    found = search(cost, astray(0.8), SCENE.body, PLAN, np.random.default_rng(1))
     hip = SCENE.body.screw_names.index("hip_l.abduction")
     assert abs(found.angles[hip] - POSE.angles[hip]) < 0.1
+
+
+def test_the_leg_that_fits_better_moves_first() -> None:
+    """There is room for one of two; the one that is tried first fits less well."""
+    body = template_body()
+    first, second = parts(body)[2:4]
+
+    def cost(poses):
+        moved = np.array([[pose.angles[leg].any() for leg in (first, second)] for pose in poses])
+        return 10 * moved.all(axis=1) - 2 * moved[:, 0] - 3 * moved[:, 1]
+
+    still = Pose(root=POSE.root, angles=np.zeros(len(body.twists)))
+    plan = Plan(Spread(0.0, 0.0, 0.0), (1.0,), 1, np.full((1, len(body.twists)), 0.1), 1)
+    found = search(cost, still, body, plan, np.random.default_rng(0))
+    assert found.angles[second].any() and not found.angles[first].any()
+
+
+def test_seen_samples_bend_what_was_seen_and_nothing_else() -> None:
+    leg = parts(SCENE.body)[2]
+    seen_poses = np.full((5, len(POSE.angles)), np.nan)
+    seen_poses[:, leg[0]] = np.linspace(0.1, 0.5, 5)
+    plan = PLAN._replace(seen=seen_poses, seen_samples=3)
+    tried = seen_samples(POSE, leg, SCENE.body, plan, np.random.default_rng(0))
+    assert len({pose.angles[leg[0]] for pose in tried}) == 3
+    assert all(pose.angles[leg[0]] in seen_poses[:, leg[0]] for pose in tried)
+    assert all((np.delete(pose.angles, leg[0]) == np.delete(POSE.angles, leg[0])).all() for pose in tried)
+    assert not seen_samples(POSE, parts(SCENE.body)[1], SCENE.body, plan, np.random.default_rng(0))
 
 
 def test_a_coarse_body_moves_like_the_full_one() -> None:
