@@ -17,6 +17,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from mocapflow_sequence.start_from_file import calm, read_pose
 
+from mocapflow.assets import Camera
 from mocapflow.components import Prior, Segmenter
 from mocapflow.data import (
     BODY,
@@ -40,13 +41,14 @@ from mocapflow.loop import settle
 from mocapflow.model import ClothedModel, moved
 from mocapflow.pipeline import load_pipeline
 from mocapflow.recording import open_recording
-from mocapflow.records import F64
+from mocapflow.records import F64, Bool
 from mocapflow.scene import Scene
 from mocapflow.track import CoupledLoop, believed
 
 CENTRE_SD = 5e-5  # m, of the true joint centres
 LOOSE = np.radians(90.0)  # rad, spread of angles that are free
 BAND_PX = 12.0
+FEET_PX = 8.0
 
 
 class Errors(NamedTuple):
@@ -84,6 +86,7 @@ def variants(
         "as shipped": (segmenter, ()),
         "true masks": (masks, ()),
         "true masks below the hem": (masks.model_copy(update={"part": "below"}), ()),
+        "true masks at the feet": (masks.model_copy(update={"part": "feet"}), ()),
         "true masks above the waist": (masks.model_copy(update={"part": "above"}), ()),
         "true pelvis": (segmenter, (TruePelvis(truth=poses),)),
     }
@@ -114,7 +117,7 @@ class TrueMasks(Segmenter):
     name = "true_masks"
     inner: Segmenter
     truth: tuple[Surface, ...]
-    part: Literal["all", "above", "below"]
+    part: Literal["all", "above", "below", "feet"]
     model_config = {"frozen": True, "arbitrary_types_allowed": True}
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
@@ -129,9 +132,25 @@ class TrueMasks(Segmenter):
         distance, true = found.distance.copy(), model_distance(surface, camera, min(BAND_PX, band))
         cloth = project(surface.vertices[surface.layer == CLOTH], camera)[:, 1]
         first, last = np.clip([cloth.min(), cloth.max()], 0, len(distance)).astype(int)
-        rows = {"all": slice(None), "above": slice(0, first), "below": slice(last, None)}[self.part]
-        distance[rows] = true[rows]
+        rows = {"all": slice(None), "above": slice(0, first), "below": slice(last, None)}
+        chosen = around_feet(surface, camera, scene) if self.part == "feet" else rows[self.part]
+        distance[chosen] = true[chosen]
         return replace(found, distance=distance)
+
+
+def around_feet(surface: Surface, camera: Camera, scene: Scene) -> Bool:
+    """Return the pixels (H, W) within `FEET_PX` of where a vertex of the feet is seen, hidden or not."""
+    import cv2
+
+    body = scene.body
+    carrier = body.skin_joint[np.arange(len(body.vertices)), body.skin_weight.argmax(axis=1)]
+    feet = np.isin(carrier, [body.joint(f"{name}_{side}") for name in ("ankle", "toe") for side in "lr"])
+    width, height = (int(length) for length in camera.size)
+    pixels = np.rint(project(surface.vertices[: len(feet)][feet], camera)).astype(int)
+    column, row = pixels[((pixels >= 0) & (pixels < camera.size)).all(axis=1)].T
+    elsewhere = np.ones((height, width), np.uint8)
+    elsewhere[row, column] = 0
+    return np.asarray(cv2.distanceTransform(elsewhere, cv2.DIST_L2, 3) < FEET_PX)
 
 
 class TruePelvis(Prior):
