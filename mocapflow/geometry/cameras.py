@@ -43,6 +43,12 @@ def centre(camera: Camera) -> F64:
     return position
 
 
+def magnification(camera: Camera, point: F64) -> float:
+    """Return how large a view shows what stands at a point (3,) in m: px per metre across the line of sight."""
+    depth = camera.camera_from_world[2, :3] @ point + camera.camera_from_world[2, 3]
+    return float(camera.intrinsics[0, 0] / depth)
+
+
 def pinhole(camera: Camera) -> Camera:
     """Return the same camera without lens distortion: the camera of an undistorted image."""
     return replace(camera, distortion=np.zeros(5), fisheye=False)

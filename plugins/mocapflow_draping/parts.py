@@ -23,8 +23,10 @@ COLUMNS = 23
 
 def posed_parts(fields: BodyFields, chain: F64) -> F64:
     """Return the parts (B, P, COLUMNS) of a body at posed joints (B, J, 4, 4)."""
-    posed = 0.5 * (chain[:, fields.joints[:, 0]] + chain[:, fields.joints[:, 1]])
-    stretch = np.linalg.svd(posed[..., :3, :3], compute_uv=False)[..., -1].clip(1e-3)
+    one, other = chain[:, fields.joints[:, 0]], chain[:, fields.joints[:, 1]]
+    posed = 0.5 * (one + other)
+    turn = np.einsum("bpij,bpij->bp", one[..., :3, :3], other[..., :3, :3])  # 1 + 2 cos of the angle between the two
+    stretch = np.sqrt(0.25 * (turn + 1.0)).clip(1e-3)  # the cosine of half of it: across the axis the mean shrinks
     inverse = np.linalg.inv(posed)[..., :3, :]
     inverse[..., 3] -= fields.origin
     parts = np.empty((*posed.shape[:2], COLUMNS))

@@ -54,8 +54,11 @@ def push_out(grid, n, row, link, skin, seen, room, near, parts, values, motion):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def lift(grid, first, last, beside, row, seen, room, near, parts, values, motion):  # type: ignore[no-untyped-def]
-    """Move both ends of a link out of the body where its middle is inside: no limb shall come between them."""
+def lift(grid, first, last, beside, row, seen, room, near, between, clear, parts, values, motion):  # type: ignore[no-untyped-def]
+    """Move both ends of a link out of the body where its middle is inside: no limb shall come between them.
+
+    `between` (N, 3) m is where each middle was measured last, `clear` (N,) m how far from the body it was there.
+    """
     middle = np.empty(3)
     for n in range(grid.shape[0]):
         m = beside[n, row]
@@ -64,9 +67,10 @@ def lift(grid, first, last, beside, row, seen, room, near, parts, values, motion
         p, q = grid[n, row], grid[m, row]
         for a in range(3):
             middle[a] = 0.5 * (p[a] + q[a])
-        if room[n] > way(middle, seen[n]) or room[m] > way(middle, seen[m]):
+        if clear[n] > way(middle, between[n]) or room[n] > way(middle, seen[n]) or room[m] > way(middle, seen[m]):
             continue
         d, part = body_distance(middle[0], middle[1], middle[2], near[n], parts, values)
+        clear[n], between[n] = d, middle
         if d < 0.0:
             out = outwards(middle[0], middle[1], middle[2], part, parts, values)
             if motion is not None:

@@ -55,6 +55,7 @@ def _close(grid, links, first, last, across, length, skin, longest, stiff, bend,
     strands, rows = grid.shape[0], grid.shape[1]
     bars, seen = np.empty((strands, rows, 3)), grid[:, 0].copy()
     room, near = np.full(strands, -1.0), np.zeros(strands, np.int64)
+    between, clear = seen.copy(), np.full(strands, -1.0)
     _bars(grid, links, first, last, bars)
     if motion is not None:
         _bars(motion[0], links, first, last, motion[1])
@@ -66,7 +67,7 @@ def _close(grid, links, first, last, across, length, skin, longest, stiff, bend,
                 _pull(grid, first, last, across[k], length[k], row, longest, 0.0, back, motion)
             excess = _pull(grid, first, last, across[0], length[0], row, longest, stiff, back, motion)
             if sweep > 0:
-                lift(grid, first, last, across[0], row, seen, room, near, parts, values, motion)
+                lift(grid, first, last, across[0], row, seen, room, near, between, clear, parts, values, motion)
             _clear(grid, links, first, last, row, sweep > 0, skin, seen, room, near, parts, values, motion)
             if sweep + 1 >= LEAST and excess < ENOUGH:
                 break
@@ -109,8 +110,11 @@ def _pull(grid, first, last, across, length, row, longest, stiff, backwards, mot
         m = across[n, row]
         if m < 0 or row > last[n] or (row <= first[n] and row <= first[m]):
             continue
-        p, q = grid[n, row], grid[m, row]
-        dx, dy, dz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+        dx, dy, dz = (
+            grid[m, row, 0] - grid[n, row, 0],
+            grid[m, row, 1] - grid[n, row, 1],
+            grid[m, row, 2] - grid[n, row, 2],
+        )
         square, most, rest = dx * dx + dy * dy + dz * dz, longest * length[n, row], length[n, row]
         if square > most * most:
             share, limit = 1.0 - most / math.sqrt(square), 1.0
@@ -119,6 +123,7 @@ def _pull(grid, first, last, across, length, row, longest, stiff, backwards, mot
             share, limit = stiff * (1.0 - rest / math.sqrt(square)), stiff
         else:
             continue
+        p, q = grid[n, row], grid[m, row]
         if motion is not None:
             follow_draw(motion[0][n, row], motion[0][m, row], p, q, share, limit, row > first[n], row > first[m])
         _draw(p, q, share, row > first[n], row > first[m])

@@ -12,6 +12,7 @@ from pydantic import Field
 from mocapflow.assets import GarmentMesh
 from mocapflow.components import ClothFitter
 from mocapflow.data import Cloth, Estimate, Frame, Past, Segmentation, Turn
+from mocapflow.geometry.cameras import magnification
 from mocapflow.geometry.misfit import dressed, misfit
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
@@ -23,9 +24,11 @@ Positive = Annotated[float, Field(gt=0)]
 
 
 class SampledForces(ClothFitter):
-    """Tries directions and amounts of every force and refines the best; later frames try only around the last best.
+    """Tries directions and amounts of every force and refines the best, one force after the other.
 
-    The thickness of a cloth does not change: it is searched for in the first frames and kept.
+    Later frames try only calm cloth, so that a search that was led astray comes back, and around the last best. Each
+    force is held about none: where strands lie on the body none of them shows, and any would do. The thickness of a
+    cloth does not change: it is searched for in the first frames and kept.
 
     Source: Rosenhahn 2008, section 12.4
     """
@@ -33,10 +36,13 @@ class SampledForces(ClothFitter):
     name: ClassVar[str] = "sampled_forces"
     directions: Annotated[int, Field(ge=2)] = 8  # tried of a force that has two components
     amounts_deg: tuple[Positive, ...] = (5.0, 10.0, 20.0)  # tried in each direction
-    step_deg: Positive = 2.5  # of the refinement; half as much each round
+    step_deg: Positive = 5.0  # of the refinement; half as much each round
     step_mm: Positive = 1.0  # of the thickness, likewise
-    rounds: Annotated[int, Field(ge=0)] = 2  # of the refinement
+    rounds: Annotated[int, Field(ge=0)] = 3  # of the refinement
     least_gain: Annotated[float, Field(ge=0, lt=1)] = 0.01  # share of the error that another force has to save
+    force_sd_deg: Positive = 6.0  # standard deviation of each force about none
+    sigma_mm: Positive = 15.0  # standard deviation of the outline of draped cloth under the best forces
+    correlation_m: Positive = 0.3  # length over which its errors agree: half a skirt
     spacing_px: Positive = 4.0  # between the points of the outline that are compared
 
     def fit(
@@ -46,17 +52,23 @@ class SampledForces(ClothFitter):
         cloth, garment = model.drape(estimate.pose, estimate.parameters, past), model.scene.garment
         if garment is None or not segmentation.silhouettes:
             return cloth
-        surface = model.surface(estimate.pose, cloth)
+        surface, cameras = model.surface(estimate.pose, cloth), model.scene.cameras
+        scale = np.array([magnification(camera, cloth.vertices.mean(axis=0)) for camera in cameras])
+        weight = 1 / (self.correlation_m * (1e-3 * self.sigma_mm) ** 2 * scale**3)
+        forces = [column for columns in samples.forces(garment) for column in columns]
 
-        def error(vertices: F64) -> float:
-            return float(misfit(dressed(surface, vertices), segmentation, model.scene.cameras, self.spacing_px).sum())
+        def error(vertices: F64, parameters: F64) -> float:
+            """Sum the squares, in standard deviations, of what the outline is off and of all forces."""
+            off = misfit(dressed(surface, vertices), segmentation, cameras, self.spacing_px)
+            amounts = np.degrees(parameters[forces]) / self.force_sd_deg
+            return float(weight @ off + amounts @ amounts)
 
-        best, least = cloth, error(cloth.vertices)
+        best, least = cloth, error(cloth.vertices, cloth.parameters)
         enough = (1 - self.least_gain) * least
         for trials in self._rounds(garment, first=len(past.moments) < FIRST_FRAMES):
             parameters = trials(best.parameters)
             drapes = model.drapes(estimate.pose, parameters, past)
-            errors = [error(vertices) for vertices in drapes]
+            errors = [error(*trial) for trial in zip(drapes, parameters, strict=True)]
             if min(errors) < least:
                 k = int(np.argmin(errors))
                 best, least = Cloth(vertices=drapes[k].copy(), parameters=parameters[k].copy()), errors[k]
@@ -64,9 +76,16 @@ class SampledForces(ClothFitter):
 
     def _rounds(self, garment: GarmentMesh, first: bool) -> Iterator[Callable[[F64], F64]]:
         """Yield what makes parameters (B, Q) to try of the best (Q,) so far."""
+        forces = samples.forces(garment)
         if first:
             for columns, values in samples.coarse(garment, self.directions, np.radians(self.amounts_deg)):
                 yield partial(samples.replaced, garment, columns=columns, values=values)
+        else:
+            every = [column for columns in forces for column in columns]
+            yield partial(samples.replaced, garment, columns=every, values=np.zeros((1, len(every))))
         for k in range(self.rounds):
-            tilt, thickness = np.radians(self.step_deg) / 2**k, first * self.step_mm / 1000 / 2**k
-            yield partial(samples.neighbours, garment, tilt=tilt, thickness=thickness)
+            for columns in forces:
+                yield partial(samples.beside, garment, columns=columns, step=np.radians(self.step_deg) / 2**k)
+            if first and samples.THICKNESS in garment.parameter_names:
+                column = garment.parameter_names.index(samples.THICKNESS)
+                yield partial(samples.beside, garment, columns=[column], step=self.step_mm / 1000 / 2**k)

@@ -50,10 +50,9 @@ def replaced(garment: GarmentMesh, parameters: F64, columns: list[int], values: 
     return within(garment, rows)
 
 
-def neighbours(garment: GarmentMesh, parameters: F64, tilt: float, thickness: float) -> F64:
-    """Return parameters (B, Q) one step up and down in each force (rad) and, if above zero, in the thickness (m)."""
-    step = np.array([thickness if name == THICKNESS else tilt for name in garment.parameter_names])
-    moves = np.diag(step)[step > 0]
+def beside(garment: GarmentMesh, parameters: F64, columns: list[int], step: float) -> F64:
+    """Return parameters (B, Q) one step up and down in each of some columns."""
+    moves = step * np.eye(len(parameters))[columns]
     return within(garment, parameters + np.concatenate([moves, -moves]))
 
 

@@ -33,6 +33,13 @@ def test_projecting_a_point_of_a_ray_gives_its_pixel():
     assert np.abs(cameras.project(points, view) - wanted).max() < 1e-9
 
 
+def test_magnification_is_how_far_a_step_aside_moves_the_pixel():
+    view, point = camera(), np.array([0.2, 0.1, 0.9])
+    aside = 1e-6 * view.camera_from_world[0, :3]  # the camera's x axis
+    moved = np.linalg.norm(np.diff(cameras.project(np.stack([point, point + aside]), view), axis=0))
+    assert abs(moved / 1e-6 / cameras.magnification(view, point) - 1) < 1e-6
+
+
 def test_points_behind_the_camera_have_no_pixel():
     view = camera()
     behind = cameras.centre(view) - view.camera_from_world[2, :3]

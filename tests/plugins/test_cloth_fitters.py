@@ -108,9 +108,9 @@ def test_samples_cover_every_force(model):
     ]  # fmt: skip
     values = samples.in_all_directions(2, 8, np.radians([5.0, 10.0, 20.0]))
     assert values.shape == (25, 2)
-    beside = samples.neighbours(garment, parameters(model), 0.1, 0.0)
-    assert beside.shape == (10, 6)
-    assert (beside[:, garment.parameter_names.index("thickness_m")] == 0).all()
+    beside = samples.beside(garment, parameters(model), [2, 3], 0.1)
+    np.testing.assert_array_equal(beside[:, 2:4], 0.1 * np.array([[1, 0], [0, 1], [-1, 0], [0, -1]]))
+    assert (np.delete(beside, [2, 3], axis=1) == 0).all()
 
 
 def test_the_slope_that_gauss_newton_follows_is_the_energys(model):
