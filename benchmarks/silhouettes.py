@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from inspect import unwrap
 
 import cv2
 import numpy as np
@@ -28,6 +29,7 @@ from mocapflow.shipped import shipped
 CLIP = shipped("examples", "data", "skirt_steps")
 SIZE = np.array([640, 800])  # px
 SPACING, BAND = 4.0, 8.0  # px, as in tracking
+outline = unwrap(silhouettes.outline)  # which is otherwise computed once for a surface
 
 
 def at_full_size(camera: Camera) -> Camera:
@@ -73,8 +75,9 @@ def steps_of(surface: Surface, camera: Camera) -> dict[str, Callable[[], object]
     kernels.face_directions(pixels, surface.faces, facing)
     cloth = surface.layer == CLOTH
     segments, times = kernels.occluding_edges(surface.edges, facing, cloth)
-    boundary = silhouettes.outline(surface, camera)
-    cover = np.zeros_like(boundary.cover)
+    ends, boundary = pixels[segments], silhouettes.outline(surface, camera)
+    crossings = kernels.crossings(ends, camera.size)
+    covered = kernels.covered(*crossings, times, camera.size[0])
     fine = np.round(pixels[surface.faces] * 16).astype(np.int32)
     coarse = np.round(pixels[surface.faces]).astype(np.int32)[:, :, None]
     return {
@@ -82,8 +85,10 @@ def steps_of(surface: Surface, camera: Camera) -> dict[str, Callable[[], object]
         "  project": lambda: kernels.project(surface.vertices, matrix, pixels, depth),
         "  faces towards the camera": lambda: kernels.face_directions(pixels, surface.faces, facing),
         "  occluding edges": lambda: kernels.occluding_edges(surface.edges, facing, cloth),
-        "  wind": lambda: kernels.wind(pixels[segments], times, boundary.corner, np.zeros_like(cover)),
-        "  outline, all of the above": lambda: silhouettes.outline(surface, camera),
+        "  where they cross the rows": lambda: kernels.crossings(ends, camera.size),
+        "  what they cover": lambda: kernels.covered(*crossings, times, camera.size[0]),
+        "  where that ends": lambda: kernels.boundary(ends, times, *covered, silhouettes.PIECE),
+        "  outline, all of the above": lambda: outline(surface, camera),
         "  contour samples": lambda: silhouettes.samples(boundary, surface, camera, SPACING),
         "vertex normals, once for all views": lambda: meshes.vertex_normals(surface.vertices, surface.faces),
         "signed distance": lambda: silhouettes.signed_distance(boundary, camera, BAND),
@@ -93,7 +98,7 @@ def steps_of(surface: Surface, camera: Camera) -> dict[str, Callable[[], object]
 
 
 def both(surface: Surface, camera: Camera) -> object:
-    boundary = silhouettes.outline(surface, camera)
+    boundary = outline(surface, camera)
     return silhouettes.mask(boundary, camera), silhouettes.samples(boundary, surface, camera, SPACING)
 
 

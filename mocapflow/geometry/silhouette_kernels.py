@@ -64,86 +64,20 @@ def occluding_edges(edges, facing, cloth):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def boundary(ends, times, size, longest):  # type: ignore[no-untyped-def]
-    """Return what directed segments cover, row by row, and the pieces of them with nothing beyond.
+def crossings(ends, size):  # type: ignore[no-untyped-def]
+    """Return where directed segments cross the rows of an image: the column behind, and which segment it is.
 
-    Segments are judged in equal pieces no longer than `longest` px; one that all but touches the plane of a camera
-    is cut into no more than MOST_PIECES.
-
-    Returns:
-        first (height + 1,) and spans (S, 2): see `covered`; the segment (B,) and the ends (B, 2, 2) of the pieces.
+    Those of a row are the elements begin[row] to begin[row + 1], in the order of their columns. A segment that runs
+    up, with what it covers before it, is given as -1 - segment.
     """
-    counts = np.empty(len(ends), np.int64)
-    for s in range(len(ends)):
-        dx, dy = ends[s, 1, 0] - ends[s, 0, 0], ends[s, 1, 1] - ends[s, 0, 1]
-        counts[s] = max(math.ceil(min(math.sqrt(dx * dx + dy * dy) / longest, MOST_PIECES)), 1)
-    whole, pieces = np.empty(counts.sum(), np.int32), np.empty((counts.sum(), 2, 2))
-    first, spans = covered(ends, times, size)
-    count = 0
-    for s in range(len(ends)):
-        x, y = ends[s, 0, 0], ends[s, 0, 1]
-        dx, dy = (ends[s, 1, 0] - x) / counts[s], (ends[s, 1, 1] - y) / counts[s]
-        length = math.sqrt(dx * dx + dy * dy)
-        if length == 0.0:
-            continue
-        for k in range(counts[s]):
-            column = math.floor(x + (k + 0.5) * dx - REACH * dy / length + 0.5)
-            row = math.floor(y + (k + 0.5) * dy + REACH * dx / length + 0.5)
-            if not (0 <= row < size[1] and _within(column, spans, first[row], first[row + 1])):
-                whole[count] = s
-                pieces[count, 0, 0], pieces[count, 0, 1] = x + k * dx, y + k * dy
-                pieces[count, 1, 0], pieces[count, 1, 1] = x + (k + 1) * dx, y + (k + 1) * dy
-                count += 1
-    return first, spans, whole[:count].copy(), pieces[:count].copy()
-
-
-@numba.njit(cache=True)
-def _within(column, spans, begin, end):  # type: ignore[no-untyped-def]
-    inside = False
-    for k in range(begin, end):
-        inside |= spans[k, 0] <= column < spans[k, 1]
-    return inside
-
-
-@numba.njit(cache=True)
-def covered(ends, times, size):  # type: ignore[no-untyped-def]
-    """Return the pixels of an image that directed segments wind about, row by row.
-
-    Returns:
-        first (height + 1,) and spans (S, 2): those of a row are the elements first[row] to first[row + 1], each a
-        first column and the one after the last.
-    """
-    begin, column, layers = _crossings(ends, times, size)
-    first, spans, count = np.zeros(size[1] + 1, np.int32), np.empty((len(column), 2), np.int32), 0
-    for row in range(size[1]):
-        over = 0
-        for c in range(begin[row], begin[row + 1]):
-            before, over = over, over + layers[c]
-            if before <= 0 < over:
-                spans[count, 0] = column[c]
-            elif over <= 0 < before and column[c] > spans[count, 0]:
-                spans[count, 1] = column[c]
-                count += 1
-        if over > 0:  # what ends behind the camera is open
-            spans[count, 1] = size[0]
-            count += 1
-        first[row + 1] = count
-    return first, spans[:count].copy()
-
-
-@numba.njit(cache=True)
-def _crossings(ends, times, size):  # type: ignore[no-untyped-def]
-    """Return where directed segments cross the rows of an image: the column behind, and how many layers begin there.
-
-    Those of a row are the elements begin[row] to begin[row + 1], in the order of their columns.
-    """
-    begin = np.zeros(size[1] + 1, np.int64)
+    begin = np.zeros(size[1] + 1, np.int32)
     for s in range(len(ends)):
         for row in range(*_rows(ends[s, 0, 1], ends[s, 1, 1], size[1])):
             begin[row + 1] += 1
-    begin = np.cumsum(begin)
+    for row in range(size[1]):
+        begin[row + 1] += begin[row]
     end = begin[:-1].copy()  # of what is there so far
-    column, layers = np.empty(begin[-1], np.int32), np.empty(begin[-1], np.int32)
+    column, segment = np.empty(begin[-1], np.int32), np.empty(begin[-1], np.int32)
     right = float(size[0])
     for s in range(len(ends)):
         x0, y0, x1, y1 = ends[s, 0, 0], ends[s, 0, 1], ends[s, 1, 0], ends[s, 1, 1]
@@ -152,14 +86,75 @@ def _crossings(ends, times, size):  # type: ignore[no-untyped-def]
             at = math.ceil(min(max(x0 + slope * (row - y0), 0.0), right))
             last = end[row]
             while last > begin[row] and column[last - 1] > at:
-                column[last], layers[last] = column[last - 1], layers[last - 1]
+                column[last], segment[last] = column[last - 1], segment[last - 1]
                 last -= 1
-            column[last], layers[last] = at, times[s] if y1 > y0 else -times[s]
+            column[last], segment[last] = at, s if y1 > y0 else -1 - s
             end[row] += 1
-    return begin, column, layers
+    return begin, column, segment
 
 
 @numba.njit(cache=True)
 def _rows(one, other, height):  # type: ignore[no-untyped-def]
     """Return the first and last-but-one row of an image between two heights."""
     return max(math.ceil(min(one, other)), 0), min(math.ceil(max(one, other)), height)
+
+
+@numba.njit(cache=True)
+def covered(begin, column, segment, layers, width):  # type: ignore[no-untyped-def]
+    """Return the pixels that segments wind about, row by row, from their crossings and how many layers end at each.
+
+    Returns:
+        first (height + 1,) and spans (S, 2): those of a row are the elements first[row] to first[row + 1], each a
+        first column and the one after the last.
+    """
+    first, spans, count = np.zeros(len(begin), np.int32), np.empty((len(column), 2), np.int32), 0
+    for row in range(len(begin) - 1):
+        over = 0
+        for c in range(begin[row], begin[row + 1]):
+            before, s = over, segment[c]
+            over += layers[s] if s >= 0 else -layers[-1 - s]
+            if before <= 0 < over:
+                spans[count, 0] = column[c]
+            elif over <= 0 < before and column[c] > spans[count, 0]:
+                spans[count, 1] = column[c]
+                count += 1
+        if over > 0:  # what ends behind the camera is open
+            spans[count, 1] = width
+            count += 1
+        first[row + 1] = count
+    return first, spans[:count].copy()
+
+
+@numba.njit(cache=True)
+def boundary(ends, layers, first, spans, longest):  # type: ignore[no-untyped-def]
+    """Return the pieces of directed segments where a cover ends: their segment (B,) and their ends (B, 2, 2).
+
+    Segments at which no layer ends are left out. They are judged in equal pieces no longer than `longest` px; one
+    that all but touches the plane of a camera is cut into no more than MOST_PIECES.
+    """
+    counts = np.zeros(len(ends), np.int64)
+    for s in range(len(ends)):
+        dx, dy = ends[s, 1, 0] - ends[s, 0, 0], ends[s, 1, 1] - ends[s, 0, 1]
+        if layers[s] and (dx or dy):
+            counts[s] = max(math.ceil(min(math.sqrt(dx * dx + dy * dy) / longest, MOST_PIECES)), 1)
+    edge, pieces = np.empty(counts.sum(), np.int32), np.empty((counts.sum(), 2, 2))
+    count = 0
+    for s in range(len(ends)):
+        if counts[s] == 0:
+            continue
+        x, y, share = ends[s, 0, 0], ends[s, 0, 1], 1.0 / counts[s]
+        dx, dy = share * (ends[s, 1, 0] - x), share * (ends[s, 1, 1] - y)
+        reach = REACH / math.sqrt(dx * dx + dy * dy)
+        for k in range(counts[s]):
+            column = math.floor(x + (k + 0.5) * dx - reach * dy + 0.5)
+            row = math.floor(y + (k + 0.5) * dy + reach * dx + 0.5)
+            inside = False
+            if 0 <= row < len(first) - 1:
+                for c in range(first[row], first[row + 1]):
+                    inside |= spans[c, 0] <= column < spans[c, 1]
+            if not inside:
+                edge[count] = s
+                pieces[count, 0, 0], pieces[count, 0, 1] = x + k * dx, y + k * dy
+                pieces[count, 1, 0], pieces[count, 1, 1] = x + (k + 1) * dx, y + (k + 1) * dy
+                count += 1
+    return edge[:count].copy(), pieces[:count].copy()

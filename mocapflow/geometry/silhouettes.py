@@ -28,10 +28,11 @@ class Outline:
     vertex: I32 = array("E", 2, unit="surface vertex index of the two ends of an edge")
     image: F64 = array("E", 2, 2, unit="px, where these project")
     layers: I32 = array("E", unit="how many layers of the surface end there")
-    edge: I32 = array("B", unit="index of the edge that a piece belongs to")
-    pixel: F64 = array("B", 2, 2, unit="px, the two ends of the piece")
+    crossings: tuple[I32, I32, I32]  # of the edges with the rows of the image: see the kernel
     first: I32 = array("H", unit="index of the first span in each row of the image, then how many there are")
     span: I32 = array("S", 2, unit="px, covered in a row: the first column, and the one after the last")
+    edge: I32 = array("B", unit="index of the edge that a piece of the boundary belongs to")
+    pixel: F64 = array("B", 2, 2, unit="px, the two ends of the piece")
 
 
 @once
@@ -45,21 +46,24 @@ def outline(surface: Surface, camera: Camera) -> Outline:
     facing = np.empty(len(surface.faces), np.int8)
     kernels.face_directions(pixels, surface.faces, facing)
     vertex, layers = kernels.occluding_edges(surface.edges, facing, surface.layer == CLOTH)
-    return _bounded(vertex, pixels.take(vertex, axis=0), layers, camera)  # several times faster than pixels[vertex]
+    image = pixels.take(vertex, axis=0)  # several times faster than pixels[vertex]
+    return _bounded(vertex, image, layers, kernels.crossings(image, camera.size), camera)
 
 
 @once
 def skin_outline(surface: Surface, camera: Camera) -> Outline:
     """Return the boundary of the silhouette that the body of a surface has without its cloth."""
     whole = outline(surface, camera)
-    skin = np.flatnonzero(surface.layer.take(whole.vertex[:, 0]) != CLOTH)
-    edges = whole.vertex.take(skin, axis=0), whole.image.take(skin, axis=0), whole.layers.take(skin)
-    return _bounded(*edges, camera)
+    layers = np.where(surface.layer.take(whole.vertex[:, 0]) == CLOTH, np.int32(0), whole.layers)
+    return _bounded(whole.vertex, whole.image, layers, whole.crossings, camera)
 
 
-def _bounded(vertex: I32, image: F64, layers: I32, camera: Camera) -> Outline:
-    first, spans, edge, pieces = kernels.boundary(image, layers, camera.size, PIECE)
-    return Outline(vertex=vertex, image=image, layers=layers, edge=edge, pixel=pieces, first=first, span=spans)
+def _bounded(vertex: I32, image: F64, layers: I32, crossings: tuple[I32, I32, I32], camera: Camera) -> Outline:
+    first, spans = kernels.covered(*crossings, layers, camera.size[0])
+    edge, pieces = kernels.boundary(image, layers, first, spans, PIECE)
+    return Outline(
+        vertex=vertex, image=image, layers=layers, crossings=crossings, first=first, span=spans, edge=edge, pixel=pieces
+    )
 
 
 def mask(boundary: Outline, camera: Camera) -> Bool:

@@ -149,7 +149,8 @@ def test_the_visible_part_of_a_long_half_hidden_edge_stays() -> None:
 
 def test_an_edge_that_runs_away_takes_no_memory():
     ends = np.array([[[0.0, 0.0], [1e12, 5.0]], [[0.0, 0.0], [8.0, 0.0]]])
-    _, _, edge, pieces = kernels.boundary(ends, np.ones(2, np.int32), np.array([320, 240], np.int32), 4.0)
+    nothing = np.zeros(241, np.int32), np.empty((0, 2), np.int32)
+    edge, pieces = kernels.boundary(ends, np.ones(2, np.int32), *nothing, 4.0)
     assert np.bincount(edge).tolist() == [kernels.MOST_PIECES, 2]
     np.testing.assert_allclose(pieces[kernels.MOST_PIECES - 1, 1], ends[0, 1])
 
@@ -165,7 +166,9 @@ def test_what_overlapping_triangles_cover_and_where_it_ends() -> None:
     inside = np.any([winding(triangle, x, y) for triangle in corners], axis=0)
 
     size = np.array([320, 240], np.int32)
-    first, spans, edge, pieces = kernels.boundary(ends, np.ones(len(ends), np.int32), size, 1e9)  # in one piece each
+    layers = np.ones(len(ends), np.int32)
+    first, spans = kernels.covered(*kernels.crossings(ends, size), layers, 320)
+    edge, pieces = kernels.boundary(ends, layers, first, spans, 1e9)  # in one piece each
     drawn = np.zeros((240, 320), bool)
     for row in range(240):
         for begin, end in spans[first[row] : first[row + 1]]:
