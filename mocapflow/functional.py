@@ -77,19 +77,19 @@ class Functional:
 
 def area(surface: Surface, silhouette: Silhouette, camera: Camera) -> float:
     """Return the shape term of a view: the squared difference of the two distance fields, within the band."""
-    band = min(BAND_PX, float(np.abs(silhouette.distance).max()))  # a segmenter may keep a narrower one
+    kept = max(silhouette.distance.max(), -silhouette.distance.min())  # a segmenter may keep a narrower band
+    band = min(BAND_PX, float(kept))
     model = silhouettes.model_distance(surface, camera, band)
-    off = (model - np.clip(silhouette.distance, -band, band)).ravel()
-    return SHAPE_WEIGHT * float(off @ off)
+    return SHAPE_WEIGHT * silhouettes.squared_difference(model, silhouette.distance, band)
 
 
 def contour(surface: Surface, matches: Matches, view: int, camera: Camera) -> float:
     """Return half the weighted squared error of the matches of a view."""
-    here = matches.camera == view
-    off = project(surface.vertices[matches.vertex[here]], camera) - matches.pixel[here]
-    direction = matches.direction[here]
-    along = np.sum(off * direction, axis=1) ** 2
-    squared = np.where(direction.any(axis=1), along, np.sum(off**2, axis=1))
+    here = np.flatnonzero(matches.camera == view)
+    points, direction = surface.vertices.take(matches.vertex[here], axis=0), matches.direction.take(here, axis=0)
+    off = project(points, camera) - matches.pixel.take(here, axis=0)
+    along = np.einsum("ma,ma->m", off, direction) ** 2
+    squared = np.where(direction.any(axis=1), along, np.einsum("ma,ma->m", off, off))
     return 0.5 * float(matches.weight[here] @ squared)
 
 

@@ -34,7 +34,8 @@ class Shown(NamedTuple):
 
 def measure_change(old: Shown, new: Shown) -> Change:
     """Return how far body, cloth and joint angles moved between two poses."""
-    squared = np.sum((new.surface.vertices - old.surface.vertices) ** 2, axis=1)
+    way = new.surface.vertices - old.surface.vertices
+    squared = np.einsum("va,va->v", way, way)
     worn = new.surface.layer == CLOTH
     body, cloth = squared[~worn], squared[worn]
     angles = np.abs(new.pose.angles - old.pose.angles)

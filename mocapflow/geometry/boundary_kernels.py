@@ -140,3 +140,13 @@ def _lower_to_segments(ends, left, top, band, square):  # type: ignore[no-untype
                 off = across - place[k] * uy
                 d = off * off + beyond * beyond
                 line[k] = d if d < line[k] else line[k]
+
+
+@numba.njit(cache=True)
+def add_squared_difference(one, other, band, columns):  # type: ignore[no-untyped-def]
+    """Add the squared differences of two fields (H, W), clipped to the band, to sums of their columns (W,): SIMD."""
+    for row in range(len(one)):
+        a, b = one[row], other[row]
+        for k in range(columns.size):
+            off = min(max(a[k], -band), band) - min(max(b[k], -band), band)
+            columns[k] += off * off

@@ -87,6 +87,13 @@ def signed_distance(boundary: Outline, camera: Camera, band_px: float) -> F32:
     return distance
 
 
+def squared_difference(one: F32, other: F32, band_px: float) -> float:
+    """Return the sum of the squared differences of two signed distances (H, W) px, each clipped to the band."""
+    columns = np.zeros(one.shape[1], np.float32)
+    boundary_kernels.add_squared_difference(one, other, np.float32(band_px), columns)
+    return float(columns.sum(dtype=np.float64))
+
+
 @once
 def model_distance(surface: Surface, camera: Camera, band_px: float) -> F32:
     """Return the signed distance (H, W) px to the silhouette of a surface, positive inside, clipped to the band."""

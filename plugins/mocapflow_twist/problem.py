@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mocapflow.components import Prior
-from mocapflow.data import Cloth, Past, Pose
+from mocapflow.data import Cloth, Past, Pose, Residual
 from mocapflow.geometry import twists
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
@@ -76,6 +76,7 @@ class Problem(NamedTuple):
     priors: Sequence[Prior]
     past: Past
     anchor: Anchor
+    felt: dict[Pose, Sequence[Residual]]  # by the priors at poses that have been tried
 
     @property
     def unknowns(self) -> int:
@@ -91,9 +92,8 @@ class Problem(NamedTuple):
             error, _ = normal_equations.point_errors(worn, guess.cloth.vertices.take(worn.vertex, axis=0))
             data += 0.5 * float(worn.weight @ error**2)
         terms = {"data": data, "damping": self.anchor.equations(guess).energy}
-        for prior in self.priors:
-            energy = prior.weight * prior.residual(guess.pose, self.past, self.model.scene).energy
-            terms[prior.name] = terms.get(prior.name, 0.0) + energy
+        for prior, residual in zip(self.priors, self._residuals(guess), strict=True):
+            terms[prior.name] = terms.get(prior.name, 0.0) + prior.weight * residual.energy
         return terms
 
     def quadratic(self, guess: Guess, velocity: F64 | None) -> Quadratic:
@@ -119,7 +119,7 @@ class Problem(NamedTuple):
 
     def _prior_equations(self, guess: Guess) -> Equations:
         hessian, gradient, energy = self.anchor.equations(guess)
-        residuals = [prior.residual(guess.pose, self.past, self.model.scene) for prior in self.priors]
+        residuals = self._residuals(guess)
         rows = np.zeros((sum(len(residual.error) for residual in residuals), self.unknowns))
         error, weight = np.empty(len(rows)), np.empty(len(rows))
         first = 0
@@ -132,3 +132,8 @@ class Problem(NamedTuple):
         rows[:, :3] += rows[:, 3:6] @ twists.hat(guess.centre)  # about the root
         pulling = (weight[:, None] * rows).T
         return Equations(hessian + pulling @ rows, gradient + pulling @ error, energy)
+
+    def _residuals(self, guess: Guess) -> Sequence[Residual]:
+        if guess.pose not in self.felt:
+            self.felt[guess.pose] = [p.residual(guess.pose, self.past, self.model.scene) for p in self.priors]
+        return self.felt[guess.pose]

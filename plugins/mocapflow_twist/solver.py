@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from mocapflow.components import PoseSolver, Prior
-from mocapflow.data import Estimate, FrameState, Matches, Past, Surface, Turn
+from mocapflow.data import Estimate, FrameState, Matches, Past, Pose, Residual, Surface, Turn
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow_twist import solve
@@ -67,8 +67,9 @@ class TwistGaussNewton(PoseSolver):
         motion = ClothMotion(model, past, self.cloth_unknowns, self.redrape == "every", self.cloth_jacobian == "once")
         anchor = Anchor(calmed(guess, model), self._precision(model, guess))
         surface, damping = model.surface(guess.pose, guess.cloth), self._least_damping(turn)
+        felt: dict[Pose, Sequence[Residual]] = {}
         for _ in range(self.iterations):
-            problem = Problem(model, self._data(match(surface), model), priors, past, anchor)
+            problem = Problem(model, self._data(match(surface), model), priors, past, anchor, felt)
             if problem.data.measurements == 0:
                 break
             before, old = guess, surface
