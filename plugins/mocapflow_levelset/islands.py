@@ -16,8 +16,10 @@ def without_islands(level: F32, evidence: Evidence) -> F32:
     """
     import cv2
 
+    if evidence.outside is None:
+        return level
     count, label = cv2.connectedComponents((level > 0).view(np.uint8), connectivity=8)
-    if count <= 2 or evidence.outside is None:
+    if count <= 2:
         return level
     area = np.bincount(label.ravel(), minlength=count)
     runs = runs_of((label > 0) & (label != 1 + area[1:].argmax()))
