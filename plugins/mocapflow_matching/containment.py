@@ -10,8 +10,8 @@ from pydantic import Field
 from mocapflow.assets import Camera
 from mocapflow.components import Matcher, pool
 from mocapflow.data import Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn, empty_matches
-from mocapflow.geometry import silhouettes
 from mocapflow.geometry.contours import nearest_compatible
+from mocapflow.geometry.silhouettes import occluding_contour
 from mocapflow.records import F64
 from mocapflow.scene import Scene
 from mocapflow_matching.robust import robust_weights
@@ -43,7 +43,7 @@ class Containment(Matcher):
 
     def match_view(self, camera: Camera, silhouette: Silhouette, surface: Surface) -> Matches:
         """Return the pairs of one view."""
-        model = silhouettes.samples(silhouettes.skin_outline(surface, camera), surface, camera, self.spacing_px)
+        model = occluding_contour(surface, camera, self.spacing_px, skin=True)
         outside = np.flatnonzero(inside_px(silhouette, model.pixel) < self.margin_px)
         place, facing = model.pixel.take(outside, axis=0), model.normal.take(outside, axis=0)
         pixel, normal = silhouette.zero_level
