@@ -51,7 +51,7 @@ class TwistGaussNewton(PoseSolver):
     root_damping_deg: Positive = 11.5  # likewise
     angle_damping_deg: Positive = 60.0  # likewise, of every joint angle
     cloth_sd: Positive = 0.06  # standard deviation of cloth parameters about a calm garment, share of their range
-    same_edges_mm: Annotated[float, Field(ge=0)] = 5.0  # way of the surface on which its occluding edges are kept
+    same_edges_mm: Annotated[float, Field(ge=0)] = 10.0  # way of the surface on which its occluding edges are kept
     stop_surface_mm: Annotated[float, Field(ge=0)] = 0.1  # a step by which no surface point moves farther ends it
     stop_angle_deg: Annotated[float, Field(ge=0)] = 0.02  # and no angle
 
