@@ -106,3 +106,14 @@ def nearest_compatible(points, normals, others, other_normals, reach, least_cosi
                         found[p] = k
                 k += direction
     return found
+
+
+@numba.njit(cache=True)
+def at_nearest(field, pixels):  # type: ignore[no-untyped-def]
+    """Return a field (H, W) at the pixels nearest to points (K, 2) px; outside the image those at its edge."""
+    height, width = field.shape
+    values = np.empty(len(pixels))
+    for k in range(len(pixels)):
+        column = min(max(int(np.rint(pixels[k, 0])), 0), width - 1)
+        values[k] = field[min(max(int(np.rint(pixels[k, 1])), 0), height - 1), column]
+    return values

@@ -10,7 +10,7 @@ from pydantic import Field
 from mocapflow.assets import Camera
 from mocapflow.components import Matcher, pool
 from mocapflow.data import Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn, empty_matches
-from mocapflow.geometry.contours import nearest_compatible
+from mocapflow.geometry.contours import at_nearest, nearest_compatible
 from mocapflow.geometry.silhouettes import occluding_contour
 from mocapflow.records import F64
 from mocapflow.scene import Scene
@@ -64,7 +64,5 @@ class Containment(Matcher):
 
 def inside_px(silhouette: Silhouette, pixels: F64) -> F64:
     """Return the signed distance (K,) px at the pixels nearest to (K, 2), a smooth field."""
-    height, width = silhouette.distance.shape
-    column, row = np.rint(pixels).astype(np.intp).T
-    inside: F64 = silhouette.distance[np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)].astype(np.float64)
+    inside: F64 = at_nearest(silhouette.distance, pixels)
     return inside

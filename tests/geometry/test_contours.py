@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mocapflow_matching.robust import robust_weights, zhang_keeps
 
-from mocapflow.geometry.contours import nearest_compatible, zero_crossings
+from mocapflow.geometry.contours import at_nearest, nearest_compatible, zero_crossings
 from mocapflow.records import F32, F64
 
 
@@ -34,6 +34,12 @@ def test_holes_and_several_components_are_all_found() -> None:
 def test_a_contour_at_the_image_border_is_left_out() -> None:
     pixel, _ = zero_crossings(disc(60.0), 3)
     assert ((pixel >= 3) & (pixel <= [96, 76])).all()
+
+
+def test_a_field_is_read_at_the_nearest_pixel_and_goes_on_beyond_its_edge() -> None:
+    field = np.arange(12, dtype=np.float32).reshape(3, 4)
+    places = np.array([[0.4, 0.0], [0.6, 1.4], [3.4, 2.4], [-7.0, 1.0], [9.0, 99.0]])
+    np.testing.assert_array_equal(at_nearest(field, places), [0, 5, 11, 4, 11])
 
 
 def test_nearest_neighbours_are_exact_and_agree_in_direction() -> None:
