@@ -22,7 +22,7 @@ LEGS = [f"{joint}_{side}" for joint in ("knee_flexion", "hip_flexion", "ankle") 
 
 def tracked(out, pipeline, *more):
     """Run without pictures and return the errors of the legs (T, 6) degrees, the legs themselves and run.json."""
-    quick = [word for stage in ("overlay", "virtual", "smooth") for word in ("--set", f"stages.{stage}=null")]
+    quick = [word for stage in ("overlay", "virtual") for word in ("--set", f"stages.{stage}=null")]
     command = [MOCAPFLOW, "run", shipped("pipelines", pipeline), "--recording", CLIP, "--out", out, *quick, *more]
     subprocess.run(list(map(str, command)), check=True, capture_output=True)
     with (out / "results" / "angles.csv").open() as mine, (CLIP / "truth" / "angles.csv").open() as true:
@@ -33,7 +33,7 @@ def tracked(out, pipeline, *more):
 
 @pytest.mark.long
 def test_wrong_frames_are_named_and_the_pose_is_right_soon_after(tmp_path):
-    errors, _, told = tracked(tmp_path / "run", "corrupted.yaml", "--frames", "0:26")
+    errors, _, told = tracked(tmp_path / "run", "corrupted.yaml", "--frames", "0:26", "--set", "stages.smooth=null")
     assert told["frames"]["lost"] == list(WRONG)
     notes = {frame["frame"]: " ".join(frame.get("notes", [])) for frame in told["per_frame"]}
     assert all(why in notes[index] for index, why in WRONG.items())
@@ -44,8 +44,8 @@ def test_wrong_frames_are_named_and_the_pose_is_right_soon_after(tmp_path):
 
 @pytest.mark.long
 def test_legs_that_nobody_sees_do_not_jump_and_are_found_where_they_are(tmp_path):
-    """A knee is raised by 100 degrees meanwhile."""
+    """A knee is raised by 100 degrees meanwhile: smoothing leads it there, backwards in time."""
     covered = "stages.corrupt before background={use: corrupt, events: [{what: covered, first: 4, count: 10}]}"
     errors, legs, _ = tracked(tmp_path / "run", "skirt.yaml", "--frames", "0:18", "--set", covered)
-    assert np.abs(np.diff(legs[3:14], axis=0)).max() < 30
-    assert errors[14 + BACK].max() < 10
+    assert np.abs(np.diff(legs, axis=0)).max() < 30
+    assert errors[14:].max() < 10
