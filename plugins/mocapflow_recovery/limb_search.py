@@ -45,9 +45,9 @@ class LimbSearch(Recovery):
     """Compares the fitted model with what the images surely show, which does not depend on the model.
 
     A level set that starts from the model can't find a limb the model has lost, so the two agree in their error.
-    Where large parts of person and model lie far apart, poses are sampled part by part around the fitted pose, the
-    one that was believed before or that of the frame before, and limbs as people were seen to hold them; the loop
-    settles again from the best of them.
+    Where large parts of person and model lie far apart, the best is taken of the fitted pose, the one that was believed
+    before, that of the frame before, and poses that people were seen in. Around it poses are sampled part by part, and
+    limbs as people were seen to hold them; the loop settles again from the best of these.
     It needs the empty scene; without one every fit is taken as it is.
     """
 

@@ -1,4 +1,4 @@
-"""Search by sampling, part by part of the body: the root, the trunk, then each limb from the trunk outward.
+"""Search by sampling, part by part of the body: the root, the trunk, and each limb from the trunk outward.
 
 A limb has six to ten angles and its cost hardly depends on the others, so a few dozen samples of one limb do what
 all at once would need millions for (annealed and partitioned sampling; Deutscher and Reid 2005, Gall et al. 2010).
