@@ -19,7 +19,7 @@ from mocapflow_sequence.start_from_file import read_pose
 
 from mocapflow.assets import Camera
 from mocapflow.data import CLOTH, NO_CLOTH, Surface
-from mocapflow.geometry import meshes, silhouettes
+from mocapflow.geometry import meshes, silhouettes, span_kernels
 from mocapflow.geometry import silhouette_kernels as kernels
 from mocapflow.geometry.cameras import projection
 from mocapflow.io.cameras import read_cameras
@@ -76,8 +76,8 @@ def steps_of(surface: Surface, camera: Camera) -> dict[str, Callable[[], object]
     cloth = surface.layer == CLOTH
     segments, times = kernels.occluding_edges(surface.edges, facing, cloth)
     ends, boundary = pixels[segments], silhouettes.outline(surface, camera)
-    crossings = kernels.crossings(ends, camera.size)
-    covered = kernels.covered(*crossings, times, camera.size[0])
+    crossings = span_kernels.crossings(ends, camera.size)
+    covered = span_kernels.covered(*crossings, times, camera.size[0])
     fine = np.round(pixels[surface.faces] * 16).astype(np.int32)
     coarse = np.round(pixels[surface.faces]).astype(np.int32)[:, :, None]
     return {
@@ -85,8 +85,8 @@ def steps_of(surface: Surface, camera: Camera) -> dict[str, Callable[[], object]
         "  project": lambda: kernels.project(surface.vertices, matrix, pixels, depth),
         "  faces towards the camera": lambda: kernels.face_directions(pixels, surface.faces, facing),
         "  occluding edges": lambda: kernels.occluding_edges(surface.edges, facing, cloth),
-        "  where they cross the rows": lambda: kernels.crossings(ends, camera.size),
-        "  what they cover": lambda: kernels.covered(*crossings, times, camera.size[0]),
+        "  where they cross the rows": lambda: span_kernels.crossings(ends, camera.size),
+        "  what they cover": lambda: span_kernels.covered(*crossings, times, camera.size[0]),
         "  where that ends": lambda: kernels.boundary(ends, times, *covered, silhouettes.PIECE),
         "  outline, all of the above": lambda: outline(surface, camera),
         "  contour samples": lambda: silhouettes.samples(boundary, surface, camera, SPACING),

@@ -60,7 +60,7 @@ def sample(ends, edges, vertices, images, points, normals, cloth, matrix, size, 
     return vertex[:count], anchor[:count], pixel[:count], normal[:count]
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def carry(ends, edges, images, points, vertices, matrix, image, pixel):  # type: ignore[no-untyped-def]
     """Write where pieces (B, 2, 2) of edges go as the ends of these do: images (B, 2, 2) px of the edges, and pieces.
 
@@ -101,21 +101,13 @@ def image_normal(point, normal, matrix):  # type: ignore[no-untyped-def]
     return (dx - x / w * dw) / w, (dy - y / w * dw) / w
 
 
-@numba.njit(cache=True)
-def fill(first, spans, mask):  # type: ignore[no-untyped-def]
-    """Set the pixels of a mask (H, W) that spans cover, see `silhouette_kernels.covered`."""
-    for row in range(len(mask)):
-        for k in range(first[row], first[row + 1]):
-            mask[row, spans[k, 0] : spans[k, 1]] = True
-
-
 @numba.njit(cache=True, error_model="numpy")
 def paint_distance(ends, first, spans, band, distance):  # type: ignore[no-untyped-def]
     """Write the signed distance to the nearest segment into a field of -band; the inside beyond reach is +band.
 
     Args:
         ends: (B, 2, 2) px, the segments.
-        first: (H + 1,), with the spans: the inside, see `silhouette_kernels.covered`.
+        first: (H + 1,), with the spans: the inside, see `span_kernels.covered`.
         spans: (S, 2) px.
         band: px, as float32.
         distance: (H, W) float32, all -band.

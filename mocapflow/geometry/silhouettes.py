@@ -2,8 +2,8 @@
 
 The boundary comes from the occluding edges alone: an edge between a face that looks at the camera and one that
 looks away, or the rim of an open mesh. Drawn with their direction, these edges say at every pixel how many
-front faces cover it (a winding number), so a mask costs a thousand short edges instead of thirty thousand
-triangles. Cloth is two-sided: both its sides cover.
+front faces cover it (a winding number), so a mask costs a few thousand short edges instead of thirty thousand
+triangles, and nothing is drawn to tell which edges bound it. Cloth is two-sided: both its sides cover.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from mocapflow.assets import Camera
 from mocapflow.data import CLOTH, Contour, Surface
-from mocapflow.geometry import boundary_kernels
+from mocapflow.geometry import boundary_kernels, span_kernels
 from mocapflow.geometry import silhouette_kernels as kernels
 from mocapflow.geometry.cameras import projection
 from mocapflow.geometry.once import once
@@ -49,7 +49,7 @@ def outline(surface: Surface, camera: Camera) -> Outline:
     kernels.face_directions(pixels, surface.faces, facing)
     vertex, layers = kernels.occluding_edges(surface.edges, facing, surface.layer == CLOTH)
     image = pixels.take(vertex, axis=0)  # several times faster than pixels[vertex]
-    return _bounded(vertex, image, layers, kernels.crossings(image, camera.size), camera)
+    return _bounded(vertex, image, layers, span_kernels.crossings(image, camera.size), camera)
 
 
 @once
@@ -61,7 +61,7 @@ def skin_outline(surface: Surface, camera: Camera) -> Outline:
 
 
 def _bounded(vertex: I32, image: F64, layers: I32, crossings: tuple[I32, I32, I32], camera: Camera) -> Outline:
-    first, spans = kernels.covered(*crossings, layers, camera.size[0])
+    first, spans = span_kernels.covered(*crossings, layers, camera.size[0])
     edge, pieces = kernels.boundary(image, layers, first, spans, PIECE)
     return Outline(
         vertex=vertex, image=image, layers=layers, crossings=crossings, first=first, span=spans, edge=edge, pixel=pieces
@@ -71,7 +71,7 @@ def _bounded(vertex: I32, image: F64, layers: I32, crossings: tuple[I32, I32, I3
 def mask(boundary: Outline, camera: Camera) -> Bool:
     """Return the silhouette as a mask (H, W)."""
     full = np.zeros((camera.size[1], camera.size[0]), bool)
-    boundary_kernels.fill(boundary.first, boundary.span, full)
+    span_kernels.fill(boundary.first, boundary.span, full)
     return full
 
 

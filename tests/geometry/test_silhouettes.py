@@ -9,7 +9,7 @@ import pytest
 
 from mocapflow.assets import Camera
 from mocapflow.data import BODY, CLOTH, Surface
-from mocapflow.geometry import meshes, silhouettes, twists
+from mocapflow.geometry import meshes, silhouettes, span_kernels, twists
 from mocapflow.geometry import silhouette_kernels as kernels
 from mocapflow.records import F64, I32, Bool
 from mocapflow.testing import tiny_cloth, tiny_pose, tiny_scene
@@ -169,7 +169,7 @@ def test_what_overlapping_triangles_cover_and_where_it_ends() -> None:
 
     size = np.array([320, 240], np.int32)
     layers = np.ones(len(ends), np.int32)
-    first, spans = kernels.covered(*kernels.crossings(ends, size), layers, 320)
+    first, spans = span_kernels.covered(*span_kernels.crossings(ends, size), layers, 320)
     edge, pieces = kernels.boundary(ends, layers, first, spans, 1e9)  # in one piece each
     drawn = np.zeros((240, 320), bool)
     for row in range(240):
