@@ -68,7 +68,8 @@ def lay(
         parts: (D, P, COLUMNS), the bodies.
         start: rad, how far from straight down strands stand before they fall.
     """
-    from mocapflow_draping.swing import blow_batch, fall_batch
+    from mocapflow_draping.blowing import blow_batch
+    from mocapflow_draping.swing import fall_batch
 
     roots, facing = where
     shape = strands.vertex.shape

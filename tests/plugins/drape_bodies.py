@@ -6,13 +6,14 @@ from functools import cache
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from mocapflow_draping.blowing import blow_batch
 from mocapflow_draping.distance import body_distances
 from mocapflow_draping.fields import build_fields
 from mocapflow_draping.frames import blown
 from mocapflow_draping.kinematic import Kinematic
 from mocapflow_draping.parts import posed_parts
 from mocapflow_draping.strands import strands_of
-from mocapflow_draping.swing import blow_batch, fall_batch
+from mocapflow_draping.swing import fall_batch
 from mocapflow_garments.skirt import Skirt
 
 from mocapflow.assets import Body
