@@ -21,7 +21,7 @@ from mocapflow.records import F64
 from mocapflow_recovery.certain import Room, View, small_room, views
 from mocapflow_recovery.coarse import coarse_body
 from mocapflow_recovery.disagreement import distance, floating_area, uncovered_area
-from mocapflow_recovery.sampling import Plan, Spread, search, seen_samples
+from mocapflow_recovery.sampling import Plan, Spread, put_back, search, seen_samples
 
 Positive = Annotated[float, Field(gt=0)]
 Count = Annotated[int, Field(ge=1)]
@@ -57,6 +57,7 @@ class LimbSearch(Recovery):
     reach_m: Positive = 0.06  # what lies nearer to the other does not count
     cloth_m: Positive = 0.2  # what lies so near to the garment may be the garment, wherever it swings
     gain: Annotated[float, Field(ge=0, lt=1)] = 0.1  # by which share another fit must be nearer to be taken
+    tolerance: Annotated[float, Field(ge=0)] = 0.03  # by which share a part may be farther that stays as it was fitted
     rows: Annotated[int, Field(ge=50)] = 160  # images are shrunk to about this height
     faces: Annotated[int, Field(ge=200)] = 2600  # of the body that is searched with
     near_m: Positive = 0.35  # changes further than this from the model are somebody else
@@ -115,7 +116,8 @@ class LimbSearch(Recovery):
         at_rest, every = np.zeros(len(body.twists)), np.arange(len(body.twists), dtype=np.int32)
         begins = [settled.estimate.pose, state.estimate.pose, *(moment.pose for moment in past.moments[-1:])]
         begins += seen_samples(Pose(root=state.estimate.pose.root, angles=at_rest), every, body, plan, rng)
-        return search(cost, begins[int(cost(begins).argmin())], body, plan, rng)
+        found = search(cost, begins[int(cost(begins).argmin())], body, plan, rng)
+        return put_back(cost, found, settled.estimate.pose, body, self.tolerance)
 
     def _plan(self, body: Body) -> Plan:
         spread = Spread(np.radians(self.spread_deg), np.radians(self.root_spread_deg), self.root_spread_m)

@@ -68,6 +68,24 @@ def search(cost: Cost, pose: Pose, body: Body, plan: Plan, rng: np.random.Genera
     return best
 
 
+def put_back(cost: Cost, found: Pose, pose: Pose, body: Body, tolerance: float) -> Pose:
+    """Return a pose that was found with those parts of another that fit about as well: what is hidden stays as it was.
+
+    Args:
+        cost: what is made small.
+        found: the pose with the least cost.
+        pose: whose parts are preferred.
+        body: whose parts are tried.
+        tolerance: share of the cost that each may add.
+    """
+    least = float(cost([found])[0])
+    for part in parts(body):
+        back = with_part(found, part, pose)
+        if float(cost([back])[0]) <= (1 + tolerance) * least:
+            found = back
+    return found
+
+
 def with_part(pose: Pose, part: I32 | None, other: Pose) -> Pose:
     """Return a pose with one part of another."""
     if part is None:

@@ -9,7 +9,7 @@ import pytest
 from mocapflow_recovery.certain import pixel_size, shrunk, small_room, views
 from mocapflow_recovery.coarse import coarse_body
 from mocapflow_recovery.disagreement import distance, floating_area, uncovered_area
-from mocapflow_recovery.sampling import Plan, Spread, parts, samples, search, seen_samples
+from mocapflow_recovery.sampling import Plan, Spread, parts, put_back, samples, search, seen_samples
 
 from mocapflow.data import NO_CLOTH, Pose
 from mocapflow.geometry.cameras import project
@@ -146,6 +146,18 @@ def test_the_leg_that_fits_better_moves_first() -> None:
     plan = Plan(Spread(0.0, 0.0, 0.0), (1.0,), 1, np.full((1, len(body.twists)), 0.1), 1)
     found = search(cost, still, body, plan, np.random.default_rng(0))
     assert found.angles[second].any() and not found.angles[first].any()
+
+
+def test_what_fits_about_as_well_stays_as_it_was() -> None:
+    body = template_body()
+    first, second = parts(body)[2:4]
+
+    def cost(poses):
+        return np.array([1.0 + 0.01 * pose.angles[first].any() + (not pose.angles[second].any()) for pose in poses])
+
+    still = Pose(root=POSE.root, angles=np.zeros(len(body.twists)))
+    found = put_back(cost, Pose(root=POSE.root, angles=still.angles + 0.1), still, body, 0.03)
+    assert found.angles[second].all() and not np.delete(found.angles, second).any()
 
 
 def test_seen_samples_bend_what_was_seen_and_nothing_else() -> None:
