@@ -69,7 +69,7 @@ def test_silhouettes_stay_while_the_model_rests(scene, pose):
         turn = replace(LATER, change=Change(body=body, cloth=0.1, angles=0.1))
         return segmenter.segment(frame, state, Past(), scene, turn) is state.segmentation
 
-    assert again(LevelSet(), 0.009) and not again(LevelSet(), 0.011) and not again(LevelSet(keep_mm=0), 0.0)
+    assert again(LevelSet(), 0.004) and not again(LevelSet(), 0.006) and not again(LevelSet(keep_mm=0), 0.0)
 
 
 def test_energies_are_named_by_view_and_term(scene, pose):
