@@ -128,7 +128,6 @@ class Surface:
     layer: U8 = array("N", unit="0 body, 1 cloth, 2 landmark")
     joints: F64 = array("J", 4, 4, unit="m, world_from_rest")
     screws: F64 = array("D", 6, unit="twist (omega, v) in the world")
-    near: Surface | None = None  # one that is all but the same: its occluding edges are taken for this one's
 
     @cached_property
     def normals(self) -> F64:

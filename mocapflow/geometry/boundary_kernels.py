@@ -60,35 +60,6 @@ def sample(ends, edges, vertices, images, points, normals, cloth, matrix, size, 
     return vertex[:count], anchor[:count], pixel[:count], normal[:count]
 
 
-@numba.njit(cache=True, error_model="numpy")
-def carry(ends, edges, images, points, vertices, matrix, image, pixel):  # type: ignore[no-untyped-def]
-    """Write where pieces (B, 2, 2) of edges go as the ends of these do: images (B, 2, 2) px of the edges, and pieces.
-
-    Args:
-        ends: (B, 2, 2) px, the pieces as they were.
-        edges: (B,) which edges they are pieces of.
-        images: (E, 2, 2) px, the edges as they were.
-        points: (N, 3) m, the vertices now.
-        vertices: (B, 2) the ends of the edge of each piece.
-        matrix: (3, 4), px from m.
-        image: (B, 2, 2) out.
-        pixel: (B, 2, 2) out.
-    """
-    for b in range(len(edges)):
-        old, now = images[edges[b]], image[b]
-        for end in range(2):
-            p = points[vertices[b, end]]
-            w = matrix[2, 0] * p[0] + matrix[2, 1] * p[1] + matrix[2, 2] * p[2] + matrix[2, 3]
-            for axis in range(2):
-                m = matrix[axis]
-                now[end, axis] = (m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3]) / w
-        along = 0 if abs(old[1, 0] - old[0, 0]) > abs(old[1, 1] - old[0, 1]) else 1
-        for end in range(2):
-            share = (ends[b, end, along] - old[0, along]) / (old[1, along] - old[0, along])
-            for axis in range(2):
-                pixel[b, end, axis] = now[0, axis] + share * (now[1, axis] - now[0, axis])
-
-
 @numba.njit(cache=True)
 def image_normal(point, normal, matrix):  # type: ignore[no-untyped-def]
     """Return how the image of a point moves with its surface normal: x and y, not of unit length."""

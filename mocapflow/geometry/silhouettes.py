@@ -8,8 +8,6 @@ triangles, and nothing is drawn to tell which edges bound it. Cloth is two-sided
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from mocapflow.assets import Camera
@@ -104,35 +102,7 @@ def model_distance(surface: Surface, camera: Camera, band_px: float) -> F32:
 
 def occluding_contour(surface: Surface, camera: Camera, spacing_px: float, skin: bool = False) -> Contour:
     """Return points on the boundary of the silhouette of a surface, or of its body without its cloth; see `samples`."""
-    look = skin_outline if skin else outline
-    seen = look(surface, camera) if surface.near is None else _carried(look(surface.near, camera), surface, camera)
-    return samples(seen, surface, camera, spacing_px)
-
-
-def beside(surface: Surface, near: Surface, reach_m: float) -> Surface:
-    """Return a surface with another one `near` it, if no vertex is further than `reach_m` from there.
-
-    To first order, an occluding contour moves in the image like the points of the surface that it consists of.
-    """
-    way = surface.vertices - near.vertices
-    return replace(surface, near=near) if np.einsum("va,va->v", way, way).max() < reach_m**2 else surface
-
-
-def _carried(boundary: Outline, surface: Surface, camera: Camera) -> Outline:
-    """Return the pieces of a boundary where another surface takes them; what they cover is left as it was."""
-    vertex = boundary.vertex.take(boundary.edge, axis=0)
-    image, pixel = np.empty((len(vertex), 2, 2)), np.empty((len(vertex), 2, 2))
-    boundary_kernels.carry(
-        boundary.pixel, boundary.edge, boundary.image, surface.vertices, vertex, projection(camera), image, pixel
-    )
-    return replace(
-        boundary,
-        vertex=vertex,
-        image=image,
-        layers=boundary.layers.take(boundary.edge),
-        edge=np.arange(len(vertex), dtype=np.int32),
-        pixel=pixel,
-    )
+    return samples((skin_outline if skin else outline)(surface, camera), surface, camera, spacing_px)
 
 
 def samples(boundary: Outline, surface: Surface, camera: Camera, spacing_px: float) -> Contour:

@@ -11,7 +11,6 @@ from pydantic import Field
 
 from mocapflow.components import PoseSolver, Prior
 from mocapflow.data import Estimate, FrameState, Matches, Past, Pose, Residual, Surface, Turn
-from mocapflow.geometry.silhouettes import beside
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow_twist import solve
@@ -51,7 +50,6 @@ class TwistGaussNewton(PoseSolver):
     root_damping_deg: Positive = 11.5  # likewise
     angle_damping_deg: Positive = 60.0  # likewise, of every joint angle
     cloth_sd: Positive = 0.06  # standard deviation of cloth parameters about a calm garment, share of their range
-    same_edges_mm: Annotated[float, Field(ge=0)] = 10.0  # way of the surface on which its occluding edges are kept
     stop_surface_mm: Annotated[float, Field(ge=0)] = 0.1  # a step by which no surface point moves farther ends it
     stop_angle_deg: Annotated[float, Field(ge=0)] = 0.02  # and no angle
 
@@ -69,10 +67,9 @@ class TwistGaussNewton(PoseSolver):
         motion = ClothMotion(model, past, self.cloth_unknowns, self.redrape == "every", self.cloth_jacobian == "once")
         anchor = Anchor(calmed(guess, model), self._precision(model, guess))
         surface, damping = model.surface(guess.pose, guess.cloth), self._least_damping(turn)
-        shown = surface
         felt: dict[Pose, Sequence[Residual]] = {}
         for _ in range(self.iterations):
-            problem = Problem(model, self._data(match(shown), model), priors, past, anchor, felt)
+            problem = Problem(model, self._data(match(surface), model), priors, past, anchor, felt)
             if problem.data.measurements == 0:
                 break
             before, old = guess, surface
@@ -82,7 +79,6 @@ class TwistGaussNewton(PoseSolver):
             surface = model.surface(guess.pose, guess.cloth)
             if self._settled(before, guess, old, surface):
                 break
-            shown = beside(surface, shown.near or shown, self.same_edges_mm / 1000)
         return self._estimate(problem, guess, motion)
 
     def _data(self, matches: Matches, model: ClothedModel) -> Data:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from mocapflow.assets import Camera
 from mocapflow.data import BODY, CLOTH, Surface
-from mocapflow.geometry import meshes, silhouettes, span_kernels, twists
+from mocapflow.geometry import meshes, silhouettes, span_kernels
 from mocapflow.geometry import silhouette_kernels as kernels
 from mocapflow.records import F64, I32, Bool
 from mocapflow.testing import tiny_cloth, tiny_pose, tiny_scene
@@ -211,19 +209,3 @@ def test_a_surface_is_looked_at_once() -> None:
     assert silhouettes.outline(seen, view) is silhouettes.outline(seen, view)
     assert silhouettes.outline(seen, view) is not silhouettes.outline(seen, camera())
     assert silhouettes.model_distance(seen, view, 8.0).max() < silhouettes.model_distance(seen, view, 12.0).max()
-
-
-def test_the_contour_of_a_turned_ball_is_that_of_its_old_edges() -> None:
-    """To first order: a turn by 1° about an axis in the image changes the contour of the same edges by 0.1 px."""
-    (vertices, faces), view, middle = sphere((0, DISTANCE, 0)), camera(), np.array([0, DISTANCE, 0])
-    turn = twists.exp(np.array([np.radians(1), 0, 0, 0, 0, 0]))[:3, :3]
-    old, new = surface(vertices, faces), surface((vertices - middle) @ turn.T + middle + [0.002, 0, 0], faces)
-    assert silhouettes.beside(new, old, 0.001).near is None
-    carried = silhouettes.occluding_contour(silhouettes.beside(new, old, 0.02), view, 4.0)
-    truth = silhouettes.occluding_contour(new, view, 4.0)
-    assert len(carried.pixel) == pytest.approx(len(truth.pixel), abs=1)
-    off = np.hypot(*(carried.pixel - [159.5 + 0.002 * FOCAL / DISTANCE, 119.5]).T) - circle_radius()
-    assert np.abs(off).max() < 0.15
-    ends = silhouettes.outline(old, view)
-    still = silhouettes.occluding_contour(replace(old, near=old), view, 4.0)
-    np.testing.assert_allclose(still.pixel, silhouettes.samples(ends, old, view, 4.0).pixel, atol=1e-9)
