@@ -12,7 +12,7 @@ parameters, M matches, T frames, S = 6 + D + Q unknowns of a frame.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field, fields, replace
+from dataclasses import field, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -63,7 +63,7 @@ class Frame:
     flow: tuple[Flow, ...] | None = None  # from the previous frame, C x
     keypoints: tuple[F64, ...] | None = None  # C x (N people, K, 3) px, px, confidence; undistorted
 
-    def cover(self, camera: int) -> Bool | None:
+    def hidden_in(self, camera: int) -> Bool | None:
         """Return where a view (H, W) shows nothing of the scene; None: it does everywhere."""
         return self.hidden[camera] if self.hidden else None
 
@@ -192,17 +192,6 @@ class Matches:
     direction: F64 = array("M", 2, unit="1")
     vertex: I32 = array("M", unit="surface vertex index")
     weight: F64 = array("M", unit="px^-2, one over the variance, robust factor included")
-
-    def unhidden(self, frame: Frame) -> Matches:
-        """Return the matches whose pixel shows the scene."""
-        seen = np.ones(len(self.camera), bool)
-        for camera, hidden in enumerate(frame.hidden):
-            rows = np.flatnonzero(self.camera == camera)
-            x, y = np.rint(self.pixel[rows].T).astype(int)
-            seen[rows] = ~hidden[np.clip(y, 0, len(hidden) - 1), np.clip(x, 0, hidden.shape[1] - 1)]
-        if seen.all():
-            return self
-        return replace(self, **{each.name: getattr(self, each.name)[seen] for each in fields(self)})
 
 
 @record

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import fields, replace
 from functools import partial
 
 import numpy as np
@@ -12,6 +13,7 @@ from mocapflow.components import ClothFitter, Matcher, Observe, PoseSolver, Pred
 from mocapflow.data import NO_CLOTH, Frame, FrameResult, FrameState, Matches, Past, Segmentation, Surface, Turn
 from mocapflow.functional import Functional
 from mocapflow.geometry import silhouettes
+from mocapflow.geometry.contours import at_nearest
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64, record
 from mocapflow.rest import Shown, Steady, measure_change
@@ -91,7 +93,18 @@ def pool_matches(
 ) -> Matches:
     """Return the matches of all matchers together, each with its share, where nothing hides the person."""
     found = pool([(m.share, m.match(frame, segmentation, surface, past, scene, turn)) for m in matchers])
-    return found.unhidden(frame)
+    return unhidden(found, frame)
+
+
+def unhidden(matches: Matches, frame: Frame) -> Matches:
+    """Return the matches whose pixel shows the scene."""
+    seen = np.ones(len(matches.camera), bool)
+    for camera, hidden in enumerate(frame.hidden):
+        rows = np.flatnonzero(matches.camera == camera)
+        seen[rows] = at_nearest(hidden, matches.pixel[rows]) == 0
+    if seen.all():
+        return matches
+    return replace(matches, **{each.name: getattr(matches, each.name)[seen] for each in fields(matches)})
 
 
 def overlaps(surface: Surface, segmentation: Segmentation, cameras: Sequence[Camera]) -> F64:

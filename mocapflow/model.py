@@ -9,7 +9,7 @@ import numpy as np
 from mocapflow.components import Draper
 from mocapflow.data import NO_CLOTH, Cloth, Past, Pose, PoseBatch, Surface
 from mocapflow.geometry import twists
-from mocapflow.geometry.once import once
+from mocapflow.once import once
 from mocapflow.records import F64, I32, record
 from mocapflow.scene import Scene
 

@@ -10,7 +10,7 @@ import numpy as np
 from mocapflow.assets import Background, Body, Camera, GarmentMesh
 from mocapflow.data import BODY, CLOTH, Cloth, Pose, Surface
 from mocapflow.geometry import kinematics, meshes
-from mocapflow.geometry.once import once
+from mocapflow.once import once
 from mocapflow.records import F64, I32, U8, Bool, record
 
 HEM_REACH = 0.15  # m from the garment, at rest: skin that its edge can come to cover or lay bare

@@ -17,6 +17,7 @@ ROOT = Path(mocapflow.__file__).parent
 PLUGINS = ROOT.parent / "plugins"
 LAYERS = (  # a module imports only from its own layer or an earlier one; `io` and `geometry` are folders
     "errors",
+    "once",
     "series",
     "records",
     "assets",

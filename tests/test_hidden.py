@@ -7,6 +7,7 @@ from mocapflow_levelset.background import BackgroundDifference
 from mocapflow_levelset.levelset import LevelSet
 
 from mocapflow.data import Matches, Past, Turn
+from mocapflow.loop import unhidden
 from mocapflow.testing import pictures, scenes
 from mocapflow.testing.views import SIZE
 
@@ -30,11 +31,11 @@ def test_a_match_behind_what_hides_the_scene_is_left_out():
     scene = scenes.tiny_scene()
     found = matches([[10, 99], [10, 100.4], [12, 120], [400, -3]], 0)
     frame = pictures.tiny_frame(scene, scenes.tiny_pose(scene))
-    assert found.unhidden(frame) is found and frame.cover(0) is None
+    assert unhidden(found, frame) is found and frame.hidden_in(0) is None
     barred = behind_bar(frame, slice(100, 110))
-    assert found.unhidden(barred).vertex.tolist() == [0, 2, 3]
-    assert len(matches([[10, 105]], 1).unhidden(barred).vertex) == 1
-    assert barred.cover(0)[100:110].all() and not barred.cover(1).any()
+    assert unhidden(found, barred).vertex.tolist() == [0, 2, 3]
+    assert len(unhidden(matches([[10, 105]], 1), barred).vertex) == 1
+    assert barred.hidden_in(0)[100:110].all() and not barred.hidden_in(1).any()
 
 
 def test_segmenters_keep_to_the_model_where_the_person_is_hidden():

@@ -15,7 +15,7 @@ from mocapflow.data import CLOTH, Contour, Surface
 from mocapflow.geometry import boundary_kernels, span_kernels
 from mocapflow.geometry import silhouette_kernels as kernels
 from mocapflow.geometry.cameras import projection
-from mocapflow.geometry.once import once
+from mocapflow.once import once
 from mocapflow.records import F32, F64, I32, Bool, array, record
 
 PIECE = 4.0  # px; longer edges are judged piece by piece, for a part of one may be hidden

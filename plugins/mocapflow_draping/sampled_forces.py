@@ -55,7 +55,7 @@ class SampledForces(ClothFitter):
         surface, cameras = model.surface(estimate.pose, cloth), model.scene.cameras
         scale = np.array([magnification(camera, cloth.vertices.mean(axis=0)) for camera in cameras])
         weight = 1 / (self.correlation_m * (1e-3 * self.sigma_mm) ** 2 * scale**3)
-        forces = [column for columns in samples.forces(garment) for column in columns]
+        forces = sum(samples.forces(garment), [])
 
         def error(vertices: F64, parameters: F64) -> float:
             """Sum the squares, in standard deviations, of what the outline is off and of all forces."""
@@ -81,7 +81,7 @@ class SampledForces(ClothFitter):
             for columns, values in samples.coarse(garment, self.directions, np.radians(self.amounts_deg)):
                 yield partial(samples.replaced, garment, columns=columns, values=values)
         else:
-            every = [column for columns in forces for column in columns]
+            every = sum(forces, [])
             yield partial(samples.replaced, garment, columns=every, values=np.zeros((1, len(every))))
         for k in range(self.rounds):
             for columns in forces:

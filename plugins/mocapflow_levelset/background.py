@@ -74,7 +74,7 @@ class BackgroundDifference(Segmenter):
                 continue
             model = model_distance(surface, camera, self.band_px)
             floor = floor_around(surface, camera, self.shadow_reach_m)
-            distance = self.find(frame.images[c], model, floor, scene.background, c, frame.cover(c))
+            distance = self.find(frame.images[c], model, floor, scene.background, c, frame.hidden_in(c))
             silhouettes.append(Silhouette(camera=c, layer=PERSON, distance=distance))
         return Segmentation(silhouettes=tuple(silhouettes))
 

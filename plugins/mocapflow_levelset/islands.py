@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mocapflow.records import F32, I32, Bool
-from mocapflow_levelset.evidence import Evidence, gather_planes
+from mocapflow_levelset.evidence import Evidence
 
 
 def without_islands(level: F32, evidence: Evidence) -> F32:
@@ -22,9 +22,9 @@ def without_islands(level: F32, evidence: Evidence) -> F32:
     if count <= 2:
         return level
     area = np.bincount(label.ravel(), minlength=count)
-    runs = runs_of((label > 0) & (label != 1 + area[1:].argmax()))
-    part = gather_planes(label[None].astype(np.float32), runs)[0].astype(np.int32)
-    explained = np.bincount(part, evidence.outside(runs, evidence.along(runs)), minlength=count) > 0
+    islands = (label > 0) & (label != 1 + area[1:].argmax())
+    runs = runs_of(islands)
+    explained = np.bincount(label[islands], evidence.outside(runs, evidence.along(runs)), minlength=count) > 0
     return np.where(explained[label], -np.abs(level), level)
 
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Annotated, ClassVar
-from weakref import WeakKeyDictionary
 
-from pydantic import Field, PrivateAttr
+from pydantic import Field
 
 from mocapflow.assets import Background
 from mocapflow.components import Segmenter
 from mocapflow.data import Frame, FrameState, Past, Segmentation, Silhouette, Surface, Turn
 from mocapflow.geometry.silhouettes import model_distance
+from mocapflow.once import once
 from mocapflow.scene import Scene
 from mocapflow_levelset.channels import ChannelName
 from mocapflow_levelset.evolve import Rhythm, Weights
@@ -75,9 +75,6 @@ class LevelSet(Segmenter):
     darkest_shadow: Annotated[float, Field(gt=0, lt=1)] = 0.5  # factor of L + 16, a and b in the deepest shadow
     shadow_chroma: Positive = 0.005  # how far a shadow may be off the plate's chromaticity, share of the range
     stranger: float = -6.0  # log density below which no region calls a pixel more unlikely
-    _plates: WeakKeyDictionary[Background, dict[tuple[int, int], Plate]] = PrivateAttr(
-        default_factory=WeakKeyDictionary
-    )
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
         """Return the person's silhouette in each usable view.
@@ -97,7 +94,7 @@ class LevelSet(Segmenter):
             model = model_distance(surface, camera, self.band_px)
             warm = turn.index > 0 and c in last
             levels = self._levels(warm)
-            weight = counted(model.shape, self.border_px, frame.cover(c))
+            weight = counted(model.shape, self.border_px, frame.hidden_in(c))
             view = View(
                 image=frame.images[c],
                 start=last[c] if warm else model,
@@ -113,16 +110,8 @@ class LevelSet(Segmenter):
     def _empty(self, scene: Scene, surface: Surface, camera: int, levels: Sequence[Level]) -> Empty | None:
         if scene.background is None or not self.use_background:
             return None
-        plates = {level.factor: self._plate(scene.background, camera, level.factor) for level in levels}
+        plates = {level.factor: _plate(scene.background, camera, self.channels, level.factor) for level in levels}
         return Empty(plates, floor_around(surface, scene.cameras[camera], self.shadow_reach_m))
-
-    def _plate(self, background: Background, camera: int, factor: int) -> Plate:
-        """Return a view of the empty scene, shrunk; computed once, forgotten with the background."""
-        known = self._plates.setdefault(background, {})
-        if (camera, factor) not in known:
-            mean, spread = background.mean[camera], background.spread[camera]
-            known[camera, factor] = plate_of(mean, spread, self.channels, factor)
-        return known[camera, factor]
 
     def _levels(self, warm: bool) -> list[Level]:
         reduced = Window(self.reduced_rho_px, self.cell_px, self.variance_floor)
@@ -149,3 +138,9 @@ class LevelSet(Segmenter):
             stride=self.stride_px,
             margin_px=self.margin_px,
         )
+
+
+@once
+def _plate(background: Background, camera: int, channels: tuple[ChannelName, ...], factor: int) -> Plate:
+    """Return a view of the empty scene, shrunk; computed once, forgotten with the background."""
+    return plate_of(background.mean[camera], background.spread[camera], channels, factor)

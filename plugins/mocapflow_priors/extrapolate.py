@@ -6,7 +6,7 @@ import numpy as np
 
 from mocapflow.data import Past, Pose
 from mocapflow.geometry import twists
-from mocapflow.geometry.once import once
+from mocapflow.once import once
 
 
 def interval(past: Past) -> float:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from mocapflow.assets import Body
 from mocapflow.components import Prior
 from mocapflow.data import Past, Pose, Residual
-from mocapflow.geometry.once import once
+from mocapflow.once import once
 from mocapflow.scene import Scene
 from mocapflow_priors.density import Density, log_density, read
 

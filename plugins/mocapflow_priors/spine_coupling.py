@@ -10,7 +10,7 @@ from pydantic import Field
 from mocapflow.assets import Body
 from mocapflow.components import Prior
 from mocapflow.data import Past, Pose, Residual
-from mocapflow.geometry.once import once
+from mocapflow.once import once
 from mocapflow.scene import Scene
 from mocapflow_priors.rows import whitened
 

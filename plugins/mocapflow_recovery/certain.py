@@ -13,8 +13,9 @@ from mocapflow_levelset.shadows import floor_around
 
 from mocapflow.assets import Background, Camera
 from mocapflow.data import Frame, Surface
-from mocapflow.geometry.cameras import scaled
+from mocapflow.geometry.cameras import magnification, scaled
 from mocapflow.geometry.silhouettes import mask, outline
+from mocapflow.once import once
 from mocapflow.records import F32, U8, Bool
 
 CHANNELS: tuple[ChannelName, ...] = ("lab",)
@@ -42,8 +43,9 @@ class View(NamedTuple):
     pixel_m: float  # how large a pixel is where the person stands
 
 
+@once
 def small_room(background: Background, cameras: tuple[Camera, ...], rows: int) -> Room:
-    """Return the empty room in images of about so many rows."""
+    """Return the empty room in images of about so many rows; made once, forgotten with the background."""
     factors = [max(round(camera.size[1] / rows), 1) for camera in cameras]
     small = tuple(map(shrunk, cameras, factors))
     plates = map(plate_of, background.mean, background.spread, [CHANNELS] * len(cameras), factors)
@@ -69,8 +71,8 @@ def views(frame: Frame, surface: Surface, room: Room, near_m: float) -> list[Vie
     found = []
     for number in np.flatnonzero(frame.usable):
         camera, plate = room.cameras[number], room.plates[number]
-        model, size = mask(outline(surface, camera), camera), pixel_size(camera, surface)
-        image, hidden = frame.images[number], frame.cover(int(number))
+        model, size = mask(outline(surface, camera), camera), 1 / magnification(camera, surface.vertices.mean(axis=0))
+        image, hidden = frame.images[number], frame.hidden_in(int(number))
         factor = image.shape[1] // int(camera.size[0])
         changed, same = _compared(crops.shrink(image, factor), plate, floor_around(surface, camera, FLOOR_REACH))
         told = True if hidden is None else crops.shrink_values(hidden.astype(np.float32), factor) == 0
@@ -78,12 +80,6 @@ def views(frame: Frame, surface: Surface, room: Room, near_m: float) -> list[Vie
         if np.count_nonzero(person) < MOST * np.count_nonzero(model):
             found.append(View(camera, person, _away(same & told, person), size))
     return found
-
-
-def pixel_size(camera: Camera, surface: Surface) -> float:
-    """Return how many metres a pixel measures at the middle of a surface."""
-    depth = (camera.camera_from_world @ np.append(surface.vertices.mean(axis=0), 1.0))[2]
-    return float(depth / camera.intrinsics[0, 0])
 
 
 def _compared(image: U8, plate: Plate, floor: F32) -> tuple[Bool, Bool]:

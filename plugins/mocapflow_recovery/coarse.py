@@ -7,10 +7,15 @@ from dataclasses import replace
 import numpy as np
 
 from mocapflow.assets import Body
+from mocapflow.once import once
 
 
+@once
 def coarse_body(body: Body, faces: int) -> Body:
-    """Return a body of about as many faces, each vertex moved like the one of the full body that is nearest at rest."""
+    """Return a body of about as many faces, each vertex moved like the one of the full body that is nearest at rest.
+
+    It is made once and forgotten with the full one.
+    """
     import open3d as o3d
     from scipy.spatial import cKDTree
 

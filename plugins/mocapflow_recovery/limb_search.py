@@ -6,19 +6,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, ClassVar, NamedTuple
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from mocapflow_priors.density import read
 from mocapflow_priors.parzen import SHIPPED
-from pydantic import Field, PrivateAttr
+from pydantic import Field
 
-from mocapflow.assets import Background, Body, Camera
+from mocapflow.assets import Body
 from mocapflow.components import Recovery
 from mocapflow.data import NO_CLOTH, Cloth, Frame, FrameResult, FrameState, Past, Pose, PoseBatch, Surface
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
-from mocapflow_recovery.certain import Room, View, small_room, views
+from mocapflow_recovery.certain import View, small_room, views
 from mocapflow_recovery.coarse import coarse_body
 from mocapflow_recovery.disagreement import distance, floating_area, uncovered_area
 from mocapflow_recovery.sampling import Plan, Spread, put_back, search, seen_samples
@@ -69,8 +68,6 @@ class LimbSearch(Recovery):
     spread_deg: Positive = 25.0  # standard deviation of the first samples; less where a joint at rest hardly bends
     root_spread_deg: Positive = 8.0  # likewise, of the root's turn
     root_spread_m: Positive = 0.06  # likewise, of its place
-    _bodies: WeakKeyDictionary[Body, Body] = PrivateAttr(default_factory=WeakKeyDictionary)
-    _rooms: WeakKeyDictionary[Background, Room] = PrivateAttr(default_factory=WeakKeyDictionary)
 
     def recover(
         self,
@@ -85,7 +82,7 @@ class LimbSearch(Recovery):
         background = model.scene.background
         if background is None:
             return result
-        room, surface = self._room(background, model.scene.cameras), surface_of(model, result)
+        room, surface = small_room(background, model.scene.cameras, self.rows), surface_of(model, result)
         seen = views(frame, surface, room, self.near_m)
         stray = self._stray(model, seen, surface)
         if not stray.doubtful(self.uncovered_cm2, self.floating_cm2):
@@ -103,7 +100,8 @@ class LimbSearch(Recovery):
     ) -> Pose:  # fmt: skip
         """Return the pose that agrees best with the views, sampled around those at hand."""
         parameters, body = settled.cloth.parameters, model.scene.body
-        coarse = replace(model.scene, body=self._coarse(body))
+        few = coarse_body(body, self.faces) if len(body.faces) > self.faces else body
+        coarse = replace(model.scene, body=few)
 
         def cost(poses: Sequence[Pose]) -> F64:
             clothes = drapes(model, poses, parameters, past)
@@ -128,18 +126,6 @@ class LimbSearch(Recovery):
             uncovered=1e4 * uncovered_area(surface, seen, self.reach_m, self.cloth_m),
             floating=1e4 * floating_area(model.scene.bare(surface), seen, self.reach_m),
         )
-
-    def _room(self, background: Background, cameras: tuple[Camera, ...]) -> Room:
-        """Return the small empty scene; made once, forgotten with the background."""
-        if background not in self._rooms:
-            self._rooms[background] = small_room(background, cameras, self.rows)
-        return self._rooms[background]
-
-    def _coarse(self, body: Body) -> Body:
-        """Return the body to search with; made once, forgotten with the body."""
-        if body not in self._bodies:
-            self._bodies[body] = coarse_body(body, self.faces) if len(body.faces) > self.faces else body
-        return self._bodies[body]
 
 
 def surface_of(model: ClothedModel, result: FrameResult) -> Surface:

@@ -17,8 +17,8 @@ from mocapflow_twist.problem import Guess
 class ClothMotion:
     """Moves pose and cloth together; lives as long as one call of the solver.
 
-    Measuring the motion of the cloth takes many drapes, so it is done only when a match needs it and, with
-    `measure_once`, only where the first one did.
+    Measuring the motion of the cloth takes many drapes, so it is done once a guess, only when a match needs it, and
+    with `measure_once` for the first guess alone.
     """
 
     model: ClothedModel

@@ -76,7 +76,7 @@ class Problem(NamedTuple):
     priors: Sequence[Prior]
     past: Past
     anchor: Anchor
-    felt: dict[Pose, Sequence[Residual]]  # by the priors at poses that have been tried
+    tried: dict[Pose, Sequence[Residual]]  # what the priors say of poses that have been tried
 
     @property
     def unknowns(self) -> int:
@@ -134,6 +134,6 @@ class Problem(NamedTuple):
         return Equations(hessian + pulling @ rows, gradient + pulling @ error, energy)
 
     def _residuals(self, guess: Guess) -> Sequence[Residual]:
-        if guess.pose not in self.felt:
-            self.felt[guess.pose] = [p.residual(guess.pose, self.past, self.model.scene) for p in self.priors]
-        return self.felt[guess.pose]
+        if guess.pose not in self.tried:
+            self.tried[guess.pose] = [p.residual(guess.pose, self.past, self.model.scene) for p in self.priors]
+        return self.tried[guess.pose]

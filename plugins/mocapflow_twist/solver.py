@@ -67,9 +67,9 @@ class TwistGaussNewton(PoseSolver):
         motion = ClothMotion(model, past, self.cloth_unknowns, self.redrape == "every", self.cloth_jacobian == "once")
         anchor = Anchor(calmed(guess, model), self._precision(model, guess))
         surface, damping = model.surface(guess.pose, guess.cloth), self._least_damping(turn)
-        felt: dict[Pose, Sequence[Residual]] = {}
+        tried: dict[Pose, Sequence[Residual]] = {}
         for _ in range(self.iterations):
-            problem = Problem(model, self._data(match(surface), model), priors, past, anchor, felt)
+            problem = Problem(model, self._data(match(surface), model), priors, past, anchor, tried)
             if problem.data.measurements == 0:
                 break
             before, old = guess, surface

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mocapflow_recovery.certain import pixel_size, shrunk, small_room, views
+from mocapflow_recovery.certain import shrunk, small_room, views
 from mocapflow_recovery.coarse import coarse_body
 from mocapflow_recovery.disagreement import distance, floating_area, uncovered_area
 from mocapflow_recovery.sampling import Plan, Spread, parts, put_back, samples, search, seen_samples
@@ -93,12 +93,6 @@ def test_a_leg_astray_counts_by_its_area_and_by_its_way(angle) -> None:
     ways = [distance(surface(astray(part * angle)), seen(), 0.2) for part in (0, 0.5, 1)]
     assert ways == sorted(ways)
     assert ways[2] > 3 * ways[0]
-
-
-def test_a_pixel_has_a_size() -> None:
-    camera = SCENE.cameras[0]
-    assert pixel_size(camera, surface(POSE)) == pytest.approx(3 / 400, rel=0.1)
-    assert pixel_size(shrunk(camera, 4), surface(POSE)) == pytest.approx(4 * pixel_size(camera, surface(POSE)))
 
 
 def test_parts_of_a_person() -> None:

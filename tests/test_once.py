@@ -5,7 +5,7 @@ import gc
 import numpy as np
 
 from mocapflow.data import Pose
-from mocapflow.geometry.once import once
+from mocapflow.once import once
 
 
 def test_computed_once_for_the_same_arguments_and_forgotten_with_the_first() -> None:
