@@ -30,7 +30,8 @@ def evaluate(run: Run, truth: Truth = None) -> None:
 
     reference, missing = (truth, "") if truth else chosen(recall(run).load().recording, "")
     if reference is None or not reference.is_file():
-        hint = missing or "name a file of known angles with --truth"
+        folder = "keypoints are compared in a run: --set stages.evaluate.reference=keypoints"
+        hint = missing or (folder if truth and truth.is_dir() else "name a file of known angles with --truth")
         raise RecordingError("there is nothing to compare with", where=str(reference or run), hint=hint)
     evaluation = evaluate_run(run, reference)
     if not evaluation.rows:

@@ -15,6 +15,7 @@ from mocapflow.io.timing import late_frames
 from mocapflow.io.video import IMAGES, VIDEOS, Video, open_video
 from mocapflow.records import record
 
+KEYPOINTS = "keypoints"
 KEYPOINT_ENDINGS = ("_json", "")
 
 
@@ -49,7 +50,7 @@ def gather(folder: Path, calibration: Path | None = None) -> Parts:
     length, broken = agreement.agree_on_length(cameras, videos, folder)
     gaps = agreement.gap_warnings(cameras, videos)
     rate, assumed = agreement.common_rate(cameras, videos, calibration)
-    keypoints = tuple(keypoint_folder(folder, camera.name) for camera in cameras)
+    keypoints = tuple(keypoint_folder(folder / KEYPOINTS, camera.name) for camera in cameras)
     odd = keypoint_warnings(cameras, keypoints, length)
     return Parts(
         lenses=lenses,
@@ -97,9 +98,9 @@ def match_videos(folder: Path, names: Sequence[str], calibration: Path) -> tuple
     return tuple(paths[name] for name in names)
 
 
-def keypoint_folder(folder: Path, camera: str) -> Path | None:
-    """Return keypoints/<camera>_json (or keypoints/<camera>) of a recording folder, None where it is missing."""
-    places = (folder / "keypoints" / f"{camera}{ending}" for ending in KEYPOINT_ENDINGS)
+def keypoint_folder(place: Path, camera: str) -> Path | None:
+    """Return <camera>_json (or <camera>) of a folder of keypoints, None where it is missing."""
+    places = (place / f"{camera}{ending}" for ending in KEYPOINT_ENDINGS)
     return next((place for place in places if place.is_dir()), None)
 
 

@@ -17,6 +17,7 @@ from mocapflow.scene import Scene
 from mocapflow_sequence import compare, comparison_plots, cycles, findings, layout, ours, runjson, tables
 from mocapflow_sequence.alignment import align, at_our_frames
 from mocapflow_sequence.cycles import Cycle
+from mocapflow_sequence.keypoint_reference import write_triangulated
 from mocapflow_sequence.ours import Ours
 from mocapflow_sequence.references import SUFFIXES, read_reference
 from mocapflow_sequence.rigs import compare_rigs
@@ -29,7 +30,8 @@ class Evaluate(Stage):
     """Compares with truth/angles.csv of the recording, with the one file in its reference/, or with another file.
 
     `reference` is a .csv with our columns, an OpenSim .mot, or a .trc or .c3d of joint centres or of markers on bony
-    landmarks (relative to the recording). Rows with frame numbers are matched by them, others interpolated at our
+    landmarks (relative to the recording), or a folder of 2D keypoints like keypoints/, which are triangulated with the
+    cameras of the run (`keypoint_reference`). Rows with frame numbers are matched by them, others interpolated at our
     times.
     Failures are not left out. A lag up to `longest_lag_s` that all angles share, and curves that count the other way,
     are reported, and taken out in `rms_aligned_deg` alone.
@@ -38,7 +40,7 @@ class Evaluate(Stage):
     """
 
     name: ClassVar[str] = "evaluate"
-    reference: str = ""  # a file, from the folder of the recording; empty: truth/angles.csv, or the one in reference/
+    reference: str = ""  # from the folder of the recording; empty: truth/angles.csv, or the one in reference/
     longest_lag_s: Annotated[float, Field(gt=0)] = LONGEST_LAG  # of one system behind the other, that is looked for
 
     def run(self, track: Track, scene: Scene, recording: Recording, run_folder: RunFolder) -> Evaluation:
@@ -46,6 +48,8 @@ class Evaluate(Stage):
         path, note = chosen(recording.folder, self.reference)
         if path is None:
             return Evaluation(reference="", rows=(), notes=(note,))
+        if path.is_dir():
+            path = write_triangulated(recording, path, scene.cameras, run_folder.path)
         return evaluate(ours.of_track(track, scene), path, run_folder.path, self.longest_lag_s)
 
 

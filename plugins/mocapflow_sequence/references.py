@@ -55,7 +55,7 @@ def read_reference(path: Path) -> Reference:
         raise RecordingError(
             f"can't compare with a {path.suffix or 'file without ending'}",
             where=str(path),
-            hint=f"known: {', '.join(SUFFIXES)}",
+            hint=f"known: {', '.join(SUFFIXES)}, and folders like keypoints/",
         )
     if not path.is_file():
         raise RecordingError("no such reference", where=str(path))

@@ -1,0 +1,110 @@
+"""2D keypoints as a reference: exact where the cameras are right, wrong where one has turned; the filter."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from keypoint_recording import copy_demo, write
+from mocapflow_bodies.template import Template
+from mocapflow_sequence.align_cameras import turn
+from mocapflow_sequence.evaluate import Evaluate
+from mocapflow_sequence.keypoint_reference import low_pass
+from mocapflow_sequence.landmarks import landmarks
+from results_scene import DEMO, make_track, stepping
+
+from mocapflow.geometry import kinematics
+from mocapflow.io import markers
+from mocapflow.recording import Recording, open_recording
+from mocapflow.results import Evaluation, RunFolder, Track
+from mocapflow.scene import Scene
+
+FRAMES = 24
+BODY = Template().load(DEMO)
+
+
+@pytest.fixture(scope="module")
+def track() -> Track:
+    swing = stepping(BODY, 8 * FRAMES)  # so slow that the filter leaves it
+    return make_track(swing.root[:FRAMES], swing.angles[:FRAMES])
+
+
+@pytest.fixture(scope="module")
+def recording(track: Track, tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    """Return a recording whose second camera has turned by a degree since it was calibrated, beside a bystander."""
+    folder = copy_demo(tmp_path_factory.mktemp("turned") / "recording")
+    cameras = seen_by(open_recording(folder))
+    write(folder, BODY, [track.pose(t) for t in range(FRAMES)], cameras, noise_px=0.0)
+    return open_recording(folder, start=2, stop=FRAMES, step=3)
+
+
+def seen_by(recording: Recording):
+    turns = np.zeros((4, 3))
+    turns[1] = np.radians([0.3, 0.9, 0.2])
+    return turn(recording.cameras, turns)
+
+
+def evaluated(track: Track, recording: Recording, cameras, out: Path) -> Evaluation:
+    scene = Scene(cameras=cameras, body=BODY)
+    return Evaluate(reference="keypoints").run(track, scene, recording, RunFolder(path=out, recipe={}))
+
+
+def apart(evaluation: Evaluation, track: Track) -> float:
+    """Return how far (m) the reference is at most from where the estimator's marks truly were."""
+    names, places, time, _ = markers.read_trc(Path(evaluation.reference))
+    np.testing.assert_allclose(time[:FRAMES], track.time, atol=1e-6)
+    marks = landmarks(BODY)
+    chains = [kinematics.chain(marks.body, track.pose(t))[0] for t in range(FRAMES)]
+    known = np.stack([kinematics.skin(marks.body, chain) for chain in chains])
+    columns = [names.index(name.replace("big_toe", "toe")) for name in marks.names]
+    return float(np.abs(markers.world_from_opensim(places)[:FRAMES, columns] - known).max())
+
+
+def test_right_cameras_give_the_very_points(track: Track, recording: Recording, tmp_path: Path) -> None:
+    evaluation = evaluated(track, recording, seen_by(recording), tmp_path)
+    assert apart(evaluation, track) < 1e-4
+    rows = {row["angle"]: row for row in evaluation.rows}
+    for side in "lr":  # its hips are marked outside their centres, which is an offset
+        assert rows[f"knee_flexion_{side}"]["frames"] == FRAMES
+        assert rows[f"knee_flexion_{side}"]["rms_without_offset_deg"] < 1.0
+
+
+def test_a_turned_camera_gives_others(track: Track, recording: Recording, tmp_path: Path) -> None:
+    assert apart(evaluated(track, recording, recording.cameras, tmp_path), track) > 0.005
+
+
+def test_a_point_that_one_camera_mistakes_is_where_the_others_see_it(
+    track: Track, recording: Recording, tmp_path: Path
+) -> None:
+    cameras = seen_by(recording)
+    wrong = turn([cameras[3]], np.radians([[0.0, 20.0, 0.0]]))
+    assert apart(evaluated(track, recording, (*cameras[:3], *wrong), tmp_path), track) < 1e-3
+
+
+def test_the_filter_keeps_what_is_slow_and_has_no_lag() -> None:
+    time = np.arange(240) / 60.0
+    slow, fast = np.sin(2 * np.pi * time), np.sin(2 * np.pi * 20 * time)
+    middle = slice(40, 200)
+    np.testing.assert_allclose(low_pass(slow + fast, 60.0)[middle], slow[middle], atol=0.015)
+
+
+def test_the_filter_halves_its_own_frequency() -> None:
+    time = np.arange(600) / 60.0
+    wave = np.sin(2 * np.pi * 6.0 * time)
+    middle = slice(100, 500)
+    np.testing.assert_allclose(low_pass(wave, 60.0)[middle], wave[middle] / 2, atol=0.001)  # 1/sqrt(2) a pass
+
+
+def test_gaps_stay_and_short_stretches_too() -> None:
+    values = np.linspace(0.0, 1.0, 60)[:, None] * [1.0, 2.0]
+    values[30:33, 1], values[36:, 1] = np.nan, np.nan
+    passed = low_pass(values, 60.0)
+    np.testing.assert_allclose(passed[:, 0], values[:, 0], atol=1e-3)  # a line is as slow as can be
+    np.testing.assert_array_equal(np.isnan(passed), np.isnan(values))
+    np.testing.assert_array_equal(passed[33:36, 1], values[33:36, 1])
+
+
+def test_too_few_frames_a_second_for_a_filter() -> None:
+    values = np.random.default_rng(1).normal(size=(40, 3))
+    np.testing.assert_array_equal(low_pass(values, 10.0), values)
