@@ -13,6 +13,7 @@ from mocapflow.components import ClothFitter, Matcher, Observe, PoseSolver, Pred
 from mocapflow.data import NO_CLOTH, Frame, FrameResult, FrameState, Matches, Past, Segmentation, Surface, Turn
 from mocapflow.functional import Functional
 from mocapflow.geometry import silhouettes
+from mocapflow.geometry.cameras import project
 from mocapflow.geometry.contours import at_nearest
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64, record
@@ -93,15 +94,19 @@ def pool_matches(
 ) -> Matches:
     """Return the matches of all matchers together, each with its share, where nothing hides the person."""
     found = pool([(m.share, m.match(frame, segmentation, surface, past, scene, turn)) for m in matchers])
-    return unhidden(found, frame)
+    return unhidden(found, frame, surface, scene.cameras)
 
 
-def unhidden(matches: Matches, frame: Frame) -> Matches:
-    """Return the matches whose pixel shows the scene."""
+def unhidden(matches: Matches, frame: Frame, surface: Surface, cameras: Sequence[Camera]) -> Matches:
+    """Return the matches whose pixel and whose surface point both lie where the picture shows the scene.
+
+    The contour of a point that is hidden is hidden too: one that is seen and found for it belongs to something else.
+    """
     seen = np.ones(len(matches.camera), bool)
-    for camera, hidden in enumerate(frame.hidden):
-        rows = np.flatnonzero(matches.camera == camera)
-        seen[rows] = at_nearest(hidden, matches.pixel[rows]) == 0
+    for number, hidden in enumerate(frame.hidden):
+        rows = np.flatnonzero(matches.camera == number)
+        points = project(surface.vertices.take(matches.vertex[rows], axis=0), cameras[number])
+        seen[rows] = (at_nearest(hidden, matches.pixel[rows]) == 0) & (at_nearest(hidden, points) == 0)
     if seen.all():
         return matches
     return replace(matches, **{each.name: getattr(matches, each.name)[seen] for each in fields(matches)})
