@@ -115,7 +115,7 @@ class LimbSearch(Recovery):
         begins = [settled.estimate.pose, state.estimate.pose, *(moment.pose for moment in past.moments[-1:])]
         begins += seen_samples(Pose(root=state.estimate.pose.root, angles=at_rest), every, body, plan, rng)
         found = search(cost, begins[int(cost(begins).argmin())], body, plan, rng)
-        return put_back(cost, found, settled.estimate.pose, body, self.tolerance)
+        return put_back(cost, found, [settled.estimate.pose, state.estimate.pose], body, self.tolerance)
 
     def _plan(self, body: Body) -> Plan:
         spread = Spread(np.radians(self.spread_deg), np.radians(self.root_spread_deg), self.root_spread_m)

@@ -68,22 +68,30 @@ def search(cost: Cost, pose: Pose, body: Body, plan: Plan, rng: np.random.Genera
     return best
 
 
-def put_back(cost: Cost, found: Pose, pose: Pose, body: Body, tolerance: float) -> Pose:
-    """Return a pose that was found with those parts of another that fit about as well: what is hidden stays as it was.
+def put_back(cost: Cost, found: Pose, poses: Sequence[Pose], body: Body, tolerance: float) -> Pose:
+    """Return a pose that was found with those parts of others that fit about as well: what is hidden stays as it was.
+
+    After the parts each joint is tried alone: a foot must not turn because its leg was found.
 
     Args:
         cost: what is made small.
         found: the pose with the least cost.
-        pose: whose parts are preferred.
+        poses: whose parts are preferred, of each the one that fits best.
         body: whose parts are tried.
         tolerance: share of the cost that each may add.
     """
     least = float(cost([found])[0])
-    for part in parts(body):
-        back = with_part(found, part, pose)
-        if float(cost([back])[0]) <= (1 + tolerance) * least:
-            found = back
+    for part in [*parts(body), *joints(body)]:
+        backs = [with_part(found, part, pose) for pose in poses]
+        costs = cost(backs)
+        if costs.min() <= (1 + tolerance) * least:
+            found = backs[int(costs.argmin())]
     return found
+
+
+def joints(body: Body) -> list[I32]:
+    """Return the screws of each joint that has any."""
+    return [np.flatnonzero(body.screw_joint == joint).astype(np.int32) for joint in np.unique(body.screw_joint)]
 
 
 def with_part(pose: Pose, part: I32 | None, other: Pose) -> Pose:

@@ -147,11 +147,26 @@ def test_what_fits_about_as_well_stays_as_it_was() -> None:
     first, second = parts(body)[2:4]
 
     def cost(poses):
-        return np.array([1.0 + 0.01 * pose.angles[first].any() + (not pose.angles[second].any()) for pose in poses])
+        return np.array([1.0 + 0.01 * pose.angles[first].any() + (not pose.angles[second].all()) for pose in poses])
 
     still = Pose(root=POSE.root, angles=np.zeros(len(body.twists)))
-    found = put_back(cost, Pose(root=POSE.root, angles=still.angles + 0.1), still, body, 0.03)
+    found = put_back(cost, Pose(root=POSE.root, angles=still.angles + 0.1), [still], body, 0.03)
     assert found.angles[second].all() and not np.delete(found.angles, second).any()
+
+
+def test_a_foot_does_not_turn_because_its_leg_was_found() -> None:
+    """The foot as it was believed fits nearly as well; as it was fitted, with the leg astray, it does not."""
+    body = template_body()
+    hip, foot = (np.flatnonzero(body.screw_joint == body.joint(name)) for name in ("hip_l", "ankle_l"))
+
+    def cost(poses):
+        return np.array([1.0 + 0.01 * (p.angles[foot] > 0.05).any() + (p.angles[foot] < 0).any()
+                         + (p.angles[hip] == 0).any() for p in poses])  # fmt: skip
+
+    believed = Pose(root=POSE.root, angles=np.zeros(len(body.twists)))
+    fitted = Pose(root=POSE.root, angles=np.where(np.isin(np.arange(len(body.twists)), foot), -0.5, 0.0))
+    found = put_back(cost, Pose(root=POSE.root, angles=believed.angles + 0.1), [fitted, believed], body, 0.03)
+    assert found.angles[hip].all() and not np.delete(found.angles, hip).any()
 
 
 def test_seen_samples_bend_what_was_seen_and_nothing_else() -> None:
