@@ -8,14 +8,19 @@ import numba
 import numpy as np
 
 from mocapflow.assets import Camera
-from mocapflow.data import Surface
+from mocapflow.data import CLOTH, Surface
 from mocapflow.geometry import silhouette_kernels as kernels
 from mocapflow.geometry.cameras import projection
 from mocapflow.records import F64, I32
 
+CELL = 4.0  # px, about the size of a face: points are looked up by squares of this size
+BEHIND = 1 << 24  # cell of what is behind the camera
+
+index = numba.uint64  # of an array: unsigned, so that nothing is checked for counting from the end
+
 
 def front_vertices(surface: Surface, camera: Camera, points: F64) -> tuple[I32, F64]:
-    """Return what is seen at points (P, 2) px of a view.
+    """Return what is seen at points (P, 2) px of a view; skin shows its outside alone, cloth both sides.
 
     Returns:
         vertex (P,): the nearest corner of the foremost triangle over each point, -1 where there is none;
@@ -25,46 +30,45 @@ def front_vertices(surface: Surface, camera: Camera, points: F64) -> tuple[I32, 
     kernels.project(surface.vertices, projection(camera), image, depth)
     vertex = np.full(len(points), -1, np.int32)
     if len(points):
-        low = np.floor(points.min(axis=0)).astype(np.int64)
-        width, height = (np.floor(points.max(axis=0)).astype(np.int64) - low + 1).tolist()
+        low = np.floor(points.min(axis=0) / CELL).astype(np.int64)
+        width, height = (np.floor(points.max(axis=0) / CELL).astype(np.int64) - low + 1).tolist()
         first, after = _in_cells(points, low, np.full((height, width), -1, np.int32))
-        _front(image, depth, surface.faces, points, low, first, after, vertex)
+        _front(image, depth, surface.faces, surface.layer == CLOTH, points, low, first, after, vertex)
     return vertex, image
 
 
 @numba.njit(cache=True)
 def _in_cells(points, low, first):  # type: ignore[no-untyped-def]
-    """Return, as linked lists, the points in each pixel: the first one, and which one comes after each."""
+    """Return, as linked lists, the points in each cell: the first one, and which one comes after each."""
     after = np.full(len(points), -1, np.int32)
     for p in range(len(points)):
-        column, row = math.floor(points[p, 0]) - low[0], math.floor(points[p, 1]) - low[1]
+        column, row = math.floor(points[p, 0] / CELL) - low[0], math.floor(points[p, 1] / CELL) - low[1]
         after[p] = first[row, column]
         first[row, column] = p
     return first, after
 
 
-@numba.njit(cache=True)
-def _front(image, depth, faces, points, low, first, after, vertex):  # type: ignore[no-untyped-def]
+@numba.njit(cache=True, error_model="numpy")
+def _front(image, depth, faces, cloth, points, low, first, after, vertex):  # type: ignore[no-untyped-def]
     height, width = first.shape
+    cells = np.full((len(image), 2), BEHIND, np.int32)  # of every vertex
+    for v in range(len(image)):
+        if depth[v] > 1e-6:
+            cells[v, 0], cells[v, 1] = math.floor(image[v, 0] / CELL) - low[0], math.floor(image[v, 1] / CELL) - low[1]
     nearest = np.zeros(len(points))  # one over the depth, which is linear in the image
     for f in range(len(faces)):
-        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
-        if min(depth[a], depth[b], depth[c]) <= 1e-6:
-            continue
-        ax, ay, bx, by, cx, cy = image[a, 0], image[a, 1], image[b, 0], image[b, 1], image[c, 0], image[c, 1]
-        area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
-        left, right = max(math.floor(min(ax, bx, cx)) - low[0], 0), min(math.floor(max(ax, bx, cx)) - low[0], width - 1)
-        top, bottom = (
-            max(math.floor(min(ay, by, cy)) - low[1], 0),
-            min(math.floor(max(ay, by, cy)) - low[1], height - 1),
-        )
-        if area == 0.0:
-            continue
+        a, b, c = index(faces[f, 0]), index(faces[f, 1]), index(faces[f, 2])
+        left, right = _span(cells[a, 0], cells[b, 0], cells[c, 0], width)
+        top, bottom = _span(cells[a, 1], cells[b, 1], cells[c, 1], height)
         for row in range(top, bottom + 1):
             for column in range(left, right + 1):
                 p = first[row, column]
                 while p >= 0:
                     x, y = points[p, 0], points[p, 1]
+                    (ax, ay), (bx, by), (cx, cy) = image[a], image[b], image[c]
+                    area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
+                    if area == 0.0 or (area > 0.0 and not cloth[a]):
+                        break
                     wa = ((bx - x) * (cy - y) - (cx - x) * (by - y)) / area
                     wb = ((cx - x) * (ay - y) - (ax - x) * (cy - y)) / area
                     wc = 1.0 - wa - wb
@@ -74,3 +78,10 @@ def _front(image, depth, faces, points, low, first, after, vertex):  # type: ign
                             nearest[p] = inverse
                             vertex[p] = a if wa >= max(wb, wc) else (b if wb >= wc else c)
                     p = after[p]
+
+
+@numba.njit(cache=True)
+def _span(one, two, three, count):  # type: ignore[no-untyped-def]
+    """Return the first and the last of `count` cells that a face touches along an axis; none if it is behind."""
+    least, most = min(one, two, three), max(one, two, three)
+    return (max(least, 0), min(most, count - 1)) if most < BEHIND else (0, -1)

@@ -11,6 +11,7 @@ def mocapflow_segmenters() -> list[type[Segmenter]]:
     """Return the segmenters of this package."""
     from mocapflow_levelset.background import BackgroundDifference
     from mocapflow_levelset.grabcut import GrabCut
+    from mocapflow_levelset.layered import Layered
     from mocapflow_levelset.levelset import LevelSet
 
-    return [LevelSet, BackgroundDifference, GrabCut]
+    return [LevelSet, Layered, BackgroundDifference, GrabCut]

@@ -12,7 +12,9 @@ def mocapflow_matchers() -> list[type[Matcher]]:
     from mocapflow_matching.containment import Containment
     from mocapflow_matching.contour_icp import ContourIcp
     from mocapflow_matching.fourier_icp import FourierIcp
+    from mocapflow_matching.inner_contours import InnerContours
     from mocapflow_matching.keypoints import Keypoints
+    from mocapflow_matching.layered_icp import LayeredIcp
     from mocapflow_matching.optical_flow import OpticalFlow
 
-    return [ContourIcp, Containment, FourierIcp, Keypoints, OpticalFlow]
+    return [ContourIcp, Containment, FourierIcp, InnerContours, Keypoints, LayeredIcp, OpticalFlow]

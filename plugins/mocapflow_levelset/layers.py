@@ -1,0 +1,109 @@
+"""The layers of a person: body parts and the garment, each with the colours that the tracked surface has shown.
+
+Left and right limbs share a layer. A layer is a histogram of colours, gathered from the pixels that the posed and
+clothed surface draws it on; layers that look alike are one to the eye and are not told apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from mocapflow.assets import Camera
+from mocapflow.data import Frame, Past, Silhouette, Surface
+from mocapflow.geometry.visibility import front_vertices
+from mocapflow.once import once
+from mocapflow.records import F32, F64, I32, Bool
+from mocapflow.scene import Scene
+from mocapflow_levelset.colours import BINS, SIDE, bins_of
+
+COLOURS = "layers"  # of Segmentation.appearance: (L, BINS) pixels of each layer by colour, older ones discounted
+SMOOTH = 0.7  # bins; standard deviation by which colours are smoothed
+UNSEEN = 0.02  # share of colours that a layer may have although it has not shown them
+ALIKE = 0.5  # Bhattacharyya coefficient from which on two layers are one to the eye
+LEAST = 50.0  # pixels that a layer has to have shown to be known
+CLIP = 4.0  # bound on the log ratio of a pixel
+SURELY = -2.0  # log ratio below which a pixel is another layer's, whatever the surface says
+
+
+class Shown(NamedTuple):
+    """What a pixel's colour says of layers, from earlier frames."""
+
+    ratio: F32  # (L, BINS) log density in a layer over the greatest in any layer unlike it; 0: nothing is known
+    apart: Bool  # (L, L) True where two layers are told apart by colour
+
+    @property
+    def told(self) -> Bool:
+        """Which layers (L,) are told apart from any other."""
+        return np.asarray(self.apart.any(axis=1))
+
+
+@once
+def layer_of(scene: Scene) -> I32:
+    """Return the layer (N,) of each surface vertex: that of the joint that moves it, sides together; cloth is last."""
+    body = scene.body
+    names = [name.removesuffix("_l").removesuffix("_r") for name in body.joint_names]
+    _, of_joint = np.unique(names, return_inverse=True)
+    strongest = np.take_along_axis(body.skin_joint, body.skin_weight.argmax(axis=1)[:, None], axis=1)[:, 0]
+    cloth = 0 if scene.garment is None else len(scene.garment.vertices)
+    layers = np.concatenate([of_joint[strongest], np.full(cloth, of_joint.max() + 1)])
+    return np.asarray(layers, np.int32)
+
+
+def gathered(
+    frame: Frame, silhouettes: Sequence[Silhouette], surface: Surface, scene: Scene, past: Past, keep: float, grid: int
+) -> F64:
+    """Return the colours (L, BINS) that layers have shown: `keep` of what is known, and those of this frame.
+
+    Pixels count every `grid` px, where the surface draws the same layer all around, well inside the silhouette.
+    What colours surely say is another layer does not count: a limb gone astray must not learn what it lies on.
+    """
+    layers, counts = layer_of(scene), np.zeros((int(layer_of(scene).max()) + 1, BINS))
+    known = past.appearance.get(COLOURS)
+    for silhouette in silhouettes:
+        camera = scene.cameras[silhouette.camera]
+        pixel, layer = _drawn(surface, camera, layers, silhouette, grid)
+        colour = bins_of(frame.images[silhouette.camera][pixel[:, 1], pixel[:, 0]])
+        if known is not None:
+            mine = shown(past).ratio[layer, colour] > SURELY
+            layer, colour = layer[mine], colour[mine]
+        counts += np.bincount(layer * BINS + colour, minlength=counts.size).reshape(counts.shape)
+    return counts if known is None else keep * known + counts
+
+
+def _drawn(surface: Surface, camera: Camera, layers: I32, silhouette: Silhouette, grid: int) -> tuple[I32, I32]:
+    """Return pixels (P, 2) and the layer (P,) drawn there, away from the borders of layers."""
+    inside = silhouette.distance[::grid, ::grid] > grid
+    row, column = np.nonzero(inside)
+    vertex, _ = front_vertices(surface, camera, np.stack([column, row], axis=1).astype(np.float64) * grid)
+    drawn = np.full(inside.shape, -1, np.int32)
+    drawn[row, column] = np.where(vertex >= 0, layers[vertex], -1)
+    whole = np.zeros(inside.shape, bool)
+    core = drawn[1:-1, 1:-1]
+    around = [drawn[:-2, 1:-1], drawn[2:, 1:-1], drawn[1:-1, :-2], drawn[1:-1, 2:]]
+    whole[1:-1, 1:-1] = (core >= 0) & np.logical_and.reduce([core == other for other in around])
+    row, column = np.nonzero(whole)
+    return np.stack([column, row], axis=1).astype(np.int32) * np.int32(grid), drawn[row, column]
+
+
+@once
+def shown(past: Past) -> Shown:
+    """Return what colours say of the layers, by what earlier frames have shown."""
+    from scipy.ndimage import gaussian_filter1d
+
+    counts = past.appearance[COLOURS]
+    cube = counts.reshape(len(counts), SIDE, SIDE, SIDE)
+    for axis in (1, 2, 3):
+        cube = gaussian_filter1d(cube, SMOOTH, axis=axis, mode="constant", truncate=3.0)
+    total = cube.sum(axis=(1, 2, 3))
+    known = counts.sum(axis=1) >= LEAST
+    density = cube.reshape(counts.shape) / np.maximum(total, 1e-9)[:, None]
+    root = np.sqrt(density)
+    apart = (root @ root.T < ALIKE) & known[:, None] & known[None]
+    likely = np.log((1 - UNSEEN) * density + UNSEEN / BINS)
+    ratio = np.zeros(counts.shape, np.float32)
+    for layer in np.flatnonzero(apart.any(axis=1)):
+        ratio[layer] = np.clip(likely[layer] - likely[apart[layer]].max(axis=0), -CLIP, CLIP)
+    return Shown(ratio, apart)

@@ -1,0 +1,51 @@
+"""Matcher `layered_icp`: nearest contours whose colours are those of the part."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, ClassVar
+
+import numpy as np
+from mocapflow_levelset.colours import bins_of
+from mocapflow_levelset.layers import COLOURS, Shown, layer_of, shown
+from pydantic import Field
+
+from mocapflow.data import Frame, Matches, Past, Segmentation, Surface, Turn
+from mocapflow.records import F64, I32, Bool
+from mocapflow.scene import Scene
+from mocapflow_matching.contour_icp import ContourIcp
+
+INSIDE = (2.0, 3.0)  # px inside of a contour at which its colours are looked up
+
+
+class LayeredIcp(ContourIcp):
+    """As `contour_icp`, but a part of the body makes no pair with a contour whose colours are surely another's.
+
+    A forearm isn't taken to the edge of the skirt beside it. It needs segmenter `layered`, which learns the colours.
+    """
+
+    name: ClassVar[str] = "layered_icp"
+    least: Annotated[float, Field(gt=0)] = 2.0  # log ratio of colours by which they are surely another part's
+
+    def match(
+        self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn
+    ) -> Matches:
+        """Return the pairs of every view; see the class."""
+        found = super().match(frame, segmentation, surface, past, scene, turn)
+        if COLOURS not in past.appearance:
+            return found
+        wrong = another_s(found, frame, shown(past), layer_of(scene), self.least)
+        return replace(found, weight=np.where(wrong, 0.0, found.weight))
+
+
+def another_s(matches: Matches, frame: Frame, known: Shown, layers: I32, least: float) -> Bool:
+    """Return which matches (M,) have, just inside the contour, colours that are surely another layer's."""
+    best: F64 = np.full(len(matches.vertex), -np.inf)
+    for camera, image in enumerate(frame.images):
+        rows = np.flatnonzero(matches.camera == camera)
+        own = layers[matches.vertex[rows]]
+        for inside in INSIDE:
+            place = np.rint(matches.pixel[rows] - inside * matches.direction[rows]).astype(np.int64)
+            column, row = np.clip(place, 0, np.array(image.shape[1::-1]) - 1).T
+            best[rows] = np.maximum(best[rows], known.ratio[own, bins_of(image[row, column])])
+    return np.asarray(best < -least)

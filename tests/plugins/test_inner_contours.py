@@ -1,0 +1,115 @@
+"""Edges inside the silhouette: found to a fraction of a pixel where two colours meet, silent where they do not."""
+
+import cv2
+import numpy as np
+import pytest
+from mocapflow_levelset.colours import BINS, bins_of
+from mocapflow_levelset.layers import COLOURS
+from mocapflow_matching import splits
+from mocapflow_matching.inner_contours import InnerContours
+from test_layers import CLOTHS, SCENE, SKIN, dressed, learned, painted
+
+from mocapflow.data import CLOTH, Past, Pose, Turn
+from mocapflow.geometry.cameras import project
+from mocapflow.testing import tiny_cloth, tiny_pose, tiny_segmentation
+
+ONE, OTHER = SKIN, CLOTHS
+FIRST = Turn(index=0, cap=4)
+
+
+def halves(edge, turn=0.0, one=ONE, other=OTHER, noise=0.0):
+    """A picture (80, 80) whose colour changes so many px from its middle along a direction, blurred."""
+    fine = (np.arange(80 * 8) - 3.5) / 8 - 39.5
+    along = np.cos(turn) * fine[None, :] + np.sin(turn) * fine[:, None]
+    sharp = np.where((along < edge)[..., None], np.float64(one), np.float64(other))
+    image = cv2.GaussianBlur(sharp.reshape(80, 8, 80, 8, 3).mean(axis=(1, 3)), (0, 0), 0.8)
+    return np.clip(np.rint(image + noise * np.random.default_rng(1).normal(size=image.shape)), 0, 255).astype(np.uint8)
+
+
+def found(image, turn=0.0, one=ONE, other=OTHER, reach=12):
+    """Where points in the middle, a little apart along the edge, find the end of the part with the first colour."""
+    across, at = np.array([np.cos(turn), np.sin(turn)]), np.arange(-12, 12)[:, None]
+    pixel = 39.5 + at * [[-across[1], across[0]]]
+    normal = np.tile(across, (len(pixel), 1))
+    ratio = np.zeros((1, BINS), np.float32)
+    for colour, says in ((one, 4), (other, -4)):
+        low, high = np.array(colour) - 24, np.array(colour) + 24
+        cube = np.stack(np.meshgrid(*(np.arange(a, b) for a, b in zip(low, high, strict=True))), axis=-1)
+        ratio[0, np.unique(bins_of(np.clip(cube, 0, 255).astype(np.uint8)))] += says
+    rough = splits.split(
+        image, np.ones(image.shape[:2]), ratio, np.zeros(len(pixel), np.int32), pixel, normal, 4.0, reach, 3, 1.0
+    )
+    return splits.refine(image, pixel, normal, rough, 3)
+
+
+@pytest.mark.parametrize("edge", [0.0, 0.37, -4.6, 8.25])
+@pytest.mark.parametrize("turn", [0.0, 0.6])
+def test_an_edge_between_two_colours_is_found_to_a_fraction_of_a_pixel(edge, turn):
+    offset, variance = found(halves(edge, turn), turn)
+    assert np.abs(offset - edge).max() < 0.1
+    assert (variance < 0.1**2).all()
+
+
+def test_noise_scatters_as_the_variance_says():
+    offset, variance = found(halves(2.3, noise=6.0))
+    assert abs(offset.mean() - 2.3) < 0.1
+    assert 0.5 < offset.std() / np.sqrt(variance.mean()) < 2
+
+
+def test_equal_colours_are_silent():
+    assert np.isnan(found(halves(2.0, other=ONE), other=ONE)[0]).all()
+
+
+def test_an_edge_out_of_reach_is_not_found():
+    assert np.isnan(found(halves(11.0), reach=6)[0]).all()
+
+
+def test_an_edge_the_other_way_round_is_none():
+    assert np.isnan(found(halves(2.0, one=OTHER, other=ONE))[0]).all()
+
+
+def kicked(degrees):
+    """A pose whose left leg is raised before the cloth."""
+    pose = tiny_pose(SCENE, 1, 0.02)
+    angles = pose.angles.copy()
+    angles[SCENE.body.screw_names.index("hip_l.flexion")] += np.radians(degrees)
+    return Pose(root=pose.root, angles=angles)
+
+
+def surface_at(pose):
+    return SCENE.surface(pose, tiny_cloth(SCENE, pose))
+
+
+def match(colour_of, believed, true=60.0):
+    pose = kicked(true)
+    frame, segmentation = painted(colour_of, pose), tiny_segmentation(SCENE, pose)
+    past = Past(appearance={COLOURS: learned(frame, pose=pose)})
+    return InnerContours().match(frame, segmentation, surface_at(kicked(believed)), past, SCENE, FIRST)
+
+
+def off(matches, pose):
+    """How far (M,) px the vertices of matches are from their targets at a pose, along their directions."""
+    pixel = np.array([
+        project(surface_at(pose).vertices[[v]], SCENE.cameras[c])[0]
+        for v, c in zip(matches.vertex, matches.camera, strict=True)
+    ])  # fmt: skip
+    return np.einsum("ma,ma->m", matches.pixel - pixel, matches.direction)
+
+
+def test_a_leg_before_the_cloth_is_drawn_to_where_it_is():
+    matches = match(dressed, believed=55.0)
+    assert len(matches.vertex) > 20
+    assert not (SCENE.layer[matches.vertex] == CLOTH).any()
+    before, after = (np.abs(off(matches, kicked(degrees))) for degrees in (55.0, 60.0))
+    assert np.median(before) > 1.5
+    assert np.median(after) < 0.7
+
+
+def test_a_leg_of_the_cloth_s_colour_is_left_alone():
+    assert len(match(lambda layer: SKIN, believed=55.0).vertex) == 0
+
+
+def test_without_colours_there_are_no_pairs():
+    pose = kicked(60.0)
+    frame, segmentation = painted(dressed, pose), tiny_segmentation(SCENE, pose)
+    assert len(InnerContours().match(frame, segmentation, surface_at(pose), Past(), SCENE, FIRST).vertex) == 0

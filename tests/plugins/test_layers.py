@@ -1,0 +1,88 @@
+"""Layers: what the surface draws where is learned, and tells colours apart."""
+
+import numpy as np
+import pytest
+from mocapflow_levelset.colours import BINS, bins_of
+from mocapflow_levelset.layered import Layered
+from mocapflow_levelset.layers import COLOURS, gathered, layer_of, shown
+
+from mocapflow.data import BODY, CLOTH, Frame, Past, Turn
+from mocapflow.geometry.visibility import front_vertices
+from mocapflow.testing import tiny_cloth, tiny_frame, tiny_past, tiny_pose, tiny_scene, tiny_segmentation, tiny_state
+
+SCENE = tiny_scene(clothed=True)
+POSE = tiny_pose(SCENE, 1, 0.05)
+SKIN, CLOTHS = (40, 80, 170), (60, 140, 60)  # BGR
+
+
+def painted(colour_of, pose=POSE, noise=3.0):
+    """Pictures in which each layer of the surface has the colour that `colour_of` gives to its number."""
+    surface, layers = SCENE.surface(pose, tiny_cloth(SCENE, pose)), layer_of(SCENE)
+    palette = np.array([colour_of(layer) for layer in range(layers.max() + 1)], np.float64)
+    images, rng = [], np.random.default_rng(7)
+    for camera in SCENE.cameras:
+        width, height = camera.size
+        grid = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).reshape(-1, 2).astype(np.float64)
+        vertex, _ = front_vertices(surface, camera, grid)
+        image = np.where(vertex[:, None] >= 0, palette[layers[vertex]], 120.0).reshape(height, width, 3)
+        images.append(np.clip(image + noise * rng.normal(size=image.shape), 0, 255).astype(np.uint8))
+    return Frame(index=1, time=0.0, images=tuple(images), usable=np.ones(len(images), bool))
+
+
+def dressed(layer):
+    return CLOTHS if layer == layer_of(SCENE).max() else SKIN
+
+
+def learned(frame, past=None, keep=0.9, pose=POSE):
+    surface = SCENE.surface(pose, tiny_cloth(SCENE, pose))
+    return gathered(frame, tiny_segmentation(SCENE, pose).silhouettes, surface, SCENE, past or Past(), keep, 3)
+
+
+def test_sides_share_a_layer_and_cloth_is_the_last():
+    layers, body = layer_of(SCENE), SCENE.body
+    carrier = body.skin_joint[np.arange(len(body.vertices)), body.skin_weight.argmax(axis=1)]
+    knees = [set(layers[: len(carrier)][carrier == body.joint(name)]) for name in ("knee_l", "knee_r")]
+    assert knees[0] == knees[1] and len(knees[0]) == 1
+    assert set(layers[SCENE.layer == CLOTH]) == {layers.max()}
+    assert layers.max() not in layers[SCENE.layer == BODY]
+
+
+def test_a_layer_has_the_colours_that_it_is_drawn_on():
+    counts = learned(painted(dressed, noise=0.0))
+    cloth, skin = (int(bins_of(np.array(colour, np.uint8))) for colour in (CLOTHS, SKIN))
+    assert counts[-1, cloth] == counts[-1].sum() > 100
+    assert counts[:-1, skin].sum() == counts[:-1].sum() > 100
+
+
+def test_what_is_apart_is_told_and_what_is_alike_is_not():
+    layers = layer_of(SCENE)
+    knee = layers[np.linalg.norm(SCENE.body.vertices - [0.1, 0, 0.3], axis=1).argmin()]
+    told = shown(Past(appearance={COLOURS: learned(painted(dressed))}))
+    skin, cloth = (int(bins_of(np.array(colour, np.uint8))) for colour in (SKIN, CLOTHS))
+    assert told.apart[knee, layers.max()] and told.apart[layers.max(), knee]
+    assert told.ratio[knee, skin] > 2 and told.ratio[knee, cloth] < -2
+    assert not told.apart[:-1, :-1].any()  # all skin
+    same = shown(Past(appearance={COLOURS: learned(painted(lambda layer: SKIN))}))
+    assert not same.apart.any() and not same.ratio.any()
+
+
+def test_old_colours_are_forgotten():
+    first = learned(painted(dressed))
+    past = Past(appearance={COLOURS: first})
+    second = learned(painted(dressed), past, keep=0.5)
+    assert second.sum() == pytest.approx(1.5 * first.sum(), rel=0.02)
+
+
+def test_a_part_does_not_learn_what_is_surely_another_s():
+    past = Past(appearance={COLOURS: learned(painted(dressed))})
+    swapped = painted(lambda layer: SKIN if layer == layer_of(SCENE).max() else CLOTHS)
+    kept = learned(swapped, past, keep=0.5)
+    np.testing.assert_allclose(kept[-1], 0.5 * past.appearance[COLOURS][-1])
+
+
+def test_the_segmenter_hands_them_on():
+    past, turn = tiny_past(SCENE, POSE), Turn(index=1, cap=4)
+    found = Layered().segment(tiny_frame(SCENE, POSE), tiny_state(SCENE, POSE), past, SCENE, turn)
+    assert len(found.silhouettes) == len(SCENE.cameras)
+    assert found.appearance[COLOURS].shape == (layer_of(SCENE).max() + 1, BINS)
+    assert found.appearance[COLOURS].sum() > 100
