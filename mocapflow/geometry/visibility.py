@@ -58,6 +58,10 @@ def _front(image, depth, faces, cloth, points, low, first, after, vertex):  # ty
     nearest = np.zeros(len(points))  # one over the depth, which is linear in the image
     for f in range(len(faces)):
         a, b, c = index(faces[f, 0]), index(faces[f, 1]), index(faces[f, 2])
+        (ax, ay), (bx, by), (cx, cy) = image[a], image[b], image[c]
+        area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
+        if not area < 0.0 and not (area > 0.0 and cloth[a]):
+            continue  # turned away
         left, right = _span(cells[a, 0], cells[b, 0], cells[c, 0], width)
         top, bottom = _span(cells[a, 1], cells[b, 1], cells[c, 1], height)
         for row in range(top, bottom + 1):
@@ -65,10 +69,6 @@ def _front(image, depth, faces, cloth, points, low, first, after, vertex):  # ty
                 p = first[row, column]
                 while p >= 0:
                     x, y = points[p, 0], points[p, 1]
-                    (ax, ay), (bx, by), (cx, cy) = image[a], image[b], image[c]
-                    area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
-                    if area == 0.0 or (area > 0.0 and not cloth[a]):
-                        break
                     wa = ((bx - x) * (cy - y) - (cx - x) * (by - y)) / area
                     wb = ((cx - x) * (ay - y) - (ax - x) * (cy - y)) / area
                     wc = 1.0 - wa - wb

@@ -6,16 +6,16 @@ from dataclasses import replace
 from typing import Annotated, ClassVar
 
 import numpy as np
-from mocapflow_levelset.colours import bins_of
 from mocapflow_levelset.layers import COLOURS, Shown, layer_of, shown
 from pydantic import Field
 
 from mocapflow.data import Frame, Matches, Past, Segmentation, Surface, Turn
-from mocapflow.records import F64, I32, Bool
+from mocapflow.records import I32, Bool
 from mocapflow.scene import Scene
+from mocapflow_matching import splits
 from mocapflow_matching.contour_icp import ContourIcp
 
-INSIDE = (2.0, 3.0)  # px inside of a contour at which its colours are looked up
+INSIDE = (2, 3)  # px inside of a contour at which its colours are looked up
 
 
 class LayeredIcp(ContourIcp):
@@ -40,12 +40,9 @@ class LayeredIcp(ContourIcp):
 
 def another_s(matches: Matches, frame: Frame, known: Shown, layers: I32, least: float) -> Bool:
     """Return which matches (M,) have, just inside the contour, colours that are surely another layer's."""
-    best: F64 = np.full(len(matches.vertex), -np.inf)
-    for camera, image in enumerate(frame.images):
-        rows = np.flatnonzero(matches.camera == camera)
-        own = layers[matches.vertex[rows]]
-        for inside in INSIDE:
-            place = np.rint(matches.pixel[rows] - inside * matches.direction[rows]).astype(np.int64)
-            column, row = np.clip(place, 0, np.array(image.shape[1::-1]) - 1).T
-            best[rows] = np.maximum(best[rows], known.ratio[own, bins_of(image[row, column])])
-    return np.asarray(best < -least)
+    wrong = np.zeros(len(matches.vertex), bool)
+    for camera in np.unique(matches.camera):
+        rows, image = np.flatnonzero(matches.camera == camera), frame.images[camera]
+        own, pixel, direction = layers[matches.vertex[rows]], matches.pixel[rows], matches.direction[rows]
+        wrong[rows] = splits.greatest(image, known.ratio, own, pixel, direction, *INSIDE) < -least
+    return wrong

@@ -57,6 +57,20 @@ def split(image, inside, ratio, layer, pixel, normal, clip, reach, half, least):
 
 
 @numba.njit(cache=True)
+def greatest(image, ratio, layer, pixel, direction, first, last):  # type: ignore[no-untyped-def]
+    """Return the greatest log ratio (K,) of `first` to `last` px before points (K, 2), against their directions."""
+    height, width = image.shape[:2]
+    best = np.full(len(pixel), -np.inf)
+    for k in range(len(pixel)):
+        for t in range(first, last + 1):
+            x = int(math.floor(pixel[k, 0] - t * direction[k, 0] + 0.5))
+            y = int(math.floor(pixel[k, 1] - t * direction[k, 1] + 0.5))
+            x, y = min(max(x, 0), width - 1), min(max(y, 0), height - 1)
+            best[k] = max(best[k], ratio[layer[k], bin_at(image, y, x)])
+    return best
+
+
+@numba.njit(cache=True)
 def refine(image, pixel, normal, offset, half):  # type: ignore[no-untyped-def]
     """Return the offsets (K,) to a fraction of a px, and the variance (K,) px² by the noise of the two colours.
 
