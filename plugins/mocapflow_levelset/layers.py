@@ -64,7 +64,10 @@ def gathered(
     known = past.appearance.get(COLOURS)
     for silhouette in silhouettes:
         camera = scene.cameras[silhouette.camera]
-        pixel, layer = _drawn(surface, camera, layers, silhouette, grid)
+        inside, hidden = silhouette.distance[::grid, ::grid] > grid, frame.hidden_in(silhouette.camera)
+        if hidden is not None:
+            inside &= ~hidden[::grid, ::grid]
+        pixel, layer = _drawn(surface, camera, layers, inside, grid)
         colour = bins_of(frame.images[silhouette.camera][pixel[:, 1], pixel[:, 0]])
         if known is not None:
             mine = shown(past).ratio[layer, colour] > SURELY
@@ -73,9 +76,8 @@ def gathered(
     return counts if known is None else keep * known + counts
 
 
-def _drawn(surface: Surface, camera: Camera, layers: I32, silhouette: Silhouette, grid: int) -> tuple[I32, I32]:
-    """Return pixels (P, 2) and the layer (P,) drawn there, away from the borders of layers."""
-    inside = silhouette.distance[::grid, ::grid] > grid
+def _drawn(surface: Surface, camera: Camera, layers: I32, inside: Bool, grid: int) -> tuple[I32, I32]:
+    """Return pixels (P, 2) and the layer (P,) drawn there, of those on a grid (h, w), away from borders of layers."""
     row, column = np.nonzero(inside)
     vertex, _ = front_vertices(surface, camera, np.stack([column, row], axis=1).astype(np.float64) * grid)
     drawn = np.full(inside.shape, -1, np.int32)

@@ -4,9 +4,10 @@ import cv2
 import numpy as np
 import pytest
 from mocapflow_levelset.colours import BINS, bins_of
-from mocapflow_levelset.layers import COLOURS
+from mocapflow_levelset.layers import COLOURS, layer_of, shown
 from mocapflow_matching import splits
 from mocapflow_matching.inner_contours import InnerContours
+from mocapflow_matching.layered_icp import LayeredIcp, another_s
 from test_layers import CLOTHS, SCENE, SKIN, dressed, learned, painted
 
 from mocapflow.data import CLOTH, Past, Pose, Turn
@@ -113,3 +114,17 @@ def test_without_colours_there_are_no_pairs():
     pose = kicked(60.0)
     frame, segmentation = painted(dressed, pose), tiny_segmentation(SCENE, pose)
     assert len(InnerContours().match(frame, segmentation, surface_at(pose), Past(), SCENE, FIRST).vertex) == 0
+
+
+def test_contours_of_another_part_s_colours_make_no_pair():
+    """Cloth and leg both bound the silhouette; painted in each other's colours, every pair is another part's."""
+    pose = kicked(60.0)
+    frame, segmentation = painted(dressed, pose), tiny_segmentation(SCENE, pose)
+    past = Past(appearance={COLOURS: learned(frame, pose=pose)})
+    swapped = painted(lambda layer: SKIN if dressed(layer) == CLOTHS else CLOTHS, pose)
+    right, wrong = (
+        LayeredIcp().match(images, segmentation, surface_at(pose), past, SCENE, FIRST) for images in (frame, swapped)
+    )
+    assert (right.weight > 0).mean() > 0.95
+    assert (wrong.weight > 0).mean() < 0.2
+    assert another_s(right, swapped, shown(past), layer_of(SCENE), 2.0).mean() > 0.8

@@ -1,5 +1,7 @@
 """Layers: what the surface draws where is learned, and tells colours apart."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mocapflow_levelset.colours import BINS, bins_of
@@ -86,3 +88,9 @@ def test_the_segmenter_hands_them_on():
     assert len(found.silhouettes) == len(SCENE.cameras)
     assert found.appearance[COLOURS].shape == (layer_of(SCENE).max() + 1, BINS)
     assert found.appearance[COLOURS].sum() > 100
+
+
+def test_what_is_hidden_is_not_learned():
+    frame = painted(dressed)
+    hidden = tuple(np.ones(image.shape[:2], bool) for image in frame.images)
+    assert learned(replace(frame, hidden=hidden)).sum() == 0
