@@ -2,8 +2,8 @@
 
 Run `OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python benchmarks/flow.py`. CPU ms of one core for all views, medians over
 rounds that take turns; the ratio is to a call of `contour_icp` in the same run. A frame calls a matcher 18 times (three
-turns of five matches and one to check); only the first six come before the body is calm, and those alone register
-shapes or, far off, low-pass. Model and silhouettes are 5 degrees a joint apart; keypoints are the body's landmarks.
+turns of five matches and one to check); only the first turn's six register shapes or, far off, low-pass. Model and
+silhouettes are 5 degrees a joint apart; keypoints are the body's landmarks.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from mocapflow.shipped import shipped
 CLIP, ROUNDS = "shorts_steps", 20
 FIRST = Turn(index=0, cap=3)
 CALM = Turn(index=2, cap=3, change=Change(body=0.005, cloth=0.0, angles=0.0))
-ALL, UNCALM = 18, 6  # calls a frame
+ALL, ONE_TURN = 18, 6  # calls a frame
 
 
 def detections(scene: Scene, pose: Pose) -> tuple[np.ndarray, ...]:
@@ -85,8 +85,8 @@ def main() -> None:
     matchers = {  # name: matcher, turn, calls a frame
         "contour_icp": (ContourIcp(), CALM, ALL),
         "contour_icp, normals too": (ContourIcp(normal_px=5.0), CALM, ALL),
-        "fourier_icp, low-passed": (FourierIcp(near_px=0), FIRST, UNCALM),
-        "optical_flow between shapes": (OpticalFlow(between="shapes"), FIRST, UNCALM),
+        "fourier_icp, low-passed": (FourierIcp(near_px=0), FIRST, ONE_TURN),
+        "optical_flow between shapes": (OpticalFlow(between="shapes"), FIRST, ONE_TURN),
         "optical_flow between frames": (OpticalFlow(between="frames"), CALM, ALL),
         "keypoints": (Keypoints(), CALM, ALL),
     }

@@ -29,17 +29,18 @@ class OpticalFlow(Matcher):
     """Pairs by flow, to be pooled with those of `contour_icp`.
 
     `shapes`: the flow that registers the model's distance image with the silhouette's takes each contour point of
-    the model to its target; it reaches further than the nearest neighbour, above all for shifts. It is needed only
-    while the body still moves by more than `calm_mm` a turn. `frames`: points tracked from the frame before (stage
-    `flow`) that lie on the surface as it was found there. They see what no contour shows, as turns of a limb about
-    itself, but add up their errors over frames; on cloth they follow the cloth, which slides over the skin.
+    the model to its target; it reaches further than the nearest neighbour, above all for shifts. It leads the way in
+    the first turns only: later it would hold a limb on the wrong part of the outline. `frames`: points tracked from
+    the frame before (stage `flow`) that lie on the surface as it was found there. They see what no contour shows, as
+    turns of a limb about itself, but add up their errors over frames; on cloth they follow the cloth, which slides
+    over the skin.
     """
 
     name = "optical_flow"
     between: Literal["both", "shapes", "frames"] = "both"  # model and image of a frame, two frames, or both
-    calm_mm: Positive = 15.0  # change of the body in a turn below which shapes are not needed
-    first_share: Share = 2.3  # against contour_icp's while the body still moves: 0.7 to 0.3
-    later_share: Share = 0.25  # 0.2 to 0.8
+    first_turns: Annotated[int, Field(ge=0)] = 1  # of a frame, in which shapes are registered
+    first_share: Share = 2.3  # against contour_icp's in these turns: 0.7 to 0.3
+    later_share: Share = 0.25  # after them: 0.2 to 0.8
     spacing_px: Positive = 4.0  # between the points of the model's contour
     smoothness: Positive = 3.0  # of the flow, against the constancy of the distance images
     band: Positive = 0.1  # half its width about the model's contour, against the longer side of the picture
@@ -54,13 +55,13 @@ class OpticalFlow(Matcher):
         self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn
     ) -> Matches:
         """Return the pairs of every view; see the class."""
-        calm = turn.change is not None and turn.change.body <= self.calm_mm / 1000
+        first = turn.index < self.first_turns
         parts = [empty_matches()]
         if self.between != "shapes":
             parts.append(self.carried(frame, surface, past, scene))
-        if self.between != "frames" and not calm:
+        if self.between != "frames" and first:
             parts += [self.registered(silhouette, surface, scene) for silhouette in segmentation.of("person")]
-        share = self.later_share if calm else self.first_share
+        share = self.first_share if first else self.later_share
         return pool([(share, part) for part in parts])
 
     def carried(self, frame: Frame, surface: Surface, past: Past, scene: Scene) -> Matches:

@@ -69,7 +69,7 @@ def test_targets_lie_on_the_contour_and_the_shift_is_found():
     assert np.median(np.linalg.norm(matches.pixel - goals, axis=1)) < 2.0
 
 
-def test_contours_are_left_out_once_the_body_is_calm():
+def test_shapes_lead_the_way_in_the_first_turn_only():
     truth = tiny_pose(SCENE)
     surface = SCENE.surface(truth, NO_CLOTH)
     matcher = OpticalFlow()
