@@ -8,8 +8,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import turning_person
+from mocapflow_priors.density import log_density, read
+from mocapflow_priors.parzen import SHIPPED
 
+from mocapflow.data import NO_CLOTH, Moment, Past, Start
+from mocapflow.geometry import twists
+from mocapflow.loop import settle
+from mocapflow.model import ClothedModel
+from mocapflow.pipeline import load_pipeline
 from mocapflow.shipped import shipped
+from mocapflow.timing import Stopwatch
+from mocapflow.track import CoupledLoop
 
 MOCAPFLOW = Path(sys.executable).with_name("mocapflow")
 CLIP = shipped("examples", "data", "skirt_steps")
@@ -58,3 +68,37 @@ def test_legs_that_nobody_sees_do_not_jump_and_are_found_where_they_are(tmp_path
 def test_a_forearm_behind_a_stripe_is_not_drawn_to_the_arm_before_it(tmp_path):
     errors, _, _ = tracked(tmp_path / "run", "disturbed.yaml", "--frames", "0:12", names=ELBOWS)
     assert errors.max() < 15  # it left by 100
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("axis", [(0, 0, 1), (0, 1, 0)], ids=["on the spot", "cartwheel"])
+def test_unseen_legs_of_a_person_who_turns_once_around_stay_plausible(axis):
+    """T-EXP6 for a root that turns through 360 degrees: nothing wraps, and what nobody sees is as people are."""
+    scene = turning_person.scene()
+    truth = [turning_person.pose(scene.body, index, axis) for index in range(turning_person.FRAMES)]
+    frames = (turning_person.frame(scene, index, axis) for index in range(len(truth)))
+    poses = list(followed(scene, truth[0], frames))
+    off = [twists.log(true.root @ np.linalg.inv(pose.root))[:3] for true, pose in zip(truth, poses, strict=True)]
+    assert np.degrees(np.linalg.norm(off, axis=1).max()) < 10
+    density, angles = read(SHIPPED), np.array([pose.angles for pose in poses])
+    screws = [scene.body.screw_names.index(name) for name in density.names]
+    least = np.quantile([log_density(density, seen)[0] for seen in density.poses], 0.01)
+    assert min(log_density(density, angles[index][screws])[0] for index in turning_person.UNSEEN) > least
+    jumps = np.degrees(np.abs(np.diff(angles, axis=0)).max(axis=1))
+    print(
+        f"angles change by at most {jumps.max():.0f}, by {jumps[turning_person.UNSEEN[-1]]:.0f} as legs are seen again"
+    )
+    assert jumps.max() < 30
+
+
+def followed(scene, begin, frames):
+    """The poses that the tracker of a body without clothes finds."""
+    stages = load_pipeline(shipped("pipelines", "bare.yaml")).stages
+    stage = next(named.stage for named in stages if isinstance(named.stage, CoupledLoop))
+    model, past, start = ClothedModel(scene=scene), Past(), Start(pose=begin, parameters=np.empty(0))
+    for frame in frames:
+        state = stage.begin(frame, past, start, model, Stopwatch())
+        result = settle(frame, state, past, stage.steps, model, lambda *_: None)
+        found = stage.recovered(frame, state, result, past, model).state
+        past = past.after(Moment(time=frame.time, pose=found.estimate.pose, cloth=NO_CLOTH), {})
+        yield found.estimate.pose
