@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numba
 import numpy as np
+import numpy.typing as npt
 
 from mocapflow.assets import Body
 from mocapflow.data import Pose, PoseBatch
@@ -84,6 +86,16 @@ def joint_positions(body: Body, joints: F64) -> F64:
     rest = np.concatenate([body.positions, np.ones((len(body.positions), 1))], axis=1)
     positions: F64 = np.einsum("...jab,jb->...ja", joints[..., :3, :], rest)
     return positions
+
+
+def part_of(body: Body, vertices: npt.NDArray[np.integer[Any]]) -> Body:
+    """Return a body of the same joints with the given vertices alone, without faces."""
+    offset = body.morph_offset
+    return replace(
+        body, vertices=body.vertices[vertices], faces=np.empty((0, 3), np.int32),
+        skin_joint=body.skin_joint[vertices], skin_weight=body.skin_weight[vertices], cut=body.cut[vertices],
+        morph_offset=None if offset is None else offset[vertices],
+    )  # fmt: skip
 
 
 def descendants(parents: Any) -> np.ndarray:

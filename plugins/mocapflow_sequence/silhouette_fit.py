@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from mocapflow.assets import Body, Camera
 from mocapflow.data import Matches, Pose
 from mocapflow.geometry.cameras import projection
+from mocapflow.geometry.kinematics import part_of
 from mocapflow.records import F64, I32
 from mocapflow_sequence.pose_fit import Observed, Solution, Spreads, View, descend
 from mocapflow_sequence.proportions import scaled
@@ -47,18 +47,14 @@ def paired(body: Body, matches: Matches, cameras: Sequence[Camera], independent:
     """Return matches as a view of the skin vertices that take part; those with the garment are left out."""
     own = matches.vertex < len(body.vertices)
     vertices, point = np.unique(matches.vertex[own], return_inverse=True)
-    offset = body.morph_offset
-    part = replace(
-        body, vertices=body.vertices[vertices], faces=np.empty((0, 3), np.int32),
-        skin_joint=body.skin_joint[vertices], skin_weight=body.skin_weight[vertices], cut=body.cut[vertices],
-        morph_offset=None if offset is None else offset[vertices],
-    )  # fmt: skip
     matrices = np.stack([projection(camera) for camera in cameras])[matches.camera[own]]
     along = matches.direction[own]
     free = np.all(along == 0, axis=1).astype(np.float64)
     onto = along[:, :, None] * along[:, None, :] + free[:, None, None] * np.eye(2)
     precision = np.sqrt(independent * matches.weight[own])
-    return View(part, partial(_look, matrices, matches.pixel[own], onto, point.astype(np.int32), precision))
+    return View(
+        part_of(body, vertices), partial(_look, matrices, matches.pixel[own], onto, point.astype(np.int32), precision)
+    )
 
 
 def _look(matrices: F64, pixel: F64, onto: F64, point: I32, precision: F64, points: F64) -> Observed:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from mocapflow_priors.ground_plane import GroundPlane, vertex_velocity
+from mocapflow_priors.ground_plane import GroundPlane
+from mocapflow_priors.soles import vertex_velocity
 from twist_fixtures import make_body, make_pose, make_scene
 
 from mocapflow.data import Past, Pose

@@ -1,0 +1,58 @@
+"""The lowest points of the feet, and how they move."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mocapflow.assets import Body
+from mocapflow.data import Pose
+from mocapflow.geometry import kinematics
+from mocapflow.once import once
+from mocapflow.records import F64
+
+FEET = ("ankle_l", "toe_l", "ankle_r", "toe_r")  # joints that carry the soles
+
+
+def lowest_points(body: Body, pose: Pose, parts: tuple[str, ...]) -> tuple[F64, F64]:
+    """Return the height (K,) m of the lowest point of each part that the body has, and how it moves.
+
+    Args:
+        body: at rest.
+        pose: of the body.
+        parts: joints, each of which stands for the skin that it carries most of.
+
+    Returns:
+        heights (K,) m, world z, and their derivatives (K, 6 + D) by an increment (omega, v, angles).
+    """
+    joints, screws = kinematics.chain(body, pose)
+    heights, slopes = [], []
+    for part in _parts(body, parts):
+        height = kinematics.skin(part, joints, pose.angles)[:, 2]
+        lowest = int(height.argmin())
+        heights.append(height[lowest])
+        slopes.append(vertex_velocity(part, joints, screws, lowest, pose.angles)[2])
+    return np.array(heights, np.float64), np.array(slopes, np.float64).reshape(-1, 6 + len(pose.angles))
+
+
+@once
+def _parts(body: Body, names: tuple[str, ...]) -> list[Body]:
+    """Return bodies of the skin that each of the joints carries most of."""
+    carrier = body.skin_joint[np.arange(len(body.vertices)), body.skin_weight.argmax(axis=1)]
+    found = [np.flatnonzero(carrier == body.joint(name)) for name in names if name in body.joint_names]
+    return [kinematics.part_of(body, vertices) for vertices in found if len(vertices)]
+
+
+def vertex_velocity(body: Body, joints: F64, screws: F64, vertex: int, angles: F64) -> F64:
+    """Return how a skinned vertex moves with an increment (omega, v, angles): (3, 6 + D) m.
+
+    Each joint that carries it moves its share of it as if it were fixed to that joint.
+    """
+    rest = np.append(kinematics.rest_shape(body, angles)[vertex], 1.0)
+    below = kinematics.descendants(body.parents)[body.screw_joint]  # (D, J)
+    velocity = np.zeros((3, 6 + len(screws)))
+    for joint, weight in zip(body.skin_joint[vertex], body.skin_weight[vertex], strict=True):
+        place = joints[joint, :3] @ rest
+        velocity[:, :3] += weight * np.cross(np.eye(3), place).T
+        velocity[:, 3:6] += weight * np.eye(3)
+        velocity[:, 6:] += weight * below[:, joint] * (np.cross(screws[:, :3], place) + screws[:, 3:]).T
+    return velocity
