@@ -22,7 +22,8 @@ class FootContact(Prior):
 
     A nearly straight leg tells its bend by its length: a foot 3 mm too high is 2.5 degrees of knee, and 3 mm are what a
     contour in the foot's own shadow is wrong by. Where the floor is not at `height_m` this says nothing. In the first
-    frame, whose pose may be centimetres off, it is silent.
+    frame, whose pose may be centimetres off, it is silent. It is for people who stand: a foot that rises slowly is held
+    back for some frames.
     """
 
     name: ClassVar[str] = "foot_contact"
