@@ -20,10 +20,11 @@ FILLED = np.ones((3, 3), np.uint8)  # cells by a vertex
 def stands_off(
     pixel: F64, normal: F64, vertex: I32, silhouette: Silhouette, surface: Surface, scene: Scene, loose_m: float
 ) -> F64:
-    """Return how uncertain (M,) px the edge of clothes makes pairs of image points and vertices.
+    """Return the standard deviation (M,) px that clothes add to pairs of image points and vertices.
 
     An arm's vertex is paired with what may be the edge of clothes on trunk or legs where these come within reach,
     going inward from the image point, and no background before them: an arm that is seen apart is known by the gap.
+    The edge stands off alike along the arm, so its many points are one measurement, and each is given the whole reach.
 
     Args:
         pixel: (M, 2) px, points of the image contour.
