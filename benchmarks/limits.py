@@ -69,7 +69,7 @@ def main() -> None:
     loop, body, garment = stages["track"], pipeline.body.load(folder), pipeline.garment
     assert isinstance(loop, CoupledLoop) and garment is not None
     scene = Scene(cameras=recording.cameras, body=body, garment=garment.sew(body))
-    truth = true_poses(folder, scene, frames)
+    truth = true_poses(folder, scene, range(frames))
     model = ClothedModel(scene=scene.with_background(stages["background"].run(recording)), draper=loop.draper)
     print(f"{'RMS over ' + str(frames) + ' frames':28} knees °      shank °  hip centre mm  pelvis yaw °")
     for label, (segmenter, priors) in variants(loop.segmenter, truth, dressed(folder, scene, truth)).items():
@@ -178,13 +178,13 @@ def replace_row(prior: Prior, row: int) -> Prior:
     return prior.model_copy(update={"row": row})
 
 
-def true_poses(folder: Path, scene: Scene, count: int) -> tuple[Pose, ...]:
-    """Return the poses whose joint centres are the true ones; what they leave open stays near rest."""
+def true_poses(folder: Path, scene: Scene, rows: Sequence[int]) -> tuple[Pose, ...]:
+    """Return the poses of frames, in order, with the true joint centres; what they leave open stays near rest."""
     from scipy.optimize import least_squares
 
     archive = np.load(folder / "truth" / "joints.npz")
     names = [str(name) for name in archive["names"]]
-    centres = archive["positions"][:count, [names.index(name) for name in scene.body.joint_names]]
+    centres = archive["positions"][list(rows)][:, [names.index(name) for name in scene.body.joint_names]]
     spread = np.where(np.isfinite(scene.body.rest_spread), scene.body.rest_spread, LOOSE)
     poses = [read_pose(folder / "init.json", scene.body)]
     for goal in centres:

@@ -12,11 +12,13 @@ import numpy as np
 from pydantic import Field
 
 from mocapflow.assets import Background, Body
-from mocapflow.components import Matcher, Segmenter, Stage
-from mocapflow.data import Cloth, Frame, Matches, Past, Pose, Segmentation, Turn
+from mocapflow.components import Draper, Matcher, Segmenter, Stage
+from mocapflow.data import Change, Frame, Matches, Past, Pose, Segmentation, Turn
 from mocapflow.errors import RecordingError
 from mocapflow.loop import pool_matches
+from mocapflow.model import ClothedModel
 from mocapflow.recording import Recording
+from mocapflow.records import F64
 from mocapflow.results import Track
 from mocapflow.scene import Scene
 from mocapflow.track import believed
@@ -26,8 +28,10 @@ from mocapflow_sequence.landmarks import landmarks
 from mocapflow_sequence.pose_fit import Solution
 from mocapflow_sequence.proportions import PROPORTIONS, scaled
 from mocapflow_sequence.silhouette_fit import refine
+from mocapflow_sequence.start_from_file import calm
 
 LOG = logging.getLogger("mocapflow")
+AT_REST = Change(body=0.0, cloth=0.0, angles=0.0)  # near the solution matchers reach less far and give up what is off
 Positive = Annotated[float, Field(gt=0)]
 
 
@@ -41,15 +45,16 @@ class CalibrateLimbs(Stage):
     name: ClassVar[str] = "calibrate_limbs"
     segmenter: Segmenter  # as in the track
     matchers: Annotated[tuple[Matcher, ...], Field(min_length=1)]  # as in the track
+    draper: Draper | None = None  # as in the track; without one the body is fitted bare
     # contours see neither hip nor shoulder: without the trunk, the thigh would take up what the trunk is wrong by
     proportions: tuple[str, ...] = (  # those that are fitted
         "girth", "trunk", "shoulder_width", "thigh", "shank", "foot", "upper_arm", "forearm",
     )  # fmt: skip
-    spread: Positive = 0.05  # standard deviation of a log proportion about the body's
+    spread: Positive = 0.02  # standard deviation of a log proportion about the body's: of a scan; 0.05 of a template
     frames: Annotated[int, Field(ge=1)] = 10  # spread over the recording
-    passes: Annotated[int, Field(ge=1)] = 2  # times that the images are segmented
-    rounds: Annotated[int, Field(ge=1)] = 6  # matchings a pass
-    independent: Annotated[float, Field(gt=0, le=1)] = 0.15  # share of contour pairs that are independent
+    passes: Annotated[int, Field(ge=1)] = 3  # times that the images are segmented; after the first, matching is calm
+    rounds: Annotated[int, Field(ge=1)] = 3  # matchings a pass
+    independent: Annotated[float, Field(gt=0, le=1)] = 0.24  # share of a frame's contour pairs; all frames count as one
 
     def run(
         self, recording: Recording, scene: Scene, background: Background | None = None, track: Track | None = None
@@ -62,50 +67,55 @@ class CalibrateLimbs(Stage):
         if unknown := set(self.proportions) - set(PROPORTIONS):
             hint = f"there are: {', '.join(PROPORTIONS)}"
             raise RecordingError(f"calibrate_limbs: no proportion '{min(unknown)}'", hint=hint)
-        scene = scene.with_background(background)
+        scene = (scene if self.draper else scene.undressed).with_background(background)
         indices, poses, clothes = self._from_track(track) if track else self._from_keypoints(recording, scene)
         spreads, body = dict.fromkeys(self.proportions, self.spread), scene.body
+        share = self.independent / len(indices)  # contours err alike in all frames: more of them tell no more
         solution = Solution(np.zeros(len(spreads)), tuple(poses))
-        for turn in range(self.passes):
-            scene = replace(scene, body=scaled(body, solution.factors(spreads)))
-            views = self._segmented(recording, scene, indices, solution.poses, clothes)
-            matchers = [partial(self._match, scene, *view, Turn(index=turn, cap=self.passes)) for view in views]
-            solution = refine(body, matchers, solution, scene.cameras, spreads, self.independent, self.rounds)
+        for done in range(self.passes):
+            model = self._model(scene, scaled(body, solution.factors(spreads)))
+            views = self._segmented(recording, model, indices, solution.poses, clothes)
+            turn = Turn(index=done, cap=self.passes, change=AT_REST if done else None)
+            matchers = [partial(self._match, scene, *view, turn) for view in views]
+            solution = refine(body, matchers, solution, scene.cameras, spreads, share, self.rounds)
         factors = solution.factors(spreads)
         LOG.info("proportions: %s", ", ".join(f"{name} {factor:.3f}" for name, factor in factors.items()))
         return scaled(body, factors)
 
-    def _from_track(self, track: Track) -> tuple[list[int], list[Pose], list[Cloth]]:
+    def _from_track(self, track: Track) -> tuple[list[int], list[Pose], list[F64]]:
         good = np.flatnonzero(track.usable.all(axis=1) & track.steady)
         good = good if len(good) >= self.frames else np.arange(len(track.frame))
         rows = good[np.unique(np.linspace(0, len(good) - 1, self.frames).round().astype(int))]
-        clothes = [Cloth(vertices=track.cloth[r].copy(), parameters=track.cloth_parameters[r].copy()) for r in rows]
+        clothes = [track.cloth_parameters[r].copy() for r in rows]
         return [int(track.frame[r]) for r in rows], [track.pose(int(r)) for r in rows], clothes
 
-    def _from_keypoints(self, recording: Recording, scene: Scene) -> tuple[list[int], list[Pose], list[Cloth]]:
+    def _from_keypoints(self, recording: Recording, scene: Scene) -> tuple[list[int], list[Pose], list[F64]]:
         found = persons(recording, spread(recording.indices, self.frames), scene.cameras)
         names, order = landmarks(scene.body).names, layout(recording, list(found), None)
         _, poses = fit(scene.body, [seen(person, order, names) for person in found.values()], scene.cameras)
-        bare = Cloth(vertices=np.empty((0, 3)), parameters=np.empty(0))
-        return list(found), list(poses), [bare] * len(found)
+        return list(found), list(poses), [calm(scene.garment)] * len(found)
+
+    def _model(self, scene: Scene, body: Body) -> ClothedModel:
+        return ClothedModel(scene=replace(scene, body=body), draper=self.draper)
 
     def _segmented(
-        self, recording: Recording, scene: Scene, indices: Sequence[int], poses: Sequence[Pose],
-        clothes: Sequence[Cloth],
-    ) -> list[tuple[Frame, Segmentation, Cloth]]:  # fmt: skip
+        self, recording: Recording, model: ClothedModel, indices: Sequence[int], poses: Sequence[Pose],
+        clothes: Sequence[F64],
+    ) -> list[tuple[Frame, Segmentation, F64]]:  # fmt: skip
         """Return the silhouettes of the chosen frames; the images are let go at once."""
-        views = []
+        views, past = [], Past()
         wanted = {index: (pose, cloth) for index, pose, cloth in zip(indices, poses, clothes, strict=True)}
         for frame in recording.until(max(indices)).frames(since=min(indices)):
             if frame.index in wanted:
                 pose, cloth = wanted[frame.index]
-                state = believed(pose, cloth.parameters, cloth)
-                found = self.segmenter.segment(frame, state, Past(), scene, Turn(index=0, cap=1))
+                state = believed(pose, cloth, model.drape(pose, cloth, past))
+                found = self.segmenter.segment(frame, state, past, model.scene, Turn(index=0, cap=1))
                 views.append((replace(frame, images=(), flow=None), found, cloth))
         return views
 
     def _match(
-        self, scene: Scene, frame: Frame, segmentation: Segmentation, cloth: Cloth, turn: Turn, body: Body, pose: Pose
+        self, scene: Scene, frame: Frame, segmentation: Segmentation, cloth: F64, turn: Turn, body: Body, pose: Pose
     ) -> Matches:
-        scene = replace(scene, body=body)
-        return pool_matches(self.matchers, frame, segmentation, Past(), scene, turn, scene.surface(pose, cloth))
+        model, past = self._model(scene, body), Past()
+        surface = model.surface(pose, model.drape(pose, cloth, past))
+        return pool_matches(self.matchers, frame, segmentation, past, model.scene, turn, surface)
