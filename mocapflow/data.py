@@ -167,19 +167,6 @@ class Silhouette:
 
 
 @record
-class Segmentation:
-    """The silhouettes of one frame, one per usable view and layer, and what they cost."""
-
-    silhouettes: tuple[Silhouette, ...]
-    energies: Mapping[str, float] = field(default_factory=dict)
-    appearance: Mapping[str, F64] = field(default_factory=dict)  # region statistics for the next frame
-
-    def of(self, layer: str) -> list[Silhouette]:
-        """Return the silhouettes of one layer."""
-        return [silhouette for silhouette in self.silhouettes if silhouette.layer == layer]
-
-
-@record
 class Matches:
     """Image points paired with surface vertices.
 
@@ -192,6 +179,20 @@ class Matches:
     direction: F64 = array("M", 2, unit="1")
     vertex: I32 = array("M", unit="surface vertex index")
     weight: F64 = array("M", unit="px^-2, one over the variance, robust factor included")
+
+
+@record
+class Segmentation:
+    """The silhouettes of one frame, one per usable view and layer, what is found inside them, and what they cost."""
+
+    silhouettes: tuple[Silhouette, ...]
+    inner: Matches | None = None  # contours of parts before others, with the vertices whose edges they are
+    energies: Mapping[str, float] = field(default_factory=dict)
+    appearance: Mapping[str, F64] = field(default_factory=dict)  # region statistics for the next frame
+
+    def of(self, layer: str) -> list[Silhouette]:
+        """Return the silhouettes of one layer."""
+        return [silhouette for silhouette in self.silhouettes if silhouette.layer == layer]
 
 
 @record

@@ -1,4 +1,4 @@
-"""Segmenter `layered`: the level set's outline, and the colours of the layers inside it."""
+"""Segmenter `layered`: the level set's outline, and inside it the contours of parts before others, by their colours."""
 
 from __future__ import annotations
 
@@ -7,33 +7,64 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from mocapflow.data import Frame, FrameState, Past, Segmentation, Turn
+from mocapflow.components import pool
+from mocapflow.data import Frame, FrameState, Matches, Past, Segmentation, Surface, Turn
 from mocapflow.scene import Scene
-from mocapflow_levelset.layers import COLOURS, gathered
+from mocapflow_levelset.inner import Search, inner_contours
+from mocapflow_levelset.layers import COLOURS, gathered, layer_of, shown
 from mocapflow_levelset.levelset import PERSON, LevelSet
+
+Positive = Annotated[float, Field(gt=0)]
+Count = Annotated[int, Field(gt=0)]
 
 
 class Layered(LevelSet):
     """The outline as `levelset` finds it; inside it, body parts and garment are told apart by their colours.
 
-    What colours each has is learned from the tracked surface, frame by frame; matcher `inner_contours` finds by them
-    where one part ends before another.
+    What colours each has is learned from the tracked surface, frame by frame. A part ends where, along the normal of
+    its edge in the model, its colours give way to those of other parts. Parts that look alike, as one leg before the
+    other, have no contour between them. Matchers `inner_contours` and `layered_icp` use what is found; in the first
+    frame nothing is known yet.
     """
 
     name: ClassVar[str] = "layered"
     keep: Annotated[float, Field(ge=0, lt=1)] = 0.9  # of what is known of the colours, from frame to frame
-    grid_px: Annotated[int, Field(ge=1)] = 4  # colours are taken every so many px, so far from borders
+    grid_px: Count = 4  # colours are taken every so many px, so far from borders
+    inner_spacing_px: Positive = 4.0  # between the points of an edge of the model
+    calm_mm: Positive = 15.0  # change of the body in a turn below which the reach is the later one
+    first_reach_px: Count = 24  # how far along the normal the end of a part is looked for
+    later_reach_px: Count = 10  # the same once it is calm
+    half_px: Annotated[int, Field(ge=2)] = 3  # on either side that colours have to agree over
+    least: Positive = 1.0  # mean log ratio of colours from which on a side is told from the other
+    inner_sigma_px: Positive = 1.0  # standard deviation of a point; that by the noise of the colours is added
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
-        """Return the silhouettes, and the colours of layers for the frames to come.
+        """Return the silhouettes, the inner contours, and the colours of layers for the frames to come.
 
-        On the first turn nobody has looked yet where the surface is, so nothing is learned.
+        Colours are learned once, on the second turn: on the first nobody has looked yet where the surface is.
         """
         found = super().segment(frame, state, past, scene, turn)
-        if turn.index == 0:
-            return replace(found, appearance=past.appearance)
         if found is state.segmentation and turn.index > 1:
             return found
         surface = scene.surface(state.estimate.pose, state.cloth)
-        layers = gathered(frame, found.of(PERSON), surface, scene, past, self.keep, self.grid_px)
-        return replace(found, appearance={**found.appearance, COLOURS: layers})
+        colours = dict(state.segmentation.appearance if turn.index > 1 else past.appearance)
+        if turn.index == 1:
+            colours[COLOURS] = gathered(frame, found.of(PERSON), surface, scene, past, self.keep, self.grid_px)
+        return replace(found, inner=self._inner(frame, found, surface, past, scene, turn), appearance=colours)
+
+    def _inner(
+        self, frame: Frame, found: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn
+    ) -> Matches | None:
+        if COLOURS not in past.appearance:
+            return None
+        layers, known, search = layer_of(scene), shown(past), self._search(turn)
+        parts = [
+            inner_contours(frame.images[s.camera], s, surface, scene.cameras[s.camera], layers, known, search)
+            for s in found.of(PERSON)
+        ]
+        return pool([(1.0, part) for part in parts]) if parts else None
+
+    def _search(self, turn: Turn) -> Search:
+        calm = turn.change is not None and turn.change.body <= self.calm_mm / 1000
+        reach = self.later_reach_px if calm else self.first_reach_px
+        return Search(self.inner_spacing_px, reach, self.half_px, self.least, self.inner_sigma_px)

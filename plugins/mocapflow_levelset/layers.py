@@ -34,11 +34,6 @@ class Shown(NamedTuple):
     ratio: F32  # (L, BINS) log density in a layer over the greatest in any layer unlike it; 0: nothing is known
     apart: Bool  # (L, L) True where two layers are told apart by colour
 
-    @property
-    def told(self) -> Bool:
-        """Which layers (L,) are told apart from any other."""
-        return np.asarray(self.apart.any(axis=1))
-
 
 @once
 def layer_of(scene: Scene) -> I32:

@@ -6,13 +6,13 @@ from dataclasses import replace
 from typing import Annotated, ClassVar
 
 import numpy as np
+from mocapflow_levelset import splits
 from mocapflow_levelset.layers import COLOURS, Shown, layer_of, shown
 from pydantic import Field
 
 from mocapflow.data import Frame, Matches, Past, Segmentation, Surface, Turn
 from mocapflow.records import I32, Bool
 from mocapflow.scene import Scene
-from mocapflow_matching import splits
 from mocapflow_matching.contour_icp import ContourIcp
 
 INSIDE = (2, 3)  # px inside of a contour at which its colours are looked up
@@ -25,7 +25,7 @@ class LayeredIcp(ContourIcp):
     """
 
     name: ClassVar[str] = "layered_icp"
-    least: Annotated[float, Field(gt=0)] = 2.0  # log ratio of colours by which they are surely another part's
+    least: Annotated[float, Field(gt=0)] = 3.0  # log ratio of colours by which they are surely another part's
 
     def match(
         self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn

@@ -1,11 +1,14 @@
 """Edges inside the silhouette: found to a fraction of a pixel where two colours meet, silent where they do not."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
+from mocapflow_levelset import splits
 from mocapflow_levelset.colours import BINS, bins_of
+from mocapflow_levelset.layered import Layered
 from mocapflow_levelset.layers import COLOURS, layer_of, shown
-from mocapflow_matching import splits
 from mocapflow_matching.inner_contours import InnerContours
 from mocapflow_matching.layered_icp import LayeredIcp, another_s
 from test_layers import CLOTHS, SCENE, SKIN, dressed, learned, painted
@@ -83,9 +86,11 @@ def surface_at(pose):
 
 def match(colour_of, believed, true=60.0):
     pose = kicked(true)
-    frame, segmentation = painted(colour_of, pose), tiny_segmentation(SCENE, pose)
+    frame, surface = painted(colour_of, pose), surface_at(kicked(believed))
     past = Past(appearance={COLOURS: learned(frame, pose=pose)})
-    return InnerContours().match(frame, segmentation, surface_at(kicked(believed)), past, SCENE, FIRST)
+    inner = Layered()._inner(frame, tiny_segmentation(SCENE, pose), surface, past, SCENE, FIRST)
+    segmentation = replace(tiny_segmentation(SCENE, pose), inner=inner)
+    return InnerContours().match(frame, segmentation, surface, past, SCENE, FIRST)
 
 
 def off(matches, pose):

@@ -6,6 +6,7 @@ import math
 
 import numba
 import numpy as np
+
 from mocapflow_levelset.colours import bin_at
 
 ENDS = 3  # samples at either end of a profile of colours that say what its two sides look like

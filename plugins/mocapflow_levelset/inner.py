@@ -1,0 +1,54 @@
+"""Inner contours of the person in one view: where parts end before others, looked for near their edges in the model."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mocapflow.assets import Camera
+from mocapflow.data import BODY, Matches, Silhouette, Surface
+from mocapflow.records import F64, I32, U8
+from mocapflow_levelset import splits
+from mocapflow_levelset.inner_edges import behind_edges, chosen, inner_edges
+from mocapflow_levelset.layers import CLIP, Shown
+
+
+class Search(NamedTuple):
+    """How to look for the end of a part."""
+
+    spacing_px: float  # between points of an edge
+    reach_px: int  # along the normal
+    half_px: int  # on either side that colours have to agree over
+    least: float  # mean log ratio from which on a side is told from the other
+    sigma_px: float  # standard deviation of a point without noise
+
+
+def inner_contours(
+    image: U8, silhouette: Silhouette, surface: Surface, camera: Camera, layers: I32, known: Shown, search: Search
+) -> Matches:
+    """Return points of inner contours, each with the vertex at whose edge the part ends there.
+
+    Edges of cloth are left out: where it hangs is not known well enough to say anything of what it lies before.
+    """
+    told = np.asarray(surface.layer == BODY) & np.asarray(known.apart.any(axis=1))[layers]
+    edges = inner_edges(surface, camera, search.spacing_px, told)
+    rough = splits.split(
+        image, silhouette.distance, known.ratio, layers[edges.vertex], edges.pixel, edges.normal, CLIP,
+        search.reach_px, search.half_px, search.least,
+    )  # fmt: skip
+    ended = np.isfinite(rough)  # few, so that what is seen is looked up for few
+    edges, rough = chosen(edges, ended), rough[ended]
+    behind = behind_edges(surface, camera, edges)
+    offset, noise = splits.refine(image, edges.pixel, edges.normal, rough, search.half_px)
+    pair = (behind >= 0) & known.apart[layers[edges.vertex], layers[behind]]
+    pair &= np.abs(offset - rough) < search.half_px
+    edges, way = chosen(edges, pair), offset[pair]
+    weight: F64 = 1 / (search.sigma_px**2 + noise[pair])
+    return Matches(
+        camera=np.full(len(way), silhouette.camera, np.int16),
+        pixel=edges.anchor + way[:, None] * edges.normal,
+        direction=edges.normal,
+        vertex=edges.vertex,
+        weight=weight,
+    )
