@@ -21,7 +21,7 @@ from mocapflow_levelset.colours import BINS, SIDE, bins_of
 
 COLOURS = "layers"  # of Segmentation.appearance: (L, BINS) pixels of each layer by colour, older ones discounted
 SMOOTH = 0.7  # bins; standard deviation by which colours are smoothed
-UNSEEN = 0.02  # share of colours that a layer may have although it has not shown them
+UNSEEN = 0.1  # share of pixels by which a layer may have any colour: shadows, highlights
 ALIKE = 0.5  # Bhattacharyya coefficient from which on two layers are one to the eye
 LEAST = 50.0  # pixels that a layer has to have shown to be known
 CLIP = 4.0  # bound on the log ratio of a pixel
