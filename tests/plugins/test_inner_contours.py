@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from mocapflow_levelset import splits
 from mocapflow_levelset.colours import BINS, bins_of
-from mocapflow_levelset.layered import Layered
+from mocapflow_levelset.inner import Search, inner_contours
 from mocapflow_levelset.layers import COLOURS, layer_of, shown
 from mocapflow_matching.inner_contours import InnerContours
 from mocapflow_matching.layered_icp import LayeredIcp, another_s
 from test_layers import CLOTHS, SCENE, SKIN, dressed, learned, painted
 
+from mocapflow.components import pool
 from mocapflow.data import CLOTH, Past, Pose, Turn
 from mocapflow.geometry.cameras import project
 from mocapflow.testing import tiny_cloth, tiny_pose, tiny_segmentation
@@ -88,9 +89,12 @@ def match(colour_of, believed, true=60.0):
     pose = kicked(true)
     frame, surface = painted(colour_of, pose), surface_at(kicked(believed))
     past = Past(appearance={COLOURS: learned(frame, pose=pose)})
-    inner = Layered()._inner(frame, tiny_segmentation(SCENE, pose), surface, past, SCENE, FIRST)
-    segmentation = replace(tiny_segmentation(SCENE, pose), inner=inner)
-    return InnerContours().match(frame, segmentation, surface, past, SCENE, FIRST)
+    segmentation, search = tiny_segmentation(SCENE, pose), Search(4.0, 24, 3, 1.0, 1.0)
+    parts = [
+        (1.0, inner_contours(image, silhouette, surface, camera, layer_of(SCENE), shown(past), search))
+        for image, silhouette, camera in zip(frame.images, segmentation.silhouettes, SCENE.cameras, strict=True)
+    ]
+    return InnerContours().match(frame, replace(segmentation, inner=pool(parts)), surface, past, SCENE, FIRST)
 
 
 def off(matches, pose):
@@ -115,7 +119,7 @@ def test_a_leg_of_the_cloth_s_colour_is_left_alone():
     assert len(match(lambda layer: SKIN, believed=55.0).vertex) == 0
 
 
-def test_without_colours_there_are_no_pairs():
+def test_without_inner_contours_there_are_no_pairs():
     pose = kicked(60.0)
     frame, segmentation = painted(dressed, pose), tiny_segmentation(SCENE, pose)
     assert len(InnerContours().match(frame, segmentation, surface_at(pose), Past(), SCENE, FIRST).vertex) == 0

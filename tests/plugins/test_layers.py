@@ -83,8 +83,14 @@ def test_a_part_does_not_learn_what_is_surely_another_s():
 
 
 def test_the_segmenter_hands_them_on():
+    """Learned on the second turn; in the next frame, contours are looked for by them from the first turn on."""
     past, turn = tiny_past(SCENE, POSE), Turn(index=1, cap=4)
-    found = Layered().segment(tiny_frame(SCENE, POSE), tiny_state(SCENE, POSE), past, SCENE, turn)
+    frame, state = tiny_frame(SCENE, POSE), tiny_state(SCENE, POSE)
+    found = Layered().segment(frame, state, past, SCENE, turn)
+    assert found.inner is None
+    then = Layered().segment(frame, state, replace(past, appearance=found.appearance), SCENE, Turn(index=0, cap=4))
+    assert then.inner is not None
+    assert then.appearance == found.appearance
     assert len(found.silhouettes) == len(SCENE.cameras)
     assert found.appearance[COLOURS].shape == (layer_of(SCENE).max() + 1, BINS)
     assert found.appearance[COLOURS].sum() > 100
