@@ -232,6 +232,7 @@ class Change:
     body: float  # m, largest move of a body vertex
     cloth: float  # m, root mean square move of the cloth: a fold may flip while all the rest hangs still
     angles: float  # rad, largest change of a joint angle
+    sigmas: float  # standard deviations of the pose, root mean square over its independent directions
 
 
 @record

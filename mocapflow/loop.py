@@ -42,7 +42,8 @@ def settle(
 
     Source: Rosenhahn 2008, Fig. 12.14
     """
-    functional, steady, watch = Functional(model, steps.priors, past), steps.steady, Stopwatch()
+    functional, watch = Functional(model, steps.priors, past), Stopwatch()
+    steady = steps.steady if past.moments else replace(steps.steady, sigmas=0.0)  # a start that is far off takes its time
     calm, turn = 0, Turn(index=0, cap=steady.max_turns)
     last = before_last = Shown(state.estimate.pose, model.surface(state.estimate.pose, state.cloth))
     energy = np.full((steady.max_turns, len(functional.terms)), np.nan)
@@ -61,12 +62,12 @@ def settle(
         state = FrameState(segmentation=segmentation, matches=match(surface), estimate=estimate, cloth=cloth)
         energy[index] = functional.values(state, surface)
         now = Shown(estimate.pose, surface)
-        change, swing = measure_change(last, now), measure_change(before_last, now)
+        change, swing = (measure_change(old, now, estimate.covariance) for old in (last, before_last))
         watch.lap("match")
         observe(frame.index, turn, state)
         before_last, last = last, now
         turn = Turn(index=index, cap=turn.cap, change=change)
-        calm = calm + 1 if steady.holds(change) else 0
+        calm = calm + 1 if index and steady.holds(change) else 0  # the first turn starts at a prediction
         if calm >= steady.turns:
             break
     assert turn.change is not None

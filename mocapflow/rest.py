@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from mocapflow.data import CLOTH, Change, Pose, Surface
-from mocapflow.records import record
+from mocapflow.geometry import twists
+from mocapflow.records import F64, record
 
 
 @record
@@ -16,13 +17,15 @@ class Steady:
 
     surface: float  # m
     angle: float  # rad
+    sigmas: float  # standard deviations; a change that small is rest whatever it is in m and rad
     turns: int  # consecutive turns within both tolerances
     max_turns: int
     halvings: int  # of a step that costs more than where it began, at most
 
     def holds(self, change: Change) -> bool:
-        """True where a change is within both tolerances."""
-        return max(change.body, change.cloth) <= self.surface and change.angles <= self.angle
+        """True where a change is within both tolerances, or hidden by what the pose is known to."""
+        exact = max(change.body, change.cloth) <= self.surface and change.angles <= self.angle
+        return exact or change.sigmas <= self.sigmas
 
 
 class Shown(NamedTuple):
@@ -32,8 +35,12 @@ class Shown(NamedTuple):
     surface: Surface
 
 
-def measure_change(old: Shown, new: Shown) -> Change:
-    """Return how far body, cloth and joint angles moved between two poses."""
+def measure_change(old: Shown, new: Shown, covariance: F64) -> Change:
+    """Return how far body, cloth and joint angles moved between two poses.
+
+    In standard deviations of the pose, by its covariance (S, S), a direction that no image shows counts little however
+    far it moves, and one that all show counts as soon as it moves.
+    """
     way = new.surface.vertices - old.surface.vertices
     squared = np.einsum("va,va->v", way, way)
     worn = new.surface.layer == CLOTH
@@ -43,4 +50,13 @@ def measure_change(old: Shown, new: Shown) -> Change:
         body=float(np.sqrt(body.max())),
         cloth=float(np.sqrt(cloth.mean())) if len(cloth) else 0.0,
         angles=float(angles.max(initial=0)),
+        sigmas=_sigmas(old.pose, new.pose, covariance),
     )
+
+
+def _sigmas(old: Pose, new: Pose, covariance: F64) -> float:
+    """Return the way between two poses in standard deviations, the root mean square over independent directions."""
+    way = np.concatenate([twists.log(new.root @ np.linalg.inv(old.root)), new.angles - old.angles])
+    unit = np.sqrt(np.diag(covariance))[: len(way)]  # scaled first: units differ widely
+    scaled = covariance[: len(way), : len(way)] / unit[:, None] / unit
+    return float(np.sqrt(way / unit @ np.linalg.solve(scaled, way / unit) / len(way)))

@@ -64,6 +64,7 @@ class SteadyState(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
     surface_mm: Positive = 0.5  # largest move of a body vertex from turn to turn, RMS move of the cloth
     angle_deg: Positive = 0.1  # largest change of a joint angle
+    sigmas: Annotated[float, Field(ge=0)] = 0.0  # of the pose, root mean square: a turn that moves it less is within them too
     turns: Count = 2  # in a row within both tolerances, then the frame is at rest
     max_turns: Count = 8  # then the frame is left as it is
     halvings: Annotated[int, Field(ge=0)] = 0  # at most, of a step that raises the functional; 0: it is taken whole
@@ -73,6 +74,7 @@ class SteadyState(BaseModel):
         return Steady(
             surface=self.surface_mm / 1000,
             angle=float(np.radians(self.angle_deg)),
+            sigmas=self.sigmas,
             turns=self.turns,
             max_turns=self.max_turns,
             halvings=self.halvings,
@@ -221,7 +223,7 @@ def lost(
         iterations=0,
         steady=False,
         oscillating=False,
-        change=Change(body=0.0, cloth=0.0, angles=0.0),
+        change=Change(body=0.0, cloth=0.0, angles=0.0, sigmas=0.0),
         overlap=np.full(len(frame.usable), np.nan),
         energy=np.full((steps.steady.max_turns, len(terms)), np.nan),
         energy_terms=terms,

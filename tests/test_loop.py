@@ -5,7 +5,7 @@ import pytest
 
 from mocapflow.assets import Camera
 from mocapflow.components import PoseSolver, Predictor
-from mocapflow.data import Estimate, Frame, Past, Pose
+from mocapflow.data import NO_CLOTH, Estimate, Frame, Moment, Past, Pose
 from mocapflow.geometry.kinematics import chain, skin
 from mocapflow.loop import Steps, settle
 from mocapflow.model import ClothedModel
@@ -41,7 +41,7 @@ def frame():
     return Frame(index=5, time=0.1, images=(image, image), usable=np.ones(2, bool))
 
 
-def go(frame, share, observe=lambda *_: None, max_turns=8):
+def go(frame, share, observe=lambda *_: None, max_turns=8, sigmas=0.0, past=None):
     camera = Camera(
         name="cam01", size=np.array([24, 16], np.int32), intrinsics=np.eye(3), distortion=np.zeros(5),
         camera_from_world=np.eye(4),
@@ -50,11 +50,13 @@ def go(frame, share, observe=lambda *_: None, max_turns=8):
     steps = Steps(
         predictor=Nothing(), segmenter=TinySegmenter(), matchers=(TinyMatcher(),), pose_solver=Towards(share=share),
         cloth_fitter=None, priors=(),
-        steady=Steady(surface=0.0005, angle=float(np.radians(0.1)), turns=2, max_turns=max_turns, halvings=0),
+        steady=Steady(
+            surface=0.0005, angle=float(np.radians(0.1)), sigmas=sigmas, turns=2, max_turns=max_turns, halvings=0
+        ),
     )  # fmt: skip
     pose = Pose(root=np.eye(4), angles=np.array([0.3, -0.4]))
     start = believed(pose, np.empty(0), model.drape(pose, np.empty(0), Past()))
-    return settle(frame, start, Past(), steps, model, observe)
+    return settle(frame, start, past or Past(), steps, model, observe)
 
 
 def test_converges_and_stops_after_the_wanted_number_of_calm_turns(frame):
@@ -69,6 +71,14 @@ def test_a_swing_between_two_states_is_told_from_creeping(frame):
     assert (swinging.steady, swinging.oscillating, swinging.iterations) == (False, True, 8)
     assert swinging.change.angles == pytest.approx(0.8)
     assert (creeping.steady, creeping.oscillating, creeping.iterations) == (False, False, 8)
+
+
+def test_what_the_pose_is_not_known_to_is_rest(frame):
+    before = Past(moments=(Moment(time=0.0, pose=Pose(root=np.eye(4), angles=np.zeros(2)), cloth=NO_CLOTH),))
+    result = go(frame, 0.05, sigmas=0.01, past=before)  # the stub says that angles are known to 1 rad
+    assert (result.steady, result.iterations) == (True, 3)  # a turn away from the prediction, then two calm ones
+    assert result.change.sigmas == pytest.approx(0.05 * 0.95**2 * 0.5 / np.sqrt(8))  # of two angles among 8 unknowns
+    assert go(frame, 0.05, sigmas=0.01).iterations == 8  # the first frame starts anywhere, and takes its time
 
 
 def test_the_cap_holds(frame):

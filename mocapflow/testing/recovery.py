@@ -56,7 +56,7 @@ def _settled(state: FrameState) -> FrameResult:
         iterations=1,
         steady=True,
         oscillating=False,
-        change=Change(body=0.0, cloth=0.0, angles=0.0),
+        change=Change(body=0.0, cloth=0.0, angles=0.0, sigmas=0.0),
         overlap=np.ones(len(state.segmentation.silhouettes)),
         energy=np.zeros((1, 0)),
         energy_terms=(),

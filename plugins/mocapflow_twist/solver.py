@@ -38,7 +38,9 @@ class TwistGaussNewton(PoseSolver):
     residual: Literal["image", "line"] = "image"  # pixels, or distance to projection rays in space
     line_sigma_mm: Positive = 3.0  # standard deviation of every distance to a ray
     damping: Annotated[float, Field(ge=0)] = 1e-4  # share of the mean diagonal; ten times more after a worse step
-    damping_per_turn: Annotated[float, Field(gt=0)] = 1.0  # factor at each turn of the loop: below 1, gentle then exact
+    damping_per_turn: Annotated[float, Field(gt=0)] = 1.0  # factor at each turn of the loop: above 1, exact then gentle
+    first_damping: Annotated[float, Field(ge=0)] = 0.0  # of the first frame's first turn at least: its start is far off
+    first_damping_per_turn: Annotated[float, Field(gt=0)] = 0.3  # factor at each further turn: gentle, then exact
     cap_deg: Positive = 10.0  # a step, each angle
     cap_mm: Positive = 100.0  # a step, the root
     correlation_px: Annotated[float, Field(ge=0)] = 15.0  # length over which contour errors agree; 0: independent
@@ -50,8 +52,7 @@ class TwistGaussNewton(PoseSolver):
     root_damping_deg: Positive = 11.5  # likewise
     angle_damping_deg: Positive = 60.0  # likewise, of every joint angle
     cloth_sd: Positive = 0.06  # standard deviation of cloth parameters about a calm garment, share of their range
-    stop_surface_mm: Annotated[float, Field(ge=0)] = 0.1  # a step by which no surface point moves farther ends it
-    stop_angle_deg: Annotated[float, Field(ge=0)] = 0.02  # and no angle
+    stop_sigmas: Annotated[float, Field(ge=0)] = 0.02  # standard deviations, in the mean: no smaller step is taken
 
     def solve(
         self,
@@ -66,19 +67,19 @@ class TwistGaussNewton(PoseSolver):
         guess = Guess(state.estimate.pose, state.cloth)
         motion = ClothMotion(model, past, self.cloth_unknowns, self.redrape == "every", self.cloth_jacobian == "once")
         anchor = Anchor(calmed(guess, model), self._precision(model, guess))
-        surface, damping = model.surface(guess.pose, guess.cloth), self._least_damping(turn)
+        surface, damping = model.surface(guess.pose, guess.cloth), self._least_damping(past, turn)
         tried: dict[Pose, Sequence[Residual]] = {}
         for _ in range(self.iterations):
             problem = Problem(model, self._data(match(surface), model), priors, past, anchor, tried)
             if problem.data.measurements == 0:
                 break
-            before, old = guess, surface
+            before = guess
             for _ in range(self.steps_per_match):
                 guess, damping = self._descend(problem, guess, motion, damping)
-                damping = max(damping, self._least_damping(turn))
-            surface = model.surface(guess.pose, guess.cloth)
-            if self._settled(before, guess, old, surface):
+                damping = max(damping, self._least_damping(past, turn))
+            if guess is before:
                 break
+            surface = model.surface(guess.pose, guess.cloth)
         return self._estimate(problem, guess, motion)
 
     def _data(self, matches: Matches, model: ClothedModel) -> Data:
@@ -98,8 +99,11 @@ class TwistGaussNewton(PoseSolver):
             measurements=components * float(share.take(rows.match)[used].sum()),
         )
 
-    def _least_damping(self, turn: Turn) -> float:
-        return self.damping * self.damping_per_turn**turn.index
+    def _least_damping(self, past: Past, turn: Turn) -> float:
+        least = self.damping * self.damping_per_turn**turn.index
+        if past.moments:
+            return least
+        return max(least, self.first_damping * self.first_damping_per_turn**turn.index)
 
     def _precision(self, model: ClothedModel, guess: Guess) -> F64:
         """Return one over the variance of the damping of every unknown."""
@@ -111,28 +115,23 @@ class TwistGaussNewton(PoseSolver):
         return precision
 
     def _descend(self, problem: Problem, guess: Guess, motion: ClothMotion, damping: float) -> tuple[Guess, float]:
-        """Return a guess of lower energy for the same matches, or the same guess where there is none."""
+        """Return a guess of lower energy for the same matches, or the same guess where there is none worth a step."""
         equations = quadratic(problem, guess, motion).total
         equations = motion.within_bounds(equations, guess)
         angles = len(guess.pose.angles)
         ranges = parameter_ranges(problem.model) if problem.unknowns > 6 + angles else np.empty(0)
         lever = solve.levers(angles, ranges)
+        least = max(LEAST_GAIN * equations.energy, 0.5 * problem.unknowns * self.stop_sigmas**2)
         for _ in range(TRIALS):
             increment = solve.step(equations, lever, damping)
             increment = solve.capped(increment, angles, np.radians(self.cap_deg), self.cap_mm / 1000)
-            if solve.gain(equations, increment) <= LEAST_GAIN * equations.energy:
+            if solve.gain(equations, increment) <= least:
                 return guess, damping
             trial = motion.moved(guess, solve.about_origin(guess.centre, len(increment)) @ increment)
             if sum(problem.energies(trial).values()) <= equations.energy:
                 return trial, LOWERED * damping
             damping = max(RAISED * damping, 1e-6)
         return guess, damping
-
-    def _settled(self, before: Guess, after: Guess, old: Surface, new: Surface) -> bool:
-        angles = np.abs(after.pose.angles - before.pose.angles).max(initial=0.0)
-        way = new.vertices - old.vertices
-        surface = np.sqrt(np.einsum("va,va->v", way, way).max())
-        return bool(angles <= np.radians(self.stop_angle_deg) and surface <= self.stop_surface_mm / 1000)
 
     def _estimate(self, problem: Problem, guess: Guess, motion: ClothMotion) -> Estimate:
         data, prior = quadratic(problem, guess, motion)

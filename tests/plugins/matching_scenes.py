@@ -33,7 +33,7 @@ from mocapflow.testing.scenes import tiny_past
 
 BAND = 12.0  # px
 FIRST = Turn(index=0, cap=5)
-CALM = Turn(index=3, cap=5, change=Change(body=0.005, cloth=0.0, angles=0.0))
+CALM = Turn(index=3, cap=5, change=Change(body=0.005, cloth=0.0, angles=0.0, sigmas=1.0))
 FRAME = Frame(index=0, time=0.0, images=(), usable=np.ones(4, bool))
 
 
@@ -114,7 +114,7 @@ def knee_error_deg(
         segmentation = cluttered(segmentation, clutter, seed)
     start = start_near(truth, off_deg, 0.0014 * off_deg, seed)
     state = replace(tiny_state(scene, start), segmentation=segmentation)
-    steady = Steady(surface=0.0005, angle=np.radians(0.1), turns=1, max_turns=5, halvings=0)
+    steady = Steady(surface=0.0005, angle=np.radians(0.1), sigmas=0.0, turns=1, max_turns=5, halvings=0)
     steps = Steps(
         predictor=Hold(), segmenter=Given(), matchers=matchers, pose_solver=TwistGaussNewton(), cloth_fitter=Fixed(),
         priors=priors, steady=steady,

@@ -66,7 +66,7 @@ def test_silhouettes_stay_while_the_model_rests(scene, pose):
     frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, believed(pose))
 
     def again(segmenter, body):
-        turn = replace(LATER, change=Change(body=body, cloth=0.1, angles=0.1))
+        turn = replace(LATER, change=Change(body=body, cloth=0.1, angles=0.1, sigmas=1.0))
         return segmenter.segment(frame, state, Past(), scene, turn) is state.segmentation
 
     assert again(LevelSet(), 0.004) and not again(LevelSet(), 0.006) and not again(LevelSet(keep_mm=0), 0.0)

@@ -14,13 +14,13 @@ from mocapflow_twist.solver import TwistGaussNewton
 from twist_fixtures import exact_matches, make_pose, make_scene, make_state
 
 from mocapflow.components import Prior
-from mocapflow.data import Matches, Past, Pose, Turn, empty_matches
+from mocapflow.data import NO_CLOTH, Matches, Moment, Past, Pose, Turn, empty_matches
 from mocapflow.geometry import kinematics, twists
 from mocapflow.model import ClothedModel
 from mocapflow.scene import Scene
 
 FREE = {"root_damping_m": 1e6, "root_damping_deg": 1e8, "angle_damping_deg": 1e8, "damping": 1e-12}
-EXACT = {**FREE, "stop_surface_mm": 0.0, "stop_angle_deg": 0.0, "cap_deg": 60.0, "cap_mm": 500.0, "correlation_px": 0.0}
+EXACT = {**FREE, "stop_sigmas": 0.0, "cap_deg": 60.0, "cap_mm": 500.0, "correlation_px": 0.0}
 TURN = Turn(index=0, cap=8)
 DEMO = Path(__file__).parents[2] / "examples" / "data" / "skirt_steps"
 HIDDEN = [9, 10, 11]  # the screws of joints 6 and 7
@@ -60,6 +60,28 @@ def test_exact_matches_give_the_pose_within_seven_iterations(residual: str, seed
     matches = exact_matches(scene, truth, np.arange(0, 300, 9), directed=False)
     solver = TwistGaussNewton(iterations=7, residual=residual, **EXACT)
     assert largest_error_deg(solve(solver, scene, start_from(truth, seed), matches).pose, truth) < 1e-8
+
+
+def test_a_step_below_what_the_pose_is_known_to_is_not_taken() -> None:
+    scene, truth = make_scene(), make_pose(1)
+    matches = exact_matches(scene, truth, np.arange(0, 300, 9), directed=False)
+    start = Pose(root=truth.root, angles=truth.angles + np.radians(0.01))
+    stop = {**EXACT, "iterations": 1}
+    assert solve(TwistGaussNewton(**{**stop, "stop_sigmas": 1.0}), scene, start, matches).pose is start
+    assert solve(TwistGaussNewton(**{**stop, "stop_sigmas": 1e-6}), scene, start, matches).pose is not start
+
+
+def test_only_the_first_frame_starts_gently() -> None:
+    scene, truth = make_scene(), make_pose(1)
+    matches, start = exact_matches(scene, truth, np.arange(0, 300, 9), directed=False), start_from(truth, 1)
+    solver = TwistGaussNewton(**{**EXACT, "iterations": 1}, first_damping=1.0)
+    later = Past(moments=(Moment(time=0.0, pose=start, cloth=NO_CLOTH),))
+    model = ClothedModel(scene=scene)
+    first, second, free = (
+        largest_error_deg(solver.solve(lambda _: matches, make_state(start), model, [], past, turn).pose, start)
+        for past, turn in ((Past(), TURN), (Past(), replace(TURN, index=1)), (later, TURN))
+    )
+    assert first < second < free
 
 
 def test_matches_that_count_along_a_direction_only_give_the_pose_too() -> None:
