@@ -16,6 +16,7 @@ from mocapflow.geometry import silhouettes
 from mocapflow.geometry.cameras import project
 from mocapflow.geometry.contours import at_nearest
 from mocapflow.model import ClothedModel
+from mocapflow.once import once
 from mocapflow.records import F64, record
 from mocapflow.rest import Shown, Steady, measure_change
 from mocapflow.scene import Scene
@@ -51,7 +52,7 @@ def settle(
         turn = Turn(index=index, cap=turn.cap, change=turn.change)
         segmentation = steps.segmenter.segment(frame, state, past, model.scene, turn)
         watch.lap("segment")
-        match = partial(pool_matches, steps.matchers, frame, segmentation, past, model.scene, turn)
+        match = once(partial(pool_matches, steps.matchers, frame, segmentation, past, model.scene, turn))
         estimate = steps.pose_solver.solve(match, state, model, steps.priors, past, turn)
         watch.lap("solve")
         fitter = steps.cloth_fitter
@@ -67,7 +68,7 @@ def settle(
         observe(frame.index, turn, state)
         before_last, last = last, now
         turn = Turn(index=index, cap=turn.cap, change=change)
-        calm = calm + 1 if index and steady.holds(change) else 0  # the first turn starts at a prediction
+        calm = calm + 1 if steady.holds(change, index + 1) else 0
         if calm >= steady.turns:
             break
     assert turn.change is not None
@@ -75,7 +76,7 @@ def settle(
         state=state,
         iterations=turn.index + 1,
         steady=calm >= steady.turns,
-        oscillating=calm == 0 and turn.index > 1 and steady.holds(swing),
+        oscillating=calm == 0 and turn.index > 1 and steady.holds(swing, turn.index + 1),
         change=turn.change,
         overlap=overlaps(surface, segmentation, model.scene.cameras),
         energy=energy,

@@ -17,15 +17,16 @@ class Steady:
 
     surface: float  # m
     angle: float  # rad
-    sigmas: float  # standard deviations; a change that small is rest whatever it is in m and rad
+    sigmas: float  # standard deviations; a change that small is rest, whatever it is in m and rad,
+    min_turns: int  # from this turn on
     turns: int  # consecutive turns within both tolerances
     max_turns: int
     halvings: int  # of a step that costs more than where it began, at most
 
-    def holds(self, change: Change) -> bool:
-        """True where a change is within both tolerances, or hidden by what the pose is known to."""
+    def holds(self, change: Change, turns: int) -> bool:
+        """True where a change is within both tolerances, or after so many turns less than the pose is known to."""
         exact = max(change.body, change.cloth) <= self.surface and change.angles <= self.angle
-        return exact or change.sigmas <= self.sigmas
+        return exact or (turns >= self.min_turns and change.sigmas <= self.sigmas)
 
 
 class Shown(NamedTuple):

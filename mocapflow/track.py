@@ -64,7 +64,8 @@ class SteadyState(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
     surface_mm: Positive = 0.5  # largest move of a body vertex from turn to turn, RMS move of the cloth
     angle_deg: Positive = 0.1  # largest change of a joint angle
-    sigmas: Annotated[float, Field(ge=0)] = 0.0  # of the pose, root mean square: a turn that moves it less is within them too
+    sigmas: Annotated[float, Field(ge=0)] = 0.0  # of the pose, in the mean: a turn that moves it less is rest too,
+    min_turns: Count = 2  # from this turn on, and not in the first frame; the first moves it from a prediction
     turns: Count = 2  # in a row within both tolerances, then the frame is at rest
     max_turns: Count = 8  # then the frame is left as it is
     halvings: Annotated[int, Field(ge=0)] = 0  # at most, of a step that raises the functional; 0: it is taken whole
@@ -75,6 +76,7 @@ class SteadyState(BaseModel):
             surface=self.surface_mm / 1000,
             angle=float(np.radians(self.angle_deg)),
             sigmas=self.sigmas,
+            min_turns=self.min_turns,
             turns=self.turns,
             max_turns=self.max_turns,
             halvings=self.halvings,
