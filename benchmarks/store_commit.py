@@ -169,7 +169,8 @@ def result_of(silhouettes, dice):  # type: ignore[no-untyped-def]
         matches=matches,
     )
     return FrameResult(
-        state=state, iterations=3, steady=True, oscillating=False, change=Change(body=0.0, cloth=0.0, angles=0.0, sigmas=0.0),
+        state=state, iterations=3, steady=True, oscillating=False,
+        change=Change(body=0.0, cloth=0.0, angles=0.0, sigmas=0.0),
         overlap=np.ones(4), energy=dice.normal(size=(8, len(TERMS))), energy_terms=TERMS,
         seconds=dict.fromkeys(STEPS, 0.001),
     )  # fmt: skip

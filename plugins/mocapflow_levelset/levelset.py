@@ -61,9 +61,7 @@ class LevelSet(Segmenter):
     half_steps: NonNegativeCount = 4  # at half the size
     steps: Count = 3  # at full size
     later_steps: Count = 3  # at full size on later turns, which start from the last turn's contour
-    keep_turns: NonNegativeCount = (
-        0  # turns after the first in which the silhouettes stay: the pose comes to them first
-    )
+    keep_turns: NonNegativeCount = 0  # turns after the first in which they stay: the pose comes to them first
     keep_mm: NonNegative = 5.0  # change of the body in a turn below which the silhouettes stay; 0: always found anew
     statistics_every: Count = 4  # steps between estimates of the colours
     redistance_every: Count = 4  # steps between repairs of the distance function

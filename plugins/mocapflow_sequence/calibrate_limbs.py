@@ -31,9 +31,8 @@ from mocapflow_sequence.silhouette_fit import refine
 from mocapflow_sequence.start_from_file import calm
 
 LOG = logging.getLogger("mocapflow")
-AT_REST = Change(
-    body=0.0, cloth=0.0, angles=0.0, sigmas=0.0
-)  # near the solution matchers reach less far and give up what is off
+# near the solution matchers reach less far and give up what is off
+AT_REST = Change(body=0.0, cloth=0.0, angles=0.0, sigmas=0.0)
 Positive = Annotated[float, Field(gt=0)]
 
 

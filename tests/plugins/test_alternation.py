@@ -29,7 +29,9 @@ def settled():
     steps = Steps(
         predictor=Hold(), segmenter=LevelSet(), matchers=(ContourIcp(),), pose_solver=TwistGaussNewton(),
         cloth_fitter=Fixed(), priors=(),
-        steady=Steady(surface=0.002, angle=float(np.radians(0.3)), sigmas=0.0, min_turns=1, turns=1, max_turns=8, halvings=0),
+        steady=Steady(
+            surface=0.002, angle=float(np.radians(0.3)), sigmas=0.0, min_turns=1, turns=1, max_turns=8, halvings=0
+        ),
     )  # fmt: skip
     cloth = scenes.tiny_cloth(SCENE, START)
     states = []
