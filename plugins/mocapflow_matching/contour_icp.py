@@ -23,7 +23,6 @@ from mocapflow.geometry.contours import nearest_compatible
 from mocapflow.geometry.silhouettes import occluding_contour
 from mocapflow.records import F64, I32
 from mocapflow.scene import Scene
-from mocapflow_matching.loose import stands_off
 from mocapflow_matching.robust import Loss, robust_weights
 from mocapflow_matching.uncertainty import contour_sigma
 
@@ -68,7 +67,6 @@ class ContourIcp(Matcher):
     scale: Positive = 2.0  # standard deviations at which the loss begins to give way
     sigma_px: Positive = 1.0  # standard deviation of a pair on skin
     cloth_sigma_px_per_m: Positive = 80.0  # the longer cloth hangs, the less it is where a draper lays it
-    loose_m: Annotated[float, Field(ge=0)] = 0.0  # how far clothes that no garment models stand off trunk and legs
 
     @property
     def stride(self) -> int:
@@ -103,12 +101,7 @@ class ContourIcp(Matcher):
         seen, shown = np.concatenate([seen, seeing]), np.concatenate([shown, showing])
         guard = self.hem_guard_px
         sigma = contour_sigma(model, surface, scene, self.sigma_px, self.cloth_sigma_px_per_m, guard)
-        sigma = sigma.take(shown)
-        if self.loose_m:
-            pixel, normal = image.pixel.take(seen, axis=0), image.normal.take(seen, axis=0)
-            off = stands_off(pixel, normal, model.vertex.take(shown), silhouette, surface, scene, self.loose_m)
-            sigma = np.hypot(sigma, off)
-        return self.weigh(silhouette.camera, image, model, seen, shown, sigma, turn)
+        return self.weigh(silhouette.camera, image, model, seen, shown, sigma[shown], turn)
 
     def contours(
         self, silhouette: Silhouette, surface: Surface, scene: Scene, turn: Turn
