@@ -61,7 +61,6 @@ class LevelSet(Segmenter):
     half_steps: NonNegativeCount = 4  # at half the size
     steps: Count = 3  # at full size
     later_steps: Count = 3  # at full size on later turns, which start from the last turn's contour
-    keep_turns: NonNegativeCount = 0  # turns after the first in which they stay: the pose comes to them first
     keep_mm: NonNegative = 5.0  # change of the body in a turn below which the silhouettes stay; 0: always found anew
     statistics_every: Count = 4  # steps between estimates of the colours
     redistance_every: Count = 4  # steps between repairs of the distance function
@@ -83,7 +82,7 @@ class LevelSet(Segmenter):
         The first turn starts from the projected model, later turns from the last turn's silhouettes. A model that
         hardly moves would leave them as they are: then they stay.
         """
-        if turn.change is not None and (turn.index <= self.keep_turns or turn.change.body < self.keep_mm / 1000):
+        if turn.change is not None and turn.change.body < self.keep_mm / 1000:
             return state.segmentation
         surface = scene.surface(state.estimate.pose, state.cloth)
         last = {s.camera: s.distance for s in state.segmentation.of(PERSON)}
