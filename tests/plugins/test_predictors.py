@@ -51,6 +51,13 @@ def test_a_share_of_the_velocity_can_be_kept_and_a_long_gap_is_bounded() -> None
     assert np.allclose(far.angles, SECOND.angles + 0.2)
 
 
+def test_an_angle_that_jumped_does_not_go_on() -> None:
+    jump = np.zeros(18)
+    jump[6:8] = np.radians([35.0, 45.0])  # in a thirtieth of a second: a kick, and more than that
+    guess = ConstantVelocity().predict(frame(2 / 30), make_past(FIRST, moved(FIRST, jump)), make_scene())
+    assert np.allclose(np.degrees(guess.angles - FIRST.angles)[:3], [70.0, 45.0, 0.0])
+
+
 def test_one_frame_or_equal_times_give_the_last_pose() -> None:
     one = Past(moments=(Moment(time=0.0, pose=FIRST, cloth=NO_CLOTH),))
     assert ConstantVelocity().predict(frame(1 / 30), one, make_scene()) is FIRST
