@@ -243,6 +243,10 @@ class Turn:
     cap: int
     change: Change | None = None
 
+    def calm(self, body_mm: float) -> bool:
+        """True where the turn before moved the body by less; the first turn never is."""
+        return self.change is not None and self.change.body < body_mm / 1000
+
 
 @record
 class FrameResult:

@@ -65,6 +65,5 @@ class Layered(LevelSet):
         return pool([(1.0, part) for part in parts]) if parts else None
 
     def _search(self, turn: Turn) -> Search:
-        calm = turn.change is not None and turn.change.body <= self.calm_mm / 1000
-        reach = self.later_reach_px if calm else self.first_reach_px
+        reach = self.later_reach_px if turn.calm(self.calm_mm) else self.first_reach_px
         return Search(self.inner_spacing_px, reach, self.half_px, self.least, self.inner_sigma_px)

@@ -82,7 +82,7 @@ class LevelSet(Segmenter):
         The first turn starts from the projected model, later turns from the last turn's silhouettes. A model that
         hardly moves would leave them as they are: then they stay.
         """
-        if turn.change is not None and turn.change.body < self.keep_mm / 1000:
+        if turn.calm(self.keep_mm):
             return state.segmentation
         surface = scene.surface(state.estimate.pose, state.cloth)
         last = {s.camera: s.distance for s in state.segmentation.of(PERSON)}

@@ -80,13 +80,10 @@ class ContourIcp(Matcher):
         parts = [(1.0, self.match_view(s, surface, scene, turn)) for s in segmentation.of("person")]
         return pool(parts) if parts else empty_matches()
 
-    def _calm(self, turn: Turn) -> bool:
-        return turn.change is not None and turn.change.body <= self.calm_mm / 1000
-
     def match_view(self, silhouette: Silhouette, surface: Surface, scene: Scene, turn: Turn) -> Matches:
         """Return the pairs of one view."""
         image, (model, curvature) = self.contours(silhouette, surface, scene, turn)
-        reach = self.later_reach_px if self._calm(turn) else self.first_reach_px
+        reach = self.later_reach_px if turn.calm(self.calm_mm) else self.first_reach_px
         cosine = float(np.cos(np.radians(self.normal_angle_deg)))
         one = self.described(*image)
         other = self.described(model.pixel, model.normal, curvature)
@@ -127,7 +124,7 @@ class ContourIcp(Matcher):
         else:
             direction = np.zeros_like(offset)
             distance = np.linalg.norm(offset, axis=1)
-        loss = self.later_loss if self._calm(turn) else self.first_loss
+        loss = self.later_loss if turn.calm(self.calm_mm) else self.first_loss
         return Matches(
             camera=np.full(len(seen), index, np.int16),
             # a model point lies between vertices: moving the target by as much makes the vertex stand for it

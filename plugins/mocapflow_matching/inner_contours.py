@@ -36,6 +36,5 @@ class InnerContours(Matcher):
             return empty_matches()
         image = project_each(surface.vertices[inner.vertex], inner.camera, scene.cameras)
         off = np.abs(np.einsum("ma,ma->m", inner.pixel - image, inner.direction)) * np.sqrt(inner.weight)
-        calm = turn.change is not None and turn.change.body <= self.calm_mm / 1000
-        loss = robust_weights(off, "geman_mcclure" if calm else "huber", self.scale)
+        loss = robust_weights(off, "geman_mcclure" if turn.calm(self.calm_mm) else "huber", self.scale)
         return replace(inner, weight=inner.weight * loss)
