@@ -34,7 +34,7 @@ def part_distance(x, y, z, p, parts, values, least):  # type: ignore[no-untyped-
     return (v00 + a * (v10 - v00)) * parts[p, STRETCH]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def body_distance(x, y, z, near, parts, values):  # type: ignore[no-untyped-def]
     """Return the least distance over all parts and the part it is to; `near` is the part to try first.
 
@@ -61,7 +61,7 @@ def body_distances(points, out, parts, values):  # type: ignore[no-untyped-def]
         out[n], near = body_distance(points[n, 0], points[n, 1], points[n, 2], near, parts, values)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def outwards(x, y, z, near, parts, values):  # type: ignore[no-untyped-def]
     """Return the unit direction out of the body at a point whose nearest part is `near`: the slope of its field."""
     u, v, w = _voxel(x, y, z, near, parts)

@@ -130,7 +130,7 @@ def _pull(grid, first, last, across, length, row, longest, stiff, backwards, mot
     return worst
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
 def _draw(p, q, share, p_moves, q_moves):  # type: ignore[no-untyped-def]
     """Shorten the way from p to q by a share of it; what is pinned stays."""
     if p_moves and q_moves:
