@@ -67,26 +67,27 @@ def check_arrays(record: Any) -> None:
         ShapeError: an array's dtype, number of axes or a length contradicts the declaration.
     """
     lengths: dict[str, int] = {}
-    for name, declared in array_fields(type(record)).items():  # type: ignore[arg-type]  # classes are hashable
-        value = getattr(record, name)
-        if value is None and declared.optional:
+    values = vars(record)
+    for name, (axes, _, dtype, optional, wide) in array_fields(type(record)).items():  # type: ignore[arg-type]  # classes are hashable
+        value = values[name]
+        if value is None and optional:
             continue
-        if not isinstance(value, (np.ndarray, Series) if declared.wide else np.ndarray):
+        if not isinstance(value, (np.ndarray, Series) if wide else np.ndarray):
             raise ShapeError(f"{type(record).__name__}.{name} is {type(value).__name__}, not a numpy array")
-        if value.dtype != declared.dtype:
-            raise ShapeError(f"{type(record).__name__}.{name} has dtype {value.dtype}; expected {declared.dtype}")
-        if not _fits(value.shape, declared.axes, lengths):
-            _complain(f"{type(record).__name__}.{name}", value.shape, declared.axes, lengths)
+        if value.dtype is not dtype and value.dtype != dtype:  # the common dtypes are one object each
+            raise ShapeError(f"{type(record).__name__}.{name} has dtype {value.dtype}; expected {dtype}")
+        if not _fits(value.shape, axes, lengths):
+            _complain(f"{type(record).__name__}.{name}", value.shape, axes, lengths)
         if isinstance(value, np.ndarray):
-            value.flags.writeable = False
+            value.setflags(write=False)
 
 
 def _fits(shape: tuple[int, ...], axes: tuple[str | int, ...], lengths: dict[str, int]) -> bool:
     """True where a shape agrees with the declaration and the lengths so far, which it adds to."""
     if len(shape) != len(axes):
         return False
-    for have, axis in zip(shape, axes, strict=True):
-        if have != (axis if isinstance(axis, int) else lengths.setdefault(axis, have)):
+    for have, axis in zip(shape, axes):  # noqa: B905  # of one length, and looked at hundreds of times a frame
+        if have != axis and (isinstance(axis, int) or have != lengths.setdefault(axis, have)):
             return False
     return True
 

@@ -79,14 +79,14 @@ class BackgroundDifference(Segmenter):
         return Segmentation(silhouettes=tuple(silhouettes))
 
     def find(
-        self, image: U8, model: F32, floor: F32, background: Background, camera: int, hidden: Bool | None = None
+        self, image: U8, model: F32, floor: Bool, background: Background, camera: int, hidden: Bool | None = None
     ) -> F32:
         """Return the signed distance (H, W) px to the person's outline in one image.
 
         Args:
             image: (H, W, 3) BGR.
             model: (H, W) px, signed distance to the projected model's outline; only tells the person from others.
-            floor: (H, W) 1 where a shadow may fall.
+            floor: (H, W) True where a shadow may fall.
             background: the empty scene.
             camera: which of its views.
             hidden: (H, W) True where the picture shows nothing of the person; None: nowhere.
@@ -100,7 +100,7 @@ class BackgroundDifference(Segmenter):
         levels = [against_plate, against_plate._replace(use_plate=False)]
         return find(view, levels, self._method(), self.band_px).level
 
-    def _start(self, image: U8, model: F32, plate: Plate, floor: F32, hidden: Bool | None) -> F32:
+    def _start(self, image: U8, model: F32, plate: Plate, floor: Bool, hidden: Bool | None) -> F32:
         """Return a level set (H, W), not a distance: positive where the image is unlike the plate."""
         import cv2
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
-from mocapflow.records import F32, U8
+from mocapflow.records import F32, U8, Bool
+
+Value = TypeVar("Value", bound=np.generic)
 
 
 class Crop(NamedTuple):
@@ -17,12 +20,8 @@ class Crop(NamedTuple):
     left: int
     right: int
 
-    def of(self, image: F32) -> F32:
+    def of(self, image: npt.NDArray[Value]) -> npt.NDArray[Value]:
         """Return the rectangle of an image, (h, w, ...)."""
-        return image[self.top : self.bottom, self.left : self.right]
-
-    def of_grey_levels(self, image: U8) -> U8:
-        """Return the rectangle of an image of grey levels, (h, w, ...)."""
         return image[self.top : self.bottom, self.left : self.right]
 
     def at(self, factor: int) -> Crop:
@@ -61,7 +60,20 @@ def shrink_values(image: F32, factor: int) -> F32:
     return np.asarray(_shrunk(image, factor), np.float32)
 
 
-def shrink_mask(mask: F32, factor: int) -> F32:
+def coarser(level: F32, factor: int) -> F32:
+    """Return a level set in fine px on a grid `factor` times coarser, in coarse px."""
+    return level.copy() if factor == 1 else shrink_values(level, factor) / np.float32(factor)
+
+
+def finer(level: F32, factor: int) -> F32:
+    """Return a level set in coarse px on a grid `factor` times finer, in fine px."""
+    import cv2
+
+    size = (level.shape[1] * factor, level.shape[0] * factor)
+    return np.asarray(cv2.resize(level * np.float32(factor), size, interpolation=cv2.INTER_LINEAR), np.float32)
+
+
+def shrink_mask(mask: Bool, factor: int) -> Bool:
     """Return a mask (H, W) at 1 / factor of its size, by the pixel nearest to the middle of each square."""
     rows, columns = (length // factor * factor for length in mask.shape)
     return np.ascontiguousarray(mask[factor // 2 : rows : factor, factor // 2 : columns : factor])
@@ -76,11 +88,3 @@ def _shrunk(image: U8 | F32, factor: int) -> np.ndarray:
     height, width = image.shape[0] // factor, image.shape[1] // factor
     whole = image[: height * factor, : width * factor]
     return np.asarray(cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA))
-
-
-def enlarge(level: F32, factor: int) -> F32:
-    """Return a level set in coarse px on a grid `factor` times finer, in fine px."""
-    import cv2
-
-    size = (level.shape[1] * factor, level.shape[0] * factor)
-    return np.asarray(cv2.resize(level, size, interpolation=cv2.INTER_LINEAR) * factor, np.float32)

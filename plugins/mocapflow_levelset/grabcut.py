@@ -58,7 +58,7 @@ class GrabCut(Segmenter):
         if self._decidable(labels):
             mixtures = np.zeros((1, 65)), np.zeros((1, 65))
             cv2.setRNGSeed(0)  # the mixtures start from random clusters; a run must repeat exactly
-            picture = np.ascontiguousarray(crop.of_grey_levels(image))
+            picture = np.ascontiguousarray(crop.of(image))
             cv2.grabCut(picture, labels, None, *mixtures, self.iterations, cv2.GC_INIT_WITH_MASK)  # type: ignore[call-overload]
         person = (labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)
         crop.of(distance)[:] = redistance(np.where(person, np.float32(1), np.float32(-1)), self.band_px)

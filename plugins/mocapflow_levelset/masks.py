@@ -12,22 +12,22 @@ from mocapflow.records import F32, Bool
 RIM_TOLERANCE_PX = 1.5  # a pixel whose distances to rim and outline agree this well lies beyond the rim
 
 
-def counted(shape: tuple[int, int], border_px: int, hidden: Bool | None = None) -> F32:
-    """Return 1 for the pixels of an image (H, W) that count and 0 for its border and where the person is hidden."""
-    weight = np.zeros(shape, np.float32)
-    weight[border_px : shape[0] - border_px, border_px : shape[1] - border_px] = 1
+def counted(shape: tuple[int, int], border_px: int, hidden: Bool | None = None) -> Bool:
+    """Return True for the pixels of an image (H, W) that count, not for its border and where the person is hidden."""
+    counts = np.zeros(shape, bool)
+    counts[border_px : shape[0] - border_px, border_px : shape[1] - border_px] = True
     if hidden is not None:
-        weight[hidden] = 0
-    return weight
+        counts &= ~hidden
+    return counts
 
 
-def without_cut(weight: F32, model: F32, body: Body, surface: Surface, camera: Camera) -> F32:
-    """Return the weight (H, W) with 0 where the nearest part of the model's outline is its cut edge.
+def without_cut(counts: Bool, model: F32, body: Body, surface: Surface, camera: Camera) -> Bool:
+    """Return which pixels (H, W) count, without those where the nearest part of the model's outline is its cut edge.
 
     There the person goes on although the model ends, so the image must not pull at the contour.
 
     Args:
-        weight: (H, W) 1 where a pixel counts.
+        counts: (H, W) True where a pixel counts.
         model: (H, W) signed distance to the model's outline, positive inside.
         body: knows which vertices lie on the rim.
         surface: the posed mesh, body vertices first.
@@ -36,12 +36,12 @@ def without_cut(weight: F32, model: F32, body: Body, surface: Surface, camera: C
     import cv2
 
     if not body.cut.any():
-        return weight
+        return counts
     pixels = project(surface.vertices[: len(body.vertices)][body.cut], camera)
     hull = cv2.convexHull(pixels[np.isfinite(pixels).all(axis=1)].astype(np.float32))
-    off_rim = np.ones(weight.shape, np.uint8)
+    off_rim = np.ones(counts.shape, np.uint8)
     cv2.fillConvexPoly(off_rim, np.rint(hull).astype(np.int32), 0)
     to_rim = cv2.distanceTransform(off_rim, cv2.DIST_L2, 5)
     to_model = cv2.distanceTransform((model <= 0).astype(np.uint8), cv2.DIST_L2, 5)
     depth = np.where(model > 0, np.abs(model), to_model)
-    return np.where(to_rim <= depth + RIM_TOLERANCE_PX, np.float32(0), weight)
+    return counts & (to_rim > depth + RIM_TOLERANCE_PX)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from mocapflow.records import F32
+from mocapflow.records import F32, Bool
 from mocapflow_levelset import crops
 from mocapflow_levelset.channels import ChannelName, features
 
@@ -52,7 +52,7 @@ def plate_of(mean: F32, spread: F32, channels: Sequence[ChannelName], factor: in
 
 
 def density_of(
-    values: F32, plate: F32, spread: F32, floor: F32, channels: Sequence[ChannelName], shadow: Shadow
+    values: F32, plate: F32, spread: F32, floor: Bool, channels: Sequence[ChannelName], shadow: Shadow
 ) -> F32:
     """Return the log density (N,) of pixels under the empty scene.
 
@@ -60,7 +60,7 @@ def density_of(
         values: (C, N) features of the pixels.
         plate: (C, N) those of the empty scene there.
         spread: (N,) its standard deviation.
-        floor: (N,) 1 where a shadow may fall, 0 elsewhere.
+        floor: (N,) True where a shadow may fall.
         channels: what the features are.
         shadow: what counts as background.
     """
@@ -91,7 +91,7 @@ def _densities(values, plate, spread, may_fall, shadow, lab, out):  # type: igno
             lit += term
             if lab < 0 or not lab <= c < lab + 3:
                 others += term
-        if lab >= 0 and may_fall[n] > 0:
+        if lab >= 0 and may_fall[n]:
             lit = max(lit, others + _in_shadow(values, plate, n, lab, inverse, shadow))
         out[n] = max(lit, stranger)
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mocapflow.records import F32, U8
+from mocapflow.records import F32, U8, Bool
 from mocapflow_levelset import crops
 from mocapflow_levelset.channels import ChannelName
 from mocapflow_levelset.crops import Crop
@@ -23,7 +23,7 @@ class Empty(NamedTuple):
     """What is known of the empty scene in one view."""
 
     plates: Mapping[int, Plate]  # by how much it is shrunk
-    floor: F32  # (H, W) 1 where shadows may fall
+    floor: Bool  # (H, W) True where shadows may fall
 
 
 class View(NamedTuple):
@@ -32,7 +32,7 @@ class View(NamedTuple):
     image: U8  # (H, W, 3) BGR
     start: F32  # (H, W) signed distance to the start contour, positive inside; only its zero contour counts
     prior: F32  # (H, W) px, signed distance to the model's outline
-    counted: F32  # (H, W) 1 where a pixel counts
+    counted: Bool  # (H, W) True where a pixel counts
     empty: Empty | None = None
 
 
@@ -71,9 +71,9 @@ def find(view: View, levels: Sequence[Level], method: Method, band_px: float) ->
     if crop is None:
         return Found(outside, Costs(0.0, 0.0, 0.0))
     front, factor = crop.of(view.start), 1
-    image = crop.of_grey_levels(view.image)
+    image = crop.of(view.image)
     for level in levels:
-        prior = crops.shrink_values(crop.of(view.prior), level.factor) / np.float32(level.factor)
+        prior = crops.coarser(crop.of(view.prior), level.factor)
         front = _brought(front, factor, level.factor, method.weights.band_px)
         evidence = _evidence(image, view, crop, level, method)
         settled = settle(without_islands(front, evidence), prior, evidence, level.window, method.weights, level.rhythm)
@@ -85,9 +85,8 @@ def find(view: View, levels: Sequence[Level], method: Method, band_px: float) ->
 def _brought(level: F32, factor: int, wanted: int, band_px: float) -> F32:
     """Return a level set of the image shrunk by `factor` as a signed distance where it is shrunk by `wanted`."""
     if wanted < factor:  # a distance first, where it costs least
-        return np.clip(crops.enlarge(redistance(level, band_px), factor // wanted), -band_px, band_px)
-    times = wanted // factor
-    return redistance(crops.shrink_values(level, times) / np.float32(times), band_px)
+        return np.clip(crops.finer(redistance(level, band_px), factor // wanted), -band_px, band_px)
+    return redistance(crops.coarser(level, wanted // factor), band_px)
 
 
 def _evidence(image: U8, view: View, crop: Crop, level: Level, method: Method) -> Evidence:
@@ -98,7 +97,7 @@ def _evidence(image: U8, view: View, crop: Crop, level: Level, method: Method) -
         plate = view.empty.plates[factor].of(crop.at(factor)), crops.shrink_mask(crop.of(view.empty.floor), factor)
     return from_image(
         crops.shrink(image, factor),
-        crops.shrink_mask(crop.of(view.counted), factor),
+        crops.shrink_mask(crop.of(view.counted), factor).astype(np.float32),
         method.channels,
         max(method.stride // factor, 1),
         plate,

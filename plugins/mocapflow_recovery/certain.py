@@ -82,7 +82,7 @@ def views(frame: Frame, surface: Surface, room: Room, near_m: float) -> list[Vie
     return found
 
 
-def _compared(image: U8, plate: Plate, floor: F32) -> tuple[Bool, Bool]:
+def _compared(image: U8, plate: Plate, floor: Bool) -> tuple[Bool, Bool]:
     """Return where an image (h, w, 3) is not the empty room, lit or shaded, and where it looks just like it."""
     values = features(image, CHANNELS)
     flat, expected, spread = values.reshape(len(values), -1), plate.planes.reshape(len(values), -1), plate.spread

@@ -16,7 +16,7 @@ from mocapflow.testing import pictures, scenes
 
 FIRST = Turn(index=0, cap=8)
 SHAPE = (200, 240)
-FLOOR = np.ones(SHAPE, np.float32)
+FLOOR = np.ones(SHAPE, bool)
 
 
 def room():
@@ -135,7 +135,7 @@ def test_darker_clothes_of_the_rooms_colour_are_no_shadow_off_the_floor():
     clean = alpha * 255 * (0.5 * (room() / 255) ** 2.2) ** (1 / 2.2) + (1 - alpha) * room()
     image = np.clip(clean + np.random.default_rng(0).normal(0, 3, clean.shape), 0, 255).astype(np.uint8)
     nowhere = np.full(SHAPE, -12, np.float32)  # no model that could fill the hole
-    off_floor = BackgroundDifference().find(image, nowhere, np.zeros(SHAPE, np.float32), known(), 0)
+    off_floor = BackgroundDifference().find(image, nowhere, np.zeros(SHAPE, bool), known(), 0)
     assert ((off_floor > 0) == (person() > 0)).mean() > 0.98
     assert (BackgroundDifference().find(image, nowhere, FLOOR, known(), 0) > 0).mean() < 0.05
 

@@ -98,7 +98,7 @@ def test_the_contour_is_sub_pixel():
     empty = np.full((160, 160, 3), (140, 130, 120), np.float32)
     start = redistance(np.roll(exact, 4, axis=1), 12.0)
     plates = {factor: plate_of(empty, np.full_like(empty, 3), ("lab",), factor) for factor in (1, 2, 4)}
-    for scene in (Empty(plates, np.ones((160, 160), np.float32)), None):
+    for scene in (Empty(plates, np.ones((160, 160), bool)), None):
         segmenter = LevelSet(shape_weight=0.0)
         view = View(image, start, start, counted(start.shape, 3), scene)
         found = find(view, segmenter._levels(warm=False), segmenter._method(), 12.0).level
