@@ -91,9 +91,9 @@ def follow_move(rate, amount, towards):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, error_model="numpy")
-def follow_length(rate, above, p, x, link):  # type: ignore[no-untyped-def]
-    """Change the rates (3, S) of a bar's lower end, on its way from p to its length from x, which has `above`."""
-    dx, dy, dz = p[0] - x[0], p[1] - x[1], p[2] - x[2]
+def follow_length(rate, above, bar, link):  # type: ignore[no-untyped-def]
+    """Change the rates (3, S) of the lower end of a bar that is brought to its length; `above` are its upper end's."""
+    dx, dy, dz = bar
     r = max(math.sqrt(dx * dx + dy * dy + dz * dz), 1e-9)
     ux, uy, uz, scale = dx / r, dy / r, dz / r, link / r
     for s in range(rate.shape[1]):
@@ -107,23 +107,22 @@ def follow_length(rate, above, p, x, link):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, error_model="numpy")
-def follow_draw(rate, other, p, q, share, most, p_moves, q_moves):  # type: ignore[no-untyped-def]
+def follow_draw(rate, other, way, share, most, moves, other_moves):  # type: ignore[no-untyped-def]
     """Change the rates (3, S) of two particles that are drawn together by a share of the way between them.
 
     Args:
-        rate: of p.
-        other: of q.
-        p: (3,) m, before.
-        q: (3,) m, before.
+        rate: of the one.
+        other: of the other.
+        way: m, three components, from the one to the other, before.
         share: of the way; it grows with the way, up to `most` for an endless one.
         most: see there.
-        p_moves: p is not pinned.
-        q_moves: q is not pinned.
+        moves: the one is not pinned.
+        other_moves: nor is the other.
     """
-    dx, dy, dz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
-    half = 0.5 if p_moves and q_moves else 1.0
+    dx, dy, dz = way
+    half = 0.5 if moves and other_moves else 1.0
     keep, grow = half * share, half * (most - share) / (dx * dx + dy * dy + dz * dz)
-    here, there = (1.0 if p_moves else 0.0), (1.0 if q_moves else 0.0)
+    here, there = (1.0 if moves else 0.0), (1.0 if other_moves else 0.0)
     for s in range(rate.shape[1]):
         ex, ey, ez = other[0, s] - rate[0, s], other[1, s] - rate[1, s], other[2, s] - rate[2, s]
         apart = grow * (dx * ex + dy * ey + dz * ez)

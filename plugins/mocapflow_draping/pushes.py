@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 
 import numba
-import numpy as np
 
 from mocapflow_draping.distance import body_distance, outwards
 from mocapflow_draping.following import follow_length, follow_move, lack
@@ -23,33 +22,37 @@ TURNS = 12  # of a bar that pushing did not free, towards straight out of the bo
 @numba.njit(cache=True, error_model="numpy", forceinline=True)
 def push_out(grid, n, row, link, skin, seen, room, near, parts, values, motion):  # type: ignore[no-untyped-def]
     """Move a particle that may be inside the body out of it, at the length of its bar."""
-    p, above = grid[n, row], grid[n, row - 1]
     for _ in range(PUSHES):
-        if room[n] >= way(p, seen[n]):
+        if within(place(grid, n, row), n, seen, room):
             return
-        _measure(p, n, skin, seen, room, near, parts, values)
+        _measure(grid, n, row, skin, seen, room, near, parts, values)
         if room[n] >= 0.0:
             return
+        p = place(grid, n, row)
         out = outwards(p[0], p[1], p[2], near[n], parts, values)
         if motion is not None:
             rate, _, carry, swell = motion
             follow_move(rate[n, row], lack(out, p, rate[n, row], carry[near[n]], swell), out)
-        _move(p, CLEAR - room[n], out)
-        if motion is not None:
-            follow_length(motion[0][n, row], motion[0][n, row - 1], p, above, link)
-        to_length(p, above, link)
-    part = body_distance(above[0], above[1], above[2], near[n], parts, values)[1]
-    gx, gy, gz = outwards(above[0], above[1], above[2], part, parts, values)
-    ux, uy, uz = (p[0] - above[0]) / link, (p[1] - above[1]) / link, (p[2] - above[2]) / link
-    for turn in range(TURNS + 1):  # from where it was left to straight away from the skin above
+        move(grid, n, row, CLEAR - room[n], out)
+        to_length(grid, n, row, link, motion)
+    _stand_off(grid, n, row, link, skin, seen, room, near, parts, values, motion)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _stand_off(grid, n, row, link, skin, seen, room, near, parts, values, motion):  # type: ignore[no-untyped-def]
+    """Turn a bar that pushing did not free towards straight out of the body above, until it is free."""
+    x, y, z = place(grid, n, row - 1)
+    part = body_distance(x, y, z, near[n], parts, values)[1]
+    gx, gy, gz = outwards(x, y, z, part, parts, values)
+    px, py, pz = place(grid, n, row)
+    ux, uy, uz = (px - x) / link, (py - y) / link, (pz - z) / link
+    for turn in range(TURNS + 1):
         w = turn / TURNS
-        p[0] = above[0] + link * ((1.0 - w) * ux + w * gx)
-        p[1] = above[1] + link * ((1.0 - w) * uy + w * gy)
-        p[2] = above[2] + link * ((1.0 - w) * uz + w * gz)
-        if motion is not None:  # its own turn is not followed: it ends where the skin lets it
-            follow_length(motion[0][n, row], motion[0][n, row - 1], p, above, link)
-        to_length(p, above, link)
-        _measure(p, n, skin, seen, room, near, parts, values)
+        grid[n, row, 0] = x + link * ((1.0 - w) * ux + w * gx)
+        grid[n, row, 1] = y + link * ((1.0 - w) * uy + w * gy)
+        grid[n, row, 2] = z + link * ((1.0 - w) * uz + w * gz)
+        to_length(grid, n, row, link, motion)  # its own turn is not followed: it ends where the skin lets it
+        _measure(grid, n, row, skin, seen, room, near, parts, values)
         if room[n] >= 0.0:
             return
 
@@ -60,18 +63,17 @@ def lift(grid, first, last, beside, row, seen, room, near, between, clear, parts
 
     `between` (N, 3) m is where each middle was measured last, `clear` (N,) m how far from the body it was there.
     """
-    middle = np.empty(3)
     for n in range(grid.shape[0]):
         m = beside[n, row]
         if m < 0 or row > last[n] or (row <= first[n] and row <= first[m]):
             continue
-        p, q = grid[n, row], grid[m, row]
-        for a in range(3):
-            middle[a] = 0.5 * (p[a] + q[a])
-        if clear[n] > way(middle, between[n]) or room[n] > way(middle, seen[n]) or room[m] > way(middle, seen[m]):
+        px, py, pz = place(grid, n, row)
+        qx, qy, qz = place(grid, m, row)
+        middle = 0.5 * (px + qx), 0.5 * (py + qy), 0.5 * (pz + qz)
+        if within(middle, n, between, clear) or within(middle, n, seen, room) or within(middle, m, seen, room):
             continue
         d, part = body_distance(middle[0], middle[1], middle[2], near[n], parts, values)
-        clear[n], between[n] = d, middle
+        clear[n], between[n, 0], between[n, 1], between[n, 2] = d, middle[0], middle[1], middle[2]
         if d < 0.0:
             out = outwards(middle[0], middle[1], middle[2], part, parts, values)
             if motion is not None:
@@ -82,32 +84,51 @@ def lift(grid, first, last, beside, row, seen, room, near, between, clear, parts
                 if row > first[m]:
                     follow_move(rate[m, row], amount, out)
             if row > first[n]:
-                _move(p, CLEAR - d, out)
+                move(grid, n, row, CLEAR - d, out)
             if row > first[m]:
-                _move(q, CLEAR - d, out)
+                move(grid, m, row, CLEAR - d, out)
 
 
 @numba.njit(cache=True, error_model="numpy", forceinline=True)
-def to_length(p, above, link):  # type: ignore[no-untyped-def]
+def to_length(grid, n, row, link, motion):  # type: ignore[no-untyped-def]
     """Put the lower end of a bar at its length from the upper one."""
-    dx, dy, dz = p[0] - above[0], p[1] - above[1], p[2] - above[2]
+    x, y, z = place(grid, n, row - 1)
+    dx, dy, dz = grid[n, row, 0] - x, grid[n, row, 1] - y, grid[n, row, 2] - z
+    if motion is not None:
+        follow_length(motion[0][n, row], motion[0][n, row - 1], (dx, dy, dz), link)
     scale = link / max(math.sqrt(dx * dx + dy * dy + dz * dz), 1e-9)
-    p[0], p[1], p[2] = above[0] + scale * dx, above[1] + scale * dy, above[2] + scale * dz
+    grid[n, row, 0], grid[n, row, 1], grid[n, row, 2] = x + scale * dx, y + scale * dy, z + scale * dz
 
 
 @numba.njit(cache=True, error_model="numpy", forceinline=True)
-def way(p, q):  # type: ignore[no-untyped-def]
-    """Return the distance between two points."""
-    return math.sqrt((p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2)
+def place(grid, n, row):  # type: ignore[no-untyped-def]
+    """Return where a particle is."""
+    return grid[n, row, 0], grid[n, row, 1], grid[n, row, 2]
 
 
 @numba.njit(cache=True, error_model="numpy", forceinline=True)
-def _measure(p, n, skin, seen, room, near, parts, values):  # type: ignore[no-untyped-def]
-    d, near[n] = body_distance(p[0], p[1], p[2], near[n], parts, values)
-    room[n] = d - skin
-    seen[n, 0], seen[n, 1], seen[n, 2] = p[0], p[1], p[2]
+def move(grid, n, row, amount, towards):  # type: ignore[no-untyped-def]
+    """Move a particle by an amount along a direction."""
+    grid[n, row, 0] += amount * towards[0]
+    grid[n, row, 1] += amount * towards[1]
+    grid[n, row, 2] += amount * towards[2]
 
 
 @numba.njit(cache=True, error_model="numpy", forceinline=True)
-def _move(p, amount, towards):  # type: ignore[no-untyped-def]
-    p[0], p[1], p[2] = p[0] + amount * towards[0], p[1] + amount * towards[1], p[2] + amount * towards[2]
+def square(p, n, seen):  # type: ignore[no-untyped-def]
+    """Return the squared distance of a point from where strand n was measured."""
+    dx, dy, dz = p[0] - seen[n, 0], p[1] - seen[n, 1], p[2] - seen[n, 2]
+    return dx * dx + dy * dy + dz * dz
+
+
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
+def within(p, n, seen, room):  # type: ignore[no-untyped-def]
+    """Return whether a point is surely clear: no farther from where strand n was measured than it had room there."""
+    return room[n] >= 0.0 and room[n] * room[n] >= square(p, n, seen)
+
+
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
+def _measure(grid, n, row, skin, seen, room, near, parts, values):  # type: ignore[no-untyped-def]
+    x, y, z = place(grid, n, row)
+    d, near[n] = body_distance(x, y, z, near[n], parts, values)
+    room[n], seen[n, 0], seen[n, 1], seen[n, 2] = d - skin, x, y, z

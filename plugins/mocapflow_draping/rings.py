@@ -15,8 +15,8 @@ import math
 import numba
 import numpy as np
 
-from mocapflow_draping.following import follow_draw, follow_length
-from mocapflow_draping.pushes import lift, push_out, to_length, way
+from mocapflow_draping.following import follow_draw
+from mocapflow_draping.pushes import lift, move, place, push_out, square, to_length
 
 ENOUGH = 0.03  # of its length: a ring none of whose links is longer by more than that is let be
 LEAST = 3  # sweeps, before that
@@ -86,19 +86,19 @@ def _place(grid, bars, links, first, last, row, bend, motion):  # type: ignore[n
     """Hang a row from the one above it: as it fell, but for the direction it keeps of the bar above."""
     for n in range(grid.shape[0]):
         if first[n] < row <= last[n]:
-            p, above, link = grid[n, row], grid[n, row - 1], links[n, row - 1]
+            link = links[n, row - 1]
             share = bend[n, row - 1] if row - 1 > first[n] else 0.0
             for a in range(3):
-                kept = (above[a] - grid[n, row - 2, a]) / links[n, row - 2] if share > 0.0 else 0.0
-                p[a] = above[a] + link * (share * kept + (1.0 - share) * bars[n, row, a])
+                above = grid[n, row - 1, a]
+                kept = (above - grid[n, row - 2, a]) / links[n, row - 2] if share > 0.0 else 0.0
+                grid[n, row, a] = above + link * (share * kept + (1.0 - share) * bars[n, row, a])
             if motion is not None:
                 rate = motion[0][n]
                 turn = (1.0 - share) * motion[1][n, row]
                 if share > 0.0:
                     turn += share / links[n, row - 2] * (rate[row - 1] - rate[row - 2])
                 rate[row] = rate[row - 1] + link * turn
-                follow_length(rate[row], rate[row - 1], p, above, link)
-            to_length(p, above, link)
+            to_length(grid, n, row, link, motion)
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -108,42 +108,33 @@ def _pull(grid, first, last, across, length, row, longest, stiff, backwards, mot
     for step in range(strands):
         n = strands - 1 - step if backwards else step
         m = across[n, row]
-        if m < 0 or row > last[n] or (row <= first[n] and row <= first[m]):
+        if m < 0 or row > last[n]:
             continue
+        here, there = row > first[n], row > first[m]  # what is pinned stays
         dx, dy, dz = (
             grid[m, row, 0] - grid[n, row, 0],
             grid[m, row, 1] - grid[n, row, 1],
             grid[m, row, 2] - grid[n, row, 2],
         )
-        square, most, rest = dx * dx + dy * dy + dz * dz, longest * length[n, row], length[n, row]
-        if square > most * most:
-            share, limit = 1.0 - most / math.sqrt(square), 1.0
+        way, rest = dx * dx + dy * dy + dz * dz, length[n, row]
+        most = longest * rest
+        if not (here or there):
+            continue
+        if way > most * most:
+            share, limit = 1.0 - most / math.sqrt(way), 1.0
             worst = max(worst, share)
-        elif stiff > 0.0 and 0.0 < square < rest * rest:
-            share, limit = stiff * (1.0 - rest / math.sqrt(square)), stiff
+        elif stiff > 0.0 and 0.0 < way < rest * rest:
+            share, limit = stiff * (1.0 - rest / math.sqrt(way)), stiff
         else:
             continue
-        p, q = grid[n, row], grid[m, row]
         if motion is not None:
-            follow_draw(motion[0][n, row], motion[0][m, row], p, q, share, limit, row > first[n], row > first[m])
-        _draw(p, q, share, row > first[n], row > first[m])
+            follow_draw(motion[0][n, row], motion[0][m, row], (dx, dy, dz), share, limit, here, there)
+        part = 0.5 * share if here and there else share
+        if here:
+            move(grid, n, row, part, (dx, dy, dz))
+        if there:
+            move(grid, m, row, -part, (dx, dy, dz))
     return worst
-
-
-@numba.njit(cache=True, error_model="numpy", forceinline=True)
-def _draw(p, q, share, p_moves, q_moves):  # type: ignore[no-untyped-def]
-    """Shorten the way from p to q by a share of it; what is pinned stays."""
-    if p_moves and q_moves:
-        share *= 0.5
-    dx, dy, dz = share * (q[0] - p[0]), share * (q[1] - p[1]), share * (q[2] - p[2])
-    if p_moves:
-        p[0] += dx
-        p[1] += dy
-        p[2] += dz
-    if q_moves:
-        q[0] -= dx
-        q[1] -= dy
-        q[2] -= dz
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -151,12 +142,11 @@ def _clear(grid, links, first, last, row, limited, skin, seen, room, near, parts
     """Give every bar of a row its length, outside the body."""
     for n in range(grid.shape[0]):
         if first[n] < row <= last[n]:
-            p, link = grid[n, row], links[n, row - 1]
-            far, most = way(p, seen[n]), max(room[n], 0.0) + STRIDE
-            if limited and far > most:
+            most = max(room[n], 0.0) + STRIDE
+            far = square(place(grid, n, row), n, seen)
+            if limited and far > most * most:
+                share = most / math.sqrt(far)
                 for a in range(3):
-                    p[a] = seen[n, a] + most / far * (p[a] - seen[n, a])
-            if motion is not None:
-                follow_length(motion[0][n, row], motion[0][n, row - 1], p, grid[n, row - 1], link)
-            to_length(p, grid[n, row - 1], link)
-            push_out(grid, n, row, link, skin, seen, room, near, parts, values, motion)
+                    grid[n, row, a] = seen[n, a] + share * (grid[n, row, a] - seen[n, a])
+            to_length(grid, n, row, links[n, row - 1], motion)
+            push_out(grid, n, row, links[n, row - 1], skin, seen, room, near, parts, values, motion)
