@@ -139,7 +139,7 @@ class Surface:
 
 @record
 class Contour:
-    """The occluding contour of a surface in one view: evenly spaced points on the boundary of its silhouette.
+    """The occluding contour of a surface in one view: evenly spaced points on the boundary of its silhouette, by row.
 
     A point lies on an edge of the mesh; `vertex` is the nearer end of that edge and `anchor` where it projects.
     """

@@ -61,6 +61,13 @@ def sample(ends, edges, vertices, images, points, normals, cloth, matrix, size, 
 
 
 @numba.njit(cache=True)
+def in_rows(vertex, anchor, pixel, normal):  # type: ignore[no-untyped-def]
+    """Return the points of a contour in the order of their rows."""
+    order = np.argsort(pixel[:, 1].copy(), kind="mergesort")
+    return vertex[order], anchor[order], pixel[order], normal[order]
+
+
+@numba.njit(cache=True)
 def image_normal(point, normal, matrix):  # type: ignore[no-untyped-def]
     """Return how the image of a point moves with its surface normal: x and y, not of unit length."""
     x, y, w = matrix[0, 3], matrix[1, 3], matrix[2, 3]

@@ -81,14 +81,19 @@ def nearest_compatible(points, normals, others, other_normals, reach, least_cosi
     """Return, for each point, the nearest other within reach whose normal agrees, or -1.
 
     Points (N, 2 + F) px and others have features in the columns after x and y, which add to the distance. The others
-    are visited outward from the point's row in the order of their rows (they must be sorted by y).
+    are visited outward from the point's row in the order of their rows (they must be sorted by y; it is fast where the
+    points are, too).
     """
     found = np.full(len(points), -1, np.int32)
     rows = others[:, 1].copy()
+    start = 0  # the first row that is not above the point
     for p in range(len(points)):
         x, y = points[p, 0], points[p, 1]
         best = reach * reach
-        start = np.searchsorted(rows, y)
+        while start < len(rows) and rows[start] < y:
+            start += 1
+        while start > 0 and rows[start - 1] >= y:
+            start -= 1
         for direction in (-1, 1):
             k = start - 1 if direction < 0 else start
             while 0 <= k < len(others):
@@ -106,6 +111,29 @@ def nearest_compatible(points, normals, others, other_normals, reach, least_cosi
                         found[p] = k
                 k += direction
     return found
+
+
+@numba.njit(cache=True)
+def pairs(one, normals, other, other_normals, reach, least_cosine, forward, backward):  # type: ignore[no-untyped-def]
+    """Return which points of one contour and of another, both sorted by row, make pairs: two indices (M,).
+
+    Forward every point of the one takes its nearest compatible of the other, backward the other way round.
+    """
+    first, second = np.empty(len(one) + len(other), np.int32), np.empty(len(one) + len(other), np.int32)
+    count = 0
+    if forward:
+        found = nearest_compatible(one, normals, other, other_normals, reach, least_cosine)
+        for p in range(len(found)):
+            if found[p] >= 0:
+                first[count], second[count] = p, found[p]
+                count += 1
+    if backward:
+        found = nearest_compatible(other, other_normals, one, normals, reach, least_cosine)
+        for p in range(len(found)):
+            if found[p] >= 0:
+                first[count], second[count] = found[p], p
+                count += 1
+    return first[:count], second[:count]
 
 
 @numba.njit(cache=True)

@@ -100,19 +100,20 @@ def model_distance(surface: Surface, camera: Camera, band_px: float) -> F32:
     return signed_distance(outline(surface, camera), camera, band_px)
 
 
+@once
 def occluding_contour(surface: Surface, camera: Camera, spacing_px: float, skin: bool = False) -> Contour:
     """Return points on the boundary of the silhouette of a surface, or of its body without its cloth; see `samples`."""
     return samples((skin_outline if skin else outline)(surface, camera), surface, camera, spacing_px)
 
 
 def samples(boundary: Outline, surface: Surface, camera: Camera, spacing_px: float) -> Contour:
-    """Return points on the boundary of a silhouette within the image, evenly spaced along it.
+    """Return points on the boundary of a silhouette within the image, evenly spaced along it, sorted by row.
 
     Their normals are the projected surface normals, which look along the image plane at an occluding contour and
     are smoother than the short edges; at cloth, which has a rim, they are those of the edges.
     """
     matrix, cloth = projection(camera), surface.layer == CLOTH
-    vertex, anchor, pixel, normal = boundary_kernels.sample(
+    points = boundary_kernels.sample(
         boundary.pixel,
         boundary.edge,
         boundary.vertex,
@@ -124,4 +125,5 @@ def samples(boundary: Outline, surface: Surface, camera: Camera, spacing_px: flo
         camera.size,
         spacing_px,
     )
+    vertex, anchor, pixel, normal = boundary_kernels.in_rows(*points)
     return Contour(vertex=vertex, anchor=anchor, pixel=pixel, normal=normal)

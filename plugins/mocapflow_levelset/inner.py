@@ -8,7 +8,7 @@ import numpy as np
 
 from mocapflow.assets import Camera
 from mocapflow.data import BODY, Matches, Silhouette, Surface
-from mocapflow.records import F64, I32, U8
+from mocapflow.records import F64, I32, U8, Bool
 from mocapflow_levelset import splits
 from mocapflow_levelset.inner_edges import behind_edges, chosen, inner_edges
 from mocapflow_levelset.layers import CLIP, Shown
@@ -24,14 +24,19 @@ class Search(NamedTuple):
     sigma_px: float  # standard deviation of a point without noise
 
 
-def inner_contours(
-    image: U8, silhouette: Silhouette, surface: Surface, camera: Camera, layers: I32, known: Shown, search: Search
-) -> Matches:
-    """Return points of inner contours, each with the vertex at whose edge the part ends there.
+def told_apart(surface: Surface, layers: I32, known: Shown) -> Bool:
+    """Return the vertices (N,) whose edges can be found.
 
-    Edges of cloth are left out: where it hangs is not known well enough to say anything of what it lies before.
+    Those of cloth are left out: where it hangs is not known well enough to say anything of what it lies before.
     """
-    told = np.asarray(surface.layer == BODY) & np.asarray(known.apart.any(axis=1))[layers]
+    return np.asarray(surface.layer == BODY) & np.asarray(known.apart.any(axis=1)).take(layers)
+
+
+def inner_contours(
+    image: U8, silhouette: Silhouette, surface: Surface, camera: Camera, layers: I32, told: Bool, known: Shown,
+    search: Search,
+) -> Matches:  # fmt: skip
+    """Return points of inner contours, each with the vertex at whose edge the part ends there; see `told_apart`."""
     edges = inner_edges(surface, camera, search.spacing_px, told)
     rough = splits.split(
         image, silhouette.distance, known.ratio, layers[edges.vertex], edges.pixel, edges.normal, CLIP,

@@ -10,7 +10,7 @@ from pydantic import Field
 from mocapflow.components import pool
 from mocapflow.data import Frame, FrameState, Matches, Past, Segmentation, Surface, Turn
 from mocapflow.scene import Scene
-from mocapflow_levelset.inner import Search, inner_contours
+from mocapflow_levelset.inner import Search, inner_contours, told_apart
 from mocapflow_levelset.layers import COLOURS, gathered, layer_of, shown
 from mocapflow_levelset.levelset import PERSON, LevelSet
 
@@ -58,8 +58,9 @@ class Layered(LevelSet):
         if COLOURS not in past.appearance:
             return None
         layers, known, search = layer_of(scene), shown(past), self._search(turn)
+        told = told_apart(surface, layers, known)
         parts = [
-            inner_contours(frame.images[s.camera], s, surface, scene.cameras[s.camera], layers, known, search)
+            inner_contours(frame.images[s.camera], s, surface, scene.cameras[s.camera], layers, told, known, search)
             for s in found.of(PERSON)
         ]
         return pool([(1.0, part) for part in parts]) if parts else None

@@ -7,9 +7,20 @@ import numpy as np
 from mocapflow.assets import Camera
 from mocapflow.data import Surface
 from mocapflow.geometry.cameras import project
-from mocapflow.records import Bool
+from mocapflow.once import once
+from mocapflow.records import F64, Bool
 
 CORNERS = 72
+
+
+@once
+def _circle(surface: Surface, radius_m: float) -> F64:
+    """Return points (CORNERS, 3) m of a circle around the person, on the floor."""
+    feet = surface.vertices[:, 2].min()
+    middle = surface.vertices[:, :2].mean(axis=0)
+    angles = np.linspace(0, 2 * np.pi, CORNERS, endpoint=False)
+    circle = middle + radius_m * np.column_stack([np.cos(angles), np.sin(angles)])
+    return np.column_stack([circle, np.full(CORNERS, feet)])
 
 
 def floor_around(surface: Surface, camera: Camera, reach_m: float) -> Bool:
@@ -20,11 +31,7 @@ def floor_around(surface: Surface, camera: Camera, reach_m: float) -> Bool:
     """
     import cv2
 
-    feet = surface.vertices[:, 2].min()
-    middle = surface.vertices[:, :2].mean(axis=0)
-    angles = np.linspace(0, 2 * np.pi, CORNERS, endpoint=False)
-    circle = middle + reach_m * np.column_stack([np.cos(angles), np.sin(angles)])
-    pixels = project(np.column_stack([circle, np.full(CORNERS, feet)]), camera)
+    pixels = project(_circle(surface, reach_m), camera)
     mask = np.zeros((camera.size[1], camera.size[0]), np.uint8)
     if not np.isfinite(pixels).all():  # the camera stands within reach
         mask[:] = 1

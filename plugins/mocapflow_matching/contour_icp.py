@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, NamedTuple
 
+import numba
 import numpy as np
 from pydantic import Field
 
@@ -19,8 +20,9 @@ from mocapflow.data import (
     Turn,
     empty_matches,
 )
-from mocapflow.geometry.contours import nearest_compatible
+from mocapflow.geometry.contours import pairs
 from mocapflow.geometry.silhouettes import occluding_contour
+from mocapflow.once import once
 from mocapflow.records import F64, I32
 from mocapflow.scene import Scene
 from mocapflow_matching.robust import Loss, robust_weights
@@ -87,26 +89,18 @@ class ContourIcp(Matcher):
         cosine = float(np.cos(np.radians(self.normal_angle_deg)))
         one = self.described(*image)
         other = self.described(model.pixel, model.normal, curvature)
-        nothing = np.empty(0, np.int32)
-        seen, shown, seeing, showing = nothing, nothing, nothing, nothing
-        if self.direction != "backward":  # every image point asks the model
-            found = nearest_compatible(one, image.normal, other, model.normal, reach, cosine)
-            seen, shown = np.flatnonzero(found >= 0).astype(np.int32), found[found >= 0]
-        if self.direction != "forward":  # every model point asks the image
-            found = nearest_compatible(other, model.normal, one, image.normal, reach, cosine)
-            seeing, showing = found[found >= 0], np.flatnonzero(found >= 0).astype(np.int32)
-        seen, shown = np.concatenate([seen, seeing]), np.concatenate([shown, showing])
+        asked, asking = self.direction != "backward", self.direction != "forward"  # the model, by the image; by it
+        seen, shown = pairs(one, image.normal, other, model.normal, reach, cosine, asked, asking)
         guard = self.hem_guard_px
         sigma = contour_sigma(model, surface, scene, self.sigma_px, self.cloth_sigma_px_per_m, guard)
-        return self.weigh(silhouette.camera, image, model, seen, shown, sigma[shown], turn)
+        return self.weigh(silhouette.camera, image, model, seen, shown, sigma, turn)
 
     def contours(
         self, silhouette: Silhouette, surface: Surface, scene: Scene, turn: Turn
     ) -> tuple[ImageContour, ModelContour]:
         """Return the contours of one view that are to be paired."""
-        pixel, normal = (np.ascontiguousarray(rows[:: self.stride]) for rows in silhouette.zero_level)
         model = occluding_contour(surface, scene.cameras[silhouette.camera], self.spacing_px)
-        return ImageContour(pixel, normal, np.zeros(len(pixel))), sorted_by_row(model, np.zeros(len(model.pixel)))
+        return image_contour(silhouette, self.stride), ModelContour(model, np.zeros(len(model.pixel)))
 
     def described(self, pixel: F64, normal: F64, curvature: F64) -> F64:
         """Return what points (K,) are compared by, in px: their place first, then features."""
@@ -115,33 +109,45 @@ class ContourIcp(Matcher):
     def weigh(
         self, index: int, image: ImageContour, model: Contour, seen: I32, shown: I32, sigma: F64, turn: Turn
     ) -> Matches:
-        """Return pairs of image points `seen` (M,) and model points `shown` (M,), of error `sigma` (M,) px."""
-        pixel, drawn = image.pixel.take(seen, axis=0), model.pixel.take(shown, axis=0)
-        offset = drawn - pixel
-        if self.residual == "normal":
-            direction = image.normal.take(seen, axis=0)
-            distance = np.abs(np.einsum("ma,ma->m", offset, direction))
-        else:
-            direction = np.zeros_like(offset)
-            distance = np.linalg.norm(offset, axis=1)
+        """Return pairs of image points `seen` (M,) and model points `shown` (M,); those (K,) have errors `sigma` px."""
+        slides = self.residual == "normal"
+        pixel, direction, vertex, spread, distance = paired_points(
+            seen, shown, image.pixel, image.normal, model.pixel, model.anchor, model.vertex, sigma, slides
+        )
         loss = self.later_loss if turn.calm(self.calm_mm) else self.first_loss
         return Matches(
             camera=np.full(len(seen), index, np.int16),
-            # a model point lies between vertices: moving the target by as much makes the vertex stand for it
-            pixel=pixel - drawn + model.anchor.take(shown, axis=0),
+            pixel=pixel,
             direction=direction,
-            vertex=model.vertex.take(shown),
-            weight=robust_weights(distance / sigma, loss, self.scale) / sigma**2,
+            vertex=vertex,
+            weight=robust_weights(distance / spread, loss, self.scale) / spread**2,
         )
 
 
-def sorted_by_row(contour: Contour, curvature: F64) -> ModelContour:
-    """Return the points of a model's contour in the order of their rows."""
-    order = np.argsort(contour.pixel[:, 1], kind="stable")
-    ordered = Contour(
-        vertex=contour.vertex.take(order),
-        anchor=contour.anchor.take(order, axis=0),
-        pixel=contour.pixel.take(order, axis=0),
-        normal=contour.normal.take(order, axis=0),
-    )
-    return ModelContour(ordered, curvature.take(order))
+@once
+def image_contour(silhouette: Silhouette, stride: int) -> ImageContour:
+    """Return every so many-th point of the contour of a silhouette."""
+    pixel, normal = (np.ascontiguousarray(rows[::stride]) for rows in silhouette.zero_level)
+    return ImageContour(pixel, normal, np.zeros(len(pixel)))
+
+
+@numba.njit(cache=True)
+def paired_points(seen, shown, pixel, normal, drawn, anchor, vertex, sigma, slides):  # type: ignore[no-untyped-def]
+    """Return target, direction, vertex, standard deviation and distance of pairs (M,); see `ContourIcp.weigh`.
+
+    A model point lies between vertices: moving the target by as much makes the vertex stand for it.
+    """
+    count = len(seen)
+    target, direction, end = np.empty((count, 2)), np.zeros((count, 2)), np.empty(count, np.int32)
+    spread, distance = np.empty(count), np.empty(count)
+    for m in range(count):
+        s, k = seen[m], shown[m]
+        dx, dy = drawn[k, 0] - pixel[s, 0], drawn[k, 1] - pixel[s, 1]
+        target[m, 0], target[m, 1] = anchor[k, 0] - dx, anchor[k, 1] - dy
+        end[m], spread[m] = vertex[k], sigma[k]
+        if slides:
+            direction[m, 0], direction[m, 1] = normal[s, 0], normal[s, 1]
+            distance[m] = abs(dx * normal[s, 0] + dy * normal[s, 1])
+        else:
+            distance[m] = np.sqrt(dx * dx + dy * dy)
+    return target, direction, end, spread, distance

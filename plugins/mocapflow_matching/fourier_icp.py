@@ -15,7 +15,7 @@ from mocapflow.records import F64, Bool
 from mocapflow.scene import Scene
 from mocapflow_matching.closed_curves import Curve, closed_contours, joined, low_passed
 from mocapflow_matching.containment import inside_px
-from mocapflow_matching.contour_icp import ContourIcp, ImageContour, ModelContour, sorted_by_row
+from mocapflow_matching.contour_icp import ContourIcp, ImageContour, ModelContour
 from mocapflow_matching.uncertainty import ANY_DIRECTION
 
 BESIDE = 3.0  # px from a point of the model's contour to the border of its mask
@@ -78,6 +78,8 @@ def _low_passed(model: ModelContour, curve: Curve) -> ModelContour:
     points = model.contour
     found = nearest_compatible(points.pixel, points.normal, raw, normal, BESIDE, ANY_DIRECTION)
     kept, at = np.flatnonzero(found >= 0), order[found[found >= 0]]
+    rows = np.argsort(curve.pixel[at, 1], kind="stable")
+    kept, at = kept[rows], at[rows]
     moved = replace(
         points,
         vertex=points.vertex[kept],
@@ -85,4 +87,4 @@ def _low_passed(model: ModelContour, curve: Curve) -> ModelContour:
         pixel=curve.pixel[at],
         normal=curve.normal[at],
     )
-    return sorted_by_row(moved, curve.curvature[at])
+    return ModelContour(moved, curve.curvature[at])

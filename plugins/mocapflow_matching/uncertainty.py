@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 
 from mocapflow.data import BODY, CLOTH, Contour, Surface
@@ -20,13 +21,26 @@ def contour_sigma(
     The outline of hanging cloth must not turn a knee: `cloth_px_per_m` of the length it hangs from is added. Skin
     within `hem_guard_px` of the cloth's edge, where the image may show cloth, is as uncertain as the cloth beside it.
     """
-    sigma = np.full(len(model.vertex), skin_px)
-    cloth = np.flatnonzero(surface.layer[model.vertex] == CLOTH)
-    sigma[cloth] += cloth_px_per_m * scene.hanging[model.vertex[cloth] - len(scene.body.vertices)]
-    skin = np.flatnonzero(surface.layer[model.vertex] == BODY)
-    skin = skin[scene.near_garment[model.vertex[skin]]]
-    if len(cloth) and len(skin) and hem_guard_px:
-        one, other = ((model.pixel.take(k, axis=0), model.normal.take(k, axis=0)) for k in (skin, cloth))
-        beside = nearest_compatible(*one, *other, hem_guard_px, ANY_DIRECTION)
-        sigma[skin[beside >= 0]] = sigma[cloth[beside[beside >= 0]]]
+    sigma: F64 = _sigma(
+        model.vertex, model.pixel, model.normal, surface.layer, scene.hanging, scene.near_garment, skin_px,
+        cloth_px_per_m, hem_guard_px,
+    )  # fmt: skip
+    return sigma
+
+
+@numba.njit(cache=True)
+def _sigma(  # type: ignore[no-untyped-def]
+    vertex, pixel, normal, layer, hanging, near_garment, skin_px, cloth_px_per_m, hem_guard_px
+):
+    sigma = np.full(len(vertex), skin_px)
+    of_layer = layer[vertex]
+    cloth = np.flatnonzero(of_layer == CLOTH)
+    for k in cloth:
+        sigma[k] += cloth_px_per_m * hanging[vertex[k] - len(near_garment)]
+    skin = np.array([k for k in np.flatnonzero(of_layer == BODY) if near_garment[vertex[k]]], np.int64)
+    if hem_guard_px > 0:
+        beside = nearest_compatible(pixel[skin], normal[skin], pixel[cloth], normal[cloth], hem_guard_px, ANY_DIRECTION)
+        for k, found in zip(skin, beside):  # noqa: B905  # compiled code knows no strict
+            if found >= 0:
+                sigma[k] = sigma[cloth[found]]
     return sigma
