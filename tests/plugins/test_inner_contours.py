@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mocapflow_levelset import splits
 from mocapflow_levelset.colours import BINS, bins_of
-from mocapflow_levelset.inner import Search, inner_contours
+from mocapflow_levelset.inner import Search, inner_contours, told_apart
 from mocapflow_levelset.layers import COLOURS, layer_of, shown
 from mocapflow_matching.inner_contours import InnerContours
 from mocapflow_matching.layered_icp import LayeredIcp, another_s
@@ -90,8 +90,10 @@ def match(colour_of, believed, true=60.0):
     frame, surface = painted(colour_of, pose), surface_at(kicked(believed))
     past = Past(appearance={COLOURS: learned(frame, pose=pose)})
     segmentation, search = tiny_segmentation(SCENE, pose), Search(4.0, 24, 3, 1.0, 1.0)
+    layers, known = layer_of(SCENE), shown(past)
+    told = told_apart(surface, layers, known)
     parts = [
-        (1.0, inner_contours(image, silhouette, surface, camera, layer_of(SCENE), shown(past), search))
+        (1.0, inner_contours(image, silhouette, surface, camera, layers, told, known, search))
         for image, silhouette, camera in zip(frame.images, segmentation.silhouettes, SCENE.cameras, strict=True)
     ]
     return InnerContours().match(frame, replace(segmentation, inner=pool(parts)), surface, past, SCENE, FIRST)
