@@ -1,26 +1,33 @@
 """How much larger are the errors of the angles than the normal equations say?
 
-`python benchmarks/calibrate_uncertainty.py RUN … [--check RUN …]`: fits one factor for all angles on run folders that
-were compared with known motion, and says what the 90 % interval covers there, on every take by the factor of the
-others, and on the runs to check. Put the factor into mocapflow_sequence/uncertainty.py.
+`python benchmarks/calibrate_uncertainty.py RUN … [--check RUN …]`: fits by how many millimetres an outline is off, on
+run folders that were compared with known motion, and says what the 90 % interval covers there, on every take by the
+fit to the others, on the runs to check, and how many single curves even exact deviations would leave badly covered.
+Put the value into mocapflow_sequence/uncertainty.py.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
+from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
 from mocapflow_sequence import layout, tables
 from mocapflow_sequence.compare import NINETY, rms
-from mocapflow_sequence.uncertainty import FACTOR
+from mocapflow_sequence.ours import of_folder
+from mocapflow_sequence.uncertainty import OUTLINE_MM, excess, px_per_mm
 
+from mocapflow.commands.again import recall
+from mocapflow.recording import open_recording
 from mocapflow.records import F64
 
 LOST_DEG = 10.0  # RMS of a curve whose limb was lost: no error of measurement
-WANTED, CURVE, CURVES = 0.90, 0.75, 0.95  # of all values; of a single curve, in this share of the curves
-FACTORS = np.arange(0.5, 10.0, 0.01)
+WANTED = 0.925  # of all values: between the 90 % that the interval promises and the 95 % of a careful one
+CURVE = 0.75  # of the values of a single curve
+TRIED_MM = np.arange(0.0, 30.0, 0.02)
 
 
 class Curve(NamedTuple):
@@ -29,10 +36,15 @@ class Curve(NamedTuple):
     name: str
     error: F64  # (T,) deg
     sd: F64  # (T,) deg, as the normal equations have it
+    size: F64  # (T,) px per mm of the person in the images
 
-    def inside(self, factor: float) -> F64:
-        """Return 1 where the interval holds the truth, else 0: (T,)."""
-        return (np.abs(self.error) <= NINETY * factor * self.sd).astype(float)
+    def whitened(self, outline_mm: float) -> F64:
+        """Return the errors in standard deviations (T,)."""
+        return self.error / (excess(self.size, outline_mm) * self.sd)
+
+    def covered(self, outline_mm: float) -> float:
+        """Return the share of the values that the 90 % interval holds."""
+        return float(np.mean(np.abs(self.whitened(outline_mm)) <= NINETY))
 
 
 def main() -> None:
@@ -41,26 +53,34 @@ def main() -> None:
     parser.add_argument("--check", nargs="*", type=Path, default=[])
     asked = parser.parse_args()
     takes = [curves_of(run) for run in asked.runs]
-    factor = fitted(sum(takes, []))
-    print(f"errors hang together over {correlation_frames(sum(takes, [])):.0f} frames; factor {factor:.2f}")
+    every, checks = sum(takes, []), [curves_of(run) for run in asked.check]
+    outline, memory = fitted(every), correlation_frames(every)
+    print(f"errors hang together over {memory:.0f} frames; an outline is off by {outline:.2f} mm")
+    own = []
     for run, take in zip(asked.runs, takes, strict=True):
-        others = fitted(sum((other for other in takes if other is not take), []))
-        print(f"{run.name:24} by the factor of the others ({others:.2f}): {told(take, others)}")
-    print(f"{'fitted, together':24} {told(sum(takes, []), factor)}")
-    checks = [curves_of(run) for run in asked.check]
+        own.append(fitted(sum((other for other in takes if other is not take), [])))
+        print(f"{run.name:24} by the others ({own[-1]:.2f} mm): {told(take, lambda _, mm=own[-1]: mm)}")
+    theirs = {curve.name: mm for take, mm in zip(takes, own, strict=True) for curve in take}
+    print(f"{'each by the others':24} {told(every, lambda curve: theirs[curve.name])}")
+    print(f"{'fitted, together':24} {told(every, lambda _: outline)}")
     for run, take in zip(asked.check, checks, strict=True):
-        print(f"{run.name:24} {told(take, factor)}")
+        print(f"{run.name:24} {told(take, lambda _: outline)}")
     if checks:
-        print(f"{'checked, together':24} {told(sum(checks, []), factor)}")
+        print(f"{'checked, together':24} {told(sum(checks, []), lambda _: outline)}")
+    for share in (0.90, 0.925, 0.95):
+        low = low_by_chance([len(curve.error) for curve in kept(every)], share, memory)
+        print(f"exact deviations, {share:.1%} covered: {low.mean():.1f} curves below, none in {np.mean(low == 0):.0%}")
 
 
 def curves_of(run: Path) -> list[Curve]:
     """Return the curves of a run folder that were compared with a reference."""
-    ours, errors = tables.read_columns(run / layout.ANGLES), tables.read_columns(run / layout.ERRORS)
+    ours, errors, pipeline = of_folder(run), tables.read_columns(run / layout.ERRORS), recall(run).load()
+    size = px_per_mm(ours.stick.places[:, 0], open_recording(pipeline.recording, scale=pipeline.scale).cameras)
     curves = []
     for name in tables.angle_names(errors):
-        known = np.isfinite(errors[name]) & np.isfinite(ours[f"{name}_sd"])
-        curves.append(Curve(f"{run.name} {name}", errors[name][known], ours[f"{name}_sd"][known] / FACTOR))
+        sd = ours.columns[f"{name}_sd"] / excess(size, OUTLINE_MM)
+        known = np.isfinite(errors[name]) & np.isfinite(sd)
+        curves.append(Curve(f"{run.name} {name}", errors[name][known], sd[known], size[known]))
     return curves
 
 
@@ -70,36 +90,54 @@ def kept(curves: list[Curve]) -> list[Curve]:
 
 
 def fitted(curves: list[Curve]) -> float:
-    """Return the least factor that covers what is wanted of all values, and of nearly every curve."""
-    for factor in FACTORS:
-        shares = [curve.inside(factor).mean() for curve in kept(curves)]
-        if pooled(kept(curves), factor) >= WANTED and np.mean(np.array(shares) >= CURVE) >= CURVES:
-            return float(factor)
-    raise SystemExit(f"no factor up to {FACTORS[-1]:.0f} covers enough")
-
-
-def pooled(curves: list[Curve], factor: float) -> float:
-    """Return the share of all values that the interval covers."""
-    return float(np.concatenate([curve.inside(factor) for curve in curves]).mean())
+    """Return the least value in mm that covers what is wanted of all values."""
+    whole = kept(curves)
+    for outline in TRIED_MM:
+        if pooled(whole, {curve.name: curve.covered(outline) for curve in whole}) >= WANTED:
+            return float(outline)
+    raise SystemExit(f"no outline up to {TRIED_MM[-1]:.0f} mm covers enough")
 
 
 def correlation_frames(curves: list[Curve], lag: int = 5) -> float:
-    """Return over how many frames whitened errors fall to 1/e, by their correlation at one lag."""
-    z = [curve.error / curve.sd for curve in kept(curves)]
-    both = sum(float(np.mean(a[lag:] * a[:-lag])) for a in z)
-    alone = sum(0.5 * float(np.mean(a[lag:] ** 2 + a[:-lag] ** 2)) for a in z)
-    return float(-lag / np.log(both / alone))
+    """Return over how many frames errors fall to 1/e: of the median curve, by its correlation at one lag."""
+    errors = [curve.error for curve in kept(curves)]
+    alike = [2 * np.sum(a[lag:] * a[:-lag]) / np.sum(a[lag:] ** 2 + a[:-lag] ** 2) for a in errors]
+    return float(-lag / np.log(np.median(alike)))
 
 
-def told(curves: list[Curve], factor: float) -> str:
+def low_by_chance(lengths: list[int], covered: float, memory: float, trials: int = 400) -> F64:
+    """Return how many curves of such lengths are below with exact deviations and normal errors: (trials,).
+
+    Args:
+        lengths: frames of each curve.
+        covered: share of all values within the interval.
+        memory: frames in which the correlation of the errors falls to 1/e.
+        trials: how often it is tried.
+    """
+    dice, kept_share, edge = np.random.default_rng(0), np.exp(-1 / memory), NormalDist().inv_cdf(0.5 + covered / 2)
+    low = np.zeros(trials)
+    for frames in lengths:
+        error = dice.normal(size=(frames, trials))
+        for frame in range(1, frames):
+            error[frame] = kept_share * error[frame - 1] + np.sqrt(1 - kept_share**2) * error[frame]
+        low += (np.abs(error) <= edge).mean(axis=0) < CURVE
+    return low
+
+
+def told(curves: list[Curve], outline_mm: Callable[[Curve], float]) -> str:
     """Return what an interval covers, in words."""
+    shares = {curve.name: curve.covered(outline_mm(curve)) for curve in curves}
     whole = kept(curves)
-    shares = {curve.name: curve.inside(factor).mean() for curve in whole}
-    low = [f"{name} {share:.0%}" for name, share in shares.items() if share < CURVE]
+    low = [f"{curve.name} {shares[curve.name]:.0%}" for curve in whole if shares[curve.name] < CURVE]
     lost = len(curves) - len(whole)
-    said = f"{pooled(whole, factor):.1%} covered" if whole else "every limb lost"
-    said += f", {pooled(curves, factor):.1%} with {lost} curves of lost limbs" if lost else ""
+    said = f"{pooled(whole, shares):.1%} covered" if whole else "every limb lost"
+    said += f", {pooled(curves, shares):.1%} with {lost} curves of lost limbs" if lost else ""
     return said + f"; {len(low)} of {len(whole)} curves below {CURVE:.0%}" + (f": {', '.join(low)}" if low else "")
+
+
+def pooled(curves: list[Curve], shares: dict[str, float]) -> float:
+    """Return the share of all values of curves of which such shares are covered."""
+    return float(np.average([shares[curve.name] for curve in curves], weights=[len(curve.error) for curve in curves]))
 
 
 if __name__ == "__main__":

@@ -2,22 +2,45 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
+from mocapflow.assets import Camera
 from mocapflow.geometry import angles
+from mocapflow.geometry.cameras import magnification
+from mocapflow.records import F64
 from mocapflow.results import Track
 from mocapflow.scene import Scene
 
-FACTOR = 2.14  # benchmarks/calibrate_uncertainty.py on six rendered takes; docs/results.md says how it holds on others
+OUTLINE_MM = 3.2  # benchmarks/calibrate_uncertainty.py on rendered takes; docs/results.md says how it holds on others
 
 
 def measured(track: Track, scene: Scene) -> angles.AngleSeries:
     """Return the angles of a track, their calibrated standard deviations, and what was seen of them.
 
-    The covariance of a track is that of the normal equations: what noise does that hangs together over 15 px of a
-    contour. Errors hang together over whole limbs and sheets of cloth, and for a third of a second; how much larger
-    that makes them is measured, one factor for all. `smooth` weighs by the covariance as it is: what neighbouring
-    frames have in common does not average out, so it is no reason to hold a frame less.
+    The covariance of a track is that of the normal equations: what noise of 1 px does that hangs together over 15 px
+    of a contour. `smooth` weighs by it as it is: what neighbouring frames have in common does not average out, so it
+    is no reason to hold a frame less.
     """
     series = angles.measure(scene.body, track.root, track.angles, track.covariance, track.observed)
-    return replace(series, sd=FACTOR * series.sd)
+    pelvis = track.root[:, :3, :3] @ scene.body.positions[0] + track.root[:, :3, 3]
+    scale = excess(px_per_mm(pelvis, scene.cameras), OUTLINE_MM)
+    return replace(series, sd=scale[:, None] * series.sd)
+
+
+def excess(size: F64, outline_mm: float) -> F64:
+    """Return by how much errors exceed those of noise of 1 px, where the images show a person `size` (T,) px per mm.
+
+    However large the image, an outline is off by some millimetres more: shadows, socks before a light floor, cloth
+    and skin that are not quite the model's. These err alike along whole limbs and for a third of a second.
+    """
+    scale: F64 = 1.0 + outline_mm * size
+    return scale
+
+
+def px_per_mm(places: F64, cameras: Sequence[Camera]) -> F64:
+    """Return how large the images show what stands at places (T, 3) in m: (T,), the median of the views."""
+    sizes = [[magnification(camera, place) for camera in cameras] for place in places]
+    return np.asarray(np.median(sizes, axis=1) / 1000)

@@ -1,14 +1,18 @@
-"""Standard deviations that mean something: the factor on those of the fit, and how it is found."""
+"""Standard deviations that mean something: what is added to those of the fit, and how it is found."""
 
 import importlib.util
+from dataclasses import replace
 from pathlib import Path
+from statistics import NormalDist
 
 import numpy as np
 import pytest
-from mocapflow_sequence.uncertainty import FACTOR, measured
+from mocapflow_sequence.ours import of_track
+from mocapflow_sequence.uncertainty import OUTLINE_MM, excess, measured, px_per_mm
 from results_scene import demo_scene, stepping
 
 from mocapflow.geometry import angles
+from mocapflow.geometry.cameras import scaled
 
 SCRIPT = Path(__file__).parents[2] / "benchmarks" / "calibrate_uncertainty.py"
 
@@ -21,37 +25,66 @@ def script():
     return module
 
 
-def test_one_factor_for_all_angles_and_the_track_keeps_the_covariance_of_the_fit():
+def curves_of(script, errors, spread, size):
+    """One curve for each row of errors (K, T) with deviations (K, T), the person at a size in px per mm."""
+    rows = zip(errors, spread, strict=True)
+    return [script.Curve(f"take {k}", *row, np.full(len(row[0]), size)) for k, row in enumerate(rows)]
+
+
+def test_all_angles_of_a_frame_alike_and_the_track_keeps_the_covariance_of_the_fit():
     scene = demo_scene()
     track = stepping(scene.body, 5)
     formal = angles.measure(scene.body, track.root, track.angles, track.covariance, track.observed)
     stated = measured(track, scene)
-    np.testing.assert_allclose(stated.sd, FACTOR * formal.sd)
+    pelvis = of_track(track, scene).stick.places[:, 0]
+    scale = excess(px_per_mm(pelvis, scene.cameras), OUTLINE_MM)
+    np.testing.assert_allclose(stated.sd, scale[:, None] * formal.sd)
     np.testing.assert_array_equal(stated.value, formal.value)
     np.testing.assert_array_equal(stated.observed, formal.observed)
 
 
-@pytest.mark.parametrize("true_factor", [1.5, 3.0])
-def test_the_factor_is_found_again(script, true_factor):
-    """Errors that are independent from frame to frame: then the share of all values decides, not that of a curve."""
-    dice = np.random.default_rng(0)
+def test_larger_images_tell_more_of_pixels_but_not_of_millimetres():
+    size = np.array([1e-9, 0.2, 0.4, 1e9])  # px per mm; the deviations of the fit go with one over it
+    assert excess(size, 5.0)[0] == pytest.approx(1.0)
+    assert excess(size, 5.0)[1:3] == pytest.approx([2.0, 3.0])
+    assert excess(size, 5.0)[3] / size[3] == pytest.approx(5.0)
+
+
+def test_the_size_of_a_person_goes_with_that_of_the_images_and_is_that_of_most_views():
+    cameras = demo_scene().cameras
+    place = np.array([[0.0, 0.0, 0.9], [0.1, 0.0, 0.9]])
+    size = px_per_mm(place, cameras)
+    assert px_per_mm(place, [scaled(camera, 0.5) for camera in cameras]) == pytest.approx(0.5 * size, rel=0.01)
+    turn = np.diag([-1.0, 1.0, -1.0, 1.0])  # the person stands behind it
+    turned = replace(cameras[0], camera_from_world=turn @ cameras[0].camera_from_world)
+    assert px_per_mm(place, [turned, *cameras[1:]]) == pytest.approx(size, rel=0.1)
+
+
+@pytest.mark.parametrize("true_mm", [3.0, 8.0])
+def test_the_outline_is_found_again(script, true_mm):
+    dice, size = np.random.default_rng(0), 0.36
     spread = dice.uniform(0.3, 3.0, (40, 300))
-    errors = true_factor * spread * dice.normal(size=spread.shape)
-    curves = [script.Curve(f"take {k}", *pair) for k, pair in enumerate(zip(errors, spread, strict=True))]
-    assert script.fitted(curves) == pytest.approx(true_factor, rel=0.03)
-    assert script.pooled(curves, true_factor) == pytest.approx(0.90, abs=0.01)
-    lost = script.Curve("lost", np.full(300, 40.0), np.full(300, 1.0))
-    assert script.fitted([*curves, lost]) == script.fitted(curves)
-    assert "with 1 curves of lost limbs" in script.told([*curves, lost], true_factor)
+    errors = excess(size, true_mm) * spread * dice.normal(size=spread.shape)
+    curves = curves_of(script, errors, spread, size)
+    wider = NormalDist().inv_cdf(0.5 + script.WANTED / 2) / NormalDist().inv_cdf(0.95)  # than 90 % asks for
+    found = script.fitted(curves)
+    assert excess(size, found) == pytest.approx(wider * excess(size, true_mm), rel=0.02)
+    lost = script.Curve("lost", np.full(300, 40.0), np.full(300, 1.0), np.full(300, size))
+    assert script.fitted([*curves, lost]) == found
+    assert "with 1 curves of lost limbs" in script.told([*curves, lost], lambda _: true_mm)
 
 
-def test_errors_that_hang_together_ask_for_more_than_their_size(script):
-    """What a single curve covers scatters then, and nearly every curve is to be covered."""
+def test_over_how_many_frames_errors_hang_together(script):
     dice, kept = np.random.default_rng(1), np.exp(-1 / 11)
     errors = dice.normal(size=(640, 60))
     for frame in range(1, 60):
         errors[:, frame] = kept * errors[:, frame - 1] + np.sqrt(1 - kept**2) * errors[:, frame]
-    curves = [script.Curve(f"take {k}", error, np.ones(60)) for k, error in enumerate(errors)]
-    assert script.correlation_frames(curves) == pytest.approx(11, rel=0.2)
-    assert 1.0 < script.fitted(curves) < 1.2
-    assert 0.9 < script.pooled(curves, script.fitted(curves)) < 0.95
+    assert script.correlation_frames(curves_of(script, errors, np.ones_like(errors), 0.36)) == pytest.approx(
+        11, rel=0.25
+    )
+
+
+@pytest.mark.parametrize(("memory", "low"), [(0.1, 0.0), (1e9, 10.0)])
+def test_curves_that_exact_deviations_cover_badly(script, memory, low):
+    """Errors of their own in every frame: none; the same error all along: as many as lie outside."""
+    assert script.low_by_chance([60] * 100, 0.90, memory).mean() == pytest.approx(low, abs=0.5)
