@@ -52,6 +52,8 @@ def main() -> None:
     parser.add_argument("runs", nargs="+", type=Path)
     parser.add_argument("--check", nargs="*", type=Path, default=[])
     asked = parser.parse_args()
+    if len(asked.runs) < 2:
+        parser.error("name two runs or more: each is judged by the fit to the others")
     takes = [curves_of(run) for run in asked.runs]
     every, checks = sum(takes, []), [curves_of(run) for run in asked.check]
     outline, memory = fitted(every), correlation_frames(every)
@@ -63,6 +65,7 @@ def main() -> None:
     theirs = {curve.name: mm for take, mm in zip(takes, own, strict=True) for curve in take}
     print(f"{'each by the others':24} {told(every, lambda curve: theirs[curve.name])}")
     print(f"{'fitted, together':24} {told(every, lambda _: outline)}")
+    print(tails(np.abs(np.concatenate([curve.whitened(outline) for curve in kept(every)]))))
     for run, take in zip(asked.check, checks, strict=True):
         print(f"{run.name:24} {told(take, lambda _: outline)}")
     if checks:
@@ -133,6 +136,12 @@ def told(curves: list[Curve], outline_mm: Callable[[Curve], float]) -> str:
     said = f"{pooled(whole, shares):.1%} covered" if whole else "every limb lost"
     said += f", {pooled(curves, shares):.1%} with {lost} curves of lost limbs" if lost else ""
     return said + f"; {len(low)} of {len(whole)} curves below {CURVE:.0%}" + (f": {', '.join(low)}" if low else "")
+
+
+def tails(size: F64) -> str:
+    """Return whether errors are as large as their deviations, and as seldom large as normal ones, in words."""
+    held = [f"{share:.0%} {np.mean(size <= NormalDist().inv_cdf(0.5 + share / 2)):.1%}" for share in (0.5, 0.9, 0.99)]
+    return f"errors over deviations: RMS {rms(size):.2f}; intervals of {', '.join(held)}"
 
 
 def pooled(curves: list[Curve], shares: dict[str, float]) -> float:

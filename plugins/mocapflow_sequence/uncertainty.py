@@ -20,9 +20,9 @@ OUTLINE_MM = 3.2  # benchmarks/calibrate_uncertainty.py on rendered takes; docs/
 def measured(track: Track, scene: Scene) -> angles.AngleSeries:
     """Return the angles of a track, their calibrated standard deviations, and what was seen of them.
 
-    The covariance of a track is that of the normal equations: what noise of 1 px does that hangs together over 15 px
-    of a contour. `smooth` weighs by it as it is: what neighbouring frames have in common does not average out, so it
-    is no reason to hold a frame less.
+    The covariance of a track is that of the normal equations: what noise of the residuals' size does that hangs
+    together over 15 px of a contour. `smooth` weighs by it as it is: what neighbouring frames have in common does not
+    average out, so it is no reason to hold a frame less.
     """
     series = angles.measure(scene.body, track.root, track.angles, track.covariance, track.observed)
     pelvis = track.root[:, :3, :3] @ scene.body.positions[0] + track.root[:, :3, 3]
@@ -31,10 +31,10 @@ def measured(track: Track, scene: Scene) -> angles.AngleSeries:
 
 
 def excess(size: F64, outline_mm: float) -> F64:
-    """Return by how much errors exceed those of noise of 1 px, where the images show a person `size` (T,) px per mm.
+    """Return by how much errors exceed those of noise in pixels, where images show a person `size` (T,) px per mm.
 
-    However large the image, an outline is off by some millimetres more: shadows, socks before a light floor, cloth
-    and skin that are not quite the model's. These err alike along whole limbs and for a third of a second.
+    An outline is off by a pixel and, however large the image, by some millimetres: shadows, socks before a light floor,
+    cloth and skin that are not quite the model's. They err alike along whole limbs and for a third of a second.
     """
     scale: F64 = 1.0 + outline_mm * size
     return scale
