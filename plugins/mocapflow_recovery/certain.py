@@ -68,10 +68,10 @@ def views(frame: Frame, surface: Surface, room: Room, near_m: float) -> list[Vie
         room: the empty room, small.
         near_m: see `surface`.
     """
-    found = []
+    found, middle = [], surface.vertices.mean(axis=0)
     for number in np.flatnonzero(frame.usable):
         camera, plate = room.cameras[number], room.plates[number]
-        model, size = mask(outline(surface, camera), camera), 1 / magnification(camera, surface.vertices.mean(axis=0))
+        model, size = mask(outline(surface, camera), camera), 1 / magnification(camera, middle)
         image, hidden = frame.images[number], frame.hidden_in(int(number))
         factor = image.shape[1] // int(camera.size[0])
         changed, same = _compared(crops.shrink(image, factor), plate, floor_around(surface, camera, FLOOR_REACH))
@@ -106,7 +106,7 @@ def _near(changed: Bool, model: Bool, near_px: float) -> Bool:
     count, label, stats, _ = cv2.connectedComponentsWithStats(changed.view(np.uint8), connectivity=8)
     away = cv2.distanceTransform((~model).view(np.uint8), cv2.DIST_L2, 3)
     kept = np.zeros(count, bool)
-    kept[np.unique(label[away <= near_px])] = True
+    kept[label[away <= near_px]] = True
     kept[0] = False
     area = np.where(kept, stats[:, cv2.CC_STAT_AREA], 0)
     kept &= area >= max(SPECK * area.max(initial=0), 2)

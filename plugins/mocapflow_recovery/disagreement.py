@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numba
 import numpy as np
 
 from mocapflow.data import CLOTH, Surface
-from mocapflow.geometry.cameras import project
+from mocapflow.geometry.cameras import projection
+from mocapflow.geometry.silhouette_kernels import project
 from mocapflow.geometry.silhouettes import mask, outline
 from mocapflow.records import F32, F64, I32, Bool
 from mocapflow_recovery.certain import View
@@ -50,6 +52,8 @@ def floating_area(bare: Surface, views: Sequence[View], reach_m: float) -> float
     for view in views:
         rows, column, row = _pixels(bare.vertices, view)
         empty[rows] += view.away[row, column] > reach_m / view.pixel_m
+    if not (empty >= 2).any():
+        return 0.0
     corners = bare.vertices[bare.faces[(empty >= 2)[bare.faces].all(axis=1)]]
     return float(
         np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
@@ -70,10 +74,23 @@ def _from_cloth(surface: Surface, view: View) -> F32:
 
 def _pixels(points: F64, view: View) -> tuple[I32, I32, I32]:
     """Return which of the points (K, 3) lie in the image, and the column and row of the pixels nearest to them."""
-    pixels = np.rint(project(points, view.camera))
-    rows = np.flatnonzero(((pixels >= 0) & (pixels < view.person.shape[::-1])).all(axis=1)).astype(np.int32)
-    column, row = pixels[rows].astype(np.int32).T
+    pixels, depth = np.empty((len(points), 2)), np.empty(len(points))
+    project(points, projection(view.camera), pixels, depth)
+    rows, column, row = _within(pixels, *view.person.shape)
     return rows, column, row
+
+
+@numba.njit(cache=True)
+def _within(pixels, height, width):  # type: ignore[no-untyped-def]
+    """Return which pixels (K, 2) lie in an image, with their columns and rows, rounded; NaN does not."""
+    rows, column, row = np.empty((3, len(pixels)), np.int32)
+    count = 0
+    for k in range(len(pixels)):
+        x, y = np.rint(pixels[k, 0]), np.rint(pixels[k, 1])
+        if 0 <= x < width and 0 <= y < height:
+            rows[count], column[count], row[count] = k, x, y
+            count += 1
+    return rows[:count], column[:count], row[:count]
 
 
 def _of(surface: Surface, view: View) -> tuple[Bool, F32]:
