@@ -23,6 +23,7 @@ class Evidence(NamedTuple):
     stride: int
     along: Callable[[I32], F32]  # features (C, N) of the N pixels of some runs
     outside: Callable[[I32, F32], F32] | None = None  # log density (N,) in the empty scene, from runs and features
+    told: F32 | None = None  # (H, W) log ratio of inside and outside that is known besides
 
 
 def from_features(planes: F32, weight: F32) -> Evidence:

@@ -82,6 +82,8 @@ def settle(level: F32, prior: F32, evidence: Evidence, window: Window, weights: 
             gaussians = local_gaussians(evidence.sparse, weight, sparse, sums, grid, weights.sigma_px / stride, reach)
             runs = near(level, weights, first) if step else runs
             log_ratio(runs, evidence, gaussians, grid.cell_px * stride, stride, weights.clip, ratio)
+            if evidence.told is not None:
+                ratio = np.clip(ratio + evidence.told, -weights.clip, weights.clip)
         advance(level, ratio, prior, runs, change, weights)
     return Settled(level, ratio, runs)
 

@@ -5,16 +5,20 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Annotated, ClassVar
 
+import numpy as np
 from pydantic import Field
 
 from mocapflow.components import pool
 from mocapflow.data import Frame, FrameState, Matches, Past, Segmentation, Surface, Turn
+from mocapflow.records import F32
 from mocapflow.scene import Scene
 from mocapflow_levelset.inner import Search, inner_contours, told_apart
 from mocapflow_levelset.layers import COLOURS, gathered, layer_of, shown
 from mocapflow_levelset.levelset import PERSON, LevelSet
+from mocapflow_levelset.surround import ROOM, beside, told
 
 Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
 Count = Annotated[int, Field(gt=0)]
 
 
@@ -25,6 +29,10 @@ class Layered(LevelSet):
     its edge in the model, its colours give way to those of other parts. Parts that look alike, as one leg before the
     other, have no contour between them. Matchers `inner_contours` and `layered_icp` use what is found; in the first
     frame nothing is known yet.
+
+    With a `colour_weight` the colours of the room beside the person are learned too, and both join the local statistics
+    of the level set. Those are taken where the person is believed to be; what earlier frames have shown finds a limb
+    that was hidden and comes back elsewhere.
     """
 
     name: ClassVar[str] = "layered"
@@ -36,6 +44,7 @@ class Layered(LevelSet):
     later_reach_px: Count = 10  # the same once it is calm
     half_px: Annotated[int, Field(ge=2)] = 3  # on either side that colours have to agree over
     least: Positive = 1.0  # mean log ratio of colours from which on a side is told from the other
+    colour_weight: NonNegative = 0.0  # of what learned colours say of person and room, beside the local statistics
     inner_sigma_px: Positive = 1.0  # standard deviation of a point; that by the noise of the colours is added
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
@@ -50,6 +59,8 @@ class Layered(LevelSet):
         colours = dict(state.segmentation.appearance if turn.index > 1 else past.appearance)
         if turn.index == 1:
             colours[COLOURS] = gathered(frame, found.of(PERSON), surface, scene, past, self.keep, self.grid_px)
+            if self.colour_weight:
+                colours[ROOM] = beside(frame, found.of(PERSON), past, self.keep, self.grid_px, self.margin_px)
         return replace(found, inner=self._inner(frame, found, surface, past, scene, turn), appearance=colours)
 
     def _inner(
@@ -64,6 +75,11 @@ class Layered(LevelSet):
             for s in found.of(PERSON)
         ]
         return pool([(1.0, part) for part in parts]) if parts else None
+
+    def _colours(self, past: Past, camera: int) -> F32 | None:
+        if not self.colour_weight or ROOM not in past.appearance:
+            return None
+        return np.float32(self.colour_weight) * told(past, camera)
 
     def _search(self, turn: Turn) -> Search:
         reach = self.later_reach_px if turn.calm(self.calm_mm) else self.first_reach_px

@@ -88,15 +88,9 @@ def _drawn(surface: Surface, camera: Camera, layers: I32, inside: Bool, grid: in
 @once
 def shown(past: Past) -> Shown:
     """Return what colours say of the layers, by what earlier frames have shown."""
-    from scipy.ndimage import gaussian_filter1d
-
     counts = past.appearance[COLOURS]
-    cube = counts.reshape(len(counts), SIDE, SIDE, SIDE)
-    for axis in (1, 2, 3):
-        cube = gaussian_filter1d(cube, SMOOTH, axis=axis, mode="constant", truncate=3.0)
-    total = cube.sum(axis=(1, 2, 3))
     known = counts.sum(axis=1) >= LEAST
-    density = cube.reshape(counts.shape) / np.maximum(total, 1e-9)[:, None]
+    density = densities(counts)
     root = np.sqrt(density)
     apart = (root @ root.T < ALIKE) & known[:, None] & known[None]
     likely = np.log((1 - UNSEEN) * density + UNSEEN / BINS)
@@ -104,3 +98,14 @@ def shown(past: Past) -> Shown:
     for layer in np.flatnonzero(apart.any(axis=1)):
         ratio[layer] = np.clip(likely[layer] - likely[apart[layer]].max(axis=0), -CLIP, CLIP)
     return Shown(ratio, apart)
+
+
+def densities(counts: F64) -> F64:
+    """Return the smoothed densities (L, BINS) of colours that were counted (L, BINS)."""
+    from scipy.ndimage import gaussian_filter1d
+
+    cube = counts.reshape(len(counts), SIDE, SIDE, SIDE)
+    for axis in (1, 2, 3):
+        cube = gaussian_filter1d(cube, SMOOTH, axis=axis, mode="constant", truncate=3.0)
+    density: F64 = cube.reshape(counts.shape) / np.maximum(cube.sum(axis=(1, 2, 3)), 1e-9)[:, None]
+    return density

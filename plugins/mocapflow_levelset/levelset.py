@@ -12,6 +12,7 @@ from mocapflow.components import Segmenter
 from mocapflow.data import Frame, FrameState, Past, Segmentation, Silhouette, Surface, Turn
 from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.once import once
+from mocapflow.records import F32
 from mocapflow.scene import Scene
 from mocapflow_levelset.channels import ChannelName
 from mocapflow_levelset.evolve import Rhythm, Weights
@@ -101,6 +102,7 @@ class LevelSet(Segmenter):
                 prior=model,
                 counted=without_cut(weight, model, scene.body, surface, camera),
                 empty=self._empty(scene, surface, c, levels),
+                colours=self._colours(past, c),
             )
             found = find(view, levels, self._method(), self.band_px)
             silhouettes.append(Silhouette(camera=c, layer=PERSON, distance=found.level))
@@ -112,6 +114,10 @@ class LevelSet(Segmenter):
             return None
         plates = {level.factor: _plate(scene.background, camera, self.channels, level.factor) for level in levels}
         return Empty(plates, floor_around(surface, scene.cameras[camera], self.shadow_reach_m))
+
+    def _colours(self, past: Past, camera: int) -> F32 | None:
+        """Return what colours tell of person and room in a view (BINS,); None: nothing is learned."""
+        return None
 
     def _levels(self, warm: bool) -> list[Level]:
         reduced = Window(self.reduced_rho_px, self.cell_px, self.variance_floor)

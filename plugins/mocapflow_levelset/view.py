@@ -10,6 +10,7 @@ import numpy as np
 from mocapflow.records import F32, U8, Bool
 from mocapflow_levelset import crops
 from mocapflow_levelset.channels import ChannelName
+from mocapflow_levelset.colours import bins_of
 from mocapflow_levelset.crops import Crop
 from mocapflow_levelset.evidence import Evidence, from_image
 from mocapflow_levelset.evolve import Costs, Rhythm, Weights, costs, settle
@@ -34,6 +35,7 @@ class View(NamedTuple):
     prior: F32  # (H, W) px, signed distance to the model's outline
     counted: Bool  # (H, W) True where a pixel counts
     empty: Empty | None = None
+    colours: F32 | None = None  # (BINS,) log ratio of each colour on the person and in the room, by earlier frames
 
 
 class Level(NamedTuple):
@@ -95,8 +97,9 @@ def _evidence(image: U8, view: View, crop: Crop, level: Level, method: Method) -
     plate = None
     if view.empty is not None and level.use_plate:
         plate = view.empty.plates[factor].of(crop.at(factor)), crops.shrink_mask(crop.of(view.empty.floor), factor)
-    return from_image(
-        crops.shrink(image, factor),
+    small = crops.shrink(image, factor)
+    evidence = from_image(
+        small,
         crops.shrink_mask(crop.of(view.counted), factor).astype(np.float32),
         method.channels,
         max(method.stride // factor, 1),
@@ -105,3 +108,4 @@ def _evidence(image: U8, view: View, crop: Crop, level: Level, method: Method) -
         method.decorrelate,
         method.calm_px if factor == 1 else 0.0,  # the mean over pixels is calm
     )
+    return evidence if view.colours is None else evidence._replace(told=evidence.weight * view.colours[bins_of(small)])
