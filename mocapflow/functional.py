@@ -12,9 +12,9 @@ from mocapflow.assets import Camera
 from mocapflow.components import Prior
 from mocapflow.data import Cloth, Estimate, FrameState, Matches, Past, Pose, Segmentation, Silhouette, Surface
 from mocapflow.geometry import silhouettes, twists
-from mocapflow.geometry.cameras import project
+from mocapflow.geometry.cameras import project_each
 from mocapflow.model import ClothedModel, moved
-from mocapflow.records import F64
+from mocapflow.records import F32, F64
 
 SHAPE_WEIGHT = 0.05  # lambda, px^-2; a segmenter may descend with another one
 BAND_PX = 12.0  # around both contours, at most; beyond, the area term does not grow
@@ -44,10 +44,10 @@ class Functional:
         cameras = self.model.scene.cameras
         said = state.segmentation.energies
         views = np.array([[said.get(f"{camera.name}.{term}", np.nan) for term in IN_VIEW] for camera in cameras])
+        matched = contours(surface, state.matches, cameras)
         for silhouette in state.segmentation.of("person"):
             c = silhouette.camera
-            views[c, 2] = area(surface, silhouette, cameras[c])
-            views[c, 3] = contour(surface, state.matches, c, cameras[c])
+            views[c, 2], views[c, 3] = area(surface, silhouette, cameras[c]), matched[c]
         return np.concatenate([views.ravel(), self._priors(state.estimate.pose)])
 
     def pull(self, segmentation: Segmentation, pose: Pose, cloth: Cloth) -> float:
@@ -77,20 +77,23 @@ class Functional:
 
 def area(surface: Surface, silhouette: Silhouette, camera: Camera) -> float:
     """Return the shape term of a view: the squared difference of the two distance fields, within the band."""
-    kept = max(silhouette.distance.max(), -silhouette.distance.min())  # a segmenter may keep a narrower band
-    band = min(BAND_PX, float(kept))
-    model = silhouettes.model_distance(surface, camera, band)
+    model = silhouettes.model_distance(surface, camera, band := _band(silhouette.distance))
     return SHAPE_WEIGHT * silhouettes.squared_difference(model, silhouette.distance, band)
 
 
-def contour(surface: Surface, matches: Matches, view: int, camera: Camera) -> float:
-    """Return half the weighted squared error of the matches of a view."""
-    here = np.flatnonzero(matches.camera == view)
-    points, direction = surface.vertices.take(matches.vertex[here], axis=0), matches.direction.take(here, axis=0)
-    off = project(points, camera) - matches.pixel.take(here, axis=0)
-    along = np.einsum("ma,ma->m", off, direction) ** 2
-    squared = np.where(direction.any(axis=1), along, np.einsum("ma,ma->m", off, off))
-    return 0.5 * float(matches.weight[here] @ squared)
+def _band(distance: F32) -> float:
+    """Return the half width of the band to compare in: a segmenter may keep a narrower one than ours."""
+    if abs(distance[0, 0]) >= BAND_PX:  # nearly always: nothing has to be looked through
+        return BAND_PX
+    return min(BAND_PX, float(max(distance.max(), -distance.min())))
+
+
+def contours(surface: Surface, matches: Matches, cameras: Sequence[Camera]) -> F64:
+    """Return half the weighted squared error of the matches of each view (C,)."""
+    off = project_each(surface.vertices.take(matches.vertex, axis=0), matches.camera, cameras) - matches.pixel
+    along = np.einsum("ma,ma->m", off, matches.direction) ** 2
+    squared = np.where(matches.direction.any(axis=1), along, np.einsum("ma,ma->m", off, off))
+    return np.bincount(matches.camera, 0.5 * matches.weight * squared, minlength=len(cameras)).astype(np.float64)
 
 
 def halfway(one: Pose, other: Pose) -> Pose:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mocapflow.data import FrameState, Matches, Past, Pose
-from mocapflow.functional import SHAPE_WEIGHT, Functional, area, contour, halfway
+from mocapflow.functional import SHAPE_WEIGHT, Functional, area, contours, halfway
 from mocapflow.geometry.cameras import project
 from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.model import moved
@@ -39,8 +39,7 @@ def test_contour_is_half_the_weighted_squared_error_along_the_direction_or_in_fu
         camera=np.array([1, 1], np.int16), pixel=pixel, direction=np.array([[1.0, 0.0], [0.0, 0.0]]),
         vertex=np.arange(2, dtype=np.int32), weight=np.array([2.0, 1.0]),
     )  # fmt: skip
-    assert contour(surface, matches, 1, camera) == pytest.approx(0.5 * (2 * 9 + 25))
-    assert contour(surface, matches, 0, camera) == 0
+    assert contours(surface, matches, [camera, camera]) == pytest.approx([0, 0.5 * (2 * 9 + 25)])
 
 
 def values_of(functional, state):

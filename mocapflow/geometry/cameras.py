@@ -30,10 +30,10 @@ def project(points: F64, camera: Camera) -> F64:
 
 def project_each(points: F64, view: I16, cameras: Sequence[Camera]) -> F64:
     """Return undistorted pixels (M, 2) of world points (M, 3) in m, each in its own view (M,)."""
-    pixels = np.empty((len(points), 2))
-    for index, camera in enumerate(cameras):
-        own = view == index
-        pixels[own] = project(points[own], camera)
+    matrix = np.stack([projection(camera) for camera in cameras]).take(view, axis=0)
+    homogeneous = np.einsum("mab,mb->ma", matrix[..., :3], points) + matrix[..., 3]
+    depth = np.where(homogeneous[:, 2:] > 0, homogeneous[:, 2:], np.nan)
+    pixels: F64 = homogeneous[:, :2] / depth
     return pixels
 
 

@@ -80,14 +80,17 @@ def find(view: View, levels: Sequence[Level], method: Method, band_px: float) ->
         evidence = _evidence(image, view, crop, level, method)
         settled = settle(without_islands(front, evidence), prior, evidence, level.window, method.weights, level.rhythm)
         front, factor = settled.level, level.factor
-    crop.of(outside)[:] = _brought(front, factor, 1, band_px)
+    np.clip(_brought(front, factor, 1, band_px), -band_px, band_px, out=crop.of(outside))
     return Found(outside, costs(settled, prior, method.weights))
 
 
 def _brought(level: F32, factor: int, wanted: int, band_px: float) -> F32:
-    """Return a level set of the image shrunk by `factor` as a signed distance where it is shrunk by `wanted`."""
+    """Return a level set of the image shrunk by `factor` as a signed distance where it is shrunk by `wanted`.
+
+    Enlarged, it is not clipped to the band.
+    """
     if wanted < factor:  # a distance first, where it costs least
-        return np.clip(crops.finer(redistance(level, band_px), factor // wanted), -band_px, band_px)
+        return crops.finer(redistance(level, band_px), factor // wanted)
     return redistance(crops.coarser(level, wanted // factor), band_px)
 
 
