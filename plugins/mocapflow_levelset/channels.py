@@ -1,4 +1,4 @@
-"""Feature channels of an image: grey, CIELAB and texture, each scaled to [0, 1] and treated as independent."""
+"""Feature channels of an image: grey, CIELAB, chromaticity and texture, scaled to about [0, 1], held independent."""
 
 from __future__ import annotations
 
@@ -10,7 +10,12 @@ import numpy as np
 
 from mocapflow.records import F32, U8
 
-ChannelName = Literal["grey", "lab", "texture"]
+ChannelName = Literal["grey", "lab", "chromaticity", "texture"]
+PLANES = {"grey": 1, "lab": 3, "chromaticity": 3, "texture": 3}
+SHADE = (
+    0.12  # of the channel's range for a factor e of lightness: what a contact shadow does, 0.25, is no more than noise
+)
+CHROMATICITY = 1.5  # of the channel's range for a chroma as great as the lightness
 TEXTURE_SCALE_PX = 2.0  # smoothing of the structure tensor
 LAG_PX = 4  # distance of the pixels whose differences tell how channels vary together
 
@@ -20,7 +25,7 @@ def features(image: U8, channels: Sequence[ChannelName]) -> F32:
 
     Args:
         image: (H, W, 3) BGR grey levels.
-        channels: which channels, in order; lab gives three, texture gives three.
+        channels: which channels, in order; `PLANES` says how many planes each gives.
     """
     import cv2
 
@@ -30,6 +35,8 @@ def features(image: U8, channels: Sequence[ChannelName]) -> F32:
             parts.append(_scaled(np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)[..., None]))
         elif name == "lab":
             parts.append(_scaled(np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2LAB), np.uint8)))
+        elif name == "chromaticity":
+            parts.append(_chromaticity(image))
         else:
             parts.append(_texture(image))
     return np.concatenate(parts) if len(parts) > 1 else parts[0]
@@ -60,6 +67,19 @@ def _separate(levels, planes):  # type: ignore[no-untyped-def]
             line, mixed = planes[c, row], levels[row, :, c]
             for x in range(line.size):
                 line[x] = np.float32(mixed[x]) * np.float32(1 / 255)
+
+
+def _chromaticity(image: U8) -> F32:
+    """Return log lightness, on so small a scale that shading hardly counts, and the two chromaticities.
+
+    A shadow scales (L + 16, a, b) by one factor, which leaves a / (L + 16) and b / (L + 16) as they are.
+    """
+    import cv2
+
+    lab = cv2.cvtColor(image.astype(np.float32) / np.float32(255), cv2.COLOR_BGR2LAB)
+    light = lab[..., 0] + np.float32(16)
+    planes = np.stack([SHADE * np.log(light / 116) + 1, *(0.5 + CHROMATICITY * lab[..., k] / light for k in (1, 2))])
+    return np.asarray(planes, np.float32)
 
 
 def _texture(image: U8) -> F32:

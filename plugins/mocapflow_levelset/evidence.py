@@ -12,7 +12,7 @@ from mocapflow.records import F32, I32, U8, Bool
 from mocapflow_levelset.channels import LAG_PX, ChannelName, decorrelation, features
 from mocapflow_levelset.plates import Plate, Shadow, density_of
 
-POINTWISE = ("grey", "lab")  # channels that depend on one pixel only
+POINTWISE = ("grey", "lab", "chromaticity")  # channels that depend on one pixel only
 
 
 class Evidence(NamedTuple):

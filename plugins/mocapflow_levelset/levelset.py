@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from mocapflow.assets import Background
+from mocapflow.assets import Background, Camera
 from mocapflow.components import Segmenter
 from mocapflow.data import Frame, FrameState, Past, Segmentation, Silhouette, Surface, Turn
 from mocapflow.geometry.silhouettes import model_distance
@@ -15,12 +15,13 @@ from mocapflow.once import once
 from mocapflow.records import F32
 from mocapflow.scene import Scene
 from mocapflow_levelset.channels import ChannelName
+from mocapflow_levelset.contact import contact_zone
 from mocapflow_levelset.evolve import Rhythm, Weights
 from mocapflow_levelset.masks import counted, without_cut
 from mocapflow_levelset.plates import Plate, Shadow, plate_of
 from mocapflow_levelset.shadows import floor_around
 from mocapflow_levelset.statistics import Window
-from mocapflow_levelset.view import Empty, Level, Method, View, find
+from mocapflow_levelset.view import Contact, Empty, Level, Method, View, find
 
 Count = Annotated[int, Field(gt=0)]
 NonNegativeCount = Annotated[int, Field(ge=0)]
@@ -41,7 +42,8 @@ class LevelSet(Segmenter):
     of an empty scene takes it for the person.
 
     The chapter's own settings: `use_background: false`, `coarse_steps: 0`, `half_steps: 0`, `cell_px: 1`,
-    `stride_px: 1`, `steps: 50`, `statistics_every: 1`, `keep_mm: 0`; `shape_weight: 0` uncouples it from the model.
+    `stride_px: 1`, `steps: 50`, `contact_steps: 0`, `statistics_every: 1`, `keep_mm: 0`;
+    `shape_weight: 0` uncouples it from the model.
     """
 
     name: ClassVar[str] = "levelset"
@@ -62,6 +64,8 @@ class LevelSet(Segmenter):
     half_steps: NonNegativeCount = 4  # at half the size
     steps: Count = 3  # at full size
     later_steps: Count = 3  # at full size on later turns, which start from the last turn's contour
+    contact_steps: NonNegativeCount = 10  # by chromaticity, where the body meets the floor and both are dark; 0: none
+    contact_px: Positive = 6.0  # to either side of the outline there
     keep_mm: NonNegative = 5.0  # change of the body in a turn below which the silhouettes stay; 0: always found anew
     statistics_every: Count = 4  # steps between estimates of the colours
     redistance_every: Count = 4  # steps between repairs of the distance function
@@ -103,6 +107,7 @@ class LevelSet(Segmenter):
                 counted=without_cut(weight, model, scene.body, surface, camera),
                 empty=self._empty(scene, surface, c, levels),
                 colours=self._colours(past, c),
+                contact=self._contact(surface, camera),
             )
             found = find(view, levels, self._method(), self.band_px)
             silhouettes.append(Silhouette(camera=c, layer=PERSON, distance=found.level))
@@ -119,15 +124,23 @@ class LevelSet(Segmenter):
         """Return what colours tell of person and room in a view (BINS,); None: nothing is learned."""
         return None
 
+    def _contact(self, surface: Surface, camera: Camera) -> Contact | None:
+        if not self.contact_steps:
+            return None
+        zone = contact_zone(surface, camera, self.contact_px)
+        return Contact(zone, self._rhythm(self.contact_steps), self._window(self.rho_px))
+
     def _levels(self, warm: bool) -> list[Level]:
-        reduced = Window(self.reduced_rho_px, self.cell_px, self.variance_floor)
-        full = Window(self.rho_px, self.cell_px, self.variance_floor)
+        reduced, full = self._window(self.reduced_rho_px), self._window(self.rho_px)
         levels = [
             Level(COARSE, self._rhythm(0 if warm else self.coarse_steps), reduced),
             Level(HALF, self._rhythm(self.half_steps), reduced),
             Level(FULL, self._rhythm(self.later_steps if warm else self.steps), full, use_plate=False),
         ]
         return [level for level in levels if level.rhythm.steps]
+
+    def _window(self, rho_px: float) -> Window:
+        return Window(rho_px, self.cell_px, self.variance_floor)
 
     def _rhythm(self, steps: int) -> Rhythm:
         return Rhythm(steps, self.statistics_every, self.redistance_every)

@@ -15,7 +15,7 @@ import numpy as np
 
 from mocapflow.records import F32, Bool
 from mocapflow_levelset import crops
-from mocapflow_levelset.channels import ChannelName, features
+from mocapflow_levelset.channels import PLANES, ChannelName, features
 
 BLACK = (-16 / 100, 128 / 255, 128 / 255)  # where the rays start, in lab channels scaled to [0, 1]
 BENDING = 0.05  # how far a shadow may be off the ray, as a share of the colour's distance from grey
@@ -72,8 +72,7 @@ def density_of(
 
 def first_lab(channels: Sequence[ChannelName]) -> int:
     """Return the index of the first lab plane among the feature planes, -1 without: then no shadow is known."""
-    widths = {"grey": 1, "lab": 3, "texture": 3}
-    return sum(widths[name] for name in channels[: list(channels).index("lab")]) if "lab" in channels else -1
+    return sum(PLANES[name] for name in channels[: list(channels).index("lab")]) if "lab" in channels else -1
 
 
 @numba.njit(cache=True, error_model="numpy")

@@ -111,7 +111,8 @@ def test_the_literal_chapter_runs(scene, pose):
     frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, believed(pose))
     literal = LevelSet(
         channels=("grey",), use_background=False, decorrelate=False, coarse_steps=0, half_steps=0, cell_px=1,
-        stride_px=1, steps=20, statistics_every=1, redistance_every=5, length_weight=0.5, variance_floor=0.02,
+        stride_px=1, steps=20, contact_steps=0, statistics_every=1, redistance_every=5, length_weight=0.5,
+        variance_floor=0.02,
     )  # fmt: skip
     assert min(overlaps(literal.segment(frame, state, Past(), scene, FIRST), scene, pose)) > 0.85
 
