@@ -11,7 +11,7 @@ from mocapflow.records import Bool
 
 NEAR_M = 0.04  # above the lowest point of the body: what shades the floor right beside itself
 DOWNWARD = 0.3  # least part of an outward normal that points down the image
-SPACING_PX = 2.0
+SPACING_PX = 4.0
 
 
 def contact_zone(surface: Surface, camera: Camera, reach_px: float) -> Bool:
@@ -21,7 +21,7 @@ def contact_zone(surface: Surface, camera: Camera, reach_px: float) -> Bool:
     outline = occluding_contour(surface, camera, SPACING_PX)
     height = surface.vertices[:, 2]
     meets = (height[outline.vertex] < height.min() + NEAR_M) & (outline.normal[:, 1] > DOWNWARD)
-    column, row = np.minimum(np.rint(outline.pixel[meets]).astype(int), camera.size - 1).T
-    elsewhere = np.ones((camera.size[1], camera.size[0]), np.uint8)
-    elsewhere[row, column] = 0
-    return np.asarray(cv2.distanceTransform(elsewhere, cv2.DIST_L2, 3) < reach_px)
+    zone = np.zeros((camera.size[1], camera.size[0]), np.uint8)
+    for x, y in np.rint(outline.pixel[meets]).astype(int):
+        cv2.circle(zone, (int(x), int(y)), round(reach_px), 1, cv2.FILLED)
+    return zone.view(bool)

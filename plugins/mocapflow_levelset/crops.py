@@ -29,7 +29,7 @@ class Crop(NamedTuple):
         return Crop(*(side // factor for side in self))
 
 
-def around(level: F32, margin_px: int, multiple: int) -> Crop | None:
+def around(level: F32 | Bool, margin_px: int, multiple: int) -> Crop | None:
     """Return the rectangle around the inside of a level set (H, W), its sides at multiples of `multiple`.
 
     None where nothing is inside.

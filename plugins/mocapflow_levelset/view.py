@@ -104,7 +104,7 @@ def _by_chromaticity(
     two inside the foot, which then seems to stand higher than it does.
     """
     zone = crop.of(contact.zone)
-    near = crops.around(zone.astype(np.float32), method.margin_px, 1)
+    near = crops.around(zone, round(min(2 * contact.window.rho_px, method.margin_px)), 1)
     if near is None:
         return front
     weight = near.of(crop.of(view.counted)).astype(np.float32)
