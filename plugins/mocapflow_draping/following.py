@@ -69,6 +69,14 @@ def follow_swing(  # type: ignore[no-untyped-def]
             pivot = end
 
 
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
+def follow_move(rate, n, row, amount, towards):  # type: ignore[no-untyped-def]
+    """Add amounts (S,) along a direction to the rates of a particle."""
+    for a in range(3):
+        for s in range(len(amount)):
+            rate[n, row, a, s] += towards[a] * amount[s]
+
+
 @numba.njit(cache=True, error_model="numpy")
 def lack(normal, p, rate, carry, swell):  # type: ignore[no-untyped-def]
     """Return how much faster (S,) a particle at p with rates (3, S) would have to leave the body to stay in contact."""
@@ -82,37 +90,30 @@ def lack(normal, p, rate, carry, swell):  # type: ignore[no-untyped-def]
     return wanted
 
 
-@numba.njit(cache=True, error_model="numpy")
-def follow_move(rate, amount, towards):  # type: ignore[no-untyped-def]
-    """Add amounts (S,) along a direction to rates (3, S)."""
-    for a in range(3):
-        for s in range(len(amount)):
-            rate[a, s] += towards[a] * amount[s]
-
-
-@numba.njit(cache=True, error_model="numpy")
-def follow_length(rate, above, bar, link):  # type: ignore[no-untyped-def]
-    """Change the rates (3, S) of the lower end of a bar that is brought to its length; `above` are its upper end's."""
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
+def follow_length(rate, n, row, bar, link):  # type: ignore[no-untyped-def]
+    """Change the rates of a bar's lower end, in `row`, as the bar from the row above is brought to its length."""
     dx, dy, dz = bar
     r = max(math.sqrt(dx * dx + dy * dy + dz * dz), 1e-9)
-    ux, uy, uz, scale = dx / r, dy / r, dz / r, link / r
-    for s in range(rate.shape[1]):
-        ex, ey, ez = rate[0, s] - above[0, s], rate[1, s] - above[1, s], rate[2, s] - above[2, s]
+    ux, uy, uz, scale, up = dx / r, dy / r, dz / r, link / r, row - 1
+    for s in range(rate.shape[3]):
+        ax, ay, az = rate[n, up, 0, s], rate[n, up, 1, s], rate[n, up, 2, s]
+        ex, ey, ez = rate[n, row, 0, s] - ax, rate[n, row, 1, s] - ay, rate[n, row, 2, s] - az
         along = ux * ex + uy * ey + uz * ez
-        mx = above[0, s] + scale * (ex - along * ux)
-        my = above[1, s] + scale * (ey - along * uy)
-        mz = above[2, s] + scale * (ez - along * uz)
+        mx, my, mz = ax + scale * (ex - along * ux), ay + scale * (ey - along * uy), az + scale * (ez - along * uz)
         share = FASTEST / math.sqrt(max(mx * mx + my * my + mz * mz, FASTEST * FASTEST))
-        rate[0, s], rate[1, s], rate[2, s] = share * mx, share * my, share * mz
+        rate[n, row, 0, s], rate[n, row, 1, s], rate[n, row, 2, s] = share * mx, share * my, share * mz
 
 
-@numba.njit(cache=True, error_model="numpy")
-def follow_draw(rate, other, way, share, most, moves, other_moves):  # type: ignore[no-untyped-def]
-    """Change the rates (3, S) of two particles that are drawn together by a share of the way between them.
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
+def follow_draw(rate, n, m, row, way, share, most, moves, other_moves):  # type: ignore[no-untyped-def]
+    """Change the rates of two particles that are drawn together by a share of the way between them.
 
     Args:
-        rate: of the one.
-        other: of the other.
+        rate: (N, L, 3, S) rates of all particles.
+        n: strand of the one.
+        m: strand of the other.
+        row: of both.
         way: m, three components, from the one to the other, before.
         share: of the way; it grows with the way, up to `most` for an endless one.
         most: see there.
@@ -123,13 +124,15 @@ def follow_draw(rate, other, way, share, most, moves, other_moves):  # type: ign
     half = 0.5 if moves and other_moves else 1.0
     keep, grow = half * share, half * (most - share) / (dx * dx + dy * dy + dz * dz)
     here, there = (1.0 if moves else 0.0), (1.0 if other_moves else 0.0)
-    for s in range(rate.shape[1]):
-        ex, ey, ez = other[0, s] - rate[0, s], other[1, s] - rate[1, s], other[2, s] - rate[2, s]
+    for s in range(rate.shape[3]):
+        ex = rate[m, row, 0, s] - rate[n, row, 0, s]
+        ey = rate[m, row, 1, s] - rate[n, row, 1, s]
+        ez = rate[m, row, 2, s] - rate[n, row, 2, s]
         apart = grow * (dx * ex + dy * ey + dz * ez)
         mx, my, mz = keep * ex + apart * dx, keep * ey + apart * dy, keep * ez + apart * dz
-        rate[0, s] += here * mx
-        rate[1, s] += here * my
-        rate[2, s] += here * mz
-        other[0, s] -= there * mx
-        other[1, s] -= there * my
-        other[2, s] -= there * mz
+        rate[n, row, 0, s] += here * mx
+        rate[n, row, 1, s] += here * my
+        rate[n, row, 2, s] += here * mz
+        rate[m, row, 0, s] -= there * mx
+        rate[m, row, 1, s] -= there * my
+        rate[m, row, 2, s] -= there * mz

@@ -30,10 +30,13 @@ def blown(facing: F64, out: F64, aside: F64) -> tuple[F64, F64, F64]:
         back, towards, amount: a tail that hangs straight down stands `amount` (B, N) rad from `towards`, on the side of
         `back`, which is perpendicular to it.
     """
-    towards, amount = tilted(np.broadcast_to(DOWN, facing.shape), facing, out, aside), np.hypot(out, aside)
+    left = np.stack([-facing[..., 1], facing[..., 0], np.zeros_like(out)], axis=-1)
+    amount = np.hypot(out, aside)
+    calm = amount == 0.0
+    whole = np.where(calm, 1.0, amount)
+    level = (np.where(calm, 1.0, out) / whole)[..., None] * facing + (aside / whole)[..., None] * left
     sine, cosine = np.sin(amount)[..., None], np.cos(amount)[..., None]
-    level = np.where(sine > 0, towards - cosine * DOWN, facing) / np.where(sine > 0, sine, 1.0)
-    return sine * DOWN - cosine * level, towards, amount
+    return sine * DOWN - cosine * level, cosine * DOWN + sine * level, amount
 
 
 def tilted(down: F64, facing: F64, out: F64, aside: F64) -> F64:

@@ -32,7 +32,7 @@ def push_out(grid, n, row, link, skin, seen, room, near, parts, values, motion):
         out = outwards(p[0], p[1], p[2], near[n], parts, values)
         if motion is not None:
             rate, _, carry, swell = motion
-            follow_move(rate[n, row], lack(out, p, rate[n, row], carry[near[n]], swell), out)
+            follow_move(rate, n, row, lack(out, p, rate[n, row], carry[near[n]], swell), out)
         move(grid, n, row, CLEAR - room[n], out)
         to_length(grid, n, row, link, motion)
     _stand_off(grid, n, row, link, skin, seen, room, near, parts, values, motion)
@@ -80,9 +80,9 @@ def lift(grid, first, last, beside, row, seen, room, near, between, clear, parts
                 rate, _, carry, swell = motion
                 amount = lack(out, middle, 0.5 * (rate[n, row] + rate[m, row]), carry[part], 0.0 * swell)
                 if row > first[n]:
-                    follow_move(rate[n, row], amount, out)
+                    follow_move(rate, n, row, amount, out)
                 if row > first[m]:
-                    follow_move(rate[m, row], amount, out)
+                    follow_move(rate, m, row, amount, out)
             if row > first[n]:
                 move(grid, n, row, CLEAR - d, out)
             if row > first[m]:
@@ -95,7 +95,7 @@ def to_length(grid, n, row, link, motion):  # type: ignore[no-untyped-def]
     x, y, z = place(grid, n, row - 1)
     dx, dy, dz = grid[n, row, 0] - x, grid[n, row, 1] - y, grid[n, row, 2] - z
     if motion is not None:
-        follow_length(motion[0][n, row], motion[0][n, row - 1], (dx, dy, dz), link)
+        follow_length(motion[0], n, row, (dx, dy, dz), link)
     scale = link / max(math.sqrt(dx * dx + dy * dy + dz * dz), 1e-9)
     grid[n, row, 0], grid[n, row, 1], grid[n, row, 2] = x + scale * dx, y + scale * dy, z + scale * dz
 

@@ -128,7 +128,7 @@ def _pull(grid, first, last, across, length, row, longest, stiff, backwards, mot
         else:
             continue
         if motion is not None:
-            follow_draw(motion[0][n, row], motion[0][m, row], (dx, dy, dz), share, limit, here, there)
+            follow_draw(motion[0], n, m, row, (dx, dy, dz), share, limit, here, there)
         part = 0.5 * share if here and there else share
         if here:
             move(grid, n, row, part, (dx, dy, dz))
