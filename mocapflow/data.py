@@ -130,6 +130,11 @@ class Surface:
     screws: F64 = array("D", 6, unit="twist (omega, v) in the world")
 
     @cached_property
+    def cloth(self) -> Bool:
+        """Which vertices (N,) are cloth."""
+        return np.asarray(self.layer == CLOTH)
+
+    @cached_property
     def normals(self) -> F64:
         """Unit vertex normals (N, 3)."""
         from mocapflow.geometry.meshes import vertex_normals  # compiled code, loaded where it is used

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mocapflow.data import CLOTH, Change, Pose, Surface
+from mocapflow.data import Change, Pose, Surface
 from mocapflow.geometry import twists
 from mocapflow.records import F64, record
 
@@ -44,7 +44,7 @@ def measure_change(old: Shown, new: Shown, covariance: F64) -> Change:
     """
     way = new.surface.vertices - old.surface.vertices
     squared = np.einsum("va,va->v", way, way)
-    worn = new.surface.layer == CLOTH
+    worn = new.surface.cloth
     body, cloth = squared[~worn], squared[worn]
     angles = np.abs(new.pose.angles - old.pose.angles)
     return Change(

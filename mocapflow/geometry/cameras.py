@@ -8,12 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from mocapflow.assets import Camera
+from mocapflow.once import once
 from mocapflow.records import F64, I16
 
 UNDISTORT_STEPS = 100
 UNDISTORT_TOLERANCE = 1e-12  # of the focal length
 
 
+@once
 def projection(camera: Camera) -> F64:
     """Return the 3 x 4 matrix that maps world points (m) to homogeneous pixels of an undistorted view."""
     return camera.intrinsics @ camera.camera_from_world[:3]

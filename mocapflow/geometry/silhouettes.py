@@ -45,7 +45,7 @@ def outline(surface: Surface, camera: Camera) -> Outline:
     kernels.project(surface.vertices, projection(camera), pixels, depth)
     facing = np.empty(len(surface.faces), np.int8)
     kernels.face_directions(pixels, surface.faces, facing)
-    vertex, layers = kernels.occluding_edges(surface.edges, facing, surface.layer == CLOTH)
+    vertex, layers = kernels.occluding_edges(surface.edges, facing, surface.cloth)
     image = pixels.take(vertex, axis=0)  # several times faster than pixels[vertex]
     return _bounded(vertex, image, layers, span_kernels.crossings(image, camera.size), camera)
 
@@ -112,7 +112,7 @@ def samples(boundary: Outline, surface: Surface, camera: Camera, spacing_px: flo
     Their normals are the projected surface normals, which look along the image plane at an occluding contour and
     are smoother than the short edges; at cloth, which has a rim, they are those of the edges.
     """
-    matrix, cloth = projection(camera), surface.layer == CLOTH
+    matrix, cloth = projection(camera), surface.cloth
     points = boundary_kernels.sample(
         boundary.pixel,
         boundary.edge,

@@ -8,7 +8,7 @@ import numba
 import numpy as np
 
 from mocapflow.assets import Camera
-from mocapflow.data import CLOTH, Surface
+from mocapflow.data import Surface
 from mocapflow.geometry import silhouette_kernels as kernels
 from mocapflow.geometry.cameras import projection
 from mocapflow.records import F64, I32
@@ -33,7 +33,7 @@ def front_vertices(surface: Surface, camera: Camera, points: F64) -> tuple[I32, 
         low = np.floor(points.min(axis=0) / CELL).astype(np.int64)
         width, height = (np.floor(points.max(axis=0) / CELL).astype(np.int64) - low + 1).tolist()
         first, after = _in_cells(points, low, np.full((height, width), -1, np.int32))
-        _front(image, depth, surface.faces, surface.layer == CLOTH, points, low, first, after, vertex)
+        _front(image, depth, surface.faces, surface.cloth, points, low, first, after, vertex)
     return vertex, image
 
 

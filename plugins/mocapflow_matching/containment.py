@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar
 
+import numba
 import numpy as np
 from pydantic import Field
 
@@ -44,18 +45,13 @@ class Containment(Matcher):
     def match_view(self, camera: Camera, silhouette: Silhouette, surface: Surface) -> Matches:
         """Return the pairs of one view."""
         model = occluding_contour(surface, camera, self.spacing_px, skin=True)
-        outside = np.flatnonzero(inside_px(silhouette, model.pixel) < self.margin_px)
-        place, facing = model.pixel.take(outside, axis=0), model.normal.take(outside, axis=0)
-        pixel, normal = silhouette.zero_level
-        found = nearest_compatible(place, facing, pixel, normal, self.reach_px, ANY_DIRECTION)
-        paired = np.flatnonzero(found >= 0)
-        direction = normal.take(found[paired], axis=0)
-        goal = pixel.take(found[paired], axis=0) - self.margin_px * direction
-        off, stray = place.take(paired, axis=0) - goal, outside[paired]
-        distance = np.abs(np.einsum("ma,ma->m", off, direction))
+        inside = inside_px(silhouette, model.pixel)
+        stray, target, direction, distance = strays(
+            inside, model.pixel, model.normal, model.anchor, *silhouette.zero_level, self.margin_px, self.reach_px
+        )
         return Matches(
             camera=np.full(len(stray), silhouette.camera, np.int16),
-            pixel=model.anchor.take(stray, axis=0) - off,
+            pixel=target,
             direction=direction,
             vertex=model.vertex.take(stray),
             weight=robust_weights(distance / self.sigma_px, "huber", self.scale) / self.sigma_px**2,
@@ -66,3 +62,22 @@ def inside_px(silhouette: Silhouette, pixels: F64) -> F64:
     """Return the signed distance (K,) px at the pixels nearest to (K, 2), a smooth field."""
     inside: F64 = at_nearest(silhouette.distance, pixels)
     return inside
+
+
+@numba.njit(cache=True)
+def strays(inside, place, facing, anchor, pixel, normal, margin, reach):  # type: ignore[no-untyped-def]
+    """Return the points of a contour (K,) that are less than `margin` inside, as pairs (M,) with the image contour.
+
+    Returns:
+        which points, where their anchors should be (M, 2), across the image contour (M, 2), and how far off (M,).
+    """
+    stray = np.flatnonzero(inside < margin)
+    found = nearest_compatible(place[stray], facing[stray], pixel, normal, reach, ANY_DIRECTION)
+    stray, found = stray[found >= 0], found[found >= 0]
+    target, direction, distance = np.empty((len(stray), 2)), normal[found], np.empty(len(stray))
+    for m in range(len(stray)):
+        k, n, (dx, dy) = stray[m], found[m], direction[m]
+        x, y = place[k, 0] - (pixel[n, 0] - margin * dx), place[k, 1] - (pixel[n, 1] - margin * dy)
+        target[m, 0], target[m, 1] = anchor[k, 0] - x, anchor[k, 1] - y
+        distance[m] = abs(x * dx + y * dy)
+    return stray, target, direction, distance

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numba
 import numpy as np
 
-from mocapflow.data import CLOTH, Surface
+from mocapflow.data import Surface
 from mocapflow.geometry.cameras import projection
 from mocapflow.geometry.silhouette_kernels import project
 from mocapflow.geometry.silhouettes import mask, outline
@@ -65,7 +65,7 @@ def _from_cloth(surface: Surface, view: View) -> F32:
     import cv2
 
     free = np.ones(view.person.shape, np.uint8)
-    _, column, row = _pixels(surface.vertices[surface.layer == CLOTH], view)
+    _, column, row = _pixels(surface.vertices[surface.cloth], view)
     if not len(row):
         return np.full(free.shape, np.inf, np.float32)
     free[row, column] = 0
