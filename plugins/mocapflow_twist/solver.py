@@ -17,6 +17,7 @@ from mocapflow_twist import solve
 from mocapflow_twist.constraint import image_rows, line_rows
 from mocapflow_twist.covariance import covariance, effective_share, observed, view_balance
 from mocapflow_twist.motion import ClothMotion
+from mocapflow_twist.normal_equations import Equations
 from mocapflow_twist.problem import Anchor, Data, Guess, Problem, Quadratic
 
 Positive = Annotated[float, Field(gt=0)]
@@ -69,18 +70,21 @@ class TwistGaussNewton(PoseSolver):
         anchor = Anchor(calmed(guess, model), self._precision(model, guess))
         surface, damping = model.surface(guess.pose, guess.cloth), self._least_damping(past, turn)
         tried: dict[Pose, Sequence[Residual]] = {}
+        found: Quadratic | None = None  # the quadratic models at the guess, once they are known
         for _ in range(self.iterations):
-            problem = Problem(model, self._data(match(surface), model), priors, past, anchor, tried)
+            problem, found = Problem(model, self._data(match(surface), model), priors, past, anchor, tried), None
             if problem.data.measurements == 0:
                 break
             before = guess
             for _ in range(self.steps_per_match):
-                guess, damping = self._descend(problem, guess, motion, damping)
+                found = quadratic(problem, guess, motion)
+                stepped, damping = self._descend(problem, guess, found.total, motion, damping)
+                guess, found = stepped, found if stepped is guess else None
                 damping = max(damping, self._least_damping(past, turn))
             if guess is before:
                 break
             surface = model.surface(guess.pose, guess.cloth)
-        return self._estimate(problem, guess, motion)
+        return self._estimate(problem, guess, found or quadratic(problem, guess, motion))
 
     def _data(self, matches: Matches, model: ClothedModel) -> Data:
         """Return the matches as rows, weighted by how many independent measurements they hold."""
@@ -114,9 +118,10 @@ class TwistGaussNewton(PoseSolver):
         precision: F64 = np.concatenate(spread) ** -2.0
         return precision
 
-    def _descend(self, problem: Problem, guess: Guess, motion: ClothMotion, damping: float) -> tuple[Guess, float]:
+    def _descend(
+        self, problem: Problem, guess: Guess, equations: Equations, motion: ClothMotion, damping: float
+    ) -> tuple[Guess, float]:
         """Return a guess of lower energy for the same matches, or the same guess where there is none worth a step."""
-        equations = quadratic(problem, guess, motion).total
         equations = motion.within_bounds(equations, guess)
         angles = len(guess.pose.angles)
         ranges = parameter_ranges(problem.model) if problem.unknowns > 6 + angles else np.empty(0)
@@ -133,8 +138,8 @@ class TwistGaussNewton(PoseSolver):
             damping = max(RAISED * damping, 1e-6)
         return guess, damping
 
-    def _estimate(self, problem: Problem, guess: Guess, motion: ClothMotion) -> Estimate:
-        data, prior = quadratic(problem, guess, motion)
+    def _estimate(self, problem: Problem, guess: Guess, found: Quadratic) -> Estimate:
+        data, prior = found
         about_root = covariance(data.hessian, prior.hessian, data.energy, problem.data.measurements)
         to_origin = solve.about_origin(guess.centre, problem.unknowns)
         return Estimate(
