@@ -90,7 +90,7 @@ def shifted(truth: F32, pixels: int) -> F32:
 def levelset(task: Task, start: F32, known: bool = False) -> Bool:
     segmenter = LevelSet(shape_weight=0.0)
     levels = segmenter._levels(warm=False)
-    empty = Empty(task.plates, np.zeros((HEIGHT, WIDTH), np.float32)) if known else None
+    empty = Empty(task.plates, np.zeros((HEIGHT, WIDTH), bool)) if known else None
     view = View(task.image, start, start, counted(start.shape, segmenter.border_px), empty)
     return find(view, levels, segmenter._method(), BAND_PX).level > 0
 
