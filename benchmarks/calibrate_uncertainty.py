@@ -61,13 +61,13 @@ def main() -> None:
     own = []
     for run, take in zip(asked.runs, takes, strict=True):
         own.append(fitted(sum((other for other in takes if other is not take), [])))
-        print(f"{run.name:24} by the others ({own[-1]:.2f} mm): {told(take, lambda _, mm=own[-1]: mm)}")
+        print(f"{run!s:24} by the others ({own[-1]:.2f} mm): {told(take, lambda _, mm=own[-1]: mm)}")
     theirs = {curve.name: mm for take, mm in zip(takes, own, strict=True) for curve in take}
     print(f"{'each by the others':24} {told(every, lambda curve: theirs[curve.name])}")
     print(f"{'fitted, together':24} {told(every, lambda _: outline)}")
     print(tails(np.abs(np.concatenate([curve.whitened(outline) for curve in kept(every)]))))
     for run, take in zip(asked.check, checks, strict=True):
-        print(f"{run.name:24} {told(take, lambda _: outline)}")
+        print(f"{run!s:24} {told(take, lambda _: outline)}")
     if checks:
         print(f"{'checked, together':24} {told(sum(checks, []), lambda _: outline)}")
     for share in (0.90, 0.925, 0.95):
@@ -83,7 +83,7 @@ def curves_of(run: Path) -> list[Curve]:
     for name in tables.angle_names(errors):
         sd = ours.columns[f"{name}_sd"] / excess(size, OUTLINE_MM)
         known = np.isfinite(errors[name]) & np.isfinite(sd)
-        curves.append(Curve(f"{run.name} {name}", errors[name][known], sd[known], size[known]))
+        curves.append(Curve(f"{run} {name}", errors[name][known], sd[known], size[known]))
     return curves
 
 

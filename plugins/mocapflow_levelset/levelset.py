@@ -99,12 +99,12 @@ class LevelSet(Segmenter):
             model = model_distance(surface, camera, self.band_px)
             warm = turn.index > 0 and c in last
             levels = self._levels(warm)
-            weight = counted(model.shape, self.border_px, frame.hidden_in(c))
+            counts = counted(model.shape, self.border_px, frame.hidden_in(c))
             view = View(
                 image=frame.images[c],
                 start=last[c] if warm else model,
                 prior=model,
-                counted=without_cut(weight, model, scene.body, surface, camera),
+                counted=without_cut(counts, model, scene.body, surface, camera),
                 empty=self._empty(scene, surface, c, levels),
                 colours=self._colours(past, c),
                 contact=self._contact(surface, camera),

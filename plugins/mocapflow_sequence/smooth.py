@@ -27,7 +27,7 @@ class Smooth(Stage):
     The smallest sum of squares over the whole sequence of (correction / its standard deviation) and
     (acceleration / the settings below): a Rauch-Tung-Striebel smoother, solved at once as a banded system. With
     good images hardly anything changes; a frame that was lost is bridged by its neighbours. The settings are
-    standard deviations of what people do, not limits. Corrections act about the pelvis.
+    standard deviations of what people do, not limits. Corrections act about the origin of the body at rest.
     """
 
     name: ClassVar[str] = "smooth"
@@ -44,7 +44,7 @@ class Smooth(Stage):
         if len(track.frame) < 3:
             return replace(track, raw_root=track.root, raw_angles=track.angles)
         lost = lost_rows(track)
-        spread = changed(track.covariance, partial(_about_pelvis, track.root, lost))
+        spread = changed(track.covariance, partial(_about_origin, track.root, lost))
         change, bridged = minimise(spread, _second_differences(track), self._limits(track), track.time, lost)
         root = track.root.copy()
         root[:, :3, :3] = twists.exp(np.pad(change[:, :3], ((0, 0), (0, 3))))[:, :3, :3] @ root[:, :3, :3]
@@ -83,8 +83,8 @@ def _second_differences(track: Track) -> F64:
     return np.concatenate([turning, moving], axis=1)
 
 
-def _about_pelvis(root: F64, lost: Bool, covariance: F64, rows: Numbers) -> F64:
-    """Return covariances of rows (K,) as of increments that turn about the pelvis; lost frames are not sure of any."""
+def _about_origin(root: F64, lost: Bool, covariance: F64, rows: Numbers) -> F64:
+    """Return covariances of rows (K,) as of increments that turn about the origin; lost frames are unsure."""
     turned = _about(root[rows, :3, 3], covariance.shape[1])
     spread = turned @ covariance @ np.swapaxes(turned, 1, 2)
     spread[lost[rows]] = LOST * np.eye(spread.shape[1])
