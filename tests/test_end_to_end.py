@@ -130,8 +130,7 @@ def test_a_leg_out_of_all_views_rests_on_the_prior_and_is_told(home, upper_half)
     )
     ours, truth = table(out / "results/angles.csv"), table(CLIPS["shorts"] / "truth/angles.csv")
     for name in ("knee_flexion_l", "ankle_l"):
-        # parzen ties the knee to the hip, which is seen, so the images tell a little of it in some frames (0.11 in one)
-        assert (ours[f"{name}_observed"] < 0.2).all() and np.median(ours[f"{name}_observed"]) < 0.05
+        assert (ours[f"{name}_observed"] < 0.1).all()
         assert np.abs(ours[name] - truth[name][:8]).max() < 10
     for name in ("elbow_l", "elbow_r"):
         assert (ours[f"{name}_observed"] > 0.5).all()
@@ -141,17 +140,14 @@ def test_a_leg_out_of_all_views_rests_on_the_prior_and_is_told(home, upper_half)
 
 @long
 def test_the_interval_of_ninety_per_cent_holds_the_truth_as_often(whole):
-    """Of all thirteen takes, 6 of 103 curves are held less than three quarters of the time: of these 16, one may be.
-
-    Both clips are of the takes that the deviations were calibrated on, and kinder than most: they hold more.
-    """
+    """Both clips are of the takes that the deviations were calibrated on, and kinder than most: they hold more."""
     inside = []
     for clip, folder in CLIPS.items():
         ours, truth = table(whole[clip] / "results/angles.csv"), table(folder / "truth/angles.csv")
         angles = [name for name in truth if name != "frame"]
         inside += [np.abs(ours[name] - truth[name]) <= 1.645 * ours[f"{name}_sd"] for name in angles]
     assert np.mean(inside) >= 0.9
-    assert sorted(map(np.mean, inside))[1] >= 0.75
+    assert min(map(np.mean, inside)) >= 0.75
 
 
 @long

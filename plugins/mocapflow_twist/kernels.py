@@ -202,20 +202,6 @@ def clustering(camera, pixel, weight, size, cells):  # type: ignore[no-untyped-d
 
 
 @numba.njit(cache=True)
-def point_errors(plane, divisor, points, error, gradient):  # type: ignore[no-untyped-def]
-    """Write the errors (R,) of rows and their gradients (R, 3) by points (R, 3) that are before the camera."""
-    for row in range(len(points)):
-        a, b, (x, y, z) = plane[row], divisor[row], points[row]
-        depth = b[0] * x + b[1] * y + b[2] * z + b[3]
-        if depth < BEHIND:
-            continue
-        near = 1.0 / depth
-        error[row] = (a[0] * x + a[1] * y + a[2] * z + a[3]) * near
-        for axis in range(3):
-            gradient[row, axis] = (a[axis] - error[row] * b[axis]) * near
-
-
-@numba.njit(cache=True)
 def jacobian(gradient, velocity, vertex, out):  # type: ignore[no-untyped-def]
     """Write the derivatives (R, S) of rows by the unknowns.
 

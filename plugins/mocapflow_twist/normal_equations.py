@@ -61,15 +61,18 @@ def body_energy(rows: Rows, body: Body, pose: Pose) -> float:
 
 def point_errors(rows: Rows, points: F64) -> tuple[F64, F64]:
     """Return errors (R,) and gradients (R, 3) by the position of points (R, 3) m; zero behind a camera."""
-    error, gradient = np.zeros(len(points)), np.zeros((len(points), 3))
-    kernels.point_errors(rows.plane, rows.divisor, points, error, gradient)
+    divisor = np.einsum("ra,ra->r", rows.divisor[:, :3], points) + rows.divisor[:, 3]
+    front = divisor >= kernels.BEHIND
+    scale = np.where(front, 1.0 / np.where(front, divisor, 1.0), 0.0)
+    error = (np.einsum("ra,ra->r", rows.plane[:, :3], points) + rows.plane[:, 3]) * scale
+    gradient = (rows.plane[:, :3] - error[:, None] * rows.divisor[:, :3]) * scale[:, None]
     return error, gradient
 
 
 def dense_equations(rows: Rows, places: F64, velocities: F64) -> Equations:
     """Return the normal equations of rows whose vertices are at places (W, 3) and move with velocities (W, 3, S)."""
     error, gradient = point_errors(rows, places.take(rows.vertex, axis=0))
-    sharpness, jacobian = np.sqrt(rows.weight), np.empty((len(error), velocities.shape[2]))
-    kernels.jacobian(sharpness[:, None] * gradient, velocities, rows.vertex, jacobian)
-    error *= sharpness
-    return Equations(jacobian.T @ jacobian, jacobian.T @ error, 0.5 * float(error @ error))
+    jacobian = np.empty((len(error), velocities.shape[2]))
+    kernels.jacobian(gradient, velocities, rows.vertex, jacobian)
+    weighted = rows.weight[:, None] * jacobian
+    return Equations(weighted.T @ jacobian, weighted.T @ error, 0.5 * float(rows.weight @ error**2))
