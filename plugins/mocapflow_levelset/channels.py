@@ -12,9 +12,7 @@ from mocapflow.records import F32, U8
 
 ChannelName = Literal["grey", "lab", "chromaticity", "texture"]
 PLANES = {"grey": 1, "lab": 3, "chromaticity": 3, "texture": 3}
-SHADE = (
-    0.12  # of the channel's range for a factor e of lightness: what a contact shadow does, 0.25, is no more than noise
-)
+SHADE = 0.12  # of the range, for a factor e of lightness: a contact shadow, a quarter of that, is no more than noise
 CHROMATICITY = 1.5  # of the channel's range for a chroma as great as the lightness
 TEXTURE_SCALE_PX = 2.0  # smoothing of the structure tensor
 LAG_PX = 4  # distance of the pixels whose differences tell how channels vary together
