@@ -21,7 +21,7 @@ from mocapflow_levelset.masks import counted, without_cut
 from mocapflow_levelset.plates import Plate, Shadow, plate_of
 from mocapflow_levelset.shadows import floor_around
 from mocapflow_levelset.statistics import Window
-from mocapflow_levelset.view import Contact, Empty, Level, Method, View, find
+from mocapflow_levelset.view import Contact, Empty, Level, Matte, Method, View, find
 
 Count = Annotated[int, Field(gt=0)]
 NonNegativeCount = Annotated[int, Field(ge=0)]
@@ -63,9 +63,11 @@ class LevelSet(Segmenter):
     coarse_steps: NonNegativeCount = 8  # at a quarter of the size, on the first turn
     half_steps: NonNegativeCount = 4  # at half the size
     steps: Count = 3  # at full size
+    draft: bool = False  # leave full size to the second turn, if there is one: what the first finds is soon redrawn
     later_steps: Count = 3  # at full size on later turns, which start from the last turn's contour
     contact_steps: NonNegativeCount = 10  # by chromaticity, where the body meets the floor and both are dark; 0: none
     contact_px: Positive = 6.0  # to either side of the outline there
+    matte_px: NonNegativeCount = 2  # across the edge, where pixels mix person and empty room; 0: nothing learned there
     keep_mm: NonNegative = 5.0  # change of the body in a turn below which the silhouettes stay; 0: always found anew
     statistics_every: Count = 4  # steps between estimates of the colours
     redistance_every: Count = 4  # steps between repairs of the distance function
@@ -87,8 +89,10 @@ class LevelSet(Segmenter):
         The first turn starts from the projected model, later turns from the last turn's silhouettes. A model that
         hardly moves would leave them as they are: then they stay.
         """
-        if turn.calm(self.keep_mm):
+        calm, drafted = turn.calm(self.keep_mm), state.segmentation.draft
+        if calm and not drafted:
             return state.segmentation
+        draft = self.draft and turn.index == 0 and turn.cap > 1
         surface = scene.surface(state.estimate.pose, state.cloth)
         last = {s.camera: s.distance for s in state.segmentation.of(PERSON)}
         silhouettes: list[Silhouette] = []
@@ -98,7 +102,7 @@ class LevelSet(Segmenter):
                 continue
             model = model_distance(surface, camera, self.band_px)
             warm = turn.index > 0 and c in last
-            levels = self._levels(warm)
+            levels = self._levels(warm, done=calm and drafted, draft=draft)
             counts = counted(model.shape, self.border_px, frame.hidden_in(c))
             view = View(
                 image=frame.images[c],
@@ -107,12 +111,13 @@ class LevelSet(Segmenter):
                 counted=without_cut(counts, model, scene.body, surface, camera),
                 empty=self._empty(scene, surface, c, levels),
                 colours=self._colours(past, c),
-                contact=self._contact(surface, camera),
+                contact=None if draft else self._contact(surface, camera),
+                matte=None if draft else self._matte(scene, c),
             )
             found = find(view, levels, self._method(), self.band_px)
             silhouettes.append(Silhouette(camera=c, layer=PERSON, distance=found.level))
             energies |= {f"{camera.name}.{term}": value for term, value in found.costs._asdict().items()}
-        return Segmentation(silhouettes=tuple(silhouettes), energies=energies)
+        return Segmentation(silhouettes=tuple(silhouettes), draft=draft, energies=energies)
 
     def _empty(self, scene: Scene, surface: Surface, camera: int, levels: Sequence[Level]) -> Empty | None:
         if scene.background is None or not self.use_background:
@@ -130,14 +135,21 @@ class LevelSet(Segmenter):
         zone = contact_zone(surface, camera, self.contact_px)
         return Contact(zone, self._rhythm(self.contact_steps), self._window(self.rho_px))
 
-    def _levels(self, warm: bool) -> list[Level]:
+    def _matte(self, scene: Scene, camera: int) -> Matte | None:
+        if scene.background is None or not self.use_background or not self.matte_px:
+            return None
+        return Matte(scene.background.mean[camera], self.matte_px)
+
+    def _levels(self, warm: bool, *, done: bool = False, draft: bool = False) -> list[Level]:
+        """Return the resolutions to go through; `done`: full size alone is left."""
         reduced, full = self._window(self.reduced_rho_px), self._window(self.rho_px)
         levels = [
             Level(COARSE, self._rhythm(0 if warm else self.coarse_steps), reduced),
-            Level(HALF, self._rhythm(self.half_steps), reduced),
+            Level(HALF, self._rhythm(0 if done else self.half_steps), reduced),
             Level(FULL, self._rhythm(self.later_steps if warm else self.steps), full, use_plate=False),
         ]
-        return [level for level in levels if level.rhythm.steps]
+        wanted = [level for level in levels if level.rhythm.steps]
+        return wanted[:-1] or wanted if draft else wanted
 
     def _window(self, rho_px: float) -> Window:
         return Window(rho_px, self.cell_px, self.variance_floor)

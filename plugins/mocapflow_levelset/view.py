@@ -15,6 +15,7 @@ from mocapflow_levelset.crops import Crop
 from mocapflow_levelset.evidence import Evidence, from_image
 from mocapflow_levelset.evolve import Costs, Rhythm, Weights, costs, settle
 from mocapflow_levelset.islands import without_islands
+from mocapflow_levelset.matting import sharpened
 from mocapflow_levelset.plates import Plate, Shadow
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.statistics import Window
@@ -35,6 +36,13 @@ class Contact(NamedTuple):
     window: Window
 
 
+class Matte(NamedTuple):
+    """How to place the contour within its pixels."""
+
+    room: F32  # (H, W, 3) BGR, the empty room
+    reach_px: int  # across the edge to either side
+
+
 class View(NamedTuple):
     """What is given of one view."""
 
@@ -45,6 +53,7 @@ class View(NamedTuple):
     empty: Empty | None = None
     colours: F32 | None = None  # (BINS,) log ratio of each colour on the person and in the room, by earlier frames
     contact: Contact | None = None
+    matte: Matte | None = None
 
 
 class Level(NamedTuple):
@@ -91,8 +100,17 @@ def find(view: View, levels: Sequence[Level], method: Method, band_px: float) ->
         front, factor = settled.level, level.factor
     if view.contact is not None:
         front = _by_chromaticity(front, prior, image, view, crop, view.contact, method)
+    if view.matte is not None:
+        front = redistance(front, method.weights.band_px)
+        front = sharpened(front, image, crop.of(view.matte.room), _movable(view, crop), view.matte.reach_px)
     np.clip(_brought(front, factor, 1, band_px), -band_px, band_px, out=crop.of(outside))
     return Found(outside, costs(settled, prior, method.weights))
+
+
+def _movable(view: View, crop: Crop) -> Bool:
+    """Return where a matte may move the contour: not where a shadow that the empty room lacks ends at the foot."""
+    counts = crop.of(view.counted)
+    return counts if view.contact is None else counts & ~crop.of(view.contact.zone)
 
 
 def _by_chromaticity(

@@ -72,6 +72,19 @@ def test_silhouettes_stay_while_the_model_rests(scene, pose):
     assert again(LevelSet(), 0.004) and not again(LevelSet(), 0.006) and not again(LevelSet(keep_mm=0), 0.0)
 
 
+def test_a_draft_is_finished_by_the_next_turn(scene, pose):
+    frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, believed(pose))
+    segmenter = LevelSet(draft=True, shape_weight=0.01)
+    first = segmenter.segment(frame, state, Past(), scene, FIRST)
+    calm = replace(LATER, change=Change(body=0.0, cloth=0.0, angles=0.0, sigmas=0.0))
+    second = segmenter.segment(frame, replace(state, segmentation=first), Past(), scene, calm)
+    assert first.draft and not second.draft
+    assert np.mean(overlaps(second, scene, pose)) > np.mean(overlaps(first, scene, pose))
+    third = replace(state, segmentation=second)
+    assert segmenter.segment(frame, third, Past(), scene, replace(calm, index=2)) is second
+    assert not segmenter.segment(frame, state, Past(), scene, Turn(index=0, cap=1)).draft  # no turn would follow
+
+
 def test_energies_are_named_by_view_and_term(scene, pose):
     frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, pose)
     energies = LevelSet().segment(frame, state, Past(), scene, FIRST).energies
