@@ -8,6 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from mocapflow import cli, runner
+from mocapflow.commands.again import Invocation, remember
 from mocapflow.commands.progress import reporter
 from mocapflow.shipped import shipped
 
@@ -132,6 +133,14 @@ def test_a_run_is_evaluated_and_exported(call):
     missing = call("evaluate", "runs/bare", "--truth", "nowhere.csv")
     assert missing.exit_code == 2
     assert missing.stderr.startswith("error: nowhere.csv  there is nothing to compare with\n")
+
+
+def test_what_the_pipeline_compares_with_is_compared_with_again(call, tmp_path):
+    changes = ("stages.evaluate.reference=truth",)  # a folder
+    remember(Invocation(str(shipped("pipelines", "bare.yaml")), str(CLIP), changes, None, "store"), tmp_path)
+    missing = call("evaluate", str(tmp_path))
+    assert missing.stderr.startswith(f"error: {CLIP / 'truth'}  there is nothing to compare with\n")
+    assert "--set stages.evaluate.reference=keypoints" in missing.stderr
 
 
 def test_plugins(call):

@@ -25,13 +25,14 @@ COLUMNS = ("angle", "frames", "rms_deg", "mae_deg", "offset_deg", "max_deg", "wo
 
 
 def evaluate(run: Run, truth: Truth = None) -> None:
-    """Compare the joint angles of a run with known ones."""
-    from mocapflow_sequence.evaluate import chosen, evaluate_run
+    """Compare the joint angles of a run with known ones: those its own pipeline names, unless others are given."""
+    from mocapflow_sequence.evaluate import evaluate_run
 
-    reference, missing = (truth, "") if truth else chosen(recall(run).load().recording, "")
+    reference, missing = (truth, "") if truth else _own_reference(run)
     if reference is None or not reference.is_file():
         folder = "keypoints are compared in a run: --set stages.evaluate.reference=keypoints"
-        hint = missing or (folder if truth and truth.is_dir() else "name a file of known angles with --truth")
+        known = reference is not None and reference.is_dir()
+        hint = missing or (folder if known else "name a file of known angles with --truth")
         raise RecordingError("there is nothing to compare with", where=str(reference or run), hint=hint)
     evaluation = evaluate_run(run, reference)
     if not evaluation.rows:
@@ -41,6 +42,15 @@ def evaluate(run: Run, truth: Truth = None) -> None:
     for note in evaluation.notes:
         typer.echo(f"note: {note}")
     typer.echo("all figures: results/evaluation.csv in the run folder")
+
+
+def _own_reference(run: Path) -> tuple[Path | None, str]:
+    """Return what the run's pipeline compares with, or why there is nothing."""
+    from mocapflow_sequence.evaluate import Evaluate, chosen
+
+    pipeline = recall(run).load()
+    wanted = [named.stage.reference for named in pipeline.stages if isinstance(named.stage, Evaluate)]
+    return chosen(pipeline.recording, wanted[0] if wanted else "")
 
 
 def export(run: Run, format_: Format) -> None:
