@@ -13,16 +13,43 @@ from mocapflow.geometry.silhouettes import occluding_contour
 from mocapflow.records import F32, F64
 
 
-def misfit(surface: Surface, segmentation: Segmentation, cameras: Sequence[Camera], spacing_px: float) -> F64:
+def misfit(
+    surface: Surface,
+    segmentation: Segmentation,
+    cameras: Sequence[Camera],
+    spacing_px: float,
+    bend_px: F64 | None = None,
+) -> F64:
     """Return the integral along the model's outline of its squared distance to the silhouette, per view (C,) px³.
 
     It is what the area term of section 12.4 measures, without drawing the surface: where two contours are d apart,
-    their distance fields differ by d all across the band. Zero where a view has no silhouette.
+    their distance fields differ by d all across the band. Zero where a view has no silhouette. From `bend_px` (C,)
+    on the square gives way to its tangent (Huber), so that few points far off do not outweigh all others.
     """
     error = np.zeros(len(cameras))
     for silhouette, contour in outlines(surface, segmentation, cameras, spacing_px):
-        error[silhouette.camera] = spacing_px * float(np.sum(at(silhouette.distance, contour.pixel) ** 2))
+        off = np.abs(at(silhouette.distance, contour.pixel))
+        near = off if bend_px is None else np.minimum(off, bend_px[silhouette.camera])
+        error[silhouette.camera] = spacing_px * float(near @ (2 * off - near))
     return error
+
+
+def unclipped(segmentation: Segmentation) -> Segmentation:
+    """Return a segmentation whose distances go on beyond their band, to a pixel: cloth may hang farther off."""
+    found = tuple(replace(each, distance=_beyond_band(each.distance)) for each in segmentation.silhouettes)
+    return replace(segmentation, silhouettes=found)
+
+
+def _beyond_band(distance: F32) -> F32:
+    import cv2
+
+    inside = (distance > 0).astype(np.uint8)
+    if not inside.any():
+        return distance
+    far = cv2.distanceTransform(inside, cv2.DIST_L2, 5) - cv2.distanceTransform(1 - inside, cv2.DIST_L2, 5)
+    far -= 0.5 * np.sign(far)  # the outline runs between the pixels
+    band = float(np.abs(distance).max())
+    return np.where(np.abs(distance) < band - 1, distance, far).astype(np.float32)
 
 
 def outlines(

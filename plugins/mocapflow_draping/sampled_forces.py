@@ -13,7 +13,7 @@ from mocapflow.assets import GarmentMesh
 from mocapflow.components import ClothFitter
 from mocapflow.data import Cloth, Estimate, Frame, Past, Segmentation, Turn
 from mocapflow.geometry.cameras import magnification
-from mocapflow.geometry.misfit import dressed, misfit
+from mocapflow.geometry.misfit import dressed, misfit, unclipped
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow_draping import samples
@@ -27,8 +27,9 @@ class SampledForces(ClothFitter):
     """Tries directions and amounts of every force and refines the best, one force after the other.
 
     Later frames try only calm cloth, so that a search that was led astray comes back, and around the last best. Each
-    force is held about none: where strands lie on the body none of them shows, and any would do. The thickness of a
-    cloth does not change: it is searched for in the first frames and kept.
+    force is held about none: where strands lie on the body none of them shows, and any would do. Beyond one standard
+    deviation an error counts by its distance, not its square: no force lifts a hem that hangs too low, and a narrower
+    skirt would pay for it. The thickness of a cloth does not change: it is searched for in the first frames and kept.
 
     Source: Rosenhahn 2008, section 12.4
     """
@@ -54,12 +55,14 @@ class SampledForces(ClothFitter):
             return cloth
         surface, cameras = model.surface(estimate.pose, cloth), model.scene.cameras
         scale = np.array([magnification(camera, cloth.vertices.mean(axis=0)) for camera in cameras])
-        weight = 1 / (self.correlation_m * (1e-3 * self.sigma_mm) ** 2 * scale**3)
+        bend = 1e-3 * self.sigma_mm * scale
+        weight = 1 / (self.correlation_m * scale * bend**2)
+        seen = unclipped(segmentation)
         forces = sum(samples.forces(garment), [])
 
         def error(vertices: F64, parameters: F64) -> float:
-            """Sum the squares, in standard deviations, of what the outline is off and of all forces."""
-            off = misfit(dressed(surface, vertices), segmentation, cameras, self.spacing_px)
+            """Sum the squares, in standard deviations, of what the outline is off (Huber) and of all forces."""
+            off = misfit(dressed(surface, vertices), seen, cameras, self.spacing_px, bend)
             amounts = np.degrees(parameters[forces]) / self.force_sd_deg
             return float(weight @ off + amounts @ amounts)
 

@@ -11,7 +11,7 @@ from mocapflow_draping.sampled_forces import SampledForces
 from mocapflow_twist.gauss_newton import GaussNewton, Task
 
 from mocapflow.data import Estimate, Frame, Moment, Past, Pose, Segmentation, Silhouette, Turn
-from mocapflow.geometry.misfit import misfit
+from mocapflow.geometry.misfit import misfit, unclipped
 from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.model import ClothedModel
 from mocapflow.testing.views import SIZE, tiny_camera
@@ -99,6 +99,29 @@ def test_the_misfit_grows_with_the_distance_between_outlines(model):
         errors.append(misfit(surface, segmentation, model.scene.cameras, 4.0))
     assert (np.diff(errors, axis=0) > 0).all()
     assert errors[0].sum() < 0.1 * errors[1].sum()  # a view that sees strands along a thigh tells little
+
+
+def test_far_errors_count_by_their_distance_and_near_ones_by_their_square(model):
+    segmentation = seen(model, parameters(model))
+    surface = model.surface(STANDING, model.drape(STANDING, parameters(model, flare_rad=0.2), Past()))
+    cameras = model.scene.cameras
+    square = misfit(surface, segmentation, cameras, 4.0)
+    np.testing.assert_allclose(misfit(surface, segmentation, cameras, 4.0, np.full(4, 100.0)), square)
+    bent = [misfit(surface, segmentation, cameras, 4.0, np.full(4, bend)) for bend in (0.01, 0.02)]
+    np.testing.assert_allclose(bent[1], 2 * bent[0], rtol=0.01)
+
+
+def test_distances_go_on_beyond_their_band(model):
+    near = seen(model, parameters(model))
+    far = unclipped(near)
+    surface = model.surface(STANDING, model.drape(STANDING, parameters(model), Past()))
+    for clipped, whole, camera in zip(near.silhouettes, far.silhouettes, model.scene.cameras, strict=True):
+        within = np.abs(clipped.distance) < 10
+        np.testing.assert_array_equal(whole.distance[within], clipped.distance[within])
+        true = model_distance(surface, camera, 40.0)
+        np.testing.assert_allclose(np.clip(whole.distance, -40, 40), true, atol=1.5)
+    empty = replace(near.silhouettes[0], distance=np.full(near.silhouettes[0].distance.shape, -12, np.float32))
+    assert (unclipped(Segmentation(silhouettes=(empty,))).silhouettes[0].distance == -12).all()
 
 
 def test_samples_cover_every_force(model):
