@@ -191,7 +191,6 @@ class Segmentation:
     """The silhouettes of one frame, one per usable view and layer, what is found inside them, and what they cost."""
 
     silhouettes: tuple[Silhouette, ...]
-    draft: bool = False  # to be drawn again: no frame rests on it
     inner: Matches | None = None  # contours of parts before others, with the vertices whose edges they are
     energies: Mapping[str, float] = field(default_factory=dict)
     appearance: Mapping[str, F64] = field(default_factory=dict)  # region statistics for the next frame

@@ -68,7 +68,7 @@ def settle(
         observe(frame.index, turn, state)
         before_last, last = last, now
         turn = Turn(index=index, cap=turn.cap, change=change)
-        calm = calm + 1 if steady.holds(change, index + 1) and not segmentation.draft else 0
+        calm = calm + 1 if steady.holds(change, index + 1) else 0
         if calm >= steady.turns:
             break
     assert turn.change is not None

@@ -1,7 +1,5 @@
 """The loop with stub steps: it converges, it oscillates, it runs into its cap."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -30,15 +28,6 @@ class Towards(PoseSolver):
         return Estimate(pose=moved, parameters=state.estimate.parameters, covariance=np.eye(8), observed=np.ones(2))
 
 
-class Drafts(TinySegmenter):
-    """Draws every silhouette again on the second turn."""
-
-    name = "drafts"
-
-    def segment(self, frame, state, past, scene, turn):
-        return replace(super().segment(frame, state, past, scene, turn), draft=turn.index == 0)
-
-
 class Nothing(Predictor):
     name = "nothing"
 
@@ -52,15 +41,15 @@ def frame():
     return Frame(index=5, time=0.1, images=(image, image), usable=np.ones(2, bool))
 
 
-def go(frame, share, observe=lambda *_: None, max_turns=8, sigmas=0.0, past=None, segmenter=None):
+def go(frame, share, observe=lambda *_: None, max_turns=8, sigmas=0.0, past=None):
     camera = Camera(
         name="cam01", size=np.array([24, 16], np.int32), intrinsics=np.eye(3), distortion=np.zeros(5),
         camera_from_world=np.eye(4),
     )  # fmt: skip
     model = ClothedModel(scene=Scene(cameras=(camera, camera), body=tiny_body(1.0)))
     steps = Steps(
-        predictor=Nothing(), segmenter=segmenter or TinySegmenter(), matchers=(TinyMatcher(),),
-        pose_solver=Towards(share=share), cloth_fitter=None, priors=(),
+        predictor=Nothing(), segmenter=TinySegmenter(), matchers=(TinyMatcher(),), pose_solver=Towards(share=share),
+        cloth_fitter=None, priors=(),
         steady=Steady(
             surface=0.0005, angle=float(np.radians(0.1)), sigmas=sigmas, min_turns=2, turns=2,
             max_turns=max_turns, halvings=0,
@@ -91,11 +80,6 @@ def test_what_the_pose_is_not_known_to_is_rest(frame):
     assert (result.steady, result.iterations) == (True, 3)  # a turn away from the prediction, then two calm ones
     assert result.change.sigmas == pytest.approx(0.05 * 0.95**2 * 0.5 / np.sqrt(8))  # of two angles among 8 unknowns
     assert go(frame, 0.05, sigmas=0.01).iterations == 8  # the first frame starts anywhere, and takes its time
-
-
-def test_no_frame_rests_on_a_draft(frame):
-    assert go(frame, 0.0).iterations == 2  # nothing moves, twice
-    assert go(frame, 0.0, segmenter=Drafts()).iterations == 3
 
 
 def test_the_cap_holds(frame):

@@ -63,7 +63,6 @@ class LevelSet(Segmenter):
     coarse_steps: NonNegativeCount = 8  # at a quarter of the size, on the first turn
     half_steps: NonNegativeCount = 4  # at half the size
     steps: Count = 3  # at full size
-    draft: bool = False  # leave full size to the second turn, if there is one: what the first finds is soon redrawn
     later_steps: Count = 3  # at full size on later turns, which start from the last turn's contour
     contact_steps: NonNegativeCount = 10  # by chromaticity, where the body meets the floor and both are dark; 0: none
     contact_px: Positive = 6.0  # to either side of the outline there
@@ -87,12 +86,10 @@ class LevelSet(Segmenter):
         """Return the person's silhouette in each usable view.
 
         The first turn starts from the projected model, later turns from the last turn's silhouettes. A model that
-        hardly moves would leave them as they are: then they stay.
+        hardly moves would leave them as they are: then they stay, but for the first frame, which starts far off.
         """
-        calm, drafted = turn.calm(self.keep_mm), state.segmentation.draft
-        if calm and not drafted:
+        if turn.calm(self.keep_mm) and past.moments:
             return state.segmentation
-        draft = self.draft and turn.index == 0 and turn.cap > 1
         surface = scene.surface(state.estimate.pose, state.cloth)
         last = {s.camera: s.distance for s in state.segmentation.of(PERSON)}
         silhouettes: list[Silhouette] = []
@@ -102,7 +99,7 @@ class LevelSet(Segmenter):
                 continue
             model = model_distance(surface, camera, self.band_px)
             warm = turn.index > 0 and c in last
-            levels = self._levels(warm, done=calm and drafted, draft=draft)
+            levels = self._levels(warm)
             counts = counted(model.shape, self.border_px, frame.hidden_in(c))
             view = View(
                 image=frame.images[c],
@@ -111,13 +108,13 @@ class LevelSet(Segmenter):
                 counted=without_cut(counts, model, scene.body, surface, camera),
                 empty=self._empty(scene, surface, c, levels),
                 colours=self._colours(past, c),
-                contact=None if draft else self._contact(surface, camera),
-                matte=None if draft else self._matte(scene, c),
+                contact=self._contact(surface, camera),
+                matte=self._matte(scene, c),
             )
             found = find(view, levels, self._method(), self.band_px)
             silhouettes.append(Silhouette(camera=c, layer=PERSON, distance=found.level))
             energies |= {f"{camera.name}.{term}": value for term, value in found.costs._asdict().items()}
-        return Segmentation(silhouettes=tuple(silhouettes), draft=draft, energies=energies)
+        return Segmentation(silhouettes=tuple(silhouettes), energies=energies)
 
     def _empty(self, scene: Scene, surface: Surface, camera: int, levels: Sequence[Level]) -> Empty | None:
         if scene.background is None or not self.use_background:
@@ -140,16 +137,14 @@ class LevelSet(Segmenter):
             return None
         return Matte(scene.background.mean[camera], self.matte_px)
 
-    def _levels(self, warm: bool, *, done: bool = False, draft: bool = False) -> list[Level]:
-        """Return the resolutions to go through; `done`: full size alone is left."""
+    def _levels(self, warm: bool) -> list[Level]:
         reduced, full = self._window(self.reduced_rho_px), self._window(self.rho_px)
         levels = [
             Level(COARSE, self._rhythm(0 if warm else self.coarse_steps), reduced),
-            Level(HALF, self._rhythm(0 if done else self.half_steps), reduced),
+            Level(HALF, self._rhythm(self.half_steps), reduced),
             Level(FULL, self._rhythm(self.later_steps if warm else self.steps), full, use_plate=False),
         ]
-        wanted = [level for level in levels if level.rhythm.steps]
-        return wanted[:-1] or wanted if draft else wanted
+        return [level for level in levels if level.rhythm.steps]
 
     def _window(self, rho_px: float) -> Window:
         return Window(rho_px, self.cell_px, self.variance_floor)
