@@ -86,9 +86,10 @@ class LevelSet(Segmenter):
         """Return the person's silhouette in each usable view.
 
         The first turn starts from the projected model, later turns from the last turn's silhouettes. A model that
-        hardly moves would leave them as they are: then they stay, but for the first frame, which starts far off.
+        hardly moves would leave them as they are: then they stay; in the first frame, which starts far off, from the
+        second turn on.
         """
-        if turn.calm(self.keep_mm) and past.moments:
+        if turn.calm(self.keep_mm) and (past.moments or turn.index > 1):
             return state.segmentation
         surface = scene.surface(state.estimate.pose, state.cloth)
         last = {s.camera: s.distance for s in state.segmentation.of(PERSON)}
