@@ -66,7 +66,7 @@ class LevelSet(Segmenter):
     later_steps: Count = 3  # at full size on later turns, which start from the last turn's contour
     contact_steps: NonNegativeCount = 10  # by chromaticity, where the body meets the floor and both are dark; 0: none
     contact_px: Positive = 6.0  # to either side of the outline there
-    matte_px: NonNegativeCount = 2  # across the edge, where pixels mix person and empty room; 0: nothing learned there
+    matte_px: NonNegativeCount = 2  # to either side of an edge, where pixels mix person and empty room; 0: no use of it
     keep_mm: NonNegative = 5.0  # change of the body in a turn below which the silhouettes stay; 0: always found anew
     statistics_every: Count = 4  # steps between estimates of the colours
     redistance_every: Count = 4  # steps between repairs of the distance function
@@ -118,9 +118,10 @@ class LevelSet(Segmenter):
         return Segmentation(silhouettes=tuple(silhouettes), energies=energies)
 
     def _empty(self, scene: Scene, surface: Surface, camera: int, levels: Sequence[Level]) -> Empty | None:
-        if scene.background is None or not self.use_background:
+        background = self._background(scene)
+        if background is None:
             return None
-        plates = {level.factor: _plate(scene.background, camera, self.channels, level.factor) for level in levels}
+        plates = {level.factor: _plate(background, camera, self.channels, level.factor) for level in levels}
         return Empty(plates, floor_around(surface, scene.cameras[camera], self.shadow_reach_m))
 
     def _colours(self, past: Past, camera: int) -> F32 | None:
@@ -134,9 +135,11 @@ class LevelSet(Segmenter):
         return Contact(zone, self._rhythm(self.contact_steps), self._window(self.rho_px))
 
     def _matte(self, scene: Scene, camera: int) -> Matte | None:
-        if scene.background is None or not self.use_background or not self.matte_px:
-            return None
-        return Matte(scene.background.mean[camera], self.matte_px)
+        background = self._background(scene)
+        return Matte(background.mean[camera], self.matte_px) if background and self.matte_px else None
+
+    def _background(self, scene: Scene) -> Background | None:
+        return scene.background if self.use_background else None
 
     def _levels(self, warm: bool) -> list[Level]:
         reduced, full = self._window(self.reduced_rho_px), self._window(self.rho_px)
