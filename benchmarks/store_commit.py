@@ -33,6 +33,7 @@ from mocapflow.data import (
     Segmentation,
     Silhouette,
 )
+from mocapflow.geometry.silhouettes import mask_distance
 from mocapflow.recording import open_recording
 from mocapflow.rows import Rows
 from mocapflow.store import Store
@@ -146,9 +147,7 @@ def outline(image, plate):  # type: ignore[no-untyped-def]
     away = cv2.GaussianBlur(np.abs(image.astype(np.float32) - plate).max(axis=2), (0, 0), 1.5) > 18
     mask = cv2.resize(away.astype(np.uint8), SIZE, interpolation=cv2.INTER_NEAREST)
     mask = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((5, 5), np.uint8))
-    inside, outside = (cv2.distanceTransform(m, cv2.DIST_L2, 5) for m in (mask, 1 - mask))
-    signed = inside - outside - np.sign(mask - 0.5).astype(np.float32) * 0.5
-    return np.clip(cv2.GaussianBlur(signed, (0, 0), 1), -BAND, BAND)  # sub-pixel, as a level set is
+    return np.clip(cv2.GaussianBlur(mask_distance(mask > 0), (0, 0), 1), -BAND, BAND)  # sub-pixel, as a level set is
 
 
 def result_of(silhouettes, dice):  # type: ignore[no-untyped-def]

@@ -9,7 +9,7 @@ import numpy as np
 
 from mocapflow.assets import Camera
 from mocapflow.data import CLOTH, Contour, Segmentation, Silhouette, Surface
-from mocapflow.geometry.silhouettes import occluding_contour
+from mocapflow.geometry.silhouettes import mask_distance, occluding_contour
 from mocapflow.records import F32, F64
 
 
@@ -41,15 +41,11 @@ def unclipped(segmentation: Segmentation) -> Segmentation:
 
 
 def _beyond_band(distance: F32) -> F32:
-    import cv2
-
-    inside = (distance > 0).astype(np.uint8)
+    inside = distance > 0
     if not inside.any():
         return distance
-    far = cv2.distanceTransform(inside, cv2.DIST_L2, 5) - cv2.distanceTransform(1 - inside, cv2.DIST_L2, 5)
-    far -= 0.5 * np.sign(far)  # the outline runs between the pixels
     band = float(np.abs(distance).max())
-    return np.where(np.abs(distance) < band - 1, distance, far).astype(np.float32)
+    return np.where(np.abs(distance) < band - 1, distance, mask_distance(inside))
 
 
 def outlines(

@@ -73,6 +73,17 @@ def mask(boundary: Outline, camera: Camera) -> Bool:
     return full
 
 
+def mask_distance(inside: Bool) -> F32:
+    """Return the distance (H, W) px of each pixel's centre to the edge of a mask (H, W), positive inside, not clipped.
+
+    The edge runs half way between the pixels on its two sides; both have to be there.
+    """
+    import cv2
+
+    within, without = (cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 5) for part in (inside, ~inside))
+    return np.where(inside, within - 0.5, 0.5 - without).astype(np.float32)
+
+
 def intersection_over_union(one: Bool, other: Bool) -> float:
     """Return how well two masks (H, W) agree, 0 to 1; NaN where both are empty."""
     union = np.count_nonzero(one | other)

@@ -9,6 +9,7 @@ import numpy as np
 from mocapflow.assets import Camera
 from mocapflow.data import Estimate, Frame, FrameState, Pose, Segmentation, Silhouette, Surface, empty_matches
 from mocapflow.geometry.cameras import project
+from mocapflow.geometry.silhouettes import mask_distance
 from mocapflow.records import F32, U8, Bool
 from mocapflow.scene import Scene
 from mocapflow.testing.scenes import tiny_cloth
@@ -80,10 +81,4 @@ def _mask(surface: Surface, camera: Camera) -> Bool:
 
 
 def _distance(mask: Bool) -> F32:
-    import cv2
-
-    inside = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 5)
-    outside = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 5)
-    signed = np.where(mask, inside - 0.5, 0.5 - outside)
-    clipped: F32 = np.clip(signed, -BAND, BAND).astype(np.float32)
-    return clipped
+    return np.clip(mask_distance(mask), -BAND, BAND)

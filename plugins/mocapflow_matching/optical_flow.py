@@ -15,7 +15,7 @@ from mocapflow.records import F32, F64, Bool
 from mocapflow.scene import Scene
 from mocapflow_matching.carried import carried_points, distances
 from mocapflow_matching.robust import robust_weights
-from mocapflow_matching.shape_flow import register, signed_distance
+from mocapflow_matching.shape_flow import register
 from mocapflow_matching.uncertainty import contour_sigma
 
 Positive = Annotated[float, Field(gt=0)]
@@ -79,7 +79,7 @@ class OpticalFlow(Matcher):
         model = silhouettes.samples(boundary, surface, camera, self.spacing_px)
         shrink = int(np.ceil(camera.size.max() / WORKING_SIDE))
         covered, shown = silhouettes.mask(boundary, camera), silhouette.distance > 0
-        here, there = (signed_distance(_shrunk(mask, shrink)) for mask in (covered, shown))
+        here, there = (silhouettes.mask_distance(_shrunk(mask, shrink)) for mask in (covered, shown))
         flow = register(here, there, self.smoothness, self.levels, self.band * max(here.shape))
         middle = (shrink - 1) / 2  # pixel centres are on integers in both sizes
         small = (model.pixel - middle) / shrink

@@ -5,22 +5,12 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from mocapflow.records import F32, Bool
+from mocapflow.records import F32
 
 WARPS = 2  # linearisations a level
 SWEEPS = 8  # of successive over-relaxation a linearisation
 RELAXATION = 1.8
 LEAST_SIDE = 8  # px of the coarsest level
-
-
-def signed_distance(mask: Bool) -> F32:
-    """Return the distance (H, W) px to the boundary of a mask, positive inside, not clipped."""
-    import cv2
-
-    inside, outside = (
-        cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5) for part in (mask, ~mask)
-    )
-    return np.asarray(np.where(mask, inside - 0.5, 0.5 - outside), np.float32)
 
 
 def register(model: F32, image: F32, smoothness: float, levels: int, band_px: float) -> F32:

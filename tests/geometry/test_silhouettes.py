@@ -209,3 +209,11 @@ def test_a_surface_is_looked_at_once() -> None:
     assert silhouettes.outline(seen, view) is silhouettes.outline(seen, view)
     assert silhouettes.outline(seen, view) is not silhouettes.outline(seen, camera())
     assert silhouettes.model_distance(seen, view, 8.0).max() < silhouettes.model_distance(seen, view, 12.0).max()
+
+
+def test_the_distance_of_a_mask_is_that_of_its_pixels_to_the_edge_between_them():
+    inside = np.zeros((20, 30), bool)
+    inside[:, 12:] = True
+    away = np.arange(30, dtype=np.float32) - 11.5  # the edge of the half plane
+    np.testing.assert_array_equal(silhouettes.mask_distance(inside), np.tile(away, (20, 1)))
+    np.testing.assert_array_equal(silhouettes.mask_distance(~inside), -np.tile(away, (20, 1)))

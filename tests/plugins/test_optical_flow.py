@@ -7,7 +7,7 @@ from matching_scenes import CALM, FIRST, FRAME, knee_error_deg, seen
 from mocapflow_matching.carried import carried_points
 from mocapflow_matching.contour_icp import ContourIcp
 from mocapflow_matching.optical_flow import OpticalFlow
-from mocapflow_matching.shape_flow import register, signed_distance
+from mocapflow_matching.shape_flow import register
 from mocapflow_priors.constant_velocity import ConstantVelocity
 from mocapflow_priors.image_flow import ImageFlowPredictor
 from mocapflow_priors.joint_limits import JointLimits
@@ -16,6 +16,7 @@ from mocapflow_sequence.raster import Canvas
 
 from mocapflow.data import CLOTH, NO_CLOTH, Flow, Frame, Past, Segmentation
 from mocapflow.geometry.cameras import project
+from mocapflow.geometry.silhouettes import mask_distance
 from mocapflow.model import moved
 from mocapflow.testing import tiny_cloth, tiny_past, tiny_pose, tiny_scene
 
@@ -42,7 +43,7 @@ def ellipse(shift, turn, size=200):
 def test_the_flow_of_an_ellipse(shift, turn, most):
     """T-FLOW1: mean error of the correspondences in px, beside that of the closest point."""
     (here, start), (there, end) = ellipse((0, 0), 0.0), ellipse(shift, turn)
-    flow = register(signed_distance(here), signed_distance(there), 10.0, 3, 30.0)
+    flow = register(mask_distance(here), mask_distance(there), 10.0, 3, 30.0)
     x, y = start.T.astype(np.float32)[:, None]
     reached = start + cv2.remap(flow, x, y, cv2.INTER_LINEAR)[0]
     closest = end[np.linalg.norm(start[:, None] - end[None], axis=2).argmin(axis=1)]
@@ -53,7 +54,7 @@ def test_the_flow_of_an_ellipse(shift, turn, most):
 
 
 def test_a_shape_that_stays_has_no_flow():
-    distance = signed_distance(ellipse((3, -2), 0.2)[0])
+    distance = mask_distance(ellipse((3, -2), 0.2)[0])
     assert np.abs(register(distance, distance, 1.0, 3, 30.0)).max() < 1e-3
 
 
