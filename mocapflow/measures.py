@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 from mocapflow.components import Garment
 from mocapflow.errors import MocapflowError, RecordingError, UnknownComponent
+from mocapflow.io.typed import read_json
 from mocapflow.resolve import Resolver
 
 
@@ -55,9 +55,8 @@ def _measures(path: Path) -> tuple[str | None, dict[str, Any]]:
     """Return the garment's type and its settings from a recording's tape measures."""
     if not path.exists():
         return None, {}
-    try:
-        said = json.loads(path.read_text(encoding="utf-8"))
-        return str(said["type"]), {f"{key}_m": value for key, value in said.items() if key != "type"}
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        hint = 'write {"type": "skirt", "waist_height": 1.05, ...}, in metres'
-        raise RecordingError(f"not a garment description: {error!r}", where=str(path), hint=hint) from None
+    hint = 'write {"type": "skirt", "waist_height": 1.05, ...}, in metres'
+    said = read_json(path, hint)
+    if not isinstance(said, dict) or "type" not in said:
+        raise RecordingError("it does not say its type", where=str(path), hint=hint)
+    return str(said["type"]), {f"{key}_m": value for key, value in said.items() if key != "type"}

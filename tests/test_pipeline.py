@@ -166,10 +166,13 @@ def test_measures_of_another_garment_are_not_used(folder):
         load()
 
 
-@pytest.mark.parametrize("text", ["{", "[]", '{"length": 3}'])
-def test_measures_that_can_not_be_read(folder, text):
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [("{", ":1:2  not JSON: "), ("[]", "  it does not say its type"), ('{"length": 3}', "  it does not say its type")],
+)
+def test_measures_that_can_not_be_read(folder, text, said):
     Path("clip/subject/garment.json").write_text(text)
-    with pytest.raises(MocapflowError, match="clip/subject/garment.json  not a garment description: "):
+    with pytest.raises(MocapflowError, match=f"clip/subject/garment.json{said}"):
         load()
 
 

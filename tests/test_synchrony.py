@@ -113,9 +113,9 @@ def test_keypoints_tell_too(tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("{", "can't be read"),
-        ('{"late": {}}', "can't be read"),
-        ('{"late_frames": {"cam01": "much"}}', "can't be read"),
+        ("{", "recording.json:1:2  not JSON: "),
+        ('{"late": {}}', "does not say how late the cameras are: KeyError"),
+        ('{"late_frames": {"cam01": "much"}}', "does not say how late the cameras are: ValueError"),
         ('{"late_frames": {"cam1": 3}}', "there is no camera 'cam1'"),
     ],
 )

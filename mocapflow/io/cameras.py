@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import twists
 from mocapflow.io.calibrated import bad, make_camera
+from mocapflow.io.typed import read_toml
 
 FARTHEST = 100.0  # m; a camera further from the origin is one calibrated in millimetres
 YAML = (".yml", ".yaml")
@@ -85,20 +85,13 @@ def metadata(path: Path) -> Mapping[str, Any]:
     """Return the `[metadata]` table of a TOML calibration; empty where there is none."""
     if path.suffix != ".toml":
         return {}
-    found = _load(path).get("metadata", {})
+    found = read_toml(path).get("metadata", {})
     return found if isinstance(found, dict) else {}
 
 
 def _from_toml(path: Path) -> tuple[Camera, ...]:
-    tables = {key: table for key, table in _load(path).items() if isinstance(table, dict) and key != "metadata"}
+    tables = {key: table for key, table in read_toml(path).items() if isinstance(table, dict) and key != "metadata"}
     return tuple(_from_table(key, table, path) for key, table in tables.items())
-
-
-def _load(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise RecordingError(f"not a TOML file: {error}", where=str(path)) from error
 
 
 def _from_table(key: str, table: Mapping[str, Any], path: Path) -> Camera:

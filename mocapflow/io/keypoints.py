@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from mocapflow.errors import RecordingError
+from mocapflow.io.typed import read_json
 from mocapflow.io.video import name_frames, numbered
 from mocapflow.records import F64
+
+FORM = 'expected OpenPose\'s format: {"people": [{"pose_keypoints_2d": [x, y, confidence, ...]}]}'
 
 
 def keypoint_files(folder: Path) -> dict[int, Path]:
@@ -26,16 +28,12 @@ def read_keypoints(path: Path) -> F64:
     Raises:
         RecordingError: the file is not in OpenPose's format.
     """
+    content = read_json(path, FORM)
     try:
-        people = json.loads(path.read_text(encoding="utf-8"))["people"]
-        rows = [np.array(person["pose_keypoints_2d"], np.float64).reshape(-1, 3) for person in people]
+        rows = [np.array(person["pose_keypoints_2d"], np.float64).reshape(-1, 3) for person in content["people"]]
         return np.stack(rows) if rows else np.empty((0, 0, 3))
     except (ValueError, TypeError, KeyError) as error:
-        raise RecordingError(
-            f"not a file of keypoints: {error}",
-            where=str(path),
-            hint='expected OpenPose\'s format: {"people": [{"pose_keypoints_2d": [x, y, confidence, ...]}]}',
-        ) from error
+        raise RecordingError(f"not a file of keypoints: {error}", where=str(path), hint=FORM) from error
 
 
 def people_at(files: Mapping[int, Path] | None, index: int) -> F64:

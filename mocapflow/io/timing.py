@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from mocapflow.errors import RecordingError, alternatives
+from mocapflow.io.typed import read_json
 
 TIMING = "recording.json"
 FORM = 'expected {"late_frames": {"cam03": 2.8}}: by how many frames its pictures come after those of the others'
@@ -21,10 +22,11 @@ def late_frames(folder: Path, names: Sequence[str]) -> tuple[int, ...]:
     path = folder / TIMING
     if not path.exists():
         return (0,) * len(names)
+    content = read_json(path, FORM)
     try:
-        late = {name: round(float(frames)) for name, frames in json.loads(path.read_text())["late_frames"].items()}
+        late = {name: round(float(frames)) for name, frames in content["late_frames"].items()}
     except (ValueError, TypeError, KeyError, AttributeError, OverflowError) as error:
-        raise RecordingError(f"can't be read: {error!r}", where=str(path), hint=FORM) from error
+        raise RecordingError(f"does not say how late the cameras are: {error!r}", where=str(path), hint=FORM) from error
     if unknown := sorted(set(late) - set(names)):
         raise RecordingError(
             f"there is no camera '{unknown[0]}'", where=str(path), hint=alternatives(unknown[0], names)

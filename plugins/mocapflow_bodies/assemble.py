@@ -19,7 +19,6 @@ KEPT_JOINTS = {
     "legs": ("pelvis", "hip", "knee", "ankle", "toe"),
     "arms": ("pelvis", "spine", "chest", "neck", "head", "clavicle", "shoulder", "elbow", "wrist"),
 }
-TALLEST, SMALLEST = 3.0, 0.3  # m, extents of a plausible body
 
 
 class Cut(NamedTuple):
@@ -87,33 +86,6 @@ def cut_out(faces: I32, skeleton: Skeleton, weights: F64, kept: tuple[str, ...])
     )
     moved = _handed_up(weights, skeleton, stays)[used][:, joints]
     return Cut(used.astype(np.int32), number[faces[whole]].astype(np.int32), part, moved, rim[used])
-
-
-def check_size(vertices: F64, skeleton: Skeleton, where: str) -> None:
-    """Check that mesh and skeleton are in metres, upright along z and in the same place.
-
-    Raises:
-        RecordingError: they are not.
-    """
-    extents = np.ptp(vertices, axis=0)
-    size = ", ".join(f"{extent:.4g}" for extent in extents)
-    if extents.max() > TALLEST:
-        guess = "in millimetres: divide by 1000" if extents.max() > 300 else "not in metres"
-        raise RecordingError(
-            f"the mesh measures {size}: it seems to be {guess}", where=where, hint="expected metres, z up"
-        )
-    if extents.max() < SMALLEST:
-        raise RecordingError(
-            f"the mesh measures {size} m: too small for a person", where=where, hint="expected metres, z up"
-        )
-    if extents.argmax() == 1 and extents[1] > 1.3 * extents[2]:
-        hint = "expected z up: swap (x, y, z) to (x, -z, y)"
-        raise RecordingError(f"the mesh measures {size} m: it seems to stand along y", where=where, hint=hint)
-    outside = (skeleton.positions < vertices.min(axis=0) - 0.1) | (skeleton.positions > vertices.max(axis=0) + 0.1)
-    if outside.any():
-        joint = skeleton.names[int(np.flatnonzero(outside.any(axis=1))[0])]
-        hint = "both are expected in metres and in the same coordinates"
-        raise RecordingError(f"joint '{joint}' lies more than 10 cm outside the mesh", where=where, hint=hint)
 
 
 def _boundary(faces: I32) -> I32:

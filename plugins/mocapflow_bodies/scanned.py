@@ -14,10 +14,10 @@ from mocapflow.assets import Body
 from mocapflow.components import BodyModel
 from mocapflow.errors import PipelineError, RecordingError, alternatives
 from mocapflow.io.meshes import read_mesh
+from mocapflow.io.scans import check_size, read_skeleton, read_weights
 from mocapflow.records import F64
-from mocapflow_bodies.assemble import Part, assemble, check_size
-from mocapflow_bodies.skeleton import read_skeleton
-from mocapflow_bodies.weights import heat_weights, read_weights
+from mocapflow_bodies.assemble import Part, assemble
+from mocapflow_bodies.weights import heat_weights
 
 
 class Morph(BaseModel):

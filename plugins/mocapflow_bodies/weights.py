@@ -1,45 +1,15 @@
-"""Skinning weights: as given, or computed from the distances to the bones, and kept to five joints a vertex."""
+"""Skinning weights computed from the distances to the bones, and weights kept to five joints a vertex."""
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
-from mocapflow.errors import RecordingError
 from mocapflow.geometry.skeleton import Skeleton
 from mocapflow.records import F64, I32
 
 KEPT = 5  # joints a vertex
 LEAST = 0.01  # weights below are dropped
 HEAT = 2.0  # how strongly the nearest bone holds a vertex; weights fall within about one segment radius
-
-
-def read_weights(path: Path, skeleton: Skeleton, vertices: int) -> F64:
-    """Return the weights (V, J) of a `weights.npz` in the order of the skeleton.
-
-    Raises:
-        RecordingError: the file can't be read, or contradicts the mesh or the skeleton.
-    """
-    try:
-        with np.load(path) as content:
-            weights, names = np.asarray(content["weights"], np.float64), [str(name) for name in content["names"]]
-    except (OSError, ValueError, KeyError) as error:
-        hint = "expected arrays `weights` (V, J) and `names` (J); without the file weights are computed"
-        raise RecordingError(f"these are not skinning weights: {error}", where=str(path), hint=hint) from error
-    if weights.shape != (vertices, len(names)) or not np.isfinite(weights).all() or (weights.sum(1) <= 0).any():
-        hint = "one finite, positive row per vertex of body.obj, one column per name"
-        raise RecordingError(
-            f"weights have shape {weights.shape} for {vertices} vertices and {len(names)} names, or empty rows",
-            where=str(path), hint=hint,
-        )  # fmt: skip
-    unknown = sorted(set(names) - set(skeleton.names))
-    if unknown:
-        hint = f"skeleton.json has: {', '.join(skeleton.names)}"
-        raise RecordingError(f"weights for joints the skeleton lacks: {', '.join(unknown)}", where=str(path), hint=hint)
-    ordered = np.zeros((vertices, len(skeleton.names)))
-    ordered[:, [skeleton.names.index(name) for name in names]] = weights
-    return ordered
 
 
 def heat_weights(vertices: F64, faces: I32, skeleton: Skeleton) -> F64:

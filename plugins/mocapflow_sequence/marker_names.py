@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from mocapflow.errors import RecordingError, alternatives
+from mocapflow.io.typed import read_toml
 
 # Landmark: its marker in Plug-in Gait and CGM2, CAST (van Sint Jan), OpenSim's gait models, OpenCap; s is the side.
 KNOWN: Mapping[str, tuple[str, ...]] = {
@@ -49,10 +49,7 @@ def landmarks(labels: Sequence[str], folder: Path) -> dict[str, int]:
 def _told(labels: Sequence[str], path: Path) -> dict[str, int]:
     if not path.is_file():
         return {}
-    try:
-        told = tomllib.loads(path.read_text(encoding="utf-8"))
-    except tomllib.TOMLDecodeError as error:
-        raise RecordingError(str(error), where=str(path)) from None
+    told = read_toml(path, 'expected lines as knee_medial_l = "LMK"')
     for landmark, label in told.items():
         if landmark not in LANDMARKS:
             raise RecordingError(

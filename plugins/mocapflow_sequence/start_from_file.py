@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-import json
 import logging
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from mocapflow.assets import Body, GarmentMesh
 from mocapflow.components import Stage
 from mocapflow.data import Pose, Start
-from mocapflow.errors import RecordingError, alternatives
+from mocapflow.errors import RecordingError
 from mocapflow.geometry import twists
 from mocapflow.geometry.joints import angles_from_rotations
+from mocapflow.io.first_pose import read_first_pose
 from mocapflow.recording import Recording
 from mocapflow.records import F64
 from mocapflow.scene import Scene
 
 LOG = logging.getLogger("mocapflow")
-FORM = (
-    'expected {"root_rotation": [3], "root_translation": [3] (m, the root joint in the world), '
-    '"joint_rotations": {name: [3]}}, rotation vectors in radians, relative to the parent'
-)
 
 
 class StartFromFile(Stage):
@@ -61,19 +57,14 @@ class StartFromFile(Stage):
 
 
 def read_pose(path: Path, body: Body) -> Pose:
-    """Return the pose of a file.
+    """Return the pose of a file; of a part of a body where the file may be that of the whole.
 
     Raises:
-        RecordingError: it is malformed, has numbers that are not finite, or names a joint the body lacks.
+        RecordingError: it is malformed, in other units, or names a joint the body lacks.
     """
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        turns = {name: _three(vector) for name, vector in content.get("joint_rotations", {}).items()}
-        rotation, translation = _three(content["root_rotation"]), _three(content["root_translation"])
-    except (ValueError, TypeError, KeyError, AttributeError) as error:
-        raise RecordingError(f"not a start pose: {_reason(error)}", where=str(path), hint=FORM) from error
-    _check_joints(turns, body, str(path))
-    return Pose(root=root_at(body, rotation, translation), angles=angles_from_rotations(body, turns))
+    found = read_first_pose(path, () if body.cut.any() else body.joint_names)
+    turns = {name: turn for name, turn in found.turns.items() if name in body.joint_names}
+    return Pose(root=root_at(body, found.rotation, found.position), angles=angles_from_rotations(body, turns))
 
 
 def root_at(body: Body, rotation: F64, position: F64) -> F64:
@@ -86,23 +77,3 @@ def root_at(body: Body, rotation: F64, position: F64) -> F64:
 def calm(garment: GarmentMesh | None) -> F64:
     """Return the parameters (Q,) of a garment without forces: zero, or the nearest to it within bounds."""
     return np.empty(0) if garment is None else np.clip(0.0, *garment.parameter_bounds.T)
-
-
-def _check_joints(turns: dict[str, F64], body: Body, where: str) -> None:
-    for name in [name for name in turns if name not in body.joint_names]:
-        if body.cut.any():  # a part of a body: the pose may be that of the whole
-            del turns[name]
-        else:
-            hint = alternatives(name, body.joint_names)
-            raise RecordingError(f"joint_rotations: the body has no joint '{name}'", where=where, hint=hint)
-
-
-def _three(numbers: Any) -> F64:
-    vector = np.array(numbers, np.float64)
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise ValueError(f"{numbers} should be three finite numbers")
-    return vector
-
-
-def _reason(error: Exception) -> str:
-    return f"{error} is missing" if isinstance(error, KeyError) else str(error)

@@ -179,7 +179,7 @@ def test_not_a_calibration(tmp_path):
     with pytest.raises(RecordingError, match=r"2 calibration files: a\.qca\.txt, b\.qca\.txt"):
         read_cameras(tmp_path)
     (tmp_path / "cameras.toml").write_text("[cam01")
-    with pytest.raises(RecordingError, match="not a TOML file"):
+    with pytest.raises(RecordingError, match="not TOML: "):
         read_cameras(tmp_path)
     (tmp_path / "cameras.toml").write_text("[metadata]\n")
     with pytest.raises(RecordingError, match="the file holds no camera"):

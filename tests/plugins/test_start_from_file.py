@@ -78,8 +78,17 @@ def test_a_part_of_the_body_starts_from_the_same_file(scene):
     ("change", "message"),
     [
         (lambda c: c["joint_rotations"].update(knee=[0, 0, 0]), "no joint 'knee'\n.*did you mean 'knee_"),
-        (lambda c: c.update(root_rotation=[0, float("nan"), 0]), "not a start pose: .*should be three finite numbers"),
-        (lambda c: c["joint_rotations"].update(knee_l=[0, 0]), "should be three finite numbers"),
+        (
+            lambda c: c.update(root_rotation=[0, float("nan"), 0]),
+            "'root_rotation' is .*nan.*\n.*three finite",
+        ),
+        (
+            lambda c: c["joint_rotations"].update(knee_l=[0, 0]),
+            r"'knee_l' is \[0, 0\]\n.*three finite",
+        ),
+        (lambda c: c["joint_rotations"].update(knee_l=[20, -4, 2]), "'knee_l' turns by 20.5 rad.* looks like degrees"),
+        (lambda c: c.update(root_translation=[-26, -42, 912]), "913 m from the origin: it looks like mm"),
+        (lambda c: c.update(joint_rotation={}), "unknown key 'joint_rotation'\n.*did you mean 'joint_rotations'"),
         (lambda c: c.pop("root_translation"), "'root_translation' is missing"),
     ],
 )

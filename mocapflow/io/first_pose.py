@@ -1,0 +1,87 @@
+"""init.json: the pose of the first frame, as somebody wrote it down."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mocapflow.errors import RecordingError, alternatives
+from mocapflow.io.cameras import FARTHEST
+from mocapflow.io.findings import Finding, error
+from mocapflow.io.typed import read_json
+from mocapflow.records import F64, array, record
+
+ROOT = ("root_rotation", "root_translation")
+KEYS = (*ROOT, "joint_rotations")
+FORM = (
+    'expected {"root_rotation": [3], "root_translation": [3] (m, the root joint in the world), '
+    '"joint_rotations": {name: [3]}}, rotation vectors in radians, relative to the parent'
+)
+
+
+@record
+class FirstPose:
+    """The pose in a file."""
+
+    rotation: F64 = array(3, unit="rad, rotation vector of the root joint in the world")
+    position: F64 = array(3, unit="m, the root joint in the world")
+    turns: Mapping[str, F64]  # of joints: rotation vectors (3,) rad, relative to the parent
+
+
+def read_first_pose(path: Path, joints: Sequence[str] = ()) -> FirstPose:
+    """Read a first pose.
+
+    Args:
+        path: the file.
+        joints: the names of the body's joints; empty: they are not compared.
+
+    Raises:
+        RecordingError: the file can't be read, or something in it is odd; see `odd_pose`.
+    """
+    content = read_json(path, FORM)
+    for odd in odd_pose(content, joints):
+        raise RecordingError(odd.message, where=str(path), hint=odd.hint)
+    vectors = {key: np.array(vector, np.float64) for key, vector in _vectors(content).items()}
+    rotation, position = (vectors.pop(key) for key in ROOT)
+    return FirstPose(rotation=rotation, position=position, turns=vectors)
+
+
+def odd_pose(content: Any, joints: Sequence[str]) -> Iterator[Finding]:
+    """Yield what is wrong with the content of a file: keys, joints, numbers, units."""
+    if not isinstance(content, dict) or not isinstance(content.get(KEYS[2], {}), dict):
+        yield error("not a first pose", FORM)
+        return
+    for key in content.keys() - set(KEYS):
+        yield error(f"unknown key '{key}'", alternatives(key, KEYS))
+    for key in ROOT:
+        if key not in content:
+            yield error(f"'{key}' is missing", FORM)
+    for joint in content.get(KEYS[2], {}):
+        if joints and joint not in joints:
+            yield error(f"the body has no joint '{joint}'", alternatives(joint, joints))
+    for key, vector in _vectors(content).items():
+        yield from _odd_vector(key, vector)
+
+
+def _vectors(content: dict[str, Any]) -> dict[str, Any]:
+    turns: dict[str, Any] = content.get(KEYS[2], {})
+    return {key: content[key] for key in ROOT if key in content} | turns
+
+
+def _odd_vector(key: str, value: Any) -> Iterator[Finding]:
+    """Yield what is wrong with a vector: lengths and turns that no person has are in other units."""
+    try:
+        vector = np.array(value, np.float64)
+    except (ValueError, TypeError):
+        vector = np.empty(0)
+    size = float(np.linalg.norm(vector))
+    if vector.shape != (3,) or not np.isfinite(size):
+        yield error(f"'{key}' is {value!r}", "expected three finite numbers")
+    elif key == "root_translation" and size > FARTHEST:
+        yield error(f"the root joint is {size:.0f} m from the origin: it looks like mm", "lengths are in metres")
+    elif key != "root_translation" and size > 2 * math.pi:
+        yield error(f"'{key}' turns by {size:.1f} rad, more than once around: it looks like degrees", FORM)

@@ -1,0 +1,115 @@
+"""The files of a scan beside its mesh, `skeleton.json` and `weights.npz`, and whether they belong to it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+
+from mocapflow.errors import RecordingError, alternatives
+from mocapflow.geometry.skeleton import Skeleton
+from mocapflow.io.typed import read_json
+from mocapflow.records import F64
+
+FORM = 'expected {"joints": [{"name": "pelvis", "parent": null, "position": [x, y, z] in m}, …]}, parents first'
+WEIGHTS = "expected arrays `weights` (V, J) and, if need be, `names` (J); without the file weights are computed"
+TALLEST, SMALLEST = 3.0, 0.3  # m, extents of a plausible body
+MARGIN = 0.1  # m that a joint may lie outside the box about the mesh
+
+
+def read_skeleton(path: Path) -> Skeleton:
+    """Read a skeleton.
+
+    Raises:
+        RecordingError: the file is missing, malformed, not parents first, has two roots or numbers that are not finite.
+    """
+    if not path.is_file():
+        raise RecordingError(
+            "there is no skeleton for the mesh", where=str(path),
+            hint=f"{FORM}; or use `body: template` with the stage fit_subject",
+        )  # fmt: skip
+    content = read_json(path, FORM)
+    try:
+        return _skeleton(content, str(path))
+    except (ValueError, TypeError, KeyError) as error:
+        raise RecordingError(f"this is not a skeleton: {error!r}", where=str(path), hint=FORM) from error
+
+
+def read_weights(path: Path, skeleton: Skeleton, vertices: int) -> F64:
+    """Return the weights (V, J) of a `weights.npz` in the order of the skeleton; without names they have it.
+
+    Raises:
+        RecordingError: the file can't be read, or contradicts the mesh or the skeleton.
+    """
+    try:
+        with np.load(path) as content:
+            weights = np.asarray(content["weights"], np.float64)
+            names = [str(name) for name in content["names"]] if "names" in content else list(skeleton.names)
+    except KeyError:
+        raise RecordingError("there are no skin weights in it", where=str(path), hint=WEIGHTS) from None
+    except (OSError, ValueError, EOFError, BadZipFile):  # what numpy says of it is about pickles
+        raise RecordingError("this is no .npz file", where=str(path), hint=WEIGHTS) from None
+    if weights.shape != (vertices, len(names)):
+        expected = f"({vertices} vertices, {len(names)} joints)"
+        raise RecordingError(f"the weights have the shape {weights.shape}; expected {expected}", where=str(path))
+    if not np.isfinite(weights).all() or (weights < 0).any() or (weights.sum(axis=1) == 0).any():
+        what = "skin weights have to be numbers of at least 0, one of each vertex above"
+        raise RecordingError(what, where=str(path), hint=WEIGHTS)
+    for name in names:
+        if name not in skeleton.names:
+            what = f"weights for '{name}', which is no joint of the skeleton"
+            raise RecordingError(what, where=str(path), hint=alternatives(name, skeleton.names))
+    ordered = np.zeros((vertices, len(skeleton.names)))
+    ordered[:, [skeleton.names.index(name) for name in names]] = weights
+    return ordered
+
+
+def check_size(vertices: F64, skeleton: Skeleton, where: str) -> None:
+    """Check that a mesh (V, 3) and a skeleton are in metres, upright along z and in the same place.
+
+    Raises:
+        RecordingError: they are not.
+    """
+    extents = np.ptp(vertices, axis=0)
+    size = ", ".join(f"{extent:.4g}" for extent in extents)
+    if extents.max() > TALLEST:
+        guess = "in millimetres: divide by 1000" if extents.max() > 300 else "not in metres"
+        raise RecordingError(
+            f"the mesh measures {size}: it seems to be {guess}", where=where, hint="expected metres, z up"
+        )
+    if extents.max() < SMALLEST:
+        raise RecordingError(
+            f"the mesh measures {size} m: too small for a person", where=where, hint="expected metres, z up"
+        )
+    if extents.argmax() == 1 and extents[1] > 1.3 * extents[2]:
+        hint = "expected z up: swap (x, y, z) to (x, -z, y)"
+        raise RecordingError(f"the mesh measures {size} m: it seems to stand along y", where=where, hint=hint)
+    low, high = vertices.min(axis=0) - MARGIN, vertices.max(axis=0) + MARGIN
+    outside = ((skeleton.positions < low) | (skeleton.positions > high)).any(axis=1)
+    if outside.any():
+        hint = "both are expected in metres and in the same rest pose, z up"
+        what = f"{outside.sum()} of {len(outside)} joints lie more than 10 cm outside the mesh"
+        raise RecordingError(f"{what}, first '{skeleton.names[int(outside.argmax())]}'", where=where, hint=hint)
+
+
+def _skeleton(content: Mapping[str, Any], where: str) -> Skeleton:
+    joints = content["joints"]
+    names = [str(joint["name"]) for joint in joints]
+    parents = []
+    for row, joint in enumerate(joints):
+        parent, earlier = joint["parent"], names[:row]
+        if names[row] in earlier:
+            raise RecordingError(f"joint '{names[row]}' is listed twice", where=where, hint=FORM)
+        if parent is not None and parent not in earlier:
+            hint = f"a parent stands before its children; {alternatives(str(parent), earlier)}"
+            what = f"parent '{parent}' of joint '{names[row]}' is not listed before it"
+            raise RecordingError(what, where=where, hint=hint)
+        parents.append(-1 if parent is None else names.index(parent))
+    positions = np.array([joint["position"] for joint in joints], np.float64).reshape(len(names), 3)
+    if parents.count(-1) != 1 or not np.isfinite(positions).all():
+        what = "positions are not all numbers" if not np.isfinite(positions).all() else "one joint must have no parent"
+        raise RecordingError(what, where=where, hint=FORM)
+    return Skeleton(tuple(names), np.array(parents, np.int32), positions)

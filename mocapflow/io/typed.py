@@ -1,0 +1,49 @@
+"""JSON and TOML files, which people type: what can't be read is told by line and column."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from mocapflow.errors import RecordingError
+
+PLACE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")  # behind what tomllib says
+
+
+def read_json(path: Path, hint: str = "") -> Any:
+    """Return what a JSON file holds.
+
+    Args:
+        path: the file.
+        hint: how to go on where it can't be read.
+
+    Raises:
+        RecordingError: it can't be opened, or is not JSON; with the place.
+    """
+    try:
+        return json.loads(_text(path, hint))
+    except json.JSONDecodeError as error:
+        where = f"{path}:{error.lineno}:{error.colno}"
+        raise RecordingError(f"not JSON: {error.msg}", where=where, hint=hint) from None
+
+
+def read_toml(path: Path, hint: str = "") -> dict[str, Any]:
+    """Return what a TOML file holds; see `read_json`."""
+    try:
+        return tomllib.loads(_text(path, hint))
+    except tomllib.TOMLDecodeError as error:
+        what, *place = PLACE.split(str(error))
+        where = ":".join([str(path), *filter(None, place)])
+        raise RecordingError(f"not TOML: {what}", where=where, hint=hint) from None
+
+
+def _text(path: Path, hint: str) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise RecordingError(f"can't be read: {error.strerror}", where=str(path), hint=hint) from None
+    except UnicodeDecodeError:
+        raise RecordingError("is not UTF-8 text", where=str(path), hint=hint) from None

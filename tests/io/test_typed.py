@@ -1,0 +1,29 @@
+"""Files that people type: where they can't be read."""
+
+import pytest
+
+from mocapflow.errors import RecordingError
+from mocapflow.io.typed import read_json, read_toml
+
+
+@pytest.mark.parametrize(
+    ("read", "text", "message"),
+    [
+        (read_json, b'{"a": 1,\n "b": }', "file:2:7  not JSON: Expecting value\n       do this"),
+        (read_toml, b"a = 1\nb = [1, 2\n", "file  not TOML: Unclosed array\n       do this"),
+        (read_toml, b"a = 1\na = 2\n", "file:2:6  not TOML: Cannot overwrite a value\n       do this"),
+        (read_json, b"\xff\xfe", "file  is not UTF-8 text\n       do this"),
+        (read_toml, b"\xff\xfe", "file  is not UTF-8 text\n       do this"),
+    ],
+)
+def test_the_place_and_what_to_do(tmp_path, monkeypatch, read, text, message):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").write_bytes(text)
+    with pytest.raises(RecordingError) as found:
+        read((tmp_path / "file").relative_to(tmp_path), "do this")
+    assert str(found.value) == message
+
+
+def test_a_file_that_is_not_there(tmp_path):
+    with pytest.raises(RecordingError, match="can't be read: No such file"):
+        read_json(tmp_path / "file")
