@@ -14,7 +14,6 @@ import numpy as np
 from mocapflow_levelset.evidence import from_image
 from mocapflow_levelset.evolve import Rhythm, Weights, settle
 from mocapflow_levelset.masks import counted
-from mocapflow_levelset.plates import Shadow
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.statistics import Window
 
@@ -37,8 +36,7 @@ def rough_contour(shape: tuple[int, int]) -> F32:
 
 def segment(image: U8, start: F32, steps: int) -> F32:
     """Return the level set (H, W) after some steps of the chapter's descent in CIELAB."""
-    shadow = Shadow(0.012, 0.0, 0.5, 0.005, -6.0)  # not used without an empty scene
-    evidence = from_image(image, counted(start.shape, 3).astype(np.float32), ("lab",), 1, None, shadow, False)
+    evidence = from_image(image, counted(start.shape, 3).astype(np.float32), ("lab",), 1)
     # a poor start: a wide window for the statistics and a soft step, as in coarse-to-fine
     weights = Weights(sigma_px=3.0, length=0.9, shape=0.0, clip=6.0, step=2.0, band_px=14.0)
     return settle(start, start, evidence, Window(24.0, 4, 0.02), weights, Rhythm(steps, 1, 2)).level

@@ -26,28 +26,27 @@ class Evidence(NamedTuple):
     told: F32 | None = None  # (H, W) log ratio of inside and outside that is known besides
 
 
+class Room(NamedTuple):
+    """The empty room at the size of an image, and how pixels are compared with it."""
+
+    plate: Plate
+    floor: Bool  # (H, W) True where a shadow may fall
+    shadow: Shadow
+    calm_px: float = 0.0  # smoothing of the image before
+
+
 def from_features(planes: F32, weight: F32) -> Evidence:
     """Return the evidence of features (C, H, W) that are already there."""
     return Evidence(planes, weight, 1, lambda runs: gather_planes(planes, runs))
 
 
 def from_image(
-    image: U8,
-    weight: F32,
-    channels: Sequence[ChannelName],
-    stride: int,
-    plate: tuple[Plate, Bool] | None,
-    shadow: Shadow,
-    decorrelate: bool,
-    calm_px: float = 0.0,
+    image: U8, weight: F32, channels: Sequence[ChannelName], stride: int, decorrelate: bool = False
 ) -> Evidence:
-    """Return the evidence of a BGR image (H, W, 3), and of the empty scene if it is known.
-
-    The empty scene is its plate, and where a shadow may fall (H, W).
+    """Return the evidence of a BGR image (H, W, 3) whose pixels count by their weight (H, W).
 
     Channels that depend on one pixel only are computed for the pixels that need them. Decorrelated, the channels
-    are turned to the image's own principal axes, so that treating them as independent is right; the empty scene's
-    density needs them as they are, so where it is known they stay.
+    are turned to the image's own principal axes, so that treating them as independent is right.
     """
     if all(name in POINTWISE for name in channels):
         sparse = features(_sparse(image, stride), channels)
@@ -61,22 +60,25 @@ def from_image(
         def along(runs: I32) -> F32:
             return gather_planes(planes, runs)
 
-    if plate is not None:
-        empty, floor = plate
-        calm = calmed(image, calm_px)
-
-        def outside(runs: I32, values: F32) -> F32:
-            if calm is not image:
-                values = features(gather(calm, runs)[None], channels)[:, 0]
-            expected, spread = gather_planes(empty.planes, runs), gather_planes(empty.spread[None], runs)[0]
-            return density_of(values, expected, spread, gather_planes(floor[None], runs)[0] > 0, channels, shadow)
-
-        return Evidence(sparse, weight, stride, along, outside)
     if decorrelate and len(sparse) > 1 and sparse.shape[2] > LAG_PX:
         axes = decorrelation(sparse)
         turned = np.einsum("ij,jyx->iyx", axes, sparse)
         return Evidence(turned, weight, stride, lambda runs: np.ascontiguousarray(axes @ along(runs)))
     return Evidence(sparse, weight, stride, along)
+
+
+def in_room(evidence: Evidence, image: U8, channels: Sequence[ChannelName], room: Room) -> Evidence:
+    """Return the evidence of an image whose outside is the empty room; its channels have to be as they are."""
+    calm = calmed(image, room.calm_px)
+
+    def outside(runs: I32, values: F32) -> F32:
+        if calm is not image:
+            values = features(gather(calm, runs)[None], channels)[:, 0]
+        expected, spread = gather_planes(room.plate.planes, runs), gather_planes(room.plate.spread[None], runs)[0]
+        shaded = gather_planes(room.floor[None], runs)[0] > 0
+        return density_of(values, expected, spread, shaded, channels, room.shadow)
+
+    return evidence._replace(outside=outside)
 
 
 def calmed(image: U8, smooth_px: float) -> U8:

@@ -12,7 +12,7 @@ from mocapflow_levelset import crops
 from mocapflow_levelset.channels import ChannelName
 from mocapflow_levelset.colours import bins_of
 from mocapflow_levelset.crops import Crop
-from mocapflow_levelset.evidence import Evidence, from_image
+from mocapflow_levelset.evidence import Evidence, Room, from_image, in_room
 from mocapflow_levelset.evolve import Costs, Rhythm, Weights, costs, settle
 from mocapflow_levelset.islands import without_islands
 from mocapflow_levelset.matting import sharpened
@@ -99,7 +99,7 @@ def find(view: View, levels: Sequence[Level], method: Method, band_px: float) ->
         settled = settle(without_islands(front, evidence), prior, evidence, level.window, method.weights, level.rhythm)
         front, factor = settled.level, level.factor
     if view.contact is not None:
-        front = _by_chromaticity(front, prior, image, view, crop, view.contact, method)
+        front = _by_chromaticity(front, view, view.contact, crop, method)
     if view.matte is not None:
         front = redistance(front, method.weights.band_px)
         front = sharpened(front, image, crop.of(view.matte.room), _movable(view, crop), view.matte.reach_px)
@@ -113,9 +113,7 @@ def _movable(view: View, crop: Crop) -> Bool:
     return counts if view.contact is None else counts & ~crop.of(view.contact.zone)
 
 
-def _by_chromaticity(
-    front: F32, prior: F32, image: U8, view: View, crop: Crop, contact: Contact, method: Method
-) -> F32:
+def _by_chromaticity(front: F32, view: View, contact: Contact, crop: Crop, method: Method) -> F32:
     """Return a level set that has gone on by chromaticity where the body meets the floor, and stays elsewhere.
 
     The edge of a foot that stands is dark, and so is the floor below it: by brightness the contour runs a pixel or
@@ -125,13 +123,11 @@ def _by_chromaticity(
     near = crops.around(zone, round(min(2 * contact.window.rho_px, method.margin_px)), 1)
     if near is None:
         return front
-    weight = near.of(crop.of(view.counted)).astype(np.float32)
-    evidence = from_image(
-        near.of(image), weight, ("chromaticity",), method.stride, None, method.shadow, method.decorrelate
-    )
+    image, weight = near.of(crop.of(view.image)), near.of(crop.of(view.counted)).astype(np.float32)
+    evidence = from_image(image, weight, ("chromaticity",), method.stride, method.decorrelate)
     start = redistance(np.ascontiguousarray(near.of(front)), method.weights.band_px)
-    goal = np.ascontiguousarray(near.of(prior))
-    found = settle(start, goal, evidence, contact.window, method.weights, contact.rhythm).level
+    prior = np.ascontiguousarray(near.of(crop.of(view.prior)))
+    found = settle(start, prior, evidence, contact.window, method.weights, contact.rhythm).level
     whole = front.copy()
     near.of(whole)[near.of(zone)] = found[near.of(zone)]
     return whole
@@ -149,19 +145,13 @@ def _brought(level: F32, factor: int, wanted: int, band_px: float) -> F32:
 
 def _evidence(image: U8, view: View, crop: Crop, level: Level, method: Method) -> Evidence:
     """Return what the image within the crop says at one resolution."""
-    factor = level.factor
-    plate = None
-    if view.empty is not None and level.use_plate:
-        plate = view.empty.plates[factor].of(crop.at(factor)), crops.shrink_mask(crop.of(view.empty.floor), factor)
-    small = crops.shrink(image, factor)
-    evidence = from_image(
-        small,
-        crops.shrink_mask(crop.of(view.counted), factor).astype(np.float32),
-        method.channels,
-        max(method.stride // factor, 1),
-        plate,
-        method.shadow,
-        method.decorrelate,
-        method.calm_px if factor == 1 else 0.0,  # the mean over pixels is calm
-    )
+    factor, small = level.factor, crops.shrink(image, level.factor)
+    empty = view.empty if level.use_plate else None
+    weight = crops.shrink_mask(crop.of(view.counted), factor).astype(np.float32)
+    turned = method.decorrelate and empty is None
+    evidence = from_image(small, weight, method.channels, max(method.stride // factor, 1), turned)
+    if empty is not None:
+        plate, floor = empty.plates[factor].of(crop.at(factor)), crops.shrink_mask(crop.of(empty.floor), factor)
+        calm_px = method.calm_px if factor == 1 else 0.0  # the mean over pixels is calm
+        evidence = in_room(evidence, small, method.channels, Room(plate, floor, method.shadow, calm_px))
     return evidence if view.colours is None else evidence._replace(told=evidence.weight * view.colours[bins_of(small)])

@@ -2,7 +2,7 @@
 
 import numpy as np
 from levelset_scenes import ellipse
-from mocapflow_levelset.evidence import from_image
+from mocapflow_levelset.evidence import Room, from_image, in_room
 from mocapflow_levelset.islands import runs_of, without_islands
 from mocapflow_levelset.plates import Shadow, plate_of
 
@@ -10,9 +10,10 @@ SHADOW = Shadow(floor=0.012, share=0.2, darkest=0.5, chroma=0.005, stranger=-6.0
 
 
 def evidence(image, known=True):
+    seen = from_image(image, np.ones((160, 160), np.float32), ("lab",), 1)
     grey = np.full((160, 160, 3), 120, np.float32)
-    plate = (plate_of(grey, np.full_like(grey, 3), ("lab",)), np.ones((160, 160), np.float32)) if known else None
-    return from_image(image, np.ones((160, 160), np.float32), ("lab",), 1, plate, SHADOW, decorrelate=False)
+    room = Room(plate_of(grey, np.full_like(grey, 3), ("lab",)), np.ones((160, 160), bool), SHADOW)
+    return in_room(seen, image, ("lab",), room) if known else seen
 
 
 def scene():
