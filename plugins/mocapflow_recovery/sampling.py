@@ -68,6 +68,26 @@ def search(cost: Cost, pose: Pose, body: Body, plan: Plan, rng: np.random.Genera
     return best
 
 
+def without_idle_parts(stray: Cost, found: Pose, fitted: Pose, body: Body, share: float) -> Pose:
+    """Return a pose that was found with those parts as they were fitted that bring next to nothing of what strays.
+
+    A search fits every part, also to what no pose explains, such as cloth that flies.
+
+    Args:
+        stray: how much of person and model lie apart, the measure by which the fit was doubted.
+        found: the pose that a search ended in.
+        fitted: the pose in doubt.
+        body: whose parts are tried.
+        share: of what the search brought together: a part that brings less stays as it was fitted.
+    """
+    before, after = stray([fitted, found])
+    for part in parts(body):
+        back = with_part(found, part, fitted)
+        if float(stray([back])[0]) - after <= share * (before - after):
+            found = back
+    return found
+
+
 def put_back(cost: Cost, found: Pose, poses: Sequence[Pose], body: Body, tolerance: float) -> Pose:
     """Return a pose that was found with those parts of others that fit about as well: what is hidden stays as it was.
 

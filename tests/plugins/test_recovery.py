@@ -9,7 +9,7 @@ import pytest
 from mocapflow_recovery.certain import shrunk, small_room, views
 from mocapflow_recovery.coarse import coarse_body
 from mocapflow_recovery.disagreement import distance, floating_area, uncovered_area
-from mocapflow_recovery.sampling import Plan, Spread, parts, put_back, samples, search, seen_samples
+from mocapflow_recovery.sampling import Plan, Spread, parts, put_back, samples, search, seen_samples, without_idle_parts
 
 from mocapflow.data import NO_CLOTH, Pose
 from mocapflow.geometry.cameras import project
@@ -152,6 +152,21 @@ def test_what_fits_about_as_well_stays_as_it_was() -> None:
     still = Pose(root=POSE.root, angles=np.zeros(len(body.twists)))
     found = put_back(cost, Pose(root=POSE.root, angles=still.angles + 0.1), [still], body, 0.03)
     assert found.angles[second].all() and not np.delete(found.angles, second).any()
+
+
+def test_a_leg_stays_where_an_arm_was_lost() -> None:
+    """The leg takes the place of cloth that flies: it lies nearer to the person, but nothing of it had strayed."""
+    body = template_body()
+    leg, arm = (np.flatnonzero(body.screw_joint == body.joint(name)) for name in ("hip_l", "shoulder_r"))
+
+    def stray(poses):
+        return np.array([100.0 * (not p.angles[arm].any()) + 5.0 * (not p.angles[leg].any()) for p in poses])
+
+    fitted = Pose(root=POSE.root, angles=np.zeros(len(body.twists)))
+    found = Pose(root=POSE.root, angles=fitted.angles + 0.1)
+    kept = without_idle_parts(stray, found, fitted, body, 0.1)
+    assert kept.angles[arm].all() and not kept.angles[leg].any()
+    assert without_idle_parts(stray, found, fitted, body, 0.01).angles[leg].all()
 
 
 def test_a_foot_does_not_turn_because_its_leg_was_found() -> None:

@@ -1,0 +1,83 @@
+"""How well poses agree with what the images surely show, by two measures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from mocapflow.data import NO_CLOTH, Cloth, Past, Pose, PoseBatch, Surface
+from mocapflow.model import ClothedModel
+from mocapflow.records import F64
+from mocapflow.scene import Scene
+from mocapflow_recovery.certain import View
+from mocapflow_recovery.disagreement import distance, floating_area, uncovered_area
+
+
+class Reach(NamedTuple):
+    """What counts as apart, m."""
+
+    reach_m: float  # what lies nearer to the other is no stray
+    cloth_m: float  # nor is what lies so near to the garment
+    cap_m: float  # beyond, it does not matter how far
+
+
+class Stray(NamedTuple):
+    """How much of person and model lie apart, cm²."""
+
+    uncovered: float
+    floating: float
+
+    def doubtful(self, uncovered: float, floating: float) -> bool:
+        """True where one of the two is larger than it may be."""
+        return self.uncovered > uncovered or self.floating > floating
+
+    def __str__(self) -> str:
+        return f"{self.uncovered:.0f} cm² of the person uncovered, {self.floating:.0f} cm² of skin in empty space"
+
+
+def stray_of(surface: Surface, scene: Scene, seen: Sequence[View], reach: Reach) -> Stray:
+    """Return how much of the person lies off a surface of the scene, and of its skin off the person."""
+    return Stray(
+        uncovered=1e4 * uncovered_area(surface, seen, reach.reach_m, reach.cloth_m),
+        floating=1e4 * floating_area(scene.bare(surface), seen, reach.reach_m),
+    )
+
+
+class Judge(NamedTuple):
+    """Measures poses of a coarse body in the garment as it is believed."""
+
+    model: ClothedModel  # drapes the garment
+    coarse: Scene  # its body has few faces
+    seen: Sequence[View]
+    parameters: F64  # of the cloth
+    past: Past
+    reach: Reach
+
+    def apart(self, poses: Sequence[Pose]) -> F64:
+        """Return for each pose (B,) how far surface and person are apart, m per unit of the person's area."""
+        return np.array([distance(surface, self.seen, self.reach.cap_m) for surface in self._surfaces(poses)])
+
+    def stray(self, poses: Sequence[Pose]) -> F64:
+        """Return for each pose (B,) how much of surface and person strays, cm²."""
+        return np.array([
+            sum(stray_of(surface, self.coarse, self.seen, self.reach)) for surface in self._surfaces(poses)
+        ])  # fmt: skip
+
+    def _surfaces(self, poses: Sequence[Pose]) -> list[Surface]:
+        clothes = drapes(self.model, poses, self.parameters, self.past)
+        return [self.coarse.surface(pose, cloth) for pose, cloth in zip(poses, clothes, strict=True)]
+
+
+def drapes(model: ClothedModel, poses: Sequence[Pose], parameters: F64, past: Past) -> list[Cloth]:
+    """Return the garment laid on each of several poses; poses that lay it alike are draped once."""
+    if model.draper is None or not model.clothed:
+        return [NO_CLOTH] * len(poses)
+    lays = model.draper.touchable(model.scene)[model.scene.body.screw_joint]
+    root, angles = np.stack([pose.root for pose in poses]), np.stack([pose.angles for pose in poses])
+    told_apart = np.concatenate([root.reshape(len(poses), -1), angles[:, lays]], axis=1)
+    _, first, same = np.unique(told_apart, axis=0, return_index=True, return_inverse=True)
+    batch = PoseBatch(root=root[first], angles=angles[first])
+    vertices = model.draper.drape(batch, np.repeat(parameters[None], len(first), axis=0), past, model.scene)
+    return [Cloth(vertices=vertices[row], parameters=parameters) for row in same.ravel()]
