@@ -40,11 +40,7 @@ def _calls(trace: TracebackType | None) -> Iterator[FrameType]:
 
 def _culprit(calls: list[FrameType], registry: Registry) -> Component | None:
     """Return the component nearest to the innermost call in plugin code."""
-    known = [(index, call) for index, call in enumerate(calls) if _is_known(call, registry)]
-    for _, call in reversed(known):
-        component: Component = call.f_locals["self"]
-        return component
-    return None
+    return next((call.f_locals["self"] for call in reversed(calls) if _is_known(call, registry)), None)
 
 
 def _is_known(call: FrameType, registry: Registry) -> bool:

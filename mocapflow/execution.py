@@ -8,11 +8,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+from mocapflow.assets import Body, GarmentMesh
 from mocapflow.blame import failure
 from mocapflow.checkpoint import Checkpoint
-from mocapflow.components import Component
+from mocapflow.components import Component, Garment
 from mocapflow.data import FrameResult
-from mocapflow.errors import ComponentFailed, MocapflowError, PluginError, ShapeError
+from mocapflow.errors import ComponentFailed, GarmentError, MocapflowError, PluginError, ShapeError
 from mocapflow.locks import Lock
 from mocapflow.pipeline import Pipeline
 from mocapflow.progress import Progress
@@ -161,12 +162,18 @@ class Execution:
         if place not in self._scenes:
             model, garment, folder = self._pipeline.body, self._pipeline.garment, self._pipeline.recording
             body = self._result(step.body) if step.body else self._blaming(model, lambda: model.load(folder))
-            sewn = self._blaming(garment, lambda: garment.sew(body)) if garment else None
+            sewn = self._sewn(garment, body) if garment else None
             cameras = self._result(step.rig).cameras if step.rig else step.recording.cameras
             scene = self._scenes[place] = Scene(cameras=cameras, body=body, garment=sewn)
             for warning in scene.warnings:
                 self._report(f"warning: {warning}")
         return self._scenes[place]
+
+    def _sewn(self, garment: Garment, body: Body) -> GarmentMesh:
+        try:
+            return self._blaming(garment, lambda: garment.sew(body))
+        except GarmentError as error:
+            raise GarmentError(error.message, where=self._pipeline.garment_where, hint=error.hint) from None
 
     def _blaming(self, component: Component, call: Callable[[], Value], kept: Callable[[], str] = str) -> Value:
         """Return what a component makes; if it raises, say who it was, what is saved and how to go on."""

@@ -10,6 +10,9 @@ from mocapflow.errors import MocapflowError, RecordingError, UnknownComponent
 from mocapflow.io.typed import read_json
 from mocapflow.resolve import Resolver
 
+FILE = Path("subject") / "garment.json"
+FROM_RECORDING = "from_recording"
+
 
 def garment_of(value: Any, recording: Path, resolver: Resolver) -> Garment | None:
     """Return the garment that a pipeline names, None without one.
@@ -20,28 +23,40 @@ def garment_of(value: Any, recording: Path, resolver: Resolver) -> Garment | Non
         resolver: of the file.
 
     Raises:
-        MocapflowError: a measure is missing or wrong, or the recording names no garment.
+        MocapflowError: a measure is missing or wrong, or the recording names no garment, or an unknown one.
     """
     if value is None:
         return None
-    file = recording / "subject" / "garment.json"
+    file = recording / FILE
     kind, measures = _measures(file)
-    named = value.get("use") if isinstance(value, dict) else value
-    if named == "from_recording":
+    named = _named(value)
+    if named == FROM_RECORDING:
         if kind is None:
             raise _no_garment(file)
         named, value = kind, {**value, "use": kind} if isinstance(value, dict) else kind
-    if named != kind:
+    elif named != kind:
         measures = {}
     try:
         garment: Garment = resolver.component("garment", value, ("garment",), measures)
         return garment
+    except UnknownComponent as error:
+        where = str(file) if named == kind else error.where
+        raise UnknownComponent(error.message, where=where, hint=error.hint) from None
     except MocapflowError as error:
-        if isinstance(error, UnknownComponent) or error.where != resolver.place(("garment",)):
+        if error.where != resolver.place(("garment",)):
             raise
         source = f"describes a {kind}" if kind else "does not exist"
-        note = f"measures come from {file}, which {source}; a value written here overrides them"
+        note = f"measures, in metres, come from {file}, which {source}; a value written here overrides them"
         raise type(error)(error.message, where=error.where, hint="\n".join(filter(None, [error.hint, note]))) from None
+
+
+def place_of(value: Any, recording: Path, resolver: Resolver) -> str:
+    """Return where the measures of a garment are written: in the recording, or as file:line:column."""
+    return str(recording / FILE) if _named(value) == FROM_RECORDING else resolver.place(("garment",))
+
+
+def _named(value: Any) -> Any:
+    return value.get("use") if isinstance(value, dict) else value
 
 
 def _no_garment(file: Path) -> RecordingError:

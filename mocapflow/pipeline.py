@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from mocapflow.components import BodyModel, Garment, Stage
 from mocapflow.errors import PipelineError, RecordingError
-from mocapflow.measures import garment_of
+from mocapflow.measures import garment_of, place_of
 from mocapflow.registry import Registry, load_registry
 from mocapflow.resolve import Resolver
 from mocapflow.yamlfile import read
@@ -87,6 +87,7 @@ class Pipeline:
     garment: Garment | None
     stages: tuple[NamedStage, ...]
     registry: Registry
+    garment_where: str = ""  # its measures are written
     start: int = 0
     stop: int | None = None
     step: int = 1
@@ -131,6 +132,7 @@ def load_pipeline(
         recording=recording,
         body=resolver.component("body", said.body, ("body",)),
         garment=garment_of(said.garment, recording, resolver),
+        garment_where=place_of(said.garment, recording, resolver),
         stages=tuple(_stage(label, value, resolver) for label, value in said.stages.items() if value is not None),
         registry=resolver.registry,
         start=part.start,

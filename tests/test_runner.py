@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mocapflow.errors import ComponentFailed, StoreError
+from mocapflow.errors import ComponentFailed, GarmentError, StoreError
 from mocapflow.hookspecs import hookimpl
 from mocapflow.runner import plan, run
 from tests.fixtures.stores import STAGES, actions, load, run_tiny, write_pipeline, write_recording
@@ -151,6 +151,17 @@ def test_a_body_that_raises_is_named(tmp_path, path, monkeypatch):
     with pytest.raises(
         ComponentFailed, match=r"^body 'tiny_body' \(plugin 'tiny_plugin' .*\) failed: ValueError: no such joint"
     ):
+        run(pipeline, store=tmp_path / "store.zarr", out=tmp_path / "out")
+
+
+def test_measures_that_can_not_be_sewn_are_told_where_they_are_written(tmp_path, path, monkeypatch):
+    pipeline = load(path)
+
+    def sew(self, body):
+        raise GarmentError("too short", hint="lengthen it")
+
+    monkeypatch.setattr(type(pipeline.garment), "sew", sew)
+    with pytest.raises(GarmentError, match=r"^.*\.yaml:\d+:\d+  too short\n       lengthen it$"):
         run(pipeline, store=tmp_path / "store.zarr", out=tmp_path / "out")
 
 

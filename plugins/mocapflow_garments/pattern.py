@@ -1,34 +1,23 @@
-"""What garments sewn from tape measures share: checks of the measures, and where a band lies on the body."""
+"""What garments sewn from tape measures share: what a length can be, and where a band lies on the body."""
 
 from __future__ import annotations
 
 import math
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from mocapflow.assets import Body
 from mocapflow.errors import GarmentError
 from mocapflow.records import F64
 from mocapflow_garments import sections
 
+Length = Annotated[float, Field(gt=0, lt=4)]  # m; a longer one is in cm or mm
+
 EASE = 0.002  # m, the least room between waistband and skin
 MEANT = 1.3  # a measure that is further below the body's own is a mistake
 LARGEST_ROOM = 0.08  # m between waistband and skin: more can't hold a garment up
-
-
-def check_measures(garment: str, measures: dict[str, float]) -> None:
-    """Refuse tape measures that are not positive lengths in metres.
-
-    Raises:
-        GarmentError: a measure is NaN, infinite, zero, negative, or longer than 4 m.
-    """
-    for key, value in measures.items():
-        if not math.isfinite(value) or value <= 0:
-            raise GarmentError(f"{garment}: {key} is {value}", hint="measure it again: a length in metres, above zero")
-        if value > 4.0:
-            raise GarmentError(
-                f"{garment}: {key} is {value} m", hint="measures are in metres; was it meant in cm or mm?"
-            )
 
 
 def even_links(rows: F64, link: float) -> F64:
