@@ -53,21 +53,6 @@ def skin(body: Body, joints: F64, angles: F64 | None = None) -> F64:
     return posed
 
 
-def morph_velocity(body: Body, joints: F64, angles: F64) -> F64:
-    """Return the velocities (V, 3) m/rad of the skin for a unit change of the morph's angle, by the morph alone.
-
-    They add to what the screw of that angle does. A pose solver may leave them out: they are some ten times smaller.
-    """
-    start, stop = body.morph_range
-    if body.morph_offset is None or not min(start, stop) < angles[body.morph_screw] < max(start, stop):
-        return np.zeros_like(body.vertices)
-    turned, offset = joints.copy(), body.morph_offset / (stop - start)
-    turned[:, :3, 3] = 0.0
-    velocity = np.empty_like(offset)
-    _skin(offset, body.skin_joint, body.skin_weight, turned, velocity)
-    return velocity
-
-
 def rest_shape(body: Body, angles: F64 | None) -> F64:
     """Return the vertices at rest (V, 3) m of the shape that the body has at joint angles (D,) rad."""
     if body.morph_offset is None:

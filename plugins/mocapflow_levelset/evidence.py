@@ -35,11 +35,6 @@ class Room(NamedTuple):
     calm_px: float = 0.0  # smoothing of the image before
 
 
-def from_features(planes: F32, weight: F32) -> Evidence:
-    """Return the evidence of features (C, H, W) that are already there."""
-    return Evidence(planes, weight, 1, lambda runs: gather_planes(planes, runs))
-
-
 def from_image(
     image: U8, weight: F32, channels: Sequence[ChannelName], stride: int, decorrelate: bool = False
 ) -> Evidence:

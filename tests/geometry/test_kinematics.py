@@ -94,19 +94,6 @@ def test_morph_changes_the_shape_with_its_angle(body, pose):
         kinematics.skin(morphing, joints)
 
 
-def test_morph_velocity_is_the_rest_of_the_derivative(body):
-    offset = np.random.default_rng(2).normal(scale=0.01, size=body.vertices.shape)
-    screw = body.screw_names.index("knee_l.flexion")
-    morphing = replace(body, morph_offset=offset, morph_screw=screw, morph_range=(1.2, 0.2))
-    angles, step = np.zeros(len(body.twists)), 1e-6
-    angles[screw] = 0.7
-    joints, _ = kinematics.chain(body, Pose(root=np.eye(4), angles=angles))
-    changed = [kinematics.skin(morphing, joints, angles + s * step * np.eye(len(angles))[screw]) for s in (1, -1)]
-    difference = (changed[0] - changed[1]) / (2 * step)
-    np.testing.assert_allclose(kinematics.morph_velocity(morphing, joints, angles), difference, atol=1e-8)
-    assert not kinematics.morph_velocity(morphing, joints, 0 * angles).any()
-
-
 def test_three_screws_reach_any_rotation_exactly(body):
     rng = np.random.default_rng(8)
     balls = [n for j, n in enumerate(body.joint_names) if (body.screw_joint == j).sum() == 3]

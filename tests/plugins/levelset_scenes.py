@@ -1,7 +1,7 @@
 """Synthetic pictures with a known outline for the tests of the segmenters."""
 
 import numpy as np
-from mocapflow_levelset.evidence import from_features
+from mocapflow_levelset.evidence import Evidence, gather_planes
 from mocapflow_levelset.evolve import Rhythm, Weights, settle
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.statistics import Window
@@ -39,6 +39,11 @@ def descend(planes, start, prior, steps, shape=0.0, rho=12.0, cell=2, every=1, l
     weights = Weights(1.5, length, shape, 6.0, 1.0, BAND)
     evidence = from_features(planes, np.ones(start.shape, np.float32))
     return settle(start, prior, evidence, Window(rho, cell, 0.02), weights, Rhythm(steps, every, 5)).level
+
+
+def from_features(planes, weight):
+    """Return the evidence of features (C, H, W) as they are."""
+    return Evidence(planes, weight, 1, lambda runs: gather_planes(planes, runs))
 
 
 def overlap(level, mask):

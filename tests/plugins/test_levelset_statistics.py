@@ -1,10 +1,9 @@
 """Local Gaussian statistics against brute force (T-LS2), and the feature channels."""
 
 import numpy as np
-from levelset_scenes import ellipse, ramp_scene
+from levelset_scenes import ellipse, from_features, ramp_scene
 from mocapflow_levelset.channels import features
 from mocapflow_levelset.energy import heaviside
-from mocapflow_levelset.evidence import from_features
 from mocapflow_levelset.evolve import Weights, log_ratio, near
 from mocapflow_levelset.statistics import Window, local_gaussians, totals
 from mocapflow_levelset.statistics_kernels import FAINT
