@@ -13,6 +13,7 @@ import numpy as np
 from mocapflow.assets import Body
 from mocapflow.data import Pose
 from mocapflow.geometry import kinematics, twists
+from mocapflow.geometry.skeleton import body_directions, skeleton_of
 from mocapflow.records import F64, Bool, array, record
 from mocapflow.series import Wide
 
@@ -58,16 +59,9 @@ def three_point(positions: F64) -> F64:
 
 
 def anatomical_axes(body: Body) -> F64:
-    """Return the axes of the rest pose as rows: forward, up, right (3, 3), from the hips (or shoulders) and z up."""
-    up = np.array([0.0, 0.0, 1.0])
-    left = np.array([1.0, 0.0, 0.0])
-    for pair in (("hip_l", "hip_r"), ("shoulder_l", "shoulder_r")):
-        if set(pair) <= set(body.joint_names):
-            across = body.positions[body.joint(pair[0])] - body.positions[body.joint(pair[1])]
-            left = across - across @ up * up
-            left = left / np.linalg.norm(left)
-            break
-    return np.stack([np.cross(left, up), up, -left])
+    """Return the axes of the rest pose as rows: forward, up, right (3, 3); see `body_directions`."""
+    forward, left, up = body_directions(skeleton_of(body))
+    return np.stack([forward, up, -left])
 
 
 def measure(

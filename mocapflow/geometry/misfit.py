@@ -28,7 +28,7 @@ def misfit(
     """
     error = np.zeros(len(cameras))
     for silhouette, contour in outlines(surface, segmentation, cameras, spacing_px):
-        off = np.abs(at(silhouette.distance, contour.pixel))
+        off = np.abs(bilinear(silhouette.distance, contour.pixel))
         near = off if bend_px is None else np.minimum(off, bend_px[silhouette.camera])
         error[silhouette.camera] = spacing_px * float(near @ (2 * off - near))
     return error
@@ -61,8 +61,8 @@ def dressed(surface: Surface, cloth: F64) -> Surface:
     return replace(surface, vertices=np.concatenate([surface.vertices[surface.layer != CLOTH], cloth]))
 
 
-def at(field: F32 | F64, pixels: F64) -> F64:
-    """Return a field (H, W) at pixels (K, 2), bilinearly; outside the image the value at its edge."""
+def bilinear(field: F32 | F64, pixels: F64) -> F64:
+    """Return a field (H, W) between its pixels, at (K, 2) px; outside the image the value at its edge."""
     height, width = field.shape
     x, y = np.clip(pixels[:, 0], 0, width - 1.001), np.clip(pixels[:, 1], 0, height - 1.001)
     column, row = x.astype(int), y.astype(int)

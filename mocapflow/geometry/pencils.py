@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from mocapflow.assets import Camera
+from mocapflow.geometry.cameras import centre
 from mocapflow.records import F64
 
 
@@ -37,9 +38,3 @@ def pencil_axes(one: Camera, other: Camera) -> F64:
     first = ahead - line * (line @ ahead)
     first /= np.linalg.norm(first)
     return np.stack([first, np.cross(line, first)])
-
-
-def centre(camera: Camera) -> F64:
-    """Return where a camera stands (3,) m."""
-    position: F64 = -camera.camera_from_world[:3, :3].T @ camera.camera_from_world[:3, 3]
-    return position

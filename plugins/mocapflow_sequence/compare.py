@@ -74,8 +74,9 @@ def cmc(curves: F64) -> float:
 
 
 def rms(error: F64) -> float:
-    """Return the root of the mean square, NaN of nothing."""
-    return float(np.sqrt(np.mean(error**2))) if len(error) else np.nan
+    """Return the root of the mean square of what is finite, NaN of nothing."""
+    known = error[np.isfinite(error)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
 
 
 def rms_interval(error: F64) -> tuple[float, float]:

@@ -118,7 +118,7 @@ def _row(own: Ours, name: str, known: F64, aligned: F64, strides: Sequence[Cycle
     return {
         "angle": name,
         **compare.figures(curve, known, sd, frame),
-        "rms_unsmoothed_deg": compare.rms((raw - known)[np.isfinite(raw - known)]),
+        "rms_unsmoothed_deg": compare.rms(raw - known),
         "rms_aligned_deg": compare.rms(error - np.mean(error)) if len(error) else np.nan,
         "cycles": len(cycles.own(strides, name)),
         "cmc_cycles": cycles.across(strides, curve, known, name),

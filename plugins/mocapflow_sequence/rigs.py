@@ -11,7 +11,7 @@ import numpy as np
 from mocapflow.geometry.registration import Registration
 from mocapflow.io import markers
 from mocapflow.records import F64, array, record
-from mocapflow_sequence import comparison_plots, layout, stick, tables
+from mocapflow_sequence import compare, comparison_plots, layout, stick, tables
 from mocapflow_sequence.alignment import resampled
 from mocapflow_sequence.ours import Ours
 from mocapflow_sequence.references import Reference
@@ -89,13 +89,13 @@ def _figures(found: Registration, by: str) -> dict[str, Any]:
         "rotation": found.rotation,
         "translation_m": found.translation,
         "scale": found.scale,
-        "residual_rms_mm": 1000 * _rms(found.residual),
-        "leave_one_out_rms_mm": 1000 * _rms(found.left_out),
+        "residual_rms_mm": 1000 * compare.rms(found.residual),
+        "leave_one_out_rms_mm": 1000 * compare.rms(found.left_out),
     }
 
 
 def _notes(found: Registration, by: str, measured: bool) -> tuple[str, ...]:
-    residual, left_out = 1000 * _rms(found.residual), 1000 * _rms(found.left_out)
+    residual, left_out = 1000 * compare.rms(found.residual), 1000 * compare.rms(found.left_out)
     said = (
         f"rigs registered by {by}: residual {residual:.1f} mm, leave-one-out {left_out:.1f} mm, scale {found.scale:.4f}"
     )
@@ -105,8 +105,3 @@ def _notes(found: Registration, by: str, measured: bool) -> tuple[str, ...]:
         else ""
     )
     return (said, odd) if odd else (said,)
-
-
-def _rms(values: F64) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan

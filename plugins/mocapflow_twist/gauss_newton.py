@@ -11,7 +11,7 @@ from mocapflow.assets import GarmentMesh
 from mocapflow.components import ClothFitter, pool
 from mocapflow.data import Cloth, Estimate, Frame, Matches, Past, PoseBatch, Segmentation, Surface, Turn
 from mocapflow.geometry.differences import drape_differences
-from mocapflow.geometry.misfit import at, dressed, misfit, outlines
+from mocapflow.geometry.misfit import bilinear, dressed, misfit, outlines
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64, Bool
 from mocapflow_twist import solve
@@ -138,11 +138,11 @@ class Task(NamedTuple):
         """Return the points of the outline, each with where the distance field says the silhouette is."""
         parts, spacing = [], self.fitter.spacing_px
         for silhouette, contour in outlines(surface, self.segmentation, self.model.scene.cameras, spacing):
-            slope = np.stack([at(axis, contour.pixel) for axis in np.gradient(silhouette.distance)[::-1]], axis=1)
+            slope = np.stack([bilinear(axis, contour.pixel) for axis in np.gradient(silhouette.distance)[::-1]], axis=1)
             steep = np.linalg.norm(slope, axis=1)
             seen = steep > 0.5  # beyond the band the field is level
             outward = -slope[seen] / steep[seen, None]
-            inside = at(silhouette.distance, contour.pixel[seen])[:, None]
+            inside = bilinear(silhouette.distance, contour.pixel[seen])[:, None]
             parts.append(
                 (
                     1.0,
