@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, NonNegativeFloat, PositiveFloat
 
 from mocapflow.assets import Body, GarmentMesh
 from mocapflow.data import (
@@ -71,7 +71,7 @@ class Matcher(Component):
     """Pairs image points with surface points."""
 
     role: ClassVar[str] = "matcher"
-    share: Annotated[float, Field(gt=0)] = 1.0  # how much it counts beside other matchers
+    share: PositiveFloat = 1.0  # how much it counts beside other matchers
 
     @abstractmethod
     def match(
@@ -147,7 +147,7 @@ class Prior(Component):
     """A term the pose solver adds: limits, learned poses, smoothness."""
 
     role: ClassVar[str] = "prior"
-    weight: Annotated[float, Field(ge=0)] = 1.0  # factor on its energy
+    weight: NonNegativeFloat = 1.0  # factor on its energy
 
     @abstractmethod
     def residual(self, pose: Pose, past: Past, scene: Scene) -> Residual:

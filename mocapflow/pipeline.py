@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt, PositiveInt
 
 from mocapflow.components import BodyModel, Garment, Stage
 from mocapflow.errors import PipelineError, RecordingError
@@ -26,16 +26,16 @@ class Strict(BaseModel):
 class Frames(Strict):
     """The part of the recording to work on: `start` up to, without, `stop`."""
 
-    start: Annotated[int, Field(ge=0)] = 0  # the first frame
-    stop: Annotated[int, Field(ge=0)] | None = None  # where it ends, without this frame; null: with the recording
-    step: Annotated[int, Field(ge=1)] = 1  # takes every so many-th frame
+    start: NonNegativeInt = 0  # the first frame
+    stop: NonNegativeInt | None = None  # where it ends, without this frame; null: with the recording
+    step: PositiveInt = 1  # takes every so many-th frame
 
 
 class PartsFile(Strict):
     """A long recording in parts that are tracked each from a start of its own, and joined."""
 
-    count: Annotated[int, Field(ge=1)] = 1  # how many; they can be tracked side by side
-    overlap: Annotated[int, Field(ge=1)] = 30  # frames that neighbours both track
+    count: PositiveInt = 1  # how many; they can be tracked side by side
+    overlap: PositiveInt = 30  # frames that neighbours both track
     start: Any = None  # a component `stage`: starts the later parts; null: the one that starts the first
     join: Any = "join"  # a component `stage`
 

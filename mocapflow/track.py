@@ -7,7 +7,16 @@ from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    NonNegativeFloat,
+    NonNegativeInt,
+    PositiveFloat,
+    PositiveInt,
+    model_validator,
+)
 
 from mocapflow.assets import Background
 from mocapflow.checkpoint import Checkpoint
@@ -54,21 +63,18 @@ STEPS = ("decode", "predict", "drape", "segment", "solve", "cloth", "match", "re
 VIEWS = 2  # fewer than these do not fix a pose in space
 UNKNOWN = np.pi**2  # rad^2 and m^2, the variance where nothing was seen
 
-Positive = Annotated[float, Field(gt=0)]
-Count = Annotated[int, Field(ge=1)]
-
 
 class SteadyState(BaseModel):
     """When the loop counts as at rest."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
-    surface_mm: Positive = 0.5  # largest move of a body vertex from turn to turn, RMS move of the cloth
-    angle_deg: Positive = 0.1  # largest change of a joint angle
-    sigmas: Annotated[float, Field(ge=0)] = 0.0  # of the pose, in the mean: a turn that moves it less is rest too,
-    min_turns: Count = 2  # from this turn on, and not in the first frame; the first moves it from a prediction
-    turns: Count = 2  # in a row within both tolerances, then the frame is at rest
-    max_turns: Count = 8  # then the frame is left as it is
-    halvings: Annotated[int, Field(ge=0)] = 0  # at most, of a step that raises the functional; 0: it is taken whole
+    surface_mm: PositiveFloat = 0.5  # largest move of a body vertex from turn to turn, RMS move of the cloth
+    angle_deg: PositiveFloat = 0.1  # largest change of a joint angle
+    sigmas: NonNegativeFloat = 0.0  # of the pose, in the mean: a turn that moves it less is rest too,
+    min_turns: PositiveInt = 2  # from this turn on, and not in the first frame; the first moves it from a prediction
+    turns: PositiveInt = 2  # in a row within both tolerances, then the frame is at rest
+    max_turns: PositiveInt = 8  # then the frame is left as it is
+    halvings: NonNegativeInt = 0  # at most, of a step that raises the functional; 0: it is taken whole
 
     def limits(self) -> Steady:
         """Return the same in metres and radians."""

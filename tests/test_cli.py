@@ -151,7 +151,7 @@ def test_plugins(call):
 
 def test_settings(call):
     said = call("settings", "mocapflow").stdout
-    assert "| `steady.turns` | `int (≥ 1)` | `2` | | in a row within both tolerances" in said
+    assert "| `steady.turns` | `int (> 0)` | `2` | | in a row within both tolerances" in said
     assert "### contour_icp" not in call("settings", "someone-elses").stdout
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, ClassVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat
 
 from mocapflow.assets import Background
 from mocapflow.components import Segmenter
@@ -28,9 +28,6 @@ PERSON = "person"
 INNER_BAND_PX = 7.0  # while the contour moves
 CHANNELS: tuple[ChannelName, ...] = ("lab",)
 
-Positive = Annotated[float, Field(gt=0)]
-NonNegative = Annotated[float, Field(ge=0)]
-Count = Annotated[int, Field(ge=0)]
 
 STRIDE = 2
 
@@ -43,17 +40,17 @@ class BackgroundDifference(Segmenter):
 
     name: ClassVar[str] = "background"
 
-    spread_floor: Positive = 0.012  # smallest standard deviation of the empty scene, share of the range
+    spread_floor: PositiveFloat = 0.012  # smallest standard deviation of the empty scene, share of the range
     shadow_share: Annotated[float, Field(ge=0, lt=1)] = 0.2  # of the background; 0: shadows count as the person
-    shadow_reach_m: Positive = 2.0  # shadows fall on the floor within this distance of the person
+    shadow_reach_m: PositiveFloat = 2.0  # shadows fall on the floor within this distance of the person
     darkest_shadow: Annotated[float, Field(gt=0, lt=1)] = 0.5  # factor of L + 16, a and b in the deepest shadow
-    shadow_chroma: Positive = 0.005  # how far a shadow may be off the plate's chromaticity, share of the range
-    smooth_px: Positive = 1.0  # of the evidence before it is cut
-    hole_px: Count = 120  # holes up to this area are filled, in square px
-    reach_px: NonNegative = 60.0  # parts further from the projected model than this are someone else; 0: keep all
+    shadow_chroma: PositiveFloat = 0.005  # how far a shadow may be off the plate's chromaticity, share of the range
+    smooth_px: PositiveFloat = 1.0  # of the evidence before it is cut
+    hole_px: NonNegativeInt = 120  # holes up to this area are filled, in square px
+    reach_px: NonNegativeFloat = 60.0  # parts further from the projected model than this are someone else; 0: keep all
     smallest_part: Annotated[float, Field(ge=0, le=1)] = 0.01  # of the largest part's area; smaller parts are noise
-    refine_steps: Count = 4  # against the plate, then as many with local statistics on both sides
-    length_weight: NonNegative = 0.5  # of the boundary's length in the refinement
+    refine_steps: NonNegativeInt = 4  # against the plate, then as many with local statistics on both sides
+    length_weight: NonNegativeFloat = 0.5  # of the boundary's length in the refinement
     band_px: Annotated[float, Field(ge=8)] = 12.0  # half width of the band in which the distance is computed
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, ClassVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, PositiveFloat, PositiveInt
 
 from mocapflow.components import Segmenter
 from mocapflow.data import Frame, FrameState, Past, Segmentation, Silhouette, Turn
@@ -26,9 +26,9 @@ class GrabCut(Segmenter):
 
     name: ClassVar[str] = "grabcut"
 
-    iterations: Annotated[int, Field(gt=0)] = 2  # of the cut
-    unsure_px: Annotated[float, Field(gt=0)] = 15.0  # half width of the band that is left to the cut
-    margin_px: Annotated[int, Field(gt=0)] = 60  # of the crop around the model
+    iterations: PositiveInt = 2  # of the cut
+    unsure_px: PositiveFloat = 15.0  # half width of the band that is left to the cut
+    margin_px: PositiveInt = 60  # of the crop around the model
     band_px: Annotated[float, Field(ge=8)] = 12.0  # half width of the band in which the distance is computed
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Annotated, ClassVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
 from mocapflow.components import pool
 from mocapflow.data import Frame, FrameState, Matches, Past, Segmentation, Surface, Turn
@@ -16,10 +16,6 @@ from mocapflow_levelset.inner import Search, inner_contours, told_apart
 from mocapflow_levelset.layers import COLOURS, gathered, layer_of, shown
 from mocapflow_levelset.levelset import PERSON, LevelSet
 from mocapflow_levelset.surround import ROOM, beside, told
-
-Positive = Annotated[float, Field(gt=0)]
-NonNegative = Annotated[float, Field(ge=0)]
-Count = Annotated[int, Field(gt=0)]
 
 
 class Layered(LevelSet):
@@ -37,15 +33,15 @@ class Layered(LevelSet):
 
     name: ClassVar[str] = "layered"
     keep: Annotated[float, Field(ge=0, lt=1)] = 0.9  # of what is known of the colours, from frame to frame
-    grid_px: Count = 4  # colours are taken every so many px, so far from borders
-    inner_spacing_px: Positive = 4.0  # between the points of an edge of the model
-    calm_mm: Positive = 15.0  # change of the body in a turn below which the reach is the later one
-    first_reach_px: Count = 24  # how far along the normal the end of a part is looked for
-    later_reach_px: Count = 10  # the same once it is calm
+    grid_px: PositiveInt = 4  # colours are taken every so many px, so far from borders
+    inner_spacing_px: PositiveFloat = 4.0  # between the points of an edge of the model
+    calm_mm: PositiveFloat = 15.0  # change of the body in a turn below which the reach is the later one
+    first_reach_px: PositiveInt = 24  # how far along the normal the end of a part is looked for
+    later_reach_px: PositiveInt = 10  # the same once it is calm
     half_px: Annotated[int, Field(ge=2)] = 3  # on either side that colours have to agree over
-    least: Positive = 1.0  # mean log ratio of colours from which on a side is told from the other
-    colour_weight: NonNegative = 0.0  # of what learned colours say of person and room, beside the local statistics
-    inner_sigma_px: Positive = 1.0  # standard deviation of a point; that by the noise of the colours is added
+    least: PositiveFloat = 1.0  # mean log ratio of colours from which on a side is told from the other
+    colour_weight: NonNegativeFloat = 0.0  # of what learned colours say of person and room, beside the local statistics
+    inner_sigma_px: PositiveFloat = 1.0  # standard deviation of a point; that by the noise of the colours is added
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
         """Return the silhouettes, the inner contours, and the colours of layers for the frames to come.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, ClassVar
 
-from pydantic import Field
+from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
 from mocapflow.assets import Background, Camera
 from mocapflow.components import Segmenter
@@ -23,10 +23,6 @@ from mocapflow_levelset.shadows import floor_around
 from mocapflow_levelset.statistics import Window
 from mocapflow_levelset.view import Contact, Empty, Level, Matte, Method, View, find
 
-Count = Annotated[int, Field(gt=0)]
-NonNegativeCount = Annotated[int, Field(ge=0)]
-Positive = Annotated[float, Field(gt=0)]
-NonNegative = Annotated[float, Field(ge=0)]
 Share = Annotated[float, Field(ge=0, lt=1)]
 
 PERSON = "person"
@@ -50,36 +46,36 @@ class LevelSet(Segmenter):
 
     channels: tuple[ChannelName, ...] = Field(("lab",), min_length=1)  # independent, their likelihoods add
     decorrelate: bool = True  # turn the channels to the image's principal axes, where no empty scene is known
-    rho_px: Positive = 12.0  # Gaussian window of the local statistics; inf: one Gaussian per region
-    reduced_rho_px: Positive = 8.0  # at reduced sizes, in px of the shrunken image
-    cell_px: Count = 8  # the statistics are summed over cells of this size
-    stride_px: Count = 4  # and taken from every so many-th pixel; 1: from all
-    variance_floor: Positive = 0.03  # smallest standard deviation inside and outside, share of a channel's range
-    sigma_px: Positive = 1.5  # width of the smooth step
-    length_weight: NonNegative = 0.9  # nu; explicit steps are stable below 0.94
-    shape_weight: NonNegative = 0.05  # lambda: 0.05 clean, 0.1 with occlusion, 0.1-0.3 in heavy noise, 0 uncoupled
-    ratio_clip: Positive = 6.0  # bound on log p1/p2
-    time_step: Positive = 1.0  # of the explicit scheme
-    coarse_steps: NonNegativeCount = 8  # at a quarter of the size, on the first turn
-    half_steps: NonNegativeCount = 4  # at half the size
-    steps: Count = 3  # at full size
-    later_steps: Count = 3  # at full size on later turns, which start from the last turn's contour
-    contact_steps: NonNegativeCount = 10  # by chromaticity, where the body meets the floor and both are dark; 0: none
-    contact_px: Positive = 6.0  # to either side of the outline there
-    matte_px: NonNegativeCount = 2  # to either side of an edge, where pixels mix person and empty room; 0: no use of it
-    keep_mm: NonNegative = 5.0  # change of the body in a turn below which the silhouettes stay; 0: always found anew
-    statistics_every: Count = 4  # steps between estimates of the colours
-    redistance_every: Count = 4  # steps between repairs of the distance function
+    rho_px: PositiveFloat = 12.0  # Gaussian window of the local statistics; inf: one Gaussian per region
+    reduced_rho_px: PositiveFloat = 8.0  # at reduced sizes, in px of the shrunken image
+    cell_px: PositiveInt = 8  # the statistics are summed over cells of this size
+    stride_px: PositiveInt = 4  # and taken from every so many-th pixel; 1: from all
+    variance_floor: PositiveFloat = 0.03  # smallest standard deviation inside and outside, share of a channel's range
+    sigma_px: PositiveFloat = 1.5  # width of the smooth step
+    length_weight: NonNegativeFloat = 0.9  # nu; explicit steps are stable below 0.94
+    shape_weight: NonNegativeFloat = 0.05  # lambda: 0.05 clean, 0.1 with occlusion, 0.1-0.3 in heavy noise, 0 uncoupled
+    ratio_clip: PositiveFloat = 6.0  # bound on log p1/p2
+    time_step: PositiveFloat = 1.0  # of the explicit scheme
+    coarse_steps: NonNegativeInt = 8  # at a quarter of the size, on the first turn
+    half_steps: NonNegativeInt = 4  # at half the size
+    steps: PositiveInt = 3  # at full size
+    later_steps: PositiveInt = 3  # at full size on later turns, which start from the last turn's contour
+    contact_steps: NonNegativeInt = 10  # by chromaticity, where the body meets the floor and both are dark; 0: none
+    contact_px: PositiveFloat = 6.0  # to either side of the outline there
+    matte_px: NonNegativeInt = 2  # to either side of an edge, where pixels mix person and empty room; 0: no use of it
+    keep_mm: NonNegativeFloat = 5.0  # change of the body in a turn below which the silhouettes stay; 0: found anew
+    statistics_every: PositiveInt = 4  # steps between estimates of the colours
+    redistance_every: PositiveInt = 4  # steps between repairs of the distance function
     band_px: Annotated[float, Field(ge=8)] = 12.0  # half width of the band in which the distance is computed
-    border_px: NonNegativeCount = 3  # left out at the image's border
-    margin_px: Count = 40  # of the crop around the start contour
+    border_px: NonNegativeInt = 3  # left out at the image's border
+    margin_px: PositiveInt = 40  # of the crop around the start contour
     use_background: bool = True  # take the outside's density from the empty scene, where it is known
-    spread_floor: Positive = 0.012  # smallest standard deviation of the empty scene, share of the range
-    calm_px: NonNegative = 1.0  # smoothing of the image before it is compared with the empty scene
+    spread_floor: PositiveFloat = 0.012  # smallest standard deviation of the empty scene, share of the range
+    calm_px: NonNegativeFloat = 1.0  # smoothing of the image before it is compared with the empty scene
     shadow_share: Share = 0.5  # of the background; 0: shadows count as changes
-    shadow_reach_m: Positive = 2.0  # shadows fall on the floor within this distance of the person
+    shadow_reach_m: PositiveFloat = 2.0  # shadows fall on the floor within this distance of the person
     darkest_shadow: Annotated[float, Field(gt=0, lt=1)] = 0.5  # factor of L + 16, a and b in the deepest shadow
-    shadow_chroma: Positive = 0.005  # how far a shadow may be off the plate's chromaticity, share of the range
+    shadow_chroma: PositiveFloat = 0.005  # how far a shadow may be off the plate's chromaticity, share of the range
     stranger: float = -6.0  # log density below which no region calls a pixel more unlikely
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:

@@ -9,7 +9,7 @@ from weakref import WeakKeyDictionary
 from mocapflow_draping.forces import thickness
 from mocapflow_draping.kinematic import Fitting, Kinematic
 from mocapflow_draping.parts import posed_parts
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import Field, NonNegativeFloat, PositiveFloat, PrivateAttr, model_validator
 
 from mocapflow.assets import GarmentMesh
 from mocapflow.components import Draper
@@ -32,10 +32,10 @@ class Xpbd(Draper):
     """
 
     name: ClassVar[str] = "xpbd"
-    skin_m: Annotated[float, Field(ge=0)] = 0.005  # room between skin and cloth of no thickness
+    skin_m: NonNegativeFloat = 0.005  # room between skin and cloth of no thickness
     rate_hz: Annotated[float, Field(ge=60)] = 960.0  # steps of the solver per second
-    move_s: Annotated[float, Field(gt=0)] = 0.3  # in which the body comes from its last pose, or from rest
-    rest_s: Annotated[float, Field(ge=0)] = 0.3  # in which the cloth comes to rest
+    move_s: PositiveFloat = 0.3  # in which the body comes from its last pose, or from rest
+    rest_s: NonNegativeFloat = 0.3  # in which the cloth comes to rest
     moves_like: Kinematic = Kinematic(sweeps=4)  # whose strands, distance fields and velocities it has
     _simulations: WeakKeyDictionary[Fitting, dict[int, Simulation]] = PrivateAttr(default_factory=WeakKeyDictionary)
 

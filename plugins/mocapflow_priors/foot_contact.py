@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import PositiveFloat
 
 from mocapflow.components import Prior
 from mocapflow.data import Past, Pose, Residual
@@ -13,8 +13,6 @@ from mocapflow.records import F64
 from mocapflow.scene import Scene
 from mocapflow_priors.rows import whitened
 from mocapflow_priors.soles import FEET, lowest_points
-
-Positive = Annotated[float, Field(gt=0)]
 
 
 class FootContact(Prior):
@@ -28,8 +26,8 @@ class FootContact(Prior):
 
     name: ClassVar[str] = "foot_contact"
     height_m: float = 0.0  # of the floor, world z
-    sd_mm: Positive = 1.0  # standard deviation of the height of a foot that stands
-    reach_mm: Positive = 4.0  # height at which the pull gives way (Geman-McClure)
+    sd_mm: PositiveFloat = 1.0  # standard deviation of the height of a foot that stands
+    reach_mm: PositiveFloat = 4.0  # height at which the pull gives way (Geman-McClure)
     parts: tuple[str, ...] = FEET  # joints that carry the soles
 
     def residual(self, pose: Pose, past: Past, scene: Scene) -> Residual:

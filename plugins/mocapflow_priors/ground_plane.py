@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
-from pydantic import Field
+from pydantic import PositiveFloat
 
 from mocapflow.components import Prior
 from mocapflow.data import Past, Pose, Residual
@@ -12,16 +12,14 @@ from mocapflow.scene import Scene
 from mocapflow_priors.rows import soft_excess, whitened
 from mocapflow_priors.soles import FEET, lowest_points
 
-Positive = Annotated[float, Field(gt=0)]
-
 
 class GroundPlane(Prior):
     """A soft floor at one height: the lowest point of each part of the feet is pushed up from under it."""
 
     name: ClassVar[str] = "ground_plane"
     height_m: float = 0.0  # of the floor, world z
-    sd_mm: Positive = 10.0  # standard deviation of a point under the floor
-    slack_mm: Positive = 5.0  # depth within which the floor is soft
+    sd_mm: PositiveFloat = 10.0  # standard deviation of a point under the floor
+    slack_mm: PositiveFloat = 5.0  # depth within which the floor is soft
     parts: tuple[str, ...] = FEET  # joints that carry the soles
 
     def residual(self, pose: Pose, past: Past, scene: Scene) -> Residual:

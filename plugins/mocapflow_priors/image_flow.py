@@ -9,7 +9,7 @@ import numpy as np
 from mocapflow_matching.carried import carried_points, distances
 from mocapflow_matching.robust import robust_weights
 from mocapflow_twist.solver import TwistGaussNewton
-from pydantic import Field
+from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
 from mocapflow.components import PoseSolver, Predictor
 from mocapflow.data import CLOTH, NO_CLOTH, Frame, Matches, Past, Pose, Surface, Turn
@@ -18,8 +18,6 @@ from mocapflow.model import ClothedModel
 from mocapflow.scene import Scene
 from mocapflow.track import believed
 from mocapflow_priors.constant_velocity import ConstantVelocity
-
-Positive = Annotated[float, Field(gt=0)]
 
 
 class ImageFlowPredictor(Predictor):
@@ -33,13 +31,13 @@ class ImageFlowPredictor(Predictor):
 
     otherwise: Predictor = ConstantVelocity()  # guesses what no point shows
     pose_solver: PoseSolver = TwistGaussNewton(iterations=8, angle_damping_deg=20.0)  # of the pose that the points show
-    sigma_px: Positive = 1.0  # standard deviation of a tracked point
-    scale: Positive = 2.0  # standard deviations beyond which a point pulls no harder (Huber)
-    cloth_share: Annotated[float, Field(ge=0)] = 0.2  # of a point on cloth that touches the skin; other cloth: none
-    touching_mm: Positive = 20.0  # distance from the skin within which cloth touches it
-    least_points: Annotated[int, Field(ge=1)] = 30  # fewer are not believed
+    sigma_px: PositiveFloat = 1.0  # standard deviation of a tracked point
+    scale: PositiveFloat = 2.0  # standard deviations beyond which a point pulls no harder (Huber)
+    cloth_share: NonNegativeFloat = 0.2  # of a point on cloth that touches the skin; other cloth: none
+    touching_mm: PositiveFloat = 20.0  # distance from the skin within which cloth touches it
+    least_points: PositiveInt = 30  # fewer are not believed
     least_agreement: Annotated[float, Field(ge=0, le=1)] = 0.5  # share of points that come to lie within `agreeing_px`
-    agreeing_px: Positive = 4.0  # distance to where it was tracked
+    agreeing_px: PositiveFloat = 4.0  # distance to where it was tracked
 
     def predict(self, frame: Frame, past: Past, scene: Scene) -> Pose:
         """Return the pose the flow leads to, or what `otherwise` predicts."""

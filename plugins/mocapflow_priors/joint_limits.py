@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import numpy as np
-from pydantic import Field
+from pydantic import PositiveFloat
 
 from mocapflow.components import Prior
 from mocapflow.data import Past, Pose, Residual
@@ -18,8 +16,8 @@ class JointLimits(Prior):
 
     name = "joint_limits"
 
-    sd_deg: Annotated[float, Field(gt=0)] = 2.0  # standard deviation of an angle beyond its limits
-    slack_deg: Annotated[float, Field(gt=0)] = 2.0  # excess within which the wall is soft
+    sd_deg: PositiveFloat = 2.0  # standard deviation of an angle beyond its limits
+    slack_deg: PositiveFloat = 2.0  # excess within which the wall is soft
 
     def residual(self, pose: Pose, past: Past, scene: Scene) -> Residual:
         """Return one row per joint angle, zero within the limits."""

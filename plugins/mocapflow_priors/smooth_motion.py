@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import numpy as np
-from pydantic import Field
+from pydantic import PositiveFloat
 
 from mocapflow.components import Prior
 from mocapflow.data import Past, Pose, Residual
@@ -15,7 +13,6 @@ from mocapflow.scene import Scene
 from mocapflow_priors.extrapolate import continued, interval
 from mocapflow_priors.rows import whitened
 
-Positive = Annotated[float, Field(gt=0)]
 RATE = 30.0  # Hz that the standard deviations are stated for
 
 
@@ -29,9 +26,9 @@ class SmoothMotion(Prior):
 
     name = "smooth_motion"
 
-    angle_sd_deg: Positive = 5.0  # of every joint angle
-    root_sd_deg: Positive = 3.0  # of the turn of the root
-    root_sd_mm: Positive = 10.0  # of the place of the root
+    angle_sd_deg: PositiveFloat = 5.0  # of every joint angle
+    root_sd_deg: PositiveFloat = 3.0  # of the turn of the root
+    root_sd_mm: PositiveFloat = 10.0  # of the place of the root
 
     def residual(self, pose: Pose, past: Past, scene: Scene) -> Residual:
         """Return three rows for the root's turn, three for its place and one per joint angle."""

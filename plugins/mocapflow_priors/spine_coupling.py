@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import PositiveFloat
 
 from mocapflow.assets import Body
 from mocapflow.components import Prior
@@ -25,7 +25,7 @@ class SpineCoupling(Prior):
     name: ClassVar[str] = "spine_coupling"
     lower: str = "spine"  # a joint
     upper: str = "chest"  # another joint
-    sd_deg: Annotated[float, Field(gt=0)] = 3.0  # 2.5 to 2.8 in motion capture of walks, squats, kicks, jumps
+    sd_deg: PositiveFloat = 3.0  # 2.5 to 2.8 in motion capture of walks, squats, kicks, jumps
 
     def residual(self, pose: Pose, past: Past, scene: Scene) -> Residual:
         """Return one row for each pair of angles of the same name."""

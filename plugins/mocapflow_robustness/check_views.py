@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import Field
+from pydantic import Field, PositiveFloat
 
 from mocapflow.assets import Background
 from mocapflow.components import Stage
@@ -31,7 +31,7 @@ class CheckViews(Stage):
 
     name: ClassVar[str] = "check_views"
     extent: ClassVar[Literal["all"]] = "all"  # so that a longer run finds the same
-    longest_s: Annotated[float, Field(gt=0)] = 0.17  # of a burst of wrong pictures
+    longest_s: PositiveFloat = 0.17  # of a burst of wrong pictures
     jump: Factor = 2.0  # how much larger than the motion around it a jump is, in the view that shows it best
     joint_jump: Factor = 1.3  # and in a view that jumps together with that one
 

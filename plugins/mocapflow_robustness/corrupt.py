@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal
 from zlib import crc32
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, NonNegativeInt, model_validator
 
 from mocapflow.components import Stage
 from mocapflow.data import Frame
@@ -20,7 +20,6 @@ from mocapflow_robustness.events import Event
 from mocapflow_robustness.tape import Tape
 
 Share = Annotated[float, Field(ge=0, le=1)]
-Count = Annotated[int, Field(ge=0)]
 Tapes = dict[tuple[Event, str], Tape]
 
 
@@ -32,10 +31,13 @@ class Corrupt(Stage):
     """
 
     name: ClassVar[str] = "corrupt"
-    seed: Count = 0  # of the noise and of where rectangles lie
+    seed: NonNegativeInt = 0  # of the noise and of where rectangles lie
     noise: Share = 0.0  # share of the pixels that get a random colour
     noise_kind: Literal["replaced", "added"] = "replaced"  # added: noise up to that share of the range, on every pixel
-    rectangles: tuple[Count, Count] = (0, 0)  # grey ones, at least and at most so many on each picture
+    rectangles: tuple[NonNegativeInt, NonNegativeInt] = (
+        0,
+        0,
+    )  # grey ones, at least and at most so many a picture
     stripe: Share = 0.0  # height of a black stripe, share of the picture
     stripe_centre: Share = 0.5  # share of the picture from its top
     events: tuple[Event, ...] = ()  # a later one goes before an earlier one

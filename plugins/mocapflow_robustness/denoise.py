@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numba
 import numpy as np
-from pydantic import Field
+from pydantic import PositiveFloat, PositiveInt
 
 from mocapflow.components import Stage
 from mocapflow.data import Frame
@@ -18,8 +18,6 @@ from mocapflow.records import U8, Bool
 BLOCK_PX = 16  # noise is everywhere alike: its share is the median over blocks of the picture
 LEAST_NOISE = 0.02  # share of lonely pixels; fine texture makes 0.004 at most on the recordings that we have
 CHANCE = 1e-9  # that noise spares a whole neighbourhood
-
-Count = Annotated[int, Field(ge=1)]
 
 
 class Denoise(Stage):
@@ -32,10 +30,10 @@ class Denoise(Stage):
     """
 
     name: ClassVar[str] = "denoise"
-    radius_px: Count = 2  # of the square of neighbours that are asked
-    alike: Count = 16  # grey levels: neighbours agree that are so near in every colour
-    company: Count = 2  # neighbours that have to agree with a pixel
-    fill_px: Annotated[float, Field(gt=0)] = 1.0  # standard deviation of the window a lonely pixel is filled from
+    radius_px: PositiveInt = 2  # of the square of neighbours that are asked
+    alike: PositiveInt = 16  # grey levels: neighbours agree that are so near in every colour
+    company: PositiveInt = 2  # neighbours that have to agree with a pixel
+    fill_px: PositiveFloat = 1.0  # standard deviation of the window a lonely pixel is filled from
 
     def run(self, recording: Recording) -> Recording:
         """Return the recording as it looks without noise."""

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
-
-Count = Annotated[int, Field(ge=1)]
+from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt, PositiveInt
 
 
 class Event(BaseModel):
@@ -16,10 +14,10 @@ class Event(BaseModel):
     what: Literal[
         "black", "torn", "covered", "frozen", "late", "other_time", "other_camera", "dropped"
     ]  # to the pictures
-    first: Annotated[int, Field(ge=0)] = 0  # frame
-    count: Count | None = None  # frames; none: for good
+    first: NonNegativeInt = 0  # frame
+    count: PositiveInt | None = None  # frames; none: for good
     views: tuple[str, ...] = ()  # names of cameras; none: all of them
-    by: Count = 3  # late: so many frames; other_time: so many frames ahead, or back where there are none
+    by: PositiveInt = 3  # late: so many frames; other_time: so many frames ahead, or back where there are none
     share: Annotated[float, Field(gt=0, le=1)] = 0.5  # covered, and known to be: the lower part of the picture
 
     def holds(self, index: int, view: str) -> bool:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import PositiveFloat, PositiveInt
 
 from mocapflow.assets import Camera, Rig
 from mocapflow.components import Stage
@@ -20,7 +20,6 @@ from mocapflow_sequence.detections import persons, spread
 from mocapflow_sequence.triangulate import triangulate
 
 LOG = logging.getLogger("mocapflow")
-Positive = Annotated[float, Field(gt=0)]
 
 
 class AlignCameras(Stage):
@@ -31,10 +30,10 @@ class AlignCameras(Stage):
     """
 
     name: ClassVar[str] = "align_cameras"
-    frames: Annotated[int, Field(ge=1)] = 30  # spread over the recording; 1: the first alone
-    spread_deg: Positive = 0.5  # standard deviation of what a camera may have turned
-    sigma_px: Positive = 6.0  # of a keypoint
-    least_px: Positive = 6.0  # a rig whose views move by less is left as it is
+    frames: PositiveInt = 30  # spread over the recording; 1: the first alone
+    spread_deg: PositiveFloat = 0.5  # standard deviation of what a camera may have turned
+    sigma_px: PositiveFloat = 6.0  # of a keypoint
+    least_px: PositiveFloat = 6.0  # a rig whose views move by less is left as it is
 
     def run(self, recording: Recording) -> Rig:
         """Return the cameras, corrected where they need it.

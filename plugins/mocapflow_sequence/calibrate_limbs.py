@@ -9,7 +9,7 @@ from functools import partial
 from typing import Annotated, ClassVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, PositiveFloat, PositiveInt
 
 from mocapflow.assets import Background, Body
 from mocapflow.components import Draper, Matcher, Segmenter, Stage
@@ -33,7 +33,6 @@ from mocapflow_sequence.start_from_file import calm
 LOG = logging.getLogger("mocapflow")
 # near the solution matchers reach less far and give up what is off
 AT_REST = Change(body=0.0, cloth=0.0, angles=0.0, sigmas=0.0)
-Positive = Annotated[float, Field(gt=0)]
 
 
 class CalibrateLimbs(Stage):
@@ -51,10 +50,10 @@ class CalibrateLimbs(Stage):
     proportions: tuple[str, ...] = (  # those that are fitted
         "girth", "trunk", "shoulder_width", "thigh", "shank", "foot", "upper_arm", "forearm",
     )  # fmt: skip
-    spread: Positive = 0.02  # standard deviation of a log proportion about the body's: of a scan; 0.05 of a template
-    frames: Annotated[int, Field(ge=1)] = 10  # spread over the recording
-    passes: Annotated[int, Field(ge=1)] = 3  # times that the images are segmented; after the first, matching is calm
-    rounds: Annotated[int, Field(ge=1)] = 3  # matchings a pass
+    spread: PositiveFloat = 0.02  # standard deviation of a log proportion about a scan's; 0.05 about a template's
+    frames: PositiveInt = 10  # spread over the recording
+    passes: PositiveInt = 3  # times that the images are segmented; after the first, matching is calm
+    rounds: PositiveInt = 3  # matchings a pass
     independent: Annotated[float, Field(gt=0, le=1)] = 0.24  # share of a frame's contour pairs; all frames count as one
 
     def run(

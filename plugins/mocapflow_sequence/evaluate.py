@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import PositiveFloat
 
 from mocapflow.components import Stage
 from mocapflow.recording import Recording
@@ -41,7 +41,7 @@ class Evaluate(Stage):
 
     name: ClassVar[str] = "evaluate"
     reference: str = ""  # from the folder of the recording; empty: truth/angles.csv, or the one in reference/
-    longest_lag_s: Annotated[float, Field(gt=0)] = LONGEST_LAG  # of one system behind the other, that is looked for
+    longest_lag_s: PositiveFloat = LONGEST_LAG  # of one system behind the other, that is looked for
 
     def run(self, track: Track, scene: Scene, recording: Recording, run_folder: RunFolder) -> Evaluation:
         """Return the evaluation of the track."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping, Sequence
-from typing import Annotated, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import PositiveInt
 
 from mocapflow.assets import Body, Camera
 from mocapflow.components import Stage
@@ -41,7 +41,7 @@ class FitSubject(Stage):
     """
 
     name: ClassVar[str] = "fit_subject"
-    frames: Annotated[int, Field(ge=1)] = 16  # spread over the recording
+    frames: PositiveInt = 16  # spread over the recording
     trial: Literal["auto", "static", "recording"] = "auto"  # auto: both, if the standing trial shows the same person
     layout: Layout | None = None  # order of the keypoints; null: told by their number
 

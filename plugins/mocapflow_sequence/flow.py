@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from typing import Annotated, ClassVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, NonNegativeInt, PositiveFloat
 
 from mocapflow.assets import Background
 from mocapflow.components import Stage
@@ -14,7 +14,6 @@ from mocapflow.data import Flow, Frame, ImageFlow, ViewChecks
 from mocapflow.recording import Recording
 from mocapflow.records import F32, U8, Bool
 
-Positive = Annotated[float, Field(gt=0)]
 LEAST_CORNER = 0.005  # share of the best corner's strength
 BLOCK = 5  # px, over which a corner is judged
 
@@ -29,11 +28,11 @@ class FollowPoints(Stage):
     name: ClassVar[str] = "flow"
     causal: ClassVar[bool] = True
     points: Annotated[int, Field(ge=1, le=500)] = 500  # a view, at most
-    spacing_px: Positive = 3.0  # between points, at least
+    spacing_px: PositiveFloat = 3.0  # between points, at least
     window_px: Annotated[int, Field(ge=3)] = 11  # edge of the square that is compared
-    levels: Annotated[int, Field(ge=0)] = 4  # of the pyramid: each doubles the motion that can be followed
-    round_trip_px: Positive = 1.0  # how near a point has to come to where it was
-    difference: Positive = 20.0  # grey levels from the empty scene
+    levels: NonNegativeInt = 4  # of the pyramid: each doubles the motion that can be followed
+    round_trip_px: PositiveFloat = 1.0  # how near a point has to come to where it was
+    difference: PositiveFloat = 20.0  # grey levels from the empty scene
 
     def run(
         self, recording: Recording, background: Background | None = None, checks: ViewChecks | None = None

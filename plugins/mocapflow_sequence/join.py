@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import logging
 from dataclasses import replace
-from typing import Annotated, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import PositiveFloat
 
 from mocapflow.components import Stage
 from mocapflow.data import PoseBatch
@@ -30,7 +30,7 @@ class Join(Stage):
     """
 
     name: ClassVar[str] = "join"
-    tolerance_mm: Annotated[float, Field(gt=0)] = 20.0  # parts further apart where they are joined: a warning
+    tolerance_mm: PositiveFloat = 20.0  # parts further apart where they are joined: a warning
 
     def run(self, parts: tuple[Track, ...], scene: Scene) -> Track:
         """Return the joined track.

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import PositiveFloat
 
 from mocapflow.components import Stage
 from mocapflow.geometry import twists
@@ -17,7 +17,6 @@ from mocapflow.series import Numbers, changed
 from mocapflow_sequence.banded import difference_weights, minimise
 from mocapflow_sequence.lost import lost_rows
 
-Positive = Annotated[float, Field(gt=0)]
 LOST = 100.0  # rad^2 and m^2, the variance of a lost frame: its neighbours decide
 
 
@@ -31,9 +30,9 @@ class Smooth(Stage):
     """
 
     name: ClassVar[str] = "smooth"
-    angle_acceleration_deg_s2: Positive = 4000.0  # of every joint angle
-    root_acceleration_deg_s2: Positive = 2000.0  # of the turn of the root
-    root_acceleration_m_s2: Positive = 15.0  # of the root
+    angle_acceleration_deg_s2: PositiveFloat = 4000.0  # of every joint angle
+    root_acceleration_deg_s2: PositiveFloat = 2000.0  # of the turn of the root
+    root_acceleration_m_s2: PositiveFloat = 15.0  # of the root
 
     def run(self, track: Track) -> Track:
         """Return the smoothed track, which keeps the poses it was made from.

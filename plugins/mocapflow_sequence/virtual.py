@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field
+from pydantic import Field, PositiveInt
 
 from mocapflow.components import Stage
 from mocapflow.data import NO_CLOTH
@@ -23,7 +23,7 @@ class Virtual(Stage):
     name: ClassVar[str] = "virtual"
     width_px: Annotated[int, Field(ge=64, multiple_of=2)] = 640  # of the video
     height_px: Annotated[int, Field(ge=64, multiple_of=2)] = 480  # of the video
-    every: Annotated[int, Field(ge=1)] = 1  # takes every so many-th frame
+    every: PositiveInt = 1  # takes every so many-th frame
     codec: Literal["mp4v", "vp09"] = "mp4v"  # vp09 plays in browsers, mp4v is fast
 
     def run(self, track: Track, scene: Scene, run_folder: RunFolder) -> Files:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
-from pydantic import Field
+from pydantic import PositiveFloat, PositiveInt
 
 from mocapflow.assets import GarmentMesh
 from mocapflow.components import ClothFitter, pool
@@ -21,8 +21,6 @@ from mocapflow_twist.normal_equations import Equations, dense_equations
 RAISED, LOWERED = 10.0, 0.1  # what a rejected and an accepted step do to the damping
 TRIALS = 4  # times that the damping is raised before a step is given up
 
-Positive = Annotated[float, Field(gt=0)]
-
 
 class GaussNewton(ClothFitter):
     """Moves the outline of the cloth onto the silhouettes by its forces.
@@ -33,12 +31,12 @@ class GaussNewton(ClothFitter):
     """
 
     name: ClassVar[str] = "gauss_newton"
-    iterations: Annotated[int, Field(ge=1)] = 3  # steps, at most
-    sigma_px: Positive = 3.0  # standard deviation of the outline of cloth
-    correlation_px: Positive = 15.0  # length over which its errors agree
-    cloth_sd: Positive = 0.15  # standard deviation of each parameter about a calm garment, share of its range
-    damping: Positive = 1e-3  # share of the mean diagonal
-    spacing_px: Positive = 4.0  # between the points of the outline
+    iterations: PositiveInt = 3  # steps, at most
+    sigma_px: PositiveFloat = 3.0  # standard deviation of the outline of cloth
+    correlation_px: PositiveFloat = 15.0  # length over which its errors agree
+    cloth_sd: PositiveFloat = 0.15  # standard deviation of each parameter about a calm garment, share of its range
+    damping: PositiveFloat = 1e-3  # share of the mean diagonal
+    spacing_px: PositiveFloat = 4.0  # between the points of the outline
 
     def fit(
         self, frame: Frame, segmentation: Segmentation, estimate: Estimate, model: ClothedModel, past: Past, turn: Turn

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
 
 from mocapflow.components import PoseSolver, Prior
 from mocapflow.data import Estimate, FrameState, Matches, Past, Pose, Residual, Surface, Turn
@@ -20,7 +20,6 @@ from mocapflow_twist.motion import ClothMotion
 from mocapflow_twist.normal_equations import Equations
 from mocapflow_twist.problem import Anchor, Data, Guess, Problem, Quadratic
 
-Positive = Annotated[float, Field(gt=0)]
 TRIALS = 8  # times that the damping is raised before a step is given up
 RAISED, LOWERED = 10.0, 0.1  # what a rejected and an accepted step do to the damping
 LEAST_GAIN = 1e-14  # share of the energy below which a step is only rounding
@@ -34,26 +33,26 @@ class TwistGaussNewton(PoseSolver):
 
     name = "twist_gauss_newton"
 
-    iterations: Annotated[int, Field(ge=1)] = 10  # times that it matches anew, at most
-    steps_per_match: Annotated[int, Field(ge=1)] = 1  # steps with the same pairs
+    iterations: PositiveInt = 10  # times that it matches anew, at most
+    steps_per_match: PositiveInt = 1  # steps with the same pairs
     residual: Literal["image", "line"] = "image"  # pixels, or distance to projection rays in space
-    line_sigma_mm: Positive = 3.0  # standard deviation of every distance to a ray
-    damping: Annotated[float, Field(ge=0)] = 1e-4  # share of the mean diagonal; ten times more after a worse step
-    damping_per_turn: Annotated[float, Field(gt=0)] = 1.0  # factor at each turn of the loop: above 1, exact then gentle
-    first_damping: Annotated[float, Field(ge=0)] = 0.0  # of the first frame's first turn at least: its start is far off
-    first_damping_per_turn: Annotated[float, Field(gt=0)] = 0.3  # factor at each further turn: gentle, then exact
-    cap_deg: Positive = 10.0  # a step, each angle
-    cap_mm: Positive = 100.0  # a step, the root
-    correlation_px: Annotated[float, Field(ge=0)] = 15.0  # length over which contour errors agree; 0: independent
+    line_sigma_mm: PositiveFloat = 3.0  # standard deviation of every distance to a ray
+    damping: NonNegativeFloat = 1e-4  # share of the mean diagonal; ten times more after a worse step
+    damping_per_turn: PositiveFloat = 1.0  # factor at each turn of the loop: above 1, exact then gentle
+    first_damping: NonNegativeFloat = 0.0  # of the first frame's first turn at least: its start is far off
+    first_damping_per_turn: PositiveFloat = 0.3  # factor at each further turn: gentle, then exact
+    cap_deg: PositiveFloat = 10.0  # a step, each angle
+    cap_mm: PositiveFloat = 100.0  # a step, the root
+    correlation_px: NonNegativeFloat = 15.0  # length over which contour errors agree; 0: independent
     balance_views: bool = False  # every view counts the same
     cloth_unknowns: bool = False  # also solves for the cloth parameters
     redrape: Literal["every", "once"] = "every"  # drape at each new pose, or once and move the cloth linearly
     cloth_jacobian: Literal["every", "once"] = "once"  # how often the motion of the cloth is measured
-    root_damping_m: Positive = 0.1  # standard deviation about the prediction
-    root_damping_deg: Positive = 11.5  # likewise
-    angle_damping_deg: Positive = 60.0  # likewise, of every joint angle
-    cloth_sd: Positive = 0.06  # standard deviation of cloth parameters about a calm garment, share of their range
-    stop_sigmas: Annotated[float, Field(ge=0)] = 0.02  # standard deviations, in the mean: no smaller step is taken
+    root_damping_m: PositiveFloat = 0.1  # standard deviation about the prediction
+    root_damping_deg: PositiveFloat = 11.5  # likewise
+    angle_damping_deg: PositiveFloat = 60.0  # likewise, of every joint angle
+    cloth_sd: PositiveFloat = 0.06  # standard deviation of cloth parameters about a calm garment, share of their range
+    stop_sigmas: NonNegativeFloat = 0.02  # standard deviations, in the mean: no smaller step is taken
 
     def solve(
         self,
