@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from difflib import get_close_matches
 
 
@@ -65,6 +65,10 @@ class ComponentFailed(MocapflowError):
 def alternatives(wanted: str, available: Iterable[str]) -> str:
     """Return the hint `available: a, b — did you mean 'a'?` for a name that is not there."""
     names = sorted(available)
-    close = get_close_matches(wanted, names, n=1)
-    guess = f" — did you mean '{close[0]}'?" if close else ""
-    return f"available: {', '.join(names) or 'none'}{guess}"
+    return " — ".join(filter(None, [f"available: {', '.join(names) or 'none'}", guess(wanted, names)]))
+
+
+def guess(wanted: str, available: Collection[str]) -> str:
+    """Return `did you mean 'a'?`, or nothing where no name is like the one that is wanted."""
+    close = get_close_matches(wanted, available, n=1)
+    return f"did you mean '{close[0]}'?" if close else ""

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import pluggy
@@ -112,16 +111,6 @@ class Registry:
         """Return the plugin that provides a component class."""
         return self._origins[cls]
 
-    def culprit(self, traceback: TracebackType | None) -> Origin | None:
-        """Return the plugin of the innermost frame of a traceback that lies in plugin code."""
-        packages = {_package(plugin): origin for origin, plugin in self._plugins.items()}
-        found = None
-        while traceback is not None:
-            module = traceback.tb_frame.f_globals.get("__name__", "")
-            found = packages.get(module.partition(".")[0], found)
-            traceback = traceback.tb_next
-        return found
-
     def add(self, origin: Origin, load: Callable[[], Any]) -> None:
         """Load and register one plugin; remember its failure and go on."""
         try:
@@ -171,8 +160,3 @@ def load_registry(local_files: Iterable[Path] = ()) -> Registry:
 
 def _distribution(entry: EntryPoint) -> str:
     return entry.dist.name if entry.dist else ""
-
-
-def _package(plugin: Any) -> str:
-    name: str = getattr(plugin, "__name__", type(plugin).__module__)
-    return name.partition(".")[0]

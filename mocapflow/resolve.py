@@ -12,7 +12,7 @@ from pydantic.errors import PydanticUserError
 
 from mocapflow.components import Component
 from mocapflow.documents import Document, Steps, dotted
-from mocapflow.errors import MocapflowError, PipelineError, alternatives
+from mocapflow.errors import MocapflowError, PipelineError, guess
 from mocapflow.registry import Registry
 
 
@@ -100,10 +100,9 @@ class Resolver:
             return self.located(PipelineError(f"{_title(cls)} needs {described}"), steps)
         if first["type"] == "extra_forbidden":
             owner = _model_at(cls, location[:-1])
-            known = [name for name in owner.model_fields]
-            message = f"unknown setting of {_title(owner)} ({', '.join(sorted(known)) or 'it has none'})"
-            _, dash, guess = alternatives(str(location[-1]), known).partition(" — ")
-            return self.located(PipelineError(message, hint=guess if dash else ""), (*steps, *location))
+            known = sorted(owner.model_fields)
+            message = f"unknown setting of {_title(owner)} ({', '.join(known) or 'it has none'})"
+            return self.located(PipelineError(message, hint=guess(str(location[-1]), known)), (*steps, *location))
         while location and not self._is_setting(cls, location, steps):
             location = location[:-1]  # pydantic also names the members of a union
         reason = first["msg"].removeprefix("Value error, ")

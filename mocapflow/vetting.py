@@ -6,14 +6,13 @@ import hashlib
 import importlib.util
 import inspect
 import sys
-from difflib import get_close_matches
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from mocapflow import hookspecs
 from mocapflow.components import Component, Stage
-from mocapflow.errors import PluginError
+from mocapflow.errors import PluginError, guess
 
 
 def import_file(path: Path) -> ModuleType:
@@ -43,9 +42,7 @@ def check_hooks(plugin: Any) -> None:
         marked = getattr(function, "mocapflow_impl", None)
         hook = (marked or {}).get("specname") or name
         if marked and hook not in known:
-            close = get_close_matches(hook, known, n=1)
-            guess = f" — did you mean '{close[0]}'?" if close else ""
-            raise PluginError(f"unknown hook '{hook}'{guess}")
+            raise PluginError(" — ".join(filter(None, [f"unknown hook '{hook}'", guess(hook, known)])))
         if name in known and not marked:
             raise PluginError(f"{name} lacks @mocapflow.hookimpl")
 

@@ -149,18 +149,6 @@ def test_a_hook_under_another_name():
     assert registry_of((OURS, lambda: plugin)).names("garment") == ("cape",)
 
 
-def test_the_culprit_is_the_innermost_plugin(tmp_path):
-    file = tmp_path / "bad_draper.py"
-    file.write_text("def fail():\n    import json\n    json.loads('{')\n")
-    registry = load_registry([file])
-    origin = registry.plugins[-1]
-    try:
-        registry._plugins[origin].fail()
-    except ValueError as error:
-        assert registry.culprit(error.__traceback__) == origin
-    assert registry.culprit(None) is None
-
-
 def test_every_provider_has_a_role():
     from mocapflow import hookspecs
 

@@ -41,10 +41,3 @@ def error(points: F64, lines: F64) -> F64:
     Source: Rosenhahn 2008, Eq. (12.3)
     """
     return np.cross(points, lines[:, :3]) - lines[:, 3:]
-
-
-def closest(points: F64, lines: F64) -> F64:
-    """Return the point of each line (M, 6) that is closest to each point (M, 3), in m."""
-    n, m = lines[:, :3], lines[:, 3:]
-    nearest: F64 = np.cross(n, m) + np.sum(n * points, axis=1, keepdims=True) * n
-    return nearest

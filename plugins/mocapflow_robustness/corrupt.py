@@ -34,10 +34,7 @@ class Corrupt(Stage):
     seed: NonNegativeInt = 0  # of the noise and of where rectangles lie
     noise: Share = 0.0  # share of the pixels that get a random colour
     noise_kind: Literal["replaced", "added"] = "replaced"  # added: noise up to that share of the range, on every pixel
-    rectangles: tuple[NonNegativeInt, NonNegativeInt] = (
-        0,
-        0,
-    )  # grey ones, at least and at most so many a picture
+    rectangles: tuple[NonNegativeInt, NonNegativeInt] = (0, 0)  # grey ones, at least and at most, on each picture
     stripe: Share = 0.0  # height of a black stripe, share of the picture
     stripe_centre: Share = 0.5  # share of the picture from its top
     events: tuple[Event, ...] = ()  # a later one goes before an earlier one
