@@ -11,6 +11,7 @@ from mocapflow.assets import Body, Rig
 from mocapflow.components import Stage
 from mocapflow.errors import MocapflowError, PipelineError, PluginError, alternatives
 from mocapflow.pipeline import NamedStage, Pipeline
+from mocapflow.registry import Registry
 
 SUPPLIED = {"Scene": "scene", "Recording": "recording", "Checkpoint": "checkpoint", "RunFolder": "run folder"}
 
@@ -28,7 +29,8 @@ def wire(pipeline: Pipeline) -> dict[str, dict[str, Source]]:
     Raises:
         PipelineError: no earlier stage makes what a stage needs, or `from` names a wrong one.
     """
-    return {named.label: _wire_stage(named, pipeline.stages[:index]) for index, named in enumerate(pipeline.stages)}
+    stages = pipeline.stages
+    return {named.label: _wire_stage(named, stages[:at], pipeline.registry) for at, named in enumerate(stages)}
 
 
 def body_source(pipeline: Pipeline, label: str) -> str | None:
@@ -51,7 +53,7 @@ def _before(pipeline: Pipeline, label: str) -> Sequence[NamedStage]:
     return pipeline.stages[: labels.index(label)]
 
 
-def _wire_stage(named: NamedStage, earlier: Sequence[NamedStage]) -> dict[str, Source]:
+def _wire_stage(named: NamedStage, earlier: Sequence[NamedStage], registry: Registry) -> dict[str, Source]:
     if named.label in SUPPLIED.values():
         raise PipelineError(f"no stage can be called '{named.label}': inputs have that name", where=named.where)
     hints = {name: hint for name, hint in _told(named, _hints, named.stage).items() if name != "return"}
@@ -59,10 +61,10 @@ def _wire_stage(named: NamedStage, earlier: Sequence[NamedStage]) -> dict[str, S
         if parameter not in hints:
             message = f"stage '{named.label}' has no input '{parameter}'"
             raise PipelineError(message, where=named.where, hint=alternatives(parameter, hints))
-    return {name: _source(named, name, hint, earlier) for name, hint in hints.items()}
+    return {name: _source(named, name, hint, earlier, registry) for name, hint in hints.items()}
 
 
-def _source(named: NamedStage, parameter: str, hint: Any, earlier: Sequence[NamedStage]) -> Source:
+def _source(named: NamedStage, parameter: str, hint: Any, earlier: Sequence[NamedStage], registry: Registry) -> Source:
     if get_origin(hint) is tuple:
         return tuple(other.label for other in earlier if _fits(_told(other, makes, other.stage), get_args(hint)[0]))
     wanted, optional = _without_none(hint)
@@ -74,8 +76,15 @@ def _source(named: NamedStage, parameter: str, hint: Any, earlier: Sequence[Name
     if source is None and not optional:
         article = "an" if wanted.__name__[0] in "AEIOU" else "a"
         message = f"stage '{named.label}' needs {article} {wanted.__name__} but no earlier stage makes one"
-        raise PipelineError(message, where=named.where)
+        raise PipelineError(message, where=named.where, hint=alternatives("", _makers(wanted, registry)))
     return source
+
+
+def _makers(wanted: type, registry: Registry) -> list[str]:
+    """Return the names of the installed stages whose `run` says that it returns a type; none of them is asked more."""
+    stages: Mapping[str, Sequence[Any]] = registry.provided("stage")
+    said = {name: classes[0].run.__annotations__.get("return") for name, classes in stages.items()}
+    return [name for name, made in said.items() if getattr(made, "__name__", made) == wanted.__name__]
 
 
 def _chosen(named: NamedStage, parameter: str, wanted: type, earlier: Sequence[NamedStage]) -> str:

@@ -169,6 +169,7 @@ def test_equations(call):
     shown = call("equations", "12.8").stdout
     assert shown.split()[:3] == ["12.8", "kinematic", "chain"]
     assert "geometry/kinematics.py:" in shown
+    assert "no equation, title or function has 'twelve' in it" in call("equations", "twelve").output
 
 
 def test_doctor(call):

@@ -199,6 +199,12 @@ def test_stages_are_wired_by_type(folder):
     }
 
 
+def test_what_would_make_an_input_is_named(folder):
+    Path("skirt.yaml").write_text(TEXT.replace("  start: start\n", ""))
+    with pytest.raises(MocapflowError, match=r"needs a Start but no earlier stage makes one\n       available: start"):
+        wire(load())
+
+
 def test_from_overrides_the_nearest(folder):
     assert wire(load("stages.export.from={track: track}"))["export"]["track"] == "track"
 
@@ -215,7 +221,8 @@ def test_a_stage_that_makes_a_body_replaces_it_for_later_stages(folder):
     ("change", "message"),
     [
         ("stages.start=start_late",
-         "--set stages.start=start_late  stage 'start' needs a Background but no earlier stage makes one"),
+         "--set stages.start=start_late  stage 'start' needs a Background but no earlier stage makes one\n"
+         "       available: none"),
         ("stages.export.from={track: start}",
          "skirt.yaml:11:3  stage 'export' wants its track from 'start', but no earlier 'start' makes one\n"
          "       available: smooth, track"),

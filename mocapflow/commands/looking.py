@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from mocapflow.errors import RecordingError
+from mocapflow.errors import MocapflowError, RecordingError
 
 
 def plugins() -> None:
@@ -69,9 +69,13 @@ def equations(
     """List the equations of the paper with the functions that implement them."""
     from mocapflow.equations import table
 
-    for row in table():
-        if wanted.lower() in f"{row.number} {row.what} {row.function}".lower():
-            typer.echo(f"{row.number:<12} {row.what:<50} {row.place()}")
+    found = [row for row in table() if wanted.lower() in f"{row.number} {row.what} {row.function}".lower()]
+    if not found:
+        raise MocapflowError(
+            f"no equation, title or function has '{wanted}' in it", hint="without a word all are listed"
+        )
+    for row in found:
+        typer.echo(f"{row.number:<12} {row.what:<50} {row.place()}")
 
 
 def doctor(

@@ -28,7 +28,8 @@ def read_mesh(path: Path) -> tuple[F64, I32]:
         hint = f"meshes are read from .obj, {', '.join(OPEN3D_FORMATS)}; .obj keeps the order of the vertices"
         raise RecordingError(f"a mesh in '{path.suffix}' can't be read", where=str(path), hint=hint)
     if not path.is_file():
-        raise RecordingError("no such mesh", where=str(path))
+        hint = "a person without a scan: `body: template` with the stage fit_subject"
+        raise RecordingError("no such mesh", where=str(path), hint=hint)
     points, triangles = _read_obj(path) if path.suffix.lower() == ".obj" else _read_by_open3d(path)
     return _checked(points, triangles, path)
 

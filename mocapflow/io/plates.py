@@ -60,7 +60,8 @@ def _read(path: Path, view: View) -> U8:
 
     image = cv2.imread(str(path), cv2.IMREAD_COLOR)
     if image is None:
-        raise RecordingError("this clean plate can't be read", where=str(path))
+        hint = "copy it again; without the folder the empty room is found from the videos"
+        raise RecordingError("this clean plate can't be read", where=str(path), hint=hint)
     width, height = (int(n) for n in view.lens.size)
     if image.shape[:2] != (height, width):
         raise RecordingError(
