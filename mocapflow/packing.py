@@ -34,7 +34,7 @@ def columns_of(result: FrameResult, cameras: int) -> Columns:
 
 
 def row_of(columns: Columns, frame: Frame, result: FrameResult, steps: Sequence[str]) -> F64:
-    """Return all numbers of a frame as one row."""
+    """Return all numbers of a frame as one row (N,), column after column."""
     estimate, rank = result.state.estimate, columns["covariance"][0]
     values: dict[str, Any] = {
         "frame": frame.index, "time": frame.time, "root": estimate.pose.root, "angles": estimate.pose.angles,
@@ -81,7 +81,7 @@ def _quantise(distance, steps):  # type: ignore[no-untyped-def]
 
 
 def distance_of(steps: npt.NDArray[np.int8]) -> F32:
-    """Return a stored silhouette in px."""
+    """Return the signed distance (H, W) px of a stored silhouette."""
     return steps.astype(np.float32) / np.float32(FINE)
 
 
@@ -100,7 +100,7 @@ def match_row(matches: Matches) -> F32:
 
 
 def matches_of(packed: F32, count: int) -> Matches:
-    """Return stored matches."""
+    """Return the first `count` of stored matches (capacity, 7)."""
     used = packed[:count].astype(np.float64)
     return Matches(
         camera=used[:, 0].astype(np.int16),

@@ -38,7 +38,7 @@ def drape_differences(drape: Drape, body: Body, touching: Bool, bounds: F64, pos
 
 
 def tried_columns(body: Body, touching: Bool, parameters: int) -> I32:
-    """Return the columns of all unknowns that change how the garment lies: angles, then parameters."""
+    """Return the columns (S,) of all unknowns that change how the garment lies: angles, then parameters."""
     from mocapflow.geometry import kinematics  # compiled code, loaded where it is used
 
     moving = kinematics.descendants(body.parents)[body.screw_joint] @ touching

@@ -40,16 +40,6 @@ def vertex_normals(vertices: F64, faces: I32) -> F64:
     return normals
 
 
-def grid_faces(rows: int, columns: int, closed: bool) -> I32:
-    """Return two triangles per cell of a (rows, columns) grid of vertices, row-major; `closed` joins the columns."""
-    row, column = np.meshgrid(np.arange(rows - 1), np.arange(columns if closed else columns - 1), indexing="ij")
-    a = (row * columns + column).ravel()
-    b = (row * columns + (column + 1) % columns).ravel()
-    return np.concatenate(
-        [np.column_stack([a, a + columns, b]), np.column_stack([b, a + columns, b + columns])]
-    ).astype(np.int32)
-
-
 def lengths_along(vertices: F64, strands: I32) -> F64:
     """Return the length (W,) along its strand from the first vertex to each vertex; strands (N, L) are -1 padded."""
     ahead = np.linalg.norm(np.diff(vertices[strands], axis=1), axis=2)

@@ -92,7 +92,7 @@ def widened(**measures: tuple[float, float]) -> tuple[str, ...]:
 
 
 def grid_faces(grid: I32, closed: bool = True) -> I32:
-    """Return two triangles per cell of a grid (strands, rows) of vertex indices, outward for counter-clockwise."""
+    """Return triangles (F, 3), two per cell of a grid (strands, rows) of vertices, outward if counter-clockwise."""
     right = np.roll(grid, -1, axis=0) if closed else grid[1:]
     left = grid if closed else grid[:-1]
     a, b, c, d = left[:, :-1], right[:, :-1], right[:, 1:], left[:, 1:]

@@ -51,7 +51,7 @@ def read_stamps(path: Path) -> tuple[int, float, F64]:
 
 
 def number_frames(stamps: F64) -> I32:
-    """Return the frame number of each stamp: a gap of k periods is k - 1 lost frames."""
+    """Return the frame number (N,) of each stamp (N,) ms: a gap of k periods is k - 1 lost frames."""
     gaps = np.diff(stamps)
     period = np.median(gaps) if len(gaps) else 0.0
     steps = np.maximum(1, np.round(gaps / period)) if period > 0 else np.ones(len(gaps))

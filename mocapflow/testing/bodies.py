@@ -8,7 +8,7 @@ import numpy as np
 
 from mocapflow.assets import Body, GarmentMesh
 from mocapflow.geometry import twists
-from mocapflow.geometry.meshes import grid_faces
+from mocapflow.geometry.sewing import grid_faces
 from mocapflow.records import F64, I32
 from mocapflow.registry import load_registry
 
@@ -65,7 +65,7 @@ def tiny_garment(body: Body) -> GarmentMesh:
     return GarmentMesh(
         name="tube",
         vertices=vertices,
-        faces=grid_faces(rows, strands, closed=True),
+        faces=grid_faces(index.T),
         strands=np.ascontiguousarray(index.T),
         rings=rings,
         ring_length=np.linalg.norm(vertices[rings[:, 0]] - vertices[rings[:, 1]], axis=1),
@@ -92,7 +92,7 @@ def _tube(x: float, height: F64, radius: F64, around: int) -> tuple[F64, I32]:
     low, high = len(rings), len(rings) + 1
     here = np.arange(around)
     ahead, top = np.roll(here, -1), low - around
-    sides = grid_faces(len(height), around, closed=True)[:, ::-1]
+    sides = grid_faces(np.arange(low, dtype=np.int32).reshape(-1, around).T)[:, ::-1]
     bottom = np.stack([np.full(around, low), ahead, here], axis=1)
     lid = np.stack([np.full(around, high), top + here, top + ahead], axis=1)
     return np.concatenate([rings, ends]), np.concatenate([sides, bottom, lid]).astype(np.int32)

@@ -49,7 +49,7 @@ def rest_bend(skeleton: Skeleton, joint: int, axis: F64) -> float:
 
 
 def orthogonal(vector: F64, to: F64) -> F64:
-    """Return the unit vector nearest to `vector` that is orthogonal to the unit vector `to`."""
+    """Return the unit vector (3,) nearest to `vector` that is orthogonal to the unit vector `to`."""
     rest = vector - (vector @ to) * to
     if np.linalg.norm(rest) < 0.1:  # nearly parallel: any other direction, the same one for every body
         turned = np.roll(vector, 1)
@@ -58,7 +58,7 @@ def orthogonal(vector: F64, to: F64) -> F64:
 
 
 def unit(vector: F64) -> F64:
-    """Return a vector at length one, straight down if it has no length."""
+    """Return a vector (3,) at length one, straight down if it has no length."""
     length = np.linalg.norm(vector)
     return np.asarray(vector / length) if length > 1e-9 else -UP
 

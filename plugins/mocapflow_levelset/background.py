@@ -17,6 +17,7 @@ from mocapflow.scene import Scene
 from mocapflow_levelset.channels import ChannelName, features
 from mocapflow_levelset.evidence import calmed
 from mocapflow_levelset.evolve import Rhythm, Weights
+from mocapflow_levelset.levelset import INNER_BAND_PX, PERSON
 from mocapflow_levelset.masks import counted
 from mocapflow_levelset.plates import Plate, Shadow, density_of, plate_of
 from mocapflow_levelset.redistance import redistance
@@ -24,8 +25,6 @@ from mocapflow_levelset.shadows import floor_around
 from mocapflow_levelset.statistics import Window
 from mocapflow_levelset.view import Empty, Level, Method, View, find
 
-PERSON = "person"
-INNER_BAND_PX = 7.0  # while the contour moves
 CHANNELS: tuple[ChannelName, ...] = ("lab",)
 
 
@@ -137,7 +136,9 @@ class BackgroundDifference(Segmenter):
     def _method(self) -> Method:
         return Method(
             channels=CHANNELS,
-            weights=Weights(1.5, self.length_weight, 0.0, 6.0, 1.0, INNER_BAND_PX),
+            weights=Weights(
+                sigma_px=1.5, length=self.length_weight, shape=0.0, clip=6.0, step=1.0, band_px=INNER_BAND_PX
+            ),
             shadow=self._shadow(),
             calm_px=self.smooth_px,
             decorrelate=False,

@@ -51,22 +51,22 @@ def _widened(first: int, last: int, length: int, margin: int, multiple: int) -> 
 
 
 def shrink(image: U8, factor: int) -> U8:
-    """Return an image at 1 / factor of its size, the mean of each square of pixels."""
+    """Return an image (H, W, 3) at 1 / factor of its size, the mean of each square of pixels."""
     return np.asarray(_shrunk(image, factor), np.uint8)
 
 
 def shrink_values(image: F32, factor: int) -> F32:
-    """Return an array at 1 / factor of its size, the mean of each square of pixels."""
+    """Return an array (H, W, ...) at 1 / factor of its size, the mean of each square of pixels."""
     return np.asarray(_shrunk(image, factor), np.float32)
 
 
 def coarser(level: F32, factor: int) -> F32:
-    """Return a level set in fine px on a grid `factor` times coarser, in coarse px."""
+    """Return a level set (H, W) in fine px on a grid `factor` times coarser, in coarse px."""
     return level.copy() if factor == 1 else shrink_values(level, factor) / np.float32(factor)
 
 
 def finer(level: F32, factor: int) -> F32:
-    """Return a level set in coarse px on a grid `factor` times finer, in fine px."""
+    """Return a level set (H, W) in coarse px on a grid `factor` times finer, in fine px."""
     import cv2
 
     size = (level.shape[1] * factor, level.shape[0] * factor)

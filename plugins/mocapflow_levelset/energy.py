@@ -8,7 +8,7 @@ from mocapflow.records import F32, F64
 
 
 def heaviside(distance: F32 | F64, sigma_px: float) -> F64:
-    """Return the smooth step of a level set, 1/2 at the contour: the error function of width `sigma_px`."""
+    """Return the smooth step of a level set (H, W) px, 1/2 at the contour: the error function of width `sigma_px`."""
     from scipy.special import erf
 
     step: F64 = 0.5 * (1 + erf(np.asarray(distance, np.float64) / (np.sqrt(2) * sigma_px)))
@@ -16,7 +16,7 @@ def heaviside(distance: F32 | F64, sigma_px: float) -> F64:
 
 
 def delta(distance: F32 | F64, sigma_px: float) -> F64:
-    """Return the derivative of the smooth step, 1/px: only pixels near the contour can move it."""
+    """Return the derivative (H, W) of the smooth step, 1/px: only pixels near the contour can move it."""
     scaled = np.asarray(distance, np.float64) / sigma_px
     slope: F64 = np.exp(-0.5 * scaled**2) / (np.sqrt(2 * np.pi) * sigma_px)
     return slope

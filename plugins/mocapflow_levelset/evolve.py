@@ -96,7 +96,7 @@ def costs(settled: Settled, prior: F32, weights: Weights) -> Costs:
 
 
 def near(level: F32, weights: Weights, first: int = 0) -> I32:
-    """Return the runs of pixels near enough to the contour to move it, rows of (y, first x, last x + 1)."""
+    """Return the runs (N, 3) of pixels near enough to the contour to move it, rows of (y, first x, last x + 1)."""
     reach = min(FRONT * weights.sigma_px, weights.band_px - 1e-3)
     runs: I32 = kernels.find_runs(level, np.float32(reach), BLOCK, first)
     return runs

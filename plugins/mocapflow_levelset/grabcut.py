@@ -13,9 +13,8 @@ from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.records import F32, U8
 from mocapflow.scene import Scene
 from mocapflow_levelset import crops
+from mocapflow_levelset.levelset import PERSON
 from mocapflow_levelset.redistance import redistance
-
-PERSON = "person"
 
 
 class GrabCut(Segmenter):

@@ -156,7 +156,12 @@ class LevelSet(Segmenter):
         return Method(
             channels=self.channels,
             weights=Weights(
-                self.sigma_px, self.length_weight, self.shape_weight, self.ratio_clip, self.time_step, INNER_BAND_PX
+                sigma_px=self.sigma_px,
+                length=self.length_weight,
+                shape=self.shape_weight,
+                clip=self.ratio_clip,
+                step=self.time_step,
+                band_px=INNER_BAND_PX,
             ),
             shadow=Shadow(self.spread_floor, self.shadow_share, self.darkest_shadow, self.shadow_chroma, self.stranger),
             calm_px=self.calm_px,

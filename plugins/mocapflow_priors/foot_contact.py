@@ -40,6 +40,6 @@ class FootContact(Prior):
 
 
 def geman_mcclure(error: F64, scale: float) -> tuple[F64, F64]:
-    """Return a redescending residual, whose square is e^2 s^2 / (e^2 + s^2), and its derivative."""
+    """Return a redescending residual of errors (K,), whose square is e^2 s^2 / (e^2 + s^2), and its derivative."""
     length = np.sqrt(error**2 + scale**2)
     return error * scale / length, (scale / length) ** 3

@@ -28,7 +28,7 @@ def angle_rows(error: F64, slope: F64, chosen: npt.NDArray[np.intp]) -> Residual
 
 
 def soft_excess(excess: F64, slack: float) -> tuple[F64, F64]:
-    """Return a penalty that is zero up to zero, then bends smoothly into a line, and its derivative.
+    """Return a penalty of excesses (K,) that is zero up to zero, then bends smoothly into a line, and its derivative.
 
     An excess of `slack` costs half of it; far out the penalty is excess - slack. Its slope is continuous.
     """

@@ -136,7 +136,7 @@ def masks(events: Sequence[Event | None], images: Sequence[U8]) -> tuple[Bool, .
 
 
 def fitted(image: U8, like: U8) -> U8:
-    """Return an image in the size of another."""
+    """Return an image (H, W, 3) in the size of another."""
     import cv2
 
     size = like.shape[1::-1]

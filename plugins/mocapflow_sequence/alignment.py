@@ -49,7 +49,7 @@ def resampled(at: F64, values: F64, wanted: F64, step: float) -> F64:
 
 
 def at_our_frames(reference: Reference, columns: Mapping[str, F64], lag: float = 0.0) -> dict[str, F64]:
-    """Return the curves of a reference at our frames, or a lag in frames before; NaN where it has nothing."""
+    """Return the curves (T,) of a reference at our frames, or a lag in frames before; NaN where it has nothing."""
     clock = columns["frame" if reference.by_frame else "time"]
     earlier = clock - lag * (float(np.median(np.diff(clock))) if len(clock) > 1 else 0.0)
     return {name: resampled(reference.at, curve, earlier, reference.step) for name, curve in reference.curves.items()}

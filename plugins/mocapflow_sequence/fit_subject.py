@@ -82,7 +82,7 @@ def unlike(first: Sequence[Seen], second: Sequence[Seen], names: Sequence[str]) 
 
 
 def limb_lengths(frames: Sequence[Seen], names: Sequence[str]) -> F64:
-    """Return the median distance (m) between the ends of each limb; NaN where a limb is never seen."""
+    """Return the median distance (L,) m between the ends of each limb; NaN where a limb is never seen."""
     ends = np.array([(names.index(a), names.index(b)) for a, b in LIMBS if a in names and b in names]).reshape(-1, 2)
     position = np.stack([frame.position for frame in frames])
     length = np.linalg.norm(position[:, ends[:, 0]] - position[:, ends[:, 1]], axis=2)

@@ -53,7 +53,7 @@ class Painter:
         self._cloth_edges = meshes.edges(self._cloth_faces)
 
     def paint(self, frame: Frame, track: Track, row: int, view: int) -> U8:
-        """Return the image of a view, enlarged if small, with the model drawn on it."""
+        """Return the image (H, W, 3) of a view, enlarged if small, with the model drawn on it."""
         import cv2
 
         camera, image = self._cameras[view], np.array(frame.images[view])

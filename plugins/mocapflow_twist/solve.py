@@ -42,7 +42,7 @@ def step(equations: Equations, lever: F64, damping: float) -> F64:
 
 
 def capped(increment: F64, angles: int, max_angle: float, max_shift: float) -> F64:
-    """Return an increment about the root, shortened as a whole until no angle (rad) and no shift (m) is too large."""
+    """Return an increment (S,) about the root, shortened until no angle (rad) and no shift (m) is too large."""
     turn, shift = np.linalg.norm(increment[:3]), np.linalg.norm(increment[3:6])
     bend = np.abs(increment[6 : 6 + angles]).max(initial=0.0)
     excess = max(1.0, turn / max_angle, bend / max_angle, shift / max_shift)

@@ -7,7 +7,7 @@ import pytest
 
 from mocapflow.assets import Camera
 from mocapflow.data import BODY, CLOTH, Surface
-from mocapflow.geometry import meshes, silhouettes, span_kernels
+from mocapflow.geometry import meshes, sewing, silhouettes, span_kernels
 from mocapflow.geometry import silhouette_kernels as kernels
 from mocapflow.records import F64, I32, Bool
 from mocapflow.testing import tiny_cloth, tiny_pose, tiny_scene
@@ -40,6 +40,11 @@ def surface(vertices: F64, faces: I32, layer: int = BODY) -> Surface:
     )
 
 
+def sheet_faces(rows: int, columns: int, closed: bool = False) -> I32:
+    """The faces of a grid of vertices, row by row; closed, the last column is beside the first."""
+    return sewing.grid_faces(np.arange(rows * columns, dtype=np.int32).reshape(rows, columns).T, closed)
+
+
 def sphere(centre: tuple[float, float, float], rows: int = 60, columns: int = 120) -> tuple[F64, I32]:
     """A closed sphere: rings from pole to pole, the poles as small caps of one vertex."""
     polar = np.linspace(0, np.pi, rows + 2)[1:-1, None]
@@ -47,7 +52,7 @@ def sphere(centre: tuple[float, float, float], rows: int = 60, columns: int = 12
     ring = [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar) + 0 * azimuth]
     points = np.stack(ring, -1).reshape(-1, 3)
     vertices = np.concatenate([points, [[0, 0, 1.0]], [[0, 0, -1.0]]]) * RADIUS + centre
-    body = meshes.grid_faces(rows, columns, closed=True)
+    body = sheet_faces(rows, columns, closed=True)
     around, last = np.arange(columns, dtype=np.int32), (rows - 1) * columns
     after, north, south = (around + 1) % columns, np.full(columns, len(points)), np.full(columns, len(points) + 1)
     caps = [np.column_stack([north, around, after]), np.column_stack([south, last + after, last + around])]
@@ -110,7 +115,7 @@ def test_a_sphere_before_another_hides_the_edge_between() -> None:
 
 def test_an_open_sheet_of_cloth_is_seen_from_both_sides() -> None:
     grid = np.array([[x, DISTANCE, z] for z in np.linspace(0.3, -0.3, 7) for x in np.linspace(-0.3, 0.3, 7)])
-    faces = meshes.grid_faces(7, 7, closed=False)
+    faces = sheet_faces(7, 7)
     for turned in (faces, faces[:, ::-1].copy()):
         boundary = silhouettes.outline(surface(grid, turned, CLOTH), camera())
         assert silhouettes.mask(boundary, camera()).sum() == pytest.approx((0.6 * FOCAL / DISTANCE) ** 2, rel=0.03)
@@ -121,7 +126,7 @@ def test_a_folded_sheet_ends_at_its_fold() -> None:
     z = np.linspace(0.2, -0.2, 5)
     x, y = np.array([-0.2, 0.0, 0.2, 0.0, -0.2]), DISTANCE + np.array([0, 0.02, 0.05, 0.08, 0.1])
     grid = np.array([[x[k], y[k], z[row]] for row in range(5) for k in range(5)])
-    boundary = silhouettes.outline(surface(grid, meshes.grid_faces(5, 5, closed=False), CLOTH), camera())
+    boundary = silhouettes.outline(surface(grid, sheet_faces(5, 5), CLOTH), camera())
     assert boundary.pixel[..., 0].max() == pytest.approx(159.5 + FOCAL * 0.2 / (DISTANCE + 0.05), abs=1e-6)
 
 
@@ -134,7 +139,7 @@ def test_a_surface_behind_the_camera_has_no_outline() -> None:
 def test_the_visible_part_of_a_long_half_hidden_edge_stays() -> None:
     wide = np.array([[x, DISTANCE, z] for z in (0.2, -0.2) for x in (-0.4, 0.4)])
     tall = np.array([[x, DISTANCE - 0.5, z] for z in (0.4, -0.3) for x in (0.0, 0.5)])
-    sheet = meshes.grid_faces(2, 2, closed=False)
+    sheet = sheet_faces(2, 2)
     both = surface(np.concatenate([wide, tall]), np.concatenate([sheet, sheet + np.int32(4)]), CLOTH)
     distance = silhouettes.model_distance(both, camera(), 12.0)
     row = 119.5 - 0.2 * FOCAL / DISTANCE

@@ -10,7 +10,8 @@ import numpy as np
 
 from mocapflow.assets import Body, Camera, GarmentMesh
 from mocapflow.data import Pose
-from mocapflow.geometry import joints, meshes, twists
+from mocapflow.geometry import joints, twists
+from mocapflow.geometry.sewing import grid_faces
 from mocapflow.results import Track
 from mocapflow.scene import Scene
 
@@ -94,7 +95,7 @@ def tube(body: Body, rows: int = 12, columns: int = 36) -> GarmentMesh:
     grid = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
     rings = np.stack([grid.ravel(), np.roll(grid, -1, axis=1).ravel()], 1).astype(np.int32)
     return GarmentMesh(
-        name="tube", vertices=points, faces=meshes.grid_faces(rows, columns, closed=True),
+        name="tube", vertices=points, faces=grid_faces(grid.T),
         strands=np.ascontiguousarray(grid.T), rings=rings, ring_length=np.full(len(rings), 0.05),
         carried_by=np.zeros(len(points), np.int32), pinned=grid[0].copy(), pinned_to=np.zeros(columns, np.int32),
         parameter_names=(), parameter_bounds=np.empty((0, 2)),
