@@ -14,7 +14,6 @@ from pydantic import Field, PositiveFloat, PositiveInt
 from mocapflow.assets import Background, Body
 from mocapflow.components import Draper, Matcher, Segmenter, Stage
 from mocapflow.data import Change, Frame, Matches, Past, Pose, Segmentation, Turn
-from mocapflow.errors import RecordingError
 from mocapflow.loop import pool_matches
 from mocapflow.model import ClothedModel
 from mocapflow.recording import Recording
@@ -25,8 +24,8 @@ from mocapflow.track import believed
 from mocapflow_sequence.detections import layout, persons, seen, spread
 from mocapflow_sequence.keypoint_fit import fit
 from mocapflow_sequence.landmarks import landmarks
-from mocapflow_sequence.pose_fit import Solution
-from mocapflow_sequence.proportions import PROPORTIONS, scaled
+from mocapflow_sequence.pose_fit import Solution, Spreads
+from mocapflow_sequence.proportions import Proportion, scaled
 from mocapflow_sequence.silhouette_fit import refine
 from mocapflow_sequence.start_from_file import calm
 
@@ -47,7 +46,7 @@ class CalibrateLimbs(Stage):
     matchers: Annotated[tuple[Matcher, ...], Field(min_length=1)]  # as in the track
     draper: Draper | None = None  # as in the track; without one the body is fitted bare
     # contours see neither hip nor shoulder: without the trunk, the thigh would take up what the trunk is wrong by
-    proportions: tuple[str, ...] = (  # those that are fitted
+    proportions: tuple[Proportion, ...] = (  # those that are fitted
         "girth", "trunk", "shoulder_width", "thigh", "shank", "foot", "upper_arm", "forearm",
     )  # fmt: skip
     spread: PositiveFloat = 0.02  # standard deviation of a log proportion about a scan's; 0.05 about a template's
@@ -64,12 +63,10 @@ class CalibrateLimbs(Stage):
         Raises:
             RecordingError: neither a track nor keypoints say where the person is.
         """
-        if unknown := set(self.proportions) - set(PROPORTIONS):
-            hint = f"there are: {', '.join(PROPORTIONS)}"
-            raise RecordingError(f"calibrate_limbs: no proportion '{min(unknown)}'", hint=hint)
         scene = (scene if self.draper else scene.undressed).with_background(background)
         indices, poses, clothes = self._from_track(track) if track else self._from_keypoints(recording, scene)
-        spreads, body = dict.fromkeys(self.proportions, self.spread), scene.body
+        spreads: Spreads = {name: self.spread for name in self.proportions}
+        body = scene.body
         share = self.independent / len(indices)  # contours err alike in all frames: more of them tell no more
         solution = Solution(np.zeros(len(spreads)), tuple(poses))
         for done in range(self.passes):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -13,10 +14,11 @@ from mocapflow.geometry.skeleton import body_directions, skeleton_of
 from mocapflow.records import F64
 
 # What can be stretched; `stature` multiplies all, `girth` what lies across the limbs and the depth of the trunk.
-PROPORTIONS = (
+Proportion = Literal[
     "stature", "girth", "trunk", "shoulder_width", "hip_width", "head",
     "thigh", "shank", "foot", "upper_arm", "forearm",
-)  # fmt: skip
+]  # fmt: skip
+PROPORTIONS: tuple[str, ...] = get_args(Proportion)
 LIMBS = {"hip": "thigh", "knee": "shank", "shoulder": "upper_arm", "elbow": "forearm"}
 WHOLE = {"neck": "head", "head": "head", "ankle": "foot", "toe": "foot", "wrist": "forearm"}
 
