@@ -215,5 +215,12 @@ def test_a_garment_is_drawn(call, garment):
     assert (panels > 0.004).all(), panels
 
 
+@pytest.mark.parametrize("out", ["nowhere/skirt.png", "skirt.doc"])
+def test_a_picture_that_can_not_be_written(call, out):
+    shown = call("show", "garment", "skirt", "--out", out)
+    assert shown.exit_code == 1
+    assert f"error: {out}  the picture can't be written" in shown.stderr
+
+
 def test_only_a_garment_has_a_picture(call):
     assert "only a garment has a picture" in call("show", "matcher", "contour_icp", "--out", "it.png").output

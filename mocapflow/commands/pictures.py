@@ -11,6 +11,7 @@ import numpy as np
 from mocapflow.components import Draper, Garment
 from mocapflow.data import Past, Pose
 from mocapflow.documents import Document, Place
+from mocapflow.errors import StoreError
 from mocapflow.measures import garment_of
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64, U8
@@ -28,6 +29,7 @@ def draw_garment(registry: Registry, name: str, recording: Path | None, draper: 
 
     Raises:
         MocapflowError: the garment needs measures that the recording does not have, or can't be sewn from them.
+        StoreError: the picture can't be written.
     """
     import cv2
 
@@ -37,7 +39,10 @@ def draw_garment(registry: Registry, name: str, recording: Path | None, draper: 
     body: Any = registry.get("body", "scanned")()
     loaded = body.load(recording)
     scene = Scene(cameras=(), body=loaded, garment=garment.sew(loaded))
-    cv2.imwrite(str(out), poster(scene, garment, registry.get("draper", draper)()))  # type: ignore[arg-type]
+    image = poster(scene, garment, registry.get("draper", draper)())  # type: ignore[arg-type]
+    if not (out.parent.is_dir() and cv2.haveImageWriter(str(out)) and cv2.imwrite(str(out), image)):
+        hint = "--out names a .png, in a folder that is there"
+        raise StoreError("the picture can't be written", where=str(out), hint=hint)
     assert scene.garment is not None
     count, strands = len(scene.garment.vertices), len(scene.garment.strands)
     sewn = f"sewn on {recording.name}: {count} vertices in {strands} strands; picture: {out}"

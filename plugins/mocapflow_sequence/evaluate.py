@@ -89,9 +89,12 @@ def evaluate(own: Ours, path: Path, folder: Path, longest_lag_s: float = LONGEST
         for name in cycles.shared(own.columns, known)
     ]
     rigs = compare_rigs(own, reference, alignment.worth, path.parent / layout.COMMON_POINTS)
-    notes = [*reference.notes, *rigs.notes, *findings.said(own, reference, alignment, strides, longest_lag_s)]
-    if not rows:
-        notes.append("the reference shares no angle and frame with the track")
+    notes = [*reference.notes, *rigs.notes]
+    if rows:
+        notes += findings.said(own, reference, alignment, strides, longest_lag_s)
+    else:
+        ours = ", ".join(tables.angle_names(own.columns))
+        notes.append(f"the reference shares no angle and frame with the track, which has {ours}")
     _write_tables(folder, own.columns, known, rows, strides)
     found = {"reference": str(path), "lag_frames": alignment.lag, "signs": alignment.signs, "notes": notes}
     runjson.write(layout.place(folder, layout.FINDINGS), {**found, "registration": rigs.figures})

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mocapflow.records import F64
-from mocapflow_sequence import layout, tables
+from mocapflow_sequence import layout, panels, tables
 from mocapflow_sequence.compare import drawn_blocks, rms, rms_interval
 
 Run = tuple[str, str, Path | str]  # variant, recording, run folder or why it failed
@@ -86,17 +86,12 @@ def run_figures(run: Path | str) -> Row:
 
 def plot(path: Path, rows: Sequence[Row]) -> None:
     """Draw the RMS of every angle and variant, one panel a recording."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     recordings, variants, angles = (
         list(dict.fromkeys(str(row[name]) for row in rows)) for name in ("recording", "variant", "angle")
     )
-    figure = Figure(figsize=(10, 1 + 2.6 * len(recordings)), layout="constrained")
-    FigureCanvasAgg(figure)
-    panels = figure.subplots(len(recordings), 1, squeeze=False, sharex=True)[:, 0]
+    figure, every = panels.panels(len(recordings), columns=1, height=2.6, width=10.0, sharex=True)
     width = 0.8 / len(variants)
-    for panel, recording in zip(panels, recordings, strict=True):
+    for panel, recording in zip(every, recordings, strict=True):
         for index, variant in enumerate(variants):
             mine = [row for row in rows if (row["recording"], row["variant"]) == (recording, variant)]
             at = np.array([angles.index(str(row["angle"])) for row in mine])
@@ -106,8 +101,9 @@ def plot(path: Path, rows: Sequence[Row]) -> None:
             at = at + (index - (len(variants) - 1) / 2) * width
             whiskers = np.maximum([value - low, high - value], 0)
             panel.bar(at, value, width, yerr=whiskers, label=variant, error_kw={"lw": 0.7})
+        panel.set_axisbelow(True)
         panel.set_title(recording, loc="left", fontsize=10)
         panel.set_ylabel("RMS °")
         panel.set_xticks(range(len(angles)), angles, rotation=25)
-    panels[0].legend(fontsize=8)
-    figure.savefig(path, dpi=110)
+    panels.legend(figure, every)
+    panels.save(figure, path)
