@@ -12,6 +12,7 @@ import numpy as np
 from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.io.cameras import metadata
+from mocapflow.io.typed import place
 from mocapflow.io.video import Video, name_frames
 
 CUT = 0.02  # share of the width or height that a video may lack against its calibration
@@ -30,7 +31,7 @@ def fit_sizes(
             if (size > camera.size).any() or (size < (1 - CUT) * camera.size).any():
                 raise RecordingError(
                     f"camera '{camera.name}': the video is {video.width} x {video.height} px, the calibration {wanted}",
-                    where=str(calibration),
+                    where=place(calibration, camera.name),
                     hint="calibrate at the size of the video, or scale size and matrix of the calibration to it",
                 )
             warnings.append(
@@ -76,12 +77,15 @@ def common_rate(cameras: Sequence[Camera], videos: Sequence[Video], calibration:
     """Return the frames per second: as [metadata] says, or as the videos do.
 
     Raises:
-        RecordingError: the videos differ by more than 1 %.
+        RecordingError: it is stated as something else than a rate, or the videos differ by more than 1 %.
     """
     rates = {c.name: v.frame_rate for c, v in zip(cameras, videos, strict=True) if v.frame_rate}
     stated = metadata(calibration).get("frame_rate")
-    if stated is not None:
+    if isinstance(stated, int | float) and 0 < stated < np.inf:
         return float(stated), []
+    if stated is not None:
+        hint = "write frames per second, or leave it out: then the videos say it"
+        raise RecordingError(f"frame_rate is {stated!r}", where=place(calibration, "frame_rate"), hint=hint)
     if not rates:
         return USUAL_RATE, [
             f"nothing says the frame rate: {USUAL_RATE:g} frames per second assumed; "

@@ -10,6 +10,7 @@ import numpy as np
 from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import twists
+from mocapflow.io.typed import place
 from mocapflow.records import F64
 
 
@@ -74,4 +75,4 @@ def numbers(value: Any, shape: tuple[int, ...], field: str, name: str, where: Pa
 
 def bad(name: str, where: Path, what: str, hint: str = "") -> RecordingError:
     """Return the error that says what is wrong with a camera."""
-    return RecordingError(f"camera '{name}' {what}", where=str(where), hint=hint)
+    return RecordingError(f"camera '{name}' {what}", where=place(where, name), hint=hint)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import numpy as np
 from mocapflow.errors import RecordingError, alternatives
 from mocapflow.io.cameras import FARTHEST
 from mocapflow.io.findings import Finding, error
-from mocapflow.io.typed import read_json
+from mocapflow.io.typed import place, read_json
 from mocapflow.records import F64, array, record
 
 ROOT = ("root_rotation", "root_translation")
@@ -43,28 +44,29 @@ def read_first_pose(path: Path, joints: Sequence[str] = ()) -> FirstPose:
         RecordingError: the file can't be read, or something in it is odd; see `odd_pose`.
     """
     content = read_json(path, FORM)
-    for odd in odd_pose(content, joints):
-        raise RecordingError(odd.message, where=str(path), hint=odd.hint)
+    for odd in odd_pose(path, content, joints):
+        raise RecordingError(odd.message, where=odd.where, hint=odd.hint)
     vectors = {key: np.array(vector, np.float64) for key, vector in _vectors(content).items()}
     rotation, position = (vectors.pop(key) for key in ROOT)
     return FirstPose(rotation=rotation, position=position, turns=vectors)
 
 
-def odd_pose(content: Any, joints: Sequence[str]) -> Iterator[Finding]:
-    """Yield what is wrong with the content of a file: keys, joints, numbers, units."""
+def odd_pose(path: Path, content: Any, joints: Sequence[str]) -> Iterator[Finding]:
+    """Yield what is wrong with the content of a file, and where: keys, joints, numbers, units."""
     if not isinstance(content, dict) or not isinstance(content.get(KEYS[2], {}), dict):
-        yield error("not a first pose", FORM)
+        yield error("not a first pose", FORM, path)
         return
     for key in content.keys() - set(KEYS):
-        yield error(f"unknown key '{key}'", alternatives(key, KEYS))
+        yield error(f"unknown key '{key}'", alternatives(key, KEYS), place(path, key))
     for key in ROOT:
         if key not in content:
-            yield error(f"'{key}' is missing", FORM)
+            yield error(f"'{key}' is missing", FORM, path)
     for joint in content.get(KEYS[2], {}):
         if joints and joint not in joints:
-            yield error(f"the body has no joint '{joint}'", alternatives(joint, joints))
+            yield error(f"the body has no joint '{joint}'", alternatives(joint, joints), place(path, joint))
     for key, vector in _vectors(content).items():
-        yield from _odd_vector(key, vector)
+        for odd in _odd_vector(key, vector):
+            yield replace(odd, where=place(path, key))
 
 
 def _vectors(content: dict[str, Any]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from mocapflow.errors import RecordingError, alternatives
 from mocapflow.geometry.skeleton import Skeleton
-from mocapflow.io.typed import read_json
+from mocapflow.io.typed import place, read_json
 from mocapflow.records import F64
 
 FORM = 'expected {"joints": [{"name": "pelvis", "parent": null, "position": [x, y, z] in m}, …]}, parents first'
@@ -33,7 +33,7 @@ def read_skeleton(path: Path) -> Skeleton:
         )  # fmt: skip
     content = read_json(path, FORM)
     try:
-        return _skeleton(content, str(path))
+        return _skeleton(content, path)
     except (ValueError, TypeError, KeyError) as error:
         raise RecordingError(f"this is not a skeleton: {error!r}", where=str(path), hint=FORM) from error
 
@@ -95,21 +95,21 @@ def check_size(vertices: F64, skeleton: Skeleton, where: str) -> None:
         raise RecordingError(f"{what}, first '{skeleton.names[int(outside.argmax())]}'", where=where, hint=hint)
 
 
-def _skeleton(content: Mapping[str, Any], where: str) -> Skeleton:
+def _skeleton(content: Mapping[str, Any], path: Path) -> Skeleton:
     joints = content["joints"]
     names = [str(joint["name"]) for joint in joints]
     parents = []
     for row, joint in enumerate(joints):
         parent, earlier = joint["parent"], names[:row]
         if names[row] in earlier:
-            raise RecordingError(f"joint '{names[row]}' is listed twice", where=where, hint=FORM)
+            raise RecordingError(f"joint '{names[row]}' is listed twice", where=place(path, names[row]), hint=FORM)
         if parent is not None and parent not in earlier:
             hint = f"a parent stands before its children; {alternatives(str(parent), earlier)}"
             what = f"parent '{parent}' of joint '{names[row]}' is not listed before it"
-            raise RecordingError(what, where=where, hint=hint)
+            raise RecordingError(what, where=place(path, names[row]), hint=hint)
         parents.append(-1 if parent is None else names.index(parent))
     positions = np.array([joint["position"] for joint in joints], np.float64).reshape(len(names), 3)
     if parents.count(-1) != 1 or not np.isfinite(positions).all():
         what = "positions are not all numbers" if not np.isfinite(positions).all() else "one joint must have no parent"
-        raise RecordingError(what, where=where, hint=FORM)
+        raise RecordingError(what, where=str(path), hint=FORM)
     return Skeleton(tuple(names), np.array(parents, np.int32), positions)

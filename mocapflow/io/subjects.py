@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ from mocapflow.io.findings import Finding, attempt, error, warning
 from mocapflow.io.first_pose import odd_pose
 from mocapflow.io.meshes import read_mesh
 from mocapflow.io.scans import TALLEST, check_size, read_skeleton, read_weights
-from mocapflow.io.typed import read_json
+from mocapflow.io.typed import place, read_json
 
 GARMENTS = {
     "skirt": ("waist_height", "waist_circumference", "hem_circumference", "length"),
@@ -51,26 +50,27 @@ def _examine_scan(subject: Path, findings: list[Finding]) -> Sequence[str]:
     return skeleton.names
 
 
-def _examine_json(path: Path, odd: Callable[[Any], Iterator[Finding]], findings: list[Finding]) -> None:
+def _examine_json(path: Path, odd: Callable[[Path, Any], Iterator[Finding]], findings: list[Finding]) -> None:
     if path.exists():
         content = attempt(lambda: read_json(path), findings)
-        findings += [replace(found, where=str(path)) for found in odd(content)] if content is not None else []
+        findings += odd(path, content) if content is not None else []
 
 
-def _odd_garment(content: Any) -> Iterator[Finding]:
+def _odd_garment(path: Path, content: Any) -> Iterator[Finding]:
     if not isinstance(content, dict):
-        yield error("expected {...} at the top")
+        yield error("expected {...} at the top", where=path)
         return
     kind = content.get("type")
     if not isinstance(kind, str) or kind not in GARMENTS:
-        yield warning(f"the garment type is {kind!r}", f"built in: {', '.join(GARMENTS)}; others need their plugin")
+        hint = f"built in: {', '.join(GARMENTS)}; others need their plugin"
+        yield warning(f"the garment type is {kind!r}", hint, place(path, "type"))
         return
     known = GARMENTS[kind]
     for key in content.keys() - {"type", *known}:
-        yield error(f"unknown measure '{key}' of {kind}", alternatives(key, known))
+        yield error(f"unknown measure '{key}' of {kind}", alternatives(key, known), place(path, key))
     for key in known:
         value = content.get(key)
         if value is None:
-            yield error(f"the {kind} lacks '{key}'", f"needed, in m: {', '.join(known)}")
+            yield error(f"the {kind} lacks '{key}'", f"needed, in m: {', '.join(known)}", path)
         elif not isinstance(value, int | float) or not 0 < value < TALLEST:
-            yield error(f"'{key}' is {value!r}", f"expected metres, between 0 and {TALLEST:g}")
+            yield error(f"'{key}' is {value!r}", f"expected metres, between 0 and {TALLEST:g}", place(path, key))

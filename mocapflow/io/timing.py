@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from mocapflow.errors import RecordingError, alternatives
-from mocapflow.io.typed import read_json
+from mocapflow.io.typed import place, read_json
 
 TIMING = "recording.json"
 FORM = 'expected {"late_frames": {"cam03": 2.8}}: by how many frames its pictures come after those of the others'
@@ -29,7 +29,7 @@ def late_frames(folder: Path, names: Sequence[str]) -> tuple[int, ...]:
         raise RecordingError(f"does not say how late the cameras are: {error!r}", where=str(path), hint=FORM) from error
     if unknown := sorted(set(late) - set(names)):
         raise RecordingError(
-            f"there is no camera '{unknown[0]}'", where=str(path), hint=alternatives(unknown[0], names)
+            f"there is no camera '{unknown[0]}'", where=place(path, unknown[0]), hint=alternatives(unknown[0], names)
         )
     return tuple(late.get(name, 0) for name in names)
 

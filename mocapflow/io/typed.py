@@ -1,4 +1,4 @@
-"""JSON and TOML files, which people type: what can't be read is told by line and column."""
+"""Files that people type, JSON and TOML: what is wrong in them is told by line and column."""
 
 from __future__ import annotations
 
@@ -38,6 +38,17 @@ def read_toml(path: Path, hint: str = "") -> dict[str, Any]:
         what, *place = PLACE.split(str(error))
         where = ":".join([str(path), *filter(None, place)])
         raise RecordingError(f"not TOML: {what}", where=where, hint=hint) from None
+
+
+def place(path: Path, name: str) -> str:
+    """Return where a name is first written in a file, as file:line:column; the file alone where it is not."""
+    word = re.compile(rf"(?<!\w){re.escape(name)}(?!\w)")
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError):
+        return str(path)
+    found = ((number, match) for number, line in enumerate(lines, 1) if (match := word.search(line)))
+    return next((f"{path}:{number}:{match.start() + 1}" for number, match in found), str(path))
 
 
 def _text(path: Path, hint: str) -> str:

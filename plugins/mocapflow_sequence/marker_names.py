@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from mocapflow.errors import RecordingError, alternatives
-from mocapflow.io.typed import read_toml
+from mocapflow.io.typed import place, read_toml
 
 # Landmark: its marker in Plug-in Gait and CGM2, CAST (van Sint Jan), OpenSim's gait models, OpenCap; s is the side.
 KNOWN: Mapping[str, tuple[str, ...]] = {
@@ -53,10 +53,12 @@ def _told(labels: Sequence[str], path: Path) -> dict[str, int]:
     for landmark, label in told.items():
         if landmark not in LANDMARKS:
             raise RecordingError(
-                f"unknown landmark '{landmark}'", where=str(path), hint=alternatives(landmark, LANDMARKS)
+                f"unknown landmark '{landmark}'", where=place(path, landmark), hint=alternatives(landmark, LANDMARKS)
             )
         if label not in labels:
-            raise RecordingError(f"no marker '{label}'", where=str(path), hint=alternatives(str(label), labels))
+            raise RecordingError(
+                f"no marker '{label}'", where=place(path, landmark), hint=alternatives(str(label), labels)
+            )
     return {landmark: list(labels).index(label) for landmark, label in told.items()}
 
 

@@ -133,7 +133,7 @@ def test_calibration_in_mm(tmp_path):
     path = tmp_path / "cameras.toml"
     write_cameras(path, cameras)
     message = (
-        r"cameras\.toml  camera 'cam01' stands 4272 m from the origin: the calibration is in mm\n"
+        r"cameras\.toml:1:2  camera 'cam01' stands 4272 m from the origin: the calibration is in mm\n"
         r"       lengths are in metres: divide every translation by 1000"
     )
     with pytest.raises(RecordingError, match=message):

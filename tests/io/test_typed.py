@@ -3,7 +3,7 @@
 import pytest
 
 from mocapflow.errors import RecordingError
-from mocapflow.io.typed import read_json, read_toml
+from mocapflow.io.typed import place, read_json, read_toml
 
 
 @pytest.mark.parametrize(
@@ -27,3 +27,12 @@ def test_the_place_and_what_to_do(tmp_path, monkeypatch, read, text, message):
 def test_a_file_that_is_not_there(tmp_path):
     with pytest.raises(RecordingError, match="can't be read: No such file"):
         read_json(tmp_path / "file")
+
+
+def test_the_place_of_a_name(tmp_path):
+    file = tmp_path / "file"
+    file.write_text('{"knee_left": 1,\n "knee_l": [1, 2]}\n[knee_r]\n')
+    assert place(file, "knee_l") == f"{file}:2:3"
+    assert place(file, "knee_r") == f"{file}:3:2"
+    assert place(file, "knee") == str(file)
+    assert place(tmp_path / "nowhere", "knee") == str(tmp_path / "nowhere")
