@@ -7,7 +7,7 @@ from typing import Any
 
 from mocapflow.components import Garment
 from mocapflow.errors import MocapflowError, RecordingError, UnknownComponent
-from mocapflow.io.typed import read_json
+from mocapflow.io.typed import place, read_json
 from mocapflow.resolve import Resolver
 
 FILE = Path("subject") / "garment.json"
@@ -46,8 +46,10 @@ def garment_of(value: Any, recording: Path, resolver: Resolver) -> Garment | Non
         if error.where != resolver.place(("garment",)):
             raise
         source = f"describes a {kind}" if kind else "does not exist"
-        note = f"measures, in metres, come from {file}, which {source}; a value written here overrides them"
-        raise type(error)(error.message, where=error.where, hint="\n".join(filter(None, [error.hint, note]))) from None
+        note = f"measures, in metres, come from {file}, which {source}; a value in the pipeline overrides them"
+        wrong = next((name for name in measures if error.message.startswith(f"garment.{name}: ")), "")
+        where = place(file, wrong.removesuffix("_m")) if wrong else error.where
+        raise type(error)(error.message, where=where, hint="\n".join(filter(None, [error.hint, note]))) from None
 
 
 def place_of(value: Any, recording: Path, resolver: Resolver) -> str:

@@ -154,7 +154,7 @@ def test_a_recording_without_measures(folder):
     file = Path("clip/subject/garment.json")
     assert str(caught.value) == (
         "skirt.yaml:2:1  garment: skirt needs waist_height_m, waist_circumference_m, hem_circumference_m, length_m\n"
-        f"       measures, in metres, come from {file}, which does not exist; a value written here overrides them"
+        f"       measures, in metres, come from {file}, which does not exist; a value in the pipeline overrides them"
     )
     with pytest.raises(MocapflowError, match="clip/subject/garment.json  the pipeline takes the garment from the rec"):
         load("garment=from_recording")
@@ -168,7 +168,7 @@ def test_measures_of_another_garment_are_not_used(folder):
 
 def test_a_wrong_measure_is_told_with_the_file_it_comes_from(folder):
     Path("clip/subject/garment.json").write_text(json.dumps({**MEASURES, "length": "69 cm"}))
-    said = "garment.length_m: .* not '69 cm'\n.*in metres, come from clip/subject/garment.json"
+    said = r"^clip/subject/garment.json:1:\d+  garment.length_m: .* not '69 cm'\n.*in metres, come from clip/subject/gar"
     with pytest.raises(MocapflowError, match=said):
         load()
 
