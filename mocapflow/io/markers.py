@@ -62,7 +62,7 @@ def read_trc(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
         frame rate; markers that are not seen are NaN.
 
     Raises:
-        RecordingError: not a TRC file, an unknown unit, or a row of another width.
+        RecordingError: not a TRC file, an unknown unit, no rate, or a row of another width.
     """
     lines = _text(path).splitlines()
     if len(lines) < 6 or not lines[0].startswith("PathFileType"):
@@ -72,6 +72,9 @@ def read_trc(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
     unit = header.get("Units", "").strip()
     if unit not in METRES:
         raise RecordingError(f"unknown unit '{unit}'", where=str(path), hint=f"known: {', '.join(METRES)}")
+    (rate,) = _row([header.get("DataRate", "")], 1, f"{path}:3")
+    if not rate > 0:
+        raise RecordingError("no DataRate above zero", where=f"{path}:3", hint="it is in rows per second")
     width = 2 + 3 * len(names)
     rows = [
         _row(_fitted(line.split("\t"), width), width, f"{path}:{number}")
@@ -80,7 +83,7 @@ def read_trc(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
     ]
     table = np.array(rows).reshape(-1, width)
     positions = table[:, 2:].reshape(-1, len(names), 3) * METRES[unit]
-    return names, positions, table[:, 1].copy(), float(header["DataRate"])
+    return names, positions, table[:, 1].copy(), rate
 
 
 def write_mot(path: Path, columns: Mapping[str, F64], time: F64, in_degrees: bool = True) -> None:
@@ -140,7 +143,7 @@ def read_c3d(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
     try:
         import ezc3d
     except ImportError as error:
-        raise RecordingError("C3D files need ezc3d", where=str(path), hint="pip install ezc3d") from error
+        raise RecordingError("C3D files need ezc3d", where=str(path), hint="pip install 'mocapflow[c3d]'") from error
     try:
         content = ezc3d.c3d(str(path))
     except OSError as error:

@@ -97,6 +97,9 @@ def test_bad_trc(tmp_path):
     path.write_text(good.replace("\n2\t", "\ntwo\t"))
     with pytest.raises(RecordingError, match=r"a\.trc:8  could not convert string to float: 'two'"):
         read_trc(path)
+    path.write_text(good.replace("DataRate", "Rate"))
+    with pytest.raises(RecordingError, match=r"a\.trc:3  no DataRate above zero"):
+        read_trc(path)
 
 
 def test_bad_mot(tmp_path):
@@ -136,5 +139,5 @@ def test_c3d(tmp_path):
 
 def test_c3d_without_ezc3d(tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "ezc3d", None)
-    with pytest.raises(RecordingError, match="C3D files need ezc3d\n       pip install ezc3d"):
+    with pytest.raises(RecordingError, match="C3D files need ezc3d\n       pip install 'mocapflow"):
         read_c3d(tmp_path / "a.c3d")
