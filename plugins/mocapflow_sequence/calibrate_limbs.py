@@ -53,7 +53,7 @@ class CalibrateLimbs(Stage):
     frames: PositiveInt = 10  # spread over the recording
     passes: PositiveInt = 3  # times that the images are segmented; after the first, matching is calm
     rounds: PositiveInt = 3  # matchings a pass
-    independent: Annotated[float, Field(gt=0, le=1)] = 0.24  # share of a frame's contour pairs; all frames count as one
+    independent: Annotated[float, Field(gt=0, le=1)] = 1.0  # share of a frame's contour pairs; all frames count as one
 
     def run(
         self, recording: Recording, scene: Scene, background: Background | None = None, track: Track | None = None
