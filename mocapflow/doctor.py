@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from mocapflow.assets import Camera
+from mocapflow.errors import MocapflowError, UnknownComponent
 from mocapflow.io import agreement, folders
 from mocapflow.io.cameras import find_calibration, read_cameras
 from mocapflow.io.findings import Finding, attempt, error, note, warning
@@ -17,6 +18,8 @@ from mocapflow.io.rigs import examine_rig
 from mocapflow.io.subjects import examine_subject
 from mocapflow.io.timing import TIMING, late_frames, timing_text, write_late_frames
 from mocapflow.io.video import Video, lost_frames, name_frames, open_video
+from mocapflow.measures import recorded_garment
+from mocapflow.registry import load_registry
 from mocapflow.synchrony import measure
 
 __all__ = ["Finding", "examine", "examine_timing"]
@@ -43,6 +46,7 @@ def examine(folder: Path) -> list[Finding]:
                 for f in _trial(static, own if own.exists() else calibration, rig=False)
             ]
     findings += examine_subject(folder)
+    findings += _garment(folder)
     findings += _missing(folder)
     return sorted(findings, key=lambda finding: ("error", "warning", "note").index(finding.severity))
 
@@ -70,6 +74,17 @@ def examine_timing(folder: Path, write: bool = False) -> list[Finding]:
     said = ", ".join(f"{camera} is {frames:.1f} frames {which}" for camera, frames, which in found)
     hint = f"write {timing_text(late)} there, or let --write do so: each frame is then taken at the same moment"
     return [*findings, warning(said, hint, folder / TIMING)]
+
+
+def _garment(folder: Path) -> list[Finding]:
+    """Return what keeps the garment that the recording describes from being sewn."""
+    try:
+        recorded_garment(folder, load_registry())
+    except UnknownComponent as problem:  # its plugin may be on another machine
+        return [warning(problem.message, problem.hint, problem.where)]
+    except MocapflowError as problem:
+        return [error(problem.message, problem.hint, problem.where)]
+    return []
 
 
 def _missing(folder: Path) -> Iterator[Finding]:

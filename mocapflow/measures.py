@@ -6,8 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from mocapflow.components import Garment
+from mocapflow.documents import Document, Place
 from mocapflow.errors import MocapflowError, RecordingError, UnknownComponent
 from mocapflow.io.typed import place, read_json
+from mocapflow.registry import Registry
 from mocapflow.resolve import Resolver
 
 FILE = Path("subject") / "garment.json"
@@ -40,7 +42,7 @@ def garment_of(value: Any, recording: Path, resolver: Resolver) -> Garment | Non
         garment: Garment = resolver.component("garment", value, ("garment",), measures)
         return garment
     except UnknownComponent as error:
-        where = str(file) if named == kind else error.where
+        where = place(file, str(kind)) if named == kind else error.where
         raise UnknownComponent(error.message, where=where, hint=error.hint) from None
     except MocapflowError as error:
         if error.where != resolver.place(("garment",)):
@@ -50,6 +52,17 @@ def garment_of(value: Any, recording: Path, resolver: Resolver) -> Garment | Non
         wrong = next((name for name in measures if error.message.startswith(f"garment.{name}: ")), "")
         where = place(file, wrong.removesuffix("_m")) if wrong else error.where
         raise type(error)(error.message, where=where, hint="\n".join(filter(None, [error.hint, note]))) from None
+
+
+def recorded_garment(recording: Path, registry: Registry) -> Garment | None:
+    """Return the garment that a recording describes, None where it describes none.
+
+    Raises:
+        MocapflowError: a measure is missing or wrong, or no plugin has such a garment.
+    """
+    file = recording / FILE
+    resolver = Resolver(Document({}, {(): Place(str(file), recording)}), registry)
+    return garment_of(FROM_RECORDING, recording, resolver) if file.exists() else None
 
 
 def place_of(value: Any, recording: Path, resolver: Resolver) -> str:

@@ -1,34 +1,24 @@
-"""Whether the files of a subject make sense: mesh, skeleton, weights, garment, first pose."""
+"""Whether the files of a subject make sense: mesh, skeleton, weights, first pose."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-from mocapflow.errors import alternatives
-from mocapflow.io.findings import Finding, attempt, error, warning
+from mocapflow.io.findings import Finding, attempt, error
 from mocapflow.io.first_pose import odd_pose
 from mocapflow.io.meshes import read_mesh
-from mocapflow.io.scans import TALLEST, check_size, read_skeleton, read_weights
-from mocapflow.io.typed import place, read_json
-
-GARMENTS = {
-    "skirt": ("waist_height", "waist_circumference", "hem_circumference", "length"),
-    "shorts": (
-        "waist_height", "waist_circumference", "hip_circumference", "leg_opening_circumference", "inseam", "length",
-    ),
-}  # fmt: skip
+from mocapflow.io.scans import check_size, read_skeleton, read_weights
+from mocapflow.io.typed import read_json
 
 
 def examine_subject(folder: Path) -> list[Finding]:
     """Return what is wrong in subject/ and init.json of a recording folder."""
     findings: list[Finding] = []
     joints = _examine_scan(folder / "subject", findings)
-    _examine_json(folder / "subject" / "garment.json", _odd_garment, findings)
-    _examine_json(folder / "init.json", partial(odd_pose, joints=joints), findings)
-    return findings
+    pose = folder / "init.json"
+    content = attempt(lambda: read_json(pose), findings) if pose.exists() else None
+    return findings if content is None else [*findings, *odd_pose(pose, content, joints)]
 
 
 def _examine_scan(subject: Path, findings: list[Finding]) -> Sequence[str]:
@@ -48,29 +38,3 @@ def _examine_scan(subject: Path, findings: list[Finding]) -> Sequence[str]:
         if skin.exists():
             attempt(lambda: read_weights(skin, skeleton, len(vertices)), findings)
     return skeleton.names
-
-
-def _examine_json(path: Path, odd: Callable[[Path, Any], Iterator[Finding]], findings: list[Finding]) -> None:
-    if path.exists():
-        content = attempt(lambda: read_json(path), findings)
-        findings += odd(path, content) if content is not None else []
-
-
-def _odd_garment(path: Path, content: Any) -> Iterator[Finding]:
-    if not isinstance(content, dict):
-        yield error("expected {...} at the top", where=path)
-        return
-    kind = content.get("type")
-    if not isinstance(kind, str) or kind not in GARMENTS:
-        hint = f"built in: {', '.join(GARMENTS)}; others need their plugin"
-        yield warning(f"the garment type is {kind!r}", hint, place(path, "type"))
-        return
-    known = GARMENTS[kind]
-    for key in content.keys() - {"type", *known}:
-        yield error(f"unknown measure '{key}' of {kind}", alternatives(key, known), place(path, key))
-    for key in known:
-        value = content.get(key)
-        if value is None:
-            yield error(f"the {kind} lacks '{key}'", f"needed, in m: {', '.join(known)}", path)
-        elif not isinstance(value, int | float) or not 0 < value < TALLEST:
-            yield error(f"'{key}' is {value!r}", f"expected metres, between 0 and {TALLEST:g}", place(path, key))
