@@ -16,7 +16,13 @@ from mocapflow.errors import PluginError, guess
 
 
 def import_file(path: Path) -> ModuleType:
-    """Import a plugin from a Python file, each file under a name of its own."""
+    """Import a plugin from a Python file, each file under a name of its own.
+
+    Raises:
+        PluginError: there is no such file, or it is not Python; what the file itself raises is passed on.
+    """
+    if not path.is_file():
+        raise PluginError(f"there is no file {path}")
     name = f"mocapflow_file_{path.stem}_{hashlib.blake2b(str(path.resolve()).encode(), digest_size=4).hexdigest()}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:

@@ -149,6 +149,11 @@ def test_a_hook_under_another_name():
     assert registry_of((OURS, lambda: plugin)).names("garment") == ("cape",)
 
 
+def test_a_plugin_file_that_is_not_there(tmp_path):
+    (failure,) = load_registry([tmp_path / "nowhere.py"]).failures
+    assert str(failure).endswith(f"did not load: there is no file {tmp_path / 'nowhere.py'}")
+
+
 def test_every_provider_has_a_role():
     from mocapflow import hookspecs
 

@@ -17,7 +17,7 @@ from mocapflow.io.typed import place, read_json
 from mocapflow.records import F64, array, record
 
 ROOT = ("root_rotation", "root_translation")
-KEYS = (*ROOT, "joint_rotations")
+TURNS = "joint_rotations"
 FORM = (
     'expected {"root_rotation": [3], "root_translation": [3] (m, the root joint in the world), '
     '"joint_rotations": {name: [3]}}, rotation vectors in radians, relative to the parent'
@@ -53,15 +53,15 @@ def read_first_pose(path: Path, joints: Sequence[str] = ()) -> FirstPose:
 
 def odd_pose(path: Path, content: Any, joints: Sequence[str]) -> Iterator[Finding]:
     """Yield what is wrong with the content of a file, and where: keys, joints, numbers, units."""
-    if not isinstance(content, dict) or not isinstance(content.get(KEYS[2], {}), dict):
+    if not isinstance(content, dict) or not isinstance(content.get(TURNS, {}), dict):
         yield error("not a first pose", FORM, path)
         return
-    for key in content.keys() - set(KEYS):
-        yield error(f"unknown key '{key}'", alternatives(key, KEYS), place(path, key))
+    for key in sorted(content.keys() - {*ROOT, TURNS}):
+        yield error(f"unknown key '{key}'", alternatives(key, (*ROOT, TURNS)), place(path, key))
     for key in ROOT:
         if key not in content:
             yield error(f"'{key}' is missing", FORM, path)
-    for joint in content.get(KEYS[2], {}):
+    for joint in content.get(TURNS, {}):
         if joints and joint not in joints:
             yield error(f"the body has no joint '{joint}'", alternatives(joint, joints), place(path, joint))
     for key, vector in _vectors(content).items():
@@ -70,7 +70,7 @@ def odd_pose(path: Path, content: Any, joints: Sequence[str]) -> Iterator[Findin
 
 
 def _vectors(content: dict[str, Any]) -> dict[str, Any]:
-    turns: dict[str, Any] = content.get(KEYS[2], {})
+    turns: dict[str, Any] = content.get(TURNS, {})
     return {key: content[key] for key in ROOT if key in content} | turns
 
 
