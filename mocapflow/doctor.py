@@ -12,11 +12,11 @@ from mocapflow.errors import MocapflowError, UnknownComponent
 from mocapflow.io import agreement, folders
 from mocapflow.io.cameras import find_calibration, read_cameras
 from mocapflow.io.findings import Finding, attempt, error, note, warning
+from mocapflow.io.lateness import TIMING, late_frames, timing_text, write_late_frames
 from mocapflow.io.lenses import View
 from mocapflow.io.plates import background
 from mocapflow.io.rigs import examine_rig
 from mocapflow.io.subjects import examine_subject
-from mocapflow.io.timing import TIMING, late_frames, timing_text, write_late_frames
 from mocapflow.io.video import Video, lost_frames, name_frames, open_video
 from mocapflow.measures import recorded_garment
 from mocapflow.registry import load_registry

@@ -16,9 +16,9 @@ from mocapflow.errors import RecordingError
 from mocapflow.io import folders
 from mocapflow.io.cameras import calibration_files
 from mocapflow.io.keypoints import keypoint_files, people_at
+from mocapflow.io.lateness import TIMING
 from mocapflow.io.lenses import View
 from mocapflow.io.plates import background
-from mocapflow.io.timing import TIMING
 from mocapflow.io.video import Video, read_frames
 from mocapflow.records import F64, Watch, record, unwatched
 

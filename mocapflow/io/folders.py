@@ -11,7 +11,7 @@ from mocapflow.errors import RecordingError
 from mocapflow.io import agreement
 from mocapflow.io.cameras import find_calibration, read_cameras
 from mocapflow.io.keypoints import odd_keypoints
-from mocapflow.io.timing import late_frames
+from mocapflow.io.lateness import late_frames
 from mocapflow.io.video import IMAGES, VIDEOS, Video, open_video
 from mocapflow.records import record
 
