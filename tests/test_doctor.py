@@ -231,7 +231,7 @@ def test_keypoints_with_nan(tmp_path):
     ("change", "message", "hint"),
     [
         (lambda g: g.update(type="gown"), "garment: no garment named 'gown'", "available: cylinder, shorts, skirt"),
-        (lambda g: g.update(lenth=1), "garment.lenth_m: unknown setting of shorts", "did you mean 'length_m'"),
+        (lambda g: g.update(lengths=1), "garment.lengths_m: unknown setting of shorts", "did you mean 'length_m'"),
         (lambda g: g.pop("inseam"), "garment: shorts needs inseam_m", "measures, in metres, come from"),
         (lambda g: g.update(length=48), "garment.length_m: input should be less than 4, not 48", "measures, in metres"),
     ],
