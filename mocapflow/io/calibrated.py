@@ -28,7 +28,7 @@ def make_camera(
     """Return a camera from the numbers of a file; `rotation` is a Rodrigues vector or a 3 x 3 matrix.
 
     Raises:
-        RecordingError: an array has the wrong length, or the matrix is not a rotation.
+        RecordingError: an array has the wrong length, or the rotation is none, or in degrees.
     """
     motion = np.eye(4)
     motion[:3, 3] = numbers(translation, (3,), "translation", name, where)
@@ -36,6 +36,9 @@ def make_camera(
         motion[:3, :3] = numbers(rotation, (3, 3), "rotation", name, where)
     else:
         vector = numbers(rotation, (3,), "rotation", name, where)
+        if (turn := float(np.linalg.norm(vector))) > 2 * np.pi:
+            hint = "rotation is a Rodrigues vector in radians, camera from world"
+            raise bad(name, where, f"turns by {turn:.1f} rad, more than once around: it looks like degrees", hint)
         motion[:3, :3] = twists.exp(np.concatenate([vector, np.zeros(3)]))[:3, :3]
     coefficients = numbers(distortion, (np.size(distortion),), "distortions", name, where)
     if len(coefficients) > 5:

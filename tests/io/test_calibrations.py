@@ -1,5 +1,6 @@
 """Calibration files of every format, and what is said of bad ones."""
 
+import re
 from dataclasses import replace
 
 import cv2
@@ -125,6 +126,14 @@ def write_changed(path, old, new):
 def test_missing_field(tmp_path):
     path = write_changed(tmp_path / "cameras.toml", "rotation =", "rotations =")
     with pytest.raises(RecordingError, match="camera 'cam01' lacks rotation\n.*each camera needs size, matrix"):
+        read_cameras(path)
+
+
+def test_rotation_in_degrees(tmp_path):
+    path = tmp_path / "cameras.toml"
+    write_cameras(path, ring())
+    path.write_text(re.sub(r"rotation = \[.*?\]", "rotation = [69.0, 81.6, -72.7]", path.read_text(), count=1))
+    with pytest.raises(RecordingError, match=r"'cam01' turns by 129.\d rad, .*: it looks like degrees"):
         read_cameras(path)
 
 
