@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numba
 import numpy as np
-from pydantic import Field
+from pydantic import PositiveFloat
 
 from mocapflow.assets import Camera
 from mocapflow.components import Matcher, pool
@@ -18,8 +18,6 @@ from mocapflow.scene import Scene
 from mocapflow_matching.robust import robust_weights
 from mocapflow_matching.uncertainty import ANY_DIRECTION
 
-Positive = Annotated[float, Field(gt=0)]
-
 
 class Containment(Matcher):
     """Pairs points of the bare body's contour that stick out of the image silhouette with the image contour.
@@ -29,11 +27,11 @@ class Containment(Matcher):
     """
 
     name: ClassVar[str] = "containment"
-    spacing_px: Positive = 6.0  # between the points of the contour
-    reach_px: Positive = 60.0  # pairs farther apart are left out
+    spacing_px: PositiveFloat = 6.0  # between the points of the contour
+    reach_px: PositiveFloat = 60.0  # pairs farther apart are left out
     margin_px: float = 0.0  # how far inside the silhouette the skin has to stay
-    sigma_px: Positive = 1.0  # standard deviation of a pair
-    scale: Positive = 3.0  # standard deviations beyond which a pair pulls no harder (Huber)
+    sigma_px: PositiveFloat = 1.0  # standard deviation of a pair
+    scale: PositiveFloat = 3.0  # standard deviations beyond which a pair pulls no harder (Huber)
 
     def match(
         self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn

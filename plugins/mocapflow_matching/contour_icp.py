@@ -6,7 +6,7 @@ from typing import Annotated, Literal, NamedTuple
 
 import numba
 import numpy as np
-from pydantic import Field
+from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from mocapflow.components import Matcher, pool
 from mocapflow.data import (
@@ -27,8 +27,6 @@ from mocapflow.records import F64, I32
 from mocapflow.scene import Scene
 from mocapflow_matching.robust import Loss, robust_weights
 from mocapflow_matching.uncertainty import contour_sigma
-
-Positive = Annotated[float, Field(gt=0)]
 
 
 class ImageContour(NamedTuple):
@@ -57,18 +55,18 @@ class ContourIcp(Matcher):
     name = "contour_icp"
     direction: Literal["both", "forward", "backward"] = "both"  # from the image to the model, back, or both
     residual: Literal["normal", "point"] = "normal"  # let points slide along the contour, or not (the chapter)
-    spacing_px: Positive = 4.0  # between the points of a contour
-    hem_guard_px: Annotated[float, Field(ge=0)] = 12.0  # skin so near to cloth counts as cloth: a hem is uncertain
-    calm_mm: Positive = 15.0  # change of the body in a turn below which reach and loss are the later ones
-    first_reach_px: Positive = 40.0  # pairs farther apart are left out
-    later_reach_px: Positive = 10.0  # the same once it is calm
+    spacing_px: PositiveFloat = 4.0  # between the points of a contour
+    hem_guard_px: NonNegativeFloat = 12.0  # skin so near to cloth counts as cloth: a hem is uncertain
+    calm_mm: PositiveFloat = 15.0  # change of the body in a turn below which reach and loss are the later ones
+    first_reach_px: PositiveFloat = 40.0  # pairs farther apart are left out
+    later_reach_px: PositiveFloat = 10.0  # the same once it is calm
     normal_angle_deg: Annotated[float, Field(gt=0, le=180)] = 60.0  # contours that differ more make no pair
     first_loss: Loss = "huber"  # of a pair by its distance
     later_loss: Loss = "geman_mcclure"  # the same once it is calm
-    normal_px: Annotated[float, Field(ge=0)] = 0.0  # px that count as far as normals at right angles, over sqrt 2
-    scale: Positive = 2.0  # standard deviations at which the loss begins to give way
-    sigma_px: Positive = 1.0  # standard deviation of a pair on skin
-    cloth_sigma_px_per_m: Positive = 80.0  # the longer cloth hangs, the less it is where a draper lays it
+    normal_px: NonNegativeFloat = 0.0  # px that count as far as normals at right angles, over sqrt 2
+    scale: PositiveFloat = 2.0  # standard deviations at which the loss begins to give way
+    sigma_px: PositiveFloat = 1.0  # standard deviation of a pair on skin
+    cloth_sigma_px_per_m: PositiveFloat = 80.0  # the longer cloth hangs, the less it is where a draper lays it
 
     @property
     def stride(self) -> int:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated
 
 import numpy as np
-from pydantic import Field
+from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
 
 from mocapflow.data import Silhouette, Surface, Turn
 from mocapflow.geometry import silhouettes
@@ -30,10 +29,10 @@ class FourierIcp(ContourIcp):
     """
 
     name = "fourier_icp"
-    harmonics: tuple[Annotated[int, Field(ge=1)], ...] = (6, 12)  # a turn each; in full from then on
-    near_px: Annotated[float, Field(ge=0)] = 3.0  # median distance of the contours below which they are near
-    least_px: Annotated[float, Field(gt=0)] = 40.0  # shorter contours are left out
-    curvature_px2: Annotated[float, Field(ge=0)] = 0.0  # px that count as far as a curvature of one per px
+    harmonics: tuple[PositiveInt, ...] = (6, 12)  # a turn each; in full from then on
+    near_px: NonNegativeFloat = 3.0  # median distance of the contours below which they are near
+    least_px: PositiveFloat = 40.0  # shorter contours are left out
+    curvature_px2: NonNegativeFloat = 0.0  # px that count as far as a curvature of one per px
 
     def contours(
         self, silhouette: Silhouette, surface: Surface, scene: Scene, turn: Turn

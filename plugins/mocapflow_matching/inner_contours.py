@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import PositiveFloat
 
 from mocapflow.components import Matcher
 from mocapflow.data import Frame, Matches, Past, Segmentation, Surface, Turn, empty_matches
 from mocapflow.geometry.cameras import project_each
 from mocapflow.scene import Scene
 from mocapflow_matching.robust import robust_weights
-
-Positive = Annotated[float, Field(gt=0)]
 
 
 class InnerContours(Matcher):
@@ -24,8 +22,8 @@ class InnerContours(Matcher):
     """
 
     name: ClassVar[str] = "inner_contours"
-    calm_mm: Positive = 15.0  # change of the body in a turn below which the loss gives far pairs up (Geman-McClure)
-    scale: Positive = 2.0  # standard deviations at which the loss begins to give way; before it is calm: Huber
+    calm_mm: PositiveFloat = 15.0  # change of the body in a turn below which far pairs are given up (Geman-McClure)
+    scale: PositiveFloat = 2.0  # standard deviations at which the loss begins to give way; before it is calm: Huber
 
     def match(
         self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn

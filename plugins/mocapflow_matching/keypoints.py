@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from mocapflow_sequence.keypoint_layouts import LAYOUTS, Layout, layout_of
 from mocapflow_sequence.landmarks import landmarks
 from mocapflow_sequence.person import scale_of
 from mocapflow_sequence.triangulate import triangulate
-from pydantic import Field
+from pydantic import PositiveFloat
 
 from mocapflow.assets import Body, Camera
 from mocapflow.components import Matcher
@@ -19,8 +19,6 @@ from mocapflow.geometry.cameras import centre, project, project_each
 from mocapflow.records import F64, I32
 from mocapflow.scene import Scene
 from mocapflow_matching.robust import robust_weights
-
-Positive = Annotated[float, Field(gt=0)]
 
 NEIGHBOURS = 60  # vertices that a landmark may be a mean of
 MEDIAN_RADIUS = 1.177  # median length of a normal 2D error, in standard deviations of its components
@@ -37,9 +35,9 @@ class Keypoints(Matcher):
 
     name = "keypoints"
     layout: Layout | None = None  # order of the keypoints; null: told by their number
-    sigma_px: Positive = 5.0  # of the estimator, where fewer than three views tell
-    least_sigma_px: Positive = 1.0  # however well the keypoints agree
-    scale: Positive = 2.0  # standard deviations beyond which a keypoint pulls no harder (Huber)
+    sigma_px: PositiveFloat = 5.0  # of the estimator, where fewer than three views tell
+    least_sigma_px: PositiveFloat = 1.0  # however well the keypoints agree
+    scale: PositiveFloat = 2.0  # standard deviations beyond which a keypoint pulls no harder (Huber)
 
     def match(
         self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn

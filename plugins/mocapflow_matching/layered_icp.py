@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from mocapflow_levelset import splits
 from mocapflow_levelset.layers import COLOURS, Shown, layer_of, shown
-from pydantic import Field
+from pydantic import PositiveFloat
 
 from mocapflow.data import Frame, Matches, Past, Segmentation, Surface, Turn
 from mocapflow.records import I32, Bool
@@ -25,7 +25,7 @@ class LayeredIcp(ContourIcp):
     """
 
     name: ClassVar[str] = "layered_icp"
-    least: Annotated[float, Field(gt=0)] = 3.0  # log ratio of colours by which they are surely another part's
+    least: PositiveFloat = 3.0  # log ratio of colours by which they are surely another part's
 
     def match(
         self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn

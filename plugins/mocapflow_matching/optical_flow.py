@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import NonNegativeFloat, NonNegativeInt, PositiveFloat
 
 from mocapflow.components import Matcher, pool
 from mocapflow.data import CLOTH, Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn, empty_matches
@@ -17,9 +17,6 @@ from mocapflow_matching.carried import carried_points, distances
 from mocapflow_matching.robust import robust_weights
 from mocapflow_matching.shape_flow import register
 from mocapflow_matching.uncertainty import contour_sigma
-
-Positive = Annotated[float, Field(gt=0)]
-Share = Annotated[float, Field(ge=0)]
 
 WORKING_SIDE = 200  # px, at most, of the distance images: they are smooth
 ON_CONTOUR = 1.0  # px from the image contour within which a target has to end
@@ -38,18 +35,18 @@ class OpticalFlow(Matcher):
 
     name = "optical_flow"
     between: Literal["both", "shapes", "frames"] = "both"  # model and image of a frame, two frames, or both
-    first_turns: Annotated[int, Field(ge=0)] = 1  # of a frame, in which shapes are registered
-    first_share: Share = 2.3  # against contour_icp's in these turns: 0.7 to 0.3
-    later_share: Share = 0.25  # after them: 0.2 to 0.8
-    spacing_px: Positive = 4.0  # between the points of the model's contour
-    smoothness: Positive = 3.0  # of the flow, against the constancy of the distance images
-    band: Positive = 0.1  # half its width about the model's contour, against the longer side of the picture
-    levels: Annotated[int, Field(ge=0)] = 3  # of the pyramid
-    contour_sigma_px: Positive = 1.0  # standard deviation of a pair of contour points on skin
-    cloth_sigma_px_per_m: Positive = 80.0  # as for contour_icp
-    image_sigma_px: Positive = 1.5  # standard deviation of a tracked point
-    cloth_share: Share = 0.2  # of a point on cloth against one on skin
-    scale: Positive = 2.0  # standard deviations beyond which a pair pulls no harder (Huber)
+    first_turns: NonNegativeInt = 1  # of a frame, in which shapes are registered
+    first_share: NonNegativeFloat = 2.3  # against contour_icp's in these turns: 0.7 to 0.3
+    later_share: NonNegativeFloat = 0.25  # after them: 0.2 to 0.8
+    spacing_px: PositiveFloat = 4.0  # between the points of the model's contour
+    smoothness: PositiveFloat = 3.0  # of the flow, against the constancy of the distance images
+    band: PositiveFloat = 0.1  # half its width about the model's contour, against the longer side of the picture
+    levels: NonNegativeInt = 3  # of the pyramid
+    contour_sigma_px: PositiveFloat = 1.0  # standard deviation of a pair of contour points on skin
+    cloth_sigma_px_per_m: PositiveFloat = 80.0  # as for contour_icp
+    image_sigma_px: PositiveFloat = 1.5  # standard deviation of a tracked point
+    cloth_share: NonNegativeFloat = 0.2  # of a point on cloth against one on skin
+    scale: PositiveFloat = 2.0  # standard deviations beyond which a pair pulls no harder (Huber)
 
     def match(
         self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn

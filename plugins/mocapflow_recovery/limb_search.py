@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from mocapflow_priors.density import read
 from mocapflow_priors.parzen import SHIPPED
-from pydantic import Field
+from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
 from mocapflow.assets import Body
 from mocapflow.components import Recovery
@@ -22,9 +22,6 @@ from mocapflow_recovery.coarse import coarse_body
 from mocapflow_recovery.disagreement import distance
 from mocapflow_recovery.judge import Judge, Reach, stray_of
 from mocapflow_recovery.sampling import Plan, Spread, put_back, search, seen_samples, without_idle_parts
-
-Positive = Annotated[float, Field(gt=0)]
-Count = Annotated[int, Field(ge=1)]
 
 
 class LimbSearch(Recovery):
@@ -39,23 +36,23 @@ class LimbSearch(Recovery):
     """
 
     name: ClassVar[str] = "limb_search"
-    uncovered_cm2: Positive = 60.0  # of the person off the model, in all views: more, and the fit is doubted
-    floating_cm2: Positive = 60.0  # likewise, of skin in empty space
-    reach_m: Positive = 0.06  # what lies nearer to the other does not count
-    cloth_m: Positive = 0.2  # what lies so near to the garment may be the garment, wherever it swings
+    uncovered_cm2: PositiveFloat = 60.0  # of the person off the model, in all views: more, and the fit is doubted
+    floating_cm2: PositiveFloat = 60.0  # likewise, of skin in empty space
+    reach_m: PositiveFloat = 0.06  # what lies nearer to the other does not count
+    cloth_m: PositiveFloat = 0.2  # what lies so near to the garment may be the garment, wherever it swings
     gain: Annotated[float, Field(ge=0, lt=1)] = 0.1  # by which share another fit must be nearer to be taken
-    tolerance: Annotated[float, Field(ge=0)] = 0.03  # by which share a part may be farther that stays as it was fitted
+    tolerance: NonNegativeFloat = 0.03  # by which share a part may be farther that stays as it was fitted
     rows: Annotated[int, Field(ge=50)] = 160  # images are shrunk to about this height
     faces: Annotated[int, Field(ge=200)] = 2600  # of the body that is searched with
-    near_m: Positive = 0.35  # changes further than this from the model are somebody else
-    cap_m: Positive = 0.2  # beyond, it does not matter how far
-    samples: Count = 40  # of each part in a round
+    near_m: PositiveFloat = 0.35  # changes further than this from the model are somebody else
+    cap_m: PositiveFloat = 0.2  # beyond, it does not matter how far
+    samples: PositiveInt = 40  # of each part in a round
     poses: Path = SHIPPED  # that people were seen in, made by `mocapflow prior fit`: limbs are tried as they are there
-    seen_samples: Annotated[int, Field(ge=0)] = 100  # of each limb in the first round, from `poses`
-    shares: Annotated[tuple[Positive, ...], Field(min_length=1)] = (1.0, 0.6, 0.4, 0.25, 0.12)  # of the spread
-    spread_deg: Positive = 25.0  # standard deviation of the first samples; less where a joint at rest hardly bends
-    root_spread_deg: Positive = 8.0  # likewise, of the root's turn
-    root_spread_m: Positive = 0.06  # likewise, of its place
+    seen_samples: NonNegativeInt = 100  # of each limb in the first round, from `poses`
+    shares: Annotated[tuple[PositiveFloat, ...], Field(min_length=1)] = (1.0, 0.6, 0.4, 0.25, 0.12)  # of the spread
+    spread_deg: PositiveFloat = 25.0  # standard deviation of the first samples; less where a joint at rest hardly bends
+    root_spread_deg: PositiveFloat = 8.0  # likewise, of the root's turn
+    root_spread_m: PositiveFloat = 0.06  # likewise, of its place
 
     def recover(
         self,
