@@ -17,6 +17,7 @@ HARMONICS: tuple[tuple[str, ...], ...] = (
 )
 LARGEST_TILT = math.radians(40)
 LARGEST_THICKNESS = 0.010  # m
+LARGEST_TAKE_UP = 0.15  # share of the length of a strand
 NOTICED = 0.001  # m by which a garment is wider than its measure: less is not worth a word
 
 Parameters = tuple[tuple[str, ...], F64]
@@ -31,6 +32,12 @@ def force_parameters(orders: tuple[int, ...]) -> Parameters:
     tilts = [name for order in orders for name in HARMONICS[order]]
     bounds = [[0.0, LARGEST_THICKNESS], *([-LARGEST_TILT, LARGEST_TILT] for _ in tilts)]
     return ("thickness_m", *tilts), np.array(bounds)
+
+
+def with_take_up(parameters: Parameters) -> Parameters:
+    """Return names and bounds with, last, the share of the length of hanging strands that folds and gathers take up."""
+    names, bounds = parameters
+    return (*names, "take_up"), np.concatenate([bounds, [[0.0, LARGEST_TAKE_UP]]])
 
 
 def sheet(

@@ -31,7 +31,7 @@ def blow_batch(  # type: ignore[no-untyped-def]
         towards: (B, N, 3), unit direction in which each tail comes to hang.
         amount: (B, N) rad, between straight down and `towards`.
         skin: (D,) m, contact distance on each body.
-        links: (N, L - 1) m, lengths of the bars.
+        links: (D, N, L - 1) m, lengths of the bars.
         pivot: (D, N) row of the last supported particle.
         last: (N,) row of the last particle.
         parts: (D, P, COLUMNS), the bodies, see `parts`.
@@ -43,7 +43,7 @@ def blow_batch(  # type: ignore[no-untyped-def]
 
     Source: Rosenhahn 2008, section 12.3
     """
-    many, rows = len(source), links.shape[1] + 1  # the last row of what is known of tails: as they hang
+    many, rows = len(source), links.shape[2] + 1  # the last row of what is known of tails: as they hang
     room, near = np.empty((many + 1, rows)), np.zeros((many + 1, rows), np.int64)
     fresh, ended = np.ones((many + 1, rows), np.bool_), np.empty(many + 1, np.int64)
     for n in range(len(last)):
@@ -64,7 +64,7 @@ def blow_batch(  # type: ignore[no-untyped-def]
                 angle -= amount[a, n]
             room[b], near[b], fresh[b] = room[a], near[a], fresh[a]
             ended[b] = swing(
-                ended[a], back[b, n], towards[b, n], angle, skin[d], links[n], last[n], parts[d], values,
+                ended[a], back[b, n], towards[b, n], angle, skin[d], links[d, n], last[n], parts[d], values,
                 grid[b, n], held[b, n], room[b], near[b], fresh[b],
             )  # fmt: skip
 

@@ -18,8 +18,9 @@ GRAZING = 0.2  # least slope at which a bar is said to meet the skin: below, its
 
 @numba.njit(cache=True, error_model="numpy")
 def follow_swing(  # type: ignore[no-untyped-def]
-    grid, held, facing, down, roots, facing_rate, down_rate, links, first, last, parts, values, carry, swell, rate
-):
+    grid, held, facing, down, roots, facing_rate, down_rate, links, first, last, parts, values, carry, swell, grow,
+    rate,
+):  # fmt: skip
     """Write the rates of strands as they fell on one body.
 
     Args:
@@ -37,6 +38,7 @@ def follow_swing(  # type: ignore[no-untyped-def]
         values: its voxels.
         carry: (P, 3, 4, S) rates of a part's points, affine in their place in the world.
         swell: (S,) rate of the contact distance.
+        grow: (S,) rate of the logarithm of the bars' length.
         rate: (N, L, 3, S), written.
     """
     for n in range(len(grid)):
@@ -52,6 +54,9 @@ def follow_swing(  # type: ignore[no-untyped-def]
             f, d = facing[n], down[n]
             sine, cosine = ux * f[0] + uy * f[1] + uz * f[2], ux * d[0] + uy * d[1] + uz * d[2]
             bar = sine * facing_rate[n] + cosine * down_rate[n]
+            bar[0] += ux * grow
+            bar[1] += uy * grow
+            bar[2] += uz * grow
             if held[n, end] > 0:
                 part = held[n, end] - 1
                 gx, gy, gz = outwards(p[0], p[1], p[2], part, parts, values)
@@ -91,7 +96,7 @@ def lack(normal, p, rate, carry, swell):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, error_model="numpy", forceinline=True)
-def follow_length(rate, n, row, bar, link):  # type: ignore[no-untyped-def]
+def follow_length(rate, n, row, bar, link, grow):  # type: ignore[no-untyped-def]
     """Change the rates of a bar's lower end, in `row`, as the bar from the row above is brought to its length."""
     dx, dy, dz = bar
     r = max(math.sqrt(dx * dx + dy * dy + dz * dz), 1e-9)
@@ -99,7 +104,7 @@ def follow_length(rate, n, row, bar, link):  # type: ignore[no-untyped-def]
     for s in range(rate.shape[3]):
         ax, ay, az = rate[n, up, 0, s], rate[n, up, 1, s], rate[n, up, 2, s]
         ex, ey, ez = rate[n, row, 0, s] - ax, rate[n, row, 1, s] - ay, rate[n, row, 2, s] - az
-        along = ux * ex + uy * ey + uz * ez
+        along = ux * ex + uy * ey + uz * ez - r * grow[s]
         mx, my, mz = ax + scale * (ex - along * ux), ay + scale * (ey - along * uy), az + scale * (ez - along * uz)
         share = FASTEST / math.sqrt(max(mx * mx + my * my + mz * mz, FASTEST * FASTEST))
         rate[n, row, 0, s], rate[n, row, 1, s], rate[n, row, 2, s] = share * mx, share * my, share * mz

@@ -1,4 +1,4 @@
-"""What a garment's parameters mean: thickness, and a tail angle per azimuth as a low Fourier series.
+"""What a garment's parameters mean: thickness, take-up, and a tail angle per azimuth as a low Fourier series.
 
 Order 0 is a flare, order 1 the wind of the chapter (its direction and amount as two components), order 2 two legs
 inside one ring, order 3 a ring that one leg leaves. Azimuths are those of the rest garment, so the series turns with
@@ -31,7 +31,7 @@ def tilts(garment: GarmentMesh, parameters: F64, azimuth: F64) -> tuple[F64, F64
     out = np.zeros((len(parameters), len(azimuth)))
     aside = np.zeros_like(out)
     for column, name in enumerate(garment.parameter_names):
-        if name == "thickness_m":
+        if name in ("thickness_m", "take_up"):
             continue
         order, part = _meaning(garment, name)
         amount = parameters[:, column, None]
@@ -52,7 +52,7 @@ def _meaning(garment: GarmentMesh, name: str) -> tuple[int, str]:
             return order, "sin" if name.endswith("_sin_rad") else "cos"
     raise PluginError(
         f"garment {garment.name} has a parameter '{name}' that draper kinematic does not know",
-        hint=alternatives(name, ["thickness_m", *chain.from_iterable(HARMONICS)]),
+        hint=alternatives(name, ["thickness_m", "take_up", *chain.from_iterable(HARMONICS)]),
     )
 
 
@@ -80,4 +80,12 @@ def thickness(garment: GarmentMesh, parameters: F64) -> F64:
     if "thickness_m" not in garment.parameter_names:
         return np.zeros(len(parameters))
     column: F64 = np.maximum(parameters[:, garment.parameter_names.index("thickness_m")], 0.0)
+    return column
+
+
+def remaining_length(garment: GarmentMesh, parameters: F64) -> F64:
+    """Return the share (B,) of their sewn length that strands span: what folds and gathers take up is lost."""
+    if "take_up" not in garment.parameter_names:
+        return np.ones(len(parameters))
+    column: F64 = 1.0 - np.maximum(parameters[:, garment.parameter_names.index("take_up")], 0.0)
     return column

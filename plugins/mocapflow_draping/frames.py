@@ -51,12 +51,13 @@ def tilted(down: F64, facing: F64, out: F64, aside: F64) -> F64:
     return turned
 
 
-def riding(strands: Strands, chain: F64, out: F64, aside: F64) -> F64:
+def riding(strands: Strands, chain: F64, links: F64, out: F64, aside: F64) -> F64:
     """Return strands (B, N, L, 3) m carried along by the skin under them, their tails tilted, lengths kept.
 
     Args:
         strands: the garment's strands.
         chain: (B, J, 4, 4) posed joints.
+        links: (B, N, L - 1) m, lengths of the bars.
         out: (B, N) rad, tilt of the tail away from the middle of its ring.
         aside: (B, N) rad, tilt to the left seen from there.
     """
@@ -66,15 +67,15 @@ def riding(strands: Strands, chain: F64, out: F64, aside: F64) -> F64:
     facing = np.einsum("bnij,nj->bni", chain[:, strands.carrier, :3, :3], strands.facing)[:, :, None]
     tail = strands.tail[:, 1:]
     bars = tilted(bars, facing, out[:, :, None] * tail, aside[:, :, None] * tail)
-    moved[:, :, 1:] = moved[:, :, :1] + np.cumsum(bars * strands.links[..., None], axis=2)
+    moved[:, :, 1:] = moved[:, :, :1] + np.cumsum(bars * links[..., None], axis=2)
     return moved
 
 
-def standing(strands: Strands, chain: F64) -> F64:
+def standing(strands: Strands, chain: F64, links: F64) -> F64:
     """Return strands (B, N, L, 3) m before they fall: level, or where a limb has carried them."""
     if strands.rides:
         still = np.zeros((len(chain), len(strands.facing)))
-        return riding(strands, chain, still, still)
-    reach = np.concatenate([np.zeros((len(strands.links), 1)), np.cumsum(strands.links, axis=1)], axis=1)
+        return riding(strands, chain, links, still, still)
+    reach = np.concatenate([np.zeros((*links.shape[:2], 1)), np.cumsum(links, axis=2)], axis=2)
     grid: F64 = roots(strands, chain)[:, :, None] + reach[..., None] * standing_out(strands, chain)[:, :, None]
     return grid

@@ -18,7 +18,7 @@ from mocapflow.geometry.kinematics import chain_batch
 from mocapflow.records import F64, I32, Bool, record
 from mocapflow.scene import Scene
 from mocapflow_draping.fields import BodyFields, build_fields, touchable_joints
-from mocapflow_draping.forces import thickness, tilts, wind
+from mocapflow_draping.forces import remaining_length, thickness, tilts, wind
 from mocapflow_draping.frames import riding, standing, standing_out
 from mocapflow_draping.laying import distinct, follow, lay, moving
 from mocapflow_draping.parts import posed_parts, rates
@@ -27,7 +27,7 @@ from mocapflow_draping.strands import Strands, roots, strands_of
 LOWER = 0.002  # m, step of a cloth that nothing holds
 TINY = 1e-6  # rad, and share of a parameter's range: what the drape starts from is differentiated by steps
 
-Motion = tuple[F64, F64, F64, F64]  # what `rings.close` needs to bring rates along
+Motion = tuple[F64, F64, F64, F64, F64]  # what `rings.close` needs to bring rates along
 
 
 @record
@@ -68,19 +68,21 @@ class Kinematic(Draper):
         fitting = self.fitting(garment, scene.body)
         strands = fitting.strands
         skin = self.skin_m + thickness(garment, parameters) / 2
-        kept, source = distinct(poses, skin)
+        length = remaining_length(garment, parameters)
+        kept, source = distinct(poses, skin, length)
         chain, skin = chain_batch(scene.body, PoseBatch(root=poses.root[kept], angles=poses.angles[kept])), skin[kept]
+        links = length[kept, None, None] * strands.links
         parts = posed_parts(fitting.fields, chain)
         winds = tilts(garment, parameters, strands.azimuth)
         if self.rule == "literal":
-            grid = self._step(fitting, chain, source, parameters, garment, skin, parts)
+            grid = self._step(fitting, chain, source, parameters, garment, skin, links, parts)
         elif strands.rides:
-            grid = riding(strands, chain[source], *winds)
+            grid = riding(strands, chain[source], links[source], *winds)
         else:
-            where = roots(strands, chain), standing_out(strands, chain)
+            where = roots(strands, chain), standing_out(strands, chain), links
             grid = lay(strands, fitting.fields, where, winds, source, skin, parts, math.radians(self.start_deg)).grid
         if self.sweeps:
-            self._close(fitting, grid, skin[source], parts[source])
+            self._close(fitting, grid, links[source], skin[source], parts[source])
         vertices: F64 = grid.reshape(len(grid), -1, 3)[:, strands.place]
         return vertices
 
@@ -96,19 +98,22 @@ class Kinematic(Draper):
         chain = chain_batch(scene.body, poses)
         parts = posed_parts(fitting.fields, chain[-1:])
         skin = self.skin_m + thickness(garment, values) / 2
-        moved = moving(fitting.fields, chain, skin, steps)
+        length = remaining_length(garment, values)
+        links = length[:, None, None] * strands.links
+        moved = moving(fitting.fields, chain, skin, length, steps)
         winds = tilts(garment, values, strands.azimuth)
         if strands.rides:
-            ridden = riding(strands, chain, *winds)
+            ridden = riding(strands, chain, links, *winds)
             grid, rate = ridden[-1:], rates(ridden, steps)
         else:
-            near = roots(strands, chain), standing_out(strands, chain)
-            here, still = (near[0][-1:], near[1][-1:]), (winds[0][-1:], winds[1][-1:])
+            near = roots(strands, chain), standing_out(strands, chain), links
+            here, still = (near[0][-1:], near[1][-1:], links[-1:]), (winds[0][-1:], winds[1][-1:])
             alone, start = np.zeros(1, np.int32), math.radians(self.start_deg)
             laid = lay(strands, fitting.fields, here, still, alone, skin[-1:], parts, start)
             grid, rate = laid.grid, follow(strands, fitting.fields, near, winds, laid, parts, moved)
         if self.sweeps:
-            self._close(fitting, grid, skin[-1:], parts, (rate, np.zeros_like(rate), moved.carry, moved.swell))
+            motion = rate, np.zeros_like(rate), moved.carry, moved.swell, moved.grow
+            self._close(fitting, grid, links[-1:], skin[-1:], parts, motion)
         row, unknowns = strands.place[vertices], 6 + len(pose.angles) + len(parameters)
         return all_columns(grid.reshape(-1, 3)[row], rate.reshape(-1, 3, len(steps))[row], tried, unknowns)
 
@@ -136,12 +141,20 @@ class Kinematic(Draper):
         return known
 
     def _step(
-        self, fitting: Fitting, chain: F64, source: I32, parameters: F64, garment: GarmentMesh, skin: F64, parts: F64
+        self,
+        fitting: Fitting,
+        chain: F64,
+        source: I32,
+        parameters: F64,
+        garment: GarmentMesh,
+        skin: F64,
+        links: F64,
+        parts: F64,
     ) -> F64:
         from mocapflow_draping.literal import blow_batch, settle_batch
 
         strands, values = fitting.strands, fitting.fields.values
-        grid = standing(strands, chain)
+        grid = standing(strands, chain, links)
         fixed = np.zeros(grid.shape[:3], bool)
         fixed[:, np.arange(len(strands.first)), strands.first] = True
         step, in_space = math.radians(self.step_deg), self.pivot == "space"
@@ -154,7 +167,9 @@ class Kinematic(Draper):
         blow_batch(grid, fixed, strands.first, strands.last, skin[source], force, amount, parts[source], values)
         return grid
 
-    def _close(self, fitting: Fitting, grid: F64, skin: F64, parts: F64, motion: Motion | None = None) -> None:
+    def _close(
+        self, fitting: Fitting, grid: F64, links: F64, skin: F64, parts: F64, motion: Motion | None = None
+    ) -> None:
         from mocapflow_draping.rings import close_batch
 
         strands = fitting.strands
@@ -163,6 +178,6 @@ class Kinematic(Draper):
         if self.bending_m > 0 and not strands.rides:
             bend = np.exp(-strands.links / self.bending_m)
         close_batch(
-            grid, strands.links, strands.first, strands.last, across, length, skin, self.longest, self.stiff, bend,
+            grid, links, strands.first, strands.last, across, length, skin, self.longest, self.stiff, bend,
             self.sweeps, parts, fitting.fields.values, motion,
         )  # fmt: skip

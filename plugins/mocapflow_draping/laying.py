@@ -13,7 +13,7 @@ from mocapflow_draping.frames import DOWN, blown
 from mocapflow_draping.parts import carried_rates, rates
 from mocapflow_draping.strands import Strands
 
-Placed = tuple[F64, F64]  # per body and strand: root (B, N, 3) m, horizontal direction `facing` (B, N, 3)
+Placed = tuple[F64, F64, F64]  # per body and strand: root (B, N, 3) m, horizontal `facing` (B, N, 3), bars (B, N, K) m
 Winds = tuple[F64, F64]  # rad, per drape and strand: tilts (B, N) of its tail, outwards and to its left
 
 
@@ -24,6 +24,7 @@ class Rates:
     steps: F64  # (S,) by which the unknowns were changed
     carry: F64  # (P, 3, 4, S) of the points of the body's parts, affine in their place in the world
     swell: F64  # (S,) of the contact distance
+    grow: F64  # (S,) of the logarithm of the bars' length
 
 
 class Laid(NamedTuple):
@@ -34,23 +35,28 @@ class Laid(NamedTuple):
     pivot: I32  # (B, N) row of the last particle on which a strand lay when it had fallen
 
 
-def distinct(poses: PoseBatch, skin: F64) -> tuple[I32, I32]:
-    """Return the rows (D,) of different neighbours in a batch of B bodies with contact distances, and which each is."""
-    known = np.concatenate([poses.root.reshape(len(skin), -1), poses.angles, skin[:, None]], axis=1)
+def distinct(poses: PoseBatch, skin: F64, length: F64) -> tuple[I32, I32]:
+    """Return the rows (D,) of different neighbours in a batch of B poses with contact distances and lengths of cloth.
+
+    And which of these each is: (B,).
+    """
+    known = np.concatenate([poses.root.reshape(len(skin), -1), poses.angles, skin[:, None], length[:, None]], axis=1)
     new = np.append(True, np.any(known[1:] != known[:-1], axis=1))
     return np.flatnonzero(new).astype(np.int32), (np.cumsum(new) - 1).astype(np.int32)
 
 
-def moving(fields: BodyFields, chain: F64, skin: F64, steps: F64) -> Rates:
-    """Return how body and contact distance move, from one small step along each unknown and, last, none.
+def moving(fields: BodyFields, chain: F64, skin: F64, length: F64, steps: F64) -> Rates:
+    """Return how body, contact distance and cloth move, from one small step along each unknown and, last, none.
 
     Args:
         fields: the body's parts.
         chain: (S + 1, J, 4, 4) posed joints.
         skin: (S + 1,) m, contact distance.
+        length: (S + 1,) of the cloth, over that as sewn.
         steps: (S,) of the unknowns.
     """
-    return Rates(steps=steps, carry=carried_rates(fields, chain, steps), swell=rates(skin, steps))
+    grow = rates(np.log(length), steps)
+    return Rates(steps=steps, carry=carried_rates(fields, chain, steps), swell=rates(skin, steps), grow=grow)
 
 
 def lay(
@@ -61,7 +67,7 @@ def lay(
     Args:
         strands: the garment's strands.
         fields: the body's parts.
-        where: where strands begin and stand on each body.
+        where: where strands begin and stand on each body, and their bars.
         winds: of each drape.
         source: (B,) body of each drape.
         skin: (D,) m, contact distance.
@@ -71,18 +77,18 @@ def lay(
     from mocapflow_draping.blowing import blow_batch
     from mocapflow_draping.swing import fall_batch
 
-    roots, facing = where
+    roots, facing, links = where
     shape = strands.vertex.shape
     fallen, lying = np.empty((len(parts), *shape, 3)), np.empty((len(parts), *shape), np.int32)
     fall_batch(
-        roots, facing, start, skin, strands.links, strands.first, strands.last, parts, fields.values,
+        roots, facing, start, skin, links, strands.first, strands.last, parts, fields.values,
         fallen, lying,
     )  # fmt: skip
     pivot = np.where(lying > 0, np.arange(shape[1], dtype=np.int32), strands.first[:, None]).max(axis=2)
     grid, held = np.empty((len(source), *shape, 3)), np.empty((len(source), *shape), np.int32)
     back, towards, amount = blown(facing[source], *winds)
     blow_batch(
-        source, back, towards, amount, skin, strands.links, pivot, strands.last, parts, fields.values,
+        source, back, towards, amount, skin, links, pivot, strands.last, parts, fields.values,
         fallen, lying, grid, held,
     )  # fmt: skip
     return Laid(grid, held, pivot[source])
@@ -95,13 +101,13 @@ def follow(
     from mocapflow_draping.following import follow_swing
 
     rate = np.zeros((*laid.grid.shape[1:], len(moved.steps)))
-    (roots, facing), (back, towards, _) = near, blown(near[1], *winds)
+    (roots, facing, links), (back, towards, _) = near, blown(near[1], *winds)
     begin, down = rates(roots, moved.steps), np.broadcast_to(DOWN, facing.shape)
     for first, out, to in ((strands.first, facing, down), (laid.pivot[0], back, towards)):
         follow_swing(
             laid.grid[0], laid.held[0], out[-1], np.ascontiguousarray(to[-1]), begin, rates(out, moved.steps),
-            rates(to, moved.steps), strands.links, first, strands.last, parts[0], fields.values, moved.carry,
-            moved.swell, rate,
+            rates(to, moved.steps), links[-1], first, strands.last, parts[0], fields.values, moved.carry,
+            moved.swell, moved.grow, rate,
         )  # fmt: skip
         begin = rate[np.arange(len(rate)), laid.pivot[0]]
     return rate

@@ -31,7 +31,7 @@ def push_out(grid, n, row, link, skin, seen, room, near, parts, values, motion):
         p = place(grid, n, row)
         out = outwards(p[0], p[1], p[2], near[n], parts, values)
         if motion is not None:
-            rate, _, carry, swell = motion
+            rate, _, carry, swell, _ = motion
             follow_move(rate, n, row, lack(out, p, rate[n, row], carry[near[n]], swell), out)
         move(grid, n, row, CLEAR - room[n], out)
         to_length(grid, n, row, link, motion)
@@ -77,7 +77,7 @@ def lift(grid, first, last, beside, row, seen, room, near, between, clear, parts
         if d < 0.0:
             out = outwards(middle[0], middle[1], middle[2], part, parts, values)
             if motion is not None:
-                rate, _, carry, swell = motion
+                rate, _, carry, swell, _ = motion
                 amount = lack(out, middle, 0.5 * (rate[n, row] + rate[m, row]), carry[part], 0.0 * swell)
                 if row > first[n]:
                     follow_move(rate, n, row, amount, out)
@@ -95,7 +95,7 @@ def to_length(grid, n, row, link, motion):  # type: ignore[no-untyped-def]
     x, y, z = place(grid, n, row - 1)
     dx, dy, dz = grid[n, row, 0] - x, grid[n, row, 1] - y, grid[n, row, 2] - z
     if motion is not None:
-        follow_length(motion[0], n, row, (dx, dy, dz), link)
+        follow_length(motion[0], n, row, (dx, dy, dz), link, motion[4])
     scale = link / max(math.sqrt(dx * dx + dy * dy + dz * dz), 1e-9)
     grid[n, row, 0], grid[n, row, 1], grid[n, row, 2] = x + scale * dx, y + scale * dy, z + scale * dz
 

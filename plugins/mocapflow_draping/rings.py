@@ -29,7 +29,7 @@ def close_batch(grid, links, first, last, across, length, skin, longest, stiff, 
 
     Args:
         grid: (B, N, L, 3) m, draped strands; overwritten.
-        links: (N, L - 1) m, lengths of the bars.
+        links: (B, N, L - 1) m, lengths of the bars.
         first: (N,) row of the first particle of each strand.
         last: (N,) row of the last one.
         across: (K, N, L) strand that lies 1, 2, 4, ... links to the left, or -1.
@@ -42,11 +42,13 @@ def close_batch(grid, links, first, last, across, length, skin, longest, stiff, 
         parts: (B, P, COLUMNS), the bodies, see `parts`.
         values: their voxels.
         motion: None or, for one drape, what is brought along in place: rates (N, L, 3, S) of the particles, as much
-            room for those of the bars, those of the body's parts (P, 3, 4, S) and of the contact distance (S,).
+            room for those of the bars, those of the body's parts (P, 3, 4, S), of the contact distance (S,) and of
+            the logarithm of the bars' length (S,).
     """
     for b in range(len(grid)):
         _close(
-            grid[b], links, first, last, across, length, skin[b], longest, stiff, bend, sweeps, parts[b], values, motion
+            grid[b], links[b], first, last, across, length, skin[b], longest, stiff, bend, sweeps, parts[b], values,
+            motion,
         )  # fmt: skip
 
 

@@ -30,7 +30,7 @@ def fall_batch(roots, facing, start, skin, links, first, last, parts, values, gr
         facing: (B, N, 3), horizontal unit direction in which each strand stands out.
         start: rad, how far from straight down each strand stands before it falls.
         skin: (B,) m, contact distance.
-        links: (N, L - 1) m, lengths of the bars.
+        links: (B, N, L - 1) m, lengths of the bars.
         first: (N,) row of the first particle of each strand.
         last: (N,) row of the last one.
         parts: (B, P, COLUMNS), the bodies, see `parts`.
@@ -38,14 +38,14 @@ def fall_batch(roots, facing, start, skin, links, first, last, parts, values, gr
         grid: (B, N, L, 3) m, written.
         held: (B, N, L), written: the part that each particle touches, plus one; 0 where it touches none.
     """
-    rows, down = links.shape[1] + 1, np.array([0.0, 0.0, -1.0])
+    rows, down = links.shape[2] + 1, np.array([0.0, 0.0, -1.0])
     room, near, fresh = np.empty(rows), np.zeros(rows, np.int64), np.empty(rows, np.bool_)
     for b in range(len(roots)):
         for n in range(roots.shape[1]):
             held[b, n], grid[b, n, first[n]] = 0, roots[b, n]
             room[:], fresh[:] = 0.0, False
             swing(
-                first[n], facing[b, n], down, start, skin[b], links[n], last[n], parts[b], values,
+                first[n], facing[b, n], down, start, skin[b], links[b, n], last[n], parts[b], values,
                 grid[b, n], held[b, n], room, near, fresh,
             )  # fmt: skip
 

@@ -38,7 +38,7 @@ class Skirt(Garment):
         straight = np.linspace(least, max(self.hem_circumference_m, least), self.rings)
         around = pattern.hip_rings(body, self.waist_height_m, down, straight, away)
         rows = self._cone(waist, facing, around, self.length_m / (self.rings - 1))
-        parameters = sewing.force_parameters(self.force_orders)
+        parameters = sewing.with_take_up(sewing.force_parameters(self.force_orders))
         repairs = sewing.widened(
             waist_circumference_m=(self.waist_circumference_m, around[0]),
             hem_circumference_m=(self.hem_circumference_m, around[-1]),

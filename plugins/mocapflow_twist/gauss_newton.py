@@ -25,7 +25,8 @@ TRIALS = 4  # times that the damping is raised before a step is given up
 class GaussNewton(ClothFitter):
     """Moves the outline of the cloth onto the silhouettes by its forces.
 
-    Each force is held about none. The thickness, which moves the outline by less than a pixel, is left as it is.
+    Each force is held about none. The thickness, which moves the outline by less than a pixel, and the take-up are left
+    as they are.
     `cloth_unknowns` of twist_gauss_newton solves for the same parameters together with the pose, and from matches;
     this fitter alternates with the pose, and reads the distance fields.
     """
@@ -112,7 +113,7 @@ class Task(NamedTuple):
 
     @property
     def _fitted(self) -> Bool:
-        return np.array([name != "thickness_m" for name in self.garment.parameter_names])
+        return np.array([name not in ("thickness_m", "take_up") for name in self.garment.parameter_names])
 
     def _from_calm(self, cloth: Cloth) -> F64:
         low, high = self.garment.parameter_bounds.T

@@ -8,7 +8,7 @@ import numpy as np
 
 from mocapflow.data import Cloth, Past
 from mocapflow.model import ClothedModel, moved
-from mocapflow.records import F64
+from mocapflow.records import F64, Bool
 from mocapflow_twist.normal_equations import Equations
 from mocapflow_twist.problem import Guess
 
@@ -54,19 +54,26 @@ class ClothMotion:
         return Guess(pose, Cloth(vertices=vertices, parameters=parameters))
 
     def within_bounds(self, equations: Equations, guess: Guess) -> Equations:
-        """Return the equations with cloth parameters held that stand at a bound and would leave it."""
+        """Return the equations with cloth parameters held that stand at a bound and would leave it, and the take-up."""
         if not (self.unknowns and self.model.clothed):
             return equations
         low, high = self._bounds.T
         first = 6 + len(guess.pose.angles)
         downhill, parameters = -equations.gradient[first:], guess.cloth.parameters
-        held = first + np.flatnonzero(((parameters <= low) & (downhill < 0)) | ((parameters >= high) & (downhill > 0)))
+        at_bound = ((parameters <= low) & (downhill < 0)) | ((parameters >= high) & (downhill > 0))
+        held = first + np.flatnonzero(at_bound | self._slow)
         hessian, gradient = equations.hessian.copy(), equations.gradient.copy()
         gradient[held] = 0.0
         diagonal = hessian[held, held]
         hessian[held], hessian[:, held] = 0.0, 0.0
         hessian[held, held] = diagonal
         return Equations(hessian, gradient, equations.energy)
+
+    @property
+    def _slow(self) -> Bool:
+        """Which cloth parameters (Q,) follow the recording, not the frame: a cloth fitter moves them."""
+        assert self.model.scene.garment is not None
+        return np.array([name == "take_up" for name in self.model.scene.garment.parameter_names])
 
     @property
     def _bounds(self) -> F64:

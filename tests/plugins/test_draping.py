@@ -132,22 +132,28 @@ def test_a_strand_over_a_cylinder_is_taut(link):
     assert np.linalg.norm(laid[0, 0, -1] - tip) < 5e-4 + 2 * sag
 
 
+def calm(scene, count):
+    return np.zeros((count, len(scene.garment.parameter_names)))
+
+
 def test_a_skirt_keeps_its_strands_and_stays_outside(skirted):
     scene, poses = skirted
-    draped = draper(sweeps=0).drape(poses, np.zeros((4, 6)), Past(), scene)
+    draped = draper(sweeps=0).drape(poses, calm(scene, 4), Past(), scene)
     check_whole_and_outside(scene, draped, poses)
 
 
 def test_the_chapters_steps_end_near_the_taut_drape(skirted):
     scene, poses = skirted
-    taut = draper(sweeps=0).drape(poses, np.zeros((4, 6)), Past(), scene)
-    steps = draper(sweeps=0, rule="literal", limited=True).drape(poses, np.zeros((4, 6)), Past(), scene)
+    taut = draper(sweeps=0).drape(poses, calm(scene, 4), Past(), scene)
+    steps = draper(sweeps=0, rule="literal", limited=True).drape(poses, calm(scene, 4), Past(), scene)
     assert np.linalg.norm(taut - steps, axis=-1)[0].mean() < 0.01
 
 
 def test_a_batch_is_its_drapes_one_by_one(skirted):
     scene, poses = skirted
-    parameters = np.random.default_rng(0).uniform(-0.1, 0.1, (4, 6))
+    parameters = calm(scene, 4)
+    parameters[:, :6] = np.random.default_rng(0).uniform(-0.1, 0.1, (4, 6))
+    parameters[:, 6] = [0.0, 0.02, 0.05, 0.1]
     together = draper().drape(poses, parameters, Past(), scene)
     for row in range(4):
         one = type(poses)(root=poses.root[row : row + 1].copy(), angles=poses.angles[row : row + 1].copy())
@@ -157,7 +163,7 @@ def test_a_batch_is_its_drapes_one_by_one(skirted):
 def test_a_draper_without_a_garment_says_so(skirted):
     scene, poses = skirted
     with pytest.raises(PluginError, match="no garment to drape"):
-        draper().drape(poses, np.zeros((4, 6)), Past(), Scene(cameras=(), body=scene.body))
+        draper().drape(poses, calm(scene, 4), Past(), Scene(cameras=(), body=scene.body))
 
 
 def test_joints_that_it_can_not_touch_do_not_move_the_cloth():
@@ -172,5 +178,5 @@ def test_joints_that_it_can_not_touch_do_not_move_the_cloth():
     angles = np.zeros((2, len(body.twists)))
     angles[1, below] = 0.3
     poses = PoseBatch(root=np.tile(np.eye(4), (2, 1, 1)), angles=angles)
-    still, moved = kinematic.drape(poses, np.zeros((2, 6)), Past(), scene)
+    still, moved = kinematic.drape(poses, calm(scene, 2), Past(), scene)
     np.testing.assert_array_equal(still, moved)

@@ -5,7 +5,7 @@ import time
 import drape_bodies
 import numpy as np
 import pytest
-from drape_bodies import SKIN, box, distances, leg_poses, lying_cylinder, prepared, swing
+from drape_bodies import SKIN, box, check_whole_and_outside, distances, leg_poses, lying_cylinder, prepared, swing
 from mocapflow_draping.forces import thickness, tilts
 from mocapflow_draping.frames import tilted
 from mocapflow_draping.literal import blow_batch
@@ -122,7 +122,7 @@ def test_wind_turns_with_the_person(skirted):
 
 
 def test_25_winds_cost_no_more_than_three(skirted, draper):
-    winds = np.zeros((25, 6))
+    winds = np.zeros((25, len(skirted.garment.parameter_names)))
     winds[:, 2:4] = in_all_directions(2, 8, np.radians([5.0, 10.0, 20.0]))
     pose = PoseBatch(root=leg_poses().root[3:].copy(), angles=leg_poses().angles[3:].copy())
     same = PoseBatch(root=np.repeat(pose.root, 25, axis=0), angles=np.repeat(pose.angles, 25, axis=0))
@@ -138,8 +138,8 @@ def test_25_winds_cost_no_more_than_three(skirted, draper):
 
 
 def test_winds_of_one_drape_are_its_winds_one_by_one(skirted, draper):
-    winds = np.zeros((9, 6))
-    winds[:6, 1:] = np.random.default_rng(1).uniform(-0.3, 0.3, (6, 5))
+    winds = np.zeros((9, len(skirted.garment.parameter_names)))
+    winds[:6, 1:6] = np.random.default_rng(1).uniform(-0.3, 0.3, (6, 5))
     winds[6:] = winds[5] * [[0.5], [0.9], [1.1]]  # harder and harder: each goes on where the one before has ended
     pose = PoseBatch(root=leg_poses().root[1:2].copy(), angles=leg_poses().angles[1:2].copy())
     same = PoseBatch(root=np.repeat(pose.root, 9, axis=0), angles=np.repeat(pose.angles, 9, axis=0))
@@ -169,11 +169,36 @@ def test_thick_cloth_keeps_farther_from_the_skin(skirted, draper):
     thick = draper.drape(standing(), parameters(skirted.garment, thickness_m=0.010), Past(), skirted)
     free = np.setdiff1d(np.arange(thick.shape[1]), skirted.garment.pinned)
     assert distances(skirted.body, thick[:, free], standing()).min() > draper.skin_m + 0.005 - 1e-4
-    np.testing.assert_array_equal(thickness(skirted.garment, np.full((2, 6), 0.003)), [0.003, 0.003])
+    two = np.repeat(parameters(skirted.garment, thickness_m=0.003), 2, axis=0)
+    np.testing.assert_array_equal(thickness(skirted.garment, two), [0.003, 0.003])
+
+
+@pytest.mark.parametrize("settings", [dict(sweeps=0), dict(sweeps=20), dict(sweeps=0, rule="literal", limited=True)])
+def test_cloth_hangs_as_much_shorter_as_folds_take_up(skirted, settings):
+    poses, draper = leg_poses(), drape_bodies.draper(**settings)
+    folded = np.repeat(parameters(skirted.garment, take_up=0.1), 4, axis=0)
+    draped = draper.drape(poses, folded, Past(), skirted)
+    whole = draper.drape(poses, 0 * folded, Past(), skirted)
+    if "rule" not in settings:
+        check_whole_and_outside(skirted, draped, poses, take_up=0.1)
+    hem = skirted.garment.strands[:, -1]
+    assert (draped[0, hem, 2] - whole[0, hem, 2]).mean() == pytest.approx(
+        0.1 * drape_bodies.SKIRT["length_m"], abs=0.01
+    )
+
+
+def test_drapes_of_one_pose_have_their_own_take_up(skirted):
+    draper, pose = drape_bodies.draper(), leg_poses()
+    same = PoseBatch(root=np.repeat(pose.root[1:2], 3, axis=0), angles=np.repeat(pose.angles[1:2], 3, axis=0))
+    amounts = np.concatenate([parameters(skirted.garment, take_up=u, flare_rad=0.1) for u in (0.0, 0.05, 0.1)])
+    together = draper.drape(same, amounts, Past(), skirted)
+    for row in range(3):
+        alone = PoseBatch(root=same.root[:1].copy(), angles=same.angles[:1].copy())
+        np.testing.assert_array_equal(draper.drape(alone, amounts[row : row + 1], Past(), skirted)[0], together[row])
 
 
 def test_a_parameter_without_a_meaning_is_refused(skirted):
     names = ("thickness_m", "flair_rad", *skirted.garment.parameter_names[2:])
     odd = type(skirted.garment)(**{**vars(skirted.garment), "parameter_names": names})
     with pytest.raises(PluginError, match=r"'flair_rad'(.|\n)*did you mean 'flare_rad'"):
-        tilts(odd, np.zeros((1, 6)), np.zeros(3))
+        tilts(odd, np.zeros((1, len(names))), np.zeros(3))

@@ -135,6 +135,18 @@ def test_cloth_parameters_stay_within_their_bounds() -> None:
     assert estimate.energies["data"] < unmoved.energies["data"]
 
 
+def test_the_take_up_is_left_to_the_cloth_fitter() -> None:
+    truth, given = make_pose(0), np.array([0.2, 0.3])
+    folding = replace(
+        MODEL, scene=replace(MODEL.scene, garment=replace(garment(), parameter_names=("lean", "take_up")))
+    )
+    matches, state = make_matches(truth, given, np.arange(COUNT)), clothed_state(truth, np.array([0.1, 0.1]))
+    solver = TwistGaussNewton(**{**EXACT, "cloth_sd": 1e6, "cloth_unknowns": True})
+    estimate = solver.solve(lambda _: matches, state, folding, [], Past(), TURN)
+    assert estimate.parameters[1] == 0.1
+    assert estimate.parameters[0] != 0.1
+
+
 def test_the_garment_is_draped_anew_at_each_pose_it_is_matched_at() -> None:
     truth, given = make_pose(0), np.array([0.2, 0.3])
     matches, seen = make_matches(truth, given, np.arange(0)), []
