@@ -11,8 +11,9 @@ def mocapflow_cloth_fitters() -> list[type[ClothFitter]]:
     """Return the cloth fitters of this package."""
     from mocapflow_draping.fixed import Fixed
     from mocapflow_draping.sampled_forces import SampledForces
+    from mocapflow_draping.take_up import TakeUp
 
-    return [Fixed, SampledForces]
+    return [Fixed, SampledForces, TakeUp]
 
 
 @hookimpl

@@ -12,11 +12,10 @@ from pydantic import Field
 from mocapflow.assets import GarmentMesh
 from mocapflow.components import ClothFitter
 from mocapflow.data import Cloth, Estimate, Frame, Past, Segmentation, Turn
-from mocapflow.geometry.cameras import magnification
-from mocapflow.geometry.misfit import dressed, misfit, unclipped
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow_draping import samples
+from mocapflow_draping.outline import outline_error
 
 FIRST_FRAMES = 2  # as many as a Past remembers
 
@@ -53,18 +52,16 @@ class SampledForces(ClothFitter):
         cloth, garment = model.drape(estimate.pose, estimate.parameters, past), model.scene.garment
         if garment is None or not segmentation.silhouettes:
             return cloth
-        surface, cameras = model.surface(estimate.pose, cloth), model.scene.cameras
-        scale = np.array([magnification(camera, cloth.vertices.mean(axis=0)) for camera in cameras])
-        bend = 1e-3 * self.sigma_mm * scale
-        weight = 1 / (self.correlation_m * scale * bend**2)
-        seen = unclipped(segmentation)
+        outline = outline_error(
+            estimate.pose, cloth, segmentation, model,
+            sigma_mm=self.sigma_mm, correlation_m=self.correlation_m, spacing_px=self.spacing_px,
+        )  # fmt: skip
         forces = sum(samples.forces(garment), [])
 
         def error(vertices: F64, parameters: F64) -> float:
             """Sum the squares, in standard deviations, of what the outline is off (Huber) and of all forces."""
-            off = misfit(dressed(surface, vertices), seen, cameras, self.spacing_px, bend)
             amounts = np.degrees(parameters[forces]) / self.force_sd_deg
-            return float(weight @ off + amounts @ amounts)
+            return outline(vertices) + float(amounts @ amounts)
 
         best, least = cloth, error(cloth.vertices, cloth.parameters)
         enough = (1 - self.least_gain) * least

@@ -12,6 +12,7 @@ from mocapflow.records import F64
 
 FORCE = re.compile(r"(?P<force>\w+?)(_cos|_sin)?_rad")
 THICKNESS = "thickness_m"
+TAKE_UP = "take_up"
 THICKNESSES = 6  # evenly spaced within the bounds
 
 

@@ -8,6 +8,7 @@ from drape_bodies import skirted
 from mocapflow_draping import samples
 from mocapflow_draping.kinematic import Kinematic
 from mocapflow_draping.sampled_forces import SampledForces
+from mocapflow_draping.take_up import TakeUp, lowest
 from mocapflow_twist.gauss_newton import GaussNewton, Task
 
 from mocapflow.data import Estimate, Frame, Moment, Past, Pose, Segmentation, Silhouette, Turn
@@ -42,9 +43,9 @@ def seen(model, truth):
     return Segmentation(silhouettes=tuple(found))
 
 
-def fitted(fitter, model, truth, start, past=None):
+def fitted(fitter, model, truth, start, past=None, time=0.0):
     blank = np.zeros((SIZE[1], SIZE[0], 3), np.uint8)
-    frame = Frame(index=0, time=0.0, images=(blank,) * 4, usable=np.ones(4, bool))
+    frame = Frame(index=0, time=time, images=(blank,) * 4, usable=np.ones(4, bool))
     estimate = Estimate(pose=STANDING, parameters=start, covariance=np.eye(10 + len(start)), observed=np.ones(4))
     return fitter.fit(frame, seen(model, truth), estimate, model, past or Past(), TURN)
 
@@ -84,6 +85,38 @@ def test_later_frames_follow_a_force_step_by_step(fitter, model):
     for _ in range(4):
         found = fitted(fitter, model, parameters(model, flare_rad=0.12), found, later(model)).parameters
     assert abs(found[column] - 0.12) < np.radians(2.5)
+
+
+def test_the_take_up_is_found_within_a_few_frames_where_the_hem_stands_out(model):
+    column, past = model.scene.garment.parameter_names.index("take_up"), Past()
+    truth, found = parameters(model, take_up=0.06, flare_rad=0.3), parameters(model, flare_rad=0.3)
+    for index in range(10):
+        cloth = fitted(TakeUp(), model, truth, found, past, index / 30)
+        past, found = past.after(Moment(time=index / 30, pose=STANDING, cloth=cloth), {}), cloth.parameters
+    assert abs(found[column] - 0.06) < 0.01
+    np.testing.assert_array_equal(np.delete(found, column), np.delete(truth, column))
+
+
+def test_a_hem_that_hardly_shows_moves_little_in_one_frame(model):
+    column = model.scene.garment.parameter_names.index("take_up")
+    found = fitted(TakeUp(), model, parameters(model, take_up=0.06), parameters(model), later(model), 2 / 30)
+    assert 0 <= found.parameters[column] < 0.01
+
+
+def test_nothing_is_taken_up_while_the_person_is_being_found_or_is_not_seen(model):
+    truth, start = parameters(model, take_up=0.06, flare_rad=0.3), parameters(model, flare_rad=0.3)
+    np.testing.assert_array_equal(fitted(TakeUp(), model, truth, start).parameters, start)
+    unseen = Estimate(pose=STANDING, parameters=start, covariance=np.eye(10 + len(start)), observed=np.ones(4))
+    frame = Frame(index=2, time=2 / 30, images=(), usable=np.zeros(4, bool))
+    kept = TakeUp().fit(frame, Segmentation(silhouettes=()), unseen, model, later(model), TURN)
+    np.testing.assert_array_equal(kept.parameters, start)
+
+
+def test_three_values_of_a_parabola_tell_where_it_is_lowest():
+    places = np.array([0.01, 0.02, 0.03])
+    assert lowest(places, (places - 0.025) ** 2) == pytest.approx(0.025)
+    assert lowest(places, (places - 0.9) ** 2) == pytest.approx(0.04)  # no farther than two steps
+    assert lowest(places, -((places - 0.018) ** 2)) == 0.03
 
 
 def test_forces_that_gain_nothing_are_left_alone(model):
@@ -139,11 +172,11 @@ def test_samples_cover_every_force(model):
 def test_the_slope_that_gauss_newton_follows_is_the_energys(model):
     truth, start = parameters(model, flare_rad=0.1, wind_cos_rad=0.1), parameters(model, thickness_m=0.005)
     cloth = model.drape(STANDING, start, Past())
-    estimate = Estimate(pose=STANDING, parameters=start, covariance=np.eye(16), observed=np.ones(4))
+    estimate = Estimate(pose=STANDING, parameters=start, covariance=np.eye(10 + len(start)), observed=np.ones(4))
     surface = model.surface(STANDING, cloth)
     task = Task(GaussNewton(spacing_px=1.0), seen(model, truth), estimate, model, model.scene.garment, Past(), surface)
-    slope = task.equations(cloth).gradient[1:]  # without the thickness
-    steps = np.radians(4.0) * np.eye(6)[1:]
+    slope = task.equations(cloth).gradient[1:6]  # without thickness and take-up
+    steps = np.radians(4.0) * np.eye(len(start))[1:6]
     ends = [[task.energy(model.drape(STANDING, start + k * step, Past())) for step in steps] for k in (-1, 1)]
     risen = np.diff(ends, axis=0)[0]  # a drape jumps where contacts change: the direction is what counts
     assert slope @ risen / np.linalg.norm(slope) / np.linalg.norm(risen) > 0.9

@@ -1,0 +1,70 @@
+"""The cloth fitter of how high the hem hangs: what folds and gathers take up of the strands."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from mocapflow.components import ClothFitter
+from mocapflow.data import Cloth, Estimate, Frame, Past, Segmentation, Turn
+from mocapflow.model import ClothedModel
+from mocapflow.records import F64
+from mocapflow_draping import samples
+from mocapflow_draping.outline import outline_error
+
+BRIEFEST = 1e-3  # s, between two frames
+FARTHEST = 2.0  # steps from the middle of three values that their parabola is trusted
+
+Positive = Annotated[float, Field(gt=0)]
+
+
+class TakeUp(ClothFitter):
+    """Moves the take-up of a hanging garment to where the outline fits the images; all else is as estimated.
+
+    Folds and gathers come and go more slowly than a leg moves, so it is a random walk that begins at none in the first
+    frame. A garment without this parameter is draped as it is.
+    """
+
+    name: ClassVar[str] = "take_up"
+    take_up_sd: Positive = 0.05  # standard deviation of its change in a second, share of a strand's length
+    step: Positive = 0.01  # to either side, of the three drapes that are compared
+    sigma_mm: Positive = 15.0  # standard deviation of the outline of draped cloth
+    correlation_m: Positive = 0.3  # length over which its errors agree: half a skirt
+    spacing_px: Positive = 4.0  # between the points of the outline that are compared
+
+    def fit(
+        self, frame: Frame, segmentation: Segmentation, estimate: Estimate, model: ClothedModel, past: Past, turn: Turn
+    ) -> Cloth:
+        """Return the garment draped at the estimated pose with the take-up that fits."""
+        cloth, garment = model.drape(estimate.pose, estimate.parameters, past), model.scene.garment
+        if garment is None or not segmentation.silhouettes or samples.TAKE_UP not in garment.parameter_names:
+            return cloth
+        if not past.moments:  # the person is only being found, from a start that may be far off
+            return cloth
+        column = garment.parameter_names.index(samples.TAKE_UP)
+        low, high = garment.parameter_bounds[column]
+        last = past.moments[-1]
+        before = last.cloth.parameters[column]
+        spread = self.take_up_sd * math.sqrt(max(frame.time - last.time, BRIEFEST))
+        middle = np.clip(estimate.parameters[column], low + self.step, high - self.step)
+        tried = middle + self.step * np.array([-1.0, 0.0, 1.0])
+        trials = samples.replaced(garment, estimate.parameters, [column], tried[:, None])
+        error = outline_error(
+            estimate.pose, cloth, segmentation, model,
+            sigma_mm=self.sigma_mm, correlation_m=self.correlation_m, spacing_px=self.spacing_px,
+        )  # fmt: skip
+        off = np.array([error(vertices) for vertices in model.drapes(estimate.pose, trials, past)])
+        best = lowest(tried, off + ((tried - before) / spread) ** 2)
+        parameters = samples.replaced(garment, estimate.parameters, [column], np.array([[best]]))[0]
+        return model.drape(estimate.pose, parameters, past)
+
+
+def lowest(places: F64, values: F64) -> float:
+    """Return where the parabola through values (3,) at evenly spaced places is lowest, not far beyond them."""
+    slope, bend = 0.5 * (values[2] - values[0]), values[0] - 2 * values[1] + values[2]
+    if bend <= 0:
+        return float(places[values.argmin()])
+    return float(places[1] + (places[1] - places[0]) * np.clip(-slope / bend, -FARTHEST, FARTHEST))
