@@ -25,7 +25,7 @@ class TakeUp(ClothFitter):
     """Moves the take-up of a hanging garment to where the outline fits the images; all else is as estimated.
 
     Folds and gathers come and go more slowly than a leg moves, so it is a random walk that begins at none in the first
-    frame. A garment without this parameter is draped as it is.
+    frame, and takes one step a frame, in its first turn. A garment without this parameter is draped as it is.
     """
 
     name: ClassVar[str] = "take_up"
@@ -42,7 +42,7 @@ class TakeUp(ClothFitter):
         cloth, garment = model.drape(estimate.pose, estimate.parameters, past), model.scene.garment
         if garment is None or not segmentation.silhouettes or samples.TAKE_UP not in garment.parameter_names:
             return cloth
-        if not past.moments:  # the person is only being found, from a start that may be far off
+        if not past.moments or turn.index > 0:  # in the first frame the person is only being found
             return cloth
         column = garment.parameter_names.index(samples.TAKE_UP)
         low, high = garment.parameter_bounds[column]
