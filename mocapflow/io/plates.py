@@ -16,14 +16,21 @@ from mocapflow.records import F32, U8
 
 LEAST_SPREAD = 1.0  # grey levels; the rounding of 8-bit pictures alone makes 0.3
 USUAL_SPREAD = 4.0  # grey levels; where no frame can be compared with the plate
+NORMAL = 1.4826  # standard deviation of a normal variable over its median absolute deviation
+THIN = 4  # every so many-th pixel tells the tone of a frame
+FITS = 8  # of a line to the pixels that agree with the last one
+FARTHEST = 2.5  # standard deviations within which a pixel agrees
+MOST_GAIN = 1.5  # between a plate and a frame of one recording
+SAME_ROOM = 10.0  # grey levels, median difference of a frame and its toned plate: above, it shows something else
 
 
 def background(folder: Path, views: Sequence[View], videos: Sequence[Video]) -> Background | None:
     """Return the empty scene from background/<camera>.png or background/<camera>/*.png, None without plates.
 
-    With one plate per camera the spread is one number per channel: the robust spread (1.4826 times the median
-    absolute difference) of the first frame against the plate, which people in the picture hardly change. With
-    several it is the larger of that of each pixel and its median over the picture.
+    Plates take the brightness and contrast of the first frame: cameras drift, and a person dims a room. With one plate
+    per camera the spread is one number per channel: the robust spread (1.4826 times the median absolute difference) of
+    the first frame against it, which people in the picture hardly change. With several it is the larger of that of
+    each pixel and its median over the picture.
 
     Raises:
         RecordingError: a camera has no plate though others do, or a plate has another size than the video.
@@ -44,15 +51,46 @@ def background(folder: Path, views: Sequence[View], videos: Sequence[Video]) -> 
 
 def _one(files: Sequence[Path], view: View, video: Video) -> tuple[F32, F32]:
     pictures = np.stack([view.image(_read(path, view)) for path in files]).astype(np.float32)
+    first, _ = next(read_frames(video, range(1)))
     mean = pictures.mean(axis=0)
+    if first is not None:
+        mean = toned(mean, view.image(first).astype(np.float32))
     if len(files) > 1:
         each = pictures.std(axis=0, ddof=1)
         spread = np.maximum(each, np.median(each, axis=(0, 1)))
     else:
-        first, _ = next(read_frames(video, range(1)))
-        difference = np.full((1, 1, 3), USUAL_SPREAD / 1.4826) if first is None else np.abs(view.image(first) - mean)
-        spread = np.broadcast_to(1.4826 * np.median(difference, axis=(0, 1)), mean.shape)
+        difference = np.full((1, 1, 3), USUAL_SPREAD / NORMAL) if first is None else np.abs(view.image(first) - mean)
+        spread = np.broadcast_to(NORMAL * np.median(difference, axis=(0, 1)), mean.shape)
     return mean, np.maximum(spread, LEAST_SPREAD).astype(np.float32)
+
+
+def toned(plate: F32, frame: F32) -> F32:
+    """Return a plate (H, W, 3) with each channel as bright and as rich in contrast as in a frame (H, W, 3).
+
+    A frame that is another picture altogether leaves the plate as it is.
+    """
+    lines = [_line(plate[::THIN, ::THIN, c].ravel(), frame[::THIN, ::THIN, c].ravel()) for c in range(plate.shape[2])]
+    if any(line is None for line in lines):
+        return plate
+    gain, offset = np.array(lines, np.float32).T
+    matched: F32 = plate * gain + offset
+    return matched
+
+
+def _line(here: F32, there: F32) -> tuple[float, float] | None:
+    """Return gain and offset that take the room's grey levels from one picture to another, None: it is not the room.
+
+    They are fitted to the pixels that agree with them, again and again; what stands before the room does not.
+    """
+    gain, offset = 1.0, float(np.median(there - here))
+    for _ in range(FITS):
+        off = np.abs(there - gain * here - offset)
+        agrees = off <= max(FARTHEST * NORMAL * float(np.median(off)), LEAST_SPREAD)
+        x, y = here[agrees], there[agrees]
+        # a room of one grey level has no contrast to compare
+        gain = float(np.mean((x - x.mean()) * (y - y.mean())) / x.var()) if x.var() > LEAST_SPREAD else 1.0
+        offset = float(y.mean() - gain * x.mean())
+    return (gain, offset) if 1 / MOST_GAIN < gain < MOST_GAIN and np.median(off) < SAME_ROOM else None
 
 
 def _read(path: Path, view: View) -> U8:

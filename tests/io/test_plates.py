@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from mocapflow.errors import RecordingError
+from mocapflow.io.plates import toned
 from mocapflow.recording import open_recording
 from tests.fixtures.recordings import NAMES, SIZE, write_recording
 
@@ -38,6 +39,32 @@ def test_several_plates_give_the_spread_of_each_pixel(tmp_path):
     scene = open_recording(tmp_path).background()
     assert np.median(scene.spread[1]) == pytest.approx(5, rel=0.1)
     assert scene.spread[1].min() >= 0.9 * 5  # no pixel is trusted more than the usual one
+
+
+def room(noise=0.0, seed=0):
+    """A room of 60 x 80 px, dark to the left and light to the right."""
+    grey = np.linspace(40, 200, 80)[None, :, None] + np.array([-10.0, 0.0, 20.0])
+    return (grey + np.random.default_rng(seed).normal(0, noise, (60, 80, 3))).astype(np.float32)
+
+
+def test_a_plate_takes_the_tone_of_a_frame_whoever_stands_before_it():
+    frame = 0.95 * room(1.0, seed=1) - np.array([4.0, 5.0, 6.0], np.float32)
+    frame[10:55, 30:45] = 90.0  # a person
+    found = toned(room(1.0, seed=2), frame)
+    expected = 0.95 * room() - np.array([4.0, 5.0, 6.0], np.float32)
+    assert np.abs(np.median(found - expected, axis=(0, 1))).max() < 0.2
+    assert np.abs(np.mean((found - expected)[:, :10], axis=(0, 1))).max() < 0.6  # the dark end too
+    assert np.abs(np.mean((found - expected)[:, -10:], axis=(0, 1))).max() < 0.6
+
+
+def test_an_even_room_may_be_darker_too():
+    flat = np.full((60, 80, 3), 120, np.float32)
+    np.testing.assert_allclose(toned(flat, flat - 7), flat - 7)
+
+
+@pytest.mark.parametrize("other", [room()[:, ::-1], np.zeros((60, 80, 3), np.float32), 0.4 * room()])
+def test_another_picture_leaves_the_plate_as_it_is(other):
+    np.testing.assert_array_equal(toned(room(), other), room())
 
 
 def test_plates_are_scaled_with_the_frames(tmp_path):
