@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from pydantic import Field, PrivateAttr
+from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt, PrivateAttr
 
 from mocapflow.assets import Body, GarmentMesh
 from mocapflow.components import Draper
@@ -46,18 +46,18 @@ class Kinematic(Draper):
     """
 
     name: ClassVar[str] = "kinematic"
-    skin_m: Annotated[float, Field(ge=0)] = 0.005  # room between skin and cloth of no thickness
-    voxel_m: Annotated[float, Field(gt=0)] = 0.010  # edge of a voxel of the body's distance fields
+    skin_m: NonNegativeFloat = 0.005  # room between skin and cloth of no thickness
+    voxel_m: PositiveFloat = 0.010  # edge of a voxel of the body's distance fields
     start_deg: Annotated[float, Field(gt=0, lt=180)] = 95.0  # how far out from straight down a strand begins to fall
     rule: Literal["contact", "literal"] = "contact"  # from contact to contact, or step by step as printed
-    step_deg: Annotated[float, Field(gt=0)] = 2.0  # literal: of one iteration
-    iterations: Annotated[int, Field(ge=1)] = 50  # literal: at most
+    step_deg: PositiveFloat = 2.0  # literal: of one iteration
+    iterations: PositiveInt = 50  # literal: at most
     limited: bool = False  # literal: stop at straight down instead of swinging about it
     pivot: Literal["strand", "space"] = "strand"  # literal: where the nearest fixed point is looked for
-    sweeps: Annotated[int, Field(ge=0)] = 20  # of the rings, at most, per row; 0 leaves them as they fell
+    sweeps: NonNegativeInt = 20  # of the rings, at most, per row; 0 leaves them as they fell
     longest: Annotated[float, Field(ge=1)] = 1.0  # of a ring link, over its rest length
     stiff: Annotated[float, Field(ge=0, le=1)] = 0.3  # how much a ring resists being shortened
-    bending_m: Annotated[float, Field(ge=0)] = 0.06  # along which a hanging strand takes up a new direction
+    bending_m: NonNegativeFloat = 0.06  # along which a hanging strand takes up a new direction
     _fittings: WeakKeyDictionary[GarmentMesh, Fitting] = PrivateAttr(default_factory=WeakKeyDictionary)
 
     def drape(self, poses: PoseBatch, parameters: F64, past: Past, scene: Scene) -> F64:

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Annotated, ClassVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, NonNegativeInt, PositiveFloat
 
 from mocapflow.assets import GarmentMesh
 from mocapflow.components import ClothFitter
@@ -18,8 +18,6 @@ from mocapflow_draping import samples
 from mocapflow_draping.outline import outline_error
 
 FIRST_FRAMES = 2  # as many as a Past remembers
-
-Positive = Annotated[float, Field(gt=0)]
 
 
 class SampledForces(ClothFitter):
@@ -35,15 +33,15 @@ class SampledForces(ClothFitter):
 
     name: ClassVar[str] = "sampled_forces"
     directions: Annotated[int, Field(ge=2)] = 8  # tried of a force that has two components
-    amounts_deg: tuple[Positive, ...] = (5.0, 10.0, 20.0)  # tried in each direction
-    step_deg: Positive = 5.0  # of the refinement; half as much each round
-    step_mm: Positive = 1.0  # of the thickness, likewise
-    rounds: Annotated[int, Field(ge=0)] = 3  # of the refinement
+    amounts_deg: tuple[PositiveFloat, ...] = (5.0, 10.0, 20.0)  # tried in each direction
+    step_deg: PositiveFloat = 5.0  # of the refinement; half as much each round
+    step_mm: PositiveFloat = 1.0  # of the thickness, likewise
+    rounds: NonNegativeInt = 3  # of the refinement
     least_gain: Annotated[float, Field(ge=0, lt=1)] = 0.01  # share of the error that another force has to save
-    force_sd_deg: Positive = 6.0  # standard deviation of each force about none
-    sigma_mm: Positive = 15.0  # standard deviation of the outline of draped cloth under the best forces
-    correlation_m: Positive = 0.3  # length over which its errors agree: half a skirt
-    spacing_px: Positive = 4.0  # between the points of the outline that are compared
+    force_sd_deg: PositiveFloat = 6.0  # standard deviation of each force about none
+    sigma_mm: PositiveFloat = 15.0  # standard deviation of the outline of draped cloth under the best forces
+    correlation_m: PositiveFloat = 0.3  # length over which its errors agree: half a skirt
+    spacing_px: PositiveFloat = 4.0  # between the points of the outline that are compared
 
     def fit(
         self, frame: Frame, segmentation: Segmentation, estimate: Estimate, model: ClothedModel, past: Past, turn: Turn

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import PositiveFloat
 
 from mocapflow.components import ClothFitter
 from mocapflow.data import Cloth, Estimate, Frame, Past, Segmentation, Turn
@@ -18,8 +18,6 @@ from mocapflow_draping.outline import outline_error
 BRIEFEST = 1e-3  # s, between two frames
 FARTHEST = 2.0  # steps from the middle of three values that their parabola is trusted
 
-Positive = Annotated[float, Field(gt=0)]
-
 
 class TakeUp(ClothFitter):
     """Moves the take-up of a hanging garment to where the outline fits the images; all else is as estimated.
@@ -29,11 +27,11 @@ class TakeUp(ClothFitter):
     """
 
     name: ClassVar[str] = "take_up"
-    take_up_sd: Positive = 0.05  # standard deviation of its change in a second, share of a strand's length
-    step: Positive = 0.01  # to either side, of the three drapes that are compared
-    sigma_mm: Positive = 15.0  # standard deviation of the outline of draped cloth
-    correlation_m: Positive = 0.3  # length over which its errors agree: half a skirt
-    spacing_px: Positive = 4.0  # between the points of the outline that are compared
+    take_up_sd: PositiveFloat = 0.05  # standard deviation of its change in a second, share of a strand's length
+    step: PositiveFloat = 0.01  # to either side, of the three drapes that are compared
+    sigma_mm: PositiveFloat = 15.0  # standard deviation of the outline of draped cloth
+    correlation_m: PositiveFloat = 0.3  # length over which its errors agree: half a skirt
+    spacing_px: PositiveFloat = 4.0  # between the points of the outline that are compared
 
     def fit(
         self, frame: Frame, segmentation: Segmentation, estimate: Estimate, model: ClothedModel, past: Past, turn: Turn
