@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mocapflow_draping import samples
 from mocapflow_draping.sampled_forces import SampledForces
 from mocapflow_draping.take_up import TakeUp
 from mocapflow_twist.gauss_newton import GaussNewton
@@ -24,6 +23,7 @@ from mocapflow_twist.gauss_newton import GaussNewton
 from mocapflow.components import ClothFitter
 from mocapflow.data import Cloth, Frame, FrameState, Moment, Past, Segmentation, Turn
 from mocapflow.geometry import silhouettes
+from mocapflow.geometry.sewing import TAKE_UP, THICKNESS
 from mocapflow.model import ClothedModel
 from mocapflow.pipeline import load_pipeline
 from mocapflow.recording import open_recording
@@ -67,7 +67,7 @@ def errors(fitter: ClothFitter, states: Sequence[FrameState], model: ClothedMode
     past, found = Past(), []
     parameters, garment = np.zeros(len(states[0].cloth.parameters)), model.scene.garment
     assert garment is not None
-    lasting = np.array([name in (samples.THICKNESS, samples.TAKE_UP) for name in garment.parameter_names])
+    lasting = np.array([name in (THICKNESS, TAKE_UP) for name in garment.parameter_names])
     for index, state in enumerate(states):
         frame = Frame(index=index, time=index / 30, images=(), usable=np.empty(0, bool))  # fitters read silhouettes
         others = tuple(s for s in state.segmentation.of("person") if s.camera != view)

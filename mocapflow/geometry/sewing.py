@@ -15,6 +15,8 @@ HARMONICS: tuple[tuple[str, ...], ...] = (
     ("two_cos_rad", "two_sin_rad"),
     ("three_cos_rad", "three_sin_rad"),
 )
+THICKNESS = "thickness_m"
+TAKE_UP = "take_up"
 LARGEST_TILT = math.radians(40)
 LARGEST_THICKNESS = 0.010  # m
 LARGEST_TAKE_UP = 0.15  # share of the length of a strand
@@ -31,13 +33,13 @@ def force_parameters(orders: tuple[int, ...]) -> Parameters:
     """
     tilts = [name for order in orders for name in HARMONICS[order]]
     bounds = [[0.0, LARGEST_THICKNESS], *([-LARGEST_TILT, LARGEST_TILT] for _ in tilts)]
-    return ("thickness_m", *tilts), np.array(bounds)
+    return (THICKNESS, *tilts), np.array(bounds)
 
 
 def with_take_up(parameters: Parameters) -> Parameters:
     """Return names and bounds with, last, the share of the length of hanging strands that folds and gathers take up."""
     names, bounds = parameters
-    return (*names, "take_up"), np.concatenate([bounds, [[0.0, LARGEST_TAKE_UP]]])
+    return (*names, TAKE_UP), np.concatenate([bounds, [[0.0, LARGEST_TAKE_UP]]])
 
 
 def sheet(

@@ -52,14 +52,15 @@ def background(folder: Path, views: Sequence[View], videos: Sequence[Video]) -> 
 def _one(files: Sequence[Path], view: View, video: Video) -> tuple[F32, F32]:
     pictures = np.stack([view.image(_read(path, view)) for path in files]).astype(np.float32)
     first, _ = next(read_frames(video, range(1)))
+    frame = None if first is None else view.image(first).astype(np.float32)
     mean = pictures.mean(axis=0)
-    if first is not None:
-        mean = toned(mean, view.image(first).astype(np.float32))
+    if frame is not None:
+        mean = toned(mean, frame)
     if len(files) > 1:
         each = pictures.std(axis=0, ddof=1)
         spread = np.maximum(each, np.median(each, axis=(0, 1)))
     else:
-        difference = np.full((1, 1, 3), USUAL_SPREAD / NORMAL) if first is None else np.abs(view.image(first) - mean)
+        difference = np.full((1, 1, 3), USUAL_SPREAD / NORMAL) if frame is None else np.abs(frame - mean)
         spread = np.broadcast_to(NORMAL * np.median(difference, axis=(0, 1)), mean.shape)
     return mean, np.maximum(spread, LEAST_SPREAD).astype(np.float32)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from mocapflow.assets import GarmentMesh
 from mocapflow.errors import PluginError, alternatives
-from mocapflow.geometry.sewing import HARMONICS
+from mocapflow.geometry.sewing import HARMONICS, TAKE_UP, THICKNESS
 from mocapflow.records import F64
 
 STEEPEST = np.radians(80.0)  # a tail tilted further would rise above its support
@@ -31,7 +31,7 @@ def tilts(garment: GarmentMesh, parameters: F64, azimuth: F64) -> tuple[F64, F64
     out = np.zeros((len(parameters), len(azimuth)))
     aside = np.zeros_like(out)
     for column, name in enumerate(garment.parameter_names):
-        if name in ("thickness_m", "take_up"):
+        if name in (THICKNESS, TAKE_UP):
             continue
         order, part = _meaning(garment, name)
         amount = parameters[:, column, None]
@@ -52,7 +52,7 @@ def _meaning(garment: GarmentMesh, name: str) -> tuple[int, str]:
             return order, "sin" if name.endswith("_sin_rad") else "cos"
     raise PluginError(
         f"garment {garment.name} has a parameter '{name}' that draper kinematic does not know",
-        hint=alternatives(name, ["thickness_m", "take_up", *chain.from_iterable(HARMONICS)]),
+        hint=alternatives(name, [THICKNESS, TAKE_UP, *chain.from_iterable(HARMONICS)]),
     )
 
 
@@ -77,15 +77,15 @@ def wind(garment: GarmentMesh, parameters: F64, turn: F64) -> tuple[F64, F64]:
 
 def thickness(garment: GarmentMesh, parameters: F64) -> F64:
     """Return the cloth's thickness (B,) m; zero where the garment has no such parameter."""
-    if "thickness_m" not in garment.parameter_names:
+    if THICKNESS not in garment.parameter_names:
         return np.zeros(len(parameters))
-    column: F64 = np.maximum(parameters[:, garment.parameter_names.index("thickness_m")], 0.0)
+    column: F64 = np.maximum(parameters[:, garment.parameter_names.index(THICKNESS)], 0.0)
     return column
 
 
 def remaining_length(garment: GarmentMesh, parameters: F64) -> F64:
     """Return the share (B,) of their sewn length that strands span: what folds and gathers take up is lost."""
-    if "take_up" not in garment.parameter_names:
+    if TAKE_UP not in garment.parameter_names:
         return np.ones(len(parameters))
-    column: F64 = 1.0 - np.maximum(parameters[:, garment.parameter_names.index("take_up")], 0.0)
+    column: F64 = 1.0 - np.maximum(parameters[:, garment.parameter_names.index(TAKE_UP)], 0.0)
     return column

@@ -10,17 +10,17 @@ import numpy as np
 from pydantic import Field, NonNegativeInt, PositiveFloat
 
 from mocapflow.assets import GarmentMesh
-from mocapflow.components import ClothFitter
 from mocapflow.data import Cloth, Estimate, Frame, Past, Segmentation, Turn
+from mocapflow.geometry.sewing import THICKNESS
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow_draping import samples
-from mocapflow_draping.outline import outline_error
+from mocapflow_draping.outline import OutlineFitter
 
 FIRST_FRAMES = 2  # as many as a Past remembers
 
 
-class SampledForces(ClothFitter):
+class SampledForces(OutlineFitter):
     """Tries directions and amounts of every force and refines the best, one force after the other.
 
     Later frames try only calm cloth, so that a search that was led astray comes back, and around the last best. Each
@@ -39,9 +39,6 @@ class SampledForces(ClothFitter):
     rounds: NonNegativeInt = 3  # of the refinement
     least_gain: Annotated[float, Field(ge=0, lt=1)] = 0.01  # share of the error that another force has to save
     force_sd_deg: PositiveFloat = 6.0  # standard deviation of each force about none
-    sigma_mm: PositiveFloat = 15.0  # standard deviation of the outline of draped cloth under the best forces
-    correlation_m: PositiveFloat = 0.3  # length over which its errors agree: half a skirt
-    spacing_px: PositiveFloat = 4.0  # between the points of the outline that are compared
 
     def fit(
         self, frame: Frame, segmentation: Segmentation, estimate: Estimate, model: ClothedModel, past: Past, turn: Turn
@@ -50,10 +47,7 @@ class SampledForces(ClothFitter):
         cloth, garment = model.drape(estimate.pose, estimate.parameters, past), model.scene.garment
         if garment is None or not segmentation.silhouettes:
             return cloth
-        outline = outline_error(
-            estimate.pose, cloth, segmentation, model,
-            sigma_mm=self.sigma_mm, correlation_m=self.correlation_m, spacing_px=self.spacing_px,
-        )  # fmt: skip
+        outline = self.outline_error(estimate.pose, cloth, segmentation, model)
         forces = sum(samples.forces(garment), [])
 
         def error(vertices: F64, parameters: F64) -> float:
@@ -84,6 +78,6 @@ class SampledForces(ClothFitter):
         for k in range(self.rounds):
             for columns in forces:
                 yield partial(samples.beside, garment, columns=columns, step=np.radians(self.step_deg) / 2**k)
-            if first and samples.THICKNESS in garment.parameter_names:
-                column = garment.parameter_names.index(samples.THICKNESS)
+            if first and THICKNESS in garment.parameter_names:
+                column = garment.parameter_names.index(THICKNESS)
                 yield partial(samples.beside, garment, columns=[column], step=self.step_mm / 1000 / 2**k)

@@ -8,11 +8,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from mocapflow.assets import GarmentMesh
+from mocapflow.geometry.sewing import THICKNESS
 from mocapflow.records import F64
 
 FORCE = re.compile(r"(?P<force>\w+?)(_cos|_sin)?_rad")
-THICKNESS = "thickness_m"
-TAKE_UP = "take_up"
 THICKNESSES = 6  # evenly spaced within the bounds
 
 

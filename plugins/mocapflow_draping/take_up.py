@@ -8,18 +8,18 @@ from typing import ClassVar
 import numpy as np
 from pydantic import PositiveFloat
 
-from mocapflow.components import ClothFitter
 from mocapflow.data import Cloth, Estimate, Frame, Past, Segmentation, Turn
+from mocapflow.geometry.sewing import TAKE_UP
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow_draping import samples
-from mocapflow_draping.outline import outline_error
+from mocapflow_draping.outline import OutlineFitter
 
 BRIEFEST = 1e-3  # s, between two frames
 FARTHEST = 2.0  # steps from the middle of three values that their parabola is trusted
 
 
-class TakeUp(ClothFitter):
+class TakeUp(OutlineFitter):
     """Moves the take-up of a hanging garment to where the outline fits the images; all else is as estimated.
 
     Folds and gathers come and go more slowly than a leg moves, so it is a random walk that begins at none in the first
@@ -29,20 +29,17 @@ class TakeUp(ClothFitter):
     name: ClassVar[str] = "take_up"
     take_up_sd: PositiveFloat = 0.05  # standard deviation of its change in a second, share of a strand's length
     step: PositiveFloat = 0.01  # to either side, of the three drapes that are compared
-    sigma_mm: PositiveFloat = 15.0  # standard deviation of the outline of draped cloth
-    correlation_m: PositiveFloat = 0.3  # length over which its errors agree: half a skirt
-    spacing_px: PositiveFloat = 4.0  # between the points of the outline that are compared
 
     def fit(
         self, frame: Frame, segmentation: Segmentation, estimate: Estimate, model: ClothedModel, past: Past, turn: Turn
     ) -> Cloth:
         """Return the garment draped at the estimated pose with the take-up that fits."""
         cloth, garment = model.drape(estimate.pose, estimate.parameters, past), model.scene.garment
-        if garment is None or not segmentation.silhouettes or samples.TAKE_UP not in garment.parameter_names:
+        if garment is None or not segmentation.silhouettes or TAKE_UP not in garment.parameter_names:
             return cloth
         if not past.moments or turn.index > 0:  # in the first frame the person is only being found
             return cloth
-        column = garment.parameter_names.index(samples.TAKE_UP)
+        column = garment.parameter_names.index(TAKE_UP)
         low, high = garment.parameter_bounds[column]
         last = past.moments[-1]
         before = last.cloth.parameters[column]
@@ -50,10 +47,7 @@ class TakeUp(ClothFitter):
         middle = np.clip(estimate.parameters[column], low + self.step, high - self.step)
         tried = middle + self.step * np.array([-1.0, 0.0, 1.0])
         trials = samples.replaced(garment, estimate.parameters, [column], tried[:, None])
-        error = outline_error(
-            estimate.pose, cloth, segmentation, model,
-            sigma_mm=self.sigma_mm, correlation_m=self.correlation_m, spacing_px=self.spacing_px,
-        )  # fmt: skip
+        error = self.outline_error(estimate.pose, cloth, segmentation, model)
         off = np.array([error(vertices) for vertices in model.drapes(estimate.pose, trials, past)])
         best = lowest(tried, off + ((tried - before) / spread) ** 2)
         parameters = samples.replaced(garment, estimate.parameters, [column], np.array([[best]]))[0]

@@ -40,7 +40,7 @@ class LimbSearch(Recovery):
     floating_cm2: PositiveFloat = 60.0  # likewise, of skin in empty space
     reach_m: PositiveFloat = 0.06  # what lies nearer to the other does not count
     cloth_m: PositiveFloat = 0.2  # what lies so near to the garment may be the garment, wherever it swings
-    gain: Annotated[float, Field(ge=0, lt=1)] = 0.1  # by which share another fit must be nearer to be taken
+    gain: Annotated[float, Field(ge=0, lt=1)] = 0.1  # share that a fit is nearer, and that each part mends
     tolerance: NonNegativeFloat = 0.03  # by which share a part may be farther that stays as it was fitted
     rows: Annotated[int, Field(ge=50)] = 160  # images are shrunk to about this height
     faces: Annotated[int, Field(ge=200)] = 2600  # of the body that is searched with

@@ -12,6 +12,7 @@ from mocapflow.components import ClothFitter, pool
 from mocapflow.data import Cloth, Estimate, Frame, Matches, Past, PoseBatch, Segmentation, Surface, Turn
 from mocapflow.geometry.differences import drape_differences
 from mocapflow.geometry.misfit import bilinear, dressed, misfit, outlines
+from mocapflow.geometry.sewing import TAKE_UP, THICKNESS
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64, Bool
 from mocapflow_twist import solve
@@ -113,7 +114,7 @@ class Task(NamedTuple):
 
     @property
     def _fitted(self) -> Bool:
-        return np.array([name not in ("thickness_m", "take_up") for name in self.garment.parameter_names])
+        return np.array([name not in (THICKNESS, TAKE_UP) for name in self.garment.parameter_names])
 
     def _from_calm(self, cloth: Cloth) -> F64:
         low, high = self.garment.parameter_bounds.T

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mocapflow.data import Cloth, Past
+from mocapflow.geometry.sewing import TAKE_UP
 from mocapflow.model import ClothedModel, moved
 from mocapflow.records import F64, Bool
 from mocapflow_twist.normal_equations import Equations
@@ -73,7 +74,7 @@ class ClothMotion:
     def _slow(self) -> Bool:
         """Which cloth parameters (Q,) follow the recording, not the frame: a cloth fitter moves them."""
         assert self.model.scene.garment is not None
-        return np.array([name == "take_up" for name in self.model.scene.garment.parameter_names])
+        return np.array([name == TAKE_UP for name in self.model.scene.garment.parameter_names])
 
     @property
     def _bounds(self) -> F64:
