@@ -15,7 +15,7 @@ from mocapflow.records import F64
 from mocapflow_draping import samples
 from mocapflow_draping.outline import OutlineFitter
 
-BRIEFEST = 1e-3  # s, between two frames
+EARLY = 1e-6  # share of the time between two steps by which a frame may come too early: rounding
 FARTHEST = 2.0  # steps from the middle of three values that their parabola is trusted
 
 
@@ -23,11 +23,13 @@ class TakeUp(OutlineFitter):
     """Moves the take-up of a hanging garment to where the outline fits the images; all else is as estimated.
 
     Folds and gathers come and go more slowly than a leg moves, so it is a random walk that begins at none in the first
-    frame, and takes one step a frame, in its first turn. A garment without this parameter is draped as it is.
+    frame and takes a step every tenth of a second, in the first turn of a frame. A garment without this parameter is
+    draped as it is.
     """
 
     name: ClassVar[str] = "take_up"
     take_up_sd: PositiveFloat = 0.05  # standard deviation of its change in a second, share of a strand's length
+    every_s: PositiveFloat = 0.1  # between two steps; where frames are farther apart, each takes one
     step: PositiveFloat = 0.01  # to either side, of the three drapes that are compared
 
     def fit(
@@ -37,13 +39,13 @@ class TakeUp(OutlineFitter):
         cloth, garment = model.drape(estimate.pose, estimate.parameters, past), model.scene.garment
         if garment is None or not segmentation.silhouettes or TAKE_UP not in garment.parameter_names:
             return cloth
-        if not past.moments or turn.index > 0:  # in the first frame the person is only being found
+        if turn.index > 0 or not self._due(frame.time, past):
             return cloth
         column = garment.parameter_names.index(TAKE_UP)
         low, high = garment.parameter_bounds[column]
         last = past.moments[-1]
         before = last.cloth.parameters[column]
-        spread = self.take_up_sd * math.sqrt(max(frame.time - last.time, BRIEFEST))
+        spread = self.take_up_sd * math.sqrt(max(frame.time - last.time, self.every_s))
         middle = np.clip(estimate.parameters[column], low + self.step, high - self.step)
         tried = middle + self.step * np.array([-1.0, 0.0, 1.0])
         trials = samples.replaced(garment, estimate.parameters, [column], tried[:, None])
@@ -52,6 +54,13 @@ class TakeUp(OutlineFitter):
         best = lowest(tried, off + ((tried - before) / spread) ** 2)
         parameters = samples.replaced(garment, estimate.parameters, [column], np.array([[best]]))[0]
         return model.drape(estimate.pose, parameters, past)
+
+    def _due(self, time: float, past: Past) -> bool:
+        """Return whether a step falls between the last frame and this; in the first the person is only being found."""
+        if not past.moments:
+            return False
+        last, now = (math.floor(each / self.every_s + EARLY) for each in (past.moments[-1].time, time))
+        return now > last
 
 
 def lowest(places: F64, values: F64) -> float:

@@ -87,20 +87,30 @@ def test_later_frames_follow_a_force_step_by_step(fitter, model):
     assert abs(found[column] - 0.12) < np.radians(2.5)
 
 
-def test_the_take_up_is_found_within_a_few_frames_where_the_hem_stands_out(model):
+def test_the_take_up_is_found_in_a_few_steps_where_the_hem_stands_out(model):
     column, past = model.scene.garment.parameter_names.index("take_up"), Past()
     truth, found = parameters(model, take_up=0.06, flare_rad=0.3), parameters(model, flare_rad=0.3)
     for index in range(10):
-        cloth = fitted(TakeUp(), model, truth, found, past, index / 30)
-        past, found = past.after(Moment(time=index / 30, pose=STANDING, cloth=cloth), {}), cloth.parameters
+        cloth = fitted(TakeUp(), model, truth, found, past, index / 10)
+        past, found = past.after(Moment(time=index / 10, pose=STANDING, cloth=cloth), {}), cloth.parameters
     assert abs(found[column] - 0.06) < 0.01
     np.testing.assert_array_equal(np.delete(found, column), np.delete(truth, column))
 
 
-def test_a_hem_that_hardly_shows_moves_little_in_one_frame(model):
+def test_a_hem_that_hardly_shows_moves_little_in_one_step(model):
     column = model.scene.garment.parameter_names.index("take_up")
-    found = fitted(TakeUp(), model, parameters(model, take_up=0.06), parameters(model), later(model), 2 / 30)
-    assert 0 <= found.parameters[column] < 0.01
+    found = fitted(TakeUp(), model, parameters(model, take_up=0.06), parameters(model), later(model), 0.1)
+    assert 0 < found.parameters[column] < 0.01
+
+
+def test_the_take_up_steps_every_tenth_of_a_second(model):
+    truth, start = parameters(model, take_up=0.06, flare_rad=0.3), parameters(model, flare_rad=0.3)
+    cloth, stepped = model.drape(STANDING, start, Past()), []
+    for frame in range(1, 31):
+        past = Past().after(Moment(time=(frame - 1) / 30, pose=STANDING, cloth=cloth), {})
+        found = fitted(TakeUp(), model, truth, start, past, frame / 30)
+        stepped.extend([frame] if np.any(found.parameters != start) else [])
+    assert stepped == list(range(3, 31, 3))
 
 
 def test_nothing_is_taken_up_while_the_person_is_being_found_or_is_not_seen(model):
