@@ -6,8 +6,8 @@ import pytest
 from drape_bodies import SKIN, box, check_whole_and_outside, distances, leg_poses, lying_cylinder, prepared, swing
 from mocapflow_draping.forces import thickness, tilts
 from mocapflow_draping.frames import tilted
-from mocapflow_draping.literal import blow_batch
 from mocapflow_draping.laying import distinct
+from mocapflow_draping.literal import blow_batch
 
 from mocapflow.data import Past, PoseBatch
 from mocapflow.errors import PluginError
