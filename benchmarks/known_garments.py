@@ -1,0 +1,165 @@
+"""Skirts and shorts for `known_motion.py`: a cone about the trunk of a rest body, and one that ends in two tubes.
+
+What is sewn has the measured circumferences and lengths wherever the body leaves room; it lies outside of the body.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.spatial import ConvexHull
+
+BAND = 0.03  # m, height of a waistband
+OFF_SKIN, TIGHT = 0.010, 0.004  # m, between skin and sewn cloth, and under the waistband
+TRUNK, THIGH = ("pelvis", "spine", "chest", "hip", "knee"), ("hip", "knee", "pelvis")
+SKIRT_COLUMNS, SKIRT_ROWS = 72, 50
+SHORTS_COLUMNS, SHORTS_ROWS, UNDER, LEG_COLUMNS, LEG_ROWS = 76, 17, 11, 50, 24
+
+
+@dataclass(frozen=True)
+class Garment:
+    """Cloth at rest: vertices (C,3), quads (Q,4), pinned vertices (P), which quads (Q) are of the first stripe."""
+
+    vertices: np.ndarray
+    quads: np.ndarray
+    pinned: np.ndarray
+    stripe: np.ndarray
+
+
+def measures_for(body: Any, own: dict[str, Any], owner: Any) -> dict[str, Any]:
+    """Return tape measures of a garment scaled from its owner to this body; waist and hip keep their ease."""
+    scale = body.vertices[:, 2].max() / owner.vertices[:, 2].max()
+    result = {k: v if k == "type" else round(float(v * scale), 3) for k, v in own.items()}
+    for what, height in (("waist_circumference", own["waist_height"]), ("hip_circumference", owner.joints[1, 2])):
+        if what in own:
+            girths = (_length(_outline(b, h, TRUNK[:4])) for b, h in ((body, height * scale), (owner, height)))
+            result[what] = round(own[what] + next(girths) - next(girths), 3)
+    return result
+
+
+def sew(body: Any, measures: dict[str, Any]) -> Garment:
+    """Sew a skirt or shorts by their measures; the waistband is pinned."""
+    if measures["type"] == "skirt":
+        columns, rows = SKIRT_COLUMNS, SKIRT_ROWS
+        points = _cone(body, measures, measures["hem_circumference"], measures["length"], columns, rows)
+    else:
+        columns, rows = SHORTS_COLUMNS, SHORTS_ROWS
+        rise = measures["length"] - measures["inseam"]
+        points = _cone(body, measures, measures["hip_circumference"], rise, columns, rows)
+    trunk = len(points)
+    quads = _tube(np.arange(trunk).reshape(rows, columns))
+    if measures["type"] == "shorts":
+        points, quads = _with_legs(body, points, quads, measures)
+    first = quads.min(1)
+    column = np.where(first < trunk, first % columns, (first - trunk - UNDER) % LEG_COLUMNS)
+    return Garment(points, quads, np.arange(2 * columns), column % 4 < 2)
+
+
+def _cone(body: Any, measures: dict[str, Any], wide: float, length: float, columns: int, rows: int) -> np.ndarray:
+    """Return points of a cone from the waist down whose columns are as long as asked."""
+    step = goal = (length - BAND) / (rows - 2)
+    for _ in range(4):
+        rings = _rings(body, measures["waist_height"], measures["waist_circumference"], wide, columns, rows, step)
+        step *= goal / np.linalg.norm(np.diff(rings[1:], axis=0), axis=2).mean()
+    return np.concatenate(rings)
+
+
+def _rings(body: Any, top: float, waist: float, wide: float, columns: int, rows: int, step: float) -> list[np.ndarray]:
+    """Return rings (N,3): a waistband, then rings about a step apart along the cloth."""
+    rings = [_ring(body, top, waist, columns), _ring(body, top - BAND, waist, columns)]
+    down, shape = step, rings[0][:, :2] - rings[0][:, :2].mean(0)
+    for share in np.arange(1, rows - 1) / (rows - 2):
+        rings.append(_ring(body, rings[-1][0, 2] - down, waist + share * (wide - waist), columns, shape))
+        aside = np.linalg.norm(rings[-1][:, :2] - rings[-2][:, :2], axis=1).mean()
+        down = np.sqrt(max(0.2 * step**2, step**2 - aside**2))
+    return rings
+
+
+def _ring(body: Any, z: float, girth: float, count: int, shape: np.ndarray | None = None) -> np.ndarray:
+    """Return points (N,3) from the front to the left, of a shape (M,2) as long as asked, but outside of the body."""
+    hull = _outline(body, z, TRUNK)
+    least = _widened(hull, TIGHT if shape is None else OFF_SKIN)
+    middle, shape = (hull.max(0) + hull.min(0)) / 2, least - least.mean(0) if shape is None else shape
+    scale = girth / _length(shape)
+    for _ in range(8):
+        both = np.vstack([middle + scale * shape, least])
+        both = both[ConvexHull(both).vertices]
+        scale *= girth / _length(both)
+    return np.column_stack([_from(both, np.array([0.0, -1.0]), count), np.full(count, z)])
+
+
+def _with_legs(
+    body: Any, points: np.ndarray, quads: np.ndarray, measures: dict[str, Any]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Add points under the crotch from front to back, and two tubes that hang from them and the lowest ring."""
+    ring, half = np.arange(len(points) - SHORTS_COLUMNS, len(points)), SHORTS_COLUMNS // 2
+    inner, along = len(points) + np.arange(UNDER), np.linspace(0, 1, UNDER + 2)[1:-1, None]
+    front, back = points[ring[0]], points[ring[half]]
+    crotch = front + along * (back - front) - [0, 0, 0.02] * np.sin(np.pi * along)
+    points = np.vstack([points, crotch])
+    for side, upper in ((1, [*ring[: half + 1], *inner[::-1]]), (-1, [*ring[half:], ring[0], *inner])):
+        rows = _leg(body, points[upper], side, crotch[:, 2].min(), measures)
+        ids = len(points) + np.arange(LEG_ROWS * LEG_COLUMNS).reshape(LEG_ROWS, LEG_COLUMNS)
+        points, quads = np.vstack([points, *rows]), np.vstack([quads, _tube(np.vstack([upper, ids]))])
+    return points, quads
+
+
+def _leg(body: Any, start: np.ndarray, side: int, top: float, measures: dict[str, Any]) -> list[np.ndarray]:
+    """Return rings (N,3) that go over from the first ring, about half the hips, to rings about the thigh."""
+    rows = []
+    for k, share in enumerate(np.arange(1, LEG_ROWS + 1) / LEG_ROWS):
+        mix, z = min(1.0, (k + 1) / 7), top - share * measures["inseam"]
+        thigh = _thigh_ring(body, z, side, measures["leg_opening_circumference"] * (1.2 - 0.2 * share))
+        bump = (1 - share) * (1 - mix) * (start[:, 2] - start[:, 2].min())
+        rows.append(np.column_stack([(1 - mix) * start[:, :2] + mix * thigh, z + bump]))
+    return rows
+
+
+def _thigh_ring(body: Any, z: float, side: int, girth: float) -> np.ndarray:
+    """Return points (N,2) about a thigh, wider outwards only; the middle one under the crotch is the inmost."""
+    hull = _widened(_outline(body, z, THIGH, side), OFF_SKIN)
+    inmost = hull[np.argmin(side * hull[:, 0])]
+    hull = inmost + (hull - inmost) * max(1.0, girth / _length(hull))
+    hull[:, 0] = side * np.maximum(side * hull[:, 0], 0.002)
+    return np.roll(_from(hull, np.array([-side, 0.0]), LEG_COLUMNS), LEG_COLUMNS - UNDER // 2 - 1, axis=0)
+
+
+def _outline(body: Any, z: float, parts: tuple[str, ...], side: int = 0) -> np.ndarray:
+    """Return the convex outline (200,2), counter-clockwise, of these parts, of one side if asked, at a height."""
+    chosen = body.faces[body.main(*parts)[body.faces].all(1)]
+    one, other = body.vertices[chosen].reshape(-1, 3), body.vertices[np.roll(chosen, -1, axis=1)].reshape(-1, 3)
+    cut = (one[:, 2] > z) != (other[:, 2] > z)
+    share = (z - one[cut, 2]) / (other[cut, 2] - one[cut, 2])
+    flat = (one[cut] + share[:, None] * (other[cut] - one[cut]))[:, :2]
+    flat = flat[side * flat[:, 0] >= 0]
+    return _resample(flat[ConvexHull(flat).vertices], 200)
+
+
+def _from(outline: np.ndarray, way: np.ndarray, count: int) -> np.ndarray:
+    """Return points (N,2) evenly along an outline, counter-clockwise from where it lies this way of its middle."""
+    fine = _resample(outline, 50 * count)
+    off = fine - (fine.max(0) + fine.min(0)) / 2
+    return _resample(np.roll(fine, -np.argmax(off @ way / np.linalg.norm(off, axis=1)), axis=0), count)
+
+
+def _resample(outline: np.ndarray, count: int) -> np.ndarray:
+    closed = np.vstack([outline, outline[:1]])
+    reached = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
+    return np.column_stack([np.interp(np.arange(count) / count * reached[-1], reached, x) for x in closed.T])
+
+
+def _widened(outline: np.ndarray, by: float) -> np.ndarray:
+    along = np.roll(outline, -1, axis=0) - np.roll(outline, 1, axis=0)
+    return outline + by * np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1, keepdims=True)
+
+
+def _length(outline: np.ndarray) -> float:
+    return float(np.linalg.norm(np.roll(outline, -1, axis=0) - outline, axis=1).sum())
+
+
+def _tube(ids: np.ndarray) -> np.ndarray:
+    """Return quads (Q,4) of rings (R,N) one below the other, facing outwards if rings run counter-clockwise."""
+    right = np.roll(ids, -1, axis=1)
+    return np.stack([ids[:-1], ids[1:], right[1:], right[:-1]], axis=-1).reshape(-1, 4)

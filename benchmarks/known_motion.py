@@ -1,0 +1,410 @@
+"""Recordings of known motion with physics cloth, against which a track can be measured.
+
+`apt install blender python3-numpy ffmpeg`, then `python benchmarks/known_motion.py TAKE DATA OUT`. TAKE is one of
+`TAKES`; DATA holds the recordings walk_skirt (subject A, her skirt) and kneeup_shorts (subject B, his shorts) and the
+folder motions; OUT/TAKE becomes a recording folder: cameras, videos, clean plates, subject, init.json, truth. The body
+is posed here, the garment sewn in `known_garments.py`; `known_motion_blender.py` drapes it with Blender's cloth and
+draws what each camera sees; softness of the lens and noise of the sensor are added here. Nothing of the tracker takes
+part. On one core about 2 s a view: 8 minutes a take of 50 frames. OUT/room_A and room_B keep the empty rooms for the
+next take.
+
+Metres, z up, floor at 0. Rest pose: the body looks along -y, left is +x. A pose is the root's translation and for each
+joint j a rotation vector relative to its parent: G_j = G_parent R_j, p_j = p_parent + G_parent (rest_j - rest_parent).
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+import tomllib
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+from known_garments import measures_for, sew
+from scipy.ndimage import gaussian_filter1d
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation, Slerp
+
+RATE = 30.0  # frames a second
+APPROACH, HOLD, RUN_UP = (
+    30,
+    15,
+    10,
+)  # frames from rest to the first pose, of standing there, of the motion before frame 0
+PLATES = 8  # empty rooms drawn per camera
+TONE = 0.965  # of a frame to its clean plate, as in the shared recordings
+SOFTNESS_PX, NOISE = 0.7, 3.0
+PURPLE = ((0.60, 0.40, 0.70), (0.32, 0.16, 0.42))  # of the stripes
+GREY = ((0.45, 0.46, 0.50), (0.12, 0.13, 0.16))
+GREEN = ((0.35, 0.62, 0.40), (0.10, 0.28, 0.16))
+SKIN, HAIR, UNDERWEAR = (0.56, 0.33, 0.21), (0.05, 0.035, 0.03), (0.10, 0.10, 0.12)
+SHIRT, SOCKS = {"A": (0.16, 0.33, 0.60), "B": (0.55, 0.10, 0.10)}, {"A": (0.80, 0.80, 0.80), "B": (0.03, 0.03, 0.035)}
+OWNER = {"skirt": "A", "shorts": "B"}
+
+
+@dataclass(frozen=True)
+class Take:
+    """Who wears what and moves how: a file of DATA/motions from a frame on, squat or dance."""
+
+    subject: str
+    garment: str
+    motion: str
+    seed: int  # of the errors of init.json and of the noise
+    stripes: tuple[tuple[float, ...], tuple[float, ...]]
+    start: int = 0
+    frames: int = 50
+    flight: tuple[int, int] | None = None  # frames of take-off and landing
+
+
+TAKES = {
+    "legcross_A_skirt": Take("A", "skirt", "legcross_A", 1, PURPLE, start=150),
+    "squat_A_skirt": Take("A", "skirt", "kneebend_A", 2, GREEN, start=190),
+    "walk_B_skirt": Take("B", "skirt", "walk_B", 3, GREEN, start=100),
+    "dance_A_shorts": Take("A", "shorts", "dance", 4, GREY),
+    "kick_B_shorts": Take("B", "shorts", "kick_B", 5, GREY, frames=40),
+    "legcross_B_shorts": Take("B", "shorts", "legcross_B", 6, GREEN, start=150),
+    "jump_A_skirt": Take("A", "skirt", "jump_A", 7, PURPLE, start=14, frames=30, flight=(13, 24)),
+    "squat_A_shorts": Take("A", "shorts", "squat", 8, GREEN),
+    "dance_B_skirt": Take("B", "skirt", "dance", 9, PURPLE),
+}
+
+
+ABOUT = """# {name}
+
+Rendered four-camera recording of known motion: {take.frames} frames at {rate:g} a second, subject {take.subject},
+motion {take.motion} from its frame {take.start}, {take.garment} simulated with Blender's cloth. Made by
+`benchmarks/known_motion.py`. Format and conventions are those of the recording of the same subject, whose body and
+cameras these are; frames are {tone:g} times as bright as the clean plates.
+"""
+
+
+@dataclass(frozen=True)
+class Body:
+    """Rest mesh (V,3), faces (F,3), joints (J,3), parents (J) with -1 for the root, weights (V,J)."""
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    names: list[str]
+    joints: np.ndarray
+    parents: list[int]
+    weights: np.ndarray
+
+    def main(self, *names: str) -> np.ndarray:
+        """Return which vertices (V) follow one of these joints most; a name without side means both."""
+        heads = np.array([name.removesuffix("_l").removesuffix("_r") for name in self.names])
+        return np.isin(heads[self.weights.argmax(1)], names)
+
+    def joint(self, name: str) -> np.ndarray:
+        """Return the place (3) of a joint in the rest pose."""
+        return self.joints[self.names.index(name)]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Root translation (T,3) and rotation vectors (T,J,3), the root's first."""
+
+    translation: np.ndarray
+    rotations: np.ndarray
+
+
+def read_body(folder: Path) -> Body:
+    """Read body.obj, skeleton.json and weights.npz of a recording's subject."""
+    lines = [line.split() for line in (folder / "body.obj").read_text().splitlines()]
+    joints = json.loads((folder / "skeleton.json").read_text())["joints"]
+    names, weights = [j["name"] for j in joints], np.load(folder / "weights.npz")
+    return Body(
+        np.array([x[1:4] for x in lines if x[:1] == ["v"]], float),
+        np.array([[y.split("/")[0] for y in x[1:4]] for x in lines if x[:1] == ["f"]], int) - 1,
+        names,
+        np.array([j["position"] for j in joints], float),
+        [names.index(j["parent"]) if j["parent"] else -1 for j in joints],
+        weights["weights"][:, [list(weights["names"]).index(n) for n in names]].astype(float),
+    )
+
+
+# --- posing -----------------------------------------------------------------------------------------------------------
+
+
+def chain(body: Body, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+    """Return turns (T,J,3,3) and positions (T,J,3) of the joints."""
+    turns = Rotation.from_rotvec(motion.rotations.reshape(-1, 3)).as_matrix().reshape(*motion.rotations.shape, 3)
+    places = np.empty(motion.rotations.shape)
+    places[:, 0] = motion.translation
+    for j, up in list(enumerate(body.parents))[1:]:
+        turns[:, j] = turns[:, up] @ turns[:, j]
+        places[:, j] = places[:, up] + turns[:, up] @ (body.joints[j] - body.joints[up])
+    return turns, places
+
+
+def skin(body: Body, motion: Motion, chosen: np.ndarray | slice = slice(None)) -> np.ndarray:
+    """Return the chosen vertices (T,V,3) by linear blend skinning."""
+    rest, weights = body.vertices[chosen], body.weights[chosen]
+    result = []
+    for turns, places in zip(*chain(body, motion), strict=True):
+        shifts = places - np.einsum("jab,jb->ja", turns, body.joints)
+        result.append(np.einsum("vj,jab,vb->va", weights, turns, rest, optimize=True) + weights @ shifts)
+    return np.stack(result)
+
+
+def angles(body: Body, positions: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the columns of truth/angles.csv, each (T) in degrees, from joint centres (T,J,3)."""
+    at = {name: positions[:, j] for j, name in enumerate(body.names)}
+    fixed = [body.names.index(n) for n in ("hip_l", "hip_r", "spine")]  # they turn as the pelvis does
+    pelvis = np.stack(
+        [Rotation.align_vectors(p[fixed] - p[0], body.joints[fixed] - body.joints[0])[0].as_matrix() for p in positions]
+    )
+    result = {}
+    for side in ("_l", "_r"):
+        thigh = np.einsum("tba,tb->ta", pelvis, at["knee" + side] - at["hip" + side])
+        result["knee_flexion" + side] = 180 - _corner(at["hip" + side], at["knee" + side], at["ankle" + side])
+        result["hip_flexion" + side] = np.degrees(np.arctan2(-thigh[:, 1], -thigh[:, 2]))
+        result["ankle" + side] = 90 - _corner(at["knee" + side], at["ankle" + side], at["toe" + side])
+        result["elbow" + side] = 180 - _corner(at["shoulder" + side], at["elbow" + side], at["wrist" + side])
+    return {n + s: result[n + s] for n in ("knee_flexion", "hip_flexion", "ankle", "elbow") for s in ("_l", "_r")}
+
+
+def _corner(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+    """Return the angle at b, in degrees."""
+    one, other = a - b, c - b
+    return np.degrees(np.arctan2(np.linalg.norm(np.cross(one, other), axis=-1), (one * other).sum(-1)))
+
+
+# --- motions ----------------------------------------------------------------------------------------------------------
+
+
+def rotations_of(take: Take, body: Body, data: Path) -> tuple[np.ndarray, int]:
+    """Return rotation vectors (T,J,3), the root's first, and how many frames of a run-up they begin with."""
+    if take.motion in ("squat", "dance"):
+        turn = (squat if take.motion == "squat" else dance)(body, np.arange(take.frames) / RATE)
+        return np.stack([turn[name] for name in body.names], axis=1), 0
+    file, before = np.load(data / "motions" / f"{take.motion}.npz"), min(take.start, RUN_UP)
+    order = [list(file["joint_names"]).index(name) for name in body.names[1:]]
+    whole = np.concatenate([file["root_rotation"][:, None], file["rotation_vectors"][:, order]], axis=1)
+    return whole[take.start - before : take.start + take.frames].astype(float), before
+
+
+def squat(body: Body, t: np.ndarray) -> dict[str, np.ndarray]:
+    """Return rotation vectors (T,3) per joint of squats with the arms forward at times (T) in s."""
+    turn = {name: np.zeros((len(t), 3)) for name in body.names}
+    knee = np.radians(8 + 45 * (1 - np.cos(2 * np.pi * t / 1.5)))
+    turn["pelvis"][:, 0], turn["spine"][:, 0], hip = 0.35 * knee, 0.05 * knee, 1.05 * knee
+    for side, sign in (("_l", 1), ("_r", -1)):
+        turn["hip" + side] = np.stack([-hip, 0 * t, sign * 0.12 * knee], axis=1)
+        turn["knee" + side][:, 0], turn["ankle" + side][:, 0] = knee, hip - knee - turn["pelvis"][:, 0]
+        turn["shoulder" + side] = _reach(
+            body, side, [[sign * 0.25, -1, 0.2 * np.sin(2 * np.pi * s / 1.1) - 0.1] for s in t]
+        )
+        turn["elbow" + side][:, 0] = -0.15
+    return turn
+
+
+def dance(body: Body, t: np.ndarray) -> dict[str, np.ndarray]:
+    """Return rotation vectors (T,3) per joint of steps with a turn, twists of the trunk by 20 degrees, waving arms."""
+    turn = {name: np.zeros((len(t), 3)) for name in body.names}
+    step = np.sin(2 * np.pi * t / 1.1)
+    turn["pelvis"] = np.stack([0.04 + 0 * t, 0.06 * step, np.radians(35) * (1 - np.cos(np.pi * t / t[-1]))], axis=1)
+    turn["spine"][:, 2] = turn["chest"][:, 2] = np.radians(10) * np.sin(2 * np.pi * t / 1.3)
+    for side, sign in (("_l", 1), ("_r", -1)):
+        lift, up = np.clip(sign * step, 0, 1) ** 1.5, np.sin(2 * np.pi * t / 1.6 + sign)
+        turn["hip" + side] = np.stack([-0.12 - 0.75 * lift, -0.06 * step, sign * 0.15 * lift], axis=1)
+        turn["knee" + side][:, 0], turn["ankle" + side][:, 0] = 0.22 + 1.1 * lift, -0.12 + 0.3 * lift
+        turn["shoulder" + side] = _reach(body, side, [[sign, -0.4 - 0.3 * u, 0.2 + 0.6 * u] for u in up])
+        turn["elbow" + side] = np.stack([-0.5 - 0.3 * up, 0 * t, sign * 0.3 * up], axis=1)
+    return turn
+
+
+def _reach(body: Body, side: str, towards: list[list[float]]) -> np.ndarray:
+    """Return rotation vectors (T,3) of a shoulder that point the upper arm these ways."""
+    arm = body.joint("elbow" + side) - body.joint("shoulder" + side)
+    return np.stack([_shortest(arm / np.linalg.norm(arm), way / np.linalg.norm(way)) for way in np.array(towards)])
+
+
+def _shortest(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    axis = np.cross(one, other)
+    return axis / np.linalg.norm(axis) * np.arctan2(np.linalg.norm(axis), one @ other)
+
+
+def ground(body: Body, rotations: np.ndarray, flight: tuple[int, int] | None = None) -> Motion:
+    """Stand the body on the floor: the lower foot, at z = 0, stays where it is; steady travel is removed."""
+    still = Motion(np.zeros((len(rotations), 3)), rotations)
+    feet = [body.main("ankle", "toe") & (sign * body.vertices[:, 0] > 0) for sign in (1, -1)]
+    soles = [skin(body, still, foot) for foot in feet]
+    heights = np.stack([s[..., 2].min(1) for s in soles], axis=1)
+    rests = np.exp((heights.min(1, keepdims=True) - heights) / 0.015)
+    rests /= rests.sum(1, keepdims=True)
+    moves = np.diff(np.stack([s[..., :2].mean(1) for s in soles], axis=1), axis=0)
+    steps = -(moves * (rests[1:] + rests[:-1])[..., None] / 2).sum(1)
+    z, t = gaussian_filter1d(-heights.min(1), 1.0, mode="nearest"), np.arange(len(rotations))
+    if flight:
+        steps[flight[0] : flight[1]] = 0.0
+        z += np.maximum(0, 9.81 / 2 * (t - flight[0]) * (flight[1] - t)) / RATE**2
+    path = np.vstack([[0.0, 0.0], np.cumsum(steps, axis=0)])
+    path -= np.stack([np.polyval(np.polyfit(t, x, 1), t) for x in path.T], axis=1)
+    return Motion(np.column_stack([gaussian_filter1d(path, 1.0, axis=0, mode="nearest"), z]), rotations)
+
+
+def build_motion(take: Take, body: Body, data: Path, centre: np.ndarray, cameras: dict) -> tuple[Motion, int]:
+    """Return the motion from the rest pose on, near a centre (2) of the floor, and the index of frame 0 in it."""
+    rotations, before = rotations_of(take, body, data)
+    main = ground(body, rotations, (take.flight[0] + before, take.flight[1] + before) if take.flight else None)
+    main = _shifted(main, centre - main.translation[before:, :2].mean(0))
+    main = _shifted(main, _into_view(skin(body, main, slice(None, None, 20))[before:].reshape(-1, 3), cameras))
+    ease = np.concatenate([0.5 - 0.5 * np.cos(np.pi * np.arange(APPROACH) / APPROACH), np.ones(HOLD)])
+    ways = [Slerp([0, 1], Rotation.from_rotvec([np.zeros(3), r])) for r in rotations[0]]
+    lead = ground(body, np.stack([way(ease).as_rotvec() for way in ways], axis=1))
+    stand = np.column_stack([np.tile(main.translation[0, :2], (len(ease), 1)), lead.translation[:, 2]])
+    whole = Motion(np.vstack([stand, main.translation]), np.concatenate([lead.rotations, rotations]))
+    return whole, len(ease) + before
+
+
+def _shifted(motion: Motion, by: np.ndarray) -> Motion:
+    return replace(motion, translation=motion.translation + [*by, 0])
+
+
+def _into_view(points: np.ndarray, cameras: dict) -> np.ndarray:
+    """Return the shift (2) on the floor, of a grid of 5 cm, by which points (N,3) leave the pictures least."""
+    shifts = [np.array([x, y]) * 0.05 for x in range(-6, 7) for y in range(-6, 7)]
+    return min(shifts, key=lambda s: beyond(points + [*s, 0], cameras) + 20 * np.linalg.norm(s))
+
+
+def beyond(points: np.ndarray, cameras: dict, margin: float = 8.0) -> float:
+    """Return by how many pixels, summed over cameras and sides, points (N,3) leave the pictures less a margin."""
+    total = 0.0
+    for camera in cameras.values():
+        seen = points @ Rotation.from_rotvec(camera["rotation"]).as_matrix().T + camera["translation"]
+        pixels = ((seen / seen[:, 2:]) @ np.array(camera["matrix"]).T)[:, :2]
+        total += np.maximum(0, margin - pixels.min(0)).sum()
+        total += np.maximum(0, pixels.max(0) + margin - camera["size"]).sum()
+    return float(total)
+
+
+# --- a recording ------------------------------------------------------------------------------------------------------
+
+
+def prepare(take: Take, data: Path, out: Path) -> None:
+    """Write cameras, subject, init.json and angles and joints of the truth, and work/scene.npz for Blender."""
+    own, owners = (data / {"A": "walk_skirt", "B": "kneeup_shorts"}[s] for s in (take.subject, OWNER[take.garment]))
+    for folder in ("truth", "subject", "work", "background", "videos"):
+        (out / folder).mkdir(parents=True, exist_ok=True)
+    for file in ("cameras.toml", "subject/body.obj", "subject/skeleton.json", "subject/weights.npz"):
+        shutil.copyfile(own / file, out / file)
+    cameras = tomllib.loads((own / "cameras.toml").read_text())
+    del cameras["metadata"]
+    body, measures = read_body(own / "subject"), json.loads((owners / "subject/garment.json").read_text())
+    if own != owners:
+        measures = measures_for(body, measures, read_body(owners / "subject"))
+    (out / "subject/garment.json").write_text(json.dumps(measures, indent=1))
+    centre = np.load(own / "truth/joints.npz")["positions"][:, 0, :2].mean(0)
+    whole, first = build_motion(take, body, data, centre, cameras)
+    motion = Motion(whole.translation[first:], whole.rotations[first:])
+    (out / "init.json").write_text(json.dumps(disturbed(body, motion, take.seed), indent=1))
+    write_truth(body, chain(body, motion)[1], out / "truth")
+    garment = sew(body, measures)
+    np.savez(
+        out / "work/scene.npz", first=first, plates=PLATES, subject=take.subject, cameras=json.dumps(cameras),
+        body=skin(body, whole).astype("f4"), faces=body.faces, paint=painted(body, take.subject),
+        garment=carried(body, garment.vertices, garment.pinned, whole).astype("f4"), quads=garment.quads,
+        pinned=garment.pinned, cloth_paint=np.where(garment.stripe[:, None], *take.stripes),
+        self_collision=take.garment == "skirt",
+    )  # fmt: skip
+
+
+def disturbed(body: Body, motion: Motion, seed: int) -> dict[str, object]:
+    """Return init.json: the first pose with errors of 4 degrees and 2 cm a component."""
+    random = np.random.default_rng(seed)
+    off = Rotation.from_rotvec(random.normal(0, np.radians(4), (len(body.names), 3)))
+    turned = (Rotation.from_rotvec(motion.rotations[0]) * off).as_rotvec().tolist()
+    return {
+        "root_rotation": turned[0],
+        "root_translation": (motion.translation[0] + random.normal(0, 0.02, 3)).tolist(),
+        "joint_rotations": dict(zip(body.names[1:], turned[1:], strict=True)),
+    }
+
+
+def write_truth(body: Body, positions: np.ndarray, folder: Path) -> None:
+    """Write angles.csv and joints.npz."""
+    table = angles(body, positions)
+    rows, form = np.column_stack([np.arange(len(positions)), *table.values()]), "%d" + ",%.3f" * len(table)
+    np.savetxt(folder / "angles.csv", rows, form, header=",".join(["frame", *table]), comments="")
+    np.savez(folder / "joints.npz", positions=positions.astype("f4"), names=body.names, parents=body.parents)
+
+
+def painted(body: Body, subject: str) -> np.ndarray:
+    """Return colours (V,3): shirt, socks, hair, underwear and skin."""
+    x, y, z = body.vertices.T
+    shoulder, elbow, head = (body.joint(name) for name in ("shoulder_l", "elbow_l", "head"))
+    sleeve = body.main("shoulder") & (np.abs(x) < 0.62 * elbow[0] + 0.38 * shoulder[0])
+    sock = body.main("ankle", "toe") | (body.main("knee") & (z < body.joint("ankle_l")[2] + 0.07))
+    scalp = (z > head[2] + 0.085) | ((y > head[1] + 0.045) & (z > head[2] + 0.02))
+    colours = np.tile(SKIN, (len(z), 1))
+    colours[body.main("pelvis", "spine", "chest") | sleeve] = SHIRT[subject]
+    colours[z > body.joint("neck")[2] + 0.02] = SKIN
+    colours[sock] = SOCKS[subject]
+    colours[body.main("head", "neck") & scalp] = HAIR
+    colours[body.main("hip") & (z > body.joint("hip_l")[2] - 0.12)] = UNDERWEAR
+    return colours
+
+
+def carried(body: Body, cloth: np.ndarray, pinned: np.ndarray, motion: Motion) -> np.ndarray:
+    """Return cloth (T,C,3) moved rigidly as the skin next to its waistband moves."""
+    belt = cKDTree(body.vertices).query(cloth[pinned])[1]
+    middle, result = body.vertices[belt].mean(0), []
+    for places in skin(body, motion, belt):
+        turn = Rotation.align_vectors(places - places.mean(0), body.vertices[belt] - middle)[0].as_matrix()
+        result.append((cloth - middle) @ turn.T + places.mean(0))
+    return np.stack(result)
+
+
+def finish(take: Take, out: Path, room: Path) -> None:
+    """Lay what was drawn around the person over empty rooms; write videos, clean plates and the true cloth."""
+    quads, random = np.load(out / "work/scene.npz")["quads"], np.random.default_rng(take.seed)
+    faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]).astype("i4")
+    np.savez_compressed(out / "truth/cloth.npz", vertices=np.load(out / "work/cloth.npy"), faces=faces)
+    for camera, boxes in json.loads((out / "work/boxes.json").read_text()).items():
+        empty = np.stack([cv2.imread(str(room / f"{camera}_{k}.png")) for k in range(PLATES)]).astype("f4")
+        cv2.imwrite(str(out / f"background/{camera}.png"), _soft(empty.mean(0)).round().astype("u1"))
+        with _encoder(out / f"videos/{camera}.mp4", *empty.shape[2:0:-1]) as encoder:
+            assert encoder.stdin
+            for frame, (x, y, w, h) in enumerate(boxes):
+                picture, drawn = empty[frame % PLATES].copy(), cv2.imread(str(out / f"work/{camera}_{frame:06}.png"))
+                weight = _fading(w, h)[..., None]
+                picture[y : y + h, x : x + w] += weight * (drawn - picture[y : y + h, x : x + w])
+                noisy = _soft(picture) * TONE + random.normal(0, NOISE, picture.shape)
+                encoder.stdin.write(np.clip(noisy.round(), 0, 255).astype("u1").tobytes())
+
+
+def _encoder(file: Path, width: int, height: int) -> subprocess.Popen[bytes]:
+    """Return a process that makes a video of the pictures (H,W,3) written to it."""
+    source = f"-f rawvideo -pix_fmt bgr24 -s {width}x{height} -r {RATE:g} -i -"
+    command = f"ffmpeg -v error -y {source} -c:v libx264 -crf 20 -pix_fmt yuv420p"
+    return subprocess.Popen([*command.split(), str(file)], stdin=subprocess.PIPE)
+
+
+def _soft(picture: np.ndarray) -> np.ndarray:
+    return cv2.GaussianBlur(picture, (0, 0), SOFTNESS_PX)
+
+
+def _fading(width: int, height: int, margin: int = 12) -> np.ndarray:
+    """Return weights (H,W) that fall to zero at the border of a box."""
+    x, y = (np.minimum(np.arange(n) + 1, n - np.arange(n)) / margin for n in (width, height))
+    return np.clip(np.minimum(x[None], y[:, None]), 0, 1).astype("f4")
+
+
+def main(name: str, data: Path, to: Path) -> None:
+    """Make one take."""
+    out, room, script = to / name, to / f"room_{TAKES[name].subject}", Path(__file__).parent / "known_motion_blender.py"
+    prepare(TAKES[name], data, out)
+    (out / "README.md").write_text(ABOUT.format(name=name, take=TAKES[name], rate=RATE, tone=TONE))
+    room.mkdir(exist_ok=True)
+    blender = ["blender", "-b", "-t", "1", "--python-exit-code", "1", "-P", str(script), "--"]
+    subprocess.run([*blender, str(out / "work"), str(room)], check=True)
+    finish(TAKES[name], out, room)
+    shutil.rmtree(out / "work")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], Path(sys.argv[2]), Path(sys.argv[3]))

@@ -1,0 +1,109 @@
+"""What the maker of takes of known motion poses, measures and sews, without Blender."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+ROOT = Path(__file__).parents[1]
+sys.path.append(str(ROOT / "benchmarks"))
+
+import known_motion as made  # noqa: E402
+from known_garments import measures_for, sew  # noqa: E402
+
+SKIRT, SHORTS = ROOT / "examples/data/skirt_steps", ROOT / "examples/data/shorts_steps"
+
+
+def at_rest(body, turn=(0, 0, 0), translation=None):
+    rotations = np.zeros((1, len(body.names), 3))
+    rotations[0, 0] = turn
+    return made.Motion((body.joints[0] if translation is None else translation)[None], rotations)
+
+
+def lengths(points):
+    return np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1).sum()
+
+
+@pytest.mark.parametrize("recording", [SKIRT, SHORTS], ids=lambda r: r.name)
+def test_angles_of_the_true_joints_are_the_true_angles(recording):
+    body, joints = made.read_body(recording / "subject"), np.load(recording / "truth/joints.npz")
+    truth = np.genfromtxt(recording / "truth/angles.csv", delimiter=",", names=True)
+    assert list(joints["names"]) == body.names
+    angles = made.angles(body, joints["positions"].astype(float))
+    assert ["frame", *angles] == list(truth.dtype.names)
+    for name, column in angles.items():
+        np.testing.assert_allclose(column, truth[name], atol=2e-3)
+
+
+@pytest.mark.parametrize("recording", [SKIRT, SHORTS], ids=lambda r: r.name)
+def test_the_pose_of_init_is_that_of_frame_0_with_its_errors(recording):
+    body, init = made.read_body(recording / "subject"), json.loads((recording / "init.json").read_text())
+    turns = [init["root_rotation"], *(init["joint_rotations"][name] for name in body.names[1:])]
+    posed = made.chain(body, made.Motion(np.array([init["root_translation"]]), np.array([turns])))[1]
+    truth = np.load(recording / "truth/joints.npz")["positions"][0]
+    bones = np.linalg.norm(posed[0, 1:] - posed[0, body.parents[1:]], axis=1)
+    np.testing.assert_allclose(bones, np.linalg.norm(truth[1:] - truth[body.parents[1:]], axis=1), atol=1e-4)
+    ways = [(p[1:] - p[body.parents[1:]]) / bones[:, None] for p in (posed[0], truth)]
+    assert 2 < np.degrees(np.arccos((ways[0] * ways[1]).sum(1))).mean() < 15  # errors add up along a limb
+    assert 0.005 < np.linalg.norm(posed[0, 0] - truth[0]) < 0.1
+
+
+def test_skinning_keeps_the_rest_body_and_turns_with_the_root():
+    body = made.read_body(SKIRT / "subject")
+    np.testing.assert_allclose(made.skin(body, at_rest(body))[0], body.vertices, atol=1e-6)
+    turn, shift = np.array([0.3, -0.2, 0.5]), np.array([0.1, 0.2, 1.0])
+    rigid = (body.vertices - body.joints[0]) @ Rotation.from_rotvec(turn).as_matrix().T + shift
+    np.testing.assert_allclose(made.skin(body, at_rest(body, turn, shift))[0], rigid, atol=1e-6)
+
+
+def test_bent_joints_show_in_the_signs_of_the_angles():
+    body = made.read_body(SKIRT / "subject")
+    motion = at_rest(body)
+    motion.rotations[0, [body.names.index(n) for n in ("hip_l", "knee_l", "ankle_l")], 0] = np.radians([-50, 60, -20])
+    bent = made.angles(body, made.chain(body, motion)[1])
+    straight = made.angles(body, body.joints[None])
+    for name, by in (("hip_flexion_l", 50), ("knee_flexion_l", 60), ("ankle_l", 20), ("knee_flexion_r", 0)):
+        assert bent[name] - straight[name] == pytest.approx(by, abs=8)  # the centres are not quite in a plane
+
+
+def test_scripted_motions_stand_on_the_floor():
+    body = made.read_body(SKIRT / "subject")
+    for script in ("squat", "dance"):
+        take = made.Take("A", "skirt", script, 0, made.GREY, frames=20)
+        motion = made.ground(body, made.rotations_of(take, body, Path())[0])
+        lowest = made.skin(body, motion, body.main("ankle", "toe"))[..., 2].min(1)
+        assert np.abs(lowest).max() < 0.02
+    knees = made.angles(body, made.chain(body, motion)[1])["knee_flexion_l"]
+    assert np.ptp(knees) > 20
+
+
+def test_start_is_disturbed_by_four_degrees_and_the_same_each_time():
+    body = made.read_body(SKIRT / "subject")
+    one, again = (made.disturbed(body, at_rest(body), seed=3) for _ in range(2))
+    assert one == again
+    assert sorted(one["joint_rotations"]) == sorted(body.names[1:])
+    assert 2 < np.degrees(np.std(list(one["joint_rotations"].values()))) < 6
+
+
+@pytest.mark.parametrize("wearer", [SKIRT, SHORTS], ids=["hers", "his"])
+def test_garments_have_their_measures(wearer):
+    body = made.read_body(wearer / "subject")
+    for owner, columns, rows in ((SKIRT, 72, 50), (SHORTS, 76, 17)):
+        measures = json.loads((owner / "subject/garment.json").read_text())
+        if owner != wearer:
+            measures = measures_for(body, measures, made.read_body(owner / "subject"))
+        garment = sew(body, measures)
+        rings = garment.vertices[: rows * columns].reshape(rows, columns, 3)
+        assert lengths(rings[0]) == pytest.approx(measures["waist_circumference"], rel=0.01)
+        assert garment.quads.max() == len(garment.vertices) - 1
+        along = np.linalg.norm(np.diff(rings, axis=0), axis=2).sum(0).mean()
+        if owner is SKIRT:
+            assert lengths(rings[-1]) == pytest.approx(measures["hem_circumference"], rel=0.01)
+            assert along == pytest.approx(measures["length"], rel=0.01)
+        else:
+            hem = garment.vertices[-50:]
+            assert lengths(hem) == pytest.approx(measures["leg_opening_circumference"], rel=0.02)
+            assert along == pytest.approx(measures["length"] - measures["inseam"], rel=0.03)
