@@ -30,11 +30,8 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation, Slerp
 
 RATE = 30.0  # frames a second
-APPROACH, HOLD, RUN_UP = (
-    30,
-    15,
-    10,
-)  # frames from rest to the first pose, of standing there, of the motion before frame 0
+APPROACH, HOLD = 30, 15  # frames from rest to the first pose, and of standing there
+RUN_UP = 10  # frames of the motion before frame 0
 PLATES = 8  # empty rooms drawn per camera
 TONE = 0.965  # of a frame to its clean plate, as in the shared recordings
 SOFTNESS_PX, NOISE = 0.7, 3.0
@@ -154,9 +151,8 @@ def angles(body: Body, positions: np.ndarray) -> dict[str, np.ndarray]:
     """Return the columns of truth/angles.csv, each (T) in degrees, from joint centres (T,J,3)."""
     at = {name: positions[:, j] for j, name in enumerate(body.names)}
     fixed = [body.names.index(n) for n in ("hip_l", "hip_r", "spine")]  # they turn as the pelvis does
-    pelvis = np.stack(
-        [Rotation.align_vectors(p[fixed] - p[0], body.joints[fixed] - body.joints[0])[0].as_matrix() for p in positions]
-    )
+    rest = body.joints[fixed] - body.joints[0]
+    pelvis = np.stack([Rotation.align_vectors(p[fixed] - p[0], rest)[0].as_matrix() for p in positions])
     result = {}
     for side in ("_l", "_r"):
         thigh = np.einsum("tba,tb->ta", pelvis, at["knee" + side] - at["hip" + side])
@@ -190,14 +186,12 @@ def rotations_of(take: Take, body: Body, data: Path) -> tuple[np.ndarray, int]:
 def squat(body: Body, t: np.ndarray) -> dict[str, np.ndarray]:
     """Return rotation vectors (T,3) per joint of squats with the arms forward at times (T) in s."""
     turn = {name: np.zeros((len(t), 3)) for name in body.names}
-    knee = np.radians(8 + 45 * (1 - np.cos(2 * np.pi * t / 1.5)))
+    knee, wave = np.radians(8 + 45 * (1 - np.cos(2 * np.pi * t / 1.5))), np.sin(2 * np.pi * t / 1.1)
     turn["pelvis"][:, 0], turn["spine"][:, 0], hip = 0.35 * knee, 0.05 * knee, 1.05 * knee
     for side, sign in (("_l", 1), ("_r", -1)):
         turn["hip" + side] = np.stack([-hip, 0 * t, sign * 0.12 * knee], axis=1)
         turn["knee" + side][:, 0], turn["ankle" + side][:, 0] = knee, hip - knee - turn["pelvis"][:, 0]
-        turn["shoulder" + side] = _reach(
-            body, side, [[sign * 0.25, -1, 0.2 * np.sin(2 * np.pi * s / 1.1) - 0.1] for s in t]
-        )
+        turn["shoulder" + side] = _reach(body, side, [[sign * 0.25, -1, 0.2 * w - 0.1] for w in wave])
         turn["elbow" + side][:, 0] = -0.15
     return turn
 

@@ -128,11 +128,8 @@ def matt(name: str, colour: Colour | None, scale: float, other: Colour | float) 
         link(paint.outputs["Color"], mix.inputs["Color1"])
         link(darker.outputs["Color"], mix.inputs["Color2"])
     else:
-        mix.inputs["Color1"].default_value = (*colour, 1)
-        mix.inputs["Color2"].default_value = (
-            *(other if isinstance(other, tuple) else [c * (1 - other) for c in colour]),
-            1,
-        )
+        second = other if isinstance(other, tuple) else [c * (1 - other) for c in colour]
+        mix.inputs["Color1"].default_value, mix.inputs["Color2"].default_value = (*colour, 1), (*second, 1)
     return shaded(made, mix.outputs["Color"])
 
 
@@ -158,10 +155,8 @@ def planks() -> Any:
     )
     for name, value in (("Scale", 1.0), ("Brick Width", 0.9), ("Row Height", 0.14), ("Mortar Size", 0.004)):
         bricks.inputs[name].default_value = value
-    bricks.inputs["Mortar"].default_value, bricks.inputs["Color2"].default_value = (
-        (0.10, 0.08, 0.06, 1),
-        (0.42, 0.35, 0.27, 1),
-    )
+    bricks.inputs["Mortar"].default_value = (0.10, 0.08, 0.06, 1)
+    bricks.inputs["Color2"].default_value = (0.42, 0.35, 0.27, 1)
     link(new("ShaderNodeTexCoord").outputs["Object"], bricks.inputs["Vector"])
     link(mottled, bricks.inputs["Color1"])
     return shaded(made, bricks.outputs["Color"])
