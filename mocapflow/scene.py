@@ -53,6 +53,14 @@ class Scene:
         return np.repeat(np.array([BODY, CLOTH], np.uint8), [len(self.body.vertices), cloth])
 
     @cached_property
+    def held(self) -> Bool:
+        """Which surface vertices (N,) the skin holds: its own, and those where the garment is pinned to it."""
+        held: Bool = self.layer == BODY
+        if self.garment is not None:
+            held[len(self.body.vertices) + self.garment.pinned] = True
+        return held
+
+    @cached_property
     def hanging(self) -> F64:
         """How far (W,) m each garment vertex is from the pinned end of its strand, along the cloth."""
         if self.garment is None:

@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from mocapflow.assets import Camera
-from mocapflow.data import BODY, Matches, Silhouette, Surface
+from mocapflow.data import Matches, Silhouette, Surface
 from mocapflow.records import F64, I32, U8, Bool
+from mocapflow.scene import Scene
 from mocapflow_levelset import splits
 from mocapflow_levelset.inner_edges import behind_edges, chosen, inner_edges
 from mocapflow_levelset.layers import CLIP, Shown
@@ -24,12 +25,13 @@ class Search(NamedTuple):
     sigma_px: float  # standard deviation of a point without noise
 
 
-def told_apart(surface: Surface, layers: I32, known: Shown) -> Bool:
+def told_apart(scene: Scene, layers: I32, known: Shown) -> Bool:
     """Return the vertices (N,) whose edges can be found.
 
-    Those of cloth are left out: where it hangs is not known well enough to say anything of what it lies before.
+    Those of cloth are left out but for a waistband: where it hangs is not known well enough to say anything of what it
+    lies before.
     """
-    return np.asarray(surface.layer == BODY) & np.asarray(known.apart.any(axis=1)).take(layers)
+    return scene.held & np.asarray(known.apart.any(axis=1)).take(layers)
 
 
 def inner_contours(

@@ -23,10 +23,10 @@ def inner_edges(surface: Surface, camera: Camera, spacing_px: float, of: Bool) -
         surface: the posed mesh.
         camera: the view.
         spacing_px: between points.
-        of: (N,) the vertices whose edges are wanted.
+        of: (N,) the vertices between which edges are wanted.
     """
     occluding = outline(surface, camera)
-    wanted = of.take(occluding.vertex[:, 0])
+    wanted = np.asarray(of.take(occluding.vertex).all(axis=1))
     wanted[occluding.edge] = False  # these bound the silhouette
     edge = np.flatnonzero(wanted).astype(np.int32)
     vertex, anchor, pixel, normal = boundary_kernels.sample(

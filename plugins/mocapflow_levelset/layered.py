@@ -65,7 +65,7 @@ class Layered(LevelSet):
         if COLOURS not in past.appearance:
             return None
         layers, known, search = layer_of(scene), shown(past), self._search(turn)
-        told = told_apart(surface, layers, known)
+        told = told_apart(scene, layers, known)
         parts = [
             inner_contours(frame.images[s.camera], s, surface, scene.cameras[s.camera], layers, told, known, search)
             for s in found.of(PERSON)

@@ -10,7 +10,8 @@ from pydantic import PositiveFloat
 
 from mocapflow.components import Matcher
 from mocapflow.data import Frame, Matches, Past, Segmentation, Surface, Turn, empty_matches
-from mocapflow.geometry.cameras import project_each
+from mocapflow.geometry.cameras import magnification, project_each
+from mocapflow.records import F64
 from mocapflow.scene import Scene
 from mocapflow_matching.robust import robust_weights
 
@@ -18,7 +19,9 @@ from mocapflow_matching.robust import robust_weights
 class InnerContours(Matcher):
     """Draws edges of parts that lie before others (a forearm before the trunk) to where these parts end in the image.
 
-    It needs segmenter `layered`, which finds their ends once a turn; without it there are no pairs.
+    A waistband is such an edge too: it says how the trunk is tilted. By how much it sits higher or lower than the tape
+    measure says, all around, does not count. It needs segmenter `layered`, which finds the ends of parts once a turn;
+    without it there are no pairs.
     """
 
     name: ClassVar[str] = "inner_contours"
@@ -33,6 +36,18 @@ class InnerContours(Matcher):
         if inner is None:
             return empty_matches()
         image = project_each(surface.vertices[inner.vertex], inner.camera, scene.cameras)
-        off = np.abs(np.einsum("ma,ma->m", inner.pixel - image, inner.direction)) * np.sqrt(inner.weight)
+        away = np.einsum("ma,ma->m", inner.pixel - image, inner.direction)
+        higher = slipped(away, inner, surface, scene)
+        off = np.abs(away - higher) * np.sqrt(inner.weight)
         loss = robust_weights(off, "geman_mcclure" if turn.calm(self.calm_mm) else "huber", self.scale)
-        return replace(inner, weight=inner.weight * loss)
+        return replace(inner, pixel=inner.pixel - higher[:, None] * inner.direction, weight=inner.weight * loss)
+
+
+def slipped(away: F64, inner: Matches, surface: Surface, scene: Scene) -> F64:
+    """Return by how many px (M,) a waistband is away all around: the median length; pairs of the body are by none."""
+    worn = surface.cloth[inner.vertex]
+    if not worn.any():
+        return np.zeros(len(worn))
+    place = surface.vertices[inner.vertex[worn]].mean(axis=0)
+    size = np.array([magnification(camera, place) for camera in scene.cameras])[inner.camera]
+    return np.where(worn, size * np.median(away[worn] / size[worn]), 0.0)

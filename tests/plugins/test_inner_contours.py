@@ -15,6 +15,7 @@ from test_layers import CLOTHS, SCENE, SKIN, dressed, learned, painted
 
 from mocapflow.components import pool
 from mocapflow.data import CLOTH, Past, Pose, Turn
+from mocapflow.geometry import twists
 from mocapflow.geometry.cameras import project
 from mocapflow.testing import tiny_cloth, tiny_pose, tiny_segmentation
 
@@ -85,13 +86,21 @@ def surface_at(pose):
     return SCENE.surface(pose, tiny_cloth(SCENE, pose))
 
 
-def match(colour_of, believed, true=60.0):
-    pose = kicked(true)
-    frame, surface = painted(colour_of, pose), surface_at(kicked(believed))
+def leaning(degrees):
+    """A pose whose trunk leans so much farther forward."""
+    pose = tiny_pose(SCENE, 1, 0.02)
+    lean = twists.exp(twists.screw(np.array([[1.0, 0.0, 0.0]]), pose.root[None, :3, 3])[0] * np.radians(degrees))
+    return Pose(root=lean @ pose.root, angles=pose.angles)
+
+
+def match(colour_of, believed, true=None, slipped_m=0.0):
+    """Pairs at a believed pose, of pictures of a true one in which all cloth sits so much lower."""
+    pose = kicked(60.0) if true is None else true
+    frame, surface = painted(colour_of, pose, lower_m=slipped_m), surface_at(believed)
     past = Past(appearance={COLOURS: learned(frame, pose=pose)})
     segmentation, search = tiny_segmentation(SCENE, pose), Search(4.0, 24, 3, 1.0, 1.0)
     layers, known = layer_of(SCENE), shown(past)
-    told = told_apart(surface, layers, known)
+    told = told_apart(SCENE, layers, known)
     parts = [
         (1.0, inner_contours(image, silhouette, surface, camera, layers, told, known, search))
         for image, silhouette, camera in zip(frame.images, segmentation.silhouettes, SCENE.cameras, strict=True)
@@ -109,16 +118,39 @@ def off(matches, pose):
 
 
 def test_a_leg_before_the_cloth_is_drawn_to_where_it_is():
-    matches = match(dressed, believed=55.0)
+    matches = match(dressed, kicked(55.0))
     assert len(matches.vertex) > 20
-    assert not (SCENE.layer[matches.vertex] == CLOTH).any()
-    before, after = (np.abs(off(matches, kicked(degrees))) for degrees in (55.0, 60.0))
+    skin = SCENE.layer[matches.vertex] != CLOTH
+    before, after = (np.abs(off(matches, kicked(degrees))[skin]) for degrees in (55.0, 60.0))
     assert np.median(before) > 1.5
     assert np.median(after) < 0.7
 
 
+def test_of_the_cloth_only_the_waistband_has_pairs():
+    matches, body = match(dressed, kicked(55.0)), len(SCENE.body.vertices)
+    cloth = matches.vertex[matches.vertex >= body] - body
+    assert len(cloth) > 10
+    assert np.isin(cloth, SCENE.garment.pinned).all()
+
+
+def test_a_waistband_says_how_the_trunk_leans():
+    true, believed = leaning(0.0), leaning(4.0)
+    matches = match(dressed, believed, true)
+    cloth = SCENE.layer[matches.vertex] == CLOTH
+    before, after = (np.abs(off(matches, pose)[cloth]) for pose in (believed, true))
+    assert np.median(before) > 2 * np.median(after)
+
+
+def test_a_waistband_that_sits_lower_than_the_tape_says_pulls_at_nothing():
+    pose = leaning(0.0)
+    slid = match(dressed, pose, pose, slipped_m=0.015)
+    cloth = SCENE.layer[slid.vertex] == CLOTH
+    assert cloth.sum() > 10
+    assert abs(np.median(off(slid, pose)[cloth])) < 0.3
+
+
 def test_a_leg_of_the_cloth_s_colour_is_left_alone():
-    assert len(match(lambda layer: SKIN, believed=55.0).vertex) == 0
+    assert len(match(lambda layer: SKIN, kicked(55.0)).vertex) == 0
 
 
 def test_without_inner_contours_there_are_no_pairs():

@@ -17,9 +17,10 @@ POSE = tiny_pose(SCENE, 1, 0.05)
 SKIN, CLOTHS = (40, 80, 170), (60, 140, 60)  # BGR
 
 
-def painted(colour_of, pose=POSE, noise=3.0):
-    """Pictures in which each layer of the surface has the colour that `colour_of` gives to its number."""
+def painted(colour_of, pose=POSE, noise=3.0, lower_m=0.0):
+    """Pictures in which each layer of the surface has the colour of `colour_of`, and cloth hangs so much lower."""
     surface, layers = SCENE.surface(pose, tiny_cloth(SCENE, pose)), layer_of(SCENE)
+    surface = replace(surface, vertices=surface.vertices - lower_m * (surface.layer == CLOTH)[:, None] * [0, 0, 1])
     palette = np.array([colour_of(layer) for layer in range(layers.max() + 1)], np.float64)
     images, rng = [], np.random.default_rng(7)
     for camera in SCENE.cameras:
