@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
-from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
+from pydantic import NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
 from mocapflow.components import PoseSolver, Prior
 from mocapflow.data import Estimate, FrameState, Matches, Past, Pose, Residual, Surface, Turn
@@ -34,6 +34,7 @@ class TwistGaussNewton(PoseSolver):
     name = "twist_gauss_newton"
 
     iterations: PositiveInt = 10  # times that it matches anew, at most
+    first_iterations: NonNegativeInt = 0  # in the first frame at least: its start is far off
     steps_per_match: PositiveInt = 1  # steps with the same pairs
     residual: Literal["image", "line"] = "image"  # pixels, or distance to projection rays in space
     line_sigma_mm: PositiveFloat = 3.0  # standard deviation of every distance to a ray
@@ -70,7 +71,7 @@ class TwistGaussNewton(PoseSolver):
         surface, damping = model.surface(guess.pose, guess.cloth), self._least_damping(past, turn)
         tried: dict[Pose, Sequence[Residual]] = {}
         found: Quadratic | None = None  # the quadratic models at the guess, once they are known
-        for _ in range(self.iterations):
+        for _ in range(self.iterations if past.moments else max(self.iterations, self.first_iterations)):
             problem, found = Problem(model, self._data(match(surface), model), priors, past, anchor, tried), None
             if problem.data.measurements == 0:
                 break

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -82,6 +83,17 @@ def test_only_the_first_frame_starts_gently() -> None:
         for past, turn in ((Past(), TURN), (Past(), replace(TURN, index=1)), (later, TURN))
     )
     assert first < second < free
+
+
+def test_only_the_first_frame_looks_for_matches_more_often() -> None:
+    scene, truth = make_scene(), make_pose(1)
+    matches, start = exact_matches(scene, truth, np.arange(0, 300, 9), directed=False), start_from(truth, 1)
+    solver = TwistGaussNewton(**{**EXACT, "iterations": 1}, first_iterations=3)
+    later = Past(moments=(Moment(time=0.0, pose=start, cloth=NO_CLOTH),))
+    for past, wanted in ((Past(), 3), (later, 1)):
+        looked = Mock(return_value=matches)
+        solver.solve(looked, make_state(start), ClothedModel(scene=scene), [], past, TURN)
+        assert looked.call_count == wanted
 
 
 def test_matches_that_count_along_a_direction_only_give_the_pose_too() -> None:
