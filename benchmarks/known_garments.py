@@ -34,22 +34,20 @@ def measures_for(body: Any, own: dict[str, Any], owner: Any) -> dict[str, Any]:
     result = {k: v if k == "type" else round(float(v * scale), 3) for k, v in own.items()}
     for what, height in (("waist_circumference", own["waist_height"]), ("hip_circumference", owner.joints[1, 2])):
         if what in own:
-            girths = (_length(_outline(b, h, TRUNK[:4])) for b, h in ((body, height * scale), (owner, height)))
-            result[what] = round(own[what] + next(girths) - next(girths), 3)
+            ease = own[what] - _length(_outline(owner, height, TRUNK[:4]))
+            result[what] = round(_length(_outline(body, height * scale, TRUNK[:4])) + ease, 3)
     return result
 
 
 def sew(body: Any, measures: dict[str, Any]) -> Garment:
     """Sew a skirt or shorts by their measures; the waistband is pinned."""
     if measures["type"] == "skirt":
-        columns, rows = SKIRT_COLUMNS, SKIRT_ROWS
-        points = _cone(body, measures, measures["hem_circumference"], measures["length"], columns, rows)
+        columns, rows, wide, length = SKIRT_COLUMNS, SKIRT_ROWS, measures["hem_circumference"], measures["length"]
     else:
-        columns, rows = SHORTS_COLUMNS, SHORTS_ROWS
-        rise = measures["length"] - measures["inseam"]
-        points = _cone(body, measures, measures["hip_circumference"], rise, columns, rows)
-    trunk = len(points)
-    quads = _tube(np.arange(trunk).reshape(rows, columns))
+        columns, rows, wide = SHORTS_COLUMNS, SHORTS_ROWS, measures["hip_circumference"]
+        length = measures["length"] - measures["inseam"]
+    points = _cone(body, measures, wide, length, columns, rows)
+    trunk, quads = len(points), _tube(np.arange(len(points)).reshape(rows, columns))
     if measures["type"] == "shorts":
         points, quads = _with_legs(body, points, quads, measures)
     first = quads.min(1)

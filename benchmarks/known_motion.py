@@ -40,7 +40,7 @@ GREY = ((0.45, 0.46, 0.50), (0.12, 0.13, 0.16))
 GREEN = ((0.35, 0.62, 0.40), (0.10, 0.28, 0.16))
 SKIN, HAIR, UNDERWEAR = (0.56, 0.33, 0.21), (0.05, 0.035, 0.03), (0.10, 0.10, 0.12)
 SHIRT, SOCKS = {"A": (0.16, 0.33, 0.60), "B": (0.55, 0.10, 0.10)}, {"A": (0.80, 0.80, 0.80), "B": (0.03, 0.03, 0.035)}
-OWNER = {"skirt": "A", "shorts": "B"}
+RECORDINGS, OWNER = {"A": "walk_skirt", "B": "kneeup_shorts"}, {"skirt": "A", "shorts": "B"}
 
 
 @dataclass(frozen=True)
@@ -174,8 +174,8 @@ def _corner(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
 
 def rotations_of(take: Take, body: Body, data: Path) -> tuple[np.ndarray, int]:
     """Return rotation vectors (T,J,3), the root's first, and how many frames of a run-up they begin with."""
-    if take.motion in ("squat", "dance"):
-        turn = (squat if take.motion == "squat" else dance)(body, np.arange(take.frames) / RATE)
+    if script := {"squat": squat, "dance": dance}.get(take.motion):
+        turn = script(body, np.arange(take.frames) / RATE)
         return np.stack([turn[name] for name in body.names], axis=1), 0
     file, before = np.load(data / "motions" / f"{take.motion}.npz"), min(take.start, RUN_UP)
     order = [list(file["joint_names"]).index(name) for name in body.names[1:]]
@@ -214,12 +214,7 @@ def dance(body: Body, t: np.ndarray) -> dict[str, np.ndarray]:
 def _reach(body: Body, side: str, towards: list[list[float]]) -> np.ndarray:
     """Return rotation vectors (T,3) of a shoulder that point the upper arm these ways."""
     arm = body.joint("elbow" + side) - body.joint("shoulder" + side)
-    return np.stack([_shortest(arm / np.linalg.norm(arm), way / np.linalg.norm(way)) for way in np.array(towards)])
-
-
-def _shortest(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    axis = np.cross(one, other)
-    return axis / np.linalg.norm(axis) * np.arctan2(np.linalg.norm(axis), one @ other)
+    return np.stack([Rotation.align_vectors([way], [arm])[0].as_rotvec() for way in towards])
 
 
 def ground(body: Body, rotations: np.ndarray, flight: tuple[int, int] | None = None) -> Motion:
@@ -269,7 +264,7 @@ def beyond(points: np.ndarray, cameras: dict, margin: float = 8.0) -> float:
     """Return by how many pixels, summed over cameras and sides, points (N,3) leave the pictures less a margin."""
     total = 0.0
     for camera in cameras.values():
-        seen = points @ Rotation.from_rotvec(camera["rotation"]).as_matrix().T + camera["translation"]
+        seen = points @ np.transpose(camera["turn"]) + camera["translation"]
         pixels = ((seen / seen[:, 2:]) @ np.array(camera["matrix"]).T)[:, :2]
         total += np.maximum(0, margin - pixels.min(0)).sum()
         total += np.maximum(0, pixels.max(0) + margin - camera["size"]).sum()
@@ -281,14 +276,16 @@ def beyond(points: np.ndarray, cameras: dict, margin: float = 8.0) -> float:
 
 def prepare(take: Take, data: Path, out: Path) -> None:
     """Write cameras, subject, init.json and angles and joints of the truth, and work/scene.npz for Blender."""
-    own, owners = (data / {"A": "walk_skirt", "B": "kneeup_shorts"}[s] for s in (take.subject, OWNER[take.garment]))
+    own, owners = (data / RECORDINGS[subject] for subject in (take.subject, OWNER[take.garment]))
     for folder in ("truth", "subject", "work", "background", "videos"):
         (out / folder).mkdir(parents=True, exist_ok=True)
     for file in ("cameras.toml", "subject/body.obj", "subject/skeleton.json", "subject/weights.npz"):
         shutil.copyfile(own / file, out / file)
-    cameras = tomllib.loads((own / "cameras.toml").read_text())
+    cameras, body = tomllib.loads((own / "cameras.toml").read_text()), read_body(own / "subject")
     del cameras["metadata"]
-    body, measures = read_body(own / "subject"), json.loads((owners / "subject/garment.json").read_text())
+    for camera in cameras.values():
+        camera["turn"] = Rotation.from_rotvec(camera["rotation"]).as_matrix().tolist()  # from world to camera
+    measures = json.loads((owners / "subject/garment.json").read_text())
     if own != owners:
         measures = measures_for(body, measures, read_body(owners / "subject"))
     (out / "subject/garment.json").write_text(json.dumps(measures, indent=1))
@@ -361,21 +358,22 @@ def finish(take: Take, out: Path, room: Path) -> None:
     for camera, boxes in json.loads((out / "work/boxes.json").read_text()).items():
         empty = np.stack([cv2.imread(str(room / f"{camera}_{k}.png")) for k in range(PLATES)]).astype("f4")
         cv2.imwrite(str(out / f"background/{camera}.png"), _soft(empty.mean(0)).round().astype("u1"))
-        with _encoder(out / f"videos/{camera}.mp4", *empty.shape[2:0:-1]) as encoder:
-            assert encoder.stdin
-            for frame, (x, y, w, h) in enumerate(boxes):
-                picture, drawn = empty[frame % PLATES].copy(), cv2.imread(str(out / f"work/{camera}_{frame:06}.png"))
-                weight = _fading(w, h)[..., None]
-                picture[y : y + h, x : x + w] += weight * (drawn - picture[y : y + h, x : x + w])
-                noisy = _soft(picture) * TONE + random.normal(0, NOISE, picture.shape)
-                encoder.stdin.write(np.clip(noisy.round(), 0, 255).astype("u1").tobytes())
+        pictures = []
+        for frame, (x, y, w, h) in enumerate(boxes):
+            picture, drawn = empty[frame % PLATES].copy(), cv2.imread(str(out / f"work/{camera}_{frame:06}.png"))
+            weight = _fading(w, h)[..., None]
+            picture[y : y + h, x : x + w] += weight * (drawn - picture[y : y + h, x : x + w])
+            noisy = _soft(picture) * TONE + random.normal(0, NOISE, picture.shape)
+            pictures.append(np.clip(noisy.round(), 0, 255).astype("u1"))
+        write_video(out / f"videos/{camera}.mp4", np.stack(pictures))
 
 
-def _encoder(file: Path, width: int, height: int) -> subprocess.Popen[bytes]:
-    """Return a process that makes a video of the pictures (H,W,3) written to it."""
+def write_video(file: Path, pictures: np.ndarray) -> None:
+    """Write pictures (T,H,W,3) as a video."""
+    _, height, width, _ = pictures.shape
     source = f"-f rawvideo -pix_fmt bgr24 -s {width}x{height} -r {RATE:g} -i -"
     command = f"ffmpeg -v error -y {source} -c:v libx264 -crf 20 -pix_fmt yuv420p"
-    return subprocess.Popen([*command.split(), str(file)], stdin=subprocess.PIPE)
+    subprocess.run([*command.split(), str(file)], input=pictures.tobytes(), check=True)
 
 
 def _soft(picture: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ import json
 import struct
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
@@ -28,14 +28,11 @@ Colour = tuple[float, ...]
 Box = tuple[int, int, int, int]  # x, y, width, height
 
 
-def add_mesh(name: str, vertices: np.ndarray, faces: np.ndarray, colours: np.ndarray | None = None) -> Any:
-    """Add a smooth mesh, with colours (F*K,3) of its corners if given, and return the object."""
+def add_mesh(name: str, vertices: np.ndarray, faces: np.ndarray) -> Any:
+    """Add a smooth mesh and return the object."""
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(vertices.tolist(), [], faces.tolist())
     mesh.polygons.foreach_set("use_smooth", np.ones(len(faces), bool))
-    if colours is not None:
-        layer = mesh.attributes.new("paint", "FLOAT_COLOR", "CORNER")
-        layer.data.foreach_set("color", np.column_stack([colours, np.ones(len(colours))]).ravel().astype("f4"))
     thing = bpy.data.objects.new(name, mesh)
     bpy.context.scene.collection.objects.link(thing)
     return thing
@@ -109,70 +106,67 @@ def lifted(
 # --- the room ---------------------------------------------------------------------------------------------------------
 
 
-def matt(name: str, colour: Colour | None, scale: float, other: Colour | float) -> Any:
-    """Return a matt material of a colour, or of the mesh's paint, mottled towards another, or darker by a share."""
-    made = bpy.data.materials.new(name)
+class Look(NamedTuple):
+    """Colours (3), or one (N,3) for each corner of the faces, with spots of others, so many a metre."""
+
+    colour: Any
+    spots: Any
+    scale: float
+
+
+def mottled(colour: Any, darker: float, scale: float) -> Look:
+    """Return the look of a colour with spots that are darker by a share."""
+    return Look(colour, np.multiply(colour, 1 - darker), scale)
+
+
+def paint(thing: Any, look: Look, boards: bool = False) -> None:
+    """Give a mesh this look, matt and glowing a little; laid as boards: beside others of one colour, with gaps."""
+    for name, colours in (("colour", look.colour), ("spots", look.spots)):
+        rgba = np.ones((len(thing.data.loops), 4), "f4")
+        rgba[:, :3] = colours
+        thing.data.attributes.new(name, "FLOAT_COLOR", "CORNER").data.foreach_set("color", rgba.ravel())
+    made = bpy.data.materials.new(thing.name)
     made.use_nodes, made.cycles.sample_as_light = True, False
-    new, link = made.node_tree.nodes.new, made.node_tree.links.new
-    noise, sharper, mix = new("ShaderNodeTexNoise"), new("ShaderNodeMapRange"), new("ShaderNodeMixRGB")
-    noise.inputs["Scale"].default_value = scale
-    sharper.inputs["From Min"].default_value, sharper.inputs["From Max"].default_value = 0.35, 0.65
-    link(new("ShaderNodeTexCoord").outputs["Object"], noise.inputs["Vector"])
-    link(noise.outputs["Fac"], sharper.inputs["Value"])
-    link(sharper.outputs["Result"], mix.inputs["Fac"])
-    if colour is None:
-        paint, darker = new("ShaderNodeAttribute"), new("ShaderNodeMixRGB")
-        paint.attribute_name, darker.blend_type, darker.inputs["Fac"].default_value = "paint", "MULTIPLY", 1.0
-        darker.inputs["Color2"].default_value = (1 - other, 1 - other, 1 - other, 1)
-        link(paint.outputs["Color"], darker.inputs["Color1"])
-        link(paint.outputs["Color"], mix.inputs["Color1"])
-        link(darker.outputs["Color"], mix.inputs["Color2"])
-    else:
-        second = other if isinstance(other, tuple) else [c * (1 - other) for c in colour]
-        mix.inputs["Color1"].default_value, mix.inputs["Color2"].default_value = (*colour, 1), (*second, 1)
-    return shaded(made, mix.outputs["Color"])
+    tree = made.node_tree
+    place = node(tree, "TexCoord", {}).outputs["Object"]
+    noise = node(tree, "TexNoise", {"Vector": place, "Scale": look.scale}).outputs["Fac"]
+    share = node(tree, "MapRange", {"Value": noise, "From Min": 0.35, "From Max": 0.65}).outputs["Result"]
+    own, other = node(tree, "Attribute", {}), node(tree, "Attribute", {})
+    own.attribute_name, other.attribute_name = "colour", "spots"
+    colour = node(tree, "MixRGB", {"Fac": share, "Color1": own.outputs["Color"], "Color2": other.outputs["Color"]})
+    if boards:
+        size = {"Scale": 1.0, "Brick Width": 0.9, "Row Height": 0.14, "Mortar Size": 0.004}
+        dark = {"Color2": (0.42, 0.35, 0.27, 1), "Mortar": (0.10, 0.08, 0.06, 1)}
+        colour = node(tree, "TexBrick", {"Vector": place, "Color1": colour.outputs["Color"], **dark, **size})
+    surface = node(tree, "BsdfDiffuse", {"Color": colour.outputs["Color"]})
+    glow = node(tree, "Emission", {"Color": colour.outputs["Color"], "Strength": AMBIENT})
+    both = node(tree, "AddShader", {0: surface.outputs[0], 1: glow.outputs[0]})
+    tree.links.new(both.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
+    thing.data.materials.append(made)
 
 
-def shaded(made: Any, colour: Any) -> Any:
-    """Return a material that scatters this colour and glows in it a little."""
-    new, link = made.node_tree.nodes.new, made.node_tree.links.new
-    surface, glow, both = new("ShaderNodeBsdfDiffuse"), new("ShaderNodeEmission"), new("ShaderNodeAddShader")
-    glow.inputs["Strength"].default_value = AMBIENT
-    for k, shader in enumerate((surface, glow)):
-        link(colour, shader.inputs["Color"])
-        link(shader.outputs[0], both.inputs[k])
-    link(both.outputs["Shader"], made.node_tree.nodes["Material Output"].inputs["Surface"])
-    return made
+def node(tree: Any, kind: str, inputs: dict[Any, Any]) -> Any:
+    """Add a node to a material, whose inputs are values or what other nodes put out, and return it."""
+    added = tree.nodes.new("ShaderNode" + kind)
+    for name, given in inputs.items():
+        if isinstance(given, bpy.types.NodeSocket):
+            tree.links.new(given, added.inputs[name])
+        else:
+            added.inputs[name].default_value = given
+    return added
 
 
-def planks() -> Any:
-    """Return the material of a floor of boards."""
-    made = matt("planks", (0.50, 0.42, 0.32), 6.0, 0.15)
-    new, link = made.node_tree.nodes.new, made.node_tree.links.new
-    bricks, mottled = (
-        new("ShaderNodeTexBrick"),
-        made.node_tree.nodes["Diffuse BSDF"].inputs["Color"].links[0].from_socket,
-    )
-    for name, value in (("Scale", 1.0), ("Brick Width", 0.9), ("Row Height", 0.14), ("Mortar Size", 0.004)):
-        bricks.inputs[name].default_value = value
-    bricks.inputs["Mortar"].default_value = (0.10, 0.08, 0.06, 1)
-    bricks.inputs["Color2"].default_value = (0.42, 0.35, 0.27, 1)
-    link(new("ShaderNodeTexCoord").outputs["Object"], bricks.inputs["Vector"])
-    link(mottled, bricks.inputs["Color1"])
-    return shaded(made, bricks.outputs["Color"])
-
-
-def add_box(low: Colour, high: Colour, look: Any) -> None:
+def add_box(low: Colour, high: Colour, look: Look, boards: bool = False) -> None:
     """Add a box between two corners."""
     corners = np.array([[(low, high)[(k >> a) & 1][a] for a in range(3)] for k in range(8)])
     faces = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]])
     thing = add_mesh("box", corners, faces)
     thing.data.polygons.foreach_set("use_smooth", np.zeros(6, bool))
-    thing.data.materials.append(look)
+    paint(thing, look, boards)
 
 
 def along_wall(
-    axis: int, sign: int, thick: tuple[float, float], span: tuple[float, float], z: tuple[float, float], look: Any
+    axis: int, sign: int, thick: tuple[float, float], span: tuple[float, float], z: tuple[float, float], look: Look
 ) -> None:
     """Add a box at a wall, of this thickness inwards from and to, along the wall from and to, and in height."""
     low, high = [span[0], span[0], z[0]], [span[1], span[1], z[1]]
@@ -182,9 +176,9 @@ def along_wall(
 
 def furnish(subject: str) -> None:
     """Build floor, walls, pictures, boxes, tape on the floor and light."""
-    random, wall = np.random.default_rng(ord(subject)), matt("wall", WALL[subject], 0.7, 0.06)
-    base, tape = matt("base", (0.07, 0.05, 0.04), 5.0, 0.1), matt("tape", (0.62, 0.58, 0.16), 5.0, 0.1)
-    add_box((-HALF, -HALF, -0.1), (HALF, HALF, 0.0), planks())
+    random, wall = np.random.default_rng(ord(subject)), mottled(WALL[subject], 0.06, 0.7)
+    base, tape = mottled((0.07, 0.05, 0.04), 0.1, 5.0), mottled((0.62, 0.58, 0.16), 0.1, 5.0)
+    add_box((-HALF, -HALF, -0.1), (HALF, HALF, 0.0), mottled((0.50, 0.42, 0.32), 0.15, 6.0), boards=True)
     add_box((-0.9, -0.35, 0.0), (0.9, -0.31, 0.002), tape)
     add_box((0.25, -1.2, 0.0), (0.29, 1.0, 0.0021), tape)
     for axis, sign in ((0, -1), (0, 1), (1, -1), (1, 1)):
@@ -192,11 +186,11 @@ def furnish(subject: str) -> None:
         along_wall(axis, sign, (-0.1, 0.02), (-HALF, HALF), (0, 0.13), base)
         for place in (-2.6, -1.0, 1.5, 3.2):
             bottom, width, top = random.uniform(0.7, 1.2), random.uniform(0.5, 0.9), random.uniform(1.8, 2.5)
-            one, scale, other = random.uniform(0.02, 0.4, 3), random.uniform(3, 8), random.uniform(0.02, 0.4, 3)
-            look = matt("picture", tuple(one), scale, tuple(other))
+            colour, scale, spots = random.uniform(0.02, 0.4, 3), random.uniform(3, 8), random.uniform(0.02, 0.4, 3)
+            look = Look(colour, spots, scale)
             along_wall(axis, sign, (0.0, 0.03), (place, place + width), (bottom, top), look)
         place, width, top = random.uniform(-3, 2), random.uniform(0.3, 0.7), random.uniform(0.5, 1.1)
-        look = matt("box", tuple(random.uniform(0.05, 0.45, 3)), 5.0, 0.4)
+        look = mottled(random.uniform(0.05, 0.45, 3), 0.4, 5.0)
         along_wall(axis, sign, (0.5, 0.9), (place, place + width), (0, top), look)
     lamp = bpy.data.objects.new("lamp", bpy.data.lights.new("lamp", "AREA"))
     lamp.data.energy, lamp.data.size, lamp.location = 215, 1.0, LIGHT[subject]
@@ -221,15 +215,9 @@ def set_up_cycles(width: int, height: int) -> None:
     render.resolution_x, render.resolution_y, render.resolution_percentage = width, height, 100
 
 
-def rotation(camera: dict[str, Any]) -> np.ndarray:
-    """Return the turn (3,3) from world to camera."""
-    vector = Vector(camera["rotation"])
-    return np.array(Matrix.Rotation(vector.length, 3, vector))
-
-
 def add_camera(name: str, given: dict[str, Any]) -> Any:
     """Add a camera; OpenCV's looks along +z with y down, Blender's along -z with y up."""
-    camera, turn, placed = bpy.data.objects.new(name, bpy.data.cameras.new(name)), rotation(given), np.eye(4)
+    camera, turn, placed = bpy.data.objects.new(name, bpy.data.cameras.new(name)), np.array(given["turn"]), np.eye(4)
     camera.data.sensor_fit, camera.data.sensor_width = "HORIZONTAL", 36.0
     camera.data.lens = given["matrix"][0][0] * 36.0 / given["size"][0]
     placed[:3, :3], placed[:3, 3] = turn.T @ np.diag([1, -1, -1]), -turn.T @ given["translation"]
@@ -242,7 +230,7 @@ def surroundings(points: np.ndarray, light: Colour, camera: dict[str, Any], pad:
     """Return the box of the picture around points (N,3) and their shadow on the floor."""
     away = points - np.array(light)
     shadow = np.array(light) - away * (light[2] / away[:, 2:])
-    seen = np.vstack([points, shadow]) @ rotation(camera).T + camera["translation"]
+    seen = np.vstack([points, shadow]) @ np.transpose(camera["turn"]) + camera["translation"]
     pixels = ((seen / seen[:, 2:]) @ np.array(camera["matrix"]).T)[:, :2]
     low, high = (np.clip(x, 0, camera["size"]).astype(int) for x in (pixels.min(0) - pad, pixels.max(0) + pad))
     return (*low.tolist(), *(high - low).tolist())
@@ -263,10 +251,10 @@ def draw(camera: Any, file: Path, seed: int, box: Box | None = None) -> None:
 
 def dress(scene: dict[str, np.ndarray]) -> tuple[Any, Any]:
     """Add the painted body and the garment."""
-    body = add_mesh("body", scene["body"][0], scene["faces"], scene["paint"][scene["faces"].ravel()])
-    worn = add_mesh("worn", scene["garment"][0], scene["quads"], np.repeat(scene["cloth_paint"], 4, axis=0))
-    body.data.materials.append(matt("skin", None, 30.0, 0.15))
-    worn.data.materials.append(matt("cloth", None, 30.0, 0.12))
+    body = add_mesh("body", scene["body"][0], scene["faces"])
+    worn = add_mesh("worn", scene["garment"][0], scene["quads"])
+    paint(body, mottled(scene["paint"][scene["faces"].ravel()], 0.15, 30.0))
+    paint(worn, mottled(np.repeat(scene["cloth_paint"], 4, axis=0), 0.12, 30.0))
     return body, worn
 
 
