@@ -6,7 +6,7 @@ folder motions; OUT/TAKE becomes a recording folder: cameras, videos, clean plat
 is posed here, the garment sewn in `known_garments.py`; `known_motion_blender.py` drapes it with Blender's cloth and
 draws what each camera sees; softness of the lens and noise of the sensor are added here. Nothing of the tracker takes
 part. On one core about 2 s a view: 8 minutes a take of 50 frames. OUT/room_A and room_B keep the empty rooms for the
-next take.
+next take; delete them when the room, the light or the cameras here have changed.
 
 Metres, z up, floor at 0. Rest pose: the body looks along -y, left is +x. A pose is the root's translation and for each
 joint j a rotation vector relative to its parent: G_j = G_parent R_j, p_j = p_parent + G_parent (rest_j - rest_parent).
@@ -180,6 +180,8 @@ def rotations_of(take: Take, body: Body, data: Path) -> tuple[np.ndarray, int]:
     file, before = np.load(data / "motions" / f"{take.motion}.npz"), min(take.start, RUN_UP)
     order = [list(file["joint_names"]).index(name) for name in body.names[1:]]
     whole = np.concatenate([file["root_rotation"][:, None], file["rotation_vectors"][:, order]], axis=1)
+    if len(whole) < take.start + take.frames:
+        raise SystemExit(f"{take.motion} has {len(whole)} frames; the take wants {take.start + take.frames}")
     return whole[take.start - before : take.start + take.frames].astype(float), before
 
 

@@ -23,7 +23,7 @@ class TakeUp(OutlineFitter):
     """Moves the take-up of a hanging garment to where the outline fits the images; all else is as estimated.
 
     Folds and gathers come and go more slowly than a leg moves, so it is a random walk that begins at none in the first
-    frame and takes a step every tenth of a second, in the first turn of a frame. A garment without this parameter is
+    frame and takes a step every `every_s`, in the first turn of a frame. A garment without this parameter is
     draped as it is.
     """
 

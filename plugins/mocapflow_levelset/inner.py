@@ -28,8 +28,8 @@ class Search(NamedTuple):
 def told_apart(scene: Scene, layers: I32, known: Shown) -> Bool:
     """Return the vertices (N,) whose edges can be found.
 
-    Those of cloth are left out but for a waistband: where it hangs is not known well enough to say anything of what it
-    lies before.
+    Those of cloth are left out but where it is pinned to the skin: where it hangs is not known well enough to say
+    anything of what it lies before.
     """
     return scene.held & np.asarray(known.apart.any(axis=1)).take(layers)
 

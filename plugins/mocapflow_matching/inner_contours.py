@@ -11,17 +11,20 @@ from pydantic import PositiveFloat
 from mocapflow.components import Matcher
 from mocapflow.data import Frame, Matches, Past, Segmentation, Surface, Turn, empty_matches
 from mocapflow.geometry.cameras import magnification, project_each
-from mocapflow.records import F64
+from mocapflow.records import F64, Bool
 from mocapflow.scene import Scene
 from mocapflow_matching.robust import robust_weights
+
+FEWEST = 8  # pairs of a waistband: fewer do not tell a tilt from a height
 
 
 class InnerContours(Matcher):
     """Draws edges of parts that lie before others (a forearm before the trunk) to where these parts end in the image.
 
-    A waistband is such an edge too: it says how the trunk is tilted. By how much it sits higher or lower than the tape
-    measure says, all around, does not count. It needs segmenter `layered`, which finds the ends of parts once a turn;
-    without it there are no pairs.
+    The edge at which the skin holds a garment, a waistband, is such an edge too: it says how the trunk is tilted. By how
+    much it sits higher or lower than the tape measure says, all around, does not count: its pairs are moved by that, to
+    where the surface is, and so hold the height of the guess a little. It needs segmenter `layered`, which finds the
+    ends of parts once a turn; without it there are no pairs.
     """
 
     name: ClassVar[str] = "inner_contours"
@@ -37,15 +40,24 @@ class InnerContours(Matcher):
             return empty_matches()
         image = project_each(surface.vertices[inner.vertex], inner.camera, scene.cameras)
         away = np.einsum("ma,ma->m", inner.pixel - image, inner.direction)
-        higher = slipped(away, inner, surface, scene)
+        worn = surface.cloth[inner.vertex]
+        higher = slipped(away, worn, inner, surface, scene)
         off = np.abs(away - higher) * np.sqrt(inner.weight)
         loss = robust_weights(off, "geman_mcclure" if turn.calm(self.calm_mm) else "huber", self.scale)
-        return replace(inner, pixel=inner.pixel - higher[:, None] * inner.direction, weight=inner.weight * loss)
+        tell = ~worn if np.count_nonzero(worn) < FEWEST else np.ones(len(worn), bool)
+        return replace(inner, pixel=inner.pixel - higher[:, None] * inner.direction, weight=inner.weight * loss * tell)
 
 
-def slipped(away: F64, inner: Matches, surface: Surface, scene: Scene) -> F64:
-    """Return by how many px (M,) a waistband is away all around: the median length; pairs of the body are by none."""
-    worn = surface.cloth[inner.vertex]
+def slipped(away: F64, worn: Bool, inner: Matches, surface: Surface, scene: Scene) -> F64:
+    """Return by how many px (M,) a waistband is away all around: the median length; pairs of the body are by none.
+
+    Args:
+        away: (M,) px of each pair, along its direction.
+        worn: (M,) which pairs are of the garment.
+        inner: the pairs.
+        surface: where they are believed to be.
+        scene: the cameras.
+    """
     if not worn.any():
         return np.zeros(len(worn))
     place = surface.vertices[inner.vertex[worn]].mean(axis=0)

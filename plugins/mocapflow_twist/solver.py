@@ -34,7 +34,7 @@ class TwistGaussNewton(PoseSolver):
     name = "twist_gauss_newton"
 
     iterations: PositiveInt = 10  # times that it matches anew, at most
-    first_iterations: NonNegativeInt = 0  # in the first frame at least: its start is far off
+    first_iterations: NonNegativeInt = 0  # the same in the first frame, if it is more: its start is far off
     steps_per_match: PositiveInt = 1  # steps with the same pairs
     residual: Literal["image", "line"] = "image"  # pixels, or distance to projection rays in space
     line_sigma_mm: PositiveFloat = 3.0  # standard deviation of every distance to a ray

@@ -103,6 +103,15 @@ def test_a_hem_that_hardly_shows_moves_little_in_one_step(model):
     assert 0 < found.parameters[column] < 0.01
 
 
+def test_a_step_is_as_long_whenever_the_frame_before_it_was(model):
+    truth, start = parameters(model, take_up=0.06, flare_rad=0.3), parameters(model, flare_rad=0.3)
+    cloth = model.drape(STANDING, start, Past())
+    pasts = [Past().after(Moment(time=time, pose=STANDING, cloth=cloth), {}) for time in (0.0, 0.1 - 1 / 30)]
+    far, near = (fitted(TakeUp(), model, truth, start, past, 0.1).parameters for past in pasts)
+    assert np.any(far != start)
+    np.testing.assert_array_equal(far, near)
+
+
 def test_the_take_up_steps_every_tenth_of_a_second(model):
     truth, start = parameters(model, take_up=0.06, flare_rad=0.3), parameters(model, flare_rad=0.3)
     cloth, stepped = model.drape(STANDING, start, Past()), []

@@ -1,12 +1,14 @@
 """Forces and thickness: T-CL6 to T-CL8 and what the parameters of a garment mean."""
 
+from unittest.mock import Mock
+
 import drape_bodies
 import numpy as np
 import pytest
 from drape_bodies import SKIN, box, check_whole_and_outside, distances, leg_poses, lying_cylinder, prepared, swing
+from mocapflow_draping import kinematic
 from mocapflow_draping.forces import thickness, tilts
 from mocapflow_draping.frames import tilted
-from mocapflow_draping.laying import distinct
 from mocapflow_draping.literal import blow_batch
 
 from mocapflow.data import Past, PoseBatch
@@ -119,13 +121,14 @@ def test_wind_turns_with_the_person(skirted):
     np.testing.assert_allclose(turned, ahead @ turn[:3, :3].T, atol=1e-6)
 
 
-def test_25_winds_share_one_drape():  # what they cost together: benchmarks/draping.py
-    pose = leg_poses()
-    rows = np.repeat([0, 3], [25, 10])  # and ten of another pose, the last five on thicker cloth
-    skin = np.where(np.arange(35) < 30, 0.005, 0.006)
-    kept, source = distinct(PoseBatch(root=pose.root[rows], angles=pose.angles[rows]), skin, np.ones(35))
-    np.testing.assert_array_equal(kept, [0, 25, 30])
-    np.testing.assert_array_equal(source, np.repeat([0, 1, 2], [25, 5, 5]))
+def test_25_winds_share_one_drape(skirted, draper, monkeypatch):  # what they cost: benchmarks/draping.py
+    laid = Mock(side_effect=kinematic.lay)
+    monkeypatch.setattr(kinematic, "lay", laid)
+    poses, winds = leg_poses(), np.zeros((35, len(skirted.garment.parameter_names)))
+    winds[:, 2:4] = np.random.default_rng(0).uniform(-0.3, 0.3, (35, 2))
+    rows = np.repeat([0, 3], [25, 10])  # and ten of another pose
+    draper.drape(PoseBatch(root=poses.root[rows], angles=poses.angles[rows]), winds, Past(), skirted)
+    assert [len(call.args[2][0]) for call in laid.call_args_list] == [2]  # where strands begin, at each pose laid
 
 
 def test_winds_of_one_drape_are_its_winds_one_by_one(skirted, draper):

@@ -1,6 +1,6 @@
 """Edges inside the silhouette: found to a fraction of a pixel where two colours meet, silent where they do not."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import cv2
 import numpy as np
@@ -8,15 +8,17 @@ import pytest
 from mocapflow_levelset import splits
 from mocapflow_levelset.colours import BINS, bins_of
 from mocapflow_levelset.inner import Search, inner_contours, told_apart
+from mocapflow_levelset.inner_edges import inner_edges
 from mocapflow_levelset.layers import COLOURS, layer_of, shown
-from mocapflow_matching.inner_contours import InnerContours
+from mocapflow_matching.inner_contours import InnerContours, slipped
 from mocapflow_matching.layered_icp import LayeredIcp, another_s
 from test_layers import CLOTHS, SCENE, SKIN, dressed, learned, painted
 
 from mocapflow.components import pool
-from mocapflow.data import CLOTH, Past, Pose, Turn
+from mocapflow.data import CLOTH, Matches, Past, Pose, Turn, empty_matches
 from mocapflow.geometry import twists
-from mocapflow.geometry.cameras import project
+from mocapflow.geometry.cameras import magnification, project
+from mocapflow.geometry.silhouettes import outline
 from mocapflow.testing import tiny_cloth, tiny_pose, tiny_segmentation
 
 ONE, OTHER = SKIN, CLOTHS
@@ -139,6 +141,46 @@ def test_a_waistband_says_how_the_trunk_leans():
     cloth = SCENE.layer[matches.vertex] == CLOTH
     before, after = (np.abs(off(matches, pose)[cloth]) for pose in (believed, true))
     assert np.median(before) > 2 * np.median(after)
+
+
+def test_edges_of_cloth_and_body_are_sought_only_between_vertices_that_are_asked_for():
+    surface, camera = surface_at(kicked(55.0)), SCENE.cameras[0]
+    for of in (SCENE.held, SCENE.layer == CLOTH, np.arange(len(SCENE.layer)) % 2 == 0):
+        found = inner_edges(surface, camera, 4.0, of)
+        assert of[found.vertex].all()
+    ends = np.full(len(SCENE.layer), False)
+    ends[outline(surface, camera).vertex[:, 0]] = True
+    ends[outline(surface, camera).vertex[:, 1]] = False  # no edge has both its ends here
+    assert len(inner_edges(surface, camera, 4.0, ends).vertex) == 0
+
+
+def test_a_slip_is_a_length_so_nearer_cameras_see_more_of_it():
+    surface, garment = surface_at(leaning(0.0)), len(SCENE.body.vertices) + SCENE.garment.pinned
+    near, back = SCENE.cameras[0], np.eye(4)
+    back[2, 3] = 1.5  # m along the line of sight
+    far = replace(near, camera_from_world=back @ near.camera_from_world)
+    scene, count = replace(SCENE, cameras=(near, far)), len(garment)
+    pairs = replace(
+        empty_matches(),
+        camera=np.repeat(np.array([0, 1], np.int16), count), vertex=np.tile(garment, 2).astype(np.int32),
+        pixel=np.zeros((2 * count, 2)), direction=np.zeros((2 * count, 2)), weight=np.ones(2 * count),
+    )  # fmt: skip
+    size = np.array([magnification(c, surface.vertices[garment].mean(axis=0)) for c in (near, far)]).repeat(count)
+    shift = slipped(-0.015 * size, np.ones(2 * count, bool), pairs, surface, scene)
+    np.testing.assert_allclose(shift, -0.015 * size, rtol=1e-9)
+    assert abs(shift[0] / shift[-1]) > 1.2
+
+
+def test_a_few_pairs_of_a_waistband_tell_nothing():
+    whole = match(dressed, leaning(0.0), leaning(0.0))
+    cloth = np.flatnonzero(SCENE.layer[whole.vertex] == CLOTH)
+    kept = np.setdiff1d(np.arange(len(whole.vertex)), cloth[3:])
+    part = Matches(**{each.name: getattr(whole, each.name)[kept] for each in fields(whole)})
+    pose = leaning(0.0)
+    segmentation = replace(tiny_segmentation(SCENE, pose), inner=part)
+    found = InnerContours().match(painted(dressed, pose), segmentation, surface_at(pose), Past(), SCENE, FIRST)
+    assert (found.weight[SCENE.layer[found.vertex] == CLOTH] == 0).all()
+    assert (found.weight[SCENE.layer[found.vertex] != CLOTH] > 0).all()
 
 
 def test_a_waistband_that_sits_lower_than_the_tape_says_pulls_at_nothing():
