@@ -10,6 +10,7 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 import numpy as np
 import numpy.typing as npt
@@ -132,7 +133,10 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Replace the metadata of a zarr node in one step: a reader sees the old or the new, never a part."""
-    part = path.with_suffix(".part")
+    """Replace the metadata of a zarr node in one step: a reader sees the old or the new, never a part.
+
+    Each writer has a part of its own: two that make the same store at once must not move each other's.
+    """
+    part = path.with_suffix(f".{uuid4().hex}.part")
     part.write_text(json.dumps(value, ensure_ascii=False, separators=(",", ":")))
     part.replace(path)

@@ -6,6 +6,7 @@ import os
 import socket
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -292,6 +293,14 @@ def test_a_file_in_the_place_of_the_store(tmp_path, path):
 
 
 # ---- locks
+
+
+def test_two_may_make_the_same_store_at_once(tmp_path):
+    path = tmp_path / "zarr.json"
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(lambda k: rows.write_json(path, {"by": k}), range(400)))
+    assert "by" in rows.read_json(path)
+    assert os.listdir(tmp_path) == ["zarr.json"]
 
 
 def test_two_runs_at_once_share_the_work(tmp_path, path, monkeypatch):
