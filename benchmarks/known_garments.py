@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from known_poses import Body
 from scipy.spatial import ConvexHull
 
 BAND = 0.03  # m, height of a waistband
@@ -28,7 +29,7 @@ class Garment:
     stripe: np.ndarray
 
 
-def measures_for(body: Any, own: dict[str, Any], owner: Any) -> dict[str, Any]:
+def measures_for(body: Body, own: dict[str, Any], owner: Body) -> dict[str, Any]:
     """Return tape measures of a garment scaled from its owner to this body; waist and hip keep their ease."""
     scale = body.vertices[:, 2].max() / owner.vertices[:, 2].max()
     result = {k: v if k == "type" else round(float(v * scale), 3) for k, v in own.items()}
@@ -39,7 +40,7 @@ def measures_for(body: Any, own: dict[str, Any], owner: Any) -> dict[str, Any]:
     return result
 
 
-def sew(body: Any, measures: dict[str, Any]) -> Garment:
+def sew(body: Body, measures: dict[str, Any]) -> Garment:
     """Sew a skirt or shorts by their measures; the waistband is pinned."""
     if measures["type"] == "skirt":
         columns, rows, wide, length = SKIRT_COLUMNS, SKIRT_ROWS, measures["hem_circumference"], measures["length"]
@@ -55,7 +56,7 @@ def sew(body: Any, measures: dict[str, Any]) -> Garment:
     return Garment(points, quads, np.arange(2 * columns), column % 4 < 2)
 
 
-def _cone(body: Any, measures: dict[str, Any], wide: float, length: float, columns: int, rows: int) -> np.ndarray:
+def _cone(body: Body, measures: dict[str, Any], wide: float, length: float, columns: int, rows: int) -> np.ndarray:
     """Return points of a cone from the waist down whose columns are as long as asked."""
     step = goal = (length - BAND) / (rows - 2)
     for _ in range(4):
@@ -64,7 +65,7 @@ def _cone(body: Any, measures: dict[str, Any], wide: float, length: float, colum
     return np.concatenate(rings)
 
 
-def _rings(body: Any, top: float, waist: float, wide: float, columns: int, rows: int, step: float) -> list[np.ndarray]:
+def _rings(body: Body, top: float, waist: float, wide: float, columns: int, rows: int, step: float) -> list[np.ndarray]:
     """Return rings (N,3): a waistband, then rings about a step apart along the cloth."""
     rings = [_ring(body, top, waist, columns), _ring(body, top - BAND, waist, columns)]
     down, shape = step, rings[0][:, :2] - rings[0][:, :2].mean(0)
@@ -75,7 +76,7 @@ def _rings(body: Any, top: float, waist: float, wide: float, columns: int, rows:
     return rings
 
 
-def _ring(body: Any, z: float, girth: float, count: int, shape: np.ndarray | None = None) -> np.ndarray:
+def _ring(body: Body, z: float, girth: float, count: int, shape: np.ndarray | None = None) -> np.ndarray:
     """Return points (N,3) from the front to the left, of a shape (M,2) as long as asked, but outside of the body."""
     hull = _outline(body, z, TRUNK)
     least = _widened(hull, TIGHT if shape is None else OFF_SKIN)
@@ -89,7 +90,7 @@ def _ring(body: Any, z: float, girth: float, count: int, shape: np.ndarray | Non
 
 
 def _with_legs(
-    body: Any, points: np.ndarray, quads: np.ndarray, measures: dict[str, Any]
+    body: Body, points: np.ndarray, quads: np.ndarray, measures: dict[str, Any]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Add points under the crotch from front to back, and two tubes that hang from them and the lowest ring."""
     ring, half = np.arange(len(points) - SHORTS_COLUMNS, len(points)), SHORTS_COLUMNS // 2
@@ -104,7 +105,7 @@ def _with_legs(
     return points, quads
 
 
-def _leg(body: Any, start: np.ndarray, side: int, top: float, measures: dict[str, Any]) -> list[np.ndarray]:
+def _leg(body: Body, start: np.ndarray, side: int, top: float, measures: dict[str, Any]) -> list[np.ndarray]:
     """Return rings (N,3) that go over from the first ring, about half the hips, to rings about the thigh."""
     rows = []
     for k, share in enumerate(np.arange(1, LEG_ROWS + 1) / LEG_ROWS):
@@ -115,7 +116,7 @@ def _leg(body: Any, start: np.ndarray, side: int, top: float, measures: dict[str
     return rows
 
 
-def _thigh_ring(body: Any, z: float, side: int, girth: float) -> np.ndarray:
+def _thigh_ring(body: Body, z: float, side: int, girth: float) -> np.ndarray:
     """Return points (N,2) about a thigh, wider outwards only; the middle one under the crotch is the inmost."""
     hull = _widened(_outline(body, z, THIGH, side), OFF_SKIN)
     inmost = hull[np.argmin(side * hull[:, 0])]
@@ -124,7 +125,7 @@ def _thigh_ring(body: Any, z: float, side: int, girth: float) -> np.ndarray:
     return np.roll(_from(hull, np.array([-side, 0.0]), LEG_COLUMNS), LEG_COLUMNS - UNDER // 2 - 1, axis=0)
 
 
-def _outline(body: Any, z: float, parts: tuple[str, ...], side: int = 0) -> np.ndarray:
+def _outline(body: Body, z: float, parts: tuple[str, ...], side: int = 0) -> np.ndarray:
     """Return the convex outline (200,2), counter-clockwise, of these parts, of one side if asked, at a height."""
     chosen = body.faces[body.main(*parts)[body.faces].all(1)]
     one, other = body.vertices[chosen].reshape(-1, 3), body.vertices[np.roll(chosen, -1, axis=1)].reshape(-1, 3)

@@ -3,13 +3,11 @@
 `apt install blender python3-numpy ffmpeg`, then `python benchmarks/known_motion.py TAKE DATA OUT`. TAKE is one of
 `TAKES`; DATA holds the recordings walk_skirt (subject A, her skirt) and kneeup_shorts (subject B, his shorts) and the
 folder motions; OUT/TAKE becomes a recording folder: cameras, videos, clean plates, subject, init.json, truth. The body
-is posed here, the garment sewn in `known_garments.py`; `known_motion_blender.py` drapes it with Blender's cloth and
-draws what each camera sees; softness of the lens and noise of the sensor are added here. Nothing of the tracker takes
-part. On one core about 2 s a view: 8 minutes a take of 50 frames. OUT/room_A and room_B keep the empty rooms for the
-next take; delete them when the room, the light or the cameras here have changed.
-
-Metres, z up, floor at 0. Rest pose: the body looks along -y, left is +x. A pose is the root's translation and for each
-joint j a rotation vector relative to its parent: G_j = G_parent R_j, p_j = p_parent + G_parent (rest_j - rest_parent).
+is posed in `known_poses.py`, the garment sewn in `known_garments.py`; `known_motion_blender.py` drapes it with
+Blender's cloth and draws what each camera sees; softness of the lens and noise of the sensor are added here. Nothing of
+the tracker takes part, its kinematics neither: what shared code with it could not tell that it is wrong. On one core
+about 2 s a view: 8 minutes a take of 50 frames. OUT/room_A and room_B keep the empty rooms for the next take; delete
+them when the room, the light or the cameras here have changed.
 """
 
 from __future__ import annotations
@@ -25,11 +23,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 from known_garments import measures_for, sew
-from scipy.ndimage import gaussian_filter1d
+from known_poses import RATE, Body, Motion, angles, chain, dance, ground, read_body, skin, squat
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation, Slerp
 
-RATE = 30.0  # frames a second
 APPROACH, HOLD = 30, 15  # frames from rest to the first pose, and of standing there
 RUN_UP = 10  # frames of the motion before frame 0
 PLATES = 8  # empty rooms drawn per camera
@@ -79,96 +76,6 @@ cameras these are; frames are {tone:g} times as bright as the clean plates.
 """
 
 
-@dataclass(frozen=True)
-class Body:
-    """Rest mesh (V,3), faces (F,3), joints (J,3), parents (J) with -1 for the root, weights (V,J)."""
-
-    vertices: np.ndarray
-    faces: np.ndarray
-    names: list[str]
-    joints: np.ndarray
-    parents: list[int]
-    weights: np.ndarray
-
-    def main(self, *names: str) -> np.ndarray:
-        """Return which vertices (V) follow one of these joints most; a name without side means both."""
-        heads = np.array([name.removesuffix("_l").removesuffix("_r") for name in self.names])
-        return np.isin(heads[self.weights.argmax(1)], names)
-
-    def joint(self, name: str) -> np.ndarray:
-        """Return the place (3) of a joint in the rest pose."""
-        return self.joints[self.names.index(name)]
-
-
-@dataclass(frozen=True)
-class Motion:
-    """Root translation (T,3) and rotation vectors (T,J,3), the root's first."""
-
-    translation: np.ndarray
-    rotations: np.ndarray
-
-
-def read_body(folder: Path) -> Body:
-    """Read body.obj, skeleton.json and weights.npz of a recording's subject."""
-    lines = [line.split() for line in (folder / "body.obj").read_text().splitlines()]
-    joints = json.loads((folder / "skeleton.json").read_text())["joints"]
-    names, weights = [j["name"] for j in joints], np.load(folder / "weights.npz")
-    return Body(
-        np.array([x[1:4] for x in lines if x[:1] == ["v"]], float),
-        np.array([[y.split("/")[0] for y in x[1:4]] for x in lines if x[:1] == ["f"]], int) - 1,
-        names,
-        np.array([j["position"] for j in joints], float),
-        [names.index(j["parent"]) if j["parent"] else -1 for j in joints],
-        weights["weights"][:, [list(weights["names"]).index(n) for n in names]].astype(float),
-    )
-
-
-# --- posing -----------------------------------------------------------------------------------------------------------
-
-
-def chain(body: Body, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
-    """Return turns (T,J,3,3) and positions (T,J,3) of the joints."""
-    turns = Rotation.from_rotvec(motion.rotations.reshape(-1, 3)).as_matrix().reshape(*motion.rotations.shape, 3)
-    places = np.empty(motion.rotations.shape)
-    places[:, 0] = motion.translation
-    for j, up in list(enumerate(body.parents))[1:]:
-        turns[:, j] = turns[:, up] @ turns[:, j]
-        places[:, j] = places[:, up] + turns[:, up] @ (body.joints[j] - body.joints[up])
-    return turns, places
-
-
-def skin(body: Body, motion: Motion, chosen: np.ndarray | slice = slice(None)) -> np.ndarray:
-    """Return the chosen vertices (T,V,3) by linear blend skinning."""
-    rest, weights = body.vertices[chosen], body.weights[chosen]
-    result = []
-    for turns, places in zip(*chain(body, motion), strict=True):
-        shifts = places - np.einsum("jab,jb->ja", turns, body.joints)
-        result.append(np.einsum("vj,jab,vb->va", weights, turns, rest, optimize=True) + weights @ shifts)
-    return np.stack(result)
-
-
-def angles(body: Body, positions: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the columns of truth/angles.csv, each (T) in degrees, from joint centres (T,J,3)."""
-    at = {name: positions[:, j] for j, name in enumerate(body.names)}
-    fixed = [body.names.index(n) for n in ("hip_l", "hip_r", "spine")]  # they turn as the pelvis does
-    rest = body.joints[fixed] - body.joints[0]
-    pelvis = np.stack([Rotation.align_vectors(p[fixed] - p[0], rest)[0].as_matrix() for p in positions])
-    result = {}
-    for side in ("_l", "_r"):
-        thigh = np.einsum("tba,tb->ta", pelvis, at["knee" + side] - at["hip" + side])
-        result["knee_flexion" + side] = 180 - _corner(at["hip" + side], at["knee" + side], at["ankle" + side])
-        result["hip_flexion" + side] = np.degrees(np.arctan2(-thigh[:, 1], -thigh[:, 2]))
-        result["ankle" + side] = 90 - _corner(at["knee" + side], at["ankle" + side], at["toe" + side])
-        result["elbow" + side] = 180 - _corner(at["shoulder" + side], at["elbow" + side], at["wrist" + side])
-    return {n + s: result[n + s] for n in ("knee_flexion", "hip_flexion", "ankle", "elbow") for s in ("_l", "_r")}
-
-
-def _corner(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
-    """Return the angle at b, in degrees."""
-    one, other = a - b, c - b
-    return np.degrees(np.arctan2(np.linalg.norm(np.cross(one, other), axis=-1), (one * other).sum(-1)))
-
-
 # --- motions ----------------------------------------------------------------------------------------------------------
 
 
@@ -183,59 +90,6 @@ def rotations_of(take: Take, body: Body, data: Path) -> tuple[np.ndarray, int]:
     if len(whole) < take.start + take.frames:
         raise SystemExit(f"{take.motion} has {len(whole)} frames; the take wants {take.start + take.frames}")
     return whole[take.start - before : take.start + take.frames].astype(float), before
-
-
-def squat(body: Body, t: np.ndarray) -> dict[str, np.ndarray]:
-    """Return rotation vectors (T,3) per joint of squats with the arms forward at times (T) in s."""
-    turn = {name: np.zeros((len(t), 3)) for name in body.names}
-    knee, wave = np.radians(8 + 45 * (1 - np.cos(2 * np.pi * t / 1.5))), np.sin(2 * np.pi * t / 1.1)
-    turn["pelvis"][:, 0], turn["spine"][:, 0], hip = 0.35 * knee, 0.05 * knee, 1.05 * knee
-    for side, sign in (("_l", 1), ("_r", -1)):
-        turn["hip" + side] = np.stack([-hip, 0 * t, sign * 0.12 * knee], axis=1)
-        turn["knee" + side][:, 0], turn["ankle" + side][:, 0] = knee, hip - knee - turn["pelvis"][:, 0]
-        turn["shoulder" + side] = _reach(body, side, [[sign * 0.25, -1, 0.2 * w - 0.1] for w in wave])
-        turn["elbow" + side][:, 0] = -0.15
-    return turn
-
-
-def dance(body: Body, t: np.ndarray) -> dict[str, np.ndarray]:
-    """Return rotation vectors (T,3) per joint of steps with a turn, twists of the trunk by 20 degrees, waving arms."""
-    turn = {name: np.zeros((len(t), 3)) for name in body.names}
-    step = np.sin(2 * np.pi * t / 1.1)
-    turn["pelvis"] = np.stack([0.04 + 0 * t, 0.06 * step, np.radians(35) * (1 - np.cos(np.pi * t / t[-1]))], axis=1)
-    turn["spine"][:, 2] = turn["chest"][:, 2] = np.radians(10) * np.sin(2 * np.pi * t / 1.3)
-    for side, sign in (("_l", 1), ("_r", -1)):
-        lift, up = np.clip(sign * step, 0, 1) ** 1.5, np.sin(2 * np.pi * t / 1.6 + sign)
-        turn["hip" + side] = np.stack([-0.12 - 0.75 * lift, -0.06 * step, sign * 0.15 * lift], axis=1)
-        turn["knee" + side][:, 0], turn["ankle" + side][:, 0] = 0.22 + 1.1 * lift, -0.12 + 0.3 * lift
-        turn["shoulder" + side] = _reach(body, side, [[sign, -0.4 - 0.3 * u, 0.2 + 0.6 * u] for u in up])
-        turn["elbow" + side] = np.stack([-0.5 - 0.3 * up, 0 * t, sign * 0.3 * up], axis=1)
-    return turn
-
-
-def _reach(body: Body, side: str, towards: list[list[float]]) -> np.ndarray:
-    """Return rotation vectors (T,3) of a shoulder that point the upper arm these ways."""
-    arm = body.joint("elbow" + side) - body.joint("shoulder" + side)
-    return np.stack([Rotation.align_vectors([way], [arm])[0].as_rotvec() for way in towards])
-
-
-def ground(body: Body, rotations: np.ndarray, flight: tuple[int, int] | None = None) -> Motion:
-    """Stand the body on the floor: the lower foot, at z = 0, stays where it is; steady travel is removed."""
-    still = Motion(np.zeros((len(rotations), 3)), rotations)
-    feet = [body.main("ankle", "toe") & (sign * body.vertices[:, 0] > 0) for sign in (1, -1)]
-    soles = [skin(body, still, foot) for foot in feet]
-    heights = np.stack([s[..., 2].min(1) for s in soles], axis=1)
-    rests = np.exp((heights.min(1, keepdims=True) - heights) / 0.015)
-    rests /= rests.sum(1, keepdims=True)
-    moves = np.diff(np.stack([s[..., :2].mean(1) for s in soles], axis=1), axis=0)
-    steps = -(moves * (rests[1:] + rests[:-1])[..., None] / 2).sum(1)
-    z, t = gaussian_filter1d(-heights.min(1), 1.0, mode="nearest"), np.arange(len(rotations))
-    if flight:
-        steps[flight[0] : flight[1]] = 0.0
-        z += np.maximum(0, 9.81 / 2 * (t - flight[0]) * (flight[1] - t)) / RATE**2
-    path = np.vstack([[0.0, 0.0], np.cumsum(steps, axis=0)])
-    path -= np.stack([np.polyval(np.polyfit(t, x, 1), t) for x in path.T], axis=1)
-    return Motion(np.column_stack([gaussian_filter1d(path, 1.0, axis=0, mode="nearest"), z]), rotations)
 
 
 def build_motion(take: Take, body: Body, data: Path, centre: np.ndarray, cameras: dict) -> tuple[Motion, int]:
