@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from threadpoolctl import threadpool_limits
+
 from mocapflow.errors import StoreError
 from mocapflow.execution import Execution, is_hit
 from mocapflow.keys import explain
@@ -101,9 +103,10 @@ def run(
         hint = "name another with --out"
         raise StoreError(f"can't write the run folder: {error.strerror}", where=str(out), hint=hint) from error
     execution = Execution(pipeline, kept, out, steps, fresh=fresh, report=report)
-    for step in steps:
-        if only is None or step.label == only:
-            execution.finish(step)
+    with threadpool_limits(limits=1, user_api="blas"):  # a frame's matrices are small: threads wait for each other
+        for step in steps:
+            if only is None or step.label == only:
+                execution.finish(step)
     return RunSummary(out=out, store=store, stages=tuple(execution.entries.values()))
 
 

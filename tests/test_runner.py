@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from mocapflow.errors import ComponentFailed, GarmentError, StoreError
 from mocapflow.hookspecs import hookimpl
@@ -75,6 +76,21 @@ def test_fresh_makes_everything_anew(tmp_path, path):
     again, _ = run_tiny(path, tmp_path, fresh=True)
     assert set(actions(again).values()) == {"run"}
     assert len([p for p in (tmp_path / "store.zarr").iterdir() if p.name.startswith("track")]) == 1
+
+
+def blas_threads():
+    return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+
+
+def test_a_run_computes_in_one_thread_and_leaves_the_others_to_the_caller(tmp_path, path):
+    during = set()
+    with threadpool_limits(limits=2, user_api="blas"):
+        before = blas_threads()
+        run(
+            load(path), store=tmp_path / "s", out=tmp_path / "run", report=lambda line: during.update(blas_threads())
+        )  # fmt: skip
+        assert blas_threads() == before
+    assert during == {1}
 
 
 def test_later_stages_know_how_the_earlier_ones_were_made(tmp_path, path):
