@@ -73,6 +73,12 @@ def joint_positions(body: Body, joints: F64) -> F64:
     return positions
 
 
+def root_position(body: Body, root: F64) -> F64:
+    """Return where the root joint (3,) m is for a `root` (4, 4); the translation alone is where rest has its origin."""
+    position: F64 = root[:3, :3] @ body.positions[0] + root[:3, 3]
+    return position
+
+
 def part_of(body: Body, vertices: npt.NDArray[np.integer[Any]]) -> Body:
     """Return a body of the same joints with the given vertices alone, without faces."""
     offset = body.morph_offset

@@ -8,6 +8,7 @@ from pydantic import PositiveFloat
 from mocapflow.components import Prior
 from mocapflow.data import Past, Pose, Residual
 from mocapflow.geometry import twists
+from mocapflow.geometry.kinematics import root_position
 from mocapflow.records import F64
 from mocapflow.scene import Scene
 from mocapflow_priors.extrapolate import continued, interval
@@ -38,11 +39,11 @@ class SmoothMotion(Prior):
             return whitened(np.empty(0), np.empty((0, unknowns)))
         expected = continued(past, 1.0)
         turn = twists.log_rotation(pose.root[:3, :3] @ expected.root[:3, :3].T)
-        position = pose.root[:3, 3]
+        place, goal = (root_position(scene.body, root) for root in (pose.root, expected.root))
         jacobian = np.eye(unknowns)
         jacobian[:3, :3] = turn_rate(turn)
-        jacobian[3:6, :3] = -twists.hat(position)
-        deviation = [turn, position - expected.root[:3, 3], pose.angles - expected.angles]
+        jacobian[3:6, :3] = -twists.hat(place)
+        deviation = [turn, place - goal, pose.angles - expected.angles]
         sharpness = self._sharpness(len(pose.angles), step)
         return whitened(sharpness * np.concatenate(deviation), sharpness[:, None] * jacobian)
 

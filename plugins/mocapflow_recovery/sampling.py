@@ -13,7 +13,7 @@ import numpy as np
 
 from mocapflow.assets import Body
 from mocapflow.data import Pose
-from mocapflow.geometry.kinematics import descendants
+from mocapflow.geometry.kinematics import descendants, root_position
 from mocapflow.model import moved
 from mocapflow.records import F64, I32, Bool
 
@@ -145,7 +145,7 @@ def samples(
     """Yield poses around a pose that differ from it in one part, within the limits of the joints."""
     angles = len(pose.angles)
     if part is None:
-        middle = pose.root[:3, :3] @ body.positions[0] + pose.root[:3, 3]
+        middle = root_position(body, pose.root)
         turns, shifts = (
             share * spread.turn * rng.normal(size=(count, 3)),
             share * spread.shift * rng.normal(size=(count, 3)),

@@ -39,7 +39,7 @@ def body_equations(rows: Rows, body: Body, pose: Pose) -> Equations:
     Source: Rosenhahn 2008, Eq. (12.8)
     """
     joints, screws = kinematics.chain(body, pose)
-    rest, centre = kinematics.rest_shape(body, pose.angles), pose.root[:3, 3].copy()
+    rest, centre = kinematics.rest_shape(body, pose.angles), kinematics.root_position(body, pose.root)
     unknowns = 6 + len(screws)
     hessian, gradient = np.empty((unknowns, unknowns)), np.empty(unknowns)
     energy: float = kernels.equations(

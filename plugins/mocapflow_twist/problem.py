@@ -7,9 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mocapflow.assets import Body
 from mocapflow.components import Prior
 from mocapflow.data import Cloth, Past, Pose, Residual
 from mocapflow.geometry import twists
+from mocapflow.geometry.kinematics import root_position
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow_twist import normal_equations
@@ -23,11 +25,6 @@ class Guess(NamedTuple):
 
     pose: Pose
     cloth: Cloth
-
-    @property
-    def centre(self) -> F64:
-        """The position of the root (3,) m, about which increments are solved."""
-        return self.pose.root[:3, 3].copy()
 
 
 class Data(NamedTuple):
@@ -44,11 +41,11 @@ class Anchor(NamedTuple):
     guess: Guess
     precision: F64
 
-    def equations(self, guess: Guess) -> Equations:
+    def equations(self, guess: Guess, body: Body) -> Equations:
         """Return the damping's energy; its gradient about the root is exact, its Hessian that of small turns."""
         held, pose = self.guess.pose, guess.pose
         turn = twists.log_rotation(pose.root[:3, :3] @ held.root[:3, :3].T)
-        shift = pose.root[:3, 3] - held.root[:3, 3]
+        shift = root_position(body, pose.root) - root_position(body, held.root)
         cloth = guess.cloth.parameters - self.guess.cloth.parameters
         error = np.concatenate([turn, shift, pose.angles - held.angles, cloth])[: len(self.precision)]
         pull = self.precision * error
@@ -83,6 +80,10 @@ class Problem(NamedTuple):
         """Number S of unknowns."""
         return len(self.anchor.precision)
 
+    def centre(self, guess: Guess) -> F64:
+        """Return the position of the root joint (3,) m, about which increments are solved."""
+        return root_position(self.model.scene.body, guess.pose.root)
+
     def energies(self, guess: Guess) -> Mapping[str, float]:
         """Return each term of the energy at a guess."""
         body = self.model.scene.body
@@ -91,7 +92,7 @@ class Problem(NamedTuple):
         if len(worn.vertex):
             error, _ = normal_equations.point_errors(worn, guess.cloth.vertices.take(worn.vertex, axis=0))
             data += 0.5 * float(worn.weight @ error**2)
-        terms = {"data": data, "damping": self.anchor.equations(guess).energy}
+        terms = {"data": data, "damping": self.anchor.equations(guess, body).energy}
         for prior, residual in zip(self.priors, self._residuals(guess), strict=True):
             terms[prior.name] = terms.get(prior.name, 0.0) + prior.weight * residual.energy
         return terms
@@ -113,12 +114,12 @@ class Problem(NamedTuple):
         if velocity is None:
             return Equations(hessian, gradient, skin.energy)
         worn = normal_equations.dense_equations(self.data.cloth, guess.cloth.vertices, velocity)
-        move = about_origin(guess.centre, self.unknowns)
+        move = about_origin(self.centre(guess), self.unknowns)
         hessian += move.T @ worn.hessian @ move
         return Equations(hessian, gradient + move.T @ worn.gradient, skin.energy + worn.energy)
 
     def _prior_equations(self, guess: Guess) -> Equations:
-        hessian, gradient, energy = self.anchor.equations(guess)
+        hessian, gradient, energy = self.anchor.equations(guess, self.model.scene.body)
         residuals = self._residuals(guess)
         rows = np.zeros((sum(len(residual.error) for residual in residuals), self.unknowns))
         error, weight = np.empty(len(rows)), np.empty(len(rows))
@@ -129,7 +130,7 @@ class Problem(NamedTuple):
             rows[here, :columns] = residual.jacobian[:, :columns]
             error[here], weight[here] = residual.error, prior.weight
             energy += prior.weight * residual.energy
-        rows[:, :3] += rows[:, 3:6] @ twists.hat(guess.centre)  # about the root
+        rows[:, :3] += rows[:, 3:6] @ twists.hat(self.centre(guess))  # about the root
         pulling = (weight[:, None] * rows).T
         return Equations(hessian + pulling @ rows, gradient + pulling @ error, energy)
 

@@ -132,7 +132,7 @@ class TwistGaussNewton(PoseSolver):
             increment = solve.capped(increment, angles, np.radians(self.cap_deg), self.cap_mm / 1000)
             if solve.gain(equations, increment) <= least:
                 return guess, damping
-            trial = motion.moved(guess, solve.about_origin(guess.centre, len(increment)) @ increment)
+            trial = motion.moved(guess, solve.about_origin(problem.centre(guess), len(increment)) @ increment)
             if sum(problem.energies(trial).values()) <= equations.energy:
                 return trial, LOWERED * damping
             damping = max(RAISED * damping, 1e-6)
@@ -141,7 +141,7 @@ class TwistGaussNewton(PoseSolver):
     def _estimate(self, problem: Problem, guess: Guess, found: Quadratic) -> Estimate:
         data, prior = found
         about_root = covariance(data.hessian, prior.hessian, data.energy, problem.data.measurements)
-        to_origin = solve.about_origin(guess.centre, problem.unknowns)
+        to_origin = solve.about_origin(problem.centre(guess), problem.unknowns)
         return Estimate(
             pose=guess.pose,
             parameters=np.array(guess.cloth.parameters),
