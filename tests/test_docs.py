@@ -28,7 +28,7 @@ def test_the_plugin_in_contributing_loads_and_conforms(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:dash", "-p", "no:cacheprovider", "test_toes_ahead.py"]
     run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stdout
-    assert "10 passed" in run.stdout
+    assert "11 passed" in run.stdout
 
 
 @pytest.mark.parametrize(("document", "least"), [("README.md", 5), ("CONTRIBUTING.md", 1), ("docs/tutorial.md", 7)])

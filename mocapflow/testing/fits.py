@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from mocapflow.components import ClothFitter, PoseSolver, Prior
-from mocapflow.data import NO_CLOTH, Past, Turn
+from mocapflow.data import NO_CLOTH, Matches, Past, Pose, Turn
 from mocapflow.model import ClothedModel, moved
 from mocapflow.records import F64
+from mocapflow.scene import Scene
 from mocapflow.testing import pictures, scenes
 from mocapflow.testing.component import TURN, Conformance
 from mocapflow.testing.jacobians import check_jacobian, differences
@@ -56,6 +57,17 @@ class PriorConformance(Conformance):
         expected = residual.jacobian[:, :unknowns].T @ residual.error
         np.testing.assert_allclose(slope, expected, atol=self.tolerance * max(1.0, np.abs(expected).max()))
 
+    def test_where_rest_has_its_origin_does_not_matter(self) -> None:
+        """A body whose rest lies elsewhere, in the same pose, costs the same."""
+        scene, shift = scenes.tiny_scene(), np.array([0.3, -0.5, 2.0])
+        past = [scenes.tiny_pose(scene, 6 + k, 0.1) for k in range(2)]
+        poses = [*past, scenes.tiny_pose(scene, 5, 0.3)]
+        elsewhere = scenes.rebased(scene, poses[0], shift)[0]
+        there = [scenes.rebased(scene, pose, shift)[1] for pose in poses]
+        here = self.prior.residual(poses[-1], scenes.tiny_past(scene, *past), scene)
+        other = self.prior.residual(there[-1], scenes.tiny_past(elsewhere, *there[:-1]), elsewhere)
+        np.testing.assert_allclose(other.energy, here.energy, rtol=1e-6, atol=1e-9)
+
 
 class PoseSolverConformance(Conformance):
     """A pose solver, given exact pairs of vertices and pixels."""
@@ -80,6 +92,21 @@ class PoseSolverConformance(Conformance):
         assert ((estimate.observed >= 0) & (estimate.observed <= 1)).all()
         reached, wanted = scene.surface(pose, NO_CLOTH).vertices, scene.surface(truth, NO_CLOTH).vertices
         assert np.linalg.norm(reached - wanted, axis=1).max() < 1e-3
+
+    def test_where_rest_has_its_origin_does_not_matter(self) -> None:
+        """From a pose far off, a body whose rest lies elsewhere comes to the same place in one call."""
+        scene, shift = scenes.tiny_scene(), np.array([0.3, -0.5, 2.0])
+        truth = scenes.tiny_pose(scene, 8)
+        start, matches = moved(truth, np.full(6 + len(truth.angles), 0.2)), scenes.exact_matches(scene, truth)
+        reached = [
+            kept.surface(self._solved(kept, pose, matches), NO_CLOTH).vertices
+            for kept, pose in ((scene, start), scenes.rebased(scene, start, shift))
+        ]
+        np.testing.assert_allclose(reached[1], reached[0], atol=1e-6)
+
+    def _solved(self, scene: Scene, pose: Pose, matches: Matches) -> Pose:
+        state, model = pictures.tiny_state(scene, pose), ClothedModel(scene=scene)
+        return self.pose_solver.solve(lambda surface: matches, state, model, (), Past(), TURN).pose
 
 
 class ClothFitterConformance(Conformance):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from mocapflow.assets import Background
@@ -87,3 +89,14 @@ def exact_matches(scene: Scene, seen: Pose) -> Matches:
         vertex=np.tile(vertex, len(scene.cameras)),
         weight=np.ones(count),
     )
+
+
+def rebased(scene: Scene, pose: Pose, shift: F64) -> tuple[Scene, Pose]:
+    """Return the same person in the same place whose rest lies `shift` (3,) m elsewhere, bare."""
+    body = scene.body
+    twisted = body.twists.copy()
+    twisted[:, 3:] -= np.cross(twisted[:, :3], shift)
+    moved = replace(body, vertices=body.vertices + shift, positions=body.positions + shift, twists=twisted)
+    root = pose.root.copy()
+    root[:3, 3] -= root[:3, :3] @ shift
+    return replace(scene, body=moved, garment=None), Pose(root=root, angles=pose.angles)

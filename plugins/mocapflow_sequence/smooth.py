@@ -13,6 +13,7 @@ from mocapflow.components import Stage
 from mocapflow.geometry import twists
 from mocapflow.records import F64, Bool
 from mocapflow.results import Track
+from mocapflow.scene import Scene
 from mocapflow.series import Numbers, changed
 from mocapflow_sequence.banded import difference_weights, minimise
 from mocapflow_sequence.lost import lost_rows
@@ -26,15 +27,15 @@ class Smooth(Stage):
     The smallest sum of squares over the whole sequence of (correction / its standard deviation) and
     (acceleration / the settings below): a Rauch-Tung-Striebel smoother, solved at once as a banded system. With
     good images hardly anything changes; a frame that was lost is bridged by its neighbours. The settings are
-    standard deviations of what people do, not limits. Corrections act about the origin of the body at rest.
+    standard deviations of what people do, not limits. The root turns about its joint, wherever rest has its origin.
     """
 
     name: ClassVar[str] = "smooth"
     angle_acceleration_deg_s2: PositiveFloat = 4000.0  # of every joint angle
     root_acceleration_deg_s2: PositiveFloat = 2000.0  # of the turn of the root
-    root_acceleration_m_s2: PositiveFloat = 15.0  # of the root
+    root_acceleration_m_s2: PositiveFloat = 15.0  # of the root joint
 
-    def run(self, track: Track) -> Track:
+    def run(self, track: Track, scene: Scene) -> Track:
         """Return the smoothed track, which keeps the poses it was made from.
 
         The covariances stay those of the single frames: neighbouring frames err alike, so that averaging them
@@ -43,12 +44,16 @@ class Smooth(Stage):
         if len(track.frame) < 3:
             return replace(track, raw_root=track.root, raw_angles=track.angles)
         lost = lost_rows(track)
-        spread = changed(track.covariance, partial(_about_origin, track.root, lost))
-        change, bridged = minimise(spread, _second_differences(track), self._limits(track), track.time, lost)
-        root = track.root.copy()
-        root[:, :3, :3] = twists.exp(np.pad(change[:, :3], ((0, 0), (0, 3))))[:, :3, :3] @ root[:, :3, :3]
-        root[:, :3, 3] += change[:, 3:6]
-        back = np.linalg.inv(_about(track.root[lost, :3, 3], spread.shape[1]))
+        joint = np.eye(4)
+        joint[:3, 3] = scene.body.positions[0]
+        placed = track.root @ joint
+        spread = changed(track.covariance, partial(_about_joint, placed, lost))
+        change, bridged = minimise(spread, _second_differences(placed, track), self._limits(track), track.time, lost)
+        turned = placed.copy()
+        turned[:, :3, :3] = twists.exp(np.pad(change[:, :3], ((0, 0), (0, 3))))[:, :3, :3] @ placed[:, :3, :3]
+        turned[:, :3, 3] += change[:, 3:6]
+        root = turned @ twists.inverse(joint)
+        back = np.linalg.inv(_about(placed[lost, :3, 3], spread.shape[1]))
         bridged = back @ bridged @ np.swapaxes(back, 1, 2)
         return replace(
             track, root=root, angles=track.angles + change[:, 6:],
@@ -71,20 +76,20 @@ def _about(points: F64, size: int) -> F64:
     return matrices
 
 
-def _second_differences(track: Track) -> F64:
+def _second_differences(placed: F64, track: Track) -> F64:
     """Return the accelerations (T - 2, 6 + D) at the inner frames; turns are compared as rotation vectors."""
     weights = difference_weights(track.time)
-    rotation = track.root[:, :3, :3]
+    rotation = placed[:, :3, :3]
     turns = twists.log_rotation(rotation[1:] @ np.swapaxes(rotation[:-1], 1, 2))
     turning = weights[:, 2, None] * turns[1:] - weights[:, 0, None] * turns[:-1]
-    straight = np.concatenate([track.root[:, :3, 3], track.angles], axis=1)
+    straight = np.concatenate([placed[:, :3, 3], track.angles], axis=1)
     moving = sum(weights[:, k, None] * straight[k : len(straight) - 2 + k] for k in range(3))
     return np.concatenate([turning, moving], axis=1)
 
 
-def _about_origin(root: F64, lost: Bool, covariance: F64, rows: Numbers) -> F64:
-    """Return covariances of rows (K,) as of increments that turn about the origin; lost frames are unsure."""
-    turned = _about(root[rows, :3, 3], covariance.shape[1])
+def _about_joint(placed: F64, lost: Bool, covariance: F64, rows: Numbers) -> F64:
+    """Return covariances of rows (K,) as of increments that turn about the root joint; lost frames are unsure."""
+    turned = _about(placed[rows, :3, 3], covariance.shape[1])
     spread = turned @ covariance @ np.swapaxes(turned, 1, 2)
     spread[lost[rows]] = LOST * np.eye(spread.shape[1])
     return spread

@@ -43,7 +43,7 @@ def folder(scene: Scene, recording: Recording, tmp_path_factory: pytest.TempPath
     path = tmp_path_factory.mktemp("run")
     track = stepping(scene.body)
     shaken = replace(track, angles=track.angles + 0.02 * np.random.default_rng(0).normal(size=track.angles.shape))
-    exported(Smooth().run(track=shaken), scene, recording, path)
+    exported(Smooth().run(track=shaken, scene=scene), scene, recording, path)
     return path
 
 
@@ -130,7 +130,7 @@ def test_run_json_says_how_it_was_made_and_how_it_went(scene: Scene, recording: 
     )
     observed = track.observed.copy()
     observed[4:, scene.body.screw_names.index("knee_l.x")] = 0.2
-    exported(Smooth().run(track=replace(broken, observed=observed)), scene, recording, tmp_path)
+    exported(Smooth().run(track=replace(broken, observed=observed), scene=scene), scene, recording, tmp_path)
     got = json.loads((tmp_path / layout.RUN).read_text())
     assert got["recipe"]["versions"] == {"numpy": np.__version__}
     assert got["frames"]["lost"] == [3]

@@ -119,7 +119,8 @@ def test_report_holds_everything(scene: Scene, track: Track, recording: Recordin
     noted = Smooth().run(
         track=replace(
             track, notes=("frame 1: cam02 black", "frame 2: cam02 black", "frame 2: fit doubted"), observed=observed
-        )
+        ),
+        scene=scene,
     )
     evaluation = Evaluate().run(track=noted, scene=scene, recording=recording, run_folder=run_folder)
     files = Report().run(track=noted, scene=scene, recording=recording, run_folder=run_folder, evaluation=evaluation)

@@ -7,11 +7,18 @@ from mocapflow_sequence.banded import difference_weights, minimise
 from mocapflow_sequence.smooth import Smooth
 from results_scene import ball_body, make_track, start_pose, stepping
 
+from mocapflow.assets import Body
 from mocapflow.geometry import angles, twists
 from mocapflow.records import F64
+from mocapflow.results import Track
+from mocapflow.scene import Scene
 from mocapflow.series import BLOCK, Numbers, Series, blocks
 
 DEMO = Path(__file__).parents[2] / "examples" / "data"
+
+
+def smoothed_by_default(track: Track, body: Body | None = None) -> Track:
+    return Smooth().run(track=track, scene=Scene(cameras=(), body=body or ball_body()))
 
 
 def rms(values: np.ndarray) -> np.ndarray:
@@ -28,7 +35,7 @@ def true_curves(clip: str) -> np.ndarray:
 def test_costs_less_than_015_degrees_on_true_curves(clip: str, sd_deg: float) -> None:
     curves = true_curves(clip)
     track = make_track(np.tile(np.eye(4), (len(curves), 1, 1)), curves, sd=np.radians(sd_deg))
-    smoothed = Smooth().run(track=track)
+    smoothed = smoothed_by_default(track)
     assert np.degrees(rms(smoothed.angles - curves)).max() < 0.15
 
 
@@ -38,7 +45,7 @@ def test_reduces_noise_at_high_frame_rates() -> None:
     fine = np.stack([np.interp(np.arange(0, 59, 0.25), np.arange(60), c) for c in curves.T], 1)
     noisy = fine + np.radians(0.7) * rng.normal(size=fine.shape)
     track = make_track(np.tile(np.eye(4), (len(fine), 1, 1)), noisy, sd=np.radians(0.7), fps=120)
-    smoothed = Smooth().run(track=track)
+    smoothed = smoothed_by_default(track)
     assert rms(smoothed.angles - fine).mean() < 0.75 * rms(noisy - fine).mean()
     assert smoothed.raw_angles is not None and (smoothed.raw_angles == noisy).all()
 
@@ -49,9 +56,28 @@ def test_constant_velocity_is_left_alone() -> None:
     root = twists.exp(steps * np.array([[0.0, 0.0, 0.1, 0.0, 0.0, 0.0]]))
     root[:, :3, 3] = steps * np.array([0.01, 0.02, 0.0]) + [3.0, 5.0, 1.0]
     track = make_track(root, steps * 0.01 * np.ones((1, 4)))
-    smoothed = Smooth().run(track=track)
+    smoothed = smoothed_by_default(track)
     assert np.abs(smoothed.root - root).max() < 1e-9
     assert np.abs(smoothed.angles - track.angles).max() < 1e-9
+
+
+def test_where_rest_has_its_origin_does_not_matter() -> None:
+    body, rng, shift = ball_body(), np.random.default_rng(3), np.array([0.0, 0.0, -1.0])
+    track = stepping(body)
+    noise = twists.exp(
+        np.concatenate([0.05 * rng.normal(size=(len(track.root), 3)), np.zeros((len(track.root), 3))], 1)
+    )
+    shaken = replace(track, root=track.root @ noise)
+    there = shaken.root.copy()
+    there[:, :3, 3] -= there[:, :3, :3] @ shift
+    moved = replace(body, positions=body.positions + shift)
+    here, other = smoothed_by_default(shaken, body), smoothed_by_default(replace(shaken, root=there), moved)
+    assert np.abs(here.root - shaken.root).max() > 1e-3
+    np.testing.assert_allclose(other.root[:, :3, :3], here.root[:, :3, :3], atol=1e-9)
+    places = [
+        smooth.root[:, :3, :3] @ b.positions[0] + smooth.root[:, :3, 3] for smooth, b in ((here, body), (other, moved))
+    ]
+    np.testing.assert_allclose(places[1], places[0], atol=1e-9)
 
 
 def test_lost_frame_is_bridged_and_uncertain() -> None:
@@ -64,7 +90,7 @@ def test_lost_frame_is_bridged_and_uncertain() -> None:
     turns = track.iterations.copy()
     turns[10] = 0  # the loop kept the prediction
     lost = replace(track, angles=wrong, root=shifted, iterations=turns)
-    smoothed = Smooth().run(track=lost)
+    smoothed = smoothed_by_default(lost)
     assert np.degrees(np.abs(smoothed.angles[10] - track.angles[10])).max() < 1.0
     assert np.abs(smoothed.root[10] - track.root[10]).max() < 1e-3
     sd = angles.measure(body, smoothed.root, smoothed.angles, smoothed.covariance).sd[:, 0]
@@ -77,7 +103,7 @@ def test_weights_by_covariance() -> None:
     spiked, covariance = track.angles.copy(), track.covariance.copy()
     spiked[15] = 0.1
     covariance[15, 6, 6] *= 400  # the first angle is uncertain there, the second is not
-    smoothed = Smooth().run(track=replace(track, angles=spiked, covariance=covariance))
+    smoothed = smoothed_by_default(replace(track, angles=spiked, covariance=covariance))
     assert smoothed.angles[15, 0] < 0.2 * smoothed.angles[15, 1]
 
 
@@ -87,7 +113,7 @@ def test_cloth_goes_with_the_root() -> None:
     root[:, :3, 3] += 0.01 * rng.normal(size=(8, 3))
     track = make_track(root, np.zeros((8, 1)), sd=0.1, cloth=1)
     track = replace(track, cloth=root[:, None, :3, 3].copy())
-    smoothed = Smooth().run(track=track)
+    smoothed = smoothed_by_default(track)
     assert np.allclose(smoothed.cloth[:, 0], smoothed.root[:, :3, 3], atol=1e-12)
 
 
@@ -133,7 +159,7 @@ def test_two_frames_are_returned_as_they_are() -> None:
     body = ball_body(("pelvis", "hip_l", "knee_l", "ankle_l"))
     pose = start_pose(body)
     track = make_track(np.tile(pose.root, (2, 1, 1)), np.tile(pose.angles, (2, 1)))
-    assert (Smooth().run(track=track).angles == track.angles).all()
+    assert (smoothed_by_default(track).angles == track.angles).all()
 
 
 def test_a_variance_that_rounding_left_below_zero_is_no_hindrance() -> None:
@@ -141,7 +167,7 @@ def test_a_variance_that_rounding_left_below_zero_is_no_hindrance() -> None:
     track = make_track(np.tile(np.eye(4), (20, 1, 1)), curves, sd=np.radians(1.0))
     covariance = track.covariance.copy()
     covariance[7, -1, -1] = -1e-6
-    smoothed = Smooth().run(track=replace(track, covariance=covariance))
+    smoothed = smoothed_by_default(replace(track, covariance=covariance))
     assert np.isfinite(smoothed.angles).all()
     assert np.degrees(np.abs(smoothed.angles - curves)).max() < 1
 
@@ -161,7 +187,7 @@ def test_what_is_wide_is_never_in_memory_as_a_whole() -> None:
 
     plain = replace(track, iterations=turns)
     wide = replace(plain, covariance=block_by_block(track.covariance), cloth=block_by_block(track.cloth))
-    expected, smoothed = Smooth().run(track=plain), Smooth().run(track=wide)
+    expected, smoothed = smoothed_by_default(plain), smoothed_by_default(wide)
     np.testing.assert_array_equal(smoothed.angles, expected.angles)
     for part in blocks(len(curves)):
         np.testing.assert_array_equal(smoothed.covariance[part], expected.covariance[part])

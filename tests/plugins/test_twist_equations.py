@@ -36,7 +36,7 @@ def points_of(scene: Scene, pose: Pose, rows: Rows) -> np.ndarray:
 
 def numeric_jacobian(scene: Scene, pose: Pose, rows: Rows) -> np.ndarray:
     """Central differences of the errors for increments about the root."""
-    columns = about_origin(pose.root[:3, 3], 6 + len(pose.angles)).T
+    columns = about_origin(kinematics.root_position(scene.body, pose.root), 6 + len(pose.angles)).T
 
     def errors(increment: np.ndarray) -> np.ndarray:
         return normal_equations.point_errors(rows, points_of(scene, moved(pose, increment), rows))[0]
