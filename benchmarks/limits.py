@@ -163,8 +163,8 @@ class TruePelvis(Prior):
 
     def residual(self, pose: Pose, past: Past, scene: Scene) -> Residual:
         """Return three rows for the turn and three for the place of the root joint."""
-        true, rest = self.truth[self.row], scene.body.positions[0]
-        place, goal = ((root[:3, :3] @ rest + root[:3, 3]) for root in (pose.root, true.root))
+        true = self.truth[self.row]
+        place, goal = (kinematics.root_position(scene.body, root) for root in (pose.root, true.root))
         jacobian = np.zeros((6, 6 + len(pose.angles)))
         jacobian[:3, :3], jacobian[3:, :3], jacobian[3:, 3:6] = np.eye(3), -twists.hat(place), np.eye(3)
         error = np.append(twists.log_rotation(pose.root[:3, :3] @ true.root[:3, :3].T), place - goal)

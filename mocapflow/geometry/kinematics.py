@@ -74,8 +74,12 @@ def joint_positions(body: Body, joints: F64) -> F64:
 
 
 def root_position(body: Body, root: F64) -> F64:
-    """Return where the root joint (3,) m is for a `root` (4, 4); the translation alone is where rest has its origin."""
-    position: F64 = root[:3, :3] @ body.positions[0] + root[:3, 3]
+    """Return where the root joint is (..., 3) m for roots (..., 4, 4).
+
+    Their translation alone is where rest has its origin, for most bodies on the floor: how far that has moved says more
+    of how the pelvis is turned than of where it is.
+    """
+    position: F64 = root[..., :3, :3] @ body.positions[0] + root[..., :3, 3]
     return position
 
 

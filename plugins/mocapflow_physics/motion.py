@@ -6,13 +6,14 @@ import numpy as np
 
 from mocapflow.data import Past, PoseBatch
 from mocapflow.geometry import twists
+from mocapflow.geometry.kinematics import root_position
 from mocapflow.records import F64
 from mocapflow.scene import Scene
 
 
 def centred(scene: Scene, root: F64) -> tuple[F64, F64]:
     """Return transforms (B, 4, 4) with the root joint at zero, and where it was (B, 3): near zero f4 is finest."""
-    centre = (root @ np.append(scene.body.positions[0], 1.0))[:, :3]
+    centre = root_position(scene.body, root)
     near = root.copy()
     near[:, :3, 3] -= centre
     return near, centre

@@ -36,11 +36,11 @@ class Room:
     def __init__(self, scene: Scene, root: F64, size: tuple[int, int]) -> None:
         self._scene = scene
         self._faces = None if scene.garment is None else scene.garment.faces
-        roots = root @ np.append(scene.body.positions[0], 1.0)
+        roots = kinematics.root_position(scene.body, root)
         lowest = scene.body.vertices[:, 2].min() - scene.body.positions[0, 2]
         height = float(np.median(roots[:, 2]) + lowest)
         self._floor = 0.0 if abs(height) < 0.2 else height  # the world's floor, unless the person stands elsewhere
-        self._camera = self._place(roots[:, :3], root[0, :3, :3], (SMOOTH * size[0], SMOOTH * size[1]))
+        self._camera = self._place(roots, root[0, :3, :3], (SMOOTH * size[0], SMOOTH * size[1]))
         self._side = BESIDE * self._camera.camera_from_world[0, :3]
         self._empty = self._backdrop()
 

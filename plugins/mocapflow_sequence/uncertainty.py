@@ -10,6 +10,7 @@ import numpy as np
 from mocapflow.assets import Camera
 from mocapflow.geometry import angles
 from mocapflow.geometry.cameras import magnification
+from mocapflow.geometry.kinematics import root_position
 from mocapflow.records import F64
 from mocapflow.results import Track
 from mocapflow.scene import Scene
@@ -25,7 +26,7 @@ def measured(track: Track, scene: Scene) -> angles.AngleSeries:
     average out, so it is no reason to hold a frame less.
     """
     series = angles.measure(scene.body, track.root, track.angles, track.covariance, track.observed)
-    pelvis = track.root[:, :3, :3] @ scene.body.positions[0] + track.root[:, :3, 3]
+    pelvis = root_position(scene.body, track.root)
     scale = excess(px_per_mm(pelvis, scene.cameras), OUTLINE_MM)
     return replace(series, sd=scale[:, None] * series.sd)
 

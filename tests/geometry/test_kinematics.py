@@ -80,6 +80,13 @@ def test_batch_equals_one_by_one(body, pose):
     np.testing.assert_array_equal(kinematics.chain_batch(body, poses)[1], kinematics.chain(body, pose)[0])
 
 
+def test_the_root_is_where_its_joint_is(body, pose):
+    roots = np.stack([np.eye(4), pose.root])
+    posed = kinematics.joint_positions(body, kinematics.chain(body, pose)[0])
+    np.testing.assert_allclose(kinematics.root_position(body, roots), [body.positions[0], posed[0]], atol=1e-12)
+    np.testing.assert_array_equal(kinematics.root_position(body, pose.root), kinematics.root_position(body, roots)[1])
+
+
 def test_morph_changes_the_shape_with_its_angle(body, pose):
     offset = np.random.default_rng(2).normal(scale=0.01, size=body.vertices.shape)
     screw = body.screw_names.index("knee_l.flexion")
