@@ -205,7 +205,8 @@ class Checkpoint:
         pose = Pose(root=column(self._columns, numbers, "root"), angles=column(self._columns, numbers, "angles"))
         parameters = column(self._columns, numbers, "cloth_parameters")
         time = float(column(self._columns, numbers, "time"))
-        return Moment(time=time, pose=pose, cloth=Cloth(vertices=cloth, parameters=parameters))
+        observed = column(self._columns, numbers, "observed")
+        return Moment(time=time, pose=pose, cloth=Cloth(vertices=cloth, parameters=parameters), observed=observed)
 
     def _row(self, row: int) -> F64:
         numbers = self._open("live/rows").read(row)

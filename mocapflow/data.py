@@ -276,6 +276,7 @@ class Moment:
     time: float  # s
     pose: Pose
     cloth: Cloth
+    observed: F64 | None = array("D", unit="1, as in Estimate; None: not known", default=None)
 
 
 @record

@@ -7,8 +7,10 @@ import numpy as np
 from mocapflow.data import Past, Pose
 from mocapflow.geometry import twists
 from mocapflow.once import once
+from mocapflow.records import Bool
 
 FASTEST = np.radians(1200)  # per s, of a joint angle; in motion capture of kicks a knee reaches 1130
+SEEN = 0.5  # share observed below which the priors hold an angle
 
 
 def interval(past: Past) -> float:
@@ -23,16 +25,25 @@ def continued(past: Past, steps: float) -> Pose:
     """Return the last pose moved on by `steps` times its last motion: the root by its twist, the angles linearly.
 
     With one frame, or `steps` of zero, it is the last pose. An angle that moved faster than people do has jumped, as a
-    limb does that was lost or is found again; it does not go on.
+    limb does that was lost or is found again; it does not go on. Nor does one that is seen again: it was where priors
+    had it, not the images.
     """
     last = past.moments[-1].pose
     if len(past.moments) < 2 or steps == 0:
         return last
     before = past.moments[-2].pose
     turned = last.angles - before.angles
-    motion = np.where(np.abs(turned) < FASTEST * interval(past), turned, 0.0)
+    motion = np.where((np.abs(turned) < FASTEST * interval(past)) & ~_back_in_sight(past), turned, 0.0)
     twist = twists.log(last.root @ twists.inverse(before.root))
     return Pose(
         root=twists.exp(steps * twist) @ last.root,
         angles=np.asarray(last.angles + steps * motion),
     )
+
+
+def _back_in_sight(past: Past) -> Bool:
+    """Return the angles (D,) that the images show in the last frame and did not in the one before."""
+    before, last = (moment.observed for moment in past.moments[-2:])
+    if before is None or last is None:
+        return np.zeros(len(past.moments[-1].pose.angles), bool)
+    return np.asarray((before < SEEN) & (last >= SEEN))
