@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mocapflow_priors.constant_velocity import ConstantVelocity
@@ -56,6 +58,21 @@ def test_an_angle_that_jumped_does_not_go_on() -> None:
     jump[6:8] = np.radians([35.0, 45.0])  # in a thirtieth of a second: a kick, and more than that
     guess = ConstantVelocity().predict(frame(2 / 30), make_past(FIRST, moved(FIRST, jump)), make_scene())
     assert np.allclose(np.degrees(guess.angles - FIRST.angles)[:3], [70.0, 45.0, 0.0])
+
+
+def test_an_angle_that_is_seen_again_does_not_go_on() -> None:
+    """Where it was before is what the priors said."""
+    hidden = np.arange(12) < 3
+    behind, before = np.where(hidden, 0.1, 0.9), np.where(hidden, 0.8, 0.9)
+
+    def moved_on(*observed: np.ndarray) -> np.ndarray:
+        moments = zip(make_past(FIRST, SECOND).moments, observed, strict=True)
+        past = Past(moments=tuple(replace(moment, observed=share) for moment, share in moments))
+        return ConstantVelocity().predict(frame(2 / 30), past, make_scene()).angles - SECOND.angles
+
+    assert moved_on(behind, before) == pytest.approx(np.where(hidden, 0.0, 0.05))
+    assert moved_on(behind, behind) == pytest.approx(0.05)  # a hidden limb goes on
+    assert moved_on(before, behind) == pytest.approx(0.05)  # and so does one that disappears
 
 
 def test_one_frame_or_equal_times_give_the_last_pose() -> None:

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mocapflow_priors.extrapolate import continued
 from mocapflow_priors.joint_limits import JointLimits
 from mocapflow_priors.rest_pose import RestPose
 from mocapflow_priors.smooth_motion import SmoothMotion
@@ -96,23 +95,6 @@ def test_smooth_motion_says_nothing_without_two_frames_or_time_between_them() ->
     one = Past(moments=(Moment(time=0.0, pose=pose, cloth=NO_CLOTH),))
     for past in (Past(), one, make_past(pose, make_pose(1), step=0.0)):
         assert SmoothMotion().residual(pose, past, scene).jacobian.shape == (0, 18)
-
-
-def test_an_angle_that_is_seen_again_has_no_velocity() -> None:
-    """Before, it was where the priors had it."""
-    first, second = make_pose(0), make_pose(0)
-    second = Pose(root=second.root, angles=second.angles + np.radians(5))
-    past = make_past(first, second)
-    hidden = np.arange(12) < 3
-    seen = [np.where(hidden, share, 0.9) for share in (0.1, 0.8)]
-
-    def going_on(before: np.ndarray, last: np.ndarray) -> np.ndarray:
-        moments = (replace(moment, observed=share) for moment, share in zip(past.moments, (before, last), strict=True))
-        return np.degrees(continued(Past(moments=tuple(moments)), 1.0).angles - second.angles)
-
-    assert going_on(seen[0], seen[1]) == pytest.approx(np.where(hidden, 0.0, 5.0))
-    assert going_on(seen[0], seen[0]) == pytest.approx(5.0)  # the priors go on
-    assert going_on(seen[1], seen[0]) == pytest.approx(5.0)  # the limb that disappears, too
 
 
 def test_a_half_turn_between_pose_and_expectation_is_finite() -> None:
