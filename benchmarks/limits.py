@@ -106,8 +106,10 @@ def track(
         state = believed(pose, parameters, model.drape(pose, parameters, past))
         new = settle(frame, state, past, steps, model, lambda *_: None).state
         parameters = new.cloth.parameters
-        past = past.after(Moment(time=frame.time, pose=new.estimate.pose, cloth=new.cloth), new.segmentation.appearance)
-        poses.append(new.estimate.pose)
+        found = new.estimate
+        moment = Moment(time=frame.time, pose=found.pose, cloth=new.cloth, observed=found.observed)
+        past = past.after(moment, new.segmentation.appearance)
+        poses.append(found.pose)
     return poses
 
 

@@ -54,7 +54,8 @@ class Tracker:
             settled = settle if seen(frame) else lost
             result = settled(frame, state, past, self.stage.steps, self.model, lambda *_: None)
             found = self.stage.recovered(frame, state, result, past, self.model).state
-            moment = Moment(time=frame.time, pose=found.estimate.pose, cloth=found.cloth)
+            estimate = found.estimate
+            moment = Moment(time=frame.time, pose=estimate.pose, cloth=found.cloth, observed=estimate.observed)
             past = past.after(moment, found.segmentation.appearance or past.appearance)
             yield past, self.error(frame.index, moment.pose)
 

@@ -220,6 +220,11 @@ class Estimate:
     energies: Mapping[str, float] = field(default_factory=dict)
 
 
+def unseen(observed: F64) -> Bool:
+    """Return True where the priors decided an angle: the images took away less than half of its variance."""
+    return np.asarray(observed < 0.5)  # False where it is not known (NaN)
+
+
 @record
 class FrameState:
     """One turn of the loop: what is known of a frame so far."""

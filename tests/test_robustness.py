@@ -99,6 +99,6 @@ def followed(scene, begin, frames):
     for frame in frames:
         state = stage.begin(frame, past, start, model, Stopwatch())
         result = settle(frame, state, past, stage.steps, model, lambda *_: None)
-        found = stage.recovered(frame, state, result, past, model).state
-        past = past.after(Moment(time=frame.time, pose=found.estimate.pose, cloth=NO_CLOTH), {})
-        yield found.estimate.pose
+        found = stage.recovered(frame, state, result, past, model).state.estimate
+        past = past.after(Moment(time=frame.time, pose=found.pose, cloth=NO_CLOTH, observed=found.observed), {})
+        yield found.pose

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from mocapflow.data import Past, Pose
+from mocapflow.data import Past, Pose, unseen
 from mocapflow.geometry import twists
 from mocapflow.once import once
 from mocapflow.records import Bool
 
 FASTEST = np.radians(1200)  # per s, of a joint angle; in motion capture of kicks a knee reaches 1130
-SEEN = 0.5  # share observed below which the priors hold an angle
 
 
 def interval(past: Past) -> float:
@@ -46,4 +45,4 @@ def _back_in_sight(past: Past) -> Bool:
     before, last = (moment.observed for moment in past.moments[-2:])
     if before is None or last is None:
         return np.zeros(len(past.moments[-1].pose.angles), bool)
-    return np.asarray((before < SEEN) & (last >= SEEN))
+    return np.asarray(unseen(before) & ~unseen(last))

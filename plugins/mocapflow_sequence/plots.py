@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from mocapflow.data import unseen
 from mocapflow.records import F64, Bool
 from mocapflow.results import Evaluation, Track
 from mocapflow_sequence import tables
 from mocapflow_sequence.compare import NINETY
-from mocapflow_sequence.lost import unseen
 from mocapflow_sequence.panels import HELD, LOST, OURS, RAW, TRUTH, legend, panels, save, title
 
 

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from mocapflow.data import unseen
 from mocapflow.records import F64, Bool
 from mocapflow.results import Evaluation, Track
 from mocapflow_sequence import plots, runjson, tables
 from mocapflow_sequence.compare import NINETY
-from mocapflow_sequence.lost import lost_rows, unseen
+from mocapflow_sequence.lost import lost_rows
 from mocapflow_sequence.panels import title
 
 DEVIATIONS = {  # column of evaluation.csv: its heading

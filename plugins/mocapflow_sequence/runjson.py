@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from mocapflow.data import unseen
 from mocapflow.geometry.angles import AngleSeries
 from mocapflow.results import RunFolder, Track
-from mocapflow_sequence.lost import lost_rows, unseen
+from mocapflow_sequence.lost import lost_rows
 
 FRAME = re.compile(r"^frame (\d+): ?(.*)$")
 

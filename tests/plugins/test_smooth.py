@@ -8,7 +8,7 @@ from mocapflow_sequence.smooth import Smooth
 from results_scene import ball_body, make_track, start_pose, stepping
 
 from mocapflow.assets import Body
-from mocapflow.geometry import angles, twists
+from mocapflow.geometry import angles, kinematics, twists
 from mocapflow.records import F64
 from mocapflow.results import Track
 from mocapflow.scene import Scene
@@ -74,10 +74,8 @@ def test_where_rest_has_its_origin_does_not_matter() -> None:
     here, other = smoothed_by_default(shaken, body), smoothed_by_default(replace(shaken, root=there), moved)
     assert np.abs(here.root - shaken.root).max() > 1e-3
     np.testing.assert_allclose(other.root[:, :3, :3], here.root[:, :3, :3], atol=1e-9)
-    places = [
-        smooth.root[:, :3, :3] @ b.positions[0] + smooth.root[:, :3, 3] for smooth, b in ((here, body), (other, moved))
-    ]
-    np.testing.assert_allclose(places[1], places[0], atol=1e-9)
+    places = kinematics.root_position(moved, other.root), kinematics.root_position(body, here.root)
+    np.testing.assert_allclose(*places, atol=1e-9)
 
 
 def test_lost_frame_is_bridged_and_uncertain() -> None:
