@@ -243,6 +243,7 @@ class Change:
     cloth: float  # m, root mean square move of the cloth: a fold may flip while all the rest hangs still
     angles: float  # rad, largest change of a joint angle
     sigmas: float  # standard deviations of the pose, root mean square over its independent directions
+    shift: F64 | None = array("N", 3, unit="m, of each vertex of the surface; None: not known", default=None)
 
 
 @record

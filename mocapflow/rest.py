@@ -42,8 +42,8 @@ def measure_change(old: Shown, new: Shown, covariance: F64) -> Change:
     In standard deviations of the pose, by its covariance (S, S), a direction that no image shows counts little however
     far it moves, and one that all show counts as soon as it moves.
     """
-    way = new.surface.vertices - old.surface.vertices
-    squared = np.einsum("va,va->v", way, way)
+    shift = new.surface.vertices - old.surface.vertices
+    squared = np.einsum("va,va->v", shift, shift)
     worn = new.surface.cloth
     body, cloth = squared[~worn], squared[worn]
     angles = np.abs(new.pose.angles - old.pose.angles)
@@ -52,6 +52,7 @@ def measure_change(old: Shown, new: Shown, covariance: F64) -> Change:
         cloth=float(np.sqrt(cloth.mean())) if len(cloth) else 0.0,
         angles=float(angles.max(initial=0)),
         sigmas=_sigmas(old.pose, new.pose, covariance),
+        shift=shift,
     )
 
 

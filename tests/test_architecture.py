@@ -2,7 +2,6 @@
 
 import ast
 import re
-import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -167,15 +166,13 @@ def test_every_hook_is_tested():
 
 
 def test_help_is_quick_and_light():
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     show = "import sys; from mocapflow import cli; sys.argv = ['mocapflow', '--help']\n"
     show += "try: cli.main()\nfinally: print('modules:', *sys.modules)"
     done = subprocess.run([sys.executable, "-c", show], capture_output=True, text=True, check=True)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
     assert "run " in done.stdout
-    loaded = {name.partition(".")[0] for name in done.stdout.partition("modules:")[2].split()}
-    assert not loaded & HEAVY
-    assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 0.5
+    loaded = done.stdout.partition("modules:")[2].split()
+    assert not {name.partition(".")[0] for name in loaded} & HEAVY
+    assert len(loaded) < 400  # today's 340 take 0.4 s; a time would tell how busy the machine is
 
 
 def test_importing_mocapflow_is_light():

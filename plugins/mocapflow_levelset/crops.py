@@ -24,6 +24,10 @@ class Crop(NamedTuple):
         """Return the rectangle of an image, (h, w, ...)."""
         return image[self.top : self.bottom, self.left : self.right]
 
+    def within(self, other: Crop) -> Crop:
+        """Return this rectangle in an image that is cut to another one around it."""
+        return Crop(self.top - other.top, self.bottom - other.top, self.left - other.left, self.right - other.left)
+
     def at(self, factor: int) -> Crop:
         """Return the rectangle of the image at 1 / factor of its size; its sides must be multiples of the factor."""
         return Crop(*(side // factor for side in self))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, ClassVar
 
+import numpy as np
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
 from mocapflow.assets import Background, Camera
@@ -12,12 +13,13 @@ from mocapflow.components import Segmenter
 from mocapflow.data import Frame, FrameState, Past, Segmentation, Silhouette, Surface, Turn
 from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.once import once
-from mocapflow.records import F32
+from mocapflow.records import F32, Bool
 from mocapflow.scene import Scene
 from mocapflow_levelset.channels import ChannelName
 from mocapflow_levelset.contact import contact_zone
 from mocapflow_levelset.evolve import Rhythm, Weights
 from mocapflow_levelset.masks import counted, without_cut
+from mocapflow_levelset.moved import moved_outline
 from mocapflow_levelset.plates import Plate, Shadow, plate_of
 from mocapflow_levelset.shadows import floor_around
 from mocapflow_levelset.statistics import Window
@@ -38,7 +40,7 @@ class LevelSet(Segmenter):
     of an empty scene takes it for the person.
 
     The chapter's own settings: `use_background: false`, `coarse_steps: 0`, `half_steps: 0`, `cell_px: 1`,
-    `stride_px: 1`, `steps: 50`, `contact_steps: 0`, `statistics_every: 1`, `keep_mm: 0`;
+    `stride_px: 1`, `steps: 50`, `contact_steps: 0`, `statistics_every: 1`, `keep_px: 0`;
     `shape_weight: 0` uncouples it from the model.
     """
 
@@ -63,7 +65,7 @@ class LevelSet(Segmenter):
     contact_steps: NonNegativeInt = 10  # by chromaticity, where the body meets the floor and both are dark; 0: none
     contact_px: PositiveFloat = 6.0  # to either side of the outline there
     matte_px: NonNegativeInt = 2  # to either side of an edge, where pixels mix person and empty room; 0: no use of it
-    keep_mm: NonNegativeFloat = 5.0  # change of the body in a turn below which the silhouettes stay; 0: found anew
+    keep_px: NonNegativeFloat = 2.0  # move of the model's outline in a turn up to which the contour stays; 0: none does
     statistics_every: PositiveInt = 4  # steps between estimates of the colours
     redistance_every: PositiveInt = 4  # steps between repairs of the distance function
     band_px: Annotated[float, Field(ge=8)] = 12.0  # half width of the band in which the distance is computed
@@ -81,37 +83,52 @@ class LevelSet(Segmenter):
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
         """Return the person's silhouette in each usable view.
 
-        The first turn starts from the projected model, later turns from the last turn's silhouettes. A model that
-        hardly moves would leave them as they are: then they stay; in the first frame, which starts far off, from the
-        second turn on.
+        The first turn starts from the projected model, later turns from the last turn's silhouettes. Where the model's
+        outline has hardly moved they would stay as they are, and are not looked at; in the first frame, which starts
+        far off, from the second turn on.
         """
-        if turn.calm(self.keep_mm) and (past.moments or turn.index > 1):
-            return state.segmentation
         surface = scene.surface(state.estimate.pose, state.cloth)
-        last = {s.camera: s.distance for s in state.segmentation.of(PERSON)}
-        silhouettes: list[Silhouette] = []
-        energies: dict[str, float] = {}
-        for c, camera in enumerate(scene.cameras):
-            if not frame.usable[c]:
-                continue
-            model = model_distance(surface, camera, self.band_px)
-            warm = turn.index > 0 and c in last
-            levels = self._levels(warm)
-            counts = counted(model.shape, self.border_px, frame.hidden_in(c))
-            view = View(
-                image=frame.images[c],
-                start=last[c] if warm else model,
-                prior=model,
-                counted=without_cut(counts, model, scene.body, surface, camera),
-                empty=self._empty(scene, surface, c, levels),
-                colours=self._colours(past, c),
-                contact=self._contact(surface, camera),
-                matte=self._matte(scene, c),
-            )
+        last = {s.camera: s for s in state.segmentation.of(PERSON)} if turn.index else {}
+        parts = {c: self._moved(surface, scene.cameras[c], past, turn) for c in last}
+        due = [c for c in np.flatnonzero(frame.usable).tolist() if (part := parts.get(c)) is None or part.any()]
+        if last and not due:
+            return state.segmentation
+        silhouettes, energies = dict(last), dict(state.segmentation.energies) if last else {}
+        for c in due:
+            levels = self._levels(warm=c in last)
+            view = self._view(frame, surface, past, scene, c, levels)
+            if c in last:
+                view = view._replace(start=last[c].distance, moved=parts[c])
             found = find(view, levels, self._method(), self.band_px)
-            silhouettes.append(Silhouette(camera=c, layer=PERSON, distance=found.level))
-            energies |= {f"{camera.name}.{term}": value for term, value in found.costs._asdict().items()}
-        return Segmentation(silhouettes=tuple(silhouettes), energies=energies)
+            silhouettes[c] = Silhouette(camera=c, layer=PERSON, distance=found.level)
+            for term, cost in found.costs._asdict().items():
+                key = f"{scene.cameras[c].name}.{term}"
+                energies[key] = cost if view.moved is None else energies[key] + cost
+        return Segmentation(silhouettes=tuple(silhouettes[c] for c in sorted(silhouettes)), energies=energies)
+
+    def _view(
+        self, frame: Frame, surface: Surface, past: Past, scene: Scene, camera: int, levels: Sequence[Level]
+    ) -> View:
+        """Return what is given of one view, to start from the projected model."""
+        lens = scene.cameras[camera]
+        model = model_distance(surface, lens, self.band_px)
+        counts = counted(model.shape, self.border_px, frame.hidden_in(camera))
+        return View(
+            image=frame.images[camera],
+            start=model,
+            prior=model,
+            counted=without_cut(counts, model, scene.body, surface, lens),
+            empty=self._empty(scene, surface, camera, levels),
+            colours=self._colours(past, camera),
+            contact=self._contact(surface, lens),
+            matte=self._matte(scene, camera),
+        )
+
+    def _moved(self, surface: Surface, camera: Camera, past: Past, turn: Turn) -> Bool | None:
+        """Return around where (H, W) the contour has to be found anew; None: everywhere."""
+        if not self.keep_px or turn.change is None or not (past.moments or turn.index > 1):
+            return None
+        return moved_outline(surface, turn.change, camera, self.keep_px)
 
     def _empty(self, scene: Scene, surface: Surface, camera: int, levels: Sequence[Level]) -> Empty | None:
         background = self._background(scene)

@@ -13,12 +13,14 @@ from mocapflow_levelset.channels import ChannelName
 from mocapflow_levelset.colours import bins_of
 from mocapflow_levelset.crops import Crop
 from mocapflow_levelset.evidence import Evidence, Room, from_image, in_room
-from mocapflow_levelset.evolve import Costs, Rhythm, Weights, costs, settle
+from mocapflow_levelset.evolve import Costs, Rhythm, Settled, Weights, costs, settle
 from mocapflow_levelset.islands import without_islands
 from mocapflow_levelset.matting import sharpened
 from mocapflow_levelset.plates import Plate, Shadow
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.statistics import Window
+
+MATTE_BAND_PX = 4.0  # a matte moves the contour by less, and looks no farther
 
 
 class Empty(NamedTuple):
@@ -54,6 +56,7 @@ class View(NamedTuple):
     colours: F32 | None = None  # (BINS,) log ratio of each colour on the person and in the room, by earlier frames
     contact: Contact | None = None
     matte: Matte | None = None
+    moved: Bool | None = None  # (H, W) True around where the contour is found anew; None: all of it
 
 
 class Level(NamedTuple):
@@ -78,7 +81,7 @@ class Method(NamedTuple):
 
 
 class Found(NamedTuple):
-    """The silhouette of one view, and what it costs."""
+    """The silhouette of one view, and what it costs; where but a part is new, what that costs more than the start."""
 
     level: F32  # (H, W) px, signed distance clipped to the band
     costs: Costs
@@ -86,10 +89,11 @@ class Found(NamedTuple):
 
 def find(view: View, levels: Sequence[Level], method: Method, band_px: float) -> Found:
     """Return the silhouette of one view (H, W) and its costs; everything outside without a start contour."""
-    crop = crops.around(view.start, method.margin_px, multiple=max(level.factor for level in levels))
-    outside = np.full(view.start.shape, -band_px, np.float32)
+    part, multiple = view.start if view.moved is None else view.moved, max(level.factor for level in levels)
+    crop = crops.around(part, method.margin_px, multiple)
+    whole = np.full(view.start.shape, -band_px, np.float32) if view.moved is None else view.start.copy()
     if crop is None:
-        return Found(outside, Costs(0.0, 0.0, 0.0))
+        return Found(whole, Costs(0.0, 0.0, 0.0))
     front, factor = crop.of(view.start), 1
     image = crop.of(view.image)
     for level in levels:
@@ -101,10 +105,22 @@ def find(view: View, levels: Sequence[Level], method: Method, band_px: float) ->
     if view.contact is not None:
         front = _by_chromaticity(front, view, view.contact, crop, method)
     if view.matte is not None:
-        front = redistance(front, method.weights.band_px)
+        front = redistance(front, MATTE_BAND_PX)
         front = sharpened(front, image, crop.of(view.matte.room), _movable(view, crop), view.matte.reach_px)
-    np.clip(_brought(front, factor, 1, band_px), -band_px, band_px, out=crop.of(outside))
-    return Found(outside, costs(settled, prior, method.weights))
+    new = np.clip(_brought(front, factor, 1, band_px), -band_px, band_px)
+    if view.moved is None:
+        crop.of(whole)[:] = new
+        return Found(whole, _costs(new, settled, prior, method))
+    kept = crops.around(view.moved, method.margin_px // 2, multiple) or crop  # nearer the rim statistics lack a side
+    kept.of(whole)[:] = kept.within(crop).of(new)
+    pairs = zip(*(_costs(crop.of(level), settled, prior, method) for level in (whole, view.start)), strict=True)
+    return Found(whole, Costs(*(now - before for now, before in pairs)))
+
+
+def _costs(level: F32, settled: Settled, prior: F32, method: Method) -> Costs:
+    """Return what a level set costs by the evidence at hand, where the contour has moved in it."""
+    band = np.float32(method.weights.band_px)
+    return costs(settled._replace(level=np.clip(level, -band, band)), prior, method.weights)
 
 
 def _movable(view: View, crop: Crop) -> Bool:

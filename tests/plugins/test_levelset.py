@@ -8,12 +8,14 @@ from levelset_scenes import ellipse
 from mocapflow_levelset.grabcut import GrabCut
 from mocapflow_levelset.levelset import LevelSet
 from mocapflow_levelset.masks import counted, without_cut
+from mocapflow_levelset.moved import moved_outline
 from mocapflow_levelset.plates import plate_of
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.view import Empty, View, find
 
 from mocapflow.data import Change, Moment, Past, Turn
-from mocapflow.geometry.silhouettes import model_distance
+from mocapflow.geometry.cameras import project
+from mocapflow.geometry.silhouettes import model_distance, occluding_contour
 from mocapflow.model import moved
 from mocapflow.testing import pictures, scenes
 
@@ -65,14 +67,63 @@ def test_later_turns_start_from_the_last_silhouettes(scene, pose):
 def test_silhouettes_stay_while_the_model_rests(scene, pose):
     frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, believed(pose))
 
-    def again(segmenter, body, index=1):
-        turn = replace(LATER, index=index, change=Change(body=body, cloth=0.1, angles=0.1, sigmas=1.0))
-        return segmenter.segment(frame, state, past, scene, turn) is state.segmentation
+    state = replace(state, segmentation=LevelSet().segment(frame, state, Past(), scene, FIRST))
+
+    def again(segmenter, shift, index=1):
+        segmentation = segmenter.segment(frame, state, past, scene, shifted(scene, state, shift, index))
+        return segmentation is state.segmentation
 
     past = Past(moments=(Moment(time=0.0, pose=pose, cloth=state.cloth),))
-    assert again(LevelSet(), 0.004) and not again(LevelSet(), 0.006) and not again(LevelSet(keep_mm=0), 0.0)
+    assert again(LevelSet(), 0.001) and not again(LevelSet(), 0.1) and not again(LevelSet(keep_px=0), 0.0)
     past = Past()  # the first frame starts far off
-    assert not again(LevelSet(), 0.004) and again(LevelSet(), 0.004, index=2)
+    assert not again(LevelSet(), 0.001) and again(LevelSet(), 0.001, index=2)
+
+
+def shifted(scene, state, shift, index=1, where=slice(None)):
+    """A later turn after one that moved some vertices by a way (3), or all along x by a distance (m)."""
+    ways = np.zeros_like(scene.surface(state.estimate.pose, state.cloth).vertices)
+    ways[where] = shift if np.ndim(shift) else [shift, 0, 0]
+    return replace(LATER, index=index, change=Change(body=0.1, cloth=0.1, angles=0.1, sigmas=1.0, shift=ways))
+
+
+def test_the_contour_is_found_anew_only_where_the_model_has_moved(scene, pose):
+    """A segmenter that would move the whole contour moves it near the lowest vertices, which alone have moved."""
+    frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, pose)
+    past = Past(moments=(Moment(time=0.0, pose=pose, cloth=state.cloth),))
+    state = replace(state, segmentation=LevelSet(steps=1, shape_weight=5.0).segment(frame, state, past, scene, FIRST))
+    height = scene.surface(pose, state.cloth).vertices[:, 2]
+    turn = shifted(scene, state, 0.1, where=height < np.quantile(height, 0.02))
+    part = LevelSet(margin_px=20).segment(frame, state, past, scene, turn)
+    whole = LevelSet(margin_px=20).segment(frame, state, past, scene, LATER)
+    old, new, all_new = (segmentation.silhouettes[0].distance for segmentation in (state.segmentation, part, whole))
+    changed, due = np.abs(new - old) > 0, np.abs(all_new - old) > 0.1
+    rows = np.flatnonzero(changed.any(axis=1))
+    assert due[: rows[0]].any() and not changed[: rows[0]].any()
+    anew = np.abs(new - all_new)[rows[0] + 10 :][np.abs(all_new)[rows[0] + 10 :] < 1]
+    assert anew.max() < 0.3
+
+
+def test_a_part_found_anew_costs_as_all_of_it(scene, pose):
+    """What a part adds to the energies of before is what the same contour, moved as a whole, costs more."""
+    frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, believed(pose))
+    past = Past(moments=(Moment(time=0.0, pose=pose, cloth=state.cloth),))
+    state = replace(state, segmentation=LevelSet().segment(frame, state, past, scene, FIRST))
+    everything = LevelSet().segment(frame, state, past, scene, shifted(scene, state, 0.2))
+    anew = LevelSet(keep_px=0).segment(frame, state, past, scene, LATER)
+    for name, cost in anew.energies.items():
+        assert everything.energies[name] == pytest.approx(cost, rel=0.1, abs=30)
+
+
+def test_an_outline_that_slides_along_itself_has_not_moved(scene, pose):
+    state, camera = pictures.tiny_state(scene, pose), scene.cameras[0]
+    surface = scene.surface(pose, state.cloth)
+    outline = occluding_contour(surface, camera, 4.0)
+    across = camera.camera_from_world[0, :3]  # x of the image
+    x, y = np.rint(project(surface.vertices[outline.vertex], camera)).astype(int).T
+    moved = moved_outline(surface, shifted(scene, state, 0.02 * across).change, camera, 1.0)[y, x]
+    upright, flat = np.abs(outline.normal[:, 0]) > 0.9, np.abs(outline.normal[:, 0]) < 0.3
+    assert upright.sum() > 10 and moved[upright].all() and flat.sum() > 2 and not moved[flat].any()
+    assert moved_outline(surface, Change(body=1, cloth=1, angles=1, sigmas=1), camera, 2.0) is None
 
 
 def test_energies_are_named_by_view_and_term(scene, pose):
