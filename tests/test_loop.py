@@ -101,6 +101,7 @@ def test_the_change_is_the_largest_move_of_the_surface(frame):
     ]
     assert result.change.angles == pytest.approx(0.05 * 0.4)
     assert result.change.body == pytest.approx(np.linalg.norm(moved[1] - moved[0], axis=1).max())
+    np.testing.assert_allclose(result.change.shift, moved[1] - moved[0], atol=1e-12)
 
 
 def test_cpu_seconds_of_every_step_are_measured(frame):

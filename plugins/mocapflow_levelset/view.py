@@ -15,12 +15,10 @@ from mocapflow_levelset.crops import Crop
 from mocapflow_levelset.evidence import Evidence, Room, from_image, in_room
 from mocapflow_levelset.evolve import Costs, Rhythm, Settled, Weights, costs, settle
 from mocapflow_levelset.islands import without_islands
-from mocapflow_levelset.matting import sharpened
+from mocapflow_levelset.matting import NEAR_PX, sharpened
 from mocapflow_levelset.plates import Plate, Shadow
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.statistics import Window
-
-MATTE_BAND_PX = 4.0  # a matte moves the contour by less, and looks no farther
 
 
 class Empty(NamedTuple):
@@ -105,7 +103,7 @@ def find(view: View, levels: Sequence[Level], method: Method, band_px: float) ->
     if view.contact is not None:
         front = _by_chromaticity(front, view, view.contact, crop, method)
     if view.matte is not None:
-        front = redistance(front, MATTE_BAND_PX)
+        front = redistance(front, NEAR_PX)
         front = sharpened(front, image, crop.of(view.matte.room), _movable(view, crop), view.matte.reach_px)
     new = np.clip(_brought(front, factor, 1, band_px), -band_px, band_px)
     if view.moved is None:

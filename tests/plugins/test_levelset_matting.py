@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from mocapflow_levelset.matting import sharpened
+from mocapflow_levelset.matting import MOST_PX, NEAR_PX, sharpened
 from scipy.special import ndtr
 
 SIZE = 80
@@ -52,3 +52,16 @@ def test_an_edge_that_cannot_be_seen_moves_nothing():
     same = np.clip(np.rint(wall + np.random.default_rng(1).normal(0, 1, wall.shape)), 0, 255).astype(np.uint8)
     level = sharpened(distance, same, wall, np.ones(distance.shape, bool), 2)
     assert np.abs(level - distance).max() < 0.15
+
+
+@pytest.mark.parametrize("angle_deg", [0, 30, 315])
+def test_a_distance_near_the_contour_is_enough(angle_deg):
+    image, wall, distance = pictured(angle_deg, noise=20.0)
+    near, whole = (
+        sharpened(np.clip(distance, -band, band), image, wall, np.full(distance.shape, True), 2)
+        for band in (np.float32(NEAR_PX), np.float32(20))
+    )
+    np.testing.assert_array_equal(near > 0, whole > 0)
+    beside = np.abs(whole) < NEAR_PX - MOST_PX - 0.1
+    assert beside.sum() > 4 * SIZE
+    np.testing.assert_array_equal(near[beside], whole[beside])
