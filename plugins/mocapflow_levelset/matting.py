@@ -18,7 +18,7 @@ SHADES = (0.3, 1.3)  # of the room beside a person
 BEYOND = 0.25  # how far noise may take the share of a pixel beyond none and all
 GREY = 10.0  # levels between person and room at which half of what is seen is believed
 MOST_PX = 1.5  # farther off, what is seen is another edge
-NEAR_PX = 4.0  # band that a level set has to be a distance in: its values move by MOST_PX, its zero with those beside it
+NEAR_PX = 4.0  # band that a level set has to be a distance in: values move by MOST_PX, a zero with those beside it
 WINDOW_PX = 3  # to either side; edges so near to one another move together
 
 
