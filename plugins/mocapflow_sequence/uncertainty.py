@@ -15,7 +15,7 @@ from mocapflow.records import F64
 from mocapflow.results import Track
 from mocapflow.scene import Scene
 
-OUTLINE_MM = 1.8  # benchmarks/calibrate_uncertainty.py on rendered takes; how it holds: docs/results/uncertainty.md
+OUTLINE_MM = 1.5  # benchmarks/calibrate_uncertainty.py on rendered takes; how it holds: docs/results/uncertainty.md
 
 
 def measured(track: Track, scene: Scene) -> angles.AngleSeries:
