@@ -103,7 +103,7 @@ class LevelSet(Segmenter):
             silhouettes[c] = Silhouette(camera=c, layer=PERSON, distance=found.level)
             for term, cost in found.costs._asdict().items():
                 key = f"{scene.cameras[c].name}.{term}"
-                energies[key] = cost if view.moved is None else energies[key] + cost
+                energies[key] = cost if view.moved is None else energies.get(key, np.nan) + cost
         return Segmentation(silhouettes=tuple(silhouettes[c] for c in sorted(silhouettes)), energies=energies)
 
     def _view(

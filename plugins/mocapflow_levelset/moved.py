@@ -14,13 +14,16 @@ SPACING_PX = 4.0  # between the points of the outline that are looked at
 
 
 def moved_outline(surface: Surface, change: Change, camera: Camera, least_px: float) -> Bool | None:
-    """Return True (H, W) at points of the outline, before and now, that moved across it by more than `least_px`.
+    """Return True (H, W) where points of the outline that moved across it by more than `least_px` are, and were.
 
-    A point that slides along the outline leaves it as it is. None where the change does not say how vertices moved.
+    A point that slides along the outline leaves it as it is. None where nobody knows: the change does not say how
+    vertices moved, or the surface has left the view.
     """
     if change.shift is None:
         return None
     outline = occluding_contour(surface, camera, SPACING_PX)
+    if not len(outline.vertex):
+        return None
     there = surface.vertices.take(outline.vertex, axis=0)
     before, now = project(there - change.shift.take(outline.vertex, axis=0), camera), project(there, camera)
     far = np.abs(np.einsum("ka,ka->k", now - before, outline.normal)) > least_px

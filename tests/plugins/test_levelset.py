@@ -103,15 +103,45 @@ def test_the_contour_is_found_anew_only_where_the_model_has_moved(scene, pose):
     assert anew.max() < 0.3
 
 
-def test_a_part_found_anew_costs_as_all_of_it(scene, pose):
-    """What a part adds to the energies of before is what the same contour, moved as a whole, costs more."""
-    frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, believed(pose))
+def test_a_part_says_what_it_costs_more_than_the_start():
+    """Of a disc that begins 4 px too far right the left half is found anew: that alone costs less than before."""
+    rows, columns = np.mgrid[:160, :160]
+    exact = (40.3 - np.hypot(columns - 80.4, rows - 79.7)).astype(np.float32)
+    image = np.where((exact > 0)[..., None], [60, 90, 150], [140, 130, 120])
+    image = np.clip(image + np.random.default_rng(0).normal(0, 3, image.shape), 0, 255).astype(np.uint8)
+    segmenter, start = LevelSet(shape_weight=0.0, margin_px=24), redistance(np.roll(exact, 4, axis=1), 12.0)
+    moved = np.zeros(start.shape, bool)
+    moved[60:100, 44] = True
+    levels, method, view = (
+        segmenter._levels(warm=False),
+        segmenter._method(),
+        View(image, start, start, counted(start.shape, 3)),
+    )
+    part, whole = (find(each, levels, method, 12.0) for each in (view._replace(moved=moved), view))
+    left = (slice(60, 100), slice(36, 52))
+    np.testing.assert_allclose(part.level[left], whole.level[left], atol=0.3)
+    np.testing.assert_array_equal(part.level[:, 80:], start[:, 80:])
+    gained = (start[left] > 0) != (part.level[left] > 0)
+    assert gained.sum() > 100
+    assert part.costs.data < -gained.sum()  # each by a log ratio well above 1
+    nothing = find(view._replace(start=part.level, moved=moved), levels, method, 12.0)
+    assert abs(nothing.costs.data) < 0.1 * abs(part.costs.data)
+
+
+def test_a_part_without_energies_of_before_has_none(scene, pose):
+    """Another segmenter may have made the silhouettes of the turn before."""
+    frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, pose)
     past = Past(moments=(Moment(time=0.0, pose=pose, cloth=state.cloth),))
-    state = replace(state, segmentation=LevelSet().segment(frame, state, past, scene, FIRST))
-    everything = LevelSet().segment(frame, state, past, scene, shifted(scene, state, 0.2))
-    anew = LevelSet(keep_px=0).segment(frame, state, past, scene, LATER)
-    for name, cost in anew.energies.items():
-        assert everything.energies[name] == pytest.approx(cost, rel=0.1, abs=30)
+    found = LevelSet().segment(frame, state, past, scene, shifted(scene, state, 0.2))
+    assert np.isnan(found.energies["cam01.data"])
+
+
+def test_a_person_who_has_left_the_view_is_looked_for_anew(scene, pose):
+    away = moved(pose, np.concatenate([[0, 0, 0, 0, 0, 40.0], np.zeros(len(pose.angles))]))
+    state = pictures.tiny_state(scene, away, pose)
+    turn = shifted(scene, state, [0, 0, 40.0])
+    surface = scene.surface(state.estimate.pose, state.cloth)
+    assert moved_outline(surface, turn.change, scene.cameras[0], 2.0) is None
 
 
 def test_an_outline_that_slides_along_itself_has_not_moved(scene, pose):
