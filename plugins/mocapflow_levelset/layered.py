@@ -35,9 +35,7 @@ class Layered(LevelSet):
     keep: Annotated[float, Field(ge=0, lt=1)] = 0.9  # of what is known of the colours, from frame to frame
     grid_px: PositiveInt = 4  # colours are taken every so many px, so far from borders
     inner_spacing_px: PositiveFloat = 4.0  # between the points of an edge of the model
-    keep_mm: NonNegativeFloat = (
-        5.0  # change of the body in a turn below which inner contours stay where the outline does
-    )
+    keep_mm: NonNegativeFloat = 5.0  # change of the body in a turn below which inner contours stay where outlines do
     calm_mm: PositiveFloat = 15.0  # change of the body in a turn below which the reach is the later one
     first_reach_px: PositiveInt = 24  # how far along the normal the end of a part is looked for
     later_reach_px: PositiveInt = 10  # the same once it is calm
