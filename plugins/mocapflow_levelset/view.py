@@ -106,13 +106,15 @@ def find(view: View, levels: Sequence[Level], method: Method, band_px: float) ->
         front = redistance(front, NEAR_PX)
         front = sharpened(front, image, crop.of(view.matte.room), _movable(view, crop), view.matte.reach_px)
     new = np.clip(_brought(front, factor, 1, band_px), -band_px, band_px)
-    if view.moved is None:
-        crop.of(whole)[:] = new
-        return Found(whole, _costs(new, settled, prior, method))
-    kept = crops.around(view.moved, method.margin_px // 2, multiple) or crop  # nearer the rim statistics lack a side
+    # near the rim of a part its statistics lack a side
+    kept = crop if view.moved is None else crops.around(view.moved, method.margin_px // 2, multiple)
+    assert kept is not None
     kept.of(whole)[:] = kept.within(crop).of(new)
-    pairs = zip(*(_costs(crop.of(level), settled, prior, method) for level in (whole, view.start)), strict=True)
-    return Found(whole, Costs(*(now - before for now, before in pairs)))
+    now = _costs(crop.of(whole), settled, prior, method)
+    if view.moved is None:
+        return Found(whole, now)
+    before = _costs(crop.of(view.start), settled, prior, method)
+    return Found(whole, Costs(*(new - old for new, old in zip(now, before, strict=True))))
 
 
 def _costs(level: F32, settled: Settled, prior: F32, method: Method) -> Costs:

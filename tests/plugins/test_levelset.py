@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from levelset_scenes import ellipse
 from mocapflow_levelset.grabcut import GrabCut
+from mocapflow_levelset.layered import Layered
 from mocapflow_levelset.levelset import LevelSet
 from mocapflow_levelset.masks import counted, without_cut
 from mocapflow_levelset.moved import moved_outline
@@ -232,3 +233,15 @@ def test_the_start_may_touch_the_image_border():
     view = View(image, start, start, counted(start.shape, 3))
     found = find(view, segmenter._levels(warm=False), segmenter._method(), 12.0)
     assert np.isfinite(found.level).all() and found.level.shape == start.shape
+
+
+def test_inner_contours_stay_only_while_the_body_rests(scene, pose):
+    """A limb that moves before the trunk moves no outline."""
+    frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, pose)
+    past = Past(moments=(Moment(time=0.0, pose=pose, cloth=state.cloth),))
+    state = replace(state, segmentation=Layered().segment(frame, state, past, scene, FIRST))
+    turn = shifted(scene, state, 0.0, index=2)
+    calm = replace(turn, change=replace(turn.change, body=0.004))
+    assert Layered().segment(frame, state, past, scene, calm) is state.segmentation
+    renewed = Layered().segment(frame, state, past, scene, turn)
+    assert renewed is not state.segmentation and renewed.silhouettes == state.segmentation.silhouettes
