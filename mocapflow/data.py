@@ -225,6 +225,11 @@ def unseen(observed: F64) -> Bool:
     return np.asarray(observed < 0.5)  # False where it is not known (NaN)
 
 
+def blind(observed: F64) -> bool:
+    """Return True where the images told of no angle at all: a lost frame, or one that shows nobody."""
+    return len(observed) > 0 and bool(unseen(observed).all())
+
+
 @record
 class FrameState:
     """One turn of the loop: what is known of a frame so far."""
@@ -284,6 +289,11 @@ class Moment:
     cloth: Cloth
     observed: F64 | None = array("D", unit="1, as in Estimate; None: not known", default=None)
 
+    @property
+    def blind(self) -> bool:
+        """True where the images told of no angle; False where that is not known."""
+        return self.observed is not None and blind(self.observed)
+
 
 @record
 class Past:
@@ -295,6 +305,10 @@ class Past:
     def after(self, moment: Moment, appearance: Mapping[str, F64]) -> Past:
         """Return the past one frame later."""
         return Past(moments=(*self.moments, moment)[-2:], appearance=appearance)
+
+    def believable(self) -> Past:
+        """Return the past, without moments where none of them shows the person: the next frame begins like a first."""
+        return Past(appearance=self.appearance) if all(moment.blind for moment in self.moments) else self
 
 
 @record

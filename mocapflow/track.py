@@ -45,6 +45,7 @@ from mocapflow.data import (
     Segmentation,
     Start,
     ViewChecks,
+    blind,
     empty_matches,
 )
 from mocapflow.errors import ComponentFailed
@@ -134,15 +135,17 @@ class CoupledLoop(Stage):
             frame = checks.passed(picture) if checks else picture
             frame = replace(frame, flow=flow.into(frame.index)) if flow else frame
             watch.lap("decode")
-            state = self.begin(frame, past, start, model, watch)
+            known, state = past.believable(), self.begin(frame, past, start, model, watch)
+            state = state if known.moments else self.approach(frame, state, known, model)
             settled = settle if seen(frame) else lost
-            result = settled(frame, state, past, self.steps, model, checkpoint.observe)
+            result = settled(frame, state, known, self.steps, model, checkpoint.observe)
             spent = result.seconds
             watch.lap("loop")
-            result = self.recovered(frame, state, result, past, model)
+            result = self.recovered(frame, state, result, known, model)
             watch.lap("recover")
             seconds = {step: watch.seconds.get(step, 0.0) + spent.get(step, 0.0) for step in STEPS}
-            notes = [*notes_on(frame, scene), *result.notes]
+            anew = bool(past.moments) and not known.moments
+            notes = [*notes_on(frame, scene, result, anew), *result.notes]
             past = checkpoint.commit(frame, past, replace(result, seconds=seconds), notes)
             self.complain(frame, result)
             watch = Stopwatch()
@@ -170,11 +173,10 @@ class CoupledLoop(Stage):
         watch.lap("predict")
         cloth = model.drape(pose, parameters, past)
         watch.lap("drape")
-        state = believed(pose, parameters, cloth)
-        return state if past.moments else self.approach(frame, state, past, model)
+        return believed(pose, parameters, cloth)
 
     def approach(self, frame: Frame, state: FrameState, past: Past, model: ClothedModel) -> FrameState:
-        """Return the first frame's state moved near the person by the first segmenter, if there is one."""
+        """Return a first frame's state moved near the person by the first segmenter, if there is one."""
         if self.first_segmenter is None or not seen(frame):
             return state
         steps = replace(self.steps, segmenter=self.first_segmenter)
@@ -238,9 +240,13 @@ def lost(
     )
 
 
-def notes_on(frame: Frame, scene: Scene) -> Sequence[str]:
-    """Return what went wrong with the views of a frame."""
+def notes_on(frame: Frame, scene: Scene, result: FrameResult, anew: bool) -> Sequence[str]:
+    """Return what went wrong with the views of a frame; `anew`: it began like a first one, but is none."""
     reasons = frame.reasons or ("",) * len(frame.usable)
     views = zip(scene.cameras, frame.usable, reasons, strict=True)
     notes = [f"{camera.name} not usable: {reason or 'no image'}" for camera, usable, reason in views if not usable]
-    return notes if seen(frame) else [*notes, f"lost, fewer than {VIEWS} views; the prediction is kept"]
+    if not seen(frame):
+        return [*notes, f"lost, fewer than {VIEWS} views; the prediction is kept"]
+    if blind(result.state.estimate.observed):
+        return [*notes, "no view shows the person; the prediction is kept but for what priors say"]
+    return [*notes, "begun anew, like a first frame: the frames before do not show the person"] if anew else notes

@@ -56,6 +56,18 @@ def test_wrong_frames_are_named_and_the_pose_is_right_soon_after(tmp_path):
 
 
 @pytest.mark.long
+def test_after_a_second_without_pictures_the_person_is_found_at_once(tmp_path):
+    """A knee was moving when the pictures ended; it does not move on, and the next picture begins anew."""
+    dropped = "stages.corrupt before background={use: corrupt, events: [{what: dropped, first: 12, count: 30}]}"
+    unsmoothed = ("--set", "stages.smooth=null", "--frames", "0:46")
+    errors, angles, told = tracked(tmp_path / "run", "skirt.yaml", "--set", dropped, *unsmoothed, names=LEGS + ELBOWS)
+    assert told["frames"]["lost"] == list(range(12, 42))
+    assert np.abs(angles[12:42] - angles[11]).max() < 60
+    assert errors[42:].max() < 8
+    assert "begun anew" in " ".join(told["per_frame"][42]["notes"])
+
+
+@pytest.mark.long
 def test_legs_that_nobody_sees_do_not_jump_and_are_found_where_they_are(tmp_path):
     """A knee is raised by 100 degrees meanwhile: smoothing leads it there, backwards in time."""
     covered = "stages.corrupt before background={use: corrupt, events: [{what: covered, first: 4, count: 10}]}"

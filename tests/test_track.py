@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from mocapflow.errors import ComponentFailed
+from mocapflow.loop import settle
 from mocapflow.runner import run
 from mocapflow.store import Store
 from tests.fixtures.stores import STAGES, load, run_tiny, same, the_track, write_pipeline, write_recording
@@ -153,9 +154,33 @@ def test_lost_frames_keep_the_prediction_and_say_so(tmp_path):
         "frame 5: lost, fewer than 2 views; the prediction is kept",
     ]
     assert sum(note.startswith("frame 3: cam01 not usable: ") for note in track.notes) == 1
+    assert [note for note in track.notes if "anew" in note] == [
+        "frame 6: begun anew, like a first frame: the frames before do not show the person"
+    ]
     run_tiny(path, tmp_path / "two", frames=5)  # resumed between lost frames
     run_tiny(path, tmp_path / "two")
     assert same(track, the_track(tmp_path / "two"))
+
+
+def test_the_first_frame_that_shows_the_person_begins_like_a_first(tmp_path, monkeypatch):
+    """However many lost frames come before it: with the first segmenter, and without a past."""
+    begun = []
+
+    def spy(frame, state, past, *rest):
+        begun.append((frame.index, len(past.moments)))
+        return settle(frame, state, past, *rest)
+
+    monkeypatch.setattr("mocapflow.track.settle", spy)
+    clip = write_recording(tmp_path / "clip", frames=8)
+    for index in (0, 1, 4, 5):
+        (clip / "videos" / "cam01" / f"{index:06}.png").write_bytes(b"")
+    stages = SHORT | {"track": SHORT["track"] | {"first_segmenter": "tiny_segmenter"}}
+    path = write_pipeline(tmp_path, clip, stages=stages)
+    run_tiny(path, tmp_path)
+    assert begun == [(2, 0), (2, 0), (3, 2), (6, 0), (6, 0), (7, 2)]
+    assert [note for note in the_track(tmp_path).notes if "anew" in note] == [
+        f"frame {index}: begun anew, like a first frame: the frames before do not show the person" for index in (2, 6)
+    ]
 
 
 def test_without_a_garment_there_is_no_cloth(tmp_path):

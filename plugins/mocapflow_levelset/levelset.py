@@ -88,7 +88,8 @@ class LevelSet(Segmenter):
         far off, from the second turn on.
         """
         surface = scene.surface(state.estimate.pose, state.cloth)
-        last = {s.camera: s for s in state.segmentation.of(PERSON)} if turn.index else {}
+        # a view in which nobody was begins anew from the model, which may stand in it by now
+        last = {s.camera: s for s in state.segmentation.of(PERSON) if len(s.zero_level[0])} if turn.index else {}
         parts = {c: self._moved(surface, scene.cameras[c], past, turn) for c in last}
         due = [c for c in np.flatnonzero(frame.usable).tolist() if (part := parts.get(c)) is None or part.any()]
         if last and not due:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field, NonNegativeFloat
+from pydantic import Field
 
 from mocapflow.components import Predictor
 from mocapflow.data import Frame, Past, Pose
@@ -18,7 +18,6 @@ class ConstantVelocity(Predictor):
     name = "constant_velocity"
 
     kept: Annotated[float, Field(ge=0, le=1)] = 1.0  # share of the velocity that lasts; less holds back a jumpy track
-    longest_steps: NonNegativeFloat = 5.0  # intervals it dares to look ahead after lost frames
 
     def predict(self, frame: Frame, past: Past, scene: Scene) -> Pose:
         """Return the last pose moved on to the time of the frame; the last pose itself if there is only one."""
@@ -26,4 +25,4 @@ class ConstantVelocity(Predictor):
         if step == 0:
             return past.moments[-1].pose
         ahead = (frame.time - past.moments[-1].time) / step
-        return continued(past, self.kept * min(max(ahead, 0.0), self.longest_steps))
+        return continued(past, self.kept * max(ahead, 0.0))

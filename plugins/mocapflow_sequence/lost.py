@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from mocapflow.data import blind
 from mocapflow.records import Bool
 from mocapflow.results import Track
 
@@ -14,6 +15,7 @@ def lost_rows(track: Track) -> Bool:
 
 
 def is_lost(track: Track, row: int) -> bool:
-    """Return True where nothing was fitted: the loop made no turn, no view was usable, or nothing is known."""
+    """Return True where nothing was fitted: no turn, no usable view, none that told anything, or nothing is known."""
     usable, known = track.usable[row], np.isfinite(track.covariance[row])
-    return bool(track.iterations[row] == 0 or (len(usable) and not usable.any()) or not known.all())
+    unused = (len(usable) and not usable.any()) or blind(track.observed[row])
+    return bool(track.iterations[row] == 0 or unused or not known.all())

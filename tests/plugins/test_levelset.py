@@ -173,6 +173,19 @@ def test_a_person_outside_a_view_gives_an_empty_silhouette(scene, pose):
         assert all((s.distance == -12).all() for s in found.silhouettes)
 
 
+def test_a_view_in_which_nobody_was_begins_anew_from_the_model(scene, pose):
+    away = moved(pose, np.concatenate([[0, 0, 0, 0, 0, 40.0], np.zeros(len(pose.angles))]))
+    frame, past = pictures.tiny_frame(scene, pose), Past()
+    empty = LevelSet().segment(frame, pictures.tiny_state(scene, away, pose), past, scene, FIRST)
+    here = pictures.tiny_state(scene, pose)
+    found = LevelSet().segment(frame, replace(here, segmentation=empty), past, scene, shifted(scene, here, 40.0))
+    afresh = LevelSet().segment(frame, here, past, scene, FIRST)
+    assert min(overlaps(found, scene, pose)) > 0.9
+    assert all(
+        np.array_equal(a.distance, b.distance) for a, b in zip(found.silhouettes, afresh.silhouettes, strict=True)
+    )
+
+
 def test_the_contour_is_sub_pixel():
     """A disc drawn with soft edges at a place between pixels is found to 0.15 px in the mean."""
     rows, columns = np.mgrid[:160, :160]

@@ -45,12 +45,27 @@ def test_constant_velocity_repeats_the_motion_as_often_as_frames_passed(steps: f
     assert np.allclose(guess.root, truth.root, atol=1e-12) and np.allclose(guess.angles, truth.angles)
 
 
-def test_a_share_of_the_velocity_can_be_kept_and_a_long_gap_is_bounded() -> None:
-    past, scene = make_past(FIRST, SECOND), make_scene()
-    half = ConstantVelocity(kept=0.5).predict(frame(2 / 30), past, scene)
+def test_a_share_of_the_velocity_can_be_kept() -> None:
+    half = ConstantVelocity(kept=0.5).predict(frame(2 / 30), make_past(FIRST, SECOND), make_scene())
     assert np.allclose(half.angles, SECOND.angles + 0.025)
-    far = ConstantVelocity(longest_steps=4).predict(frame(10.0), past, scene)
-    assert np.allclose(far.angles, SECOND.angles + 0.2)
+
+
+@pytest.mark.parametrize("rate", [10.0, 30.0, 120.0])
+def test_while_nothing_is_seen_the_motion_dies_away_at_any_frame_rate(rate: float) -> None:
+    speed, lasts = 6.0, 0.05  # rad/s, s
+    slow = moved(FIRST, np.full(18, speed / rate))
+    past = make_past(FIRST, slow, 1 / rate)
+    for index in range(2, int(rate) + 2):  # a second
+        pose = ConstantVelocity().predict(frame(index / rate), past, make_scene())
+        past = past.after(Moment(time=index / rate, pose=pose, cloth=NO_CLOTH, observed=np.zeros(12)), {})
+    steps = 1 / (1 - np.exp(-1 / rate / lasts))  # of a geometric series: the first whole, each after it less
+    assert past.moments[-1].pose.angles - slow.angles == pytest.approx(speed / rate * steps, rel=1e-6)
+
+
+def test_who_is_seen_again_does_not_go_on_from_where_nobody_saw_him() -> None:
+    first, second = make_past(FIRST, SECOND).moments
+    blind, seen = replace(first, observed=np.zeros(12)), replace(second, observed=np.ones(12))
+    assert ConstantVelocity().predict(frame(2 / 30), Past(moments=(blind, seen)), make_scene()) is SECOND
 
 
 def test_an_angle_that_jumped_does_not_go_on() -> None:

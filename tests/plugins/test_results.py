@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from mocapflow_sequence import layout, runjson, tables
 from mocapflow_sequence.export import Export
+from mocapflow_sequence.lost import lost_rows
 from mocapflow_sequence.smooth import Smooth
 from results_scene import DEMO, ball_body, cameras, demo_scene, stepping
 
@@ -116,6 +117,13 @@ def test_joint_centres_read_back_in_the_world(scene: Scene, recording: Recording
     assert rate == pytest.approx(30)
     here = markers.world_from_opensim(places[3])
     assert np.abs(here - kinematics.joint_positions(scene.body, joints)).max() < 1e-6
+
+
+def test_a_frame_that_shows_nobody_is_lost(scene: Scene) -> None:
+    track = stepping(scene.body, 4)
+    observed = track.observed.copy()
+    observed[2] = 1e-12  # rounding, of priors alone
+    assert lost_rows(replace(track, observed=observed)).tolist() == [False, False, True, False]
 
 
 def test_run_json_says_how_it_was_made_and_how_it_went(scene: Scene, recording: Recording, tmp_path: Path) -> None:
