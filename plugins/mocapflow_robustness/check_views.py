@@ -17,7 +17,6 @@ from mocapflow.records import F32
 from mocapflow_robustness import doubts
 from mocapflow_robustness.thumbnails import Thumbnails, thumbnail, thumbnails
 
-LEAST_LONGEST = 4  # frames, where few of them make a second
 Factor = Annotated[float, Field(gt=1)]
 
 
@@ -49,7 +48,7 @@ class CheckViews(Stage):
 
     def longest(self, frame_rate: float) -> int:
         """Return of how many frames a burst may be."""
-        return max(round(self.longest_s * frame_rate), LEAST_LONGEST)
+        return max(round(self.longest_s * frame_rate), 1)
 
     def doubt(self, seen: Thumbnails, room: F32, frame_rate: float, names: Sequence[str]) -> npt.NDArray[np.str_]:
         """Return (T, C) why a picture is not to be trusted, "" where it is.
@@ -62,7 +61,7 @@ class CheckViews(Stage):
         """
         empty = doubts.blank(seen.grey, room)
         foreign, like = doubts.lookalike(seen.grey, room)
-        old = doubts.repeated(np.where(empty | foreign, np.nan, seen.news))
+        old = doubts.repeated(np.where(empty | foreign, np.nan, seen.news)) & doubts.peopled(seen.grey, room)
         settled = doubts.bridged(seen.grey, seen.there & ~(empty | foreign | old))
         torn = doubts.bursts(settled, self.longest(frame_rate), self.jump, self.joint_jump)
         said = np.full(empty.shape, "", "U64")

@@ -11,7 +11,8 @@ LEAST_CONTRAST = 1.5  # grey levels, standard deviation of a thumbnail that show
 FAINT = 0.1  # share of the usual contrast below which nothing is shown
 NEARER = 0.5  # a picture is of another camera if it differs from that one's room by less than this share
 NO_NEWS = 0.1  # share of the usual news in a picture that repeats the one before
-SOME_NEWS = 0.5  # share that other cameras then have, or the person just stands still
+SOME_NEWS = 0.5  # share that most other cameras then have, or the person just stands still
+NOBODY = 0.1  # share of the contrast to its room that a camera's pictures with most in them have; below, nobody is seen
 FAST = 4  # times the usual step: no body moves much faster than that, from frame to frame
 NEIGHBOURS = 4  # steps before and after a burst that say how fast things move
 
@@ -37,10 +38,20 @@ def lookalike(grey: F32, room: F32) -> tuple[Bool, npt.NDArray[np.intp]]:
 
 
 def repeated(news: F64) -> Bool:
-    """Return (T, C) which pictures repeat the one before though some other camera sees things move."""
-    share = np.nan_to_num(news / np.nanmedian(news, axis=0), nan=1.0)
-    old: Bool = (share < NO_NEWS) & (share > SOME_NEWS).any(axis=1, keepdims=True)
+    """Return (T, C) which pictures repeat the one before though at least half of the cameras see things move."""
+    known = np.isfinite(news)
+    usual = np.array([np.median(news[rows, camera]) if rows.any() else 1.0 for camera, rows in enumerate(known.T)])
+    share = news / np.maximum(usual, 1e-9)
+    moving = (known & (share > SOME_NEWS)).sum(axis=1, keepdims=True) >= 0.5 * known.sum(axis=1, keepdims=True)
+    old: Bool = known & (share < NO_NEWS) & moving
     return old
+
+
+def peopled(grey: F32, room: F32) -> Bool:
+    """Return (T, C) which thumbnails differ from the empty room (C, S, S): an empty one has no news either."""
+    off = contrast(grey - room)  # a person dims the whole room, too
+    shown: Bool = off > NOBODY * np.percentile(off, 90, axis=0)
+    return shown
 
 
 def bursts(grey: F32, longest: int, strong: float, weak: float) -> Bool:

@@ -1,5 +1,6 @@
 """Wrong pictures among right ones: which are found, and that motion is not taken for one."""
 
+import shutil
 from dataclasses import replace
 
 import cv2
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 from mocapflow_robustness.check_views import CheckViews
 from mocapflow_robustness.corrupt import Corrupt
-from mocapflow_robustness.doubts import bridged, bursts
+from mocapflow_robustness.doubts import bridged, bursts, repeated
 from mocapflow_robustness.events import Event
 
 from mocapflow.data import Frame, ViewChecks
@@ -81,6 +82,34 @@ def test_several_things_at_once(clip):
     assert {index for index, camera in told if camera == 2} == set(range(40, FRAMES))
     assert {why for (_, camera), why in told.items() if camera == 2} == {"the picture looks like one of cam01"}
     assert not any(camera == 1 for _, camera in told)
+
+
+def test_a_view_that_the_person_leaves_does_not_repeat_itself(clip, tmp_path):
+    """A codec shows an empty room as the same picture again and again."""
+    folder = tmp_path / "clip"
+    shutil.copytree(clip, folder)
+    empty = np.clip(rooms()[1] - 4, 0, 255).astype(np.uint8)
+    for index in range(40, FRAMES):
+        cv2.imwrite(str(folder / f"videos/cam02/{index:06}.png"), empty)
+    assert found(folder) == {}
+
+
+def test_who_stands_still_is_not_frozen_though_one_view_sees_a_bystander_move():
+    news = np.random.default_rng(0).uniform(0.8, 1.2, (20, 4))
+    news[10:15, :3] = 0.01
+    assert not repeated(news).any()
+    news[10:15, 2] = 1.0
+    assert np.argwhere(repeated(news)).tolist() == [[row, view] for row in range(10, 15) for view in (0, 1)]
+    assert not repeated(np.full((1, 4), np.nan)).any()  # a recording of one frame
+
+
+@pytest.mark.parametrize("rate", [7.5, 10.0, 30.0, 120.0])
+def test_how_long_a_burst_may_be_does_not_depend_on_the_frame_rate(rate):
+    """At 10 frames a second half a second of a kick is five frames."""
+    assert CheckViews().longest(rate) == pytest.approx(0.17 * rate, abs=0.5)
+    gesture = np.concatenate([drifting(20, 0, 0), 8 + drifting(0, 0, round(0.5 * rate)), drifting(20, 0, 0)])
+    wrong = bursts(gesture, longest=CheckViews().longest(rate), strong=2, weak=1.3)
+    assert not wrong.any()
 
 
 def drifting(still, moving, later):
