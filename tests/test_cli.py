@@ -5,12 +5,14 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from mocapflow_sequence import layout, tables
 from typer.testing import CliRunner
 
 from mocapflow import cli, runner
-from mocapflow.commands.again import Invocation, remember
+from mocapflow.commands.again import FILE, Invocation, remember
 from mocapflow.commands.progress import reporter
 from mocapflow.shipped import shipped
+from tests.fixtures.stores import STAGES, write_pipeline, write_recording
 
 CLIP = shipped("examples", "data", "skirt_steps")
 
@@ -141,6 +143,40 @@ def test_what_the_pipeline_compares_with_is_compared_with_again(call, tmp_path):
     missing = call("evaluate", str(tmp_path))
     assert missing.stderr.startswith(f"error: {CLIP / 'truth'}  there is nothing to compare with\n")
     assert "--set stages.evaluate.reference=keypoints" in missing.stderr
+
+
+def test_an_export_leaves_what_the_run_folder_remembers(call, tmp_path):
+    path = write_pipeline(tmp_path, write_recording(tmp_path / "clip", 3), stages={**STAGES, "export": "export"})
+    assert call("run", path.name, "--out", "out", "--set", "stages.note=tiny_export").exit_code == 0
+    before = Path("out", FILE).read_text()
+    exported = call("export", "out", "--format", "trc")
+    assert exported.exit_code == 0, exported.output
+    assert "track: from the store" in exported.stderr and "note: " not in exported.stderr
+    assert Path("out", FILE).read_text() == before
+    assert "\nnote " in call("status", "out").stdout
+
+
+@pytest.mark.parametrize("truth", [[], ["--truth", str(CLIP / "truth/angles.csv")]])
+def test_a_comparison_is_made_as_in_the_run(call, tmp_path, truth):
+    known = tables.read_columns(CLIP / "truth/angles.csv")
+    late = {name: np.roll(column, 8) if name != "frame" else column for name, column in known.items()}
+    tables.write_columns(layout.place(tmp_path, layout.ANGLES), {**late, "time": known["frame"] / 30})
+    lags = []
+    for longest in (0.4, 0.1):  # s
+        changes = (f"stages.evaluate.longest_lag_s={longest}",)
+        remember(Invocation(str(shipped("pipelines", "bare.yaml")), str(CLIP), changes, None, "store"), tmp_path)
+        assert call("evaluate", str(tmp_path), *truth).exit_code == 0
+        lags.append(json.loads(layout.place(tmp_path, layout.FINDINGS).read_text())["lag_frames"])
+    assert lags[0] == pytest.approx(8, abs=0.5)
+    assert lags[1] is None  # none is found so near
+
+
+def test_a_run_folder_from_elsewhere_is_compared_with_what_is_given(call, tmp_path):
+    known = tables.read_columns(CLIP / "truth/angles.csv")
+    tables.write_columns(layout.place(tmp_path, layout.ANGLES), {**known, "time": known["frame"] / 30})
+    remember(Invocation("/elsewhere/bare.yaml", None, (), None, "store"), tmp_path)
+    assert call("evaluate", str(tmp_path)).stderr.startswith("error: /elsewhere/bare.yaml  there is no such file")
+    assert call("evaluate", str(tmp_path), "--truth", str(CLIP / "truth/angles.csv")).exit_code == 0
 
 
 def test_plugins(call):

@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from mocapflow.commands.again import recall
-from mocapflow.errors import RecordingError
+from mocapflow.errors import MocapflowError, RecordingError
 
 Run = Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")]
 Truth = Annotated[
@@ -25,16 +25,19 @@ COLUMNS = ("angle", "frames", "rms_deg", "mae_deg", "offset_deg", "max_deg", "wo
 
 
 def evaluate(run: Run, truth: Truth = None) -> None:
-    """Compare the joint angles of a run with known ones: those its own pipeline names, unless others are given."""
+    """Compare the joint angles of a run with known ones: those its own pipeline names, unless others are given.
+
+    Settings are those of the run. A folder whose pipeline is not here is compared with what is given by the defaults.
+    """
     from mocapflow_sequence.evaluate import evaluate_run
 
-    reference, missing = (truth, "") if truth else _own_reference(run)
+    reference, missing, longest_lag_s = _comparison(run, truth)
     if reference is None or not reference.is_file():
         folder = "keypoints are compared in a run: --set stages.evaluate.reference=keypoints"
         known = reference is not None and reference.is_dir()
         hint = missing or (folder if known else "name a file of known angles with --truth")
         raise RecordingError("there is nothing to compare with", where=str(reference or run), hint=hint)
-    evaluation = evaluate_run(run, reference)
+    evaluation = evaluate_run(run, reference, longest_lag_s)
     if not evaluation.rows:
         raise RecordingError("; ".join(evaluation.notes), where=str(reference))
     typer.echo(f"compared with {evaluation.reference}")
@@ -44,18 +47,24 @@ def evaluate(run: Run, truth: Truth = None) -> None:
     typer.echo("all figures: results/evaluation.csv in the run folder")
 
 
-def _own_reference(run: Path) -> tuple[Path | None, str]:
-    """Return what the run's pipeline compares with, or why there is nothing."""
-    from mocapflow_sequence.evaluate import Evaluate, chosen
+def _comparison(run: Path, truth: Path | None) -> tuple[Path | None, str, float]:
+    """Return what a run is compared with, or why there is nothing, and the longest lag to look for (s)."""
+    from mocapflow_sequence.evaluate import LONGEST_LAG, Evaluate, chosen
 
-    pipeline = recall(run).load()
-    wanted = [named.stage.reference for named in pipeline.stages if isinstance(named.stage, Evaluate)]
-    return chosen(pipeline.recording, wanted[0] if wanted else "")
+    try:
+        pipeline = recall(run).load()
+    except MocapflowError:
+        if truth is None:
+            raise
+        return truth, "", LONGEST_LAG
+    stage = next((named.stage for named in pipeline.stages if isinstance(named.stage, Evaluate)), Evaluate())
+    reference, missing = (truth, "") if truth else chosen(pipeline.recording, stage.reference)
+    return reference, missing, stage.longest_lag_s
 
 
 def export(run: Run, format_: Format) -> None:
     """Write the track of a run in other formats, into the run folder."""
-    from mocapflow.commands.running import execute
+    from mocapflow.commands.running import carry_out
     from mocapflow.results import Evaluation, Files
     from mocapflow.wiring import makes
 
@@ -63,7 +72,8 @@ def export(run: Run, format_: Format) -> None:
     writers = [named for named in invocation.load().stages if issubclass(makes(named.stage), Files | Evaluation)]
     silent = [f"stages.{named.label}=null" for named in writers]
     wanted = f"stages.export={{use: export, formats: [{', '.join(format_)}]}}"
-    typer.echo(execute(invocation.changed(*silent, wanted), run, fresh=False))
+    exporting = invocation.changed(*silent, wanted)
+    typer.echo(carry_out(exporting.load(), exporting, run))
 
 
 def view(

@@ -14,6 +14,7 @@ from mocapflow.commands.workers import Scheduler, Workers, finished
 from mocapflow.errors import PipelineError
 
 if TYPE_CHECKING:
+    from mocapflow.pipeline import Pipeline
     from mocapflow.runner import RunSummary
 
 File = Annotated[Path, typer.Argument(metavar="PIPELINE", help="A pipeline file (.yaml).")]
@@ -113,11 +114,16 @@ def track(invocation: Invocation, out: Path, label: str) -> None:
 
 
 def execute(invocation: Invocation, out: Path, fresh: bool) -> RunSummary:
-    """Run what an invocation says and return the summary."""
+    """Run what an invocation says, have the run folder remember it, and return the summary."""
     pipeline = invocation.load()
+    remember(invocation, out)
+    return carry_out(pipeline, invocation, out, fresh)
+
+
+def carry_out(pipeline: Pipeline, invocation: Invocation, out: Path, fresh: bool = False) -> RunSummary:
+    """Run the pipeline of an invocation and return the summary."""
     from mocapflow import runner
 
-    remember(invocation, out)
     with noted(reporter(), out) as report:
         store = Path(invocation.store)
         return runner.run(pipeline, store=store, url=invocation.url, out=out, fresh=fresh, report=report)

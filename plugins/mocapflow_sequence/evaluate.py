@@ -68,13 +68,13 @@ def chosen(recording: Path, wanted: str) -> tuple[Path | None, str]:
     return None, f"reference/ holds {names}: name one, e.g. --set stages.evaluate.reference=reference/{there[0].name}"
 
 
-def evaluate_run(run_folder: Path, truth: Path) -> Evaluation:
+def evaluate_run(run_folder: Path, truth: Path, longest_lag_s: float = LONGEST_LAG) -> Evaluation:
     """Compare the files of a run folder with a reference file; writes into the run folder.
 
     Raises:
         RecordingError: the run folder has no angles, or the reference can't be read.
     """
-    return evaluate(ours.of_folder(run_folder), truth, run_folder)
+    return evaluate(ours.of_folder(run_folder), truth, run_folder, longest_lag_s)
 
 
 def evaluate(own: Ours, path: Path, folder: Path, longest_lag_s: float = LONGEST_LAG) -> Evaluation:
