@@ -45,6 +45,7 @@ class Cell:
     pipeline: Path
     recording: Path
     changes: tuple[str, ...]  # as in --set
+    folder: Path  # of the experiment: paths in changes start there
     frames: str | None
 
 
@@ -73,10 +74,11 @@ def load_experiment(path: Path, recordings: Sequence[Path] = (), frames: str | N
         chosen = {target: value for _, level in combination for target, value in level.items()}
         changes = said.change | chosen
         pipeline = str(changes.pop(PIPELINE, said.pipeline))
+        file = resolver.file(pipeline, (PIPELINE,))
         written = tuple(f"{target}={json.dumps(value)}" for target, value in changes.items())
         cells += [
-            Cell(variant, name, resolver.file(pipeline, (PIPELINE,)), folder, written, frames or said.frames)
-            for name, folder in zip(names, folders, strict=True)
+            Cell(variant, name, file, recording, written, path.parent, frames or said.frames)
+            for name, recording in zip(names, folders, strict=True)
         ]
     return tuple(cells)
 

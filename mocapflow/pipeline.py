@@ -101,6 +101,7 @@ def load_pipeline(
     *,
     recording: Path | None = None,
     changes: Iterable[str] = (),
+    folder: Path = Path(),
     frames: slice | None = None,
 ) -> Pipeline:
     """Read a pipeline file and resolve every name in it.
@@ -110,12 +111,13 @@ def load_pipeline(
         registry: where components are looked up; None: the installed plugins and those the file names.
         recording: replaces the recording of the file.
         changes: `PATH=VALUE` as in `--set`.
+        folder: where relative paths in changes start.
         frames: replaces the frames of the file.
 
     Raises:
         MocapflowError: what is wrong, at which line, and what exists instead.
     """
-    document = read(Path(path), changes)
+    document = read(Path(path), changes, folder)
     plain = Resolver(document, Registry())
     said = plain.build(PipelineFile, document.values, ())
     assert isinstance(said, PipelineFile)

@@ -13,8 +13,10 @@ from mocapflow.documents import Document, Place, Steps, changed, dotted
 from mocapflow.errors import PipelineError, alternatives
 
 
-def read(path: Path, changes: Iterable[str] = ()) -> Document:
+def read(path: Path, changes: Iterable[str] = (), folder: Path = Path()) -> Document:
     """Read a YAML file, the one it extends, and changes `PATH=VALUE` (of the command line) on top.
+
+    Relative paths in changes start at a folder, those in a file at its own.
 
     Raises:
         PipelineError: no such file, not YAML, or a change of something that is not there.
@@ -24,7 +26,7 @@ def read(path: Path, changes: Iterable[str] = ()) -> Document:
         document = _extended(document, path)
     for change in changes:
         target, equals, text = change.partition("=")
-        place = Place(f"--set {change}", Path())
+        place = Place(f"--set {change}", folder)
         if not equals:
             raise PipelineError("a change is written PATH=VALUE", where=place.text)
         value = _parse(text, place.text, None)

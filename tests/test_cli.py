@@ -156,6 +156,15 @@ def test_an_export_leaves_what_the_run_folder_remembers(call, tmp_path):
     assert "\nnote " in call("status", "out").stdout
 
 
+def test_paths_of_changes_start_where_the_run_was_begun(call, tmp_path, monkeypatch):
+    (tmp_path / "clip").symlink_to(CLIP)
+    Path("start.yaml").write_text("stages:\n  start: start_from_file\n")
+    assert call("run", "start.yaml", "--set", "recording=clip", "--out", "out").exit_code == 0
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    assert " hit " in call("status", "../out").stdout
+
+
 @pytest.mark.parametrize("truth", [[], ["--truth", str(CLIP / "truth/angles.csv")]])
 def test_a_comparison_is_made_as_in_the_run(call, tmp_path, truth):
     known = tables.read_columns(CLIP / "truth/angles.csv")

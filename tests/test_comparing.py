@@ -1,6 +1,7 @@
 """The command `compare`: a cell that fails is told, and the others go on."""
 
 import csv
+import os
 import sys
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import yaml
 from typer.testing import CliRunner
 
 from mocapflow import cli
-from tests.fixtures.stores import STAGES, write_pipeline, write_recording
+from tests.fixtures.stores import PLUGIN, STAGES, write_pipeline, write_recording
 
 
 @pytest.fixture
@@ -23,8 +24,8 @@ def compare(tmp_path, monkeypatch):
     grid["factors"] = {"draper": {"one": None, "other": {"stages.track.draper": "other_draper"}}}
     Path("grid.yaml").write_text(yaml.safe_dump(grid))
 
-    def invoke(*words):
-        words = ("compare", "grid.yaml", "--out", "grid", *words)
+    def invoke(*words, file="grid.yaml"):
+        words = ("compare", file, "--out", "grid", *words)
         monkeypatch.setattr(sys, "argv", ["mocapflow", *words])
         return CliRunner().invoke(cli.app, words, prog_name="mocapflow")
 
@@ -54,6 +55,17 @@ def test_a_cell_that_fails_does_not_end_the_others(compare, monkeypatch):
     monkeypatch.delenv("TINY_RAISE_AT")
     assert compare().exit_code == 0
     assert runs()["one", "long"] == (7, "")
+
+
+def test_paths_of_changes_start_at_the_folder_of_the_file(compare, tmp_path):
+    there = tmp_path / "not/here"
+    there.mkdir(parents=True)
+    grid = yaml.safe_load(Path("grid.yaml").read_text())
+    grid |= {"pipeline": "../../tiny.yaml", "recordings": ["../../short"]}
+    grid["change"] = {"plugins": [os.path.relpath(PLUGIN, there)]}
+    (there / "grid.yaml").write_text(yaml.safe_dump(grid))
+    done = compare(file="not/here/grid.yaml")
+    assert done.exit_code == 0, done.output
 
 
 def test_what_cannot_be_loaded_is_told_before_anything_runs(compare):

@@ -255,7 +255,8 @@ def shipped_files(experiments):
 @pytest.mark.parametrize("file", shipped_files(experiments=True), ids=lambda file: file.name)
 def test_every_cell_of_a_shipped_experiment_loads(file):
     for cell in load_experiment(file):
-        assert wire(load_pipeline(cell.pipeline, load_registry(), recording=cell.recording, changes=cell.changes))
+        options = {"recording": cell.recording, "changes": cell.changes, "folder": cell.folder}
+        assert wire(load_pipeline(cell.pipeline, load_registry(), **options))
 
 
 @pytest.mark.parametrize("file", shipped_files(experiments=False), ids=lambda file: file.name)

@@ -25,14 +25,19 @@ class Invocation:
     frames: str | None
     store: str  # a folder
     url: str | None = None  # where its results are shared
+    folder: str = ""  # paths in changes start there; empty: the working directory
 
     def load(self) -> Pipeline:
         """Return the pipeline."""
         from mocapflow.pipeline import load_pipeline
 
-        recording = Path(self.recording) if self.recording else None
-        frames = parse_frames(self.frames)
-        return load_pipeline(Path(self.pipeline), recording=recording, changes=self.changes, frames=frames)
+        return load_pipeline(
+            Path(self.pipeline),
+            recording=Path(self.recording) if self.recording else None,
+            changes=self.changes,
+            folder=Path(self.folder),
+            frames=parse_frames(self.frames),
+        )
 
     def absolute(self) -> Invocation:
         """Return the same for any working directory."""
@@ -41,6 +46,7 @@ class Invocation:
             pipeline=str(Path(self.pipeline).absolute()),
             recording=self.recording and str(Path(self.recording).absolute()),
             store=str(Path(self.store).absolute()),
+            folder=str(Path(self.folder).absolute()),
         )
 
     def changed(self, *changes: str) -> Invocation:

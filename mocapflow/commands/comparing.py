@@ -84,6 +84,7 @@ def invocation(cell: Cell, store: str, url: str | None = None) -> Invocation:
         pipeline=str(cell.pipeline),
         recording=str(cell.recording),
         changes=cell.changes,
+        folder=str(cell.folder),
         frames=cell.frames,
         store=store,
         url=url,
