@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -86,7 +87,7 @@ def load_experiment(path: Path, recordings: Sequence[Path] = (), frames: str | N
 def levels(said: ExperimentFile, factor: str, document: Document) -> list[tuple[str, Mapping[str, Any]]]:
     """Return the levels of a factor with what each changes."""
     for name in said.factors[factor]:
-        if "/" in name or "+" in name:
+        if "/" in name or "+" in name or not name.strip("."):
             where = document.place(("factors", factor, name)).text
             raise PipelineError(f"a level can't be called '{name}': it names folders and columns", where=where)
     return [(name, changes or {}) for name, changes in said.factors[factor].items()]
@@ -98,9 +99,9 @@ def short_names(folders: Sequence[Path]) -> list[str]:
     Raises:
         PipelineError: two folders have the same name even so, or are the same.
     """
-    last = [folder.name for folder in folders]
-    names = [f"{folder.parent.name}-{name}" if last.count(name) > 1 else name
-             for folder, name in zip(folders, last, strict=True)]  # fmt: skip
+    paths = [Path(os.path.abspath(folder)) for folder in folders]  # `.` has no name
+    last = [path.name for path in paths]
+    names = [f"{path.parent.name}-{path.name}" if last.count(path.name) > 1 else path.name for path in paths]
     for name in names:
         if names.count(name) > 1:
             same = [str(folder) for folder, other in zip(folders, names, strict=True) if other == name]

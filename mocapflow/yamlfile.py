@@ -64,11 +64,20 @@ def _parse(text: str, file: str, path: Path | None) -> Document:
             return {key: build(value, (*steps, key)) for key, value in keys(node, steps)}
         if isinstance(node, yaml.SequenceNode):
             return [build(item, (*steps, index)) for index, item in enumerate(node.value)]
-        return loader.construct_object(node)
+        return plain(node)
+
+    def plain(node: yaml.Node) -> Any:
+        base_60 = node.tag.endswith((":int", ":float")) and ":" in node.value  # of YAML 1.1: it makes 10:20 620
+        if base_60 or node.tag.endswith(":timestamp"):
+            return node.value
+        try:
+            return loader.construct_object(node)
+        except ValueError as error:
+            raise PipelineError(f"not YAML: {error}", where=mark(node.start_mark)) from None
 
     def keys(node: yaml.MappingNode, steps: Steps) -> Iterable[tuple[str, yaml.Node]]:
         for key_node, value in node.value:
-            key: Hashable = loader.construct_object(key_node)
+            key: Hashable = plain(key_node)
             where = mark(key_node.start_mark)
             if not isinstance(key, str):
                 raise PipelineError(f"a name should be text, not {key!r}: put it in quotes", where=where)
@@ -85,6 +94,8 @@ def _parse(text: str, file: str, path: Path | None) -> Document:
         where = mark(error.problem_mark) if error.problem_mark else file
         context = f" ({error.context})" if error.context else ""
         raise PipelineError(f"not YAML: {error.problem}{context}", where=where) from None
+    except RecursionError:
+        raise PipelineError("not YAML: values inside of values without an end", where=file) from None
     except yaml.YAMLError as error:
         raise PipelineError(f"not YAML: {str(error).splitlines()[0]}", where=file) from None
 

@@ -45,9 +45,28 @@ def test_every_combination_on_every_recording(tmp_path: Path) -> None:
     )
 
 
+def test_a_date_in_a_change_is_text(tmp_path: Path) -> None:
+    text = GRID.replace("change: {stages.overlay: null}", "change: {stages.track.file: 2024-02-03}")
+    assert load_experiment(written(tmp_path, text))[0].changes == ('stages.track.file="2024-02-03"',)
+
+
+def test_frames_are_text_without_quotes(tmp_path: Path) -> None:
+    cells = load_experiment(written(tmp_path, GRID.replace("frames: 0:20", "frames: 10:20")))
+    assert cells[0].frames == "10:20"
+
+
 def test_recordings_of_one_name_are_told_apart(tmp_path: Path) -> None:
     cells = load_experiment(written(tmp_path, GRID), [Path("one/take"), Path("two/take"), Path("three")])
     assert [cell.name for cell in cells[:3]] == ["one-take", "two-take", "three"]
+
+
+def test_a_recording_is_called_by_its_folder_however_it_is_given(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "one" / "take").mkdir(parents=True)
+    monkeypatch.chdir(tmp_path / "one" / "take")
+    cells = load_experiment(written(tmp_path, GRID), [Path(), Path(".."), Path("../../two/take")])
+    assert [cell.name for cell in cells[:3]] == ["one-take", "one", "two-take"]
 
 
 @pytest.mark.parametrize("folders", [("one/take", "one/take"), ("a/x/take", "b/x/take"), ("a/x", "b/x", "a-x")])
@@ -64,6 +83,7 @@ def test_recordings_that_cannot_be_told_apart_are_refused(tmp_path: Path, folder
         ("recordings: [takes/a, b]", "recordings: []", r"grid\.yaml:3:13?.*recordings"),
         ("frames:", "frame:", r"grid\.yaml:4:1  frame: unknown setting of an experiment"),
         ("    rings:", "    a/b:", r"grid\.yaml:8:5  a level can't be called 'a/b'"),
+        ("    rings:", "    ..:", r"grid\.yaml:8:5  a level can't be called '\.\.'"),
     ],
 )
 def test_what_is_wrong_is_told_by_line(tmp_path: Path, old: str, new: str, message: str) -> None:

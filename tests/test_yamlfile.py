@@ -76,6 +76,17 @@ def test_changes_of_the_command_line_come_last(folder):
     assert document.place(("frames", "start")).text == "--set frames={start: 3}"
 
 
+def test_what_looks_like_a_date_or_a_time_is_text(folder):
+    values = read(write("times.yaml", "recording: 2024-02-30\n2024-02-03: 10:20\npoint: 1:20.5\n")).values
+    assert values == {"recording": "2024-02-30", "2024-02-03": "10:20", "point": "1:20.5"}
+
+
+def test_paths_of_changes_start_at_a_folder(folder):
+    document = read(Path("base.yaml"), ["recording=clip", "stages.track.file=a.npz"], Path("/there"))
+    assert document.place(("recording",)).folder == document.place(("stages", "track", "file")).folder == Path("/there")
+    assert document.place(("stages", "track", "use")).folder == Path()
+
+
 def test_a_stage_can_be_put_before_another(folder):
     changes = ["stages.denoise before track=denoise", "stages.corrupt before denoise={use: corrupt}"]
     stages = read(Path("base.yaml"), changes).values["stages"]
@@ -94,6 +105,8 @@ def test_a_stage_can_be_put_before_another(folder):
         ("a:\n\tb: 1", "bad.yaml:2:1  not YAML: found character '\\t' that cannot start any token"
          " (while scanning for the next token)"),
         ("a: 1\na: 2", "bad.yaml:2:1  'a' is written twice"),
+        ("a: &a [*a]", "bad.yaml  not YAML: values inside of values without an end"),
+        ("a: 1\nb: 0x_", "bad.yaml:2:4  not YAML: invalid literal for int() with base 16: ''"),
         ("b: {1: 2}", "bad.yaml:1:5  a name should be text, not 1: put it in quotes"),
         ("- a", "bad.yaml:1:1  the file should hold `name: value` lines"),
         ("a: \x01", "bad.yaml  not YAML: unacceptable character #x0001: special characters are not allowed"),
