@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,8 @@ from mocapflow.measures import garment_of, place_of
 from mocapflow.registry import Registry, load_registry
 from mocapflow.resolve import Resolver
 from mocapflow.yamlfile import read
+
+LABEL = re.compile(r"[\w-]+")  # of a stage
 
 
 class Strict(BaseModel):
@@ -175,6 +178,9 @@ def _parts(said: PartsFile, resolver: Resolver) -> Parts:
 
 def _stage(label: str, value: Any, resolver: Resolver) -> NamedStage:
     steps = ("stages", label)
+    if not LABEL.fullmatch(label):
+        hint = "its name is that of files: letters, digits, _ and -"
+        raise PipelineError(f"no stage can be called '{label}'", where=resolver.place(steps), hint=hint)
     wiring: Mapping[str, str] = {}
     if isinstance(value, dict) and "from" in value:
         wiring, value = value["from"], {key: inner for key, inner in value.items() if key != "from"}

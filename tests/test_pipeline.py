@@ -135,6 +135,10 @@ def test_a_plugin_file_named_by_the_pipeline(folder):
         ("recording: clip", "recording: clip\nspeed: 3",
          "skirt.yaml:2:1  speed: unknown setting of a pipeline (body, frames, garment, mocapflow, parts, plugins, "
          "recording, scale, stages)"),
+        ("smooth: smooth", "a/b: smooth", "skirt.yaml:10:3  no stage can be called 'a/b'\n"
+         "       its name is that of files: letters, digits, _ and -"),
+        ("smooth: smooth", "../x: smooth", "skirt.yaml:10:3  no stage can be called '../x'\n"
+         "       its name is that of files: letters, digits, _ and -"),
         ("recording: clip", "recording: clip\nframes: {start: 9, stop: 2}",
          "skirt.yaml:2:1  frames: 9:2 holds no frame"),
     ],
