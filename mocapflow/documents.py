@@ -11,6 +11,7 @@ from mocapflow.errors import PipelineError, alternatives
 
 Steps = tuple[str | int, ...]  # the way to a value: keys of mappings, indices of lists
 GROUPS = {"frames", "parts"}  # of plain settings, which a file may leave out
+STAGES: Steps = ("stages",)  # names in there are free: a wrong one would be a new one
 BEFORE = " before "  # between a path and the name that its value is put before
 
 
@@ -67,6 +68,9 @@ def changed(document: Document, target: str, new: Document) -> Document:
             hint = alternatives(part, known)
             raise PipelineError(f"there is no '{dotted((*steps, part))}'", where=new.place(()).text, hint=hint)
         steps = (*steps, key)
+    if new.values is None and steps[:-1] == STAGES and isinstance(holder, dict) and steps[-1] not in holder:
+        hint = alternatives(parts[-1], holder)
+        raise PipelineError(f"there is no '{dotted(steps)}' to leave out", where=new.place(()).text, hint=hint)
     holder[steps[-1]] = new.values
     if successor and not _moved(holder, steps[-1], successor):
         message = f"there is no '{dotted((*steps[:-1], successor))}' to put '{parts[-1]}' before"

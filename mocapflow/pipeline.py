@@ -11,6 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt, PositiveInt
 
 from mocapflow.components import BodyModel, Garment, Stage
+from mocapflow.documents import Document, Place, changed
 from mocapflow.errors import PipelineError, RecordingError
 from mocapflow.measures import garment_of, place_of
 from mocapflow.registry import Registry, load_registry
@@ -121,6 +122,8 @@ def load_pipeline(
         MocapflowError: what is wrong, at which line, and what exists instead.
     """
     document = read(Path(path), changes, folder)
+    if frames is not None:
+        document = changed(document, "frames", _given(frames))
     plain = Resolver(document, Registry())
     said = plain.build(PipelineFile, document.values, ())
     assert isinstance(said, PipelineFile)
@@ -128,7 +131,7 @@ def load_pipeline(
     recording = recording or _recording(said, resolver)
     if not recording.is_dir():
         raise RecordingError("there is no such folder", where=str(recording), hint="--recording DIR names another")
-    part = _frames(frames) if frames else said.frames
+    part = said.frames
     if part.stop is not None and part.stop <= part.start:
         raise resolver.located(PipelineError(f"{part.start}:{part.stop} holds no frame"), ("frames",))
     return Pipeline(
@@ -164,8 +167,12 @@ def _recording(said: PipelineFile, resolver: Resolver) -> Path:
     return resolver.file(said.recording, ("recording",))
 
 
-def _frames(part: slice) -> Frames:
-    return Frames(start=part.start or 0, stop=part.stop, step=part.step or 1)
+def _given(part: slice) -> Document:
+    """Return frames as the value that they replace, written in --frames."""
+    said = {"start": part.start, "stop": part.stop, "step": part.step}
+    written = ":".join("" if value is None else str(value) for value in said.values())
+    place = Place(f"--frames {written.removesuffix(':')}", Path())
+    return Document({name: value for name, value in said.items() if value is not None}, {(): place})
 
 
 def _parts(said: PartsFile, resolver: Resolver) -> Parts:

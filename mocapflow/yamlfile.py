@@ -111,11 +111,16 @@ def _extended(child: Document, path: Path) -> Document:
     if "extends" in base.values:
         message = f"{child.values['extends']} itself extends another file; `extends` goes one level deep"
         raise PipelineError(message, where=child.place(("extends",)).text)
+    if "mocapflow" in child.values:
+        base = changed(base, "mocapflow", Document(child.values["mocapflow"], _places(child, ("mocapflow",))))
     changes = child.values.get("change") or {}
     if not isinstance(changes, dict):
         raise PipelineError("change: write `path.to.value: new value` lines", where=child.place(("change",)).text)
     for target, value in changes.items():
-        steps: Steps = ("change", target)
-        places = {at[2:]: place for at, place in child.places.items() if at[:2] == steps}
-        base = changed(base, target, Document(value, places))
+        base = changed(base, target, Document(value, _places(child, ("change", target))))
     return base
+
+
+def _places(document: Document, steps: Steps) -> dict[Steps, Place]:
+    """Return the places of a value and of what is in it, by the way from there."""
+    return {at[len(steps) :]: place for at, place in document.places.items() if at[: len(steps)] == steps}

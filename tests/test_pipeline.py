@@ -80,8 +80,27 @@ def test_frames(folder):
     assert (pipeline.start, pipeline.stop, pipeline.step) == (2, 9, 1)
     pipeline = load("frames={start: 2, stop: 9}", frames=slice(None, 60, 2))
     assert (pipeline.start, pipeline.stop, pipeline.step) == (0, 60, 2)
-    with pytest.raises(MocapflowError, match="skirt.yaml:1:1  frames: 0:0 holds no frame"):
-        load(frames=slice(0, 0))
+
+
+@pytest.mark.parametrize(
+    ("frames", "message"),
+    [
+        (slice(5, 5), "--frames 5:5  frames: 5:5 holds no frame"),
+        (slice(None, 0), "--frames :0  frames: 0:0 holds no frame"),
+        (slice(0, 6, 0), "--frames 0:6:0  frames.step: input should be greater than 0, not 0"),
+    ],
+)
+def test_frames_that_are_given_are_told_as_such(folder, frames, message):
+    Path("skirt.yaml").write_text(TEXT + "frames: {start: 2, step: 2}\n")
+    with pytest.raises(MocapflowError) as caught:
+        load(frames=frames)
+    assert str(caught.value) == message
+
+
+def test_the_version_of_a_file_that_extends_another_counts(folder):
+    Path("other.yaml").write_text("mocapflow: 99\nextends: skirt.yaml\n")
+    with pytest.raises(MocapflowError, match="other.yaml:1:1  mocapflow: input should be 1, not 99"):
+        load_pipeline(Path("other.yaml"), small_plugins.registry())
 
 
 def test_a_stage_is_left_out_by_null(folder):

@@ -137,6 +137,10 @@ def test_what_is_wrong_is_told_with_line_and_column(folder, text, message):
          "       available: 0, 1"),
         ("stages.corrupt before trak=x", "--set stages.corrupt before trak=x  "
          "there is no 'stages.trak' to put 'corrupt' before\n       available: corrupt, track — did you mean 'track'?"),
+        ("stages.trak=null", "--set stages.trak=null  there is no 'stages.trak' to leave out\n"
+         "       available: track — did you mean 'track'?"),
+        ("stages.trak before track=null", "--set stages.trak before track=null  "
+         "there is no 'stages.trak' to leave out\n       available: track — did you mean 'track'?"),
         ("garment.length_m=1", "--set garment.length_m=1  there is no 'garment'\n       available: recording, stages"),
     ],
 )  # fmt: skip
