@@ -27,7 +27,8 @@ class Commands(typer.core.TyperGroup):
             typer.echo(f"error: {error}", err=True)
             raise typer.Exit(error.exit_status) from None
         except KeyboardInterrupt:
-            again = shlex.join(["mocapflow", *sys.argv[1:]])
+            words = [word for word in sys.argv[1:] if word != "--fresh"]  # it would remove what is saved
+            again = shlex.join(["mocapflow", *words])
             typer.echo(f"\ninterrupted; finished frames are saved. To go on: {again}", err=True)
             raise typer.Exit(130) from None
 

@@ -98,6 +98,7 @@ def test_an_interrupt_ends_with_130_and_says_how_to_go_on(call, monkeypatch):
     assert result.stderr == (
         "\ninterrupted; finished frames are saved. To go on: mocapflow run start.yaml --set 'frames={start: 1}'\n"
     )
+    assert call("run", "start.yaml", "--fresh").stderr.endswith("To go on: mocapflow run start.yaml\n")
 
 
 def test_a_bug_shows_its_traceback(call, monkeypatch):
