@@ -40,7 +40,8 @@ def write_plugin(name: str, role: str, folder: Path) -> list[Path]:
     """Write a plugin package into a new folder and return its files.
 
     Raises:
-        PluginError: the name can't be one, nobody wrote templates for the role, or the folder is there already.
+        PluginError: the name can't be one, nobody wrote templates for the role, the folder is there already, or
+            can't be written.
     """
     if role not in KINDS:
         raise PluginError(f"there are no templates for a {role}", hint=alternatives(role, KINDS))
@@ -71,6 +72,11 @@ def write_plugin(name: str, role: str, folder: Path) -> list[Path]:
 
 
 def _write(path: Path, template: Path, words: Mapping[str, str]) -> Path:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(Template(template.read_text(encoding="utf-8")).substitute(words), encoding="utf-8")
+    text = Template(template.read_text(encoding="utf-8")).substitute(words)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        hint = "name another folder with --out"
+        raise PluginError(f"can't be written: {error.strerror}", where=str(path), hint=hint) from None
     return path

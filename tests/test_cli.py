@@ -9,6 +9,7 @@ from mocapflow_sequence import layout, tables
 from typer.testing import CliRunner
 
 from mocapflow import cli, runner
+from mocapflow.commands import results
 from mocapflow.commands.again import FILE, Invocation, remember
 from mocapflow.commands.progress import reporter
 from mocapflow.shipped import shipped
@@ -61,6 +62,11 @@ def test_the_store(call):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
+        (("new", "plugin", "mine", "--out", "start.yaml/mine"),
+         "error: start.yaml/mine/pyproject.toml  can't be written: Not a directory\n"
+         "       name another folder with --out\n"),
+        (("plan", "start.yaml", "--frames", "0:6:0"),
+         "error: --frames 0:6:0  frames.step: input should be greater than 0, not 0\n"),
         (("run", "stert.yaml"), "error: stert.yaml  there is no such file\n"
          "       available: start.yaml — did you mean 'start.yaml'?\n"),
         (("run", "start.yaml", "--set", "stages.start.tilt=3"),
@@ -80,6 +86,35 @@ def test_what_the_user_can_mend_ends_with_2(call, words, message):
     assert result.stderr == message
     assert result.exit_code == 2
     assert result.stdout == ""
+
+
+@pytest.mark.parametrize("days", ["nan", "-1"])
+def test_days_that_are_no_age_prune_nothing(call, days):
+    call("run", "start.yaml")
+    assert "a number of days" in call("cache", "prune", "--days", days).stderr
+    assert call("cache", "list").stdout.startswith("start-")
+    assert "0 results" in call("cache", "prune", "--days", "inf").stdout
+
+
+def test_a_viewer_that_can_not_open_is_told(call, monkeypatch):
+    monkeypatch.setattr(results, "export", lambda run, formats: None)
+    monkeypatch.setattr(sys, "executable", "false")
+    shown = call("view", "out")
+    assert shown.exit_code == 2
+    assert shown.stderr == (
+        "error: out/results/scene.rrd  the viewer ended with status 1\n"
+        "       it needs a display; --no-show only writes this file, which `rerun` opens anywhere\n"
+    )
+
+
+def test_a_prior_that_can_not_be_written(call):
+    angles = str(CLIP / "truth/angles.csv")
+    made = call("prior", "fit", angles, "--out", "nowhere/mine.npz")
+    assert made.exit_code == 1
+    assert made.stderr == (
+        "error: nowhere/mine.npz  can't be written: No such file or directory\n"
+        "       --out names a .npz, in a folder that is there\n"
+    )
 
 
 def test_a_store_that_is_not_there_ends_with_1(call):

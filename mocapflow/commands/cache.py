@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from datetime import datetime, timedelta
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 app = typer.Typer(help="List, explain and prune cached results.", no_args_is_help=True)
 Where = Annotated[Path, typer.Option("--store", help="The store.")]
 DEFAULT = Path("runs/store.zarr")
+DAY = 86400  # s
 
 
 @app.command("list")
@@ -57,6 +58,8 @@ def prune(
     """Remove results; damaged ones that were set aside always go."""
     from mocapflow.store import remove
 
+    if days is not None and not days >= 0:  # so says nan, too
+        raise typer.BadParameter("a number of days, 0 or more", param_hint="--days")
     going = [artifact for artifact in _artifacts(store) if everything or _goes(artifact, days, unfinished)]
     for artifact in filter(_in_use, going):
         typer.echo(f"kept {artifact.path.name}: a run is writing it", err=True)
@@ -76,7 +79,7 @@ def _goes(artifact: Artifact, days: float | None, unfinished: bool) -> bool:
     if days is None:
         return False
     made = datetime.fromisoformat(str(artifact.attributes["created"]))
-    return datetime.now(made.tzinfo) - made > timedelta(days=days)
+    return (datetime.now(made.tzinfo) - made).total_seconds() > days * DAY
 
 
 def _in_use(artifact: Artifact) -> bool:

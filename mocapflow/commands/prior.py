@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from mocapflow.errors import StoreError
+
 app = typer.Typer(help="Learn which poses are likely.", no_args_is_help=True)
 
 
@@ -35,6 +37,10 @@ def fit(
     from mocapflow_priors import density, training
 
     learned = training.fit(files, Template().load(Path()), angles or training.FREE, percentile)
-    density.write(out, learned)
+    try:
+        density.write(out, learned)
+    except OSError as error:
+        hint = "--out names a .npz, in a folder that is there"
+        raise StoreError(f"can't be written: {error.strerror}", where=str(out), hint=hint) from None
     typer.echo(f"{out}: {len(learned.poses)} poses, bandwidth {np.degrees(learned.bandwidth):.1f}°")
     typer.echo(f"angles: {', '.join(learned.names)}")

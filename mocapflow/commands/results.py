@@ -84,8 +84,10 @@ def view(
 ) -> None:
     """Look at a run in Rerun: cameras, images, outlines, body, garment and angles on one timeline."""
     export(run, ["rrd"])
-    if show:
-        subprocess.run([sys.executable, "-m", "rerun", str(run / "results" / "scene.rrd")], check=True)
+    scene = run / "results" / "scene.rrd"
+    if show and (status := subprocess.run([sys.executable, "-m", "rerun", str(scene)], check=False).returncode):
+        hint = "it needs a display; --no-show only writes this file, which `rerun` opens anywhere"
+        raise MocapflowError(f"the viewer ended with status {status}", where=str(scene), hint=hint)
 
 
 def table(rows: Sequence[Mapping[str, object]]) -> str:

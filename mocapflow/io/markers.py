@@ -62,13 +62,15 @@ def read_trc(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
         frame rate; markers that are not seen are NaN.
 
     Raises:
-        RecordingError: not a TRC file, an unknown unit, no rate, or a row of another width.
+        RecordingError: not a TRC file, no markers, an unknown unit, no rate, or a row of another width.
     """
     lines = _text(path).splitlines()
     if len(lines) < 6 or not lines[0].startswith("PathFileType"):
         raise RecordingError("not a TRC file: its first word is not PathFileType", where=str(path))
     header = dict(zip(lines[1].split("\t"), lines[2].split("\t"), strict=False))
     names = tuple(name for name in (cell.strip() for cell in lines[3].split("\t")[2:]) if name)
+    if not names:
+        raise RecordingError("no marker is named", where=f"{path}:4")
     unit = header.get("Units", "").strip()
     if unit not in METRES:
         raise RecordingError(f"unknown unit '{unit}'", where=str(path), hint=f"known: {', '.join(METRES)}")

@@ -137,6 +137,12 @@ def test_c3d(tmp_path):
         read_c3d(path)
 
 
+def test_a_trc_without_markers(tmp_path):
+    write_trc(tmp_path / "a.trc", [], np.empty((2, 0, 3)), 30)
+    with pytest.raises(RecordingError, match=r"a\.trc:4  no marker is named"):
+        read_trc(tmp_path / "a.trc")
+
+
 def test_c3d_without_ezc3d(tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "ezc3d", None)
     with pytest.raises(RecordingError, match="C3D files need ezc3d\n       pip install 'mocapflow"):
