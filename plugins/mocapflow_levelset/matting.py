@@ -13,7 +13,6 @@ from mocapflow.records import F32, U8, Bool
 
 EVERY = 3  # rows, or columns where the contour runs along the rows: their windows overlap
 INNER, OUTER = 1, 2  # px beyond the reach, inside and outside, whose colours count as pure
-ALONG = 0.2  # what a difference along the room's own colour counts: it may be one of shade
 SHADES = (0.3, 1.3)  # of the room beside a person
 BEYOND = 0.25  # how far noise may take the share of a pixel beyond none and all
 GREY = 10.0  # levels between person and room at which half of what is seen is believed
@@ -100,31 +99,25 @@ def _take(edges, sums, level):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, error_model="numpy")
 def _share_of_person(seen, empty, reach, inside):  # type: ignore[no-untyped-def]
-    """Return the integral of the person's share over the reach to either side, px, and the squared contrast."""
+    """Return the integral of the person's share over the reach to either side, px, and the squared contrast inside."""
     first, last = INNER, INNER + 2 * reach
     shade = _shade(seen, empty, last)
-    for c in range(3):
-        inside[c] = np.float32(0)
-        for k in range(first + 1):
+    inside[:] = 0
+    contrast = np.float32(0)
+    for k in range(first + 1):
+        for c in range(3):
             inside[c] += seen[k, c] / np.float32(first + 1)
-    total, contrast = np.float32(0), np.float32(0)
+            contrast += (seen[k, c] - shade * empty[k, c]) ** 2 / np.float32(first + 1)
+    total = np.float32(0)
     for k in range(first, last + 1):
-        norm, along, seen_along = np.float32(1e-6), np.float32(0), np.float32(0)
-        square, product = np.float32(0), np.float32(0)
+        square, product = np.float32(1e-3), np.float32(0)
         for c in range(3):
             behind = shade * empty[k, c]
-            whole, part = inside[c] - behind, seen[k, c] - behind
-            norm += behind * behind
-            along += whole * behind
-            seen_along += part * behind
-            square += whole * whole
-            product += whole * part
-        dim = np.float32(1 - ALONG * ALONG) / norm
-        square, product = max(square - dim * along * along, np.float32(1e-3)), product - dim * along * seen_along
+            square += (inside[c] - behind) ** 2
+            product += (inside[c] - behind) * (seen[k, c] - behind)
         share = min(max(product / square, np.float32(-BEYOND)), np.float32(1 + BEYOND))
         total += share if first < k < last else np.float32(0.5) * share
-        contrast += square
-    return total, contrast / np.float32(2 * reach + 1)
+    return total, contrast
 
 
 @numba.njit(cache=True, error_model="numpy")
