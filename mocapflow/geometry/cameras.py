@@ -13,6 +13,7 @@ from mocapflow.records import F64, I16
 
 UNDISTORT_STEPS = 100
 UNDISTORT_TOLERANCE = 1e-12  # of the focal length
+UNDISTORT_OFF = 0.1  # px; a pixel that is found is shown nearer than this to where it was
 
 
 @once
@@ -64,12 +65,22 @@ def scaled(camera: Camera, factor: float) -> Camera:
     return replace(camera, intrinsics=scale @ camera.intrinsics, size=size)
 
 
+def bends(camera: Camera) -> bool:
+    """Tell whether the lens shows anything but a pinhole image; a fisheye does without any coefficient."""
+    return camera.fisheye or bool(camera.distortion.any())
+
+
 def undistort(pixels: F64, camera: Camera) -> F64:
-    """Return pixels (M, 2) with the lens distortion of the camera removed."""
-    if not len(pixels) or not camera.distortion.any():
+    """Return pixels (M, 2) with the lens distortion of the camera removed; NaN where its model shows no such pixel."""
+    if not len(pixels) or not bends(camera):
         return pixels
-    if not camera.fisheye:
-        return _undistort_radial(pixels, camera)
+    ideal = _undistort_fisheye(pixels, camera) if camera.fisheye else _undistort_radial(pixels, camera)
+    off = np.linalg.norm(distort(ideal, camera) - pixels, axis=1)
+    ideal[~(off < UNDISTORT_OFF)] = np.nan  # beyond where the model turns back, or 90 degrees off the axis
+    return ideal
+
+
+def _undistort_fisheye(pixels: F64, camera: Camera) -> F64:
     import cv2
 
     k = np.asarray(camera.intrinsics)
@@ -100,7 +111,7 @@ def distort(pixels: F64, camera: Camera) -> F64:
     """Return undistorted pixels (M, 2) as the lens of the camera shows them."""
     import cv2
 
-    if not len(pixels) or not camera.distortion.any():
+    if not len(pixels) or not bends(camera):
         return pixels
     rays = np.column_stack([pixels, np.ones(len(pixels))]) @ np.linalg.inv(camera.intrinsics).T
     zero = np.zeros(3)

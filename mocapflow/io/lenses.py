@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mocapflow.assets import Camera
-from mocapflow.geometry.cameras import pinhole, scaled, undistort
+from mocapflow.geometry.cameras import bends, pinhole, scaled, undistort
 from mocapflow.records import F64, U8, record
 
 
@@ -41,21 +41,24 @@ class View:
         return np.asarray(cv2.remap(image, *self._maps, cv2.INTER_LINEAR), np.uint8)
 
     def points(self, points: F64) -> F64:
-        """Return keypoints (N, K, 3: px, px, confidence) of the lens where they are in `image`'s results."""
+        """Return keypoints (N, K, 3: px, px, confidence) of the lens where they are in `image`'s results.
+
+        One that is not seen, or lies where the lens' model shows nothing, is at (0, 0) with confidence 0.
+        """
         if not points.size:
             return points
         moved = points.copy()
         pixels = undistort(points[..., :2].reshape(-1, 2), self.lens)
         factor = self.camera.size / self.lens.size
         moved[..., :2] = ((pixels + 0.5) * factor - 0.5).reshape(*points.shape[:2], 2)
-        moved[points[..., 2] <= 0] = 0.0  # not seen
+        moved[(points[..., 2] <= 0) | np.isnan(moved[..., 0])] = 0.0
         return moved
 
     @cached_property
     def _maps(self) -> tuple[Any, Any] | None:
         import cv2
 
-        if not self.lens.distortion.any():
+        if not bends(self.lens):
             return None
         k, size = self.camera.intrinsics, (int(self.camera.size[0]), int(self.camera.size[1]))
         if self.lens.fisheye:

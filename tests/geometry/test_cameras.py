@@ -13,6 +13,7 @@ LENSES = {
     "mild": ((-0.0462, 0.14, 0.0006, 0.0007), False),
     "strong": ((-0.28, 0.09, 0.001, -0.0008, -0.012), False),
     "fisheye": ((-0.02, 0.01, -0.005, 0.001), True),
+    "equidistant": ((), True),
 }
 
 
@@ -52,6 +53,23 @@ def test_distortion_there_and_back(lens):
     assert np.abs(cameras.distort(cameras.undistort(seen, view), view) - seen).max() < 0.01
 
 
+@pytest.mark.parametrize(
+    ("distortion", "fisheye", "last"),
+    [
+        ((-0.5,), False, 0.545),  # r (1 - r^2 / 2) is greatest there, times the focal length
+        ((-0.1, -0.05), True, 0.904),  # theta (1 - theta^2 / 10 - theta^4 / 20) too
+        ((), True, np.pi / 2),  # 90 degrees
+    ],
+)
+def test_a_pixel_that_no_ray_meets_is_nowhere(distortion, fisheye, last):
+    view = look_at("a", np.array([3.0, -2.0, 1.7]), size=(1920, 1080), focal=500.0, distortion=distortion)
+    view = replace(view, fisheye=fisheye)
+    radius = 500.0 * np.linspace(0, 4, 80)
+    ideal = cameras.undistort(view.intrinsics[:2, 2] + np.outer(radius, [0.6, 0.8]), view)
+    assert np.isnan(ideal[radius > 500 * last]).all()
+    assert (np.diff(np.linalg.norm(ideal[radius < 0.95 * 500 * last] - view.intrinsics[:2, 2], axis=1)) > 0).all()
+
+
 @pytest.mark.parametrize("lens", ["mild", "strong"])
 def test_undistorted_projection_equals_opencv(lens):
     view = camera(*LENSES[lens])
@@ -59,6 +77,16 @@ def test_undistorted_projection_equals_opencv(lens):
     rotation, _ = cv2.Rodrigues(view.camera_from_world[:3, :3])
     seen, _ = cv2.projectPoints(points, rotation, view.camera_from_world[:3, 3], view.intrinsics, view.distortion)
     assert np.abs(cameras.undistort(seen[:, 0], view) - cameras.project(points, view)).max() < 0.01
+
+
+def test_a_fisheye_without_coefficients_shows_angles_as_radii():
+    view = camera(fisheye=True)
+    middle, focal = view.intrinsics[:2, 2], view.intrinsics[0, 0]
+    angle = np.radians([10.0, 25.0, 40.0])
+    seen = middle + focal * np.outer(angle, [0.6, 0.8])
+    expected = middle + focal * np.outer(np.tan(angle), [0.6, 0.8])
+    np.testing.assert_allclose(cameras.undistort(seen, view), expected, atol=1e-6)
+    np.testing.assert_allclose(cameras.distort(expected, view), seen, atol=1e-6)
 
 
 def test_a_camera_without_distortion_returns_the_pixels():

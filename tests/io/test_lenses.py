@@ -9,7 +9,12 @@ from mocapflow.geometry.cameras import distort, project
 from mocapflow.io.lenses import View
 from tests.fixtures.recordings import look_at
 
-LENSES = {"none": ((), False), "radial": ((-0.25, 0.08, 0.001, -0.001), False), "fisheye": ((-0.02, 0.01, 0, 0), True)}
+LENSES = {
+    "none": ((), False),
+    "radial": ((-0.25, 0.08, 0.001, -0.001), False),
+    "fisheye": ((-0.02, 0.01, 0, 0), True),
+    "equidistant": ((), True),
+}
 
 
 def lens(name, size=(200, 160)):
@@ -58,6 +63,13 @@ def test_unseen_points_stay_unseen():
     moved = View(lens=lens("radial"), scale=0.5).points(np.array([[[30.0, 40, 0.5], [0, 0, 0], [50, 60, 0]]]))
     assert (moved[0, 1:] == 0).all()
     assert moved[0, 0, 2] == 0.5
+
+
+def test_a_keypoint_where_the_lens_shows_nothing_is_not_seen():
+    strong = replace(lens("none", size=(800, 600)), distortion=np.array([-0.5, 0, 0, 0, 0]))
+    moved = View(lens=strong).points(np.array([[[400.0, 310, 0.9], [790, 590, 0.9]]]))
+    assert moved[0, 0, 2] == 0.9
+    assert (moved[0, 1] == 0).all()
 
 
 def test_without_distortion_the_image_is_passed_on():
