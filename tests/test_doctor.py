@@ -212,6 +212,15 @@ def test_bad_clean_plate(good):
     assert errors(good) == ["this clean plate is 32 x 40 px, the video 64 x 48"]
 
 
+def test_keypoints_of_one_frame_twice(tmp_path):
+    write_recording(tmp_path, frames=2)
+    place = tmp_path / "keypoints" / "cam01_json"
+    place.mkdir(parents=True)
+    for frame in range(2):
+        (place / f"{frame}_cam01.json").write_text('{"people": []}')
+    assert errors(tmp_path) == ["two files for frame 1: 0_cam01.json, 1_cam01.json"]
+
+
 def test_keypoints_with_nan(tmp_path):
     write_recording(tmp_path, frames=2)
     for name in ("cam01", "cam02"):

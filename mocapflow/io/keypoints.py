@@ -16,7 +16,11 @@ FORM = 'expected OpenPose\'s format: {"people": [{"pose_keypoints_2d": [x, y, co
 
 
 def keypoint_files(folder: Path) -> dict[int, Path]:
-    """Return the files of one camera's folder by frame number."""
+    """Return the files of one camera's folder by frame number.
+
+    Raises:
+        RecordingError: two files have one number.
+    """
     return numbered(folder, (".json",))
 
 

@@ -46,7 +46,7 @@ def open_video(path: Path) -> Video:
     """Open a video file or a folder of images; only the first picture is decoded.
 
     Raises:
-        RecordingError: nothing in it can be decoded.
+        RecordingError: nothing in it can be decoded, or two images are of one frame.
     """
     if path.is_dir():
         return _open_folder(path)
@@ -133,12 +133,23 @@ def _decoded(capture: Any, video: Video) -> Iterator[int]:
 
 
 def numbered(folder: Path, suffixes: tuple[str, ...]) -> dict[int, Path]:
-    """Return the files of a folder by frame number: the last run of digits in the name."""
-    found = {}
+    """Return the files of a folder by frame number: the last run of digits in the name; hidden files are left out.
+
+    Raises:
+        RecordingError: two files have one number.
+    """
+    found: dict[int, Path] = {}
     for path in sorted(folder.iterdir()):
         digits = re.findall(r"\d+", path.stem)
-        if digits and path.suffix.lower() in suffixes:
-            found[int(digits[-1])] = path
+        if not digits or path.suffix.lower() not in suffixes or path.name.startswith("."):
+            continue
+        if (other := found.setdefault(int(digits[-1]), path)) != path:
+            raise RecordingError(
+                f"two files for frame {int(digits[-1])}: {other.name}, {path.name}",
+                where=str(folder),
+                hint="the last digits of a name are its frame, as in cam01_000012.png: rename the files, "
+                "or remove those that are too many",
+            )
     return found
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from mocapflow.errors import RecordingError
 from mocapflow.io.stamps import number_frames
-from mocapflow.io.video import lost_frames, name_frames, open_video, read_frames
+from mocapflow.io.video import lost_frames, name_frames, numbered, open_video, read_frames
 from tests.fixtures.recordings import avi_frames, number_of, picture, write_video
 
 FRAMES = 20
@@ -104,6 +104,19 @@ def test_a_folder_of_images(tmp_path):
         "there is no image of this frame", "", "000004.png can't be read",
     ]  # fmt: skip
     assert lost_frames(video) == [2]
+
+
+def test_two_images_of_one_frame_are_told_apart_by_nobody(tmp_path):
+    for number in range(3):
+        cv2.imwrite(str(tmp_path / f"frame_{number:06d}_cam1.png"), picture(number))
+    with pytest.raises(RecordingError, match="two files for frame 1: frame_000000_cam1.png, frame_000001_cam1.png\n"):
+        open_video(tmp_path)
+
+
+def test_hidden_files_are_no_images(tmp_path):
+    cv2.imwrite(str(tmp_path / "000001.png"), picture(1))
+    (tmp_path / "._000001.png").write_bytes(b"what another system keeps beside the file")
+    assert numbered(tmp_path, (".png",)) == {1: tmp_path / "000001.png"}
 
 
 def test_what_is_no_video(tmp_path):
