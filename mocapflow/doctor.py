@@ -122,8 +122,9 @@ def _trial(folder: Path, calibration: Path, rig: bool = True) -> list[Finding]:
     length = min(video.frames for video in whole) if agreed is None else agreed[0]
     places = [folders.keypoint_folder(folder / folders.KEYPOINTS, camera.name) for camera in cameras]
     odd = attempt(lambda: folders.keypoint_warnings(cameras, places, length), findings)
-    findings += [warning(text, where=folder) for text in odd or ()]
-    if fitted is not None:
+    unused = attempt(lambda: folders.plate_warnings(folder, cameras), findings)
+    findings += [warning(text, where=folder) for text in (*(odd or ()), *(unused or ()))]
+    if fitted is not None and unused is not None:
         attempt(lambda: background(folder, [View(lens=lens) for lens in lenses], whole), findings)
     return findings
 

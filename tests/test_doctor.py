@@ -212,6 +212,19 @@ def test_bad_clean_plate(good):
     assert errors(good) == ["this clean plate is 32 x 40 px, the video 64 x 48"]
 
 
+def test_two_plates_of_a_camera_are_told_once(good):
+    cv2.imwrite(str(good / "background" / "cam01.jpg"), np.zeros((48, 64, 3), np.uint8))
+    assert errors(good) == ["2 clean plates of cam01: cam01.jpg, cam01.png"]
+
+
+def test_a_plate_of_no_camera(good):
+    (good / "background" / "cam01.png").rename(good / "background" / "cam1.png")
+    assert errors(good) == ["no clean plate of cam01"]
+    assert messages(good, "warning") == [
+        "not used from background/: cam1.png; plates are named after their cameras: cam01.png"
+    ]
+
+
 def test_keypoints_of_one_frame_twice(tmp_path):
     write_recording(tmp_path, frames=2)
     place = tmp_path / "keypoints" / "cam01_json"

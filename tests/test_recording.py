@@ -135,6 +135,18 @@ def test_missing_camera(tmp_path):
     assert "missing camera: no calibration of side\n" in refused(tmp_path)
 
 
+def test_two_videos_of_one_camera(tmp_path):
+    write_recording(tmp_path)
+    write_video(tmp_path / "videos" / "cam02.mkv", 10)
+    assert refused(tmp_path) == (
+        f"{tmp_path / 'videos'}  two videos of cam02: cam02.mkv, cam02.mp4\n"
+        "       which one is meant? move the other one out of videos/"
+    )
+    (tmp_path / "videos" / "cam02.mkv").unlink()
+    (tmp_path / "videos" / "cam02").mkdir()
+    assert "two videos of cam02: cam02, cam02.mp4" in refused(tmp_path)
+
+
 def test_unequal_lengths(tmp_path):
     write_recording(tmp_path, frames=10, lengths={"cam03": 8})
     assert refused(tmp_path) == (

@@ -59,31 +59,58 @@ def gather(folder: Path, calibration: Path | None = None) -> Parts:
         calibration=calibration,
         frame_rate=rate,
         length=length,
-        warnings=(*cut, *broken, *gaps, *assumed, *odd),
+        warnings=(*cut, *broken, *gaps, *assumed, *odd, *plate_warnings(folder, cameras)),
     )
 
 
 def video_paths(folder: Path) -> dict[str, Path]:
-    """Return the video files and image folders of a recording by camera name."""
-    if not (folder / "videos").is_dir():
-        return {}
-    entries = sorted((folder / "videos").iterdir())
-    return {p.name if p.is_dir() else p.stem: p for p in entries if p.is_dir() or p.suffix.lower() in VIDEOS}
+    """Return the video files and image folders of a recording by camera name.
+
+    Raises:
+        RecordingError: two of them have the name of one camera.
+    """
+    paths: dict[str, Path] = {}
+    for path in _entries(folder / "videos"):
+        if not path.is_dir() and path.suffix.lower() not in VIDEOS:
+            continue
+        name = path.name if path.is_dir() else path.stem
+        if (other := paths.setdefault(name, path)) != path:
+            hint = "which one is meant? move the other one out of videos/"
+            raise RecordingError(
+                f"two videos of {name}: {other.name}, {path.name}", where=str(folder / "videos"), hint=hint
+            )
+    return paths
 
 
 def plates(folder: Path, camera: str) -> tuple[Path, ...]:
-    """Return the clean plates of a camera: background/<camera>.png, or every image in background/<camera>/."""
+    """Return the clean plates of a camera: background/<camera>.png, or every image in background/<camera>/.
+
+    Raises:
+        RecordingError: two images have the name of the camera.
+    """
     place = folder / "background"
-    single = [p for ending in IMAGES if (p := place / f"{camera}{ending}").exists()]
-    several = sorted((place / camera).iterdir()) if (place / camera).is_dir() else []
-    return tuple(single[:1] or [p for p in several if p.suffix.lower() in IMAGES])
+    single = [path for path in _images(place) if path.stem == camera]
+    if len(single) > 1:
+        hint = f"keep one of them, or put all plates of this camera into background/{camera}/"
+        names = ", ".join(path.name for path in single)
+        raise RecordingError(f"{len(single)} clean plates of {camera}: {names}", where=str(place), hint=hint)
+    return tuple(single or _images(place / camera))
+
+
+def plate_warnings(folder: Path, cameras: Sequence[Camera]) -> list[str]:
+    """Say what in background/ is no clean plate of any camera."""
+    found = {path for camera in cameras for path in plates(folder, camera.name)}
+    used = found | {path.parent for path in found}
+    unused = [path.name for path in _entries(folder / "background") if path not in used]
+    names = f"plates are named after their cameras: {cameras[0].name}.png"
+    return [f"not used from background/: {', '.join(unused)}; {names}"] if unused else []
 
 
 def match_videos(folder: Path, names: Sequence[str], calibration: Path) -> tuple[Path, ...]:
     """Return the video of each camera.
 
     Raises:
-        RecordingError: a camera has no video, or a video no camera.
+        RecordingError: a camera has no video or two, or a video no camera.
     """
     paths = video_paths(folder)
     lost, extra = [n for n in names if n not in paths], [n for n in paths if n not in names]
@@ -115,3 +142,12 @@ def keypoint_warnings(cameras: Sequence[Camera], places: Sequence[Path | None], 
         for camera, place in zip(cameras, places, strict=True)
     ]
     return [text for row in rows for text in row]
+
+
+def _entries(place: Path) -> list[Path]:
+    """Return what a folder holds but hidden files, in order; nothing where there is no such folder."""
+    return sorted(path for path in place.iterdir() if not path.name.startswith(".")) if place.is_dir() else []
+
+
+def _images(place: Path) -> list[Path]:
+    return [path for path in _entries(place) if path.suffix.lower() in IMAGES]

@@ -31,6 +31,27 @@ def test_one_plate_takes_its_spread_from_the_first_frame(tmp_path):
     assert np.ptp(scene.spread[0], axis=(0, 1)).max() == 0
 
 
+def test_the_ending_of_a_plate_may_be_in_capitals(tmp_path):
+    write_recording(tmp_path, frames=2)
+    for name in NAMES:
+        plate(tmp_path / "background" / f"{name}.PNG")
+    recording = open_recording(tmp_path)
+    assert recording.warnings == ()
+    assert recording.background() is not None
+    assert "background/cam02.PNG" in recording.content
+
+
+def test_what_is_no_plate_of_any_camera_is_said(tmp_path):
+    write_recording(tmp_path, frames=2)
+    plate(tmp_path / "background" / "empty.png")
+    (tmp_path / "background" / "cam01.heic").write_bytes(b"")
+    recording = open_recording(tmp_path)
+    assert recording.background() is None
+    assert recording.warnings == (
+        "not used from background/: cam01.heic, empty.png; plates are named after their cameras: cam01.png",
+    )
+
+
 def test_several_plates_give_the_spread_of_each_pixel(tmp_path):
     write_recording(tmp_path, frames=2)
     for name in NAMES:
@@ -80,6 +101,10 @@ def test_bad_plates(tmp_path):
         plate(tmp_path / "background" / f"{name}.png")
     with pytest.raises(RecordingError, match="background  no clean plate of cam03\n       give every camera its plate"):
         open_recording(tmp_path).background()
+    plate(tmp_path / "background" / "cam02.jpg")
+    with pytest.raises(RecordingError, match=r"background  2 clean plates of cam02: cam02\.jpg, cam02\.png\n.*keep one"):
+        open_recording(tmp_path)
+    (tmp_path / "background" / "cam02.jpg").unlink()
     plate(tmp_path / "background" / "cam03.png", size=(32, 24))
     with pytest.raises(RecordingError, match=r"cam03\.png  this clean plate is 32 x 24 px, the video 64 x 48"):
         open_recording(tmp_path).background()
