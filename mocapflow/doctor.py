@@ -102,11 +102,12 @@ def _missing(folder: Path) -> Iterator[Finding]:
 
 
 def _trial(folder: Path, calibration: Path, rig: bool = True) -> list[Finding]:
-    """Return what is odd about cameras, videos, keypoints and clean plates of one folder."""
+    """Return what is odd about cameras, their delays, videos, keypoints and clean plates of one folder."""
     findings: list[Finding] = []
     cameras = attempt(lambda: read_cameras(calibration), findings)
     if cameras is None:
         return findings
+    attempt(lambda: late_frames(folder, [c.name for c in cameras]), findings)
     paths = attempt(lambda: folders.match_videos(folder, [c.name for c in cameras], calibration), findings)
     videos = None if paths is None else [attempt(partial(open_video, path), findings) for path in paths]
     if videos is None or any(video is None for video in videos):

@@ -312,6 +312,28 @@ def test_weights_of_another_mesh(good):
     assert errors(good) == []
 
 
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ('{"late_frames": {"cam9": 3}}', "there is no camera 'cam9'"),
+        ("[]", "does not say how late the cameras are: "),
+        ("{", "not JSON: "),
+    ],
+)
+def test_recording_json(good, content, message):
+    (good / "recording.json").write_text('{"late_frames": {"cam02": 1}}')
+    assert examine(good) == []
+    (good / "recording.json").write_text(content)
+    (finding,) = examine(good)
+    assert finding.severity == "error"
+    assert finding.message.startswith(message)
+
+
+def test_a_first_pose_that_is_null(good):
+    (good / "init.json").write_text("null")
+    assert errors(good) == ["not a first pose"]
+
+
 def test_not_json(good):
     (good / "init.json").write_text("{")
     (good / "subject" / "garment.json").write_text("[]")

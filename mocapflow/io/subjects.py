@@ -17,8 +17,9 @@ def examine_subject(folder: Path) -> list[Finding]:
     findings: list[Finding] = []
     joints = _examine_scan(folder / "subject", findings)
     pose = folder / "init.json"
-    content = attempt(lambda: read_json(pose), findings) if pose.exists() else None
-    return findings if content is None else [*findings, *odd_pose(pose, content, joints)]
+    if pose.exists():
+        attempt(lambda: findings.extend(odd_pose(pose, read_json(pose), joints)), findings)
+    return findings
 
 
 def _examine_scan(subject: Path, findings: list[Finding]) -> Sequence[str]:
