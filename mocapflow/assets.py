@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mocapflow.errors import GarmentError, MocapflowError, alternatives
+from mocapflow.errors import GarmentError, MocapflowError, ShapeError, alternatives
 from mocapflow.records import F32, F64, I32, Bool, array, record
 
 
@@ -51,6 +51,19 @@ class Body:
     morph_screw: int = -1  # the angle that drives the morph
     morph_range: tuple[float, float] = (0.0, 1.0)  # rad, where the morph begins and where it is complete
 
+    def __post_init__(self) -> None:
+        """Refuse what points beyond the body: kernels look up unchecked.
+
+        Raises:
+            ShapeError: an index is not that of a vertex or joint.
+        """
+        if (stray := _stray(self.faces, len(self.vertices))) is not None:
+            raise ShapeError(f"Body: a face names vertex {stray} of {len(self.vertices)}")
+        count = len(self.parents)
+        for what, index in (("the skin", self.skin_joint), ("a screw", self.screw_joint), ("a parent", self.parents)):
+            if (stray := _stray(index, count, least=-1 if what == "a parent" else 0)) is not None:
+                raise ShapeError(f"Body: {what} names joint {stray} of {count}")
+
     def joint(self, name: str) -> int:
         """Return the index of a joint by name.
 
@@ -87,8 +100,8 @@ class GarmentMesh:
         """
         count = len(self.vertices)
         for what, index in (("face", self.faces), ("strand", self.strands), ("ring", self.rings), ("pin", self.pinned)):
-            if index.max(initial=-1) >= count:
-                raise GarmentError(f"{self.name}: a {what} names vertex {index.max()} of {count}")
+            if (stray := _stray(index, count, least=-1 if what == "strand" else 0)) is not None:
+                raise GarmentError(f"{self.name}: a {what} names vertex {stray} of {count}")
         if not np.isfinite(self.vertices).all():
             first = int(np.argwhere(~np.isfinite(self.vertices))[0, 0])
             raise GarmentError(f"{self.name}: vertex {first} is not finite", hint="check the tape measures")
@@ -107,3 +120,9 @@ class Background:
 
     mean: tuple[F32, ...]  # C x (H, W, 3) grey levels
     spread: tuple[F32, ...]  # C x (H, W, 3) grey levels, standard deviation
+
+
+def _stray(index: I32, count: int, least: int = 0) -> int | None:
+    """Return an index that is not in least ... count - 1, None where all are."""
+    low, high = int(index.min(initial=least)), int(index.max(initial=-1))
+    return low if low < least else high if high >= count else None

@@ -1,10 +1,13 @@
 """The tools that test plugins find what is wrong."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mocapflow.components import Garment, Prior
 from mocapflow.data import Residual, Turn
+from mocapflow.errors import ShapeError
 from mocapflow.geometry.meshes import edges
 from mocapflow.testing import (
     GarmentConformance,
@@ -55,6 +58,22 @@ def test_impure_steps_are_found():
         assert_pure(counting, np.zeros(2))
     with pytest.raises(AssertionError, match="argument 0 was changed"):
         assert_pure(changing, np.zeros(2))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda body: {"faces": body.faces - 1}, "a face names vertex -1 of"),
+        (lambda body: {"faces": body.faces + 1}, "a face names vertex"),
+        (lambda body: {"skin_joint": body.skin_joint - 1}, "the skin names joint -1 of"),
+        (lambda body: {"screw_joint": body.screw_joint + 9}, "a screw names joint"),
+        (lambda body: {"parents": body.parents + 2}, "a parent names joint"),
+    ],
+)
+def test_a_body_that_points_beyond_itself_is_refused_when_it_is_made(change, said):
+    body = tiny_body()
+    with pytest.raises(ShapeError, match=f"Body: {said}"):
+        replace(body, **change(body))
 
 
 def test_the_tiny_scene():

@@ -162,6 +162,10 @@ def test_measures_that_fit_are_not_repaired():
         (lambda mesh: {"vertices": np.concatenate([mesh.vertices[:1], mesh.vertices[:1], mesh.vertices[2:]])},
          "strand 0 has a link of zero length"),
         (lambda mesh: {"faces": mesh.faces + 1}, "a face names vertex"),
+        (lambda mesh: {"faces": mesh.faces - 1}, "a face names vertex -1 of"),
+        (lambda mesh: {"rings": -1 - mesh.rings}, "a ring names vertex -"),
+        (lambda mesh: {"pinned": mesh.pinned - 5}, "a pin names vertex -5 of"),
+        (lambda mesh: {"strands": mesh.strands - 2}, "a strand names vertex -"),
         (lambda mesh: {"ring_length": 0 * mesh.ring_length}, "ring link 0 has no length"),
     ],
 )  # fmt: skip
