@@ -17,6 +17,9 @@ from mocapflow.geometry.skeleton import body_directions, skeleton_of
 from mocapflow.records import F64, Bool, array, record
 from mocapflow.series import Wide
 
+STRAIGHT = 1e-12  # sine of the angle below which the limbs span no plane
+UNMOVED = 1e-9  # rad per rad; a screw that changes an angle by less does not change it
+
 
 class Definition(NamedTuple):
     """One angle: its column, the joints it lies between, and what is added (degrees)."""
@@ -69,6 +72,8 @@ def measure(
 ) -> AngleSeries:
     """Return the angles of a track, by first-order propagation their standard deviations, and what was seen of them.
 
+    Both are NaN for an angle that no screw changes.
+
     Args:
         body: the body.
         root: (T, 4, 4) m, world_from_body.
@@ -96,6 +101,8 @@ def measure(
                 turn = np.hstack([np.eye(3), np.zeros((3, 3)), np.where(below[:, pelvis], screws[:, :3].T, 0.0)])
                 seen_from = axes[:2] @ joints[pelvis, :3, :3].T  # the pelvis' forward and up, in the world
                 value[row, column], gradient = _flexion(places[index], moves[index], seen_from, turn)
+            if np.abs(gradient[6:]).max(initial=0.0) < UNMOVED:
+                continue
             if spread is not None:
                 variance = float(gradient @ spread @ gradient)
                 sd[row, column] = np.degrees(np.sqrt(max(variance, 0.0)))
@@ -113,9 +120,17 @@ def _velocities(places: F64, screws: F64, below: Bool) -> F64:
 
 
 def _three_point_gradient(places: F64, moves: F64) -> F64:
-    """Return the gradient (6 + D,) of a three-point angle in rad."""
-    by_a, by_b = _angle_between(places[1] - places[0], places[2] - places[1])
-    gradient: F64 = by_a @ (moves[1] - moves[0]) + by_b @ (moves[2] - moves[1])
+    """Return the gradient (6 + D,) of a three-point angle in rad; a straight limb bends as its joint turns it most."""
+    a, b = places[1] - places[0], places[2] - places[1]
+    by_a, by_b = moves[1] - moves[0], moves[2] - moves[1]
+    long_a, long_b = float(np.linalg.norm(a)), float(np.linalg.norm(b))
+    normal = np.cross(a, b)
+    if np.linalg.norm(normal) < STRAIGHT * long_a * long_b:
+        turn = by_b / long_b - by_a / long_a
+        _, size, ways = np.linalg.svd(turn - np.outer(a, a @ turn) / long_a**2, full_matrices=False)
+        return np.asarray(size[0] * ways[0])
+    normal /= np.linalg.norm(normal)
+    gradient: F64 = np.cross(a, normal) @ by_a / long_a**2 + np.cross(normal, b) @ by_b / long_b**2
     return gradient
 
 
@@ -133,12 +148,3 @@ def _flexion(places: F64, moves: F64, pelvis: F64, turn: F64) -> tuple[float, F6
     relative = moves[1] - moves[0] + twists.hat(thigh) @ turn  # how the thigh moves as seen from the pelvis
     gradient = (-up * pelvis[0] + forward * pelvis[1]) @ relative / (forward**2 + up**2)
     return float(np.degrees(np.arctan2(forward, -up))), gradient
-
-
-def _angle_between(a: F64, b: F64) -> tuple[F64, F64]:
-    """Return the gradients of the angle between two vectors; straight limbs bend in any one plane."""
-    normal = np.cross(a, b)
-    if np.linalg.norm(normal) < 1e-12 * np.linalg.norm(a) * np.linalg.norm(b):
-        normal = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
-    normal = normal / np.linalg.norm(normal)
-    return np.cross(a, normal) / (a @ a), np.cross(normal, b) / (b @ b)

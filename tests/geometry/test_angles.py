@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -81,17 +82,47 @@ def test_gradients_agree_with_finite_differences() -> None:
     assert np.allclose(sd, np.linalg.norm(factor.T @ numeric, axis=0), rtol=1e-6)
 
 
-def test_standard_deviation_of_a_straight_limb_is_finite() -> None:
-    body = stick_body()
+def straightened(body: Body) -> Body:
+    """Return the body with the left hip, knee and ankle on one line at rest."""
     straight = np.array(body.positions)
     straight[body.joint("ankle_l")] = 2 * straight[body.joint("knee_l")] - straight[body.joint("hip_l")]
-    from dataclasses import replace
+    return replace(body, positions=straight, twists=twists.screw(body.twists[:, :3], straight[body.screw_joint]))
 
-    body = replace(body, positions=straight, twists=twists.screw(body.twists[:, :3], straight[body.screw_joint]))
+
+def without_screws(body: Body, dropped: set[str]) -> Body:
+    kept = np.array([name not in dropped for name in body.screw_names])
+    arrays = {name: getattr(body, name)[kept] for name in ("twists", "screw_joint", "limits", "rest_spread")}
+    return replace(body, screw_names=tuple(np.array(body.screw_names)[kept].tolist()), **arrays)
+
+
+def test_standard_deviation_of_a_straight_limb_is_finite() -> None:
+    body = straightened(stick_body())
     size = 6 + len(body.twists)
     series = angles.measure(body, np.eye(4)[None], np.zeros((1, size - 6)), 1e-4 * np.eye(size)[None])
     assert series.value[0, 0] < 1e-5
     assert 0.5 < series.sd[0, 0] < 2.0  # 0.01 rad about the axes of the knee, and what hip and root add
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_straight_limb_bends_as_its_hinge_does(axis: int) -> None:
+    body = straightened(stick_body())
+    knee = [name for name in body.screw_names if name.startswith("knee_l")]
+    body = without_screws(body, {*knee} - {knee[axis]})
+    size, seen = 6 + len(body.twists), np.array([name in knee for name in body.screw_names], float)
+    series = angles.measure(body, np.eye(4)[None], np.zeros((1, size - 6)), 1e-4 * np.eye(size)[None], seen[None])
+    assert series.sd[0, 0] == pytest.approx(np.degrees(0.01), rel=0.05)  # the shank is upright within 15 degrees
+    assert series.observed[0, 0] == pytest.approx(1.0)
+
+
+def test_nothing_is_known_of_an_angle_that_no_screw_changes() -> None:
+    body = straightened(stick_body())
+    body = without_screws(body, {name for name in body.screw_names if name.startswith("knee_l")})
+    size = 6 + len(body.twists)
+    series = angles.measure(
+        body, np.eye(4)[None], np.zeros((1, size - 6)), 1e-4 * np.eye(size)[None], np.ones((1, size - 6))
+    )
+    assert np.isnan([series.sd[0, 0], series.observed[0, 0]]).all()
+    assert np.isfinite(series.sd[0, 1:]).all()
 
 
 def test_legs_only_body_has_no_elbows() -> None:
