@@ -189,7 +189,7 @@ def test_calibration_in_mm(tmp_path):
     cameras = [replace(c, camera_from_world=c.camera_from_world * [[1, 1, 1, 1000]]) for c in ring()]
     write_cameras(tmp_path / "cameras.toml", cameras)
     assert refused(tmp_path) == (
-        f"{tmp_path / 'cameras.toml'}:1:2  camera 'cam01' stands 4272 m from the origin: the calibration is in mm\n"
+        f"{tmp_path / 'cameras.toml'}:1:3  camera 'cam01' stands 4272 m from the origin: the calibration is in mm\n"
         "       lengths are in metres: divide every translation by 1000"
     )
 
@@ -198,7 +198,7 @@ def test_calibration_in_mm(tmp_path):
 def test_image_size_against_calibration(tmp_path, size):
     write_recording(tmp_path)
     write_video(tmp_path / "videos" / "cam02.mp4", 10, size)
-    place = f"{tmp_path / 'cameras.toml'}:10:2"
+    place = f"{tmp_path / 'cameras.toml'}:10:3"
     assert refused(tmp_path) == (
         f"{place}  camera 'cam02': the video is {size[0]} x {size[1]} px, the calibration 64 x 48\n"
         "       calibrate at the size of the video, or scale size and matrix of the calibration to it"
@@ -238,7 +238,7 @@ def test_folders_of_images(tmp_path):
     assert open_recording(tmp_path).frame_rate == 60
 
 
-@pytest.mark.parametrize("rate", ["'thirty'", "0", "-30.0", "nan"])
+@pytest.mark.parametrize("rate", ["'thirty'", "0", "-30.0", "nan", "true"])
 def test_a_frame_rate_that_is_none(tmp_path, rate):
     write_recording(tmp_path, frames=2)
     with (tmp_path / "cameras.toml").open("a") as file:

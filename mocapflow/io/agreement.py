@@ -81,7 +81,7 @@ def common_rate(cameras: Sequence[Camera], videos: Sequence[Video], calibration:
     """
     rates = {c.name: v.frame_rate for c, v in zip(cameras, videos, strict=True) if v.frame_rate}
     stated = metadata(calibration).get("frame_rate")
-    if isinstance(stated, int | float) and 0 < stated < np.inf:
+    if isinstance(stated, int | float) and not isinstance(stated, bool) and 0 < stated < np.inf:
         return float(stated), []
     if stated is not None:
         hint = "write frames per second, or leave it out: then the videos say it"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -101,7 +102,9 @@ def _from_table(key: str, table: Mapping[str, Any], path: Path) -> Camera:
         hint = f"each camera needs {', '.join(FIELDS)}; tables other than [metadata] are cameras"
         raise bad(name, path, f"lacks {', '.join(missing)}", hint)
     size, matrix, distortion, rotation, translation = (table[field] for field in FIELDS)
-    fisheye = bool(table.get("fisheye", False))
+    fisheye = table.get("fisheye", False)
+    if not isinstance(fisheye, bool):
+        raise bad(name, path, f"has fisheye = {fisheye!r}", "write true or false, without quotes")
     return make_camera(name, size, matrix, distortion, rotation, translation, where=path, fisheye=fisheye)
 
 
@@ -132,8 +135,9 @@ def _table(camera: Camera) -> str:
     rows = ", ".join(str([float(x) for x in row]) for row in camera.intrinsics)
     coefficients = camera.distortion[: 4 if camera.fisheye or not camera.distortion[4] else 5]
     rotation = twists.log_rotation(camera.camera_from_world[:3, :3])
+    name = json.dumps(camera.name, ensure_ascii=False)  # as TOML quotes it
     return (
-        f'[{camera.name}]\nname = "{camera.name}"\nsize = {camera.size.tolist()}\nmatrix = [{rows}]\n'
+        f"[{name}]\nname = {name}\nsize = {camera.size.tolist()}\nmatrix = [{rows}]\n"
         f"distortions = {coefficients.tolist()}\nrotation = {rotation.tolist()}\n"
         f"translation = {camera.camera_from_world[:3, 3].tolist()}\nfisheye = {str(camera.fisheye).lower()}\n"
     )

@@ -45,6 +45,13 @@ def test_toml_there_and_back(tmp_path):
     assert_same(read_cameras(tmp_path), cameras)
 
 
+@pytest.mark.parametrize("name", ["left cam", "cam.1", 'the "old" one', "Kamera größer", ""])
+def test_any_name_there_and_back(tmp_path, name):
+    cameras = (replace(ring()[0], name=name), *ring()[1:])
+    write_cameras(tmp_path / "cameras.toml", cameras)
+    assert_same(read_cameras(tmp_path), cameras)
+
+
 def test_anipose_names_and_metadata(tmp_path):
     path = tmp_path / "calibration.toml"
     path.write_text(
@@ -142,7 +149,7 @@ def test_calibration_in_mm(tmp_path):
     path = tmp_path / "cameras.toml"
     write_cameras(path, cameras)
     message = (
-        r"cameras\.toml:1:2  camera 'cam01' stands 4272 m from the origin: the calibration is in mm\n"
+        r"cameras\.toml:1:3  camera 'cam01' stands 4272 m from the origin: the calibration is in mm\n"
         r"       lengths are in metres: divide every translation by 1000"
     )
     with pytest.raises(RecordingError, match=message):
@@ -162,6 +169,8 @@ def test_nan(tmp_path):
         ("size = [64, 48]", "size = [-64, 48]", "has the size -64 x 48"),
         ("size = [64, 48]", 'size = ["big", 48]', r"has no numbers in size: \['big', 48\]"),
         ("matrix = [[60.0", "matrix = [[-60.0", "has no camera matrix"),
+        ("fisheye = false", 'fisheye = "false"', "has fisheye = 'false'\n       write true or false"),
+        ("fisheye = false", "fisheye = 1", "has fisheye = 1\n"),
         ("rotation = [", "rotation = [[2, 0, 0], [0, 1, 0], [0, 0, 1]] # [", "has a matrix that is not a rotation"),
         ("distortions = [0.0, 0.0, 0.0, 0.0]", "distortions = [0, 0, 0, 0, 0, 0.1]", "has 6 distortion coefficients"),
     ],
