@@ -11,7 +11,6 @@ import pytest
 from mocapflow.doctor import examine
 from mocapflow.geometry import twists
 from mocapflow.io.cameras import write_cameras
-from mocapflow.io.meshes import write_mesh
 from tests.fixtures.recordings import avi_frames, look_at, ring, write_recording, write_video
 
 DEMO = Path(__file__).parents[1] / "examples" / "data"
@@ -31,7 +30,8 @@ def good(tmp_path):
     subject.mkdir()
     corners = np.array([[x, y, z] for x in (-0.2, 0.2) for y in (-0.1, 0.1) for z in (0.0, 1.8)])
     faces = np.array([[a, b, c] for a in range(6) for b, c in [(a + 1, a + 2)]], np.int32)
-    write_mesh(subject / "body.obj", corners, faces)
+    rows = [f"v {x} {y} {z}\n" for x, y, z in corners] + [f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in faces]
+    (subject / "body.obj").write_text("".join(rows))
     joints = [
         {"name": name, "parent": parent, "position": [0.05, 0, 1 - 0.3 * k]}
         for k, (name, parent) in enumerate(CHAIN.items())

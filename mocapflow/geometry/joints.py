@@ -32,16 +32,6 @@ def angles_from_rotations(body: Body, rotations: Mapping[str, F64]) -> F64:
     return angles
 
 
-def rotations_from_angles(body: Body, angles: F64) -> dict[str, F64]:
-    """Return the rotation vector (3,) rad of every joint that has screws, relative to its parent."""
-    rotations = {}
-    for joint, name in enumerate(body.joint_names):
-        screws = np.flatnonzero(body.screw_joint == joint)
-        if len(screws):
-            rotations[name] = twists.log_rotation(_product(body.twists[screws, :3], angles[screws]))
-    return rotations
-
-
 def decompose(axes: F64, rotation: F64) -> F64:
     """Return the angles (K,) of turns about unit axes (K, 3), first axis outermost, that make up a rotation (3, 3)."""
     if len(axes) == 3 and np.allclose(axes @ axes.T, np.eye(3), atol=1e-9):

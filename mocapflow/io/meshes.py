@@ -63,13 +63,6 @@ def _read_by_open3d(path: Path) -> tuple[F64, I32]:
     return np.asarray(mesh.vertices, np.float64), np.asarray(mesh.triangles, np.int32)
 
 
-def write_mesh(path: Path, vertices: F64, faces: I32) -> None:
-    """Write a triangle mesh as OBJ, in micrometres' precision."""
-    rows = [f"v {x:.6f} {y:.6f} {z:.6f}\n" for x, y, z in vertices]
-    rows += [f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in faces]
-    path.write_text("".join(rows), encoding="utf-8")
-
-
 def _fan(fields: Sequence[str], known: int, where: str) -> list[tuple[int, int, int]]:
     """Return the triangles of one face; each field is vertex, vertex/texture or vertex/texture/normal."""
     try:

@@ -10,7 +10,8 @@ from scipy.linalg import expm
 
 from mocapflow.data import Pose, PoseBatch
 from mocapflow.geometry import kinematics, twists
-from mocapflow.geometry.joints import angles_from_rotations, decompose, rotations_from_angles
+from mocapflow.geometry.joints import angles_from_rotations, decompose
+from tests.fixtures.turns import rotations_from_angles
 
 RECORDING = Path(__file__).parents[2] / "examples" / "data" / "skirt_steps"
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mocapflow.errors import RecordingError
-from mocapflow.io.meshes import read_mesh, write_mesh
+from mocapflow.io.meshes import read_mesh
 
 DEMO = Path(__file__).parents[2] / "examples" / "data"
 
@@ -33,14 +33,6 @@ def test_seams_groups_polygons_and_unused_vertices(tmp_path):
     np.testing.assert_array_equal(vertices, [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [5, 5, 5]])
     assert faces.tolist() == [[0, 1, 2], [0, 2, 3], [0, 1, 2], [0, 2, 3], [0, 1, 2]]
     assert faces.dtype == np.int32
-
-
-def test_there_and_back(tmp_path):
-    vertices, faces = read_mesh(DEMO / "skirt_steps" / "subject" / "body.obj")
-    write_mesh(tmp_path / "a.obj", vertices, faces)
-    again, same = read_mesh(tmp_path / "a.obj")
-    np.testing.assert_allclose(again, vertices, atol=5e-7)
-    np.testing.assert_array_equal(same, faces)
 
 
 @pytest.mark.parametrize(

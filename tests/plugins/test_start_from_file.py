@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import kinematics
-from mocapflow.geometry.joints import rotations_from_angles
 from mocapflow.recording import open_recording
 from mocapflow.scene import Scene
+from tests.fixtures.turns import rotations_from_angles
 
 RECORDING = Path(__file__).parents[2] / "examples" / "data" / "skirt_steps"
 

@@ -16,8 +16,8 @@ from mocapflow.assets import Body
 from mocapflow.cli import app
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import angles
-from mocapflow.geometry.joints import rotations_from_angles
 from mocapflow.io import markers
+from tests.fixtures.turns import rotations_from_angles
 
 BENT = {"hip_l.flexion": 40.0, "knee_l.flexion": 70.0, "ankle_l.dorsiflexion": 12.0, "elbow_l.flexion": 50.0}
 BVH = """HIERARCHY
