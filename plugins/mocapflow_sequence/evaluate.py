@@ -120,7 +120,7 @@ def _row(own: Ours, name: str, known: F64, aligned: F64, strides: Sequence[Cycle
     error = (curve - aligned)[np.isfinite(curve - aligned)]
     return {
         "angle": name,
-        **compare.figures(curve, known, sd, frame),
+        **compare.figures(curve, known, sd, frame, own.frame_rate),
         "rms_unsmoothed_deg": compare.rms(raw - known),
         "rms_aligned_deg": compare.rms(error - np.mean(error)) if len(error) else np.nan,
         "cycles": len(cycles.own(strides, name)),

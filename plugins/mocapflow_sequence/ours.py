@@ -14,7 +14,7 @@ from mocapflow.io import markers
 from mocapflow.records import F64, record
 from mocapflow.results import Track
 from mocapflow.scene import Scene
-from mocapflow_sequence import layout, opensim, tables
+from mocapflow_sequence import compare, layout, opensim, tables
 from mocapflow_sequence.export import before_smoothing
 from mocapflow_sequence.stick import Stick
 from mocapflow_sequence.uncertainty import measured
@@ -33,8 +33,7 @@ class Ours:
     @property
     def frame_rate(self) -> float:
         """Frames per second, 30 where a single frame does not tell."""
-        time = self.columns["time"]
-        return float(1 / np.median(np.diff(time))) if len(time) > 1 else 30.0
+        return compare.per_second(self.columns["time"])
 
 
 def of_track(track: Track, scene: Scene) -> Ours:

@@ -10,7 +10,7 @@ import numpy as np
 
 from mocapflow.records import F64
 from mocapflow_sequence import layout, panels, tables
-from mocapflow_sequence.compare import drawn_blocks, rms, rms_interval
+from mocapflow_sequence.compare import drawn_blocks, per_second, rms, rms_interval
 
 Run = tuple[str, str, Path | str]  # variant, recording, run folder or why it failed
 Row = dict[str, float | str]
@@ -24,14 +24,15 @@ def compare(runs: Sequence[Run], folder: Path) -> list[Row]:
     A run that failed has a row in runs.csv that says why.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    rows, baseline = [], runs[0][0]
+    rows: list[Row] = []
+    baseline = runs[0][0]
     errors = {(variant, recording): angle_errors(path) for variant, recording, path in runs}
-    for variant, recording, _ in runs:
+    for variant, recording, path in runs:
         ours, base = errors[variant, recording], errors[baseline, recording]
-        rows += [
-            {"recording": recording, "variant": variant, "angle": angle, **figures(error, base.get(angle))}
-            for angle, error in ours.items()
-        ]
+        rate = frame_rate(Path(path)) if ours else np.nan
+        for angle, error in ours.items():
+            found = figures(error, base.get(angle), rate)
+            rows.append({"recording": recording, "variant": variant, "angle": angle, **found})
     tables.write_rows(folder / "compare.csv", rows)
     tables.write_rows(folder / "runs.csv", [{"recording": r, "variant": v, **run_figures(path)} for v, r, path in runs])
     if rows:
@@ -46,22 +47,34 @@ def angle_errors(run: Path | str) -> dict[str, F64]:
     return {name: error for name, error in tables.read_columns(run / layout.ERRORS).items() if name != "frame"}
 
 
-def figures(error: F64, base: F64 | None) -> Row:
-    """Return what is said of an angle: its RMS and how much that differs from the baseline's, with 95 % intervals."""
+def frame_rate(run: Path) -> float:
+    """Return the frames per second of a run."""
+    said = json.loads((run / layout.RUN).read_text(encoding="utf-8"))
+    return per_second(np.array([frame["time"] for frame in said["per_frame"]]))
+
+
+def figures(error: F64, base: F64 | None, rate: float) -> Row:
+    """Return what is said of an angle: its RMS and how much that differs from the baseline's, with 95 % intervals.
+
+    Args:
+        error: (T,) deg.
+        base: (T,) deg, of the baseline; None where it has no such angle.
+        rate: frames per second.
+    """
     seen = np.isfinite(error)
-    low, high = rms_interval(error[seen])
+    low, high = rms_interval(error[seen], rate)
     row: Row = {"frames": int(seen.sum()), "rms_deg": rms(error[seen]), "rms_low_deg": low, "rms_high_deg": high}
     row["mae_deg"] = float(np.abs(error[seen]).mean())
     difference = (np.nan,) * 3
     if base is not None and len(base) == len(error):
         both = seen & np.isfinite(base)
-        difference = paired_difference(error[both], base[both])
+        difference = paired_difference(error[both], base[both], rate)
     return row | dict(zip(("difference_deg", "difference_low_deg", "difference_high_deg"), difference, strict=True))
 
 
-def paired_difference(error: F64, base: F64) -> tuple[float, float, float]:
+def paired_difference(error: F64, base: F64, rate: float) -> tuple[float, float, float]:
     """Return by how much the RMS of one error exceeds that of another, and its 95 % interval."""
-    rows = drawn_blocks(len(error))
+    rows = drawn_blocks(len(error), rate)
     drawn = np.sqrt(np.mean(error[rows] ** 2, axis=1)) - np.sqrt(np.mean(base[rows] ** 2, axis=1))
     low, high = np.percentile(drawn, [2.5, 97.5])
     return rms(error) - rms(base), float(low), float(high)

@@ -9,6 +9,7 @@ from mocapflow_sequence.ours import Ours
 from mocapflow_sequence.references import read_reference
 from mocapflow_sequence.stick import Stick
 from results_scene import DEMO, demo_scene, stepping
+from scipy.signal import lfilter
 
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import angles
@@ -19,7 +20,7 @@ FRAMES = np.arange(120.0)
 
 
 def row(ours: np.ndarray, truth: np.ndarray) -> dict[str, float]:
-    return compare.figures(ours, truth, np.ones(len(ours)), FRAMES[: len(ours)])
+    return compare.figures(ours, truth, np.ones(len(ours)), FRAMES[: len(ours)], 30.0)
 
 
 def test_identical_curves_deviate_by_nothing() -> None:
@@ -50,11 +51,31 @@ def test_lag_is_recovered_to_a_tenth_of_a_frame(delay: float, noise: float) -> N
         return 30 * np.sin(t / 6) + 10 * np.sin(t / 2.5 + 1)
 
     wobble = noise * np.random.default_rng(4).normal(size=120)
-    assert compare.lag(curve(FRAMES - delay) + wobble + 5, curve(FRAMES)) == pytest.approx(delay, abs=0.1)
+    assert compare.lag(curve(FRAMES - delay) + wobble + 5, curve(FRAMES), 30.0) == pytest.approx(delay, abs=0.1)
 
 
 def test_lag_of_a_curve_that_does_not_move_is_unknown() -> None:
-    assert np.isnan(compare.lag(np.ones(60), np.arange(60.0)))
+    assert np.isnan(compare.lag(np.ones(60), np.arange(60.0), 30.0))
+
+
+def test_a_lag_is_looked_for_in_seconds() -> None:
+    time = np.arange(240) / 120
+    late = np.sin(9 * (time - 0.1))  # 12 frames
+    assert compare.lag(late, np.sin(9 * time), 120.0) == pytest.approx(12, abs=0.1)
+
+
+def hanging_together(seconds: float, rate: float, takes: int) -> np.ndarray:
+    """Return errors (takes, T) about 1 of unit spread, whose correlation falls to 1/e within a third of a second."""
+    kept = np.exp(-3 / rate)
+    noise = np.random.default_rng(0).normal(size=(takes, round(seconds * rate)))
+    noise[:, 1:] *= np.sqrt(1 - kept**2)
+    return np.asarray(1 + lfilter([1], [1, -kept], noise))
+
+
+@pytest.mark.parametrize("rate", [10.0, 120.0])
+def test_the_interval_of_an_rms_does_not_hang_on_the_frame_rate(rate: float) -> None:
+    low, high = np.transpose([compare.rms_interval(error, rate) for error in hanging_together(16.0, rate, 120)])
+    assert 0.72 < np.mean((low <= np.sqrt(2)) & (np.sqrt(2) <= high)) < 0.95
 
 
 def test_coverage_counts_our_own_intervals() -> None:

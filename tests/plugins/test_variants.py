@@ -19,7 +19,13 @@ def finished(folder: Path, error: np.ndarray, lost: int = 0) -> Path:
     """Write what a run leaves behind."""
     tables.write_columns(layout.place(folder, layout.ERRORS), {"frame": FRAMES, "knee_flexion_l": error})
     frames = [
-        {"iterations": 3, "steady": row % 2 == 0, "cpu_seconds": 0.2, **({"lost": True} if row < lost else {})}
+        {
+            "time": row / 30,
+            "iterations": 3,
+            "steady": row % 2 == 0,
+            "cpu_seconds": 0.2,
+            **({"lost": True} if row < lost else {}),
+        }
         for row in range(len(FRAMES))
     ]
     layout.place(folder, layout.RUN).write_text(json.dumps({"per_frame": frames, "overlap_median": [0.9, None, 0.8]}))
@@ -41,8 +47,8 @@ def test_figures_of_two_variants(tmp_path: Path) -> None:
 
 
 def test_a_paired_difference_is_sharper_than_its_parts() -> None:
-    difference, low, high = variants.paired_difference(1.05 * SHARED, SHARED)
-    alone_low, alone_high = variants.rms_interval(SHARED)
+    difference, low, high = variants.paired_difference(1.05 * SHARED, SHARED, 30.0)
+    alone_low, alone_high = variants.rms_interval(SHARED, 30.0)
     assert low <= difference <= high
     assert high - low < 0.2 * (alone_high - alone_low)
     assert low > 0
