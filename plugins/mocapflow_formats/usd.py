@@ -45,7 +45,7 @@ class Author:
         stage, geom = self._stage, self._geom
         geom.SetStageUpAxis(stage, geom.Tokens.z)
         geom.SetStageMetersPerUnit(stage, 1.0)
-        stage.SetTimeCodesPerSecond(self._result.track.frame_rate)
+        stage.SetTimeCodesPerSecond(self._result.recording.frame_rate)  # codes are frames of the videos
         if self._frames:
             stage.SetStartTimeCode(self._frames[0])
             stage.SetEndTimeCode(self._frames[-1])

@@ -123,6 +123,16 @@ def test_usd_opens_and_moves_body_and_garment(result: Result, tmp_path: Path) ->
     np.testing.assert_allclose(body.Get(3), result.bare(3).vertices, atol=NEAR)
 
 
+def test_usd_plays_every_other_frame_at_the_speed_of_the_recording(result: Result, tmp_path: Path) -> None:
+    pytest.importorskip("pxr")
+    from pxr import Usd
+
+    track = replace(result.track, frame=2 * result.track.frame, time=2 * result.track.time)
+    stage = Usd.Stage.Open(str(write("usd", replace(result, track=track), tmp_path)))
+    played = (stage.GetEndTimeCode() - stage.GetStartTimeCode()) / stage.GetTimeCodesPerSecond()
+    assert played == pytest.approx(track.time[-1] - track.time[0])
+
+
 def test_rerun_holds_everything_on_one_timeline(result: Result, tmp_path: Path) -> None:
     logged = readers.rerun_entities(write("rrd", result, tmp_path))
     track, body = result.track, result.scene.body
