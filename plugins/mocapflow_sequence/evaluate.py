@@ -98,7 +98,8 @@ def evaluate(own: Ours, path: Path, folder: Path, longest_lag_s: float = LONGEST
     _write_tables(folder, own.columns, known, rows, strides)
     found = {"reference": str(path), "lag_frames": alignment.lag, "signs": alignment.signs, "notes": notes}
     runjson.write(layout.place(folder, layout.FINDINGS), {**found, "registration": rigs.figures})
-    pictures = [*comparison_plots.draw(own.columns, known, strides, folder), *rigs.write(folder, own.frame_rate)]
+    written = rigs.write(folder, own.frame_rate, float(own.columns["time"][0]))
+    pictures = [*comparison_plots.draw(own.columns, known, strides, folder), *written]
     return Evaluation(reference=str(path), rows=tuple(rows), notes=tuple(notes), pictures=tuple(pictures))
 
 

@@ -31,8 +31,14 @@ class Rigs:
     figures: Mapping[str, Any] | None = None
     notes: tuple[str, ...] = ()
 
-    def write(self, folder: Path, frame_rate: float) -> list[Path]:
-        """Write the distances, the stick model as a .trc and as a picture into a run folder; return the pictures."""
+    def write(self, folder: Path, frame_rate: float, start: float) -> list[Path]:
+        """Write the distances, the stick model as a .trc and as a picture into a run folder; return the pictures.
+
+        Args:
+            folder: the run folder.
+            frame_rate: per second.
+            start: time of the first frame, s.
+        """
         if self.theirs is None or self.aligned is None:
             for part in (layout.DISTANCES, layout.STICK, layout.STICK_PLOT):
                 (folder / part).unlink(missing_ok=True)  # of another reference
@@ -41,7 +47,7 @@ class Rigs:
         tables.write_rows(layout.place(folder, layout.DISTANCES), rows)
         laid = stick.constant(self.theirs)
         places = markers.opensim_from_world(laid.places)
-        markers.write_trc(layout.place(folder, layout.STICK), laid.names, places, frame_rate)
+        markers.write_trc(layout.place(folder, layout.STICK), laid.names, places, frame_rate, start=start)
         return [comparison_plots.draw_sticks(layout.place(folder, layout.STICK_PLOT), self.ours, laid, self.frame)]
 
 

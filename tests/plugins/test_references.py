@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -133,6 +134,14 @@ def test_without_common_points_joint_centres_do(own: Ours, tmp_path: Path) -> No
     names, places, _, _ = markers.read_trc(tmp_path / layout.STICK)
     knee = markers.world_from_opensim(places)[:, names.index("knee_l")]
     assert np.linalg.norm(knee - own.stick.places[:, own.stick.names.index("knee_l")], axis=1).max() < 0.03
+
+
+def test_the_stick_model_has_the_times_of_the_track(own: Ours, tmp_path: Path) -> None:
+    read(tmp_path, moved(PLACES)[0])
+    columns, raw = ({name: values[10:] for name, values in part.items()} for part in (own.columns, own.raw))
+    late = Ours(columns=columns, raw=raw, stick=replace(own.stick, places=own.stick.places[10:]))
+    evaluate(late, tmp_path / "markers.c3d", tmp_path)
+    np.testing.assert_allclose(markers.read_trc(tmp_path / layout.STICK)[2], columns["time"], atol=1e-6)
 
 
 def test_the_stick_model_keeps_its_lengths(own: Ours, tmp_path: Path) -> None:
