@@ -52,8 +52,10 @@ class EmptyScene(Stage):
     def _pictures(self, recording: Recording, camera: int) -> U8:
         """Return pictures (N, H, W, 3) of one camera, spread over the recording."""
         step = max(recording.length // self.samples, 1)
-        sampled = replace(recording.seen_by(camera), indices=range(step // 2, recording.length, step))
-        pictures = [frame.images[0] for frame in sampled.frames() if frame.usable[0]]
+        read = range(step // 2, recording.length, step)  # evenly, but up to twice as many as are kept
+        kept = {read[round(row)] for row in np.linspace(0, len(read) - 1, self.samples)}
+        sampled = replace(recording.seen_by(camera), indices=read)
+        pictures = [frame.images[0] for frame in sampled.frames() if frame.usable[0] and frame.index in kept]
         if len(pictures) < 3:
             raise RecordingError(
                 f"{recording.views[camera].lens.name} has {len(pictures)} readable frames, too few for a median",

@@ -13,6 +13,7 @@ from mocapflow.geometry.cameras import project
 from mocapflow.recording import open_recording
 from mocapflow.shipped import shipped
 from mocapflow.testing import pictures, scenes
+from tests.fixtures.recordings import number_of, ring, write_recording
 
 FIRST = Turn(index=0, cap=8)
 SHAPE = (200, 240)
@@ -116,6 +117,17 @@ def test_the_stage_prefers_plates_and_can_do_without():
     for plate, spread, learnt in zip(plates.mean, plates.spread, median.mean, strict=True):
         # the person never leaves their place, so there the median shows them; the room agrees
         assert (np.abs(plate - learnt) < 2 * spread).mean() > 0.7
+
+
+@pytest.mark.parametrize("length", [5, 25, 26, 48, 49, 63])
+def test_the_median_is_of_as_many_frames_as_stated_all_over_the_recording(tmp_path, monkeypatch, length):
+    write_recording(tmp_path, frames=length, cameras=ring(names=("cam01",)))
+    taken = []
+    monkeypatch.setattr("mocapflow_sequence.background.temporal_median", lambda pictures: (taken.extend(pictures), 0))
+    EmptyScene(samples=25).run(open_recording(tmp_path, stop=3))
+    numbers = [number_of(picture) for picture in taken]
+    assert len(set(numbers)) == len(numbers) == min(length, 25)
+    assert max(numbers[0], length - 1 - numbers[-1], *np.diff(numbers)) <= 2 * max(length // 25, 1)
 
 
 def test_wanted_plates_that_are_missing_are_an_error(tmp_path):
