@@ -39,8 +39,9 @@ class FourierIcp(ContourIcp):
     ) -> tuple[ImageContour, ModelContour]:
         """Return the contours of one view, low-passed as the turn and their shapes allow."""
         image, model = super().contours(silhouette, surface, scene, turn)
-        near = np.median(np.abs(inside_px(silhouette, model.contour.pixel))) < self.near_px
-        if turn.index >= len(self.harmonics) or not len(model.contour.pixel) or near:
+        if turn.index >= len(self.harmonics) or not len(model.contour.pixel):
+            return image, model
+        if np.median(np.abs(inside_px(silhouette, model.contour.pixel))) < self.near_px:
             return image, model
         camera = scene.cameras[silhouette.camera]
         covered = silhouettes.mask(silhouettes.outline(surface, camera), camera)

@@ -84,6 +84,13 @@ def test_near_contours_are_matched_in_full():
     assert view(FourierIcp(near_px=0), truth, shown, FIRST)[0].curvature.any()
 
 
+def test_a_view_that_shows_nothing_of_the_model_has_no_pairs():
+    truth = tiny_pose(SCENE)
+    away = moved(truth, np.r_[0, 0, 0, 0, 0, 50.0, np.zeros(len(truth.angles))])
+    image, model = view(FourierIcp(), away, seen(SCENE.surface(truth, NO_CLOTH), SCENE), FIRST)
+    assert len(image.pixel) and not len(model.contour.pixel)
+
+
 def test_other_numbers_of_components_fall_back():
     """Something small that belongs to the person in the image alone: contours differ, all are matched as they are."""
     truth = tiny_pose(SCENE)
