@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 from mocapflow_levelset import splits
@@ -25,6 +25,7 @@ class LayeredIcp(ContourIcp):
     """
 
     name: ClassVar[str] = "layered_icp"
+    residual: Literal["normal"] = "normal"  # the direction of a pair says where its inside is, so it has to have one
     least: PositiveFloat = 3.0  # log ratio of colours by which they are surely another part's
 
     def match(

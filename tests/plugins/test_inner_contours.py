@@ -213,3 +213,8 @@ def test_contours_of_another_part_s_colours_make_no_pair():
     assert (right.weight > 0).mean() > 0.95
     assert (wrong.weight > 0).mean() < 0.2
     assert another_s(right, swapped, shown(past), layer_of(SCENE), 2.0).mean() > 0.8
+
+
+def test_whose_colours_they_are_needs_the_direction_of_a_contour():
+    with pytest.raises(ValueError, match="Input should be 'normal'"):
+        LayeredIcp(residual="point")
