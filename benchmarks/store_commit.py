@@ -1,4 +1,4 @@
-"""What a committed frame costs: CPU ms and MB, against npz of the same content, and where the time goes.
+"""What a committed frame costs: CPU ms and MB, against npz of the same content, where the time goes, what is waited.
 
 Four views of the demo clip, brought to 640x800 px: signed distances to the outline of the difference from the clean
 plate, clipped to a band of 12 px as the segmenter does; 1,200 matches; 33 angles; 1,152 cloth vertices.
@@ -18,7 +18,7 @@ from typing import TypeVar
 import cv2
 import numpy as np
 
-from mocapflow import packing
+from mocapflow import packing, rows
 from mocapflow.checkpoint import Checkpoint
 from mocapflow.data import (
     Change,
@@ -82,6 +82,7 @@ def main(count: int = 40) -> None:
         print(f"{name:<18}{middle:8.2f}{min(values[1:]):8.2f}{middle / best:8.2f}{size[name] / 1e6:8.3f}")
     print(f"first commit (makes the arrays) {spent['commit'][0]:.1f} ms; sealing {sealing[0] / count:.2f} ms a frame;")
     print(f"reading silhouettes and matches back {np.median(read):.2f} ms a frame")
+    print(f"waiting until the drive has it {np.median(parts.waited[1:]):.1f} ms a frame")
     print("of the commit:", ", ".join(f"{name} {np.median(ms[1:]):.2f} ms" for name, ms in parts.spent.items()))
 
 
@@ -93,14 +94,17 @@ def timed(spent: list[float], call: Callable[[], T]) -> T:
 
 
 class Parts:
-    """Splits a commit: quantising, packing, each kind of array, the count of frames."""
+    """Splits a commit: quantising, packing, each kind of array; and how long it waits for the drive."""
 
     def __init__(self) -> None:
-        self.spent: dict[str, list[float]] = {}
+        self.spent: dict[str, list[float]] = {}  # ms of CPU
+        self.waited: list[float] = []  # ms
 
     def __enter__(self) -> None:
         self._now: dict[str, float] = {}
-        self._real = (packing.quantised, packing.match_row, packing.row_of, Rows.write)
+        self.waited.append(0.0)
+        self._real = (packing.quantised, packing.match_row, packing.row_of, Rows.write, rows.flush)
+        rows.flush = self._wait
         packing.quantised = self._watch("quantise", packing.quantised)
         packing.match_row = self._watch("pack", packing.match_row)
         packing.row_of = self._watch("pack", packing.row_of)
@@ -108,7 +112,7 @@ class Parts:
         Rows.write = lambda rows, *a: self._watch(f"write {rows._path.parent.name}", write)(rows, *a)  # type: ignore[method-assign]
 
     def __exit__(self, *_: object) -> None:
-        packing.quantised, packing.match_row, packing.row_of, Rows.write = self._real  # type: ignore[method-assign]
+        packing.quantised, packing.match_row, packing.row_of, Rows.write, rows.flush = self._real  # type: ignore[method-assign]
         for name, ms in self._now.items():
             kind = (
                 "write silhouettes"
@@ -116,6 +120,11 @@ class Parts:
                 else name.replace("write track-000000000000", "write cloth")
             )
             self.spent.setdefault(kind, []).append(ms)
+
+    def _wait(self, path: Path) -> None:
+        start = time.perf_counter()
+        self._real[-1](path)
+        self.waited[-1] += 1000 * (time.perf_counter() - start)
 
     def _watch(self, name: str, call: Callable) -> Callable:  # type: ignore[type-arg]
         def watched(*args):  # type: ignore[no-untyped-def]

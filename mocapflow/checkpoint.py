@@ -2,8 +2,9 @@
 
 Layout of its group: `live/rows` holds all numbers of a frame in one row of float64, `cloth` one chunk per frame,
 `silhouettes/<layer>/<camera>` int8 at 1/8 px, `matches/<capacity>` one padded row per frame, and
-`live/appearance-<size>` the last two appearances in turns. `Checkpoint.track` writes the rows out as the named
-arrays of `Track`. A frame counts once `frames_done` says so, which is written last and in one step.
+`live/appearance-<size>` the last two appearances in turns, each behind the number of its frame. `Checkpoint.track`
+writes the rows out as the named arrays of `Track`. A frame counts once `frames_done` says so, which is written last
+and in one step, when the rest is on the drive.
 """
 
 from __future__ import annotations
@@ -132,7 +133,7 @@ class Checkpoint:
                     row, state.cloth.vertices
                 )
             self._write_seen(row, state.segmentation.silhouettes, state.matches)
-            self._write_appearance(row, appearance)
+            self._write_appearance(row, frame.index, appearance)
             self._write_trace(row)
             news = {"notes": self._notes(frame.index, notes), "frames_done": row + 1, "complete": False}
             write_json(self._path / "zarr.json", group_meta(self._attributes | news))
@@ -161,10 +162,10 @@ class Checkpoint:
         found = []
         for folder in sorted((self._path / "silhouettes").glob("*/*/zarr.json")):
             layer, camera = folder.parent.parent.name, folder.parent.name
-            steps = self._open(f"silhouettes/{layer}/{camera}").read(row)
-            if steps.flat[0] != packing.UNSEEN:
-                camera_index = self._cameras.index(camera)
-                found.append(Silhouette(camera=camera_index, layer=layer, distance=packing.distance_of(steps)))
+            kept = self._open(f"silhouettes/{layer}/{camera}")
+            if kept.has(row):
+                distance = packing.distance_of(kept.read(row))
+                found.append(Silhouette(camera=self._cameras.index(camera), layer=layer, distance=distance))
         return tuple(found), packing.matches_of(packed, count)
 
     @cached_property
@@ -187,18 +188,20 @@ class Checkpoint:
         name = f"matches/{len(packed)}"
         self._rows(name, packed, 0, f"M{len(packed)}", "match", columns=packing.MATCH).write(row, packed)
 
-    def _write_appearance(self, row: int, appearance: Mapping[str, F64]) -> None:
+    def _write_appearance(self, row: int, index: int, appearance: Mapping[str, F64]) -> None:
         self._attributes["appearance"] = [[name, list(values.shape)] for name, values in appearance.items()]
         if appearance:
-            flat = np.concatenate([values.ravel() for values in appearance.values()])
+            flat = np.concatenate([[index], *(values.ravel() for values in appearance.values())])
             self._rows(f"live/appearance-{len(flat)}", flat, np.nan, f"A{len(flat)}").write(row % 2, flat)
 
     def _appearance(self, row: int) -> dict[str, F64]:
         shapes = {name: tuple(shape) for name, shape in self._attributes["appearance"]}
-        size = sum(prod(shape) for shape in shapes.values())
         if not shapes:
             return {}
-        flat = self._open(f"live/appearance-{size}").read(row % 2)
+        size = sum(prod(shape) for shape in shapes.values())
+        frame, flat = np.split(self._open(f"live/appearance-{1 + size}").read(row % 2), [1])
+        if frame != self._indices[row]:
+            raise Corrupted(f"the appearance of frame {self._indices[row]} is missing in {self._path}")
         return {name: column(shapes, flat, name) for name in shapes}
 
     def _moment(self, numbers: F64, cloth: F64) -> Moment:

@@ -2,11 +2,15 @@
 
 A write through zarr's own interface costs 1.1 ms of CPU however small it is, the same chunk written here 0.1 ms
 (benchmarks/store_commit.py). The files are plain zarr v3: bytes, then zstd level 1 with its checksum.
+
+What is written here is on the drive when the call returns: a machine may lose its power. For the nine files of a frame
+that takes 30 ms of waiting and 2 ms of CPU (there, on a busy machine).
 """
 
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -26,7 +30,7 @@ class Corrupted(StoreError):
 
 
 class Rows:
-    """One array of shape (T, ...) whose chunks are single rows; what was never written reads as `fill`."""
+    """One array of shape (T, ...) whose chunks are single rows; zarr reads what was never written as `fill`."""
 
     def __init__(self, path: Path) -> None:
         meta = read_json(path / "zarr.json")
@@ -81,14 +85,25 @@ class Rows:
             whole = np.full(self._chunk, self._fill, self._dtype)
             whole[: len(values)] = values
         self._file(block).write_bytes(self._zstd.encode(whole))
+        flush(self._file(block))
+
+    def has(self, row: int) -> bool:
+        """Return whether a row was written."""
+        return self._file(row).exists()
 
     def read(self, row: int) -> npt.NDArray[Any]:
-        """Return one row, freshly allocated."""
+        """Return one row, freshly allocated.
+
+        Raises:
+            Corrupted: it was never written, or can't be read back.
+        """
         values = np.empty(self.shape[1:], self._dtype)
+        if not values.size:
+            return values
         try:
             self._zstd.decode(self._file(row).read_bytes(), out=values)
-        except FileNotFoundError:
-            values[...] = self._fill
+        except FileNotFoundError as error:
+            raise Corrupted(f"row {row} of {self._path} is missing") from error
         except (RuntimeError, ValueError) as error:
             raise Corrupted(f"row {row} of {self._path} is damaged: {error}") from error
         return values
@@ -139,4 +154,11 @@ def write_json(path: Path, value: Any) -> None:
     """
     part = path.with_suffix(f".{uuid4().hex}.part")
     part.write_text(json.dumps(value, ensure_ascii=False, separators=(",", ":")))
+    flush(part)
     part.replace(path)
+
+
+def flush(path: Path) -> None:
+    """Wait until a file is on the drive."""
+    with path.open("rb") as file:
+        os.fsync(file.fileno())

@@ -22,7 +22,7 @@ from mocapflow.digests import Digests
 from mocapflow.errors import StoreError
 from mocapflow.keys import Recipe
 from mocapflow.locks import Lock, acquire
-from mocapflow.rows import Corrupted, read_json, write_json
+from mocapflow.rows import Corrupted, flush, read_json, write_json
 
 SHORT = 12  # digits of the key in a group's name
 LIBRARIES = ("mocapflow", "numpy", "scipy", "opencv-python-headless", "numba")
@@ -141,6 +141,8 @@ class Store:
         with writing(self.path):
             group = zarr.open_group(str(artifact.path), mode="r+")
             save_record(group, value)
+            for file in filter(Path.is_file, artifact.path.rglob("*")):
+                flush(file)
             group.update_attributes({"complete": True})
         return reread(artifact)
 

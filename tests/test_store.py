@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import re
 import socket
 import threading
 import time
@@ -127,7 +128,8 @@ def test_rows_are_plain_zarr(tmp_path):
     read = zarr.open_array(str(tmp_path / "a"), mode="r")
     assert np.array_equal(read[2], values)
     assert np.isnan(read[1]).all()
-    assert np.isnan(made.read(1)).all()
+    with pytest.raises(Corrupted, match="row 1 of .* is missing"):
+        made.read(1)
     zarr.open_array(str(tmp_path / "a"), mode="r+")[1] = 2 * values
     assert np.array_equal(Rows(tmp_path / "a").read(1), 2 * values)
     made.resize(6)
@@ -234,15 +236,78 @@ def test_what_is_wide_stays_in_the_store_and_is_missed_when_it_is_removed(tmp_pa
         other.cloth[0]
 
 
-def test_a_damaged_frame_of_a_half_done_track_is_noticed(tmp_path, path):
-    run_tiny(path, tmp_path / "whole")
-    run_tiny(path, tmp_path, frames=6)
+def cut_back(group, frames):
+    """Leave a finished track as a run leaves it that is killed after so many frames."""
+    meta = rows.read_json(group / "zarr.json")
+    attributes = {name: value for name, value in meta["attributes"].items() if name != "sealed"}
+    rows.write_json(group / "zarr.json", meta | {"attributes": attributes | {"frames_done": frames, "complete": False}})
+
+
+@pytest.mark.parametrize(
+    ("lost", "told"),
+    [
+        ("live/rows/c.5.*", "row 5 of .*/live/rows is missing"),
+        ("cloth/c.4.*", "row 4 of .*/cloth is missing"),
+        ("live/appearance-*/c.*", "row 1 of .*/live/appearance-[0-9]+ is missing"),
+        (None, "the appearance of frame 5 is missing in .*"),  # those of frames 10 and 11 are there
+    ],
+)
+def test_a_half_done_track_whose_files_are_missing_is_made_anew(tmp_path, path, lost, told):
+    run_tiny(path, tmp_path)
+    whole = the_track(tmp_path)
     (group,) = (tmp_path / "store.zarr").glob("track-*")
-    file = group / "live" / "rows" / "c.5.0"
-    file.unlink()  # reads as the fill value
+    cut_back(group, 6)
+    for file in group.glob(lost) if lost else ():
+        file.unlink()
     _, lines = run_tiny(path, tmp_path)
-    assert any("is damaged and made anew: frame 5 is missing" in line for line in lines)
-    assert same(the_track(tmp_path / "whole"), the_track(tmp_path))
+    assert any(re.search(f"is damaged and made anew: {told}", line) for line in lines), lines
+    assert same(whole, the_track(tmp_path))
+
+
+@pytest.fixture
+def unsafe(monkeypatch):
+    """The files of a track that a power loss would take: written, but not known to be on the drive."""
+    found, real = set(), (Path.write_bytes, Path.write_text, os.fsync)
+
+    def written(kind):
+        def write(self, *args, **kwargs):
+            size = real[kind](self, *args, **kwargs)
+            if "track-" in str(self):
+                found.add(self.stat().st_ino)
+            return size
+
+        return write
+
+    def fsync(number):
+        real[2](number)
+        found.discard(os.fstat(number).st_ino)
+
+    monkeypatch.setattr(Path, "write_bytes", written(0))
+    monkeypatch.setattr(Path, "write_text", written(1))
+    monkeypatch.setattr(os, "fsync", fsync)
+    return found
+
+
+def test_a_frame_is_on_the_drive_before_it_counts(tmp_path, path, monkeypatch, unsafe):
+    left, replace = [], Path.replace
+
+    def counted(self, target):
+        if Path(target).parent.name.startswith("track-"):
+            left.append(len(unsafe))
+        return replace(self, target)
+
+    monkeypatch.setattr(Path, "replace", counted)
+    run_tiny(path, tmp_path)
+    assert left == [0] * 14  # begun, twelve frames, sealed
+
+
+def test_a_result_is_on_the_drive_before_it_is_complete(store, monkeypatch):
+    synced, real = set(), os.fsync
+    monkeypatch.setattr(os, "fsync", lambda number: (synced.add(os.fstat(number).st_ino), real(number)))
+    made = put(store, tiny_body(1.0))
+    files = {file for file in made.path.rglob("*") if file.is_file()} - {made.path / "zarr.json"}
+    assert len(files) > 10
+    assert {file.stat().st_ino for file in files} <= synced
 
 
 # ---- a store that can't be written
