@@ -71,10 +71,12 @@ class Execution:
 
     def _loaded(self, step: Step, found: Artifact) -> Any:
         try:
-            result = self._store.load(found, step.frames if step.chain else None)
-        except Corrupted as error:
-            self._set_aside(found.path, error)
+            return self._read(step, found)
+        except Corrupted:  # or somebody is making it anew: who may write it looks again
             return self._made(step)
+
+    def _read(self, step: Step, found: Artifact) -> Any:
+        result = self._store.load(found, step.frames if step.chain else None)
         self._entered(step, found)
         return result
 
@@ -84,8 +86,11 @@ class Execution:
         with self._store.writer(step.key, f"{step.label}-{step.key[:6]}", self._report) as lock:
             started = self._started(step)
             if started is not None and is_hit(step, started):  # another run has made it while this one waited
-                self._entered(step, started)
-                return self._store.load(started, step.frames if step.chain else None)
+                try:
+                    return self._read(step, started)
+                except Corrupted as error:
+                    self._set_aside(started.path, error)
+                    started = None
             return self._chain(step, started, lock) if step.chain else self._whole(step)
 
     def _started(self, step: Step) -> Artifact | None:

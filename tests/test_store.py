@@ -19,11 +19,12 @@ from mocapflow.assets import Background
 from mocapflow.checkpoint import Checkpoint
 from mocapflow.data import Frame, Past, Pose, Silhouette, Start
 from mocapflow.errors import ComponentFailed, StoreError
+from mocapflow.execution import Execution
 from mocapflow.packing import FINE, distance_of, match_row, matches_of, quantised
 from mocapflow.rows import Corrupted, Rows
 from mocapflow.series import Series
 from mocapflow.store import Store, remove
-from tests.fixtures.stores import run_tiny, same, the_track, write_pipeline, write_recording
+from tests.fixtures.stores import actions, run_tiny, same, the_track, write_pipeline, write_recording
 from tests.fixtures.tiny_plugin import TinyMatcher, tiny_body
 
 RECIPE = {"component": {"name": "some"}}
@@ -200,7 +201,7 @@ def damage_array_json(group):
 
 
 def damage_chunk(group):
-    file = group / "angles" / "c.0.0"
+    (file,) = (file for file in (group / "angles").rglob("*") if file.is_file() and file.name != "zarr.json")
     file.write_bytes(file.read_bytes()[:-5])
 
 
@@ -221,6 +222,35 @@ def test_a_damaged_group_is_set_aside_and_made_anew(tmp_path, path, damage):
     assert warning.startswith(f"warning: {group.name} is damaged and made anew: ")
     assert len(list((tmp_path / "store.zarr").glob(f"damaged-{group.name}-*"))) == 1
     assert same(whole, the_track(tmp_path))
+
+
+def test_a_damaged_result_that_another_run_makes_anew_is_left_alone(tmp_path, path, monkeypatch):
+    run_tiny(path, tmp_path)
+    kept, real = Store(tmp_path / "store.zarr"), Store.load
+    (smooth,) = [a for a in kept.artifacts() if a.path.name.startswith("smooth-")]
+    whole = kept.load(smooth)
+
+    def load(self, artifact, frames=None):
+        monkeypatch.setattr(Store, "load", real)
+        kept.save(kept.begin("smooth", smooth.key, smooth.recipe), whole)  # by the other, before this one can write
+        raise Corrupted("damaged")
+
+    monkeypatch.setattr(Store, "load", load)
+    summary, lines = run_tiny(path, tmp_path)  # `export` reads it
+    assert actions(summary)["smooth"] == "hit"
+    assert not [line for line in lines if "damaged" in line]
+    assert not list(kept.path.glob("damaged-*"))
+
+
+def test_a_result_that_another_run_left_damaged_is_made_anew(tmp_path, path, monkeypatch):
+    run_tiny(path, tmp_path)
+    (group,) = (tmp_path / "store.zarr").glob("smooth-*")
+    damage_chunk(group)
+    real = Execution._find
+    monkeypatch.setattr(Execution, "_find", lambda self, step: None if step.label == "smooth" else real(self, step))
+    summary, lines = run_tiny(path, tmp_path)  # the other is done when this one may write
+    assert actions(summary)["smooth"] == "run"
+    assert sum("is damaged and made anew" in line for line in lines) == 1
 
 
 def test_what_is_wide_stays_in_the_store_and_is_missed_when_it_is_removed(tmp_path, path):
