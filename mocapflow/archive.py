@@ -16,6 +16,7 @@ import numpy as np
 
 from mocapflow.errors import StoreError
 from mocapflow.records import F64, array_fields
+from mocapflow.results import notes_of
 from mocapflow.rows import Corrupted
 from mocapflow.series import BLOCK, Numbers, Series, blocks
 
@@ -44,7 +45,7 @@ def save_record(group: zarr.Group, value: Any) -> None:
 
 
 def load_record(group: zarr.Group, rows: int | None = None) -> Any:
-    """Return the record in a group; `rows` shortens every array with an axis T.
+    """Return the record in a group; `rows` shortens every array with an axis T, and leaves the notes on its frames.
 
     Raises:
         Corrupted: it can't be read back.
@@ -63,6 +64,8 @@ def load_record(group: zarr.Group, rows: int | None = None) -> Any:
                 values[field.name] = read(group, field.name, rows if declared.axes[:1] == ("T",) else None)
             elif field.name in group:
                 values[field.name] = _load_nested(group[field.name])
+        if rows is not None and "notes" in values:
+            values["notes"] = notes_of(values["frame"], values["notes"])
         return cls(**values)
     except StoreError:
         raise

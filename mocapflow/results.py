@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +45,12 @@ class Track:
     def pose(self, row: int) -> Pose:
         """Return the pose of one row."""
         return Pose(root=self.root[row].copy(), angles=self.angles[row].copy())
+
+
+def notes_of(frames: I32, notes: Iterable[str]) -> tuple[str, ...]:
+    """Return those of the notes of a track that are on some frames (K,)."""
+    heads = {f"frame {frame}" for frame in frames.tolist()}
+    return tuple(note for note in notes if note.partition(":")[0] in heads)
 
 
 @record

@@ -100,6 +100,17 @@ def test_a_smaller_stop_reads_the_first_frames(tmp_path, path):
     assert len(json.loads((tmp_path / "out" / "results.json").read_text())["angles"]) == 5
 
 
+def test_a_smaller_stop_has_the_notes_of_its_frames_only(tmp_path, path):
+    for index in (1, 4):
+        (tmp_path / "clip" / "videos" / "cam02" / f"{index:06}.png").unlink()
+    run_tiny(path, tmp_path)
+    store = Store(tmp_path / "store.zarr")
+    (found,) = [a for a in store.artifacts() if a.path.name.startswith("track-")]
+    short, longer = (store.load(found, frames).notes for frames in (3, 5))
+    assert {note.partition(":")[0] for note in longer} == {"frame 1", "frame 4"}
+    assert short == tuple(note for note in longer if note.startswith("frame 1:"))
+
+
 def test_a_smaller_stop_than_what_is_half_done(tmp_path, path, monkeypatch):
     monkeypatch.setenv("TINY_RAISE_AT", "8")
     with pytest.raises(ComponentFailed):

@@ -14,10 +14,9 @@ from mocapflow.data import PoseBatch
 from mocapflow.errors import PipelineError
 from mocapflow.geometry import kinematics
 from mocapflow.records import F64, I32, Bool, array_fields
-from mocapflow.results import Track
+from mocapflow.results import Track, notes_of
 from mocapflow.scene import Scene
 from mocapflow.series import Series, joined, picked
-from mocapflow_sequence.runjson import FRAME
 
 LOG = logging.getLogger("mocapflow")
 
@@ -75,10 +74,8 @@ def disagreement(one: Track, other: Track, scene: Scene) -> tuple[I32, F64]:
 
 def cut(track: Track, rows: Bool) -> Track:
     """Return some rows (T,) of a track, with the notes on them."""
-    kept = set(track.frame[rows].tolist())
-    notes = tuple(note for note in track.notes if (m := FRAME.match(note)) and int(m[1]) in kept)
     values: dict[str, Any] = {name: picked(getattr(track, name), rows) for name in _by_frame(track)}
-    return replace(track, notes=notes, **values)
+    return replace(track, notes=notes_of(values["frame"], track.notes), **values)
 
 
 def together(first: Track, second: Track) -> Track:
