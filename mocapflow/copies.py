@@ -57,15 +57,14 @@ class Copies:
             return max(self._of(key), key=_order, default=None)
 
     def fetch(self, copy: Copy, path: Path) -> None:
-        """Bring a copy to a folder that is not there yet."""
-        source, part = f"{self._root}/{copy.name}/", path.with_name(f".{uuid.uuid4().hex}")
+        """Bring a copy to a folder that is not there yet; if that fails, a part of it may be there."""
+        source = f"{self._root}/{copy.name}/"
         with self._reaching():
             found = self._files.find(source)
-            targets = [part / file.removeprefix(source) for file in found]
+            targets = [path / file.removeprefix(source) for file in found]
             for folder in {target.parent for target in targets}:
                 folder.mkdir(parents=True, exist_ok=True)
             self._files.get(found, [str(target) for target in targets])
-            part.rename(path)
 
     def send(self, path: Path) -> None:
         """Make a copy of a group; of all there are, the furthest stays."""

@@ -162,3 +162,9 @@ def flush(path: Path) -> None:
     """Wait until a file is on the drive."""
     with path.open("rb") as file:
         os.fsync(file.fileno())
+
+
+def flush_all(folder: Path) -> None:
+    """Wait until all files in a folder are on the drive."""
+    for path in filter(Path.is_file, folder.rglob("*")):
+        flush(path)

@@ -8,15 +8,18 @@ folder that all machines mount: the locks hold there.
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 from mocapflow.copies import Copies, further
 from mocapflow.errors import StoreError
 from mocapflow.locks import Lock
-from mocapflow.store import Artifact, Report, Store, remove
+from mocapflow.rows import flush_all
+from mocapflow.store import Artifact, Report, Store, writing
 
 
 def open_store(path: Path, url: str | None = None) -> Store:
@@ -74,9 +77,15 @@ class SharedStore(Store):
         here, there = super().find(key), self._copies.find(key)
         if there is None or (here is not None and not further(there.attributes, here.attributes)):
             return
-        if here is not None:
-            remove(here.path)
-        self._copies.fetch(there, self.path / there.group)
+        part = self.path / f".{uuid4().hex}"
+        try:
+            self._copies.fetch(there, part)
+            with writing(self.path):
+                flush_all(part)
+                self.clear(key)
+                part.rename(self.path / there.group)
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
 
     def _send(self, key: str) -> None:
         here, there = super().find(key), self._copies.find(key)

@@ -22,7 +22,7 @@ from mocapflow.digests import Digests
 from mocapflow.errors import StoreError
 from mocapflow.keys import Recipe
 from mocapflow.locks import Lock, acquire
-from mocapflow.rows import Corrupted, flush, read_json, write_json
+from mocapflow.rows import Corrupted, flush_all, read_json, write_json
 
 SHORT = 12  # digits of the key in a group's name
 LIBRARIES = ("mocapflow", "numpy", "scipy", "opencv-python-headless", "numba")
@@ -116,8 +116,7 @@ class Store:
 
     def begin(self, label: str, key: str, recipe: Recipe) -> Artifact:
         """Return a new, unfinished artifact; what stood in its place is removed."""
-        for old in self._groups(f"*-{key[:SHORT]}"):
-            remove(old)
+        self.clear(key)
         path = self.path / f"{label}-{key[:SHORT]}"
         attributes = {
             "key": key, "recipe": recipe, "versions": versions(), "complete": False,
@@ -127,6 +126,11 @@ class Store:
             path.mkdir(parents=True)
             write_json(path / "zarr.json", group_meta(attributes))
         return Artifact(path, attributes)
+
+    def clear(self, key: str) -> None:
+        """Remove what there is of a key, also what is damaged."""
+        for old in self._groups(f"*-{key[:SHORT]}"):
+            remove(old)
 
     def save(self, artifact: Artifact, value: Any) -> Artifact:
         """Write a record into an artifact and finish it.
@@ -141,8 +145,7 @@ class Store:
         with writing(self.path):
             group = zarr.open_group(str(artifact.path), mode="r+")
             save_record(group, value)
-            for file in filter(Path.is_file, artifact.path.rglob("*")):
-                flush(file)
+            flush_all(artifact.path)
             group.update_attributes({"complete": True})
         return reread(artifact)
 

@@ -97,6 +97,41 @@ def test_a_copy_that_never_arrived_is_not_seen(tmp_path, path, url, monkeypatch)
     assert Copies(url).find(key) is not None
 
 
+def cut_line(monkeypatch, url):
+    """Let a copy break off after its first file."""
+    files, _ = fsspec.core.url_to_fs(url)
+    real = type(files).get
+
+    def get(self, sources, targets, **options):
+        real(self, sources[:1], targets[:1], **options)
+        raise OSError("the line is cut")
+
+    monkeypatch.setattr(type(files), "get", get)
+
+
+def test_a_copy_that_breaks_off_leaves_what_is_here(tmp_path, path, url, monkeypatch):
+    shared(path, tmp_path / "one", url)
+    run_tiny(path, tmp_path / "two", frames=5)
+    with monkeypatch.context() as patch:
+        cut_line(patch, url)
+        with pytest.raises(StoreError, match="can't reach the store at .*the line is cut"):
+            shared(path, tmp_path / "two", url, "stages.smooth={use: tiny_smooth, width: 5}")
+    assert len(the_track(tmp_path / "two").frame) == 5
+    assert not [p.name for p in (tmp_path / "two" / "store.zarr").glob(".*") if p.name != ".state"]
+    shared(path, tmp_path / "two", url, "stages.smooth={use: tiny_smooth, width: 5}")
+    assert same(the_track(tmp_path / "one"), the_track(tmp_path / "two"))
+
+
+def test_a_copy_takes_the_place_of_what_is_damaged_here(tmp_path, path, url):
+    shared(path, tmp_path / "one", url)
+    run_tiny(path, tmp_path / "two", frames=5)
+    (group,) = (tmp_path / "two" / "store.zarr").glob("track-*")
+    (group / "zarr.json").write_text("{")
+    summary, _ = shared(path, tmp_path / "two", url, "stages.smooth={use: tiny_smooth, width: 5}")
+    assert actions(summary)["track"] == "hit"
+    assert same(the_track(tmp_path / "one"), the_track(tmp_path / "two"))
+
+
 def the_track_key(folder):
     return next(a.key for a in Store(folder / "store.zarr").artifacts() if a.path.name.startswith("track-"))
 
