@@ -34,6 +34,7 @@ CORE = (
     "rest",
     "results",
     "scene",
+    "series",
     "track",
 )
 PYTHON = f" {sys.version_info.major}.{sys.version_info.minor}"  # another minor version writes syntax trees otherwise

@@ -1,5 +1,6 @@
 """A table of edits, each of which must or must not change a key; and what a miss says about its reason."""
 
+import ast
 import os
 import shutil
 import sys
@@ -7,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from mocapflow import digests, recipes
+from mocapflow import digests, recipes, sources
 from mocapflow.data import Start
 from mocapflow.digests import Digests
 from mocapflow.keys import explain, key_of
@@ -223,6 +224,19 @@ def test_the_core_covers_what_every_result_depends_on(monkeypatch):
     Digests().core()
     assert {"twists", "kinematics", "scene", "model", "loop", "track", "data", "components"} <= set(read)
     assert not {"cli", "store", "runner", "keys", "registry", "checkpoint"} & set(read)
+
+
+def test_all_of_mocapflow_that_a_plugin_imports_counts():
+    """What finds plugins, what refuses and what is computed once change no result."""
+    free = {"errors", "hookspecs", "once"}
+    imported = {
+        name.split(".")[1]
+        for path in (PLUGIN.parents[2] / "plugins").rglob("*.py")
+        for name in sources.imports(ast.parse(path.read_text()))
+        if name.startswith("mocapflow.")
+    }
+    assert {"series", "geometry"} <= imported
+    assert imported - free <= {*digests.CORE, *sources.SHARED}
 
 
 def test_an_edited_plugin_file_changes_the_keys_of_its_components(tmp_path, clip):
