@@ -18,6 +18,7 @@ from mocapflow.errors import StoreError
 
 BEAT = 5.0  # s between heartbeats
 DEAD = 60.0  # s without a heartbeat after which a writer on another machine counts as gone
+GUARD = "guard"  # the file beside the locks that `_guard` locks
 POLL = 0.2  # s between looks at a lock that another run holds
 
 
@@ -81,10 +82,19 @@ def acquire(path: Path, name: str, report: Callable[[str], None]) -> Lock:
         time.sleep(POLL)
 
 
+def held(path: Path) -> bool:
+    """Return whether somebody holds a lock; one that ended without giving it back does not."""
+    if not path.exists():
+        return False
+    with _guard(path.parent):
+        holder = _holder(path)
+        return holder is not None and not _stale(path, holder)
+
+
 @contextmanager
 def _guard(folder: Path) -> Iterator[None]:
     """Let one process at a time look at the locks and change them."""
-    with (folder / "guard").open("a") as file:
+    with (folder / GUARD).open("a") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         yield
 
@@ -101,7 +111,13 @@ def _holder(path: Path) -> dict[str, Any] | None:
 
 def _stale(path: Path, holder: dict[str, Any]) -> bool:
     ended = gone(holder)
-    return time.time() - path.stat().st_mtime > DEAD if ended is None else ended
+    return _now(path.parent) - path.stat().st_mtime > DEAD if ended is None else ended
+
+
+def _now(folder: Path) -> float:
+    """Return the time in s by the clock that heartbeats go by: that of the drive, which may be another machine's."""
+    os.utime(folder / GUARD)
+    return (folder / GUARD).stat().st_mtime
 
 
 def myself() -> dict[str, Any]:

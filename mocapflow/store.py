@@ -21,7 +21,7 @@ from typing import Any
 from mocapflow.digests import Digests
 from mocapflow.errors import StoreError
 from mocapflow.keys import Recipe
-from mocapflow.locks import Lock, acquire
+from mocapflow.locks import Lock, acquire, held
 from mocapflow.rows import Corrupted, flush_all, read_json, write_json
 
 SHORT = 12  # digits of the key in a group's name
@@ -108,11 +108,16 @@ class Store:
     def writer(self, key: str, name: str, report: Report) -> Iterator[Lock]:
         """Hold the right to write the artifact of a key; waits for whoever else is writing it."""
         with writing(self.path):
-            lock = acquire(self._state / f"{key[:SHORT]}.lock", name, report)
+            lock = acquire(self._lock(key), name, report)
         try:
             yield lock
         finally:
             lock.release()
+
+    def busy(self, key: str) -> bool:
+        """Return whether a run is writing the artifact of a key."""
+        with writing(self.path):
+            return held(self._lock(key))
 
     def begin(self, label: str, key: str, recipe: Recipe) -> Artifact:
         """Return a new, unfinished artifact; what stood in its place is removed."""
@@ -175,6 +180,9 @@ class Store:
     def damaged(self, key: str) -> Path | None:
         """Return the group of a key if even its attributes can't be read."""
         return next((p for p in self._groups(f"*-{key[:SHORT]}") if _open(p) is None), None)
+
+    def _lock(self, key: str) -> Path:
+        return self._state / f"{key[:SHORT]}.lock"
 
     def _groups(self, pattern: str) -> list[Path]:
         return sorted(p for p in self.path.glob(pattern) if p.is_dir() and not p.name.startswith((".", "damaged-")))

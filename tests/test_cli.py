@@ -12,6 +12,7 @@ from mocapflow import cli, runner
 from mocapflow.commands import results
 from mocapflow.commands.again import FILE, Invocation, remember
 from mocapflow.commands.progress import reporter
+from mocapflow.locks import myself
 from mocapflow.shipped import shipped
 from tests.fixtures.stores import STAGES, write_pipeline, write_recording
 
@@ -57,6 +58,17 @@ def test_the_store(call):
     assert "0 results" in call("cache", "prune", "--days", "1", *store).stdout
     assert f"removed {name}" in call("cache", "prune", "--all", *store).stdout
     assert call("cache", "list", *store).stdout == ""
+
+
+def test_what_a_run_is_writing_is_not_pruned(call):
+    call("run", "start.yaml", "--store", "store.zarr")
+    name = call("cache", "list", "--store", "store.zarr").stdout.split()[0]
+    lock = Path("store.zarr/.state", f"{name.partition('-')[2]}.lock")
+    prune = ("cache", "prune", "--all", "--store", "store.zarr")
+    lock.write_text(json.dumps(myself()))
+    assert f"kept {name}: a run is writing it" in call(*prune).output
+    lock.write_text(json.dumps({**myself(), "pid": 2**22 + 1}))  # it was killed
+    assert f"removed {name}" in call(*prune).stdout
 
 
 @pytest.mark.parametrize(

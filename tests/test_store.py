@@ -449,6 +449,24 @@ def test_stale_locks_are_taken_over_with_a_message(tmp_path, monkeypatch, holder
     assert not path.exists()
 
 
+def test_a_lock_is_held_as_long_as_its_run_is_alive(store):
+    key, lock = "1" * 32, store.path / ".state" / f"{'1' * 12}.lock"
+    assert not store.busy(key)
+    with store.writer(key, "track-12", print):
+        assert store.busy(key)
+    lock.write_text(json.dumps({"pid": 2**22 + 1, "host": socket.gethostname()}))  # it was killed
+    assert not store.busy(key)
+
+
+def test_a_lock_is_as_old_as_the_drive_says_whatever_the_time_is_here(tmp_path, monkeypatch):
+    path, lines = tmp_path / "x.lock", []
+    path.write_text(json.dumps({"pid": 1, "host": "elsewhere"}))
+    monkeypatch.setattr(locks.time, "time", lambda: path.stat().st_mtime + 3600)
+    monkeypatch.setattr(locks.time, "sleep", lambda _: path.unlink())
+    locks.acquire(path, "track-12", lines.append).release()
+    assert lines == ["track-12: waiting for process 1 on elsewhere, which is making it"]
+
+
 def test_a_lock_that_was_taken_over_is_noticed_before_the_next_write(tmp_path):
     lock = locks.acquire(tmp_path / "x.lock", "track-12", print)
     lock.check()

@@ -83,9 +83,9 @@ def _goes(artifact: Artifact, days: float | None, unfinished: bool) -> bool:
 
 
 def _in_use(artifact: Artifact) -> bool:
-    from mocapflow.store import SHORT
+    from mocapflow.store import Store
 
-    return (artifact.path.parent / ".state" / f"{artifact.key[:SHORT]}.lock").exists()
+    return Store(artifact.path.parent).busy(artifact.key)
 
 
 def _artifacts(store: Path) -> list[Artifact]:
