@@ -55,6 +55,7 @@ class Checkpoint:
         cameras: their names.
         lock: the right to write; checked before each frame.
         wanted: how many frames `track` returns; None: all that are done.
+        fresh: True where the same command would make all anew.
         iteration_done: told (frame, iteration, state) after each turn of the loop.
         frame_done: told (frame, result) after each commit.
     """
@@ -68,13 +69,14 @@ class Checkpoint:
         lock: Lock | None = None,
         *,
         wanted: int | None = None,
+        fresh: bool = False,
         iteration_done: Callable[[int, int, FrameState], None] = silent,
         frame_done: Callable[[int, FrameResult], None] = silent,
     ) -> None:
         self._store, self._path, self._lock = store, artifact.path, lock
         self._indices, self._cameras = indices, tuple(cameras)
         self._attributes: dict[str, Any] = dict(artifact.attributes)
-        self._wanted, self._cap = wanted, 0
+        self._wanted, self._fresh, self._cap = wanted, fresh, 0
         self._turns: list[Pose] | None = None  # of the frame at hand
         self._iteration_done, self._frame_done = iteration_done, frame_done
         self._arrays: dict[str, Rows] = {}
@@ -95,7 +97,8 @@ class Checkpoint:
         if not self.done:
             return "no frame is saved yet; run the same command to start again"
         first, last = self._indices[0], self._indices[self.done - 1]
-        return f"frames {first}–{last} are saved; run the same command to continue at {self.next_index}"
+        again = "run the same command without --fresh" if self._fresh else "run the same command"
+        return f"frames {first}–{last} are saved; {again} to continue at {self.next_index}"
 
     def past(self) -> Past:
         """Return what the next frame may know of earlier ones, bit by bit as it was."""

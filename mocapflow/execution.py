@@ -131,7 +131,7 @@ class Execution:
             observers.frame_done(frame, result)
 
         return Checkpoint(
-            self._store, artifact, longer, names, lock, wanted=len(indices),
+            self._store, artifact, longer, names, lock, wanted=len(indices), fresh=self._fresh,
             iteration_done=observers.iteration_done, frame_done=frame_done,
         )  # fmt: skip
 

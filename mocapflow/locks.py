@@ -38,7 +38,7 @@ class Lock:
             StoreError: another run took it over, because this one gave no sign of life.
         """
         if not self._ours():
-            hint = "this run stood still for too long; run the same command to continue from what is saved"
+            hint = "this run stood still for too long; without --fresh the same command continues from what is saved"
             raise StoreError(f"another run took over {self._path.stem}", hint=hint)
 
     def release(self) -> None:

@@ -143,6 +143,12 @@ def test_a_component_that_raises_is_named_and_the_run_goes_on_there(tmp_path, pa
     assert same(the_track(tmp_path / "whole"), the_track(tmp_path))
 
 
+def test_after_a_fresh_run_going_on_needs_a_run_that_is_not(tmp_path, path, monkeypatch):
+    monkeypatch.setenv("TINY_RAISE_AT", "3")
+    with pytest.raises(ComponentFailed, match="run the same command without --fresh to continue at 3"):
+        run_tiny(path, tmp_path, fresh=True)
+
+
 def origin(path):
     pipeline = load(path)
     track = next(named.stage for named in pipeline.stages if named.label == "track")
