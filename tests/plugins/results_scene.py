@@ -42,6 +42,7 @@ def ball_body(names: tuple[str, ...] = (), folder: Path = DEMO) -> Body:
         full = np.pad(full, ((0, 0), (0, 5 - len(kept))))
     skin = np.argsort(-full, axis=1)[:, :5]
     weight = np.take_along_axis(full, skin, 1)
+    skin = np.minimum(skin, len(kept) - 1)  # what was padded weighs nothing
     return Body(
         vertices=vertices, faces=np.array(triangles, np.int32), joint_names=tuple(order), parents=parents,
         positions=positions, screw_names=tuple(f"{order[j]}.{'xyz'[k % 3]}" for k, j in enumerate(moving)),
