@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
-from mocapflow.copies import Copies, further
+from mocapflow.copies import META, Copies, further
 from mocapflow.errors import StoreError
 from mocapflow.locks import Lock
-from mocapflow.rows import flush_all
+from mocapflow.rows import Corrupted, flush_all
 from mocapflow.store import Artifact, Report, Store, writing
 
 
@@ -46,11 +46,16 @@ class SharedStore(Store):
 
     def load(self, artifact: Artifact, frames: int | None = None) -> Any:
         """Return the record of an artifact, fetched first if it is not here; see `Store.load`."""
-        here = super().find(artifact.key)
-        if here is None or further(artifact.attributes, here.attributes):
+        if self._is_further(artifact):
             with super().writer(artifact.key, artifact.path.name, lambda _: None):
                 self._fetch(artifact.key)
+            if self._is_further(artifact):
+                raise Corrupted(f"the copy of {artifact.path.name} is gone")
         return super().load(artifact, frames)
+
+    def _is_further(self, artifact: Artifact) -> bool:
+        here = super().find(artifact.key)
+        return here is None or further(artifact.attributes, here.attributes)
 
     @contextmanager
     def writer(self, key: str, name: str, report: Report) -> Iterator[Lock]:
@@ -80,6 +85,8 @@ class SharedStore(Store):
         part = self.path / f".{uuid4().hex}"
         try:
             self._copies.fetch(there, part)
+            if not (part / META).is_file():  # dropped meanwhile for one that is further: what is here stays
+                return
             with writing(self.path):
                 flush_all(part)
                 self.clear(key)

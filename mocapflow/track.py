@@ -248,5 +248,5 @@ def notes_on(frame: Frame, scene: Scene, result: FrameResult, anew: bool) -> Seq
     if not seen(frame):
         return [*notes, f"lost, fewer than {VIEWS} views; the prediction is kept"]
     if blind(result.state.estimate.observed):
-        return [*notes, "no view shows the person; the prediction is kept but for what priors say"]
+        return [*notes, "no view shows the person; the prediction is kept"]
     return [*notes, "begun anew, like a first frame: the frames before do not show the person"] if anew else notes

@@ -72,8 +72,9 @@ def _parse(text: str, file: str, path: Path | None) -> Document:
             return node.value
         try:
             return loader.construct_object(node)
-        except ValueError as error:
-            raise PipelineError(f"not YAML: {error}", where=mark(node.start_mark)) from None
+        except (ValueError, LookupError):  # the latter of 'x: !!bool abc'
+            kind = node.tag.rpartition(":")[2]
+            raise PipelineError(f"not YAML: '{node.value}' is no {kind}", where=mark(node.start_mark)) from None
 
     def keys(node: yaml.MappingNode, steps: Steps) -> Iterable[tuple[str, yaml.Node]]:
         for key_node, value in node.value:

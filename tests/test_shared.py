@@ -122,6 +122,23 @@ def test_a_copy_that_breaks_off_leaves_what_is_here(tmp_path, path, url, monkeyp
     assert same(the_track(tmp_path / "one"), the_track(tmp_path / "two"))
 
 
+def test_a_copy_that_is_dropped_meanwhile_leaves_what_is_here(tmp_path, path, url, monkeypatch):
+    """Another machine has sent one that is further."""
+    shared(path, tmp_path / "one", url)
+    run_tiny(path, tmp_path / "two", frames=5)
+    found = Copies.fetch
+
+    def dropped(copies, copy, folder):
+        copies.remove(copy.attributes["key"])
+        found(copies, copy, folder)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Copies, "fetch", dropped)
+        _, lines = shared(path, tmp_path / "two", url)
+    assert "track: going on after 5 frames" in lines
+    assert same(the_track(tmp_path / "one"), the_track(tmp_path / "two"))
+
+
 def test_a_copy_takes_the_place_of_what_is_damaged_here(tmp_path, path, url):
     shared(path, tmp_path / "one", url)
     run_tiny(path, tmp_path / "two", frames=5)

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 import tracemalloc
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -198,6 +199,19 @@ def test_the_first_frame_that_shows_the_person_begins_like_a_first(tmp_path, mon
     assert [note for note in the_track(tmp_path).notes if "anew" in note] == [
         f"frame {index}: begun anew, like a first frame: the frames before do not show the person" for index in (2, 6)
     ]
+
+
+def test_a_frame_that_shows_nobody_says_so(tmp_path, monkeypatch):
+    def empty(frame, *rest):
+        result = settle(frame, *rest)
+        if frame.index != 2:
+            return result
+        estimate = replace(result.state.estimate, observed=np.zeros(2))
+        return replace(result, state=replace(result.state, estimate=estimate))
+
+    monkeypatch.setattr("mocapflow.track.settle", empty)
+    run_tiny(write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=SHORT), tmp_path, frames=4)
+    assert the_track(tmp_path).notes == ("frame 2: no view shows the person; the prediction is kept",)
 
 
 def test_without_a_garment_there_is_no_cloth(tmp_path):

@@ -53,9 +53,10 @@ def _comparison(run: Path, truth: Path | None) -> tuple[Path | None, str, float]
 
     try:
         pipeline = recall(run).load()
-    except MocapflowError:
+    except MocapflowError as error:
         if truth is None:
             raise
+        typer.echo(f"warning: compared by the default settings, as those of the run can't be read: {error}", err=True)
         return truth, "", LONGEST_LAG
     stage = next((named.stage for named in pipeline.stages if isinstance(named.stage, Evaluate)), Evaluate())
     reference, missing = (truth, "") if truth else chosen(pipeline.recording, stage.reference)

@@ -61,8 +61,9 @@ class CheckViews(Stage):
         """
         empty = doubts.blank(seen.grey, room)
         foreign, like = doubts.lookalike(seen.grey, room)
-        old = doubts.repeated(np.where(empty | foreign, np.nan, seen.news)) & doubts.peopled(seen.grey, room)
-        settled = doubts.bridged(seen.grey, seen.there & ~(empty | foreign | old))
+        good = seen.there & ~(empty | foreign)
+        old = doubts.repeated(np.where(empty | foreign, np.nan, seen.news)) & doubts.peopled(seen.grey, room, good)
+        settled = doubts.bridged(seen.grey, good & ~old)
         torn = doubts.bursts(settled, self.longest(frame_rate), self.jump, self.joint_jump)
         said = np.full(empty.shape, "", "U64")
         said[torn] = "the picture does not fit the ones before and after"

@@ -11,7 +11,7 @@ LEAST_CONTRAST = 1.5  # grey levels, standard deviation of a thumbnail that show
 FAINT = 0.1  # share of the usual contrast below which nothing is shown
 NEARER = 0.5  # a picture is of another camera if it differs from that one's room by less than this share
 NO_NEWS = 0.1  # share of the usual news in a picture that repeats the one before
-SOME_NEWS = 0.5  # share that most other cameras then have, or the person just stands still
+SOME_NEWS = 0.5  # share that half of the cameras then have at least, or the person just stands still
 NOBODY = 0.1  # share of the contrast to its room that a camera's pictures with most in them have; below, nobody is seen
 FAST = 4  # times the usual step: no body moves much faster than that, from frame to frame
 NEIGHBOURS = 4  # steps before and after a burst that say how fast things move
@@ -47,10 +47,17 @@ def repeated(news: F64) -> Bool:
     return old
 
 
-def peopled(grey: F32, room: F32) -> Bool:
-    """Return (T, C) which thumbnails differ from the empty room (C, S, S): an empty one has no news either."""
+def peopled(grey: F32, room: F32, good: Bool) -> Bool:
+    """Return (T, C) which thumbnails differ from the empty room (C, S, S): an empty one has no news either.
+
+    Args:
+        grey: (T, C, S, S) thumbnails.
+        room: (C, S, S) likewise, of the empty scene.
+        good: (T, C) which of them show what their camera saw: what is usual is theirs.
+    """
     off = contrast(grey - room)  # a person dims the whole room, too
-    shown: Bool = off > NOBODY * np.percentile(off, 90, axis=0)
+    usual = [np.percentile(off[rows, camera], 90) if rows.any() else 0.0 for camera, rows in enumerate(good.T)]
+    shown: Bool = off > NOBODY * np.array(usual)
     return shown
 
 

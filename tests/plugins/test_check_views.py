@@ -84,6 +84,13 @@ def test_several_things_at_once(clip):
     assert not any(camera == 1 for _, camera in told)
 
 
+def test_a_frozen_view_is_found_beside_missing_pictures(clip):
+    """A missing picture is black: nothing differs more from the room, and it says nothing of what is usual."""
+    missing = dict(what="dropped", first=5, count=8, views=["cam02"])
+    told = found(clip, dict(what="frozen", first=25, count=3, views=["cam02"]), missing)
+    assert set(told) == {(index, 1) for index in (25, 26, 27)}
+
+
 def test_a_view_that_the_person_leaves_does_not_repeat_itself(clip, tmp_path):
     """A codec shows an empty room as the same picture again and again."""
     folder = tmp_path / "clip"
