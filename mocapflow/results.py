@@ -39,12 +39,17 @@ class Track:
 
     @property
     def frame_rate(self) -> float:
-        """Frames per second, 30 where a single frame does not tell."""
-        return float(1 / np.median(np.diff(self.time))) if len(self.time) > 1 else 30.0
+        """Frames per second, see `frame_rate_of`."""
+        return frame_rate_of(self.time)
 
     def pose(self, row: int) -> Pose:
         """Return the pose of one row."""
         return Pose(root=self.root[row].copy(), angles=self.angles[row].copy())
+
+
+def frame_rate_of(time: F64) -> float:
+    """Return how many frames there are in a second by their times (T,) s; 30 where a single frame does not tell."""
+    return float(1 / np.median(np.diff(time))) if len(time) > 1 else 30.0
 
 
 def notes_of(frames: I32, notes: Iterable[str]) -> tuple[str, ...]:

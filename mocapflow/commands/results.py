@@ -49,7 +49,7 @@ def evaluate(run: Run, truth: Truth = None) -> None:
 
 def _comparison(run: Path, truth: Path | None) -> tuple[Path | None, str, float]:
     """Return what a run is compared with, or why there is nothing, and the longest lag to look for (s)."""
-    from mocapflow_sequence.evaluate import LONGEST_LAG, Evaluate, chosen
+    from mocapflow_sequence.evaluate import LONGEST_LAG_S, Evaluate, chosen
 
     try:
         pipeline = recall(run).load()
@@ -57,7 +57,7 @@ def _comparison(run: Path, truth: Path | None) -> tuple[Path | None, str, float]
         if truth is None:
             raise
         typer.echo(f"warning: compared by the default settings, as those of the run can't be read: {error}", err=True)
-        return truth, "", LONGEST_LAG
+        return truth, "", LONGEST_LAG_S
     stage = next((named.stage for named in pipeline.stages if isinstance(named.stage, Evaluate)), Evaluate())
     reference, missing = (truth, "") if truth else chosen(pipeline.recording, stage.reference)
     return reference, missing, stage.longest_lag_s

@@ -7,21 +7,14 @@ import numpy.typing as npt
 
 from mocapflow.records import F64
 
-BLOCK_S = (
-    1.0  # s; errors hang together for a third of a second, so the bootstrap draws whole blocks of three times that
-)
+# errors hang together for a third of a second, so the bootstrap draws whole blocks of three times that
+BLOCK_S = 1.0
 LEAST_BLOCKS = 4  # of a short take, whose blocks are shorter
 DRAWS = 1000
 SEED = 0
 NINETY = 1.6449  # standard deviations
 NINETY_FIVE = 1.96  # standard deviations
-LONGEST_LAG_S = 0.2  # s; more would leave too little of a short take to compare
-USUAL_RATE = 30.0  # per second, where a single frame does not tell
-
-
-def per_second(time: F64) -> float:
-    """Return how many frames there are in a second, from their times (T,) s."""
-    return float(1 / np.median(np.diff(time))) if len(time) > 1 else USUAL_RATE
+ANGLE_LAG_S = 0.2  # of one curve behind the other; more would leave too little of a short take to compare
 
 
 def figures(ours: F64, truth: F64, sd: F64, frame: F64, rate: float) -> dict[str, float]:
@@ -122,7 +115,7 @@ def lag(ours: F64, truth: F64, rate: float) -> float:
     It minimises the mean square of the difference without its mean, over the frames that every shift has, and
     places the minimum by a parabola through the best shift and its neighbours.
     """
-    reach = min(round(LONGEST_LAG_S * rate), (len(ours) - 1) // 3)
+    reach = min(round(ANGLE_LAG_S * rate), (len(ours) - 1) // 3)
     if reach < 1 or np.ptp(truth) == 0 or np.ptp(ours) == 0:
         return np.nan
     middle = truth[reach : len(truth) - reach]

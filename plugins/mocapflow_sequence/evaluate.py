@@ -22,7 +22,7 @@ from mocapflow_sequence.ours import Ours
 from mocapflow_sequence.references import SUFFIXES, read_reference
 from mocapflow_sequence.rigs import compare_rigs
 
-LONGEST_LAG = 0.5  # s
+LONGEST_LAG_S = 0.5  # s
 Row = Mapping[str, float | str]
 
 
@@ -41,7 +41,7 @@ class Evaluate(Stage):
 
     name: ClassVar[str] = "evaluate"
     reference: str = ""  # from the folder of the recording; empty: truth/angles.csv, or the one in reference/
-    longest_lag_s: PositiveFloat = LONGEST_LAG  # of one system behind the other, that is looked for
+    longest_lag_s: PositiveFloat = LONGEST_LAG_S  # of one system behind the other, that is looked for
 
     def run(self, track: Track, scene: Scene, recording: Recording, run_folder: RunFolder) -> Evaluation:
         """Return the evaluation of the track."""
@@ -68,7 +68,7 @@ def chosen(recording: Path, wanted: str) -> tuple[Path | None, str]:
     return None, f"reference/ holds {names}: name one, e.g. --set stages.evaluate.reference=reference/{there[0].name}"
 
 
-def evaluate_run(run_folder: Path, truth: Path, longest_lag_s: float = LONGEST_LAG) -> Evaluation:
+def evaluate_run(run_folder: Path, truth: Path, longest_lag_s: float = LONGEST_LAG_S) -> Evaluation:
     """Compare the files of a run folder with a reference file; writes into the run folder.
 
     Raises:
@@ -77,7 +77,7 @@ def evaluate_run(run_folder: Path, truth: Path, longest_lag_s: float = LONGEST_L
     return evaluate(ours.of_folder(run_folder), truth, run_folder, longest_lag_s)
 
 
-def evaluate(own: Ours, path: Path, folder: Path, longest_lag_s: float = LONGEST_LAG) -> Evaluation:
+def evaluate(own: Ours, path: Path, folder: Path, longest_lag_s: float = LONGEST_LAG_S) -> Evaluation:
     """Compare with a reference file; writes tables, what was found of both systems, and pictures into a run folder."""
     reference = read_reference(path)
     known = at_our_frames(reference, own.columns)

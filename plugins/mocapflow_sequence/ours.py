@@ -12,9 +12,9 @@ from mocapflow.errors import RecordingError
 from mocapflow.geometry import kinematics
 from mocapflow.io import markers
 from mocapflow.records import F64, record
-from mocapflow.results import Track
+from mocapflow.results import Track, frame_rate_of
 from mocapflow.scene import Scene
-from mocapflow_sequence import compare, layout, opensim, tables
+from mocapflow_sequence import layout, opensim, tables
 from mocapflow_sequence.export import before_smoothing
 from mocapflow_sequence.stick import Stick
 from mocapflow_sequence.uncertainty import measured
@@ -33,7 +33,7 @@ class Ours:
     @property
     def frame_rate(self) -> float:
         """Frames per second, 30 where a single frame does not tell."""
-        return compare.per_second(self.columns["time"])
+        return frame_rate_of(self.columns["time"])
 
 
 def of_track(track: Track, scene: Scene) -> Ours:

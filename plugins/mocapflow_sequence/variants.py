@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from mocapflow.records import F64
+from mocapflow.results import frame_rate_of
 from mocapflow_sequence import layout, panels, tables
-from mocapflow_sequence.compare import drawn_blocks, per_second, rms, rms_interval
+from mocapflow_sequence.compare import drawn_blocks, rms, rms_interval
 
 Run = tuple[str, str, Path | str]  # variant, recording, run folder or why it failed
 Row = dict[str, float | str]
@@ -50,7 +51,7 @@ def angle_errors(run: Path | str) -> dict[str, F64]:
 def frame_rate(run: Path) -> float:
     """Return the frames per second of a run."""
     said = json.loads((run / layout.RUN).read_text(encoding="utf-8"))
-    return per_second(np.array([frame["time"] for frame in said["per_frame"]]))
+    return frame_rate_of(np.array([frame["time"] for frame in said["per_frame"]]))
 
 
 def figures(error: F64, base: F64 | None, rate: float) -> Row:
