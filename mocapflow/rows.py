@@ -84,8 +84,9 @@ class Rows:
         if len(values) < self._chunk[0]:  # zarr keeps whole chunks
             whole = np.full(self._chunk, self._fill, self._dtype)
             whole[: len(values)] = values
-        self._file(block).write_bytes(self._zstd.encode(whole))
-        flush(self._file(block))
+        file = self._file(block)
+        file.write_bytes(self._zstd.encode(whole))
+        flush(file)
 
     def has(self, row: int) -> bool:
         """Return whether a row was written."""

@@ -56,14 +56,14 @@ def test_wrong_frames_are_named_and_the_pose_is_right_soon_after(tmp_path):
 
 
 @pytest.mark.long
-def test_after_a_second_without_pictures_the_person_is_found_at_once(tmp_path):
+def test_after_a_second_without_pictures_the_person_is_found_within_five_frames(tmp_path):
     """A knee was moving when the pictures ended; it does not move on, and the next picture begins anew."""
     dropped = "stages.corrupt before background={use: corrupt, events: [{what: dropped, first: 12, count: 30}]}"
-    unsmoothed = ("--set", "stages.smooth=null", "--frames", "0:46")
+    unsmoothed = ("--set", "stages.smooth=null", "--frames", "0:50")
     errors, angles, told = tracked(tmp_path / "run", "skirt.yaml", "--set", dropped, *unsmoothed, names=LEGS + ELBOWS)
     assert told["frames"]["lost"] == list(range(12, 42))
     assert np.abs(angles[12:42] - angles[11]).max() < 60
-    assert errors[42:].max() < 8
+    assert errors[42 + 5 :].max() < 8
     assert "begun anew" in " ".join(told["per_frame"][42]["notes"])
 
 
