@@ -21,13 +21,14 @@ from mocapflow_robustness.corrupt import Corrupt
 from mocapflow_robustness.events import Event
 from mocapflow_sequence.start_from_file import StartFromFile
 
-from mocapflow.data import Moment, Past, Pose, ViewChecks
+from mocapflow.data import Moment, Past, Pose
 from mocapflow.geometry.angles import measure
 from mocapflow.loop import settle
 from mocapflow.model import ClothedModel
 from mocapflow.pipeline import load_pipeline
 from mocapflow.recording import Recording, open_recording
 from mocapflow.records import F64
+from mocapflow.results import ViewChecks
 from mocapflow.scene import Scene
 from mocapflow.timing import Stopwatch
 from mocapflow.track import CoupledLoop, lost, seen

@@ -57,11 +57,12 @@ class Body:
         Raises:
             ShapeError: an index is not that of a vertex or joint.
         """
-        if (stray := _stray(self.faces, len(self.vertices))) is not None:
+        if (stray := _stray(self.faces, len(self.vertices), 0)) is not None:
             raise ShapeError(f"Body: a face names vertex {stray} of {len(self.vertices)}")
         count = len(self.parents)
-        for what, index in (("the skin", self.skin_joint), ("a screw", self.screw_joint), ("a parent", self.parents)):
-            if (stray := _stray(index, count, least=-1 if what == "a parent" else 0)) is not None:
+        skin, screws, parents = (self.skin_joint, 0), (self.screw_joint, 0), (self.parents, -1)
+        for what, (index, least) in {"the skin": skin, "a screw": screws, "a parent": parents}.items():
+            if (stray := _stray(index, count, least)) is not None:
                 raise ShapeError(f"Body: {what} names joint {stray} of {count}")
 
     def joint(self, name: str) -> int:
@@ -99,8 +100,9 @@ class GarmentMesh:
             GarmentError: a vertex is not finite or not there, or a link has no length.
         """
         count = len(self.vertices)
-        for what, index in (("face", self.faces), ("strand", self.strands), ("ring", self.rings), ("pin", self.pinned)):
-            if (stray := _stray(index, count, least=-1 if what == "strand" else 0)) is not None:
+        face, strand, ring, pin = (self.faces, 0), (self.strands, -1), (self.rings, 0), (self.pinned, 0)
+        for what, (index, least) in {"face": face, "strand": strand, "ring": ring, "pin": pin}.items():
+            if (stray := _stray(index, count, least)) is not None:
                 raise GarmentError(f"{self.name}: a {what} names vertex {stray} of {count}")
         if not np.isfinite(self.vertices).all():
             first = int(np.argwhere(~np.isfinite(self.vertices))[0, 0])
@@ -122,7 +124,7 @@ class Background:
     spread: tuple[F32, ...]  # C x (H, W, 3) grey levels, standard deviation
 
 
-def _stray(index: I32, count: int, least: int = 0) -> int | None:
+def _stray(index: I32, count: int, least: int) -> int | None:
     """Return an index that is not in least ... count - 1, None where all are."""
     low, high = int(index.min(initial=least)), int(index.max(initial=-1))
     return low if low < least else high if high >= count else None

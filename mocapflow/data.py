@@ -12,9 +12,8 @@ parameters, M matches, T frames, S = 6 + D + Q unknowns of a frame.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field, replace
+from dataclasses import field
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 
@@ -33,24 +32,6 @@ class Flow:
 
 
 @record
-class ImageFlow:
-    """The image flow of a recording: what was tracked into each frame from the frame before it in the run."""
-
-    frame: I32 = array("P", unit="frame index, ascending")
-    camera: I16 = array("P", unit="camera index, ascending within a frame")
-    pixel: F32 = array("P", 2, unit="px, in the frame before")
-    displacement: F32 = array("P", 2, unit="px")
-    cameras: int
-
-    def into(self, index: int) -> tuple[Flow, ...]:
-        """Return the flow into a frame, one per camera."""
-        first, last = np.searchsorted(self.frame, [index, index + 1])
-        borders = first + np.searchsorted(self.camera[first:last], np.arange(self.cameras + 1))
-        views = [slice(*pair) for pair in pairwise(borders.tolist())]
-        return tuple(Flow(pixel=self.pixel[view], displacement=self.displacement[view]) for view in views)
-
-
-@record
 class Frame:
     """One moment, seen by every camera."""
 
@@ -66,25 +47,6 @@ class Frame:
     def hidden_in(self, camera: int) -> Bool | None:
         """Return where a view (H, W) shows nothing of the scene; None: it does everywhere."""
         return self.hidden[camera] if self.hidden else None
-
-
-@record
-class ViewChecks:
-    """Pictures of a recording that are not what a camera saw at that moment."""
-
-    frame: I32 = array("P", unit="frame index, ascending")
-    camera: I16 = array("P", unit="camera index")
-    reasons: tuple[str, ...]  # P, for people
-
-    def passed(self, frame: Frame) -> Frame:
-        """Return a frame whose wrong views are not usable."""
-        first, last = np.searchsorted(self.frame, [frame.index, frame.index + 1])
-        if first == last:
-            return frame
-        usable, reasons = frame.usable.copy(), list(frame.reasons or [""] * len(frame.usable))
-        for camera, reason in zip(self.camera[first:last], self.reasons[first:last], strict=True):
-            usable[camera], reasons[camera] = False, reason
-        return replace(frame, usable=usable, reasons=tuple(reasons))
 
 
 @record

@@ -1,16 +1,55 @@
-"""What a run hands over: the track over all frames, the files it wrote, how far it is from the truth."""
+"""What stages hand over: wrong pictures, image flow, the track over all frames, files, how far it is from the truth."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mocapflow.data import Pose
-from mocapflow.records import F64, I16, I32, Bool, Watch, array, record, unwatched
+from mocapflow.data import Flow, Frame, Pose
+from mocapflow.records import F32, F64, I16, I32, Bool, Watch, array, record, unwatched
 from mocapflow.series import Wide
+
+
+@record
+class ViewChecks:
+    """Pictures of a recording that are not what a camera saw at that moment."""
+
+    frame: I32 = array("P", unit="frame index, ascending")
+    camera: I16 = array("P", unit="camera index")
+    reasons: tuple[str, ...]  # P, for people
+
+    def passed(self, frame: Frame) -> Frame:
+        """Return a frame whose wrong views are not usable."""
+        first, last = np.searchsorted(self.frame, [frame.index, frame.index + 1])
+        if first == last:
+            return frame
+        usable, reasons = frame.usable.copy(), list(frame.reasons or [""] * len(frame.usable))
+        for camera, reason in zip(self.camera[first:last], self.reasons[first:last], strict=True):
+            usable[camera], reasons[camera] = False, reason
+        return replace(frame, usable=usable, reasons=tuple(reasons))
+
+
+@record
+class ImageFlow:
+    """The image flow of a recording: what was tracked into each frame from the frame before it in the run."""
+
+    frame: I32 = array("P", unit="frame index, ascending")
+    camera: I16 = array("P", unit="camera index, ascending within a frame")
+    pixel: F32 = array("P", 2, unit="px, in the frame before")
+    displacement: F32 = array("P", 2, unit="px")
+    cameras: int
+
+    def into(self, index: int) -> tuple[Flow, ...]:
+        """Return the flow into a frame, one per camera."""
+        first, last = np.searchsorted(self.frame, [index, index + 1])
+        borders = first + np.searchsorted(self.camera[first:last], np.arange(self.cameras + 1))
+        views = [slice(*pair) for pair in pairwise(borders.tolist())]
+        return tuple(Flow(pixel=self.pixel[view], displacement=self.displacement[view]) for view in views)
 
 
 @record

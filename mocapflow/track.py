@@ -39,12 +39,10 @@ from mocapflow.data import (
     Frame,
     FrameResult,
     FrameState,
-    ImageFlow,
     Past,
     Pose,
     Segmentation,
     Start,
-    ViewChecks,
     blind,
     empty_matches,
 )
@@ -56,7 +54,7 @@ from mocapflow.model import ClothedModel
 from mocapflow.recording import Recording
 from mocapflow.records import F64
 from mocapflow.rest import Steady
-from mocapflow.results import Track
+from mocapflow.results import ImageFlow, Track, ViewChecks
 from mocapflow.scene import Scene
 from mocapflow.timing import Stopwatch
 
@@ -136,7 +134,6 @@ class CoupledLoop(Stage):
             frame = replace(frame, flow=flow.into(frame.index)) if flow else frame
             watch.lap("decode")
             known, state = past.believable(), self.begin(frame, past, start, model, watch)
-            state = state if known.moments else self.approach(frame, state, known, model)
             settled = settle if seen(frame) else lost
             result = settled(frame, state, known, self.steps, model, checkpoint.observe)
             spent = result.seconds
@@ -144,8 +141,7 @@ class CoupledLoop(Stage):
             result = self.recovered(frame, state, result, known, model)
             watch.lap("recover")
             seconds = {step: watch.seconds.get(step, 0.0) + spent.get(step, 0.0) for step in STEPS}
-            anew = bool(past.moments) and not known.moments
-            notes = [*notes_on(frame, scene, result, anew), *result.notes]
+            notes = [*notes_on(frame, scene, past, result), *result.notes]
             past = checkpoint.commit(frame, past, replace(result, seconds=seconds), notes)
             self.complain(frame, result)
             watch = Stopwatch()
@@ -173,7 +169,8 @@ class CoupledLoop(Stage):
         watch.lap("predict")
         cloth = model.drape(pose, parameters, past)
         watch.lap("drape")
-        return believed(pose, parameters, cloth)
+        state, known = believed(pose, parameters, cloth), past.believable()
+        return state if known.moments else self.approach(frame, state, known, model)
 
     def approach(self, frame: Frame, state: FrameState, past: Past, model: ClothedModel) -> FrameState:
         """Return a first frame's state moved near the person by the first segmenter, if there is one."""
@@ -240,8 +237,8 @@ def lost(
     )
 
 
-def notes_on(frame: Frame, scene: Scene, result: FrameResult, anew: bool) -> Sequence[str]:
-    """Return what went wrong with the views of a frame; `anew`: it began like a first one, but is none."""
+def notes_on(frame: Frame, scene: Scene, past: Past, result: FrameResult) -> Sequence[str]:
+    """Return what went wrong with the views of a frame and with those before it."""
     reasons = frame.reasons or ("",) * len(frame.usable)
     views = zip(scene.cameras, frame.usable, reasons, strict=True)
     notes = [f"{camera.name} not usable: {reason or 'no image'}" for camera, usable, reason in views if not usable]
@@ -249,4 +246,5 @@ def notes_on(frame: Frame, scene: Scene, result: FrameResult, anew: bool) -> Seq
         return [*notes, f"lost, fewer than {VIEWS} views; the prediction is kept"]
     if blind(result.state.estimate.observed):
         return [*notes, "no view shows the person; the prediction is kept"]
+    anew = past.moments and not past.believable().moments
     return [*notes, "begun anew, like a first frame: the frames before do not show the person"] if anew else notes

@@ -11,9 +11,9 @@ from pydantic import Field, PositiveFloat
 
 from mocapflow.assets import Background
 from mocapflow.components import Stage
-from mocapflow.data import ViewChecks
 from mocapflow.recording import Recording
 from mocapflow.records import F32
+from mocapflow.results import ViewChecks
 from mocapflow_robustness import doubts
 from mocapflow_robustness.thumbnails import Thumbnails, thumbnail, thumbnails
 

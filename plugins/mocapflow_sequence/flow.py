@@ -10,9 +10,10 @@ from pydantic import Field, NonNegativeInt, PositiveFloat
 
 from mocapflow.assets import Background
 from mocapflow.components import Stage
-from mocapflow.data import Flow, Frame, ImageFlow, ViewChecks
+from mocapflow.data import Flow, Frame
 from mocapflow.recording import Recording
 from mocapflow.records import F32, U8, Bool
+from mocapflow.results import ImageFlow, ViewChecks
 
 LEAST_CORNER = 0.005  # share of the best corner's strength
 BLOCK = 5  # px, over which a corner is judged
