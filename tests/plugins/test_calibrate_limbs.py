@@ -85,6 +85,7 @@ def test_exact_silhouettes_give_the_lengths_back(body, poses, tmp_path):
         assert abs(length(fitted, *ends) - length(body, *ends)) < 0.003  # m; a pixel is 12 mm
 
 
+@pytest.mark.long
 def test_clothes_are_laid_on_every_pose_that_is_tried(body, poses, tmp_path):
     folder = copy_demo(tmp_path / "recording")
     cameras, rng = open_recording(folder).cameras, np.random.default_rng(3)
