@@ -23,7 +23,7 @@ class RecoveryConformance(Conformance):
         scene = scenes.tiny_scene()
         pose = scenes.tiny_pose(scene, 3, 0.1)
         state = pictures.tiny_state(scene, pose)
-        result = _settled(state)
+        result = settled(state)
         frame, model, past = pictures.tiny_frame(scene, pose), scenes.tiny_model(scene), scenes.tiny_past(scene, pose)
         recovered = assert_pure(self.recovery.recover, frame, state, result, past, model, _not_to_be_called)
         assert same(recovered, result)
@@ -37,9 +37,9 @@ class RecoveryConformance(Conformance):
         frame, past = pictures.tiny_frame(scene, truth), scenes.tiny_past(scene, lost)
 
         def settle(pose: Pose, parameters: F64) -> FrameResult:
-            return _settled(pictures.tiny_state(scene, pose, truth))
+            return settled(pictures.tiny_state(scene, pose, truth))
 
-        recovered = assert_pure(self.recovery.recover, frame, state, _settled(state), past, model, settle)
+        recovered = assert_pure(self.recovery.recover, frame, state, settled(state), past, model, settle)
         assert recovered.notes
         wanted = scene.surface(truth, NO_CLOTH).vertices
         before, after = (
@@ -49,7 +49,7 @@ class RecoveryConformance(Conformance):
         assert after < 0.5 * before
 
 
-def _settled(state: FrameState) -> FrameResult:
+def settled(state: FrameState) -> FrameResult:
     """Return a state as what the loop hands over."""
     return FrameResult(
         state=state,
