@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from mocapflow.assets import Camera
-from mocapflow.components import ClothFitter, Matcher, Observe, PoseSolver, Predictor, Prior, Segmenter, pool
+from mocapflow.components import ClothFitter, Matcher, Observe, PoseSolver, Prior, Segmenter, pool
 from mocapflow.data import NO_CLOTH, Frame, FrameResult, FrameState, Matches, Past, Segmentation, Surface, Turn
 from mocapflow.functional import Functional
 from mocapflow.geometry import silhouettes
@@ -27,7 +27,6 @@ from mocapflow.timing import Stopwatch
 class Steps:
     """The components of the loop."""
 
-    predictor: Predictor
     segmenter: Segmenter
     matchers: Sequence[Matcher]
     pose_solver: PoseSolver

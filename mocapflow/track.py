@@ -151,7 +151,6 @@ class CoupledLoop(Stage):
     def steps(self) -> Steps:
         """The components as the loop takes them."""
         return Steps(
-            predictor=self.predictor,
             segmenter=self.segmenter,
             matchers=self.matchers,
             pose_solver=self.pose_solver,

@@ -5,7 +5,6 @@ import pytest
 from mocapflow_draping.fixed import Fixed
 from mocapflow_levelset.levelset import LevelSet
 from mocapflow_matching.contour_icp import ContourIcp
-from mocapflow_priors.hold import Hold
 from mocapflow_twist.solver import TwistGaussNewton
 
 from mocapflow.data import Past, Turn
@@ -27,7 +26,7 @@ FRAME = pictures.tiny_frame(SCENE, TRUTH)
 def settled():
     """The frame settled from 2 cm and 1 degree aside."""
     steps = Steps(
-        predictor=Hold(), segmenter=LevelSet(), matchers=(ContourIcp(),),
+        segmenter=LevelSet(), matchers=(ContourIcp(),),
         pose_solver=TwistGaussNewton(stop_sigmas=0.1),  # smaller steps are those of matches that change
         cloth_fitter=Fixed(), priors=(),
         steady=Steady(
