@@ -158,8 +158,7 @@ def calmed(guess: Guess, model: ClothedModel) -> Guess:
     """Return a guess whose garment hangs without forces: where its parameters are held, however they came about."""
     if model.scene.garment is None:
         return guess
-    calm = np.clip(0.0, *model.scene.garment.parameter_bounds.T)
-    return Guess(guess.pose, replace(guess.cloth, parameters=calm))
+    return Guess(guess.pose, replace(guess.cloth, parameters=model.scene.calm))
 
 
 def parameter_ranges(model: ClothedModel) -> F64:
