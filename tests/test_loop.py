@@ -43,10 +43,7 @@ def go(frame, share, observe=lambda *_: None, max_turns=8, sigmas=0.0, past=None
     steps = Steps(
         segmenter=TinySegmenter(), matchers=(TinyMatcher(),), pose_solver=Towards(share=share),
         cloth_fitter=None, priors=(),
-        steady=Steady(
-            surface=0.0005, angle=float(np.radians(0.1)), sigmas=sigmas, min_turns=2, turns=2,
-            max_turns=max_turns, halvings=0,
-        ),
+        steady=Steady(sigmas=sigmas, max_turns=max_turns),
     )  # fmt: skip
     pose = Pose(root=np.eye(4), angles=np.array([0.3, -0.4]))
     start = believed(pose, np.empty(0), model.drape(pose, np.empty(0), Past()))
