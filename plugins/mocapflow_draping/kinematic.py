@@ -53,6 +53,7 @@ class Kinematic(Draper):
     step_deg: PositiveFloat = 2.0  # literal: of one iteration
     iterations: PositiveInt = 50  # literal: at most
     limited: bool = False  # literal: stop at straight down instead of swinging about it
+    pivot: Literal["strand", "space"] = "strand"  # literal: where the nearest fixed point is looked for
     sweeps: NonNegativeInt = 20  # of the rings, at most, per row; 0 leaves them as they fell
     longest: Annotated[float, Field(ge=1)] = 1.0  # of a ring link, over its rest length
     stiff: Annotated[float, Field(ge=0, le=1)] = 0.3  # how much a ring resists being shortened
@@ -156,9 +157,10 @@ class Kinematic(Draper):
         grid = standing(strands, chain, links)
         fixed = np.zeros(grid.shape[:3], bool)
         fixed[:, np.arange(len(strands.first)), strands.first] = True
+        step, in_space = math.radians(self.step_deg), self.pivot == "space"
         settle_batch(
-            grid, fixed, strands.first, strands.last, skin, math.radians(self.step_deg), self.iterations, self.limited,
-            False, LOWER, parts, values,
+            grid, fixed, strands.first, strands.last, skin, step, self.iterations, self.limited, in_space,
+            LOWER, parts, values,
         )  # fmt: skip
         grid, fixed = grid[source], fixed[source]
         force, amount = wind(garment, parameters, chain[source, strands.carrier[0], :3, :3])

@@ -29,6 +29,14 @@ def effective_share(matches: Matches, correlation_px: float) -> F64:
     return np.where(used, share.take(matches.camera), 1.0)
 
 
+def view_balance(matches: Matches, share: F64) -> F64:
+    """Return factors (M,) that give every view the same total weight, and all views together what they had."""
+    weight = matches.weight * share
+    total = np.bincount(matches.camera, weight)
+    mean = total[total > 0].mean() if total.any() else 0.0
+    return np.where(total > 0, mean / np.where(total > 0, total, 1.0), 0.0)[matches.camera]
+
+
 def residual_scale(energy: float, measurements: float, spent: float) -> float:
     """Return s^2, the variance of the residuals in units of what their weights promise.
 

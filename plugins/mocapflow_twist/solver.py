@@ -15,7 +15,7 @@ from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow_twist import solve
 from mocapflow_twist.constraint import image_rows, line_rows
-from mocapflow_twist.covariance import covariance, effective_share, observed
+from mocapflow_twist.covariance import covariance, effective_share, observed, view_balance
 from mocapflow_twist.motion import ClothMotion
 from mocapflow_twist.normal_equations import Equations
 from mocapflow_twist.problem import Anchor, Data, Guess, Problem, Quadratic
@@ -45,6 +45,7 @@ class TwistGaussNewton(PoseSolver):
     cap_deg: PositiveFloat = 10.0  # a step, each angle
     cap_mm: PositiveFloat = 100.0  # a step, the root
     correlation_px: NonNegativeFloat = 15.0  # length over which contour errors agree; 0: independent
+    balance_views: bool = False  # every view counts the same
     cloth_unknowns: bool = False  # also solves for the cloth parameters
     redrape: Literal["every", "once"] = "every"  # drape at each new pose, or once and move the cloth linearly
     cloth_jacobian: Literal["every", "once"] = "once"  # how often the motion of the cloth is measured
@@ -91,7 +92,8 @@ class TwistGaussNewton(PoseSolver):
         line = self.residual == "line"
         rows = line_rows(matches, cameras, self.line_sigma_mm / 1000) if line else image_rows(matches, cameras)
         share = effective_share(matches, self.correlation_px)
-        weight = rows.weight * share.take(rows.match)
+        balance = view_balance(matches, share) if self.balance_views else np.ones(len(share))
+        weight = rows.weight * (share * balance).take(rows.match)
         used = np.isfinite(weight) & (weight > 0)
         components = 2 / 3 if line else 1.0  # of the three components of X x n - m, two are independent
         body = len(model.scene.body.vertices)

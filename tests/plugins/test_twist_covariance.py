@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mocapflow_twist.covariance import covariance, effective_share, observed
+from mocapflow_twist.covariance import covariance, effective_share, observed, view_balance
 from mocapflow_twist.solver import TwistGaussNewton
 from test_twist_solver import FREE, solve
 from twist_fixtures import exact_matches, make_pose, make_scene
@@ -52,6 +52,15 @@ def test_each_view_is_counted_for_itself_and_rejected_matches_do_not_count() -> 
     half = replace(one, weight=np.where(np.arange(597) % 2, 1.0, 0.0))
     used = half.weight > 0
     assert effective_share(half, 15.0)[used].sum() == pytest.approx(effective_share(one, 15.0).sum(), rel=0.02)
+
+
+def test_balanced_views_weigh_the_same() -> None:
+    one = contour((3.0, 3.0), (600.0, 3.0), 1.0)
+    matches = replace(one, camera=np.where(np.arange(597) < 100, 0, 3).astype(np.int16))
+    share = effective_share(matches, 15.0)
+    balanced = matches.weight * share * view_balance(matches, share)
+    assert balanced[:100].sum() == pytest.approx(balanced[100:].sum())
+    assert balanced.sum() == pytest.approx((matches.weight * share).sum())
 
 
 @pytest.mark.parametrize("promised", [1.0, 0.5])
