@@ -19,7 +19,6 @@ from mocapflow_draping.fixed import Fixed
 from mocapflow_matching.contour_icp import ContourIcp
 from mocapflow_matching.fourier_icp import FourierIcp
 from mocapflow_matching.optical_flow import OpticalFlow
-from mocapflow_priors.hold import Hold
 from mocapflow_priors.joint_limits import JointLimits
 from mocapflow_priors.rest_pose import RestPose
 from mocapflow_priors.spine_coupling import SpineCoupling
@@ -106,9 +105,9 @@ def error(scene: Scene, truth: Pose, start: Pose, matchers: Sequence[Matcher], r
     seen, model = shown(scene, truth), ClothedModel(scene=scene)
     frame = pictured(scene, seen)
     steps = Steps(
-        predictor=Hold(), segmenter=Given(), matchers=matchers, pose_solver=TwistGaussNewton(iterations=5),
+        segmenter=Given(), matchers=matchers, pose_solver=TwistGaussNewton(iterations=5),
         cloth_fitter=Fixed(), priors=[JointLimits(), RestPose(), SpineCoupling()],
-        steady=Steady(surface=0.002, angle=np.radians(0.3), sigmas=0.0, min_turns=1, turns=1, max_turns=8, halvings=0),
+        steady=Steady(surface_mm=2.0, angle_deg=0.3, min_turns=1, turns=1),
     )  # fmt: skip
 
     def settle_from(pose: Pose, parameters: F64) -> FrameResult:

@@ -17,7 +17,6 @@ import numpy as np
 from limits import true_poses
 from mocapflow_sequence.calibrate_limbs import CalibrateLimbs
 from mocapflow_sequence.proportions import scaled
-from mocapflow_sequence.start_from_file import calm
 
 from mocapflow.assets import Body
 from mocapflow.data import Pose
@@ -59,7 +58,7 @@ def main() -> None:
 def track_of(scene: Scene, rows: Sequence[int], truth: Sequence[Pose]) -> Track:
     """Return a track whose poses are off by `OFF`."""
     count, size = len(rows), len(scene.body.twists)
-    parameters = calm(scene.garment)
+    parameters = scene.calm
     return Track(
         frame=np.array(rows, np.int32), time=np.array(rows) / 30.0, root=np.stack([pose.root for pose in truth]),
         angles=np.stack([p.angles for p in truth]) + OFF * np.random.default_rng(0).normal(size=(count, size)),

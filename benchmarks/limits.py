@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
-from mocapflow_sequence.start_from_file import calm, read_pose
+from mocapflow_sequence.start_from_file import read_pose
 
 from mocapflow.assets import Camera
 from mocapflow.components import Prior, Segmenter
@@ -97,7 +97,7 @@ def track(
     truth: Sequence[Pose],
 ) -> list[Pose]:  # fmt: skip
     """Return the pose of each frame, tracked from the true pose of the first."""
-    past, poses, pose, parameters = Past(), list[Pose](), truth[0], calm(model.scene.garment)
+    past, poses, pose, parameters = Past(), list[Pose](), truth[0], model.scene.calm
     for row, frame in enumerate(frames):
         if past.moments:
             pose = loop.predictor.predict(frame, past, model.scene)

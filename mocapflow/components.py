@@ -28,6 +28,7 @@ from mocapflow.data import (
     Segmentation,
     Surface,
     Turn,
+    empty_matches,
 )
 from mocapflow.geometry.differences import drape_differences
 from mocapflow.records import F64, I32, Bool
@@ -224,7 +225,9 @@ class Stage(Component):
 
 
 def pool(parts: Sequence[tuple[float, Matches]]) -> Matches:
-    """Return the matches of several matchers as one set, each weighted by its share."""
+    """Return the matches of several matchers as one set, each weighted by its share; none of no matcher."""
+    if not parts:
+        return empty_matches()
     if len(parts) == 1 and parts[0][0] == 1.0:
         return parts[0][1]
     matches = [m for _, m in parts]

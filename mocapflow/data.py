@@ -19,7 +19,7 @@ import numpy as np
 
 from mocapflow.records import F32, F64, I16, I32, U8, Bool, array, record
 
-BODY, CLOTH, LANDMARK = 0, 1, 2  # values of Surface.layer
+BODY, CLOTH = 0, 1  # values of Surface.layer
 BORDER = 3  # px along the image border where a silhouette is cut, not occluding
 
 
@@ -87,7 +87,7 @@ class Surface:
     vertices: F64 = array("N", 3, unit="m")
     faces: I32 = array("F", 3, unit="vertex index")
     edges: I32 = array("E", 4, unit="two vertices, then the faces left and right of the way between them, or -1")
-    layer: U8 = array("N", unit="0 body, 1 cloth, 2 landmark")
+    layer: U8 = array("N", unit="0 body, 1 cloth")
     joints: F64 = array("J", 4, 4, unit="m, world_from_rest")
     screws: F64 = array("D", 6, unit="twist (omega, v) in the world")
 

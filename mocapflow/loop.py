@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from mocapflow.assets import Camera
-from mocapflow.components import ClothFitter, Matcher, Observe, PoseSolver, Predictor, Prior, Segmenter, pool
+from mocapflow.components import ClothFitter, Matcher, Observe, PoseSolver, Prior, Segmenter, pool
 from mocapflow.data import NO_CLOTH, Frame, FrameResult, FrameState, Matches, Past, Segmentation, Surface, Turn
 from mocapflow.functional import Functional
 from mocapflow.geometry import silhouettes
@@ -27,7 +27,6 @@ from mocapflow.timing import Stopwatch
 class Steps:
     """The components of the loop."""
 
-    predictor: Predictor
     segmenter: Segmenter
     matchers: Sequence[Matcher]
     pose_solver: PoseSolver
@@ -44,7 +43,9 @@ def settle(
     Source: Rosenhahn 2008, Fig. 12.14
     """
     functional, watch = Functional(model, steps.priors, past), Stopwatch()
-    steady = steps.steady if past.moments else replace(steps.steady, sigmas=0.0)  # the start may be far off
+    steady = steps.steady
+    if not past.moments:
+        steady = steady.model_copy(update={"sigmas": 0.0})  # the start may be far off
     calm, turn = 0, Turn(index=0, cap=steady.max_turns)
     last = before_last = Shown(state.estimate.pose, model.surface(state.estimate.pose, state.cloth))
     energy = np.full((steady.max_turns, len(functional.terms)), np.nan)

@@ -21,12 +21,12 @@ in a pipeline file, with its settings where they differ from the defaults: `drap
 """
 
 
-def manual(registry: Registry, distribution: str = "") -> str:
+def manual(registry: Registry, distribution: str) -> str:
     """Return all settings as a Markdown document.
 
     Args:
         registry: whose components.
-        distribution: only those of this package.
+        distribution: only those of this package; empty: all.
     """
     lines = [INTRODUCTION]
     for file in (PipelineFile, ExperimentFile):

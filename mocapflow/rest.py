@@ -5,27 +5,29 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
 from mocapflow.data import Change, Pose, Surface
 from mocapflow.geometry import twists
-from mocapflow.records import F64, record
+from mocapflow.records import F64
 
 
-@record
-class Steady:
-    """What counts as rest, how long the loop may go on, and how it is kept from getting worse."""
+class Steady(BaseModel):
+    """When the loop counts as at rest, how long it may go on, and how it is kept from getting worse."""
 
-    surface: float  # m
-    angle: float  # rad
-    sigmas: float  # standard deviations; a change that small is rest, whatever it is in m and rad,
-    min_turns: int  # from this turn on
-    turns: int  # consecutive turns within both tolerances
-    max_turns: int
-    halvings: int  # of a step that costs more than where it began, at most
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    surface_mm: PositiveFloat = 0.5  # largest move of a body vertex from turn to turn, RMS move of the cloth
+    angle_deg: PositiveFloat = 0.1  # largest change of a joint angle
+    sigmas: NonNegativeFloat = 0.0  # of the pose, in the mean: a turn that moves it less is rest too,
+    min_turns: PositiveInt = 2  # from this turn on, and not in the first frame; the first moves it from a prediction
+    turns: PositiveInt = 2  # in a row within both tolerances, then the frame is at rest
+    max_turns: PositiveInt = 8  # then the frame is left as it is
+    halvings: NonNegativeInt = 0  # at most, of a step that raises the functional; 0: it is taken whole
 
     def holds(self, change: Change, turns: int) -> bool:
         """True where a change is within both tolerances, or after so many turns less than the pose is known to."""
-        exact = max(change.body, change.cloth) <= self.surface and change.angles <= self.angle
+        near = max(change.body, change.cloth) <= self.surface_mm / 1000
+        exact = near and change.angles <= float(np.radians(self.angle_deg))
         return exact or (turns >= self.min_turns and change.sigmas <= self.sigmas)
 
 

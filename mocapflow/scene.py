@@ -67,6 +67,11 @@ class Scene:
             return np.empty(0)
         return meshes.lengths_along(self.garment.vertices, self.garment.strands)
 
+    @property
+    def calm(self) -> F64:
+        """Parameters (Q,) of the garment without forces: zero, or the nearest to it within bounds."""
+        return np.empty(0) if self.garment is None else np.clip(0.0, *self.garment.parameter_bounds.T)
+
     @cached_property
     def near_garment(self) -> Bool:
         """Which body vertices (V,) a garment covers or ends close to, by the rest pose."""

@@ -22,7 +22,7 @@ from mocapflow.rows import Corrupted, flush_all
 from mocapflow.store import Artifact, Report, Store, writing
 
 
-def open_store(path: Path, url: str | None = None) -> Store:
+def open_store(path: Path, url: str | None) -> Store:
     """Return the store of a folder; with a URL, one whose results are shared there."""
     return Store(path) if url is None else SharedStore(path, Copies(url))
 

@@ -7,16 +7,7 @@ from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    NonNegativeFloat,
-    NonNegativeInt,
-    PositiveFloat,
-    PositiveInt,
-    model_validator,
-)
+from pydantic import Field, model_validator
 
 from mocapflow.assets import Background
 from mocapflow.checkpoint import Checkpoint
@@ -63,31 +54,6 @@ VIEWS = 2  # fewer than these do not fix a pose in space
 UNKNOWN = np.pi**2  # rad^2 and m^2, the variance where nothing was seen
 
 
-class SteadyState(BaseModel):
-    """When the loop counts as at rest."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-    surface_mm: PositiveFloat = 0.5  # largest move of a body vertex from turn to turn, RMS move of the cloth
-    angle_deg: PositiveFloat = 0.1  # largest change of a joint angle
-    sigmas: NonNegativeFloat = 0.0  # of the pose, in the mean: a turn that moves it less is rest too,
-    min_turns: PositiveInt = 2  # from this turn on, and not in the first frame; the first moves it from a prediction
-    turns: PositiveInt = 2  # in a row within both tolerances, then the frame is at rest
-    max_turns: PositiveInt = 8  # then the frame is left as it is
-    halvings: NonNegativeInt = 0  # at most, of a step that raises the functional; 0: it is taken whole
-
-    def limits(self) -> Steady:
-        """Return the same in metres and radians."""
-        return Steady(
-            surface=self.surface_mm / 1000,
-            angle=float(np.radians(self.angle_deg)),
-            sigmas=self.sigmas,
-            min_turns=self.min_turns,
-            turns=self.turns,
-            max_turns=self.max_turns,
-            halvings=self.halvings,
-        )
-
-
 class CoupledLoop(Stage):
     """Tracks the person through the recording, saved frame by frame.
 
@@ -104,7 +70,7 @@ class CoupledLoop(Stage):
     cloth_fitter: ClothFitter | None = None  # needed with a garment
     priors: tuple[Prior, ...] = ()  # added to the matches
     recovery: Recovery | None = None  # looks again where a fit is lost
-    steady: SteadyState = SteadyState()
+    steady: Steady = Steady()
     keep: Annotated[Literal["final", "trace"], FREE] = "final"  # trace: also the pose of every turn
     on_unsteady: Annotated[Literal["go_on", "stop"], FREE] = "go_on"  # after a frame that did not come to rest
 
@@ -151,13 +117,12 @@ class CoupledLoop(Stage):
     def steps(self) -> Steps:
         """The components as the loop takes them."""
         return Steps(
-            predictor=self.predictor,
             segmenter=self.segmenter,
             matchers=self.matchers,
             pose_solver=self.pose_solver,
             cloth_fitter=self.cloth_fitter,
             priors=self.priors,
-            steady=self.steady.limits(),
+            steady=self.steady,
         )
 
     def begin(self, frame: Frame, past: Past, start: Start, model: ClothedModel, watch: Stopwatch) -> FrameState:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mocapflow.assets import Camera
-from mocapflow.components import PoseSolver, Predictor
+from mocapflow.components import PoseSolver
 from mocapflow.data import NO_CLOTH, Estimate, Frame, Moment, Past, Pose
 from mocapflow.geometry.kinematics import chain, skin
 from mocapflow.loop import Steps, settle
@@ -28,13 +28,6 @@ class Towards(PoseSolver):
         return Estimate(pose=moved, parameters=state.estimate.parameters, covariance=np.eye(8), observed=np.ones(2))
 
 
-class Nothing(Predictor):
-    name = "nothing"
-
-    def predict(self, frame, past, scene):
-        raise AssertionError
-
-
 @pytest.fixture
 def frame():
     image = np.zeros((16, 24, 3), np.uint8)
@@ -48,12 +41,9 @@ def go(frame, share, observe=lambda *_: None, max_turns=8, sigmas=0.0, past=None
     )  # fmt: skip
     model = ClothedModel(scene=Scene(cameras=(camera, camera), body=tiny_body(1.0)))
     steps = Steps(
-        predictor=Nothing(), segmenter=TinySegmenter(), matchers=(TinyMatcher(),), pose_solver=Towards(share=share),
+        segmenter=TinySegmenter(), matchers=(TinyMatcher(),), pose_solver=Towards(share=share),
         cloth_fitter=None, priors=(),
-        steady=Steady(
-            surface=0.0005, angle=float(np.radians(0.1)), sigmas=sigmas, min_turns=2, turns=2,
-            max_turns=max_turns, halvings=0,
-        ),
+        steady=Steady(sigmas=sigmas, max_turns=max_turns),
     )  # fmt: skip
     pose = Pose(root=np.eye(4), angles=np.array([0.3, -0.4]))
     start = believed(pose, np.empty(0), model.drape(pose, np.empty(0), Past()))

@@ -78,7 +78,7 @@ def place(folder: Path, cell: Cell) -> Path:
     return folder / cell.variant / cell.name
 
 
-def invocation(cell: Cell, store: str, url: str | None = None) -> Invocation:
+def invocation(cell: Cell, store: str, url: str | None) -> Invocation:
     """Return a cell as the command that runs it."""
     return Invocation(
         pipeline=str(cell.pipeline),

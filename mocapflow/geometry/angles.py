@@ -114,9 +114,9 @@ def measure(
 def _velocities(places: F64, screws: F64, below: Bool) -> F64:
     """Return how each joint centre moves with an increment: (J, 3, 6 + D)."""
     count = len(places)
-    by_screws = (np.cross(screws[None, :, :3], places[:, None]) + screws[None, :, 3:]) * below.T[:, :, None]
+    by_screws = kinematics.screw_velocities(screws, places, below.T)
     identity = np.broadcast_to(np.eye(3), (count, 3, 3))
-    return np.concatenate([-twists.hat(places), identity, np.swapaxes(by_screws, 1, 2)], axis=2)
+    return np.concatenate([-twists.hat(places), identity, by_screws], axis=2)
 
 
 def _three_point_gradient(places: F64, moves: F64) -> F64:

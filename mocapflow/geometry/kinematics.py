@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from mocapflow.assets import Body
 from mocapflow.data import Pose, PoseBatch
-from mocapflow.records import F64
+from mocapflow.records import F64, Bool
 
 
 def chain(body: Body, pose: Pose) -> tuple[F64, F64]:
@@ -64,6 +64,20 @@ def rest_shape(body: Body, angles: F64 | None) -> F64:
     shape: F64 = body.vertices + share * body.morph_offset
     shape.flags.writeable = False  # like the vertices of a body: compiled code tells the two apart
     return shape
+
+
+def screw_velocities(screws: F64, points: F64, share: F64 | Bool) -> F64:
+    """Return how points (N, 3) m in the world move with a unit change of each angle: (N, 3, D) m.
+
+    Args:
+        screws: (D, 6), see `chain`.
+        points: where they are; of a point that several joints carry, where one of them would have it.
+        share: (N, D) of its screw's motion that a point takes part in: 1 below the screw, 0 elsewhere; or the weight
+            of the joint in place of 1.
+    """
+    rate = (np.cross(screws[None, :, :3], points[:, None]) + screws[None, :, 3:]) * share[..., None]
+    velocities: F64 = np.swapaxes(rate, 1, 2)
+    return velocities
 
 
 def joint_positions(body: Body, joints: F64) -> F64:

@@ -1,4 +1,4 @@
-"""Twists (omega, v), their exponentials and logarithms in SE(3), and the adjoint.
+"""Twists (omega, v), their exponentials and logarithms in SE(3).
 
 Every function takes arrays with any leading axes. Source of the closed forms: Murray, Li, Sastry 1994, chapter 2.
 """
@@ -111,22 +111,6 @@ def log(motion: F64) -> F64:
     w = hat(omega)
     v = np.linalg.solve(np.eye(3) + b * w + c * (w @ w), motion[..., :3, 3:])[..., 0]
     return np.concatenate([omega, v], axis=-1)
-
-
-def adjoint(motion: F64) -> F64:
-    """Return the matrix that carries twists from body to world: `exp(Ad_T x) = T exp(x) T^-1`.
-
-    Args:
-        motion: (..., 4, 4).
-
-    Returns:
-        (..., 6, 6).
-    """
-    rotation = motion[..., :3, :3]
-    matrix = np.zeros((*motion.shape[:-2], 6, 6))
-    matrix[..., :3, :3] = matrix[..., 3:, 3:] = rotation
-    matrix[..., 3:, :3] = hat(motion[..., :3, 3]) @ rotation
-    return matrix
 
 
 def screw(axis: F64, point: F64) -> F64:

@@ -33,7 +33,7 @@ class FirstPose:
     turns: Mapping[str, F64]  # of joints: rotation vectors (3,) rad, relative to the parent
 
 
-def read_first_pose(path: Path, joints: Sequence[str] = ()) -> FirstPose:
+def read_first_pose(path: Path, joints: Sequence[str]) -> FirstPose:
     """Read a first pose.
 
     Args:

@@ -32,7 +32,7 @@ class Parts:
     warnings: tuple[str, ...]
 
 
-def gather(folder: Path, calibration: Path | None = None) -> Parts:
+def gather(folder: Path, calibration: Path | None) -> Parts:
     """Read what a recording folder holds and check that it agrees.
 
     Raises:

@@ -74,12 +74,12 @@ def read_trc(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
     unit = header.get("Units", "").strip()
     if unit not in METRES:
         raise RecordingError(f"unknown unit '{unit}'", where=str(path), hint=f"known: {', '.join(METRES)}")
-    (rate,) = _row([header.get("DataRate", "")], 1, f"{path}:3")
+    (rate,) = numbers([header.get("DataRate", "")], 1, f"{path}:3")
     if not rate > 0:
         raise RecordingError("no DataRate above zero", where=f"{path}:3", hint="it is in rows per second")
     width = 2 + 3 * len(names)
     rows = [
-        _row(_fitted(line.split("\t"), width), width, f"{path}:{number}")
+        numbers(_fitted(line.split("\t"), width), width, f"{path}:{number}")
         for number, line in enumerate(lines[5:], 6)
         if line.strip()
     ]
@@ -123,7 +123,7 @@ def read_mot(path: Path) -> tuple[dict[str, F64], F64]:
     if "time" not in names:
         raise RecordingError("no column 'time'", where=f"{path}:{end + 2}", hint=f"the columns are: {', '.join(names)}")
     rows = [
-        _row(line.split(), len(names), f"{path}:{number}")
+        numbers(line.split(), len(names), f"{path}:{number}")
         for number, line in enumerate(lines[end + 2 :], end + 3)
         if line.strip()
     ]
@@ -175,7 +175,7 @@ def _fitted(cells: Sequence[str], width: int) -> Sequence[str]:
     return [*cells[:kept], *[""] * (width - kept)]
 
 
-def _row(cells: Sequence[str], width: int, where: str) -> list[float]:
+def numbers(cells: Sequence[str], width: int, where: str) -> list[float]:
     """Return the numbers of a row; an empty cell is NaN."""
     if len(cells) != width:
         raise RecordingError(f"{len(cells)} columns; expected {width}", where=where)

@@ -21,6 +21,7 @@ from mocapflow.records import F64, I32, U8, array, record
 
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 VIDEOS = (".mp4", ".avi", ".mov", ".mkv", ".m4v", ".webm", ".mpg")
+NAMED = 5  # frames that a message lists
 
 
 @record
@@ -153,10 +154,10 @@ def numbered(folder: Path, suffixes: tuple[str, ...]) -> dict[int, Path]:
     return found
 
 
-def name_frames(indices: Sequence[int], named: int = 5) -> str:
+def name_frames(indices: Sequence[int]) -> str:
     """Return e.g. `frames 3, 4, 9 and 20 more`."""
-    first = ", ".join(str(index) for index in indices[:named])
-    more = f" and {len(indices) - named} more" if len(indices) > named else ""
+    first = ", ".join(str(index) for index in indices[:NAMED])
+    more = f" and {len(indices) - NAMED} more" if len(indices) > NAMED else ""
     return f"{'frame' if len(indices) == 1 else 'frames'} {first}{more}"
 
 

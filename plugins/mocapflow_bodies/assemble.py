@@ -32,7 +32,7 @@ class Cut(NamedTuple):
 
 
 def assemble(
-    vertices: F64, faces: I32, skeleton: Skeleton, weights: F64, part: Part = "full", offset: F64 | None = None
+    vertices: F64, faces: I32, skeleton: Skeleton, weights: F64, part: Part, offset: F64 | None = None
 ) -> Body:
     """Return the body of a mesh (V, 3) m, (F, 3), a skeleton and weights (V, J), or a part of it.
 

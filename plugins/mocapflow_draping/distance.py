@@ -53,14 +53,6 @@ def body_distance(x, y, z, near, parts, values):  # type: ignore[no-untyped-def]
     return least, nearest
 
 
-@numba.njit(cache=True, error_model="numpy")
-def body_distances(points, out, parts, values):  # type: ignore[no-untyped-def]
-    """Write the distances (N,) of points (N, 3) to one posed body."""
-    near = 0
-    for n in range(len(points)):
-        out[n], near = body_distance(points[n, 0], points[n, 1], points[n, 2], near, parts, values)
-
-
 @numba.njit(cache=True, error_model="numpy", forceinline=True)
 def outwards(x, y, z, near, parts, values):  # type: ignore[no-untyped-def]
     """Return the unit direction out of the body at a point whose nearest part is `near`: the slope of its field."""

@@ -75,9 +75,8 @@ def touchable_joints(body: Body, garment: GarmentMesh) -> I32:
     carrying = descendants(body.parents)[:, garment.carried_by].any(axis=1)
     hull = ConvexHull(np.concatenate([garment.vertices, body.positions[carrying]]))
     within = np.all(body.vertices @ hull.equations[:, :3].T + hull.equations[:, 3] < 0.02, axis=1)
-    main = body.skin_joint[np.arange(len(within)), body.skin_weight.argmax(axis=1)]
     seen = np.zeros(len(body.parents), bool)
-    seen[main[within]] = True
+    seen[body.main_joint[within]] = True
     child = np.isin(body.parents, np.flatnonzero(seen))
     reach = seen | (child & descendants(body.parents)[garment.carried_by].any(axis=0))
     return np.flatnonzero(reach).astype(np.int32)

@@ -79,7 +79,7 @@ def strands_of(garment: GarmentMesh, body: Body) -> Strands:
     beside, ring_length = _beside(garment, vertex, own)
     carrier = garment.carried_by[vertex[:, -1]]
     under = np.asarray(cKDTree(body.vertices).query(rows)[1], np.int32)
-    rides = bool(np.mean(_main_joint(body, under[:, -1]) == carrier) > 0.5)
+    rides = bool(np.mean(body.main_joint[under[:, -1]] == carrier) > 0.5)
     facing = _from_middle(rows, beside) if rides else _along(rows)
     return Strands(
         vertex=vertex,
@@ -167,12 +167,6 @@ def roots(strands: Strands, chain: F64) -> F64:
     held = np.einsum("nk,bnkij->bnij", strands.root_weight, chain[:, strands.root_joint, :3])
     pinned: F64 = np.einsum("bnij,nj->bni", held[..., :3], strands.rest[:, 0]) + held[..., 3]
     return pinned
-
-
-def _main_joint(body: Body, skin: I32) -> I32:
-    """Return the joint (N,) that moves most of each body vertex."""
-    joint: I32 = body.skin_joint[skin, body.skin_weight[skin].argmax(axis=1)]
-    return joint
 
 
 def _along(rows: F64) -> F64:

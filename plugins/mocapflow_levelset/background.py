@@ -20,15 +20,13 @@ from mocapflow_levelset.evolve import Rhythm, Weights
 from mocapflow_levelset.levelset import INNER_BAND_PX, PERSON
 from mocapflow_levelset.masks import counted
 from mocapflow_levelset.plates import Plate, Shadow, density_of, plate_of
-from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.shadows import floor_around
 from mocapflow_levelset.statistics import Window
 from mocapflow_levelset.view import Empty, Level, Method, View, find
 
 CHANNELS: tuple[ChannelName, ...] = ("lab",)
-
-
-STRIDE = 2
+STRIDE = 2  # of the pixels that the statistics are taken from
+REFINE_STEPS = 4  # against the plate, then as many with local statistics on both sides
 
 
 class BackgroundDifference(Segmenter):
@@ -48,7 +46,6 @@ class BackgroundDifference(Segmenter):
     hole_px: NonNegativeInt = 120  # holes up to this area are filled, in square px
     reach_px: NonNegativeFloat = 60.0  # parts further from the projected model than this are someone else; 0: keep all
     smallest_part: Annotated[float, Field(ge=0, le=1)] = 0.01  # of the largest part's area; smaller parts are noise
-    refine_steps: NonNegativeInt = 4  # against the plate, then as many with local statistics on both sides
     length_weight: NonNegativeFloat = 0.5  # of the boundary's length in the refinement
     band_px: Annotated[float, Field(ge=8)] = 12.0  # half width of the band in which the distance is computed
 
@@ -89,10 +86,8 @@ class BackgroundDifference(Segmenter):
         """
         plate = plate_of(background.mean[camera], background.spread[camera], CHANNELS)
         start = self._start(image, model, plate, floor, hidden)
-        if not self.refine_steps:
-            return redistance(start, self.band_px)
         view = View(image, start, start, counted(start.shape, 0, hidden), Empty({1: plate}, floor))
-        against_plate = Level(1, Rhythm(self.refine_steps, 3, 3), Window(12.0, 8, 0.02))
+        against_plate = Level(1, Rhythm(REFINE_STEPS, 3, 3), Window(12.0, 8, 0.02))
         levels = [against_plate, against_plate._replace(use_plate=False)]
         return find(view, levels, self._method(), self.band_px).level
 
@@ -131,7 +126,7 @@ class BackgroundDifference(Segmenter):
         return kept
 
     def _shadow(self) -> Shadow:
-        return Shadow(self.spread_floor, self.shadow_share, self.darkest_shadow, self.shadow_chroma, -6.0)
+        return Shadow(self.spread_floor, self.shadow_share, self.darkest_shadow, self.shadow_chroma)
 
     def _method(self) -> Method:
         return Method(

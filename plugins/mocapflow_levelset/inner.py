@@ -14,11 +14,12 @@ from mocapflow_levelset import splits
 from mocapflow_levelset.inner_edges import behind_edges, chosen, inner_edges
 from mocapflow_levelset.layers import CLIP, Shown
 
+SPACING_PX = 4.0  # between the points of an edge of the model
+
 
 class Search(NamedTuple):
     """How to look for the end of a part."""
 
-    spacing_px: float  # between points of an edge
     reach_px: int  # along the normal
     half_px: int  # on either side that colours have to agree over
     least: float  # mean log ratio from which on a side is told from the other
@@ -39,7 +40,7 @@ def inner_contours(
     search: Search,
 ) -> Matches:  # fmt: skip
     """Return points of inner contours, each with the vertex at whose edge the part ends there; see `told_apart`."""
-    edges = inner_edges(surface, camera, search.spacing_px, told)
+    edges = inner_edges(surface, camera, SPACING_PX, told)
     rough = splits.split(
         image, silhouette.distance, known.ratio, layers[edges.vertex], edges.pixel, edges.normal, CLIP,
         search.reach_px, search.half_px, search.least,

@@ -34,7 +34,6 @@ class Layered(LevelSet):
     name: ClassVar[str] = "layered"
     keep: Annotated[float, Field(ge=0, lt=1)] = 0.9  # of what is known of the colours, from frame to frame
     grid_px: PositiveInt = 4  # colours are taken every so many px, so far from borders
-    inner_spacing_px: PositiveFloat = 4.0  # between the points of an edge of the model
     keep_mm: NonNegativeFloat = 5.0  # change of the body in a turn below which inner contours stay where outlines do
     calm_mm: PositiveFloat = 15.0  # change of the body in a turn below which the reach is the later one
     first_reach_px: PositiveInt = 24  # how far along the normal the end of a part is looked for
@@ -80,4 +79,4 @@ class Layered(LevelSet):
 
     def _search(self, turn: Turn) -> Search:
         reach = self.later_reach_px if turn.calm(self.calm_mm) else self.first_reach_px
-        return Search(self.inner_spacing_px, reach, self.half_px, self.least, self.inner_sigma_px)
+        return Search(reach, self.half_px, self.least, self.inner_sigma_px)

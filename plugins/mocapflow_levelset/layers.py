@@ -41,9 +41,8 @@ def layer_of(scene: Scene) -> I32:
     body = scene.body
     names = [name.removesuffix("_l").removesuffix("_r") for name in body.joint_names]
     _, of_joint = np.unique(names, return_inverse=True)
-    strongest = np.take_along_axis(body.skin_joint, body.skin_weight.argmax(axis=1)[:, None], axis=1)[:, 0]
     cloth = 0 if scene.garment is None else len(scene.garment.vertices)
-    layers = np.concatenate([of_joint[strongest], np.full(cloth, of_joint.max() + 1)])
+    layers = np.concatenate([of_joint[body.main_joint], np.full(cloth, of_joint.max() + 1)])
     return np.asarray(layers, np.int32)
 
 

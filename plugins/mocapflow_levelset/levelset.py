@@ -29,6 +29,7 @@ Share = Annotated[float, Field(ge=0, lt=1)]
 
 PERSON = "person"
 INNER_BAND_PX = 7.0  # while the contour moves
+REDUCED_RHO_PX = 8.0  # Gaussian window of the local statistics at reduced sizes, in px of the shrunken image
 COARSE, HALF, FULL = 4, 2, 1  # what the image is shrunk by
 
 
@@ -48,8 +49,7 @@ class LevelSet(Segmenter):
 
     channels: tuple[ChannelName, ...] = Field(("lab",), min_length=1)  # independent, their likelihoods add
     decorrelate: bool = True  # turn the channels to the image's principal axes, where no empty scene is known
-    rho_px: PositiveFloat = 12.0  # Gaussian window of the local statistics; inf: one Gaussian per region
-    reduced_rho_px: PositiveFloat = 8.0  # at reduced sizes, in px of the shrunken image
+    rho_px: PositiveFloat = 12.0  # Gaussian window of the local statistics at full size; inf: one Gaussian per region
     cell_px: PositiveInt = 8  # the statistics are summed over cells of this size
     stride_px: PositiveInt = 4  # and taken from every so many-th pixel; 1: from all
     variance_floor: PositiveFloat = 0.03  # smallest standard deviation inside and outside, share of a channel's range
@@ -78,7 +78,6 @@ class LevelSet(Segmenter):
     shadow_reach_m: PositiveFloat = 2.0  # shadows fall on the floor within this distance of the person
     darkest_shadow: Annotated[float, Field(gt=0, lt=1)] = 0.5  # factor of L + 16, a and b in the deepest shadow
     shadow_chroma: PositiveFloat = 0.005  # how far a shadow may be off the plate's chromaticity, share of the range
-    stranger: float = -6.0  # log density below which no region calls a pixel more unlikely
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
         """Return the person's silhouette in each usable view.
@@ -156,7 +155,7 @@ class LevelSet(Segmenter):
         return scene.background if self.use_background else None
 
     def _levels(self, warm: bool) -> list[Level]:
-        reduced, full = self._window(self.reduced_rho_px), self._window(self.rho_px)
+        reduced, full = self._window(REDUCED_RHO_PX), self._window(self.rho_px)
         levels = [
             Level(COARSE, self._rhythm(0 if warm else self.coarse_steps), reduced),
             Level(HALF, self._rhythm(self.half_steps), reduced),
@@ -181,7 +180,7 @@ class LevelSet(Segmenter):
                 step=self.time_step,
                 band_px=INNER_BAND_PX,
             ),
-            shadow=Shadow(self.spread_floor, self.shadow_share, self.darkest_shadow, self.shadow_chroma, self.stranger),
+            shadow=Shadow(self.spread_floor, self.shadow_share, self.darkest_shadow, self.shadow_chroma),
             calm_px=self.calm_px,
             decorrelate=self.decorrelate,
             stride=self.stride_px,

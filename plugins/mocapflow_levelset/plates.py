@@ -19,6 +19,7 @@ from mocapflow_levelset.channels import PLANES, ChannelName, features
 
 BLACK = (-16 / 100, 128 / 255, 128 / 255)  # where the rays start, in lab channels scaled to [0, 1]
 BENDING = 0.05  # how far a shadow may be off the ray, as a share of the colour's distance from grey
+STRANGER = np.float32(-6.0)  # log density below which no pixel is called more unlikely
 LOG_ROOT = np.float32(-0.5 * np.log(2 * np.pi))
 
 
@@ -29,7 +30,6 @@ class Shadow(NamedTuple):
     share: float  # prior share of shadow on the background; 0 switches the suppression off
     darkest: float  # smallest factor k of (L + 16, a, b)
     chroma: float  # standard deviation of the distance to the ray, share of a channel's range
-    stranger: float  # log density below which nothing is called more unlikely
 
 
 class Plate(NamedTuple):
@@ -77,7 +77,7 @@ def first_lab(channels: Sequence[ChannelName]) -> int:
 
 @numba.njit(cache=True, error_model="numpy")
 def _densities(values, plate, spread, may_fall, shadow, lab, out):  # type: ignore[no-untyped-def]
-    floor, _, _, _, stranger = shadow
+    floor = shadow[0]
     channels = values.shape[0]
     for n in range(out.size):
         variance = max(spread[n] * spread[n], floor * floor)
@@ -92,15 +92,15 @@ def _densities(values, plate, spread, may_fall, shadow, lab, out):  # type: igno
                 others += term
         if lab >= 0 and may_fall[n]:
             lit = max(lit, others + _in_shadow(values, plate, n, lab, inverse, shadow))
-        out[n] = max(lit, stranger)
+        out[n] = max(lit, STRANGER)
 
 
 @numba.njit(cache=True, error_model="numpy")
 def _in_shadow(values, plate, n, lab, inverse, shadow):  # type: ignore[no-untyped-def]
     """Return the log density of a shadowed plate: uniform along the ray down to the darkest, Gaussian across."""
-    _, share, darkest, chroma, stranger = shadow
+    _, share, darkest, chroma = shadow
     if share <= 0:
-        return stranger
+        return STRANGER
     l0, a0, b0 = (
         plate[lab, n] - np.float32(BLACK[0]),
         plate[lab + 1, n] - np.float32(BLACK[1]),

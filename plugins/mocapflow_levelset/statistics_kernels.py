@@ -68,7 +68,7 @@ def inside_sums(features, weight, level, sums, cell, table, sigma):  # type: ign
 def gaussians(smooth, everywhere, level, cell, reach, scale, floor):  # type: ignore[no-untyped-def]
     """Return log norm, means and 1 / (2 variance) of both regions, blended to global where the window is empty.
 
-    Cells further than `reach` from the contour are left undefined.
+    Cells further than `reach` from the contour are left zero.
     """
     rows, columns, twice = smooth.shape
     height, width = level.shape

@@ -21,7 +21,7 @@ def carried_points(frame: Frame, past: Past, scene: Scene) -> Matches:
         return empty_matches()
     before = past.moments[-1]
     surface = scene.surface(before.pose, before.cloth)
-    parts = [empty_matches()]
+    parts = []
     for index, flow in enumerate(frame.flow):
         if frame.usable[index] and len(flow.pixel):
             vertex, image = front_vertices(surface, scene.cameras[index], flow.pixel.astype(np.float64))

@@ -10,7 +10,7 @@ from pydantic import PositiveFloat
 
 from mocapflow.assets import Camera
 from mocapflow.components import Matcher, pool
-from mocapflow.data import Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn, empty_matches
+from mocapflow.data import Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn
 from mocapflow.geometry.contours import at_nearest, nearest_compatible
 from mocapflow.geometry.silhouettes import occluding_contour
 from mocapflow.records import F64
@@ -37,8 +37,7 @@ class Containment(Matcher):
         self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn
     ) -> Matches:
         """Return the pairs of every view; see the class."""
-        parts = [(1.0, self.match_view(scene.cameras[s.camera], s, surface)) for s in segmentation.of("person")]
-        return pool(parts) if parts else empty_matches()
+        return pool([(1.0, self.match_view(scene.cameras[s.camera], s, surface)) for s in segmentation.of("person")])
 
     def match_view(self, camera: Camera, silhouette: Silhouette, surface: Surface) -> Matches:
         """Return the pairs of one view."""

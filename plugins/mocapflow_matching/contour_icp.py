@@ -18,7 +18,6 @@ from mocapflow.data import (
     Silhouette,
     Surface,
     Turn,
-    empty_matches,
 )
 from mocapflow.geometry.contours import pairs
 from mocapflow.geometry.silhouettes import occluding_contour
@@ -77,8 +76,7 @@ class ContourIcp(Matcher):
         self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn
     ) -> Matches:
         """Return pairs of contour points; see the class."""
-        parts = [(1.0, self.match_view(s, surface, scene, turn)) for s in segmentation.of("person")]
-        return pool(parts) if parts else empty_matches()
+        return pool([(1.0, self.match_view(s, surface, scene, turn)) for s in segmentation.of("person")])
 
     def match_view(self, silhouette: Silhouette, surface: Surface, scene: Scene, turn: Turn) -> Matches:
         """Return the pairs of one view."""

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import NonNegativeFloat, NonNegativeInt, PositiveFloat
 
 from mocapflow.components import Matcher, pool
-from mocapflow.data import CLOTH, Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn, empty_matches
+from mocapflow.data import CLOTH, Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn
 from mocapflow.geometry import silhouettes
 from mocapflow.records import F32, F64, Bool
 from mocapflow.scene import Scene
@@ -53,7 +53,7 @@ class OpticalFlow(Matcher):
     ) -> Matches:
         """Return the pairs of every view; see the class."""
         first = turn.index < self.first_turns
-        parts = [empty_matches()]
+        parts = []
         if self.between != "shapes":
             parts.append(self.carried(frame, surface, past, scene))
         if self.between != "frames" and first:

@@ -37,8 +37,7 @@ def lowest_points(body: Body, pose: Pose, parts: tuple[str, ...]) -> tuple[F64, 
 @once
 def _parts(body: Body, names: tuple[str, ...]) -> list[Body]:
     """Return bodies of the skin that each of the joints carries most of."""
-    carrier = body.skin_joint[np.arange(len(body.vertices)), body.skin_weight.argmax(axis=1)]
-    found = [np.flatnonzero(carrier == body.joint(name)) for name in names if name in body.joint_names]
+    found = [np.flatnonzero(body.main_joint == body.joint(name)) for name in names if name in body.joint_names]
     return [kinematics.part_of(body, vertices) for vertices in found if len(vertices)]
 
 
@@ -54,5 +53,5 @@ def vertex_velocity(body: Body, joints: F64, screws: F64, vertex: int, angles: F
         place = joints[joint, :3] @ rest
         velocity[:, :3] += weight * np.cross(np.eye(3), place).T
         velocity[:, 3:6] += weight * np.eye(3)
-        velocity[:, 6:] += weight * below[:, joint] * (np.cross(screws[:, :3], place) + screws[:, 3:]).T
+        velocity[:, 6:] += kinematics.screw_velocities(screws, place[None], weight * below[None, :, joint])[0]
     return velocity

@@ -19,7 +19,7 @@ from mocapflow.once import once
 from mocapflow.records import F32, U8, Bool
 
 CHANNELS: tuple[ChannelName, ...] = ("lab",)
-SHADOW = Shadow(floor=0.012, share=0.2, darkest=0.5, chroma=0.005, stranger=-6.0)
+SHADOW = Shadow(floor=0.012, share=0.2, darkest=0.5, chroma=0.005)
 EMPTY = 3.0  # standard deviations within which a pixel is that of the empty room
 FLOOR_REACH = 2.0  # m, from the person, where their shadow may fall
 SPECK = 0.01  # of the largest part's area: smaller parts are noise

@@ -27,7 +27,6 @@ from mocapflow_sequence.landmarks import landmarks
 from mocapflow_sequence.pose_fit import Solution, Spreads
 from mocapflow_sequence.proportions import Proportion, scaled
 from mocapflow_sequence.silhouette_fit import refine
-from mocapflow_sequence.start_from_file import calm
 
 LOG = logging.getLogger("mocapflow")
 # near the solution matchers reach less far and give up what is off
@@ -90,7 +89,7 @@ class CalibrateLimbs(Stage):
         found = persons(recording, spread(recording.indices, self.frames), scene.cameras)
         names, order = landmarks(scene.body).names, layout(recording, list(found), None)
         _, poses = fit(scene.body, [seen(person, order, names) for person in found.values()], scene.cameras)
-        return list(found), list(poses), [calm(scene.garment)] * len(found)
+        return list(found), list(poses), [scene.calm] * len(found)
 
     def _model(self, scene: Scene, body: Body) -> ClothedModel:
         return ClothedModel(scene=replace(scene, body=body), draper=self.draper)

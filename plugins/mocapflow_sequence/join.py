@@ -37,15 +37,15 @@ class Join(Stage):
         Raises:
             PipelineError: two parts have no frame in common.
         """
-        joined = parts[0]
+        track = parts[0]
         for later in parts[1:]:
-            common, apart = disagreement(joined, later, scene)
+            common, apart = disagreement(track, later, scene)
             best = int(np.argmin(apart))
             seam = int(common[best])
             note = self._note(seam, 1000 * apart, best)
-            before, after = cut(joined, joined.frame < seam), cut(later, later.frame >= seam)
-            joined = together(before, replace(after, notes=(note, *after.notes)))
-        return joined
+            before, after = cut(track, track.frame < seam), cut(later, later.frame >= seam)
+            track = together(before, replace(after, notes=(note, *after.notes)))
+        return track
 
     def _note(self, seam: int, apart_mm: F64, best: int) -> str:
         far = apart_mm[best] > self.tolerance_mm

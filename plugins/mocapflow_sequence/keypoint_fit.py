@@ -12,7 +12,7 @@ from mocapflow.data import Pose
 from mocapflow.geometry.cameras import projection
 from mocapflow.records import F64, array, record
 from mocapflow_sequence.landmarks import Landmarks, landmarks
-from mocapflow_sequence.pose_fit import Observed, Solution, Spreads, View, descend
+from mocapflow_sequence.pose_fit import Observed, Solution, Spreads, View, descend, projected
 
 DETECTOR_PX = 3.0  # px, of a keypoint against the place the estimator means
 
@@ -61,10 +61,7 @@ def in_images(points: F64, seen: Seen, spread: F64, cameras: Sequence[Camera]) -
     camera, point = np.nonzero(seen.confidence > 0)
     matrices = np.stack([projection(c) for c in cameras])[camera]
     focal = np.array([c.intrinsics[0, 0] for c in cameras])[camera]
-    homogeneous = np.einsum("nab,nb->na", matrices[:, :, :3], points[point]) + matrices[:, :, 3]
-    depth = np.maximum(homogeneous[:, 2], 0.1)
-    pixel = homogeneous[:, :2] / depth[:, None]
-    slope = (matrices[:, :2, :3] - pixel[..., None] * matrices[:, 2:, :3]) / depth[:, None, None]
+    pixel, slope, depth = projected(points[point], matrices)
     precision = np.sqrt(np.clip(seen.confidence[camera, point], 0.0, 1.0)) / np.hypot(
         DETECTOR_PX, spread[point] * focal / depth
     )

@@ -89,7 +89,7 @@ def _cloth_surface(vertices: F64, faces: I32, edges: I32, body: Surface) -> Surf
 
 
 def _remarks(frame: Frame, track: Track, row: int, view: int) -> list[str]:
-    """Return what a viewer should know of a view: lost, not at rest."""
+    """Return what a viewer should know of a view: that it has no image, or that the frame was lost."""
     said = []
     if not frame.usable[view]:
         said.append(f"no image: {frame.reasons[view]}" if frame.reasons else "no image")

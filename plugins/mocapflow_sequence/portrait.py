@@ -56,14 +56,15 @@ def portrait(
     return np.asarray(cv2.resize(fine, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def pattern(garment: GarmentMesh, size: tuple[int, int] = SIZE) -> U8:
+def pattern(garment: GarmentMesh) -> U8:
     """Return the image (H, W, 3) BGR of a garment laid flat: each row as long as it is around, at its depth."""
-    image = np.full((size[1], size[0], 3), np.round(255 * WALL), np.uint8)
+    width, height = SIZE
+    image = np.full((height, width, 3), np.round(255 * WALL), np.uint8)
     rows = _rows(garment)
-    width = max(reach for _, _, reach in rows)
+    half = max(reach for _, _, reach in rows)
     depth = max(below for below, _, _ in rows)
-    scale = min(0.8 * size[0] / (2 * width), 0.7 * size[1] / depth)
-    origin = np.array([size[0] / 2, 0.2 * size[1]])
+    scale = min(0.8 * width / (2 * half), 0.7 * height / depth)
+    origin = np.array([width / 2, 0.2 * height])
     ends = np.array([[[left, below], [right, below]] for below, left, right in rows])
     drawing.segments(image, ends * scale + origin, INK)
     for (below, left, right), shift in ((rows[0], -8), (rows[-1], 20)):

@@ -18,6 +18,7 @@ FREE_SPREAD = np.radians(60.0)  # rad, of angles the body leaves free: unseen jo
 LIMIT_SPREAD = np.radians(2.0)  # rad, by how much an angle may pass a limit
 CAUCHY = 2.0  # standard deviations at which the weight of an observation has halved
 ENOUGH = 1e-6  # share of the cost below which a gain is none
+NEAREST = 0.1  # m, depth below which a projection is not believed
 STEP = 1e-4  # of a log proportion, for differences
 
 Spreads = Mapping[str, float]  # proportions to fit, with the standard deviation of their logarithm about zero
@@ -48,6 +49,19 @@ class Solution(NamedTuple):
     def factors(self, spreads: Spreads) -> Mapping[str, float]:
         """Return the proportions by name."""
         return dict(zip(spreads, np.exp(self.logs).tolist(), strict=True))
+
+
+def projected(points: F64, matrices: F64) -> tuple[F64, F64, F64]:
+    """Return pixels (N, 2) of points (N, 3), their derivatives (N, 2, 3) by the points, and depths (N,) m.
+
+    Each point has its own projection matrix (N, 3, 4). Behind a camera, where a bad guess may put it, it counts as
+    close before it.
+    """
+    homogeneous = np.einsum("nab,nb->na", matrices[:, :, :3], points) + matrices[:, :, 3]
+    depth = np.maximum(homogeneous[:, 2], NEAREST)
+    pixel = homogeneous[:, :2] / depth[:, None]
+    slope = (matrices[:, :2, :3] - pixel[..., None] * matrices[:, 2:, :3]) / depth[:, None, None]
+    return pixel, slope, depth
 
 
 def descend(views: Sequence[View], solution: Solution, spreads: Spreads, rounds: int = 80) -> Solution:
@@ -142,6 +156,5 @@ def velocities(body: Body, pose: Pose, logs: F64, spreads: Spreads) -> tuple[F64
     for k in range(body.skin_joint.shape[1]):
         own, weight = body.skin_joint[:, k], body.skin_weight[:, k]
         carried = np.einsum("vab,vb->va", joints[own, :3, :3], now.vertices) + joints[own, :3, 3]
-        turn = np.cross(screws[:, None, :3], carried[None]) + screws[:, None, 3:]
-        free[:, :, 6:] += np.moveaxis(turn * (below[:, own] * weight)[..., None], 0, -1)
+        free[:, :, 6:] += kinematics.screw_velocities(screws, carried, (below[:, own] * weight).T)
     return points, moves

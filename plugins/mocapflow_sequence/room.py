@@ -21,6 +21,7 @@ STAND: drawing.Colour = (190, 185, 180)
 FLOOR, WALL = np.array([0.86, 0.85, 0.83]), np.array([0.97, 0.955, 0.94])
 BESIDE = 1.0  # m, from the body to its stick model
 TILE = 0.5  # m
+DEPTH = 0.45  # m from a camera to the end of the pyramid that is drawn for it
 ASIDE = (32.0, -32.0, 45.0, -45.0, 20.0, -20.0, 60.0, -60.0)  # deg from straight before the person
 
 
@@ -117,10 +118,10 @@ class Room:
         drawing.dots(image, pixels, (40, 40, 200), 3.5 * SMOOTH)
 
 
-def _frustum(camera: Camera, floor: float, depth: float = 0.45) -> F64:
+def _frustum(camera: Camera, floor: float) -> F64:
     """Return the centre of a camera, the corners of what it sees at a depth, and the floor below it: (6, 3) m."""
     width, height = camera.size
     corners = np.array([[0, 0, 1], [width, 0, 1], [width, height, 1], [0, height, 1.0]])
     rays = corners @ np.linalg.inv(camera.intrinsics).T @ camera.camera_from_world[:3, :3]
     centre = cameras.centre(camera)
-    return np.vstack([centre, centre + depth * rays, [*centre[:2], floor]])
+    return np.vstack([centre, centre + DEPTH * rays, [*centre[:2], floor]])

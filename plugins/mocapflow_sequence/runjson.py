@@ -19,7 +19,7 @@ from mocapflow_sequence.lost import lost_rows
 FRAME = re.compile(r"^frame (\d+): ?(.*)$")
 
 
-def summary(track: Track, series: AngleSeries, run_folder: RunFolder, warnings: tuple[str, ...] = ()) -> dict[str, Any]:
+def summary(track: Track, series: AngleSeries, run_folder: RunFolder, warnings: tuple[str, ...]) -> dict[str, Any]:
     """Return what run.json says: recipe, seconds per step, and per frame iterations, rest, overlap and mishaps."""
     seconds = track.seconds
     lost, said = lost_rows(track), by_frame(track.notes)

@@ -12,7 +12,7 @@ from mocapflow.data import Matches, Pose
 from mocapflow.geometry.cameras import projection
 from mocapflow.geometry.kinematics import part_of
 from mocapflow.records import F64, I32
-from mocapflow_sequence.pose_fit import Observed, Solution, Spreads, View, descend
+from mocapflow_sequence.pose_fit import Observed, Solution, Spreads, View, descend, projected
 from mocapflow_sequence.proportions import scaled
 
 STEPS = 4  # Gauss-Newton steps between two matchings
@@ -58,9 +58,6 @@ def paired(body: Body, matches: Matches, cameras: Sequence[Camera], independent:
 
 
 def _look(matrices: F64, pixel: F64, onto: F64, point: I32, precision: F64, points: F64) -> Observed:
-    homogeneous = np.einsum("nab,nb->na", matrices[:, :, :3], points[point]) + matrices[:, :, 3]
-    depth = np.maximum(homogeneous[:, 2], 0.1)
-    at = homogeneous[:, :2] / depth[:, None]
-    slope = (matrices[:, :2, :3] - at[..., None] * matrices[:, 2:, :3]) / depth[:, None, None]
+    at, slope, _ = projected(points[point], matrices)
     error = np.einsum("nab,nb->na", onto, at - pixel)
     return Observed(error, np.einsum("nab,nbi->nai", onto, slope), point, precision)

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from mocapflow.assets import Body, GarmentMesh
+from mocapflow.assets import Body
 from mocapflow.components import Stage
 from mocapflow.data import Pose, Start
 from mocapflow.errors import RecordingError
@@ -53,7 +53,7 @@ class StartFromFile(Stage):
             there = ", ".join(sorted(p.name for p in recording.folder.iterdir()))
             hint = f"the recording has: {there}\nwithout a start pose, use the stage start_from_keypoints"
             raise RecordingError("there is no file with the first pose", where=str(path), hint=hint)
-        return Start(pose=read_pose(path, scene.body), parameters=calm(scene.garment))
+        return Start(pose=read_pose(path, scene.body), parameters=scene.calm)
 
 
 def read_pose(path: Path, body: Body) -> Pose:
@@ -72,8 +72,3 @@ def root_at(body: Body, rotation: F64, position: F64) -> F64:
     root = twists.exp(np.append(rotation, np.zeros(3)))
     root[:3, 3] = position - root[:3, :3] @ body.positions[0]
     return root
-
-
-def calm(garment: GarmentMesh | None) -> F64:
-    """Return the parameters (Q,) of a garment without forces: zero, or the nearest to it within bounds."""
-    return np.empty(0) if garment is None else np.clip(0.0, *garment.parameter_bounds.T)

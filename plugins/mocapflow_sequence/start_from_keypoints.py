@@ -13,7 +13,6 @@ from mocapflow_sequence.detections import layout, need_keypoints, person_at, see
 from mocapflow_sequence.keypoint_fit import fit
 from mocapflow_sequence.keypoint_layouts import Layout
 from mocapflow_sequence.landmarks import landmarks
-from mocapflow_sequence.start_from_file import calm
 
 
 class StartFromKeypoints(Stage):
@@ -39,7 +38,7 @@ class StartFromKeypoints(Stage):
             if person is not None:
                 points = seen(person, layout(recording, [index], self.layout), names)
                 _, (pose,) = fit(scene.body, [points], scene.cameras)
-                return Start(pose=pose, parameters=calm(scene.garment))
+                return Start(pose=pose, parameters=scene.calm)
         first, last = recording.indices[0], recording.indices[-1]
         raise RecordingError(
             f"in frames {first} to {last} no two cameras see the same person",

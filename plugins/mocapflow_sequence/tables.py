@@ -10,6 +10,7 @@ import numpy as np
 
 from mocapflow.errors import RecordingError
 from mocapflow.geometry.angles import AngleSeries
+from mocapflow.io.markers import numbers
 from mocapflow.records import F64
 from mocapflow.results import Track
 
@@ -58,17 +59,8 @@ def read_columns(path: Path) -> dict[str, F64]:
     if len(rows) < 2:
         raise RecordingError("the table has no rows", where=str(path))
     header = [name.strip() for name in rows[0]]
-    values = np.array([_numbers(row, len(header), f"{path}:{number}") for number, row in enumerate(rows[1:], 2)])
+    values = np.array([numbers(row, len(header), f"{path}:{number}") for number, row in enumerate(rows[1:], 2)])
     return {name: values[:, column].copy() for column, name in enumerate(header)}
-
-
-def _numbers(row: Sequence[str], width: int, where: str) -> list[float]:
-    if len(row) != width:
-        raise RecordingError(f"a row has {len(row)} cells; the header has {width}", where=where)
-    try:
-        return [float(cell) if cell.strip() else np.nan for cell in row]
-    except ValueError as error:
-        raise RecordingError(f"not a number: {error}", where=where) from None
 
 
 def write_rows(path: Path, rows: Sequence[Mapping[str, float | str]]) -> Path:

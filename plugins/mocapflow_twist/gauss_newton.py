@@ -105,7 +105,7 @@ class Task(NamedTuple):
         """Return the cloth after one damped step, its parameters within their bounds."""
         low, high = self.garment.parameter_bounds.T
         parameters, downhill = cloth.parameters, -equations.gradient
-        free = ~(((parameters <= low) & (downhill < 0)) | ((parameters >= high) & (downhill > 0))) & self._fitted
+        free = ~solve.at_bound(parameters, downhill, low, high) & self._fitted
         part = Equations(equations.hessian[np.ix_(free, free)], equations.gradient[free], equations.energy)
         increment = np.zeros(len(parameters))
         increment[free] = solve.step(part, solve.CLOTH_LEVER / (high - low)[free], damping)
@@ -116,9 +116,7 @@ class Task(NamedTuple):
         return np.array([name not in (THICKNESS, TAKE_UP) for name in self.garment.parameter_names])
 
     def _from_calm(self, cloth: Cloth) -> F64:
-        low, high = self.garment.parameter_bounds.T
-        off: F64 = cloth.parameters - np.clip(0.0, low, high)
-        return off
+        return cloth.parameters - self.model.scene.calm
 
     def _velocity(self, cloth: Cloth) -> F64:
         """Return the velocities (W, 3, Q) of the cloth for unit changes of its parameters."""

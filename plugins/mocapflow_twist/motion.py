@@ -12,6 +12,7 @@ from mocapflow.model import ClothedModel, moved
 from mocapflow.records import F64, Bool
 from mocapflow_twist.normal_equations import Equations
 from mocapflow_twist.problem import Guess
+from mocapflow_twist.solve import at_bound
 
 
 @dataclass
@@ -61,8 +62,7 @@ class ClothMotion:
         low, high = self._bounds.T
         first = 6 + len(guess.pose.angles)
         downhill, parameters = -equations.gradient[first:], guess.cloth.parameters
-        at_bound = ((parameters <= low) & (downhill < 0)) | ((parameters >= high) & (downhill > 0))
-        held = first + np.flatnonzero(at_bound | self._slow)
+        held = first + np.flatnonzero(at_bound(parameters, downhill, low, high) | self._slow)
         hessian, gradient = equations.hessian.copy(), equations.gradient.copy()
         gradient[held] = 0.0
         diagonal = hessian[held, held]

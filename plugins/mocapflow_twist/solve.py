@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mocapflow.geometry import twists
-from mocapflow.records import F64
+from mocapflow.records import F64, Bool
 from mocapflow_twist.normal_equations import Equations
 
 ROOT_LEVER = 0.3  # m a radian of the root moves the surface: makes turning and shifting comparable
@@ -25,6 +25,12 @@ def about_origin(centre: F64, unknowns: int) -> F64:
     matrix = np.eye(unknowns)
     matrix[3:6, :3] = twists.hat(centre)
     return matrix
+
+
+def at_bound(parameters: F64, downhill: F64, low: F64, high: F64) -> Bool:
+    """Return which parameters (Q,) stand at a bound and would leave it downhill."""
+    held: Bool = ((parameters <= low) & (downhill < 0)) | ((parameters >= high) & (downhill > 0))
+    return held
 
 
 def step(equations: Equations, lever: F64, damping: float) -> F64:

@@ -49,7 +49,7 @@ class TwistGaussNewton(PoseSolver):
     cloth_unknowns: bool = False  # also solves for the cloth parameters
     redrape: Literal["every", "once"] = "every"  # drape at each new pose, or once and move the cloth linearly
     cloth_jacobian: Literal["every", "once"] = "once"  # how often the motion of the cloth is measured
-    root_damping_m: PositiveFloat = 0.1  # standard deviation about the prediction
+    root_damping_m: PositiveFloat = 0.1  # standard deviation about the pose that a turn of the loop begins from
     root_damping_deg: PositiveFloat = 11.5  # likewise
     angle_damping_deg: PositiveFloat = 60.0  # likewise, of every joint angle
     cloth_sd: PositiveFloat = 0.06  # standard deviation of cloth parameters about a calm garment, share of their range
@@ -160,8 +160,7 @@ def calmed(guess: Guess, model: ClothedModel) -> Guess:
     """Return a guess whose garment hangs without forces: where its parameters are held, however they came about."""
     if model.scene.garment is None:
         return guess
-    calm = np.clip(0.0, *model.scene.garment.parameter_bounds.T)
-    return Guess(guess.pose, replace(guess.cloth, parameters=calm))
+    return Guess(guess.pose, replace(guess.cloth, parameters=model.scene.calm))
 
 
 def parameter_ranges(model: ClothedModel) -> F64:

@@ -7,7 +7,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 from mocapflow_draping.blowing import blow_batch
-from mocapflow_draping.distance import body_distances
+from mocapflow_draping.distance import body_distance
 from mocapflow_draping.fields import build_fields
 from mocapflow_draping.frames import blown
 from mocapflow_draping.kinematic import Kinematic
@@ -167,7 +167,7 @@ def distances(body, points, poses=None, voxel=VOXEL):
     values, parts = prepared(body, chain, voxel)
     out = np.empty(points.shape[:2])
     for row, cloud in enumerate(points):
-        body_distances(np.ascontiguousarray(cloud), out[row], parts[row], values)
+        out[row] = [body_distance(*point, 0, parts[row], values)[0] for point in cloud]
     return out
 
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 from mocapflow_draping.fixed import Fixed
-from mocapflow_priors.hold import Hold
 from mocapflow_twist.solver import TwistGaussNewton
 
 from mocapflow.components import Matcher, Prior, Segmenter
@@ -114,9 +113,9 @@ def knee_error_deg(
         segmentation = cluttered(segmentation, clutter, seed)
     start = start_near(truth, off_deg, 0.0014 * off_deg, seed)
     state = replace(tiny_state(scene, start), segmentation=segmentation)
-    steady = Steady(surface=0.0005, angle=np.radians(0.1), sigmas=0.0, min_turns=1, turns=1, max_turns=5, halvings=0)
+    steady = Steady(min_turns=1, turns=1, max_turns=5)
     steps = Steps(
-        predictor=Hold(), segmenter=Given(), matchers=matchers, pose_solver=TwistGaussNewton(), cloth_fitter=Fixed(),
+        segmenter=Given(), matchers=matchers, pose_solver=TwistGaussNewton(), cloth_fitter=Fixed(),
         priors=priors, steady=steady,
     )  # fmt: skip
     result = settle(FRAME, state, tiny_past(scene, start), steps, ClothedModel(scene=scene), lambda *_: None)

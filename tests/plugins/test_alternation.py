@@ -5,7 +5,6 @@ import pytest
 from mocapflow_draping.fixed import Fixed
 from mocapflow_levelset.levelset import LevelSet
 from mocapflow_matching.contour_icp import ContourIcp
-from mocapflow_priors.hold import Hold
 from mocapflow_twist.solver import TwistGaussNewton
 
 from mocapflow.data import Past, Turn
@@ -27,12 +26,10 @@ FRAME = pictures.tiny_frame(SCENE, TRUTH)
 def settled():
     """The frame settled from 2 cm and 1 degree aside."""
     steps = Steps(
-        predictor=Hold(), segmenter=LevelSet(), matchers=(ContourIcp(),),
+        segmenter=LevelSet(), matchers=(ContourIcp(),),
         pose_solver=TwistGaussNewton(stop_sigmas=0.1),  # smaller steps are those of matches that change
         cloth_fitter=Fixed(), priors=(),
-        steady=Steady(
-            surface=0.002, angle=float(np.radians(0.3)), sigmas=0.0, min_turns=1, turns=1, max_turns=8, halvings=0
-        ),
+        steady=Steady(surface_mm=2.0, angle_deg=0.3, min_turns=1, turns=1),
     )  # fmt: skip
     cloth = scenes.tiny_cloth(SCENE, START)
     states = []

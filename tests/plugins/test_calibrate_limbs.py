@@ -14,7 +14,7 @@ from mocapflow_matching.contour_icp import ContourIcp
 from mocapflow_sequence.calibrate_limbs import CalibrateLimbs
 from mocapflow_sequence.pose_fit import velocities
 from mocapflow_sequence.proportions import scaled
-from mocapflow_sequence.start_from_file import calm, read_pose
+from mocapflow_sequence.start_from_file import read_pose
 from pydantic import ValidationError
 from results_scene import make_track
 
@@ -51,7 +51,7 @@ def masks_of(body, poses, garment=None):
         def segment(self, frame, state, past, scene, turn):
             model = ClothedModel(scene=Scene(cameras=scene.cameras, body=body, garment=garment), draper=Kinematic())
             pose = poses[frame.index]
-            surface = model.surface(pose, model.drape(pose, calm(garment), past))
+            surface = model.surface(pose, model.drape(pose, model.scene.calm, past))
             distances = [model_distance(surface, camera, 12.0) for camera in scene.cameras]
             return Segmentation(
                 silhouettes=tuple(Silhouette(camera=c, layer="person", distance=d) for c, d in enumerate(distances))
@@ -97,7 +97,7 @@ def test_clothes_are_laid_on_every_pose_that_is_tried(body, poses, tmp_path):
     )  # fmt: skip
     wrong = Scene(cameras=cameras, body=scaled(body, WRONG), garment=garment)
     root, angles = np.stack([p.root for p in start]), np.stack([p.angles for p in start])
-    track = replace(make_track(root, angles), cloth_parameters=np.tile(calm(garment), (3, 1)))
+    track = replace(make_track(root, angles), cloth_parameters=np.tile(wrong.calm, (3, 1)))
     fitted = stage.run(open_recording(folder), wrong, None, track)
     for ends in (("hip_l", "knee_l"), ("knee_r", "ankle_r")):
         assert abs(length(fitted, *ends) - length(body, *ends)) < 0.006  # m: half a pixel, half of what was wrong
