@@ -239,6 +239,7 @@ class FrameResult:
     energy: F64 = array("U", "E", unit="terms of the functional after each of at most U turns; NaN where there is none")
     energy_terms: tuple[str, ...]  # their E names
     notes: tuple[str, ...] = ()  # what a user should know of the frame
+    doubted: bool = False  # the images contradict it, and nothing better was found
     seconds: Mapping[str, float] = field(default_factory=dict)  # CPU time of each step; never part of a result
 
 

@@ -26,9 +26,9 @@ def columns_of(result: FrameResult, cameras: int) -> Columns:
     angles = len(estimate.pose.angles)
     return {
         "frame": (), "time": (), "root": (4, 4), "angles": (angles,), "cloth_parameters": (len(estimate.parameters),),
-        "iterations": (), "steady": (), "oscillating": (), "body_change": (), "cloth_change": (), "angle_change": (),
-        "usable": (cameras,), "overlap": (cameras,), "seconds": (len(result.seconds),), "match_count": (),
-        "energy": result.energy.shape,
+        "iterations": (), "steady": (), "oscillating": (), "doubted": (), "body_change": (), "cloth_change": (),
+        "angle_change": (), "usable": (cameras,), "overlap": (cameras,), "seconds": (len(result.seconds),),
+        "match_count": (), "energy": result.energy.shape,
         "observed": (angles,), "covariance": (6 + angles, 6 + angles),
     }  # fmt: skip
 
@@ -39,8 +39,9 @@ def row_of(columns: Columns, frame: Frame, result: FrameResult, steps: Sequence[
     values: dict[str, Any] = {
         "frame": frame.index, "time": frame.time, "root": estimate.pose.root, "angles": estimate.pose.angles,
         "cloth_parameters": result.state.cloth.parameters, "iterations": result.iterations, "steady": result.steady,
-        "oscillating": result.oscillating, "body_change": result.change.body, "cloth_change": result.change.cloth,
-        "angle_change": result.change.angles, "usable": frame.usable, "overlap": result.overlap,
+        "oscillating": result.oscillating, "doubted": result.doubted, "body_change": result.change.body,
+        "cloth_change": result.change.cloth, "angle_change": result.change.angles, "usable": frame.usable,
+        "overlap": result.overlap,
         "seconds": [result.seconds.get(step, 0.0) for step in steps], "match_count": len(result.state.matches.weight),
         "energy": result.energy, "observed": estimate.observed, "covariance": estimate.covariance[:rank, :rank],
     }  # fmt: skip

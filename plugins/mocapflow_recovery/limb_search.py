@@ -75,10 +75,11 @@ class LimbSearch(Recovery):
         found = self._search(frame, state, result.state, seen, past, model)
         other = settle(found, result.state.cloth.parameters)
         again = surface_of(model, other)
-        if distance(again, seen, self.cap_m) < (1 - self.gain) * distance(surface, seen, self.cap_m):
-            then = stray_of(again, model.scene, seen, self._reach())
-            return noted(other, f"fit doubted, {stray}: found again by search; then {then}")
-        return noted(result, f"fit doubted, {stray}: search found nothing better")
+        if distance(again, seen, self.cap_m) >= (1 - self.gain) * distance(surface, seen, self.cap_m):
+            return noted(result, f"fit doubted, {stray}: search found nothing better", doubted=True)
+        then = stray_of(again, model.scene, seen, self._reach())
+        still = then.doubtful(self.uncovered_cm2, self.floating_cm2)
+        return noted(other, f"fit doubted, {stray}: found again by search; then {then}", doubted=still)
 
     def _search(
         self, frame: Frame, state: FrameState, settled: FrameState, seen: Sequence[View], past: Past,
@@ -110,6 +111,6 @@ def surface_of(model: ClothedModel, result: FrameResult) -> Surface:
     return model.surface(result.state.estimate.pose, result.state.cloth)
 
 
-def noted(result: FrameResult, note: str) -> FrameResult:
-    """Return a result with one more note."""
-    return replace(result, notes=(*result.notes, note))
+def noted(result: FrameResult, note: str, doubted: bool) -> FrameResult:
+    """Return a result with one more note, and whether it is still doubted."""
+    return replace(result, notes=(*result.notes, note), doubted=doubted)

@@ -68,9 +68,11 @@ def against(evaluation: Evaluation) -> list[str]:
 
 
 def mishaps(track: Track, held: Mapping[str, int]) -> list[str]:
-    """Return which frames were lost or did not come to rest, and which angles the priors held in how many frames."""
+    """Return which frames were lost, doubted or not at rest, and which angles the priors held in how many frames."""
     lost, restless = lost_rows(track), ~track.steady
     said = [f"frames lost and bridged: {_spans(track, lost)}"] if lost.any() else []
+    if track.doubted.any():
+        said.append(f"frames that the images contradict: {_spans(track, track.doubted)}")
     if restless.any():
         said.append(f"{restless.sum()} of {len(restless)} frames did not come to rest: {_spans(track, restless)}")
     return said + [f"{title(name)}: held by the priors in {n} frames" for name, n in held.items()]

@@ -32,6 +32,7 @@ def summary(track: Track, series: AngleSeries, run_folder: RunFolder, warnings: 
             "last": int(track.frame[-1]) if len(track.frame) else None,
             "not_at_rest": track.frame[~track.steady],
             "lost": track.frame[lost],
+            "doubted": track.frame[track.doubted],
             "bridged_by": "the neighbouring frames, in `smooth`" if lost.any() and track.raw_root is not None else None,
             "held_by_priors": held_by_priors(series),
         },
@@ -76,6 +77,7 @@ def _frame(track: Track, row: int, lost: bool, said: Mapping[int, list[str]]) ->
         "overlap": [round(float(v), 4) for v in track.overlap[row]],
         "cpu_seconds": round(float(np.nansum(track.seconds[row])), 4),
         **({"lost": True} if lost else {}),
+        **({"doubted": True} if track.doubted[row] else {}),
         **({"unusable_views": np.flatnonzero(~track.usable[row])} if not track.usable[row].all() else {}),
         **({"notes": said[index]} if index in said else {}),
     }

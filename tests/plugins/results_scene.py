@@ -118,7 +118,7 @@ def make_track(
         frame=np.arange(count, dtype=np.int32), time=np.arange(count) / fps, root=root, angles=angles,
         covariance=np.tile(sd**2 * np.eye(size), (count, 1, 1)), observed=np.ones(angles.shape),
         cloth=np.zeros((count, cloth, 3)), cloth_parameters=np.zeros((count, 0)),
-        iterations=np.full(count, 3, np.int16), steady=np.ones(count, bool),
+        iterations=np.full(count, 3, np.int16), steady=np.ones(count, bool), doubted=np.zeros(count, bool),
         usable=np.ones((count, views), bool), overlap=np.full((count, views), 0.9),
         seconds=np.full((count, 2), 0.01), step_names=("segment", "solve"),
         energy=np.tile([[1.0, 2.0], [0.5, 2.0], [np.nan, np.nan]], (count, 1, 1)),

@@ -9,11 +9,13 @@ import pytest
 from mocapflow_recovery.certain import shrunk, small_room, views
 from mocapflow_recovery.coarse import coarse_body
 from mocapflow_recovery.disagreement import distance, floating_area, uncovered_area
+from mocapflow_recovery.limb_search import LimbSearch
 from mocapflow_recovery.sampling import Plan, Spread, parts, put_back, samples, search, seen_samples, without_idle_parts
 
 from mocapflow.data import NO_CLOTH, Pose
 from mocapflow.geometry.cameras import project
 from mocapflow.testing import pictures, scenes, template_body
+from mocapflow.testing.recovery import settled
 
 SCENE = scenes.tiny_scene()
 POSE = scenes.tiny_pose(SCENE, 3, 0.1)
@@ -182,6 +184,16 @@ def test_a_foot_does_not_turn_because_its_leg_was_found() -> None:
     fitted = Pose(root=POSE.root, angles=np.where(np.isin(np.arange(len(body.twists)), foot), -0.5, 0.0))
     found = put_back(cost, Pose(root=POSE.root, angles=believed.angles + 0.1), [fitted, believed], body, 0.03)
     assert found.angles[hip].all() and not np.delete(found.angles, hip).any()
+
+
+@pytest.mark.parametrize(("end", "doubted"), [(0.0, False), (0.9, True)], ids=["found", "still astray"])
+def test_a_fit_that_still_strays_is_doubted(end, doubted) -> None:
+    def settle(pose, parameters):
+        return settled(pictures.tiny_state(SCENE, astray(end), POSE))
+
+    lost = pictures.tiny_state(SCENE, astray(0.9), POSE)
+    past, model = scenes.tiny_past(SCENE, POSE), scenes.tiny_model(SCENE)
+    assert LimbSearch().recover(FRAME, lost, settled(lost), past, model, settle).doubted == doubted
 
 
 def test_seen_samples_bend_what_was_seen_and_nothing_else() -> None:

@@ -134,8 +134,9 @@ def test_run_json_says_how_it_was_made_and_how_it_went(scene: Scene, recording: 
     overlap[3] = np.nan
     note = "frame 3: seen by too few cameras; the prediction is kept"
     broken = replace(
-        track, iterations=turns, steady=steady, usable=usable, overlap=overlap, notes=("frame 3: cam02 black", note)
-    )
+        track, iterations=turns, steady=steady, usable=usable, overlap=overlap, notes=("frame 3: cam02 black", note),
+        doubted=np.arange(6) == 4,
+    )  # fmt: skip
     observed = track.observed.copy()
     observed[4:, scene.body.screw_names.index("knee_l.x")] = 0.2
     exported(Smooth().run(track=replace(broken, observed=observed), scene=scene), scene, recording, tmp_path)
@@ -144,6 +145,8 @@ def test_run_json_says_how_it_was_made_and_how_it_went(scene: Scene, recording: 
     assert got["frames"]["lost"] == [3]
     assert "neighbouring" in got["frames"]["bridged_by"]
     assert got["frames"]["not_at_rest"] == [2, 3]
+    assert got["frames"]["doubted"] == [4]
+    assert [frame.get("doubted", False) for frame in got["per_frame"]] == [False] * 4 + [True, False]
     assert got["frames"]["held_by_priors"] == {"knee_flexion_l": 2}
     assert got["cpu_seconds"]["per_step"] == pytest.approx({"segment": 0.06, "solve": 0.06})
     assert [f["iterations"] for f in got["per_frame"]] == [3, 3, 3, 0, 3, 3]
@@ -165,5 +168,5 @@ def test_legs_alone_export(recording: Recording, tmp_path: Path) -> None:
 
 def test_table_with_a_missing_cell_says_where(tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text("frame,knee_flexion_l\n0,1.5\n1\n")
-    with pytest.raises(Exception, match=r"t\.csv:3  a row has 1 cells"):
+    with pytest.raises(Exception, match=r"t\.csv:3  1 columns; expected 2"):
         tables.read_columns(tmp_path / "t.csv")

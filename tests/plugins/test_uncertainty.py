@@ -8,7 +8,7 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 from mocapflow_sequence.ours import of_track
-from mocapflow_sequence.uncertainty import OUTLINE_MM, excess, measured, px_per_mm
+from mocapflow_sequence.uncertainty import DOUBTED, OUTLINE_MM, excess, measured, px_per_mm
 from results_scene import demo_scene, stepping
 
 from mocapflow.geometry import angles
@@ -41,6 +41,14 @@ def test_all_angles_of_a_frame_alike_and_the_track_keeps_the_covariance_of_the_f
     np.testing.assert_allclose(stated.sd, scale[:, None] * formal.sd)
     np.testing.assert_array_equal(stated.value, formal.value)
     np.testing.assert_array_equal(stated.observed, formal.observed)
+
+
+def test_what_images_contradict_is_less_sure():
+    scene = demo_scene()
+    track = stepping(scene.body, 5)
+    stated = measured(replace(track, doubted=np.array([False, False, True, False, False])), scene)
+    ratio = stated.sd / measured(track, scene).sd
+    np.testing.assert_allclose(ratio, np.tile([[1], [1], [DOUBTED], [1], [1]], ratio.shape[1]))
 
 
 def test_larger_images_tell_more_of_pixels_but_not_of_millimetres():
