@@ -8,7 +8,7 @@ import pytest
 from mocapflow_sequence import layout, tables
 from typer.testing import CliRunner
 
-from mocapflow import cli, runner
+from mocapflow import cli, registry, runner
 from mocapflow.commands import results
 from mocapflow.commands.again import FILE, Invocation, remember
 from mocapflow.commands.progress import reporter
@@ -242,6 +242,16 @@ def test_plugins(call):
     result = call("plugins")
     assert "priors  (mocapflow 0.1.0)\n  predictor:    constant_velocity, hold" in result.stdout
     assert result.stderr == ""
+
+
+@pytest.mark.parametrize("command", ["plugins", "settings"])
+def test_a_plugin_that_does_not_load_is_told(call, tmp_path, monkeypatch, command):
+    broken = registry.load_registry([tmp_path / "nowhere.py"])
+    monkeypatch.setattr(registry, "load_registry", lambda: broken)
+    result = call(command)
+    assert result.exit_code == 0
+    assert result.stderr.startswith("note: ")
+    assert "nowhere.py" in result.stderr
 
 
 def test_settings(call):

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mocapflow.errors import MocapflowError, RecordingError
+
+if TYPE_CHECKING:
+    from mocapflow.registry import Registry
 
 
 def plugins() -> None:
@@ -22,8 +25,7 @@ def plugins() -> None:
             own = sorted(name for name, found in provided.items() if any(registry.origin(c) == origin for c in found))
             if own:
                 typer.echo(f"  {role + ':':<13} {', '.join(own)}")
-    for failure in registry.failures:
-        typer.echo(f"note: {failure}", err=True)
+    _tell_failures(registry)
 
 
 def show(
@@ -60,7 +62,9 @@ def settings(
     from mocapflow.manual import manual
     from mocapflow.registry import load_registry
 
-    typer.echo(manual(load_registry(), package), nl=False)
+    registry = load_registry()
+    typer.echo(manual(registry, package), nl=False)
+    _tell_failures(registry)
 
 
 def equations(
@@ -95,3 +99,9 @@ def doctor(
     if any(finding.severity == "error" for finding in findings):
         raise typer.Exit(RecordingError.exit_status)
     typer.echo(f"{recording}: {'can be used' if findings else 'nothing to mend'}")
+
+
+def _tell_failures(registry: Registry) -> None:
+    """Say which plugins could not be loaded: what they provide is missing above."""
+    for failure in registry.failures:
+        typer.echo(f"note: {failure}", err=True)
