@@ -89,10 +89,12 @@ def _cloth_surface(vertices: F64, faces: I32, edges: I32, body: Surface) -> Surf
 
 
 def _remarks(frame: Frame, track: Track, row: int, view: int) -> list[str]:
-    """Return what a viewer should know of a view: that it has no image, or that the frame was lost."""
+    """Return what a viewer should know of a view: no image, a lost frame, a fit that images contradict."""
     said = []
     if not frame.usable[view]:
         said.append(f"no image: {frame.reasons[view]}" if frame.reasons else "no image")
     if is_lost(track, row):
         said.append("frame lost, bridged")
+    if track.doubted[row]:
+        said.append("doubted: the images contradict this pose")
     return said

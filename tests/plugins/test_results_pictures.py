@@ -78,6 +78,17 @@ def test_overlay_of_a_lost_view_says_so(scene: Scene, track: Track, recording: R
     assert np.abs(shown[0].astype(int) - shown[1]).max() > 100
 
 
+def test_overlay_of_a_doubted_frame_says_so(scene: Scene, track: Track, recording: Recording) -> None:
+    frame = next(recording.frames())
+    plain, said = (
+        Painter(scene).paint(frame, replace(track, doubted=np.full(len(track.frame), doubted)), 0, 1)
+        for doubted in (False, True)
+    )
+    differs = np.flatnonzero(np.any(plain != said, axis=(1, 2)))
+    assert 0 < len(differs) < 80  # a line of text at the top
+    assert differs.max() < 160
+
+
 def test_virtual_room_moves_with_the_person(scene: Scene, track: Track, tmp_path: Path) -> None:
     run_folder = RunFolder(path=tmp_path, recipe={})
     (path,) = Virtual(width_px=320, height_px=240).run(track=track, scene=scene, run_folder=run_folder).paths
