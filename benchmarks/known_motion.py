@@ -65,7 +65,8 @@ TAKES = {
     "squat_A_shorts": Take("A", "shorts", "squat", 8, GREEN),
     "dance_B_skirt": Take("B", "skirt", "dance", 9, PURPLE),
     "kneeup_A_skirt": Take("A", "skirt", "kneeup_A", 11, GREEN, start=5),
-    "kick_B_skirt": Take("B", "skirt", "kick_B", 12, PURPLE, start=120, frames=40),  # a foot leaves them
+    # a foot leaves the pictures
+    "kick_B_skirt": Take("B", "skirt", "kick_B", 12, PURPLE, start=120, frames=40),
     "walk_B_shorts": Take("B", "shorts", "walk_B", 13, PURPLE, start=200, frames=40),
     "legcross_B_skirt": Take("B", "skirt", "legcross_B", 14, GREEN, start=60, frames=40),
 }

@@ -214,6 +214,15 @@ def test_a_frame_that_shows_nobody_says_so(tmp_path, monkeypatch):
     assert the_track(tmp_path).notes == ("frame 2: no view shows the person; the prediction is kept",)
 
 
+def test_a_doubted_frame_is_kept_as_such(tmp_path, monkeypatch):
+    def doubting(frame, *rest):
+        return replace(settle(frame, *rest), doubted=frame.index == 2)
+
+    monkeypatch.setattr("mocapflow.track.settle", doubting)
+    run_tiny(write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=SHORT), tmp_path, frames=4)
+    assert the_track(tmp_path).doubted.tolist() == [False, False, True, False]
+
+
 def test_without_a_garment_there_is_no_cloth(tmp_path):
     stages = STAGES | {"track": STAGES["track"] | {"draper": None, "cloth_fitter": None}}
     path = write_pipeline(tmp_path, write_recording(tmp_path / "clip"), garment=None, stages=stages)

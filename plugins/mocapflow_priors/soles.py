@@ -37,7 +37,8 @@ def lowest_points(body: Body, pose: Pose, parts: tuple[str, ...]) -> tuple[F64, 
 @once
 def _parts(body: Body, names: tuple[str, ...]) -> list[Body]:
     """Return bodies of the skin that each of the joints carries most of."""
-    found = [np.flatnonzero(body.main_joint == body.joint(name)) for name in names if name in body.joint_names]
+    carrier = body.main_joint
+    found = [np.flatnonzero(carrier == body.joint(name)) for name in names if name in body.joint_names]
     return [kinematics.part_of(body, vertices) for vertices in found if len(vertices)]
 
 

@@ -24,8 +24,8 @@ def measured(track: Track, scene: Scene) -> angles.AngleSeries:
 
     The covariance of a track is that of the normal equations: what noise of the residuals' size does that hangs
     together over 15 px of a contour. `smooth` weighs by it as it is: what neighbouring frames have in common does not
-    average out, so it is no reason to hold a frame less. Nor does it weigh doubted frames less: they come in rows,
-    in the midst of fast motion, which it would take away.
+    average out, so it is no reason to hold a frame less. Nor does it weigh doubted frames less: in the one take
+    that has many they come in a row, in the midst of a kick, which it would take away.
     """
     series = angles.measure(scene.body, track.root, track.angles, track.covariance, track.observed)
     pelvis = root_position(scene.body, track.root)
