@@ -36,6 +36,8 @@ def glance(track: Track, evaluation: Evaluation | None) -> list[str]:
     if len(overlap):
         said.append(f"overlap of model and image: {np.median(overlap):.3f} in the median of all frames and views")
     said.append(f"{lost} of {len(track.frame)} frames lost and bridged" if lost else "no frame lost")
+    if track.doubted.any():
+        said.append(f"{track.doubted.sum()} of {len(track.frame)} frames that the images contradict: don't trust these")
     if len(track.seconds):
         said.append(f"{np.median(np.nansum(track.seconds, axis=1)):.2f} s of CPU a frame")
     return said

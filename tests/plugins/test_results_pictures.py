@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 import pytest
-from mocapflow_sequence import drawing, layout, raster
+from mocapflow_sequence import drawing, layout, raster, report_rows
 from mocapflow_sequence.evaluate import Evaluate
 from mocapflow_sequence.overlay import Overlay, Painter
 from mocapflow_sequence.report import Report
@@ -76,6 +76,14 @@ def test_overlay_of_a_lost_view_says_so(scene: Scene, track: Track, recording: R
         for source in (recording, fake)
     ]
     assert np.abs(shown[0].astype(int) - shown[1]).max() > 100
+
+
+def test_the_report_says_at_once_which_frames_the_images_contradict(track: Track) -> None:
+    doubted = replace(track, doubted=np.arange(len(track.frame)) == 1)
+    said = "1 of 4 frames that the images contradict: don't trust these"
+    assert (said in report_rows.glance(track, None), said in report_rows.glance(doubted, None)) == (False, True)
+    assert report_rows.mishaps(track, {}) == []
+    assert report_rows.mishaps(doubted, {}) == ["frames that the images contradict: 1"]
 
 
 def test_overlay_of_a_doubted_frame_says_so(scene: Scene, track: Track, recording: Recording) -> None:
