@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +22,17 @@ def read_json(path: Path, hint: str = "") -> Any:
         hint: how to go on where it can't be read.
 
     Raises:
-        RecordingError: it can't be opened, or is not JSON; with the place.
+        RecordingError: it can't be opened, is not JSON, or says something twice; with the place.
     """
+
+    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        for key, count in Counter(key for key, _ in pairs).items():
+            if count > 1:  # json itself would take the last one in silence
+                raise RecordingError(f"'{key}' is there more than once", where=place(path, key), hint=hint)
+        return dict(pairs)
+
     try:
-        return json.loads(_text(path, hint))
+        return json.loads(_text(path, hint), object_pairs_hook=once)
     except json.JSONDecodeError as error:
         where = f"{path}:{error.lineno}:{error.colno}"
         raise RecordingError(f"not JSON: {error.msg}", where=where, hint=hint) from None

@@ -12,6 +12,7 @@ from mocapflow.io.typed import place, read_json, read_toml
         (read_json, b'{"a": 1,\n "b": }', "file:2:7  not JSON: Expecting value\n       do this"),
         (read_toml, b"a = 1\nb = [1, 2\n", "file  not TOML: Unclosed array\n       do this"),
         (read_toml, b"a = 1\na = 2\n", "file:2:6  not TOML: Cannot overwrite a value\n       do this"),
+        (read_json, b'{"a": 1,\n "a": 2}', "file:1:3  'a' is there more than once\n       do this"),
         (read_json, b"\xff\xfe", "file  is not UTF-8 text\n       do this"),
         (read_toml, b"\xff\xfe", "file  is not UTF-8 text\n       do this"),
     ],
