@@ -52,7 +52,7 @@ def place(path: Path, name: str) -> str:
     """Return where a name is first written in a file, as file:line:column; the file alone where it is not."""
     word = re.compile(rf"(?<!\w){re.escape(name)}(?!\w)")
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError):
         return str(path)
     found = ((number, match) for number, line in enumerate(lines, 1) if (match := word.search(line)))
@@ -61,7 +61,7 @@ def place(path: Path, name: str) -> str:
 
 def _text(path: Path, hint: str) -> str:
     try:
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")  # some editors put a byte order mark before the text
     except OSError as error:
         raise RecordingError(f"can't be read: {error.strerror}", where=str(path), hint=hint) from None
     except UnicodeDecodeError:

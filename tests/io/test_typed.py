@@ -25,6 +25,12 @@ def test_the_place_and_what_to_do(tmp_path, monkeypatch, read, text, message):
     assert str(found.value) == message
 
 
+@pytest.mark.parametrize(("read", "text"), [(read_json, b'{"a": 1}'), (read_toml, b"a = 1\n")])
+def test_a_byte_order_mark_is_passed_over(tmp_path, read, text):
+    (tmp_path / "file").write_bytes(b"\xef\xbb\xbf" + text)
+    assert read(tmp_path / "file") == {"a": 1}
+
+
 def test_a_file_that_is_not_there(tmp_path):
     with pytest.raises(RecordingError, match="can't be read: No such file"):
         read_json(tmp_path / "file")
