@@ -15,7 +15,8 @@ from mocapflow.geometry import twists
 from mocapflow.io.calibrated import bad, make_camera
 from mocapflow.io.typed import read_toml
 
-FARTHEST = 100.0  # m; a camera further from the origin is one calibrated in millimetres
+FARTHEST = 100.0  # m; a camera further from the origin is one calibrated in centimetres
+MILLIMETRES = 1000.0  # m; beyond, in millimetres
 YAML = (".yml", ".yaml")
 FIELDS = ("size", "matrix", "distortions", "rotation", "translation")
 
@@ -30,7 +31,7 @@ def read_cameras(path: Path) -> tuple[Camera, ...]:
         The cameras with their lens distortion. A size of 0 x 0 means that the file does not say.
 
     Raises:
-        RecordingError: the file is missing, incomplete, not a calibration, or in millimetres.
+        RecordingError: the file is missing, incomplete, not a calibration, or not in metres.
     """
     from mocapflow.io import opencv, qualisys
 
@@ -123,11 +124,12 @@ def _check(camera: Camera, path: Path) -> None:
         )
     distance = float(np.linalg.norm(camera.camera_from_world[:3, 3]))
     if distance > FARTHEST:
+        unit, factor = ("mm", 1000) if distance > MILLIMETRES else ("cm", 100)
         raise bad(
             camera.name,
             path,
-            f"stands {distance:.0f} m from the origin: the calibration is in mm",
-            "lengths are in metres: divide every translation by 1000",
+            f"stands {distance:.0f} m from the origin: the calibration is in {unit}",
+            f"lengths are in metres: divide every translation by {factor}",
         )
 
 

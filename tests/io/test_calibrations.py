@@ -144,13 +144,14 @@ def test_rotation_in_degrees(tmp_path):
         read_cameras(path)
 
 
-def test_calibration_in_mm(tmp_path):
-    cameras = [replace(c, camera_from_world=c.camera_from_world * [[1, 1, 1, 1000]]) for c in ring()]
+@pytest.mark.parametrize(("unit", "factor", "away"), [("mm", 1000, 4272), ("cm", 100, 427)])
+def test_calibration_in_other_units(tmp_path, unit, factor, away):
+    cameras = [replace(c, camera_from_world=c.camera_from_world * [[1, 1, 1, factor]]) for c in ring()]
     path = tmp_path / "cameras.toml"
     write_cameras(path, cameras)
     message = (
-        r"cameras\.toml:1:3  camera 'cam01' stands 4272 m from the origin: the calibration is in mm\n"
-        r"       lengths are in metres: divide every translation by 1000"
+        rf"cameras\.toml:1:3  camera 'cam01' stands {away} m from the origin: the calibration is in {unit}\n"
+        rf"       lengths are in metres: divide every translation by {factor}$"
     )
     with pytest.raises(RecordingError, match=message):
         read_cameras(path)
