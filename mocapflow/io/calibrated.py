@@ -40,13 +40,7 @@ def make_camera(
             hint = "rotation is a Rodrigues vector in radians, camera from world"
             raise bad(name, where, f"turns by {turn:.1f} rad, more than once around: it looks like degrees", hint)
         motion[:3, :3] = twists.exp(np.concatenate([vector, np.zeros(3)]))[:3, :3]
-    coefficients = numbers(distortion, (np.size(distortion),), "distortions", name, where)
-    if len(coefficients) > 5:
-        if coefficients[5:].any():
-            raise bad(
-                name, where, f"has {len(coefficients)} distortion coefficients", "at most 5 are known: k1 k2 p1 p2 k3"
-            )
-        coefficients = coefficients[:5]
+    coefficients = _coefficients(distortion, fisheye, name, where)
     return Camera(
         name=name,
         size=numbers(size, (2,), "size", name, where).astype(np.int32),
@@ -55,6 +49,17 @@ def make_camera(
         camera_from_world=motion,
         fisheye=fisheye,
     )
+
+
+def _coefficients(distortion: Any, fisheye: bool, name: str, where: Path) -> F64:
+    """Return at most 5 coefficients of a lens, without the zeros behind those that are known."""
+    found = numbers(distortion, (np.size(distortion),), "distortions", name, where)
+    known = 4 if fisheye else 5
+    # three may be k1 k2 k3 or k1 k2 p1: OpenCV has no such list
+    if found[known:].any() or (len(found) == 3 and found[2]):
+        hint = "a fisheye has 4: k1 k2 k3 k4" if fisheye else "write 2, 4 or 5 of them, in this order: k1 k2 p1 p2 k3"
+        raise bad(name, where, f"has {len(found)} distortion coefficients", hint)
+    return found[:known]
 
 
 def numbers(value: Any, shape: tuple[int, ...], field: str, name: str, where: Path) -> F64:

@@ -174,11 +174,20 @@ def test_nan(tmp_path):
         ("fisheye = false", "fisheye = 1", "has fisheye = 1\n"),
         ("rotation = [", "rotation = [[2, 0, 0], [0, 1, 0], [0, 0, 1]] # [", "has a matrix that is not a rotation"),
         ("distortions = [0.0, 0.0, 0.0, 0.0]", "distortions = [0, 0, 0, 0, 0, 0.1]", "has 6 distortion coefficients"),
+        ("distortions = [0.0, 0.0, 0.0, 0.0]", "distortions = [0.1, 0, 0.1]", "has 3 distortion .*\n.* k1 k2 p1 p2 k3"),
     ],
 )
 def test_bad_numbers(tmp_path, old, new, message):
     with pytest.raises(RecordingError, match=f"camera 'cam01' {message}"):
         read_cameras(write_changed(tmp_path / "cameras.toml", old, new))
+
+
+def test_a_fisheye_with_the_coefficients_of_another_lens(tmp_path):
+    path = tmp_path / "cameras.toml"
+    write_cameras(path, [replace(c, fisheye=True) for c in ring()])
+    path.write_text(path.read_text().replace("[0.0, 0.0, 0.0, 0.0]", "[0.1, 0, 0, 0, 0.1]", 1))
+    with pytest.raises(RecordingError, match="'cam01' has 5 distortion coefficients\n       a fisheye has 4"):
+        read_cameras(path)
 
 
 def test_trailing_zero_coefficients_are_left_out(tmp_path):
