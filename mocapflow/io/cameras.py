@@ -13,7 +13,7 @@ from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import twists
 from mocapflow.io.calibrated import bad, make_camera
-from mocapflow.io.typed import read_toml
+from mocapflow.io.typed import place, read_toml
 
 FARTHEST = 100.0  # m; a camera further from the origin is one calibrated in centimetres
 MILLIMETRES = 1000.0  # m; beyond, in millimetres
@@ -31,7 +31,8 @@ def read_cameras(path: Path) -> tuple[Camera, ...]:
         The cameras with their lens distortion. A size of 0 x 0 means that the file does not say.
 
     Raises:
-        RecordingError: the file is missing, incomplete, not a calibration, or not in metres.
+        RecordingError: the file is missing, incomplete, not a calibration, not in metres, or has its
+            frame rate where nobody looks for it.
     """
     from mocapflow.io import opencv, qualisys
 
@@ -92,7 +93,11 @@ def metadata(path: Path) -> Mapping[str, Any]:
 
 
 def _from_toml(path: Path) -> tuple[Camera, ...]:
-    tables = {key: table for key, table in read_toml(path).items() if isinstance(table, dict) and key != "metadata"}
+    content = read_toml(path)
+    tables = {key: table for key, table in content.items() if isinstance(table, dict) and key != "metadata"}
+    if any("frame_rate" in table for table in (content, *tables.values())):
+        hint = "in TOML what follows a [table] belongs to it: write it right below a line [metadata]"
+        raise RecordingError("frame_rate is not under [metadata]", where=place(path, "frame_rate"), hint=hint)
     return tuple(_from_table(key, table, path) for key, table in tables.items())
 
 

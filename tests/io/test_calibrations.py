@@ -52,6 +52,15 @@ def test_any_name_there_and_back(tmp_path, name):
     assert_same(read_cameras(tmp_path), cameras)
 
 
+@pytest.mark.parametrize("form", ["frame_rate = 100\n{}", "{}frame_rate = 100\n"])
+def test_a_frame_rate_in_the_wrong_place(tmp_path, form):
+    path = tmp_path / "cameras.toml"
+    write_cameras(path, ring())
+    path.write_text(form.format(path.read_text()))
+    with pytest.raises(RecordingError, match=r"toml:\d+:1  frame_rate is not under \[metadata\]\n"):
+        read_cameras(path)
+
+
 def test_anipose_names_and_metadata(tmp_path):
     path = tmp_path / "calibration.toml"
     path.write_text(
