@@ -10,13 +10,16 @@ from zipfile import BadZipFile
 import numpy as np
 
 from mocapflow.errors import RecordingError, alternatives
-from mocapflow.geometry.skeleton import Skeleton
+from mocapflow.geometry.skeleton import Skeleton, body_directions
 from mocapflow.io.typed import place, read_json
 from mocapflow.records import F64
 
 FORM = 'expected {"joints": [{"name": "pelvis", "parent": null, "position": [x, y, z] in m}, …]}, parents first'
 WEIGHTS = "expected arrays `weights` (V, J) and, if need be, `names` (J); without the file weights are computed"
 TALLEST, SMALLEST = 3.0, 0.3  # m, extents of a plausible body
+SHORTEST = 0.01  # m, a bone between joints whose angle is measured, and the way from one hip to the other
+LIMBS = ("knee", "ankle", "elbow", "wrist")  # joints that end such a bone
+PAIRS = (("hip_l", "hip_r"), ("shoulder_l", "shoulder_r"))  # that tell left from right
 MARGIN = 0.1  # m that a joint may lie outside the box about the mesh
 
 
@@ -24,7 +27,8 @@ def read_skeleton(path: Path) -> Skeleton:
     """Read a skeleton.
 
     Raises:
-        RecordingError: the file is missing, malformed, not parents first, has two roots or numbers that are not finite.
+        RecordingError: the file is missing, malformed, not parents first, has two roots or numbers that are not finite,
+            two joints of a limb are in one place, or left and right are exchanged.
     """
     if not path.is_file():
         raise RecordingError(
@@ -33,9 +37,11 @@ def read_skeleton(path: Path) -> Skeleton:
         )  # fmt: skip
     content = read_json(path, FORM)
     try:
-        return _skeleton(content, path)
+        skeleton = _skeleton(content, path)
     except (ValueError, TypeError, KeyError) as error:
         raise RecordingError(f"this is not a skeleton: {error!r}", where=str(path), hint=FORM) from error
+    _check_limbs(skeleton, path)
+    return skeleton
 
 
 def read_weights(path: Path, skeleton: Skeleton, vertices: int) -> F64:
@@ -93,6 +99,22 @@ def check_size(vertices: F64, skeleton: Skeleton, where: str) -> None:
         hint = "both are expected in metres and in the same rest pose, z up"
         what = f"{outside.sum()} of {len(outside)} joints lie more than 10 cm outside the mesh"
         raise RecordingError(f"{what}, first '{skeleton.names[int(outside.argmax())]}'", where=where, hint=hint)
+
+
+def _check_limbs(skeleton: Skeleton, path: Path) -> None:
+    """Check that limbs have a length, that left is apart from right, and that toes point the way the body looks."""
+    at = dict(zip(skeleton.names, skeleton.positions, strict=True))
+    bones = [(name, skeleton.names[parent]) for name, parent in zip(skeleton.names, skeleton.parents, strict=True)
+             if parent >= 0 and name.startswith(LIMBS)]  # fmt: skip
+    for name, other in [*bones, *(pair for pair in PAIRS if set(pair) <= at.keys())]:
+        apart = (at[name] - at[other])[: 2 if (name, other) in PAIRS else 3]  # left and right: as seen from above
+        if np.linalg.norm(apart) < SHORTEST:
+            what, hint = f"joints '{name}' and '{other}' are in one place", "no angle can be measured there"
+            raise RecordingError(what, where=place(path, name), hint=hint)
+    feet = [at[f"toe_{side}"] - at[f"ankle_{side}"] for side in "lr" if {f"toe_{side}", f"ankle_{side}"} <= at.keys()]
+    if feet and np.mean(feet, axis=0) @ body_directions(skeleton)[0] < 0:
+        hint = "hip_l is the person's own left hip: exchange _l and _r in all names; mind weights.npz and init.json"
+        raise RecordingError("the toes point backwards: left and right are exchanged", where=str(path), hint=hint)
 
 
 def _skeleton(content: Mapping[str, Any], path: Path) -> Skeleton:

@@ -167,6 +167,14 @@ def edit(path, change):
     path.write_text(json.dumps(content))
 
 
+def exchange_sides(joints):
+    other = {"_l": "_r", "_r": "_l"}
+    for joint in joints:
+        for key in ("name", "parent"):
+            end = (joint[key] or "")[-2:]
+            joint[key] = joint[key] if end not in other else joint[key][:-2] + other[end]
+
+
 def test_mesh_without_skeleton(recording):
     (recording / "subject" / "skeleton.json").unlink()
     with pytest.raises(RecordingError, match="skeleton.json  there is no skeleton for the mesh\n.*body: template"):
@@ -181,6 +189,15 @@ def test_mesh_without_skeleton(recording):
         (lambda joints: joints[3].update(parent=None), "one joint must have no parent"),
         (lambda joints: joints[3].update(position=[0, float("nan"), 0]), "positions are not all numbers"),
         (lambda joints: joints[3].pop("position"), "this is not a skeleton"),
+        (
+            lambda joints: joints[3].update(position=joints[2]["position"]),
+            r"json:\d+:\d+  joints 'ankle_l' and 'knee_l' are in one place",
+        ),
+        (
+            lambda joints: joints[1].update(position=[-0.103175, 0.00503, 0.95]),
+            "joints 'hip_l' and 'hip_r' are in one place",
+        ),
+        (exchange_sides, "the toes point backwards: left and right are exchanged"),
         (
             lambda joints: joints[3].update(position=[0, 0, 5]),
             "1 of 19 joints lie .* outside the mesh, first 'ankle_l'",
