@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -56,15 +57,17 @@ def read_weights(path: Path, skeleton: Skeleton, vertices: int) -> F64:
             names = [str(name) for name in content["names"]] if "names" in content else list(skeleton.names)
     except KeyError:
         raise RecordingError("there are no skin weights in it", where=str(path), hint=WEIGHTS) from None
-    except (OSError, ValueError, EOFError, BadZipFile):  # what numpy says of it is about pickles
-        raise RecordingError("this is no .npz file", where=str(path), hint=WEIGHTS) from None
+    except (OSError, ValueError, TypeError, EOFError, BadZipFile):  # what numpy says of it is about pickles
+        raise RecordingError("this is no .npz file of numbers and names", where=str(path), hint=WEIGHTS) from None
     if weights.shape != (vertices, len(names)):
         expected = f"({vertices} vertices, {len(names)} joints)"
         raise RecordingError(f"the weights have the shape {weights.shape}; expected {expected}", where=str(path))
     if not np.isfinite(weights).all() or (weights < 0).any() or (weights.sum(axis=1) == 0).any():
         what = "skin weights have to be numbers of at least 0, one of each vertex above"
         raise RecordingError(what, where=str(path), hint=WEIGHTS)
-    for name in names:
+    for name, count in Counter(names).items():
+        if count > 1:
+            raise RecordingError(f"weights for '{name}' are there more than once", where=str(path), hint=WEIGHTS)
         if name not in skeleton.names:
             what = f"weights for '{name}', which is no joint of the skeleton"
             raise RecordingError(what, where=str(path), hint=alternatives(name, skeleton.names))

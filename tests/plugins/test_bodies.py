@@ -223,6 +223,26 @@ def test_weights_of_another_mesh(recording):
         Scanned().load(recording)
 
 
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [
+        (["pelvis", "hip_l", "hip_l"], "weights for 'hip_l' are there more than once"),
+        ("pelvis", "this is no .npz file of numbers and names"),
+    ],
+)
+def test_names_of_weights_that_name_no_columns(recording, names, message):
+    np.savez(recording / "subject" / "weights.npz", weights=np.ones((13348, 3)), names=np.array(names))
+    with pytest.raises(RecordingError, match=rf"weights\.npz  {message}\n"):
+        Scanned().load(recording)
+
+
+def test_weights_in_a_npy_by_another_name(recording):
+    with (recording / "subject" / "weights.npz").open("wb") as file:
+        np.save(file, np.ones((13348, 19)))
+    with pytest.raises(RecordingError, match=r"weights\.npz  this is no .npz file of numbers and names\n"):
+        Scanned().load(recording)
+
+
 def test_missing_mesh(tmp_path):
     with pytest.raises(RecordingError, match="body.obj"):
         Scanned().load(tmp_path)
