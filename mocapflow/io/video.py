@@ -22,6 +22,7 @@ from mocapflow.records import F64, I32, U8, array, record
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 VIDEOS = (".mp4", ".avi", ".mov", ".mkv", ".m4v", ".webm", ".mpg")
 NAMED = 5  # frames that a message lists
+SPARSE = 1000  # frames for each image of a folder, above which the numbers are no frames
 
 
 @record
@@ -47,7 +48,7 @@ def open_video(path: Path) -> Video:
     """Open a video file or a folder of images; only the first picture is decoded.
 
     Raises:
-        RecordingError: nothing in it can be decoded, or two images are of one frame.
+        RecordingError: nothing in it can be decoded, two images are of one frame, or they are numbered by their time.
     """
     if path.is_dir():
         return _open_folder(path)
@@ -172,6 +173,13 @@ def _open_folder(path: Path) -> Video:
             where=str(path),
             hint="images are named by frame: 000000.png, 000001.png",
         )
+    last = max(files)
+    if last > SPARSE * (len(files) + NAMED):  # every frame that lacks would be told, one by one
+        raise RecordingError(
+            f"{len(files)} images, and {files[last].name} would be frame {last}",
+            where=str(path),
+            hint="the last digits of a name are its frame, not its time or date: rename to 000000.png, 000001.png",
+        )
     height, width = image.shape[:2]
     numbers = np.array(sorted(files), np.int32)
     return Video(
@@ -179,7 +187,7 @@ def _open_folder(path: Path) -> Video:
         width=width,
         height=height,
         frame_rate=0.0,
-        declared=max(files) + 1,
+        declared=last + 1,
         stamps=np.arange(len(numbers), dtype=np.float64),
         numbers=numbers,
     )

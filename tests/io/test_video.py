@@ -113,6 +113,16 @@ def test_two_images_of_one_frame_are_told_apart_by_nobody(tmp_path):
         open_video(tmp_path)
 
 
+@pytest.mark.parametrize("first", [20260131, 1700000000000])
+def test_images_named_by_date_or_time(tmp_path, first):
+    for name in (first, first + 33):
+        cv2.imwrite(str(tmp_path / f"{name}.png"), np.zeros((8, 8, 3), np.uint8))
+    with pytest.raises(
+        RecordingError, match=f"2 images, and {first + 33}.png would be frame {first + 33}\n.*not its time"
+    ):
+        open_video(tmp_path)
+
+
 def test_hidden_files_are_no_images(tmp_path):
     cv2.imwrite(str(tmp_path / "000001.png"), picture(1))
     (tmp_path / "._000001.png").write_bytes(b"what another system keeps beside the file")
