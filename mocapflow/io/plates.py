@@ -11,7 +11,7 @@ from mocapflow.assets import Background
 from mocapflow.errors import RecordingError
 from mocapflow.io.folders import plates
 from mocapflow.io.lenses import View
-from mocapflow.io.video import Video, read_frames
+from mocapflow.io.video import Video, check_depth, read_frames
 from mocapflow.records import F32, U8
 
 LEAST_SPREAD = 1.0  # grey levels; the rounding of 8-bit pictures alone makes 0.3
@@ -33,7 +33,8 @@ def background(folder: Path, views: Sequence[View], videos: Sequence[Video]) -> 
     each pixel and its median over the picture.
 
     Raises:
-        RecordingError: a camera has no plate though others do, or a plate has another size than the video.
+        RecordingError: a camera has no plate though others do, or a plate has another size than the video,
+            or is far too dark.
     """
     found = [plates(folder, view.lens.name) for view in views]
     if not any(found):
@@ -101,6 +102,7 @@ def _read(path: Path, view: View) -> U8:
     if image is None:
         hint = "copy it again; without the folder the empty room is found from the videos"
         raise RecordingError("this clean plate can't be read", where=str(path), hint=hint)
+    check_depth(path)
     width, height = (int(n) for n in view.lens.size)
     if image.shape[:2] != (height, width):
         raise RecordingError(

@@ -21,6 +21,7 @@ from mocapflow.records import F64, I32, U8, array, record
 
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 VIDEOS = (".mp4", ".avi", ".mov", ".mkv", ".m4v", ".webm", ".mpg")
+DARK = 8192  # of 65535: a picture of 16 bits a pixel that reaches no more holds the 10 or 12 bits of a camera
 NAMED = 5  # frames that a message lists
 SPARSE = 1000  # frames for each image of a folder, above which the numbers are no frames
 
@@ -48,7 +49,8 @@ def open_video(path: Path) -> Video:
     """Open a video file or a folder of images; only the first picture is decoded.
 
     Raises:
-        RecordingError: nothing in it can be decoded, two images are of one frame, or they are numbered by their time.
+        RecordingError: nothing in it can be decoded, two images are of one frame, or they are numbered by their time
+            or far too dark.
     """
     if path.is_dir():
         return _open_folder(path)
@@ -155,6 +157,23 @@ def numbered(folder: Path, suffixes: tuple[str, ...]) -> dict[int, Path]:
     return found
 
 
+def check_depth(path: Path) -> None:
+    """Check that a picture of 16 bits a pixel uses them: of the higher 8, which are taken, nearly all would be 0.
+
+    Raises:
+        RecordingError: it does not.
+    """
+    import cv2
+
+    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    if image is not None and image.dtype == np.uint16 and 0 < image.max() < DARK:
+        raise RecordingError(
+            f"a picture of 16 bits a pixel that reaches {image.max()} of 65535: as 8 bits it is nearly black",
+            where=str(path),
+            hint="save it as 8 bits, or multiply its values so that they use all 16: 12 bits by 16, 10 bits by 64",
+        )
+
+
 def name_frames(indices: Sequence[int]) -> str:
     """Return e.g. `frames 3, 4, 9 and 20 more`."""
     first = ", ".join(str(index) for index in indices[:NAMED])
@@ -166,13 +185,15 @@ def _open_folder(path: Path) -> Video:
     import cv2
 
     files = numbered(path, IMAGES)
-    image = next((i for f in files.values() if (i := cv2.imread(str(f), cv2.IMREAD_COLOR)) is not None), None)
+    found = ((f, i) for f in files.values() if (i := cv2.imread(str(f), cv2.IMREAD_COLOR)) is not None)
+    first, image = next(found, (path, None))
     if image is None:
         raise RecordingError(
             "no image in this folder can be read",
             where=str(path),
             hint="images are named by frame: 000000.png, 000001.png",
         )
+    check_depth(first)
     last = max(files)
     if last > SPARSE * (len(files) + NAMED):  # every frame that lacks would be told, one by one
         raise RecordingError(

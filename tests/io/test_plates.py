@@ -108,6 +108,9 @@ def test_bad_plates(tmp_path):
     plate(tmp_path / "background" / "cam03.png", size=(32, 24))
     with pytest.raises(RecordingError, match=r"cam03\.png  this clean plate is 32 x 24 px, the video 64 x 48"):
         open_recording(tmp_path).background()
+    cv2.imwrite(str(tmp_path / "background" / "cam03.png"), np.full((48, 64), 4000, np.uint16))
+    with pytest.raises(RecordingError, match=r"cam03\.png  a picture of 16 bits a pixel that reaches 4000 of 65535"):
+        open_recording(tmp_path).background()
     (tmp_path / "background" / "cam03.png").write_text("no image")
     with pytest.raises(RecordingError, match=r"cam03\.png  this clean plate can't be read"):
         open_recording(tmp_path).background()

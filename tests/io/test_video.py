@@ -123,6 +123,14 @@ def test_images_named_by_date_or_time(tmp_path, first):
         open_video(tmp_path)
 
 
+def test_twelve_bits_in_sixteen(tmp_path):
+    cv2.imwrite(str(tmp_path / "000000.png"), picture(1).astype(np.uint16) * 16)
+    with pytest.raises(RecordingError, match=r"000000\.png  a picture of 16 bits .* reaches 3520 of 65535.*\n.*8 bits"):
+        open_video(tmp_path)
+    cv2.imwrite(str(tmp_path / "000000.png"), picture(1).astype(np.uint16) * 257)
+    assert numbers(open_video(tmp_path)) == [1]
+
+
 def test_hidden_files_are_no_images(tmp_path):
     cv2.imwrite(str(tmp_path / "000001.png"), picture(1))
     (tmp_path / "._000001.png").write_bytes(b"what another system keeps beside the file")
