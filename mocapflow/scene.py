@@ -10,6 +10,7 @@ import numpy as np
 from mocapflow.assets import Background, Body, Camera, GarmentMesh
 from mocapflow.data import BODY, CLOTH, Cloth, Pose, Surface
 from mocapflow.geometry import kinematics, meshes
+from mocapflow.geometry.angles import unmeasured
 from mocapflow.once import once
 from mocapflow.records import F64, I32, U8, Bool, record
 
@@ -27,8 +28,11 @@ class Scene:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a user should know of the person's clothes; also in run.json."""
-        return () if self.garment is None else tuple(f"{self.garment.name}: {said}" for said in self.garment.repairs)
+        """What a user should know of the person and the clothes; also in run.json."""
+        # a part of a body lacks what it was told to
+        lacking = "" if self.body.cut.any() else unmeasured(self.body.joint_names)
+        worn = () if self.garment is None else tuple(f"{self.garment.name}: {said}" for said in self.garment.repairs)
+        return (f"body: {lacking}", *worn) if lacking else worn
 
     def with_background(self, background: Background | None) -> Scene:
         """Return the scene with the empty room known."""

@@ -16,7 +16,18 @@ from tests.fixtures.recordings import avi_frames, look_at, ring, write_recording
 DEMO = Path(__file__).parents[1] / "examples" / "data"
 
 
-CHAIN = {"pelvis": None, "hip_l": "pelvis", "knee_l": "hip_l", "ankle_l": "knee_l"}
+LIMBS = (("hip", "knee", "ankle", "toe"), ("shoulder", "elbow", "wrist"))
+CHAIN = {"pelvis": None} | {
+    f"{name}_{side}": f"{limb[k - 1]}_{side}" if k else "pelvis"
+    for side in "lr" for limb in LIMBS for k, name in enumerate(limb)
+}  # fmt: skip
+
+
+def position(name):
+    height = 1.0 - 0.3 * next((limb.index(name[:-2]) for limb in LIMBS if name[:-2] in limb), 0)
+    return [{"l": 0.05, "r": -0.05}.get(name[-1], 0.0), -0.05 if name.startswith("toe") else 0.0, height]
+
+
 SHORTS = dict(
     type="shorts", waist_height=1.0, waist_circumference=0.9, hip_circumference=1.1, leg_opening_circumference=0.6,
     inseam=0.25, length=0.48,
@@ -32,12 +43,9 @@ def good(tmp_path):
     faces = np.array([[a, b, c] for a in range(6) for b, c in [(a + 1, a + 2)]], np.int32)
     rows = [f"v {x} {y} {z}\n" for x, y, z in corners] + [f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in faces]
     (subject / "body.obj").write_text("".join(rows))
-    joints = [
-        {"name": name, "parent": parent, "position": [0.05, 0, 1 - 0.3 * k]}
-        for k, (name, parent) in enumerate(CHAIN.items())
-    ]
+    joints = [{"name": name, "parent": parent, "position": position(name)} for name, parent in CHAIN.items()]
     (subject / "skeleton.json").write_text(json.dumps({"joints": joints}))
-    np.savez(subject / "weights.npz", weights=np.full((8, 4), 0.25), names=list(CHAIN))
+    np.savez(subject / "weights.npz", weights=np.full((8, len(CHAIN)), 0.25), names=list(CHAIN))
     (subject / "garment.json").write_text(json.dumps(SHORTS))
     pose = {"root_rotation": [0, 0, 0.1], "root_translation": [0, 0, 1], "joint_rotations": {"knee_l": [0.1, 0, 0]}}
     (tmp_path / "init.json").write_text(json.dumps(pose))
@@ -115,7 +123,7 @@ def test_lengths_in_mm(good):
     edit(good / "subject" / "garment.json", lambda g: g.update(length=483))
     edit(good / "init.json", lambda pose: pose.update(root_translation=[0, 100, 900]))
     found = errors(good)
-    assert any(m.startswith("4 of 4 joints lie more than 10 cm outside the mesh") for m in found)
+    assert any(m.startswith("15 of 15 joints lie more than 10 cm outside the mesh") for m in found)
     assert "garment.length_m: input should be less than 4, not 483" in found
     assert "the root joint is 906 m from the origin: it looks like mm" in found
 
@@ -289,11 +297,18 @@ def test_skeleton_and_weights_against_the_mesh(good):
         content["joints"][0]["position"] = [2.0, 0, 1.0]
 
     edit(good / "subject" / "skeleton.json", move)
-    assert errors(good) == ["1 of 4 joints lie more than 10 cm outside the mesh, first 'pelvis'"]
+    assert errors(good) == ["1 of 15 joints lie more than 10 cm outside the mesh, first 'pelvis'"]
     edit(good / "subject" / "skeleton.json", lambda s: s["joints"][1].update(parent="pelvs"))
     (finding,) = [f for f in examine(good) if f.severity == "error"]
     assert finding.message == "parent 'pelvs' of joint 'hip_l' is not listed before it"
     assert "did you mean 'pelvis'?" in finding.hint
+
+
+def test_joints_by_names_of_which_no_angle_is_known(good):
+    (good / "init.json").unlink()
+    (good / "subject" / "weights.npz").unlink()
+    edit(good / "subject" / "skeleton.json", lambda s: s["joints"][-1].update(name="RightHand"))
+    assert messages(good, "warning") == ["no angles elbow_r: the skeleton has no joints named wrist_r"]
 
 
 def test_weights_of_another_mesh(good):

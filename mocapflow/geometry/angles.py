@@ -41,7 +41,19 @@ class AngleSeries:
 
 def definitions(joint_names: tuple[str, ...]) -> tuple[Definition, ...]:
     """Return the angles that a skeleton with these joints has, in the order of the columns."""
-    wanted = [
+    return tuple(d for d in _all() if set(d.points) <= set(joint_names))
+
+
+def unmeasured(joint_names: tuple[str, ...]) -> str:
+    """Say which angles a skeleton with these joints lacks, and for want of which joints; "" where it has all."""
+    lost = [d for d in _all() if not set(d.points) <= set(joint_names)]
+    joints = dict.fromkeys(point for d in lost for point in d.points if point not in joint_names)
+    said = f"no angles {', '.join(d.name for d in lost)}: the skeleton has no joints named {', '.join(joints)}"
+    return said if lost else ""
+
+
+def _all() -> list[Definition]:
+    return [
         Definition(f"{name}_{side}", tuple(f"{joint}_{side}" for joint in joints), offset)
         for name, joints, offset in (
             ("knee_flexion", ("hip", "knee", "ankle"), 0.0),
@@ -51,7 +63,6 @@ def definitions(joint_names: tuple[str, ...]) -> tuple[Definition, ...]:
         )
         for side in ("l", "r")
     ]
-    return tuple(d for d in wanted if set(d.points) <= set(joint_names))
 
 
 def three_point(positions: F64) -> F64:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from mocapflow.io.findings import Finding, attempt, error
+from mocapflow.geometry.angles import unmeasured
+from mocapflow.io.findings import Finding, attempt, error, warning
 from mocapflow.io.first_pose import odd_pose
 from mocapflow.io.meshes import read_mesh
 from mocapflow.io.scans import check_size, read_skeleton, read_weights
@@ -33,6 +34,8 @@ def _examine_scan(subject: Path, findings: list[Finding]) -> Sequence[str]:
     skeleton = attempt(lambda: read_skeleton(bones), findings)
     if skeleton is None:
         return ()
+    if lacking := unmeasured(skeleton.names):
+        findings.append(warning(lacking, "angles are measured between joints of these names only", bones))
     if mesh is not None:
         vertices = mesh[0]
         attempt(lambda: check_size(vertices, skeleton, str(body)), findings)

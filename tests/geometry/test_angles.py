@@ -9,6 +9,7 @@ from mocapflow.assets import Body
 from mocapflow.data import Pose
 from mocapflow.geometry import angles, twists
 from mocapflow.model import moved
+from mocapflow.scene import Scene
 
 DEMO = Path(__file__).parents[2] / "examples" / "data"
 
@@ -42,6 +43,18 @@ def test_columns_and_three_point_angles_are_those_of_the_truth(clip: str) -> Non
         if len(wish.points) == 3:
             points = joints["positions"][:, [names.index(p) for p in wish.points]].astype(np.float64)
             assert np.abs(angles.three_point(points) + wish.offset - truth[:, column]).max() < 2e-3
+
+
+def test_what_is_not_measured_is_said() -> None:
+    body = stick_body()
+    assert angles.unmeasured(body.joint_names) == ""
+    legs = stick_body(keep=("pelvis", "hip", "knee", "ankle", "toe"))
+    said = "no angles elbow_l, elbow_r: the skeleton has no joints named shoulder_l, elbow_l, wrist_l, "
+    assert angles.unmeasured(legs.joint_names) == said + "shoulder_r, elbow_r, wrist_r"
+    assert Scene(cameras=(), body=body).warnings == ()
+    assert Scene(cameras=(), body=legs).warnings == (f"body: {angles.unmeasured(legs.joint_names)}",)
+    cut = np.ones(len(legs.cut), bool)  # as `part: legs` leaves it
+    assert Scene(cameras=(), body=replace(legs, cut=cut)).warnings == ()
 
 
 @pytest.mark.parametrize("clip", ["skirt_steps", "shorts_steps"])
