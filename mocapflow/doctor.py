@@ -107,7 +107,7 @@ def _trial(folder: Path, calibration: Path, rig: bool = True) -> list[Finding]:
     cameras = attempt(lambda: read_cameras(calibration), findings)
     if cameras is None:
         return findings
-    attempt(lambda: late_frames(folder, [c.name for c in cameras]), findings)
+    late = attempt(lambda: late_frames(folder, [c.name for c in cameras]), findings)
     paths = attempt(lambda: folders.match_videos(folder, [c.name for c in cameras], calibration), findings)
     videos = None if paths is None else [attempt(partial(open_video, path), findings) for path in paths]
     if videos is None or any(video is None for video in videos):
@@ -121,6 +121,9 @@ def _trial(folder: Path, calibration: Path, rig: bool = True) -> list[Finding]:
     findings += examine_rig(lenses) if rig else []
     findings += _lost(cameras, whole)
     length = min(video.frames for video in whole) if agreed is None else agreed[0]
+    if late is not None:
+        delayed = [replace(video, late=frames) for video, frames in zip(whole, late, strict=True)]
+        attempt(lambda: agreement.check_lateness(cameras, delayed, length, folder), findings)
     places = [folders.keypoint_folder(folder / folders.KEYPOINTS, camera.name) for camera in cameras]
     odd = attempt(lambda: folders.keypoint_warnings(cameras, places, length), findings)
     unused = attempt(lambda: folders.plate_warnings(folder, cameras), findings)

@@ -331,6 +331,7 @@ def test_weights_of_another_mesh(good):
     ("content", "message"),
     [
         ('{"late_frames": {"cam9": 3}}', "there is no camera 'cam9'"),
+        ('{"late_frames": {"cam02": 100}}', "camera 'cam02' is 100 frames late in a recording of 3"),
         ("[]", "does not say how late the cameras are: "),
         ("{", "not JSON: "),
     ],

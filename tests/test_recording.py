@@ -205,6 +205,21 @@ def test_image_size_against_calibration(tmp_path, size):
     )
 
 
+def test_a_video_turned_by_a_quarter(tmp_path):
+    write_recording(tmp_path)
+    write_video(tmp_path / "videos" / "cam02.mp4", 10, (48, 64))
+    assert "the video is turned by a quarter, perhaps by a mark in the file" in refused(tmp_path)
+
+
+def test_a_camera_later_than_the_recording_is_long(tmp_path):
+    write_recording(tmp_path, frames=2)
+    (tmp_path / "recording.json").write_text('{"late_frames": {"cam02": -40}}')
+    assert refused(tmp_path) == (
+        f"{tmp_path / 'recording.json'}:1:19  camera 'cam02' is -40 frames late in a recording of 2\n"
+        "       late_frames counts frames, not milliseconds; `mocapflow doctor DIR --sync` measures it"
+    )
+
+
 def test_slightly_smaller_images_were_cut(tmp_path):
     write_recording(tmp_path, frames=2, cameras=ring(size=(272, 480)))
     write_video(tmp_path / "videos" / "cam02.mp4", 2, (268, 480))

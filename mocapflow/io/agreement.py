@@ -12,6 +12,7 @@ import numpy as np
 from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.io.cameras import metadata
+from mocapflow.io.lateness import TIMING
 from mocapflow.io.typed import place
 from mocapflow.io.video import Video, name_frames
 
@@ -29,10 +30,14 @@ def fit_sizes(
         if camera.size.any() and (size != camera.size).any():
             wanted = f"{camera.size[0]} x {camera.size[1]}"
             if (size > camera.size).any() or (size < (1 - CUT) * camera.size).any():
+                turned = (size[::-1] == camera.size).all()
                 raise RecordingError(
                     f"camera '{camera.name}': the video is {video.width} x {video.height} px, the calibration {wanted}",
                     where=place(calibration, camera.name),
-                    hint="calibrate at the size of the video, or scale size and matrix of the calibration to it",
+                    hint="the video is turned by a quarter, perhaps by a mark in the file that players heed and other\n"
+                    "programs do not: calibrate with pictures that are turned the same way"
+                    if turned
+                    else "calibrate at the size of the video, or scale size and matrix of the calibration to it",
                 )
             warnings.append(
                 f"{camera.name}: the video is {video.width} x {video.height} px, the calibration {wanted}: "
@@ -62,6 +67,19 @@ def agree_on_length(cameras: Sequence[Camera], videos: Sequence[Video], folder: 
         for camera, video, cut in zip(cameras, videos, broken, strict=True)
         if cut
     ]
+
+
+def check_lateness(cameras: Sequence[Camera], videos: Sequence[Video], length: int, folder: Path) -> None:
+    """Check that a late camera has a picture of any of the `length` frames.
+
+    Raises:
+        RecordingError: it is later than the recording is long.
+    """
+    for camera, video in zip(cameras, videos, strict=True):
+        if abs(video.late) >= length:
+            what = f"camera '{camera.name}' is {video.late} frames late in a recording of {length}"
+            hint = "late_frames counts frames, not milliseconds; `mocapflow doctor DIR --sync` measures it"
+            raise RecordingError(what, where=place(folder / TIMING, camera.name), hint=hint)
 
 
 def gap_warnings(cameras: Sequence[Camera], videos: Sequence[Video]) -> list[str]:

@@ -48,6 +48,7 @@ def gather(folder: Path, calibration: Path | None) -> Parts:
     videos = tuple(replace(open_video(path), late=frames) for path, frames in zip(paths, late, strict=True))
     lenses, cut = agreement.fit_sizes(cameras, videos, calibration)
     length, broken = agreement.agree_on_length(cameras, videos, folder)
+    agreement.check_lateness(cameras, videos, length, folder)
     gaps = agreement.gap_warnings(cameras, videos)
     rate, assumed = agreement.common_rate(cameras, videos, calibration)
     keypoints = tuple(keypoint_folder(folder / KEYPOINTS, camera.name) for camera in cameras)
