@@ -14,6 +14,8 @@ from mocapflow.io.markers import numbers
 from mocapflow.records import F64
 from mocapflow.results import Track
 
+FORM = "expected UTF-8 text, commas between the columns, a point in a number"
+
 
 def angle_columns(track: Track, series: AngleSeries) -> dict[str, F64]:
     """Return the columns of angles.csv: frame, time, every angle followed by its deviation, then what was seen."""
@@ -50,15 +52,23 @@ def read_columns(path: Path) -> dict[str, F64]:
     """Read a table of numbers; empty cells are NaN.
 
     Raises:
-        RecordingError: the file is missing, or a row has other cells than the header or a cell is no number.
+        RecordingError: the file is missing or no UTF-8 text, two columns have one name, or a row has other cells than
+            the header or a cell is no number.
     """
     if not path.is_file():
         raise RecordingError("no such table", where=str(path))
-    with path.open(newline="", encoding="utf-8-sig") as file:
-        rows = [row for row in csv.reader(file) if row]
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            rows = [row for row in csv.reader(file) if row]
+    except UnicodeDecodeError:
+        raise RecordingError("is not UTF-8 text", where=str(path), hint=FORM) from None
     if len(rows) < 2:
         raise RecordingError("the table has no rows", where=str(path))
     header = [name.strip() for name in rows[0]]
+    if len(header) == 1 and ";" in header[0]:
+        raise RecordingError("the columns are divided by semicolons", where=f"{path}:1", hint=FORM)
+    if twice := next((name for name in header if header.count(name) > 1), None):
+        raise RecordingError(f"two columns are called '{twice}'", where=f"{path}:1", hint="which one is meant?")
     values = np.array([numbers(row, len(header), f"{path}:{number}") for number, row in enumerate(rows[1:], 2)])
     return {name: values[:, column].copy() for column, name in enumerate(header)}
 

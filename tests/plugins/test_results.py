@@ -10,6 +10,7 @@ from mocapflow_sequence.lost import lost_rows
 from mocapflow_sequence.smooth import Smooth
 from results_scene import DEMO, ball_body, cameras, demo_scene, stepping
 
+from mocapflow.errors import RecordingError
 from mocapflow.geometry import kinematics
 from mocapflow.io import markers
 from mocapflow.recording import Recording, open_recording
@@ -164,6 +165,20 @@ def test_legs_alone_export(recording: Recording, tmp_path: Path) -> None:
     body = ball_body(("pelvis", "hip_l", "knee_l", "ankle_l", "toe_l", "hip_r", "knee_r", "ankle_r", "toe_r"))
     exported(stepping(body, 4), Scene(cameras=cameras(), body=body), recording, tmp_path)
     assert tables.angle_names(tables.read_columns(tmp_path / layout.ANGLES)) == COLUMNS[:6]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (b"frame,knee_flexion_l,knee_flexion_l\n0,1,2\n", r"t\.csv:1  two columns are called 'knee_flexion_l'"),
+        (b"frame;knee_flexion_l\n0;1,5\n", r"t\.csv:1  the columns are divided by semicolons\n.*commas between"),
+        (b"frame,knee (\xb0)\n0,1\n", r"t\.csv  is not UTF-8 text\n"),
+    ],
+)
+def test_tables_of_other_forms(tmp_path: Path, text: bytes, message: str) -> None:
+    (tmp_path / "t.csv").write_bytes(text)
+    with pytest.raises(RecordingError, match=message):
+        tables.read_columns(tmp_path / "t.csv")
 
 
 def test_table_with_a_missing_cell_says_where(tmp_path: Path) -> None:
