@@ -11,6 +11,8 @@ from mocapflow_sequence.cycles import Cycle
 from mocapflow_sequence.ours import Ours
 from mocapflow_sequence.references import Reference
 
+BENT = 20.0  # deg that some angle of a person who moves exceeds
+
 
 def said(
     own: Ours, reference: Reference, found: Alignment, strides: Sequence[Cycle], longest_lag_s: float
@@ -19,6 +21,12 @@ def said(
     notes = []
     if not reference.by_frame and len(reference.at) > 1:
         notes.append(f"reference at {1 / reference.step:.4g} per second, interpolated at our {own.frame_rate:.4g}")
+    theirs, most = (
+        max((float(np.nanmax(np.abs(curve), initial=0.0)) for curve in curves), default=0.0)
+        for curves in (reference.curves.values(), [own.columns[name] for name in found.signs])
+    )
+    if theirs <= np.pi and most > BENT:
+        notes.append(f"no angle of the reference is above {theirs:.1f}, ours reach {most:.0f}: is it in radians?")
     if np.isnan(found.lag):
         notes.append(f"no lag within {longest_lag_s:g} s fits best; see longest_lag_s of stage evaluate")
     elif found.worth:

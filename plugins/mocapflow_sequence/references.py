@@ -48,7 +48,7 @@ def read_reference(path: Path) -> Reference:
     from which joint centres and knee axes are found (`marker_joints`).
 
     Raises:
-        RecordingError: the file is missing, of another kind, or has none of our angles.
+        RecordingError: the file is missing, of another kind, has none of our angles, or goes back in time.
     """
     readers = {".csv": _table, ".mot": _motion, ".sto": _motion, ".trc": _trc, ".c3d": _c3d}
     if path.suffix.lower() not in readers:
@@ -59,7 +59,13 @@ def read_reference(path: Path) -> Reference:
         )
     if not path.is_file():
         raise RecordingError("no such reference", where=str(path))
-    return readers[path.suffix.lower()](path)
+    reference = readers[path.suffix.lower()](path)
+    grows = np.diff(reference.at) > 0  # what is interpolated has to; nan does not
+    if not grows.all():
+        row, clock = int(np.argmin(grows)) + 1, "frame" if reference.by_frame else "time"
+        hint = "one row for each moment, in their order"
+        raise RecordingError(f"the {clock} does not grow from row {row} to row {row + 1}", where=str(path), hint=hint)
+    return reference
 
 
 def _table(path: Path) -> Reference:

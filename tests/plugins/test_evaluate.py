@@ -130,6 +130,19 @@ def test_a_run_folder_is_evaluated_from_its_files(tmp_path: Path) -> None:
     assert all(r["rms_deg"] == pytest.approx(1.5, abs=1e-3) for r in got.rows)
 
 
+def test_a_reference_in_radians_or_out_of_order_is_told(tmp_path: Path) -> None:
+    columns = tables.read_columns(DEMO / "truth" / "angles.csv")
+    clock = {"frame": columns.pop("frame")}
+    tables.write_columns(layout.place(tmp_path, layout.ANGLES), clock | {"time": clock["frame"] / 30} | columns)
+    turned = tables.write_columns(tmp_path / "turned.csv", clock | {n: np.radians(v) for n, v in columns.items()})
+    assert any(note.endswith("is it in radians?") for note in evaluate_run(tmp_path, turned).notes)
+    assert not any("radians" in note for note in evaluate_run(tmp_path, DEMO / "truth" / "angles.csv").notes)
+    clock["frame"][5] = 4
+    tables.write_columns(turned, clock | columns)
+    with pytest.raises(RecordingError, match=r"turned\.csv  the frame does not grow from row 5 to row 6\n"):
+        evaluate_run(tmp_path, turned)
+
+
 def test_folder_without_angles_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"no such run folder: it has no results/angles.csv"):
         evaluate_run(tmp_path, DEMO / "truth" / "angles.csv")
