@@ -23,6 +23,9 @@ FORM = (
     '"joint_rotations": {name: [3]}}, rotation vectors in radians, relative to the parent'
 )
 
+HIGHEST = 10.0  # m above the floor; a root joint that is higher is in other units
+MILLIMETRES = 500.0  # m from the origin; beyond, in millimetres, below, in centimetres
+
 
 @record
 class FirstPose:
@@ -83,7 +86,8 @@ def _odd_vector(key: str, value: Any) -> Iterator[Finding]:
     size = float(np.linalg.norm(vector))
     if vector.shape != (3,) or not np.isfinite(size):
         yield error(f"'{key}' is {value!r}", "expected three finite numbers")
-    elif key == "root_translation" and size > FARTHEST:
-        yield error(f"the root joint is {size:.0f} m from the origin: it looks like mm", "lengths are in metres")
+    elif key == "root_translation" and (size > FARTHEST or abs(vector[2]) > HIGHEST):
+        unit = "mm" if size > MILLIMETRES else "cm"
+        yield error(f"the root joint is {size:.0f} m from the origin: it looks like {unit}", "lengths are in metres")
     elif key != "root_translation" and size > 2 * math.pi:
         yield error(f"'{key}' turns by {size:.1f} rad, more than once around: it looks like degrees", FORM)

@@ -88,6 +88,7 @@ def test_a_part_of_the_body_starts_from_the_same_file(scene):
         ),
         (lambda c: c["joint_rotations"].update(knee_l=[20, -4, 2]), "'knee_l' turns by 20.5 rad.* looks like degrees"),
         (lambda c: c.update(root_translation=[-26, -42, 912]), "913 m from the origin: it looks like mm"),
+        (lambda c: c.update(root_translation=[-3, -4, 91]), "91 m from the origin: it looks like cm"),
         (lambda c: c.update(joint_rotation={}), "unknown key 'joint_rotation'\n.*did you mean 'joint_rotations'"),
         (lambda c: c.pop("root_translation"), "'root_translation' is missing"),
     ],
