@@ -21,6 +21,7 @@ from mocapflow.records import F64
 from mocapflow.scene import Scene
 
 LOG = logging.getLogger("mocapflow")
+SLACK = 15.0  # deg beyond a limit that a pose may be, written down by eye
 
 
 class StartFromFile(Stage):
@@ -53,7 +54,10 @@ class StartFromFile(Stage):
             there = ", ".join(sorted(p.name for p in recording.folder.iterdir()))
             hint = f"the recording has: {there}\nwithout a start pose, use the stage start_from_keypoints"
             raise RecordingError("there is no file with the first pose", where=str(path), hint=hint)
-        return Start(pose=read_pose(path, scene.body), parameters=scene.calm)
+        pose = read_pose(path, scene.body)
+        if odd := beyond_limits(pose, scene.body):
+            LOG.warning("%s bends joints as nobody can: %s; are its turns in radians, of the right sign?", path, odd)
+        return Start(pose=pose, parameters=scene.calm)
 
 
 def read_pose(path: Path, body: Body) -> Pose:
@@ -65,6 +69,14 @@ def read_pose(path: Path, body: Body) -> Pose:
     found = read_first_pose(path, () if body.cut.any() else body.joint_names)
     turns = {name: turn for name, turn in found.turns.items() if name in body.joint_names}
     return Pose(root=root_at(body, found.rotation, found.position), angles=angles_from_rotations(body, turns))
+
+
+def beyond_limits(pose: Pose, body: Body) -> str:
+    """Return which angles of a pose are far beyond what a joint can do, "" where none is."""
+    low, high = np.degrees(body.limits.T)
+    angles = np.degrees(pose.angles)
+    far = np.flatnonzero((angles < low - SLACK) | (angles > high + SLACK))
+    return ", ".join(f"{body.screw_names[k]} {angles[k]:.0f}° of {low[k]:.0f}° to {high[k]:.0f}°" for k in far)
 
 
 def root_at(body: Body, rotation: F64, position: F64) -> F64:

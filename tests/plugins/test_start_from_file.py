@@ -1,6 +1,7 @@
 """The first pose from a file: the forward kinematics of the recordings' README, and what may be wrong with it."""
 
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -99,6 +100,17 @@ def test_bad_files(recording, scene, change, message):
     (recording / "init.json").write_text(json.dumps(content))
     with pytest.raises(RecordingError, match=message):
         StartFromFile().run(open_recording(recording), scene)
+
+
+def test_a_knee_that_bends_the_wrong_way_is_told(recording, scene, caplog):
+    StartFromFile().run(open_recording(recording), scene)
+    assert not caplog.messages
+    content = json.loads((recording / "init.json").read_text())
+    content["joint_rotations"]["knee_l"] = [-1.0, 0, 0]
+    (recording / "init.json").write_text(json.dumps(content))
+    StartFromFile().run(open_recording(recording), scene)
+    (message,) = caplog.messages
+    assert re.search(r"init.json bends joints as nobody can: knee_l.flexion -5\d° of -\d+° to 1\d\d°; are its", message)
 
 
 def test_missing_file(recording, scene):
