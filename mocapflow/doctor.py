@@ -12,10 +12,11 @@ from mocapflow.errors import MocapflowError, UnknownComponent
 from mocapflow.io import agreement, folders
 from mocapflow.io.cameras import find_calibration, read_cameras
 from mocapflow.io.findings import Finding, attempt, error, note, warning
+from mocapflow.io.first_pose import read_first_pose
 from mocapflow.io.lateness import TIMING, late_frames, timing_text, write_late_frames
 from mocapflow.io.lenses import View
 from mocapflow.io.plates import background
-from mocapflow.io.rigs import examine_rig
+from mocapflow.io.rigs import examine_rig, examine_view
 from mocapflow.io.subjects import examine_subject
 from mocapflow.io.video import Video, lost_frames, name_frames, open_video
 from mocapflow.measures import recorded_garment
@@ -46,6 +47,7 @@ def examine(folder: Path) -> list[Finding]:
                 for f in _trial(static, own if own.exists() else calibration, rig=False)
             ]
     findings += examine_subject(folder)
+    findings += [] if calibration is None else _start(folder, calibration)
     findings += _garment(folder)
     findings += _missing(folder)
     return sorted(findings, key=lambda finding: ("error", "warning", "note").index(finding.severity))
@@ -85,6 +87,18 @@ def _garment(folder: Path) -> list[Finding]:
     except MocapflowError as problem:
         return [error(problem.message, problem.hint, problem.where)]
     return []
+
+
+def _start(folder: Path, calibration: Path) -> list[Finding]:
+    """Return which cameras don't see where the person is said to begin; what can't be read is told elsewhere."""
+    pose = folder / "init.json"
+    try:
+        cameras = [camera for camera in read_cameras(calibration) if camera.size.all()]
+        root = read_first_pose(pose, ()).position if pose.exists() else None
+    except MocapflowError:
+        return []
+    found = [] if root is None else examine_view(cameras, root, "the root joint of the first pose")
+    return [replace(finding, where=str(pose)) for finding in found]
 
 
 def _missing(folder: Path) -> Iterator[Finding]:

@@ -345,6 +345,16 @@ def test_recording_json(good, content, message):
     assert finding.message.startswith(message)
 
 
+def test_a_first_pose_that_cameras_do_not_see(good):
+    cameras = list(ring())
+    edit(good / "init.json", lambda pose: pose.update(root_translation=[0, 0, 9]))
+    assert errors(good) == ["no camera sees the root joint of the first pose"]
+    edit(good / "init.json", lambda pose: pose.update(root_translation=[0, 0, 1]))
+    cameras[1] = look_at("cam02", np.array([4.0, 0, 1.5]), target=(4, 4, 1.0))
+    write_cameras(good / "cameras.toml", cameras)
+    assert "cam02 does not see the root joint of the first pose" in messages(good, "warning")
+
+
 def test_a_first_pose_that_is_null(good):
     (good / "init.json").write_text("null")
     assert errors(good) == ["not a first pose"]

@@ -36,6 +36,19 @@ def examine_rig(cameras: Sequence[Camera]) -> Iterator[Finding]:
             )
 
 
+def examine_view(cameras: Sequence[Camera], point: F64, what: str) -> Iterator[Finding]:
+    """Yield which cameras of known size don't see a point (3,) m that they should; `what` is its name."""
+    blind = [camera.name for camera in cameras if not _sees(camera, point[None]).any()]
+    hint = (
+        "is its place in metres, in the world of the calibration? is rotation camera-from-world, and translation not\n"
+        "the camera's position? has each camera its own name?"
+    )
+    if blind and len(blind) == len(cameras):
+        yield problem(f"no camera sees {what}", hint)
+    elif blind:
+        yield warning(f"{', '.join(blind)} {'do' if len(blind) > 1 else 'does'} not see {what}", hint)
+
+
 def _common_view(cameras: Sequence[Camera]) -> Iterator[Finding]:
     seen = [np.stack([_sees(other, _seen_space(camera)) for other in cameras]) for camera in cameras]
     alone = [c.name for i, (c, s) in enumerate(zip(cameras, seen, strict=True)) if not np.delete(s, i, 0).any()]
