@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -32,7 +33,7 @@ def columns(path: Path) -> dict[str, F64]:
     """Return the angles (T,) in degrees that the joints of a BVH file allow, named as in angles.csv.
 
     Raises:
-        RecordingError: the reader of BVH files is not installed.
+        RecordingError: the reader of BVH files is not installed, or the file is not whole.
     """
     places = joint_places(path)
     found: dict[str, F64] = {}
@@ -54,6 +55,7 @@ def joint_places(path: Path) -> dict[str, F64]:
     except ImportError as error:
         hint = "pip install 'mocapflow[bvh]'"
         raise RecordingError("BVH files need the package bvhio", where=str(path), hint=hint) from error
+    _check_whole(path)
     root = bvhio.readAsHierarchy(str(path))
     joints = [joint for joint, _, _ in root.layout()]
     ours = our_names([joint.Name for joint in joints])
@@ -64,6 +66,22 @@ def joint_places(path: Path) -> dict[str, F64]:
         for name, index in ours.items():
             places[name].append(tuple(joints[index].PositionWorld))
     return {name: np.array(way) for name, way in places.items()}
+
+
+def _check_whole(path: Path) -> None:
+    """Check that a file goes on to its last frame: bvhio reads for ever where the joints are cut off.
+
+    Raises:
+        RecordingError: it does not.
+    """
+    joints, _, motion = path.read_text(encoding="utf-8", errors="replace").partition("MOTION")
+    count = re.search(r"Frames:\s*(\d+)", motion)
+    if joints.count("{") != joints.count("}") or count is None:
+        raise RecordingError("no whole BVH file: its joints or its motion are cut off", where=str(path))
+    rows = [line for line in motion.splitlines() if line.strip()][2:]  # below `Frames:` and `Frame Time:`
+    if len(rows) < int(count[1]):
+        said = f"no whole BVH file: {len(rows)} of {count[1]} frames are there"
+        raise RecordingError(said, where=str(path), hint="copy it again")
 
 
 def our_names(names: Sequence[str]) -> dict[str, int]:

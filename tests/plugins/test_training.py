@@ -122,6 +122,20 @@ def test_a_bvh_motion(tmp_path: Path) -> None:
         assert found[name] == pytest.approx([degrees], abs=1e-3), name
 
 
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("HIERARCHY\nROOT hips\n{", "its joints or its motion are cut off"),
+        ("HIERARCHY\nROOT hips\n{\n}\nMOTION\nFrames: 2\nFrame Time: 0.1\n0 0 0\n", "1 of 2 frames are there"),
+    ],
+)
+def test_a_bvh_that_is_cut_off(tmp_path: Path, text: str, message: str) -> None:
+    pytest.importorskip("bvhio")
+    (tmp_path / "take.bvh").write_text(text)
+    with pytest.raises(RecordingError, match=rf"take\.bvh  no whole BVH file: {message}"):
+        training_bvh.columns(tmp_path / "take.bvh")
+
+
 def test_the_command(body: Body, motion: np.ndarray, tmp_path: Path) -> None:
     columns = opensim.coordinates(body, np.tile(np.eye(4), (12, 1, 1)), motion)
     markers.write_mot(tmp_path / "take.mot", columns, np.arange(12) / 30)
