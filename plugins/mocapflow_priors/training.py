@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from mocapflow_priors.density import Density, bandwidth
 Angles = Mapping[str, F64]  # by screw: (T,) rad, zero in the rest pose
 FREE = ("hip", "knee.flexion", "ankle.dorsiflexion", "shoulder", "elbow.flexion")  # what no other prior holds
 BENDS = np.radians(np.linspace(-60, 170, 461))  # of any joint, to look up what they show
+DEGREES = "an angles.csv has degrees; a motion has some angle that bends further"
 COLUMNS = {  # of angles.csv: the screw that makes nearly all of each
     "hip_flexion": "hip.flexion",
     "knee_flexion": "knee.flexion",
@@ -81,7 +83,7 @@ def read_angles(path: Path, body: Body) -> Angles:
         raise RecordingError("there is no such file", where=str(path))
     try:
         return reader(path, body)
-    except (ValueError, KeyError) as error:
+    except (ValueError, KeyError, TypeError, IndexError, SyntaxError, BadZipFile) as error:  # as readers say so
         raise RecordingError(f"cannot be read as {path.suffix}: {error}", where=str(path)) from error
 
 
@@ -97,10 +99,13 @@ def from_rotations(path: Path, body: Body) -> Angles:
 
 def from_table(path: Path, body: Body) -> Angles:
     """Read an angles.csv: degrees between joint centres, as a run writes them."""
-    with path.open(encoding="utf-8", newline="") as file:
+    with path.open(encoding="utf-8-sig", newline="") as file:
         rows = list(csv.DictReader(file))
     names = {name for name in rows[0] if name and name[:-2] in COLUMNS} if rows else set()
-    return from_columns({name: np.array([float(row[name] or "nan") for row in rows]) for name in names}, body)
+    degrees = {name: np.array([float(row[name] or "nan") for row in rows]) for name in names}
+    if degrees and all(np.nanmax(np.abs(values), initial=0.0) <= np.pi for values in degrees.values()):
+        raise RecordingError("no angle in it is above 3.14: it seems to be in radians", where=str(path), hint=DEGREES)
+    return from_columns(degrees, body)
 
 
 def from_joints(path: Path, body: Body) -> Angles:

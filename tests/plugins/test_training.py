@@ -105,6 +105,12 @@ def test_a_table_of_angles(body: Body, motion: np.ndarray, tmp_path: Path) -> No
     )  # a hinge that is not quite square to the limb, and hip against thigh
 
 
+def test_a_table_in_radians(body: Body, tmp_path: Path) -> None:
+    tables.write_columns(tmp_path / "angles.csv", {"knee_flexion_l": np.radians(np.linspace(5, 90, 9))})
+    with pytest.raises(RecordingError, match=r"angles\.csv  no angle in it is above 3\.14: .* in radians"):
+        training.read_angles(tmp_path / "angles.csv", body)
+
+
 def test_an_opensim_motion(body: Body, motion: np.ndarray, tmp_path: Path) -> None:
     columns = opensim.coordinates(body, np.tile(np.eye(4), (12, 1, 1)), motion)
     markers.write_mot(tmp_path / "angles.mot", columns, np.arange(12) / 30)
@@ -134,6 +140,16 @@ def test_a_bvh_that_is_cut_off(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "take.bvh").write_text(text)
     with pytest.raises(RecordingError, match=rf"take\.bvh  no whole BVH file: {message}"):
         training_bvh.columns(tmp_path / "take.bvh")
+
+
+def test_files_of_another_kind(body: Body, tmp_path: Path) -> None:
+    pytest.importorskip("bvhio")
+    (tmp_path / "take.bvh").write_text("ROOT hips\n{\n}\nMOTION\nFrames: 0\nFrame Time: 0.1\n")
+    with (tmp_path / "take.npz").open("wb") as file:
+        np.save(file, np.ones(3))
+    for name in ("take.bvh", "take.npz"):
+        with pytest.raises(RecordingError, match=rf"{name}  cannot be read as \.(bvh|npz): "):
+            training.read_angles(tmp_path / name, body)
 
 
 def test_the_command(body: Body, motion: np.ndarray, tmp_path: Path) -> None:
