@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from filecmp import cmp
 from functools import partial
+from itertools import combinations
 from pathlib import Path
 
 from mocapflow.assets import Camera
@@ -133,7 +135,7 @@ def _trial(folder: Path, calibration: Path, rig: bool = True) -> list[Finding]:
     findings += [warning(text, where=folder) for part in (fitted, agreed, rate) if part is not None for text in part[1]]
     lenses = cameras if fitted is None else fitted[0]
     findings += examine_rig(lenses) if rig else []
-    findings += _lost(cameras, whole)
+    findings += [*_copies(cameras, whole), *_lost(cameras, whole)]
     length = min(video.frames for video in whole) if agreed is None else agreed[0]
     if late is not None:
         delayed = [replace(video, late=frames) for video, frames in zip(whole, late, strict=True)]
@@ -145,6 +147,14 @@ def _trial(folder: Path, calibration: Path, rig: bool = True) -> list[Finding]:
     if fitted is not None and unused is not None:
         attempt(lambda: background(folder, [View(lens=lens) for lens in lenses], whole), findings)
     return findings
+
+
+def _copies(cameras: Sequence[Camera], videos: Sequence[Video]) -> Iterator[Finding]:
+    """Yield which cameras have one and the same file."""
+    for (a, one), (b, other) in combinations(zip([c.name for c in cameras], videos, strict=True), 2):
+        if one.path.is_file() and other.path.is_file() and cmp(one.path, other.path, shallow=False):
+            hint = "one of them is a copy by mistake: copy it again from its own camera"
+            yield warning(f"{a} and {b} have the same video", hint, other.path)
 
 
 def _lost(cameras: Sequence[Camera], videos: Sequence[Video]) -> Iterator[Finding]:

@@ -1,6 +1,7 @@
 """The doctor finds each fault, says what to do, and finds nothing on a good recording."""
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -353,6 +354,11 @@ def test_a_first_pose_that_cameras_do_not_see(good):
     cameras[1] = look_at("cam02", np.array([4.0, 0, 1.5]), target=(4, 4, 1.0))
     write_cameras(good / "cameras.toml", cameras)
     assert "cam02 does not see the root joint of the first pose" in messages(good, "warning")
+
+
+def test_a_video_copied_twice(good):
+    shutil.copy(good / "videos" / "cam01.mp4", good / "videos" / "cam03.mp4")
+    assert messages(good, "warning") == ["cam01 and cam03 have the same video"]
 
 
 def test_a_first_pose_that_is_null(good):
