@@ -25,10 +25,10 @@ def heard():
 
 @pytest.fixture
 def path(tmp_path):
-    return write_pipeline(tmp_path, write_recording(tmp_path / "clip", frames=60))
+    return write_pipeline(tmp_path, write_recording(tmp_path / "clip", frames=30))
 
 
-def started(words, folder, slow="0.2"):
+def started(words, folder, slow="0.4"):
     environment = {**os.environ, "TINY_SLOW": slow}
     return subprocess.Popen(
         [MOCAPFLOW, *words], cwd=folder, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
@@ -49,7 +49,7 @@ def test_a_run_is_asked_after_interrupted_and_gone_on_with(tmp_path, path):
         said = status(tmp_path)
         run.send_signal(signal.SIGINT)
         rest = "".join(lines)
-    assert re.search(r"^track +resume .* \d+ of 60 frames done", said, re.MULTILINE)
+    assert re.search(r"^track +resume .* \d+ of 30 frames done", said, re.MULTILINE)
     assert re.search(rf"^process {run.pid} on \S+, 0:\d\d ago: track: ", said, re.MULTILINE)
     assert run.returncode == 130
     assert rest.endswith(f"interrupted; finished frames are saved. To go on: mocapflow {' '.join(words)}\n")

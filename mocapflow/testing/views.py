@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from mocapflow.assets import Camera
@@ -10,10 +12,12 @@ from mocapflow.records import F64
 SIZE = (320, 240)  # px
 
 
+@cache
 def room(camera: int) -> F64:
-    """Return the empty room (240, 320, 3): a soft pattern, another one in each view."""
+    """Return the empty room (240, 320, 3): a soft pattern, another one in each view; it can't be written to."""
     row, column = np.mgrid[: SIZE[1], : SIZE[0]]
     pattern: F64 = 90 + 15 * np.sin(row / 23 + camera)[..., None] + 10 * np.cos(column / 17)[..., None] * [1, 0.5, 0.2]
+    pattern.setflags(write=False)
     return pattern
 
 
