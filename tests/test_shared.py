@@ -27,7 +27,7 @@ def url(request, tmp_path):
 
 @pytest.fixture
 def path(tmp_path):
-    return write_pipeline(tmp_path, write_recording(tmp_path / "clip"))
+    return write_pipeline(tmp_path, write_recording(tmp_path / "clip", frames=8))
 
 
 def shared(path, folder, url, *changes, frames=None):

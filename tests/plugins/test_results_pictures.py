@@ -190,9 +190,7 @@ def test_report_fetches_nothing(page: str) -> None:
     assert "url(" not in style and "@import" not in style
 
 
-def test_report_without_reference(
-    scene: Scene, track: Track, recording: Recording, page: str, tmp_path: Path
-) -> None:
+def test_report_without_reference(scene: Scene, track: Track, recording: Recording, page: str, tmp_path: Path) -> None:
     run_folder = RunFolder(path=tmp_path, recipe={})
     nothing = Evaluation(reference="", rows=(), notes=("the recording has no truth/angles.csv",))
     Report().run(track=track, scene=scene, recording=recording, run_folder=run_folder, evaluation=nothing)
