@@ -23,3 +23,11 @@ def code_is_read_once():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Digests, "_source", source)
         yield
+
+
+@pytest.fixture
+def unrendered(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compose pictures of a comparison but don't render them, which takes a second each: for who reads its figures."""
+    from mocapflow_sequence import comparison_plots
+
+    monkeypatch.setattr(comparison_plots, "save", lambda figure, path: path)

@@ -90,6 +90,7 @@ def columns_only(columns: dict[str, np.ndarray]) -> Ours:
     return Ours(columns=columns, raw=columns, stick=Stick(names=(), places=np.empty((len(columns["frame"]), 0, 3))))
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_frames_are_matched_by_number(tmp_path: Path) -> None:
     tables.write_columns(tmp_path / "t.csv", {"frame": np.array([5.0, 7.0]), "knee_flexion_l": np.array([50.0, 70.0])})
     ours = {"frame": np.arange(10.0), "time": np.arange(10) / 30, "knee_flexion_l": 10 * np.arange(10.0) + 1}
@@ -119,6 +120,7 @@ def test_demo_truth_is_found(tmp_path: Path) -> None:
     assert all(r["frames"] == len(track.frame) for r in got.rows)
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_a_run_folder_is_evaluated_from_its_files(tmp_path: Path) -> None:
     truth = DEMO / "truth" / "angles.csv"
     columns = tables.read_columns(truth)
@@ -148,6 +150,7 @@ def test_folder_without_angles_is_an_error(tmp_path: Path) -> None:
         evaluate_run(tmp_path, DEMO / "truth" / "angles.csv")
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_motion_file_in_time_is_interpolated(tmp_path: Path) -> None:
     time = np.arange(0, 2, 0.01)
     columns = {"knee_angle_r": 30 + 20 * np.sin(5 * time), "pelvis_ty": np.ones_like(time)}
@@ -160,6 +163,7 @@ def test_motion_file_in_time_is_interpolated(tmp_path: Path) -> None:
     assert got[0]["frames"] == np.sum(frames / 30 <= 1.99)
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_times_that_count_from_one_sample_start_at_zero(tmp_path: Path) -> None:
     time = np.arange(1, 51) / 60
     curve = 30 + 20 * np.sin(np.arange(50) / 5)
@@ -169,6 +173,7 @@ def test_times_that_count_from_one_sample_start_at_zero(tmp_path: Path) -> None:
     assert (got["frames"], round(float(got["rms_deg"]), 3)) == (50, 0)
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_gait2392_counts_knees_the_other_way_which_is_told_and_not_changed(tmp_path: Path) -> None:
     time = np.arange(50) / 30
     curve = 40 + 20 * np.sin(5 * time)

@@ -70,10 +70,12 @@ def test_right_cameras_give_the_very_points(track: Track, recording: Recording, 
         assert rows[f"knee_flexion_{side}"]["rms_without_offset_deg"] < 1.0
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_a_turned_camera_gives_others(track: Track, recording: Recording, tmp_path: Path) -> None:
     assert apart(evaluated(track, recording, recording.cameras, tmp_path), track) > 0.005
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_a_point_that_one_camera_mistakes_is_where_the_others_see_it(
     track: Track, recording: Recording, tmp_path: Path
 ) -> None:

@@ -104,6 +104,7 @@ def moved(places: np.ndarray) -> tuple[np.ndarray, Rotation, np.ndarray]:
     return turn.apply(places.reshape(-1, 3)).reshape(places.shape) + shift, turn, shift
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_two_rigs_are_brought_together_by_common_points(own: Ours, tmp_path: Path) -> None:
     read(tmp_path, moved(PLACES)[0])
     wand = np.random.default_rng(0).uniform(-1, 1, (20, 3))
@@ -136,6 +137,7 @@ def test_without_common_points_joint_centres_do(own: Ours, tmp_path: Path) -> No
     assert np.linalg.norm(knee - own.stick.places[:, own.stick.names.index("knee_l")], axis=1).max() < 0.03
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_the_stick_model_has_the_times_of_the_track(own: Ours, tmp_path: Path) -> None:
     read(tmp_path, moved(PLACES)[0])
     columns, raw = ({name: values[10:] for name, values in part.items()} for part in (own.columns, own.raw))
@@ -144,6 +146,7 @@ def test_the_stick_model_has_the_times_of_the_track(own: Ours, tmp_path: Path) -
     np.testing.assert_allclose(markers.read_trc(tmp_path / layout.STICK)[2], columns["time"], atol=1e-6)
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_the_stick_model_keeps_its_lengths(own: Ours, tmp_path: Path) -> None:
     loose = PLACES + np.random.default_rng(0).normal(scale=0.005, size=PLACES.shape)
     read(tmp_path, loose)
@@ -157,6 +160,7 @@ def test_the_stick_model_keeps_its_lengths(own: Ours, tmp_path: Path) -> None:
         assert length[0] == pytest.approx(body, abs=0.003)
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_a_faster_marker_system_that_started_later(own: Ours, tmp_path: Path) -> None:
     """Markers at 100 per second from 0.2 s on are met at our times; a lag of 2 frames is found and not applied."""
     time = np.arange(0, 59 / RATE, 0.01)
