@@ -9,7 +9,7 @@ from mocapflow_sequence import layout, tables
 from typer.testing import CliRunner
 
 from mocapflow import cli, registry, runner
-from mocapflow.commands import results
+from mocapflow.commands import pictures, results
 from mocapflow.commands.again import FILE, Invocation, remember
 from mocapflow.commands.progress import reporter
 from mocapflow.locks import myself
@@ -321,7 +321,8 @@ def test_a_garment_is_drawn(call, garment):
 
 
 @pytest.mark.parametrize("out", ["nowhere/skirt.png", "skirt.doc"])
-def test_a_picture_that_can_not_be_written(call, out):
+def test_a_picture_that_can_not_be_written(call, monkeypatch, out):
+    monkeypatch.setattr(pictures, "poster", lambda *_: np.zeros((8, 8, 3), np.uint8))  # which takes two seconds to draw
     shown = call("show", "garment", "skirt", "--out", out)
     assert shown.exit_code == 1
     assert f"error: {out}  the picture can't be written" in shown.stderr
