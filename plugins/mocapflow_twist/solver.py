@@ -70,7 +70,7 @@ class TwistGaussNewton(PoseSolver):
         anchor = Anchor(calmed(guess, model), self._precision(model, guess))
         surface, damping = model.surface(guess.pose, guess.cloth), self._least_damping(past, turn)
         tried: dict[Pose, Sequence[Residual]] = {}
-        found: Quadratic | None = None  # the quadratic models at the guess, once they are known
+        found: Quadratic | None = None  # the last quadratic models, for the covariance
         for _ in range(self.iterations if past.moments else max(self.iterations, self.first_iterations)):
             problem, found = Problem(model, self._data(match(surface), model), priors, past, anchor, tried), None
             if problem.data.measurements == 0:
@@ -78,8 +78,7 @@ class TwistGaussNewton(PoseSolver):
             before = guess
             for _ in range(self.steps_per_match):
                 found = quadratic(problem, guess, motion)
-                stepped, damping = self._descend(problem, guess, found.total, motion, damping)
-                guess, found = stepped, found if stepped is guess else None
+                guess, damping = self._descend(problem, guess, found.total, motion, damping)
                 damping = max(damping, self._least_damping(past, turn))
             if guess is before:
                 break
