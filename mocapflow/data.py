@@ -180,6 +180,7 @@ class Estimate:
     covariance: F64 = array("S", "S", unit="of (omega, v, angles, parameters)")
     observed: F64 = array("D", unit="1, share of the priors' variance of each angle that the images took away")
     energies: Mapping[str, float] = field(default_factory=dict)
+    matches: Matches | None = None  # what its last step explains; None: the solver does not say
 
 
 def unseen(observed: F64) -> Bool:

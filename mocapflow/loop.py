@@ -16,7 +16,6 @@ from mocapflow.geometry import silhouettes
 from mocapflow.geometry.cameras import project
 from mocapflow.geometry.contours import at_nearest
 from mocapflow.model import ClothedModel
-from mocapflow.once import once
 from mocapflow.records import F64, record
 from mocapflow.rest import Shown, Steady, measure_change
 from mocapflow.scene import Scene
@@ -53,7 +52,7 @@ def settle(
         turn = Turn(index=index, cap=turn.cap, change=turn.change)
         segmentation = steps.segmenter.segment(frame, state, past, model.scene, turn)
         watch.lap("segment")
-        match = once(partial(pool_matches, steps.matchers, frame, segmentation, past, model.scene, turn))
+        match = partial(pool_matches, steps.matchers, frame, segmentation, past, model.scene, turn)
         estimate = steps.pose_solver.solve(match, state, model, steps.priors, past, turn)
         watch.lap("solve")
         fitter = steps.cloth_fitter
@@ -61,7 +60,8 @@ def settle(
         estimate, cloth = functional.step(state, segmentation, estimate, cloth, steady.halvings)
         watch.lap("cloth")
         surface = model.surface(estimate.pose, cloth)
-        state = FrameState(segmentation=segmentation, matches=match(surface), estimate=estimate, cloth=cloth)
+        matches = match(surface) if estimate.matches is None else estimate.matches
+        state = FrameState(segmentation=segmentation, matches=matches, estimate=estimate, cloth=cloth)
         energy[index] = functional.values(state, surface)
         now = Shown(estimate.pose, surface)
         change, swing = (measure_change(old, now, estimate.covariance) for old in (last, before_last))

@@ -72,7 +72,8 @@ class TwistGaussNewton(PoseSolver):
         tried: dict[Pose, Sequence[Residual]] = {}
         found: Quadratic | None = None  # the last quadratic models, for the covariance
         for _ in range(self.iterations if past.moments else max(self.iterations, self.first_iterations)):
-            problem, found = Problem(model, self._data(match(surface), model), priors, past, anchor, tried), None
+            matches, found = match(surface), None
+            problem = Problem(model, self._data(matches, model), priors, past, anchor, tried)
             if problem.data.measurements == 0:
                 break
             before = guess
@@ -83,7 +84,7 @@ class TwistGaussNewton(PoseSolver):
             if guess is before:
                 break
             surface = model.surface(guess.pose, guess.cloth)
-        return self._estimate(problem, guess, found or quadratic(problem, guess, motion))
+        return self._estimate(problem, guess, found or quadratic(problem, guess, motion), matches)
 
     def _data(self, matches: Matches, model: ClothedModel) -> Data:
         """Return the matches as rows, weighted by how many independent measurements they hold."""
@@ -137,7 +138,7 @@ class TwistGaussNewton(PoseSolver):
             damping = max(RAISED * damping, 1e-6)
         return guess, damping
 
-    def _estimate(self, problem: Problem, guess: Guess, found: Quadratic) -> Estimate:
+    def _estimate(self, problem: Problem, guess: Guess, found: Quadratic, matches: Matches) -> Estimate:
         data, prior = found
         about_root = covariance(data.hessian, prior.hessian, data.energy, problem.data.measurements)
         to_origin = solve.about_origin(problem.centre(guess), problem.unknowns)
@@ -147,6 +148,7 @@ class TwistGaussNewton(PoseSolver):
             covariance=to_origin @ about_root @ to_origin.T,
             observed=observed(about_root, prior.hessian)[6 : 6 + len(guess.pose.angles)],
             energies=problem.energies(guess),
+            matches=matches,
         )
 
 
