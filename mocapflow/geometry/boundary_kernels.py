@@ -7,6 +7,8 @@ import math
 import numba
 import numpy as np
 
+LANES = 8  # pixels in a vector
+
 
 @numba.njit(cache=True)
 def sample(ends, edges, vertices, images, points, normals, cloth, matrix, size, spacing):  # type: ignore[no-untyped-def]
@@ -128,7 +130,8 @@ def _lower_to_segments(ends, left, top, band, square):  # type: ignore[no-untype
         first = max(math.ceil(min(ay, by) - band), 0)
         last = min(math.floor(max(ay, by) + band) + 1, square.shape[0])
         begin = max(math.ceil(min(ax, bx) - band), 0)
-        end = min(math.floor(max(ax, bx) + band) + 1, square.shape[1])
+        # whole vectors of pixels: a remainder would cost as much as two more
+        end = min(begin + -(-(math.floor(max(ax, bx) + band) + 1 - begin) // LANES) * LANES, square.shape[1])
         for row in range(first, last):
             line, place = square[row, begin:end], columns[begin:end]
             py = np.float32(row) - my
@@ -138,7 +141,7 @@ def _lower_to_segments(ends, left, top, band, square):  # type: ignore[no-untype
                 beyond = beyond if beyond > zero else zero
                 off = across - place[k] * uy
                 d = off * off + beyond * beyond
-                line[k] = d if d < line[k] else line[k]
+                line[k] = (d if d < line[k] else line[k]) + zero  # else a masked store: slow on some machines
 
 
 @numba.njit(cache=True)

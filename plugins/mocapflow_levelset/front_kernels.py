@@ -56,15 +56,15 @@ def log_ratio(runs, values, weight, outside, known, gaussians, cell, first, clip
             stretch(gaussians[i, :, 0], gaussians[below, :, 0], fy, j0, j1, start, scale, values, n, inside[: stop - x])
             if known:
                 for k in range(stop - x):
-                    inside[k] = max(inside[k], -clip)
                     beyond[k] = outside[n + k]
             else:
                 stretch(
                     gaussians[i, :, 1], gaussians[below, :, 1], fy, j0, j1, start, scale, values, n, beyond[: stop - x]
                 )
             counts, ratio = weight[y, x:stop], out[y, x:stop]
+            least = -clip if known else -np.float32(np.inf)  # of the person's density, beside a known room
             for k in range(ratio.size):
-                ratio[k] = counts[k] * min(max(inside[k] - beyond[k], -clip), clip)
+                ratio[k] = counts[k] * min(max(max(inside[k], least) - beyond[k], -clip), clip)
             n += stop - x
             x = stop
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from mocapflow.geometry.contours import WORD, find_crossed
 from mocapflow.records import F32
 
 LANES = 8  # pixels in a vector
@@ -33,16 +34,20 @@ def _redistance(level, band, out):  # type: ignore[no-untyped-def]
     out[:] = far
     reach = int(np.ceil(band))
     points = np.empty((4, 2), np.float32)
+    crossed = np.zeros(width // WORD + 1, np.uint64)
+    cells = crossed.view(np.uint8)
     for y in range(height - 1):
-        for x in range(width - 1):
-            a, b, c, d = level[y, x], level[y, x + 1], level[y + 1, x + 1], level[y + 1, x]
-            inside = (a > 0) + (b > 0) + (c > 0) + (d > 0)
-            if inside in (0, 4):
+        find_crossed(level[y], level[y + 1], cells)
+        for word in range(crossed.size):
+            if crossed[word] == 0:
                 continue
-            count = _crossings(a, b, c, d, np.float32(x), np.float32(y), points)
-            _stamp(out, points, 0, 1, x, y, reach)
-            if count == 4:
-                _stamp(out, points, 2, 3, x, y, reach)
+            for x in range(word * WORD, (word + 1) * WORD):
+                if cells[x]:
+                    a, b, c, d = level[y, x], level[y, x + 1], level[y + 1, x + 1], level[y + 1, x]
+                    count = _crossings(a, b, c, d, np.float32(x), np.float32(y), points)
+                    _stamp(out, points, 0, 1, x, y, reach)
+                    if count == 4:
+                        _stamp(out, points, 2, 3, x, y, reach)
     for y in range(height):
         for x in range(width):
             distance = np.sqrt(min(out[y, x], far))
@@ -104,4 +109,4 @@ def _stamp(out, points, i, j, x, y, reach):  # type: ignore[no-untyped-def]
             beyond = beyond if beyond > zero else zero
             across = first_across - place * uy
             squared = across * across + beyond * beyond
-            line[k] = squared if squared < line[k] else line[k]
+            line[k] = (squared if squared < line[k] else line[k]) + zero  # else a masked store: slow on some machines
