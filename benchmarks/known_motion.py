@@ -35,6 +35,7 @@ SOFTNESS_PX, NOISE = 0.7, 3.0
 PURPLE = ((0.60, 0.40, 0.70), (0.32, 0.16, 0.42))  # of the stripes
 GREY = ((0.45, 0.46, 0.50), (0.12, 0.13, 0.16))
 GREEN = ((0.35, 0.62, 0.40), (0.10, 0.28, 0.16))
+DARK = ((0.06, 0.06, 0.08), (0.06, 0.06, 0.08))  # plain
 SKIN, HAIR, UNDERWEAR = (0.56, 0.33, 0.21), (0.05, 0.035, 0.03), (0.10, 0.10, 0.12)
 SHIRT, SOCKS = {"A": (0.16, 0.33, 0.60), "B": (0.55, 0.10, 0.10)}, {"A": (0.80, 0.80, 0.80), "B": (0.03, 0.03, 0.035)}
 RECORDINGS, OWNER = {"A": "walk_skirt", "B": "kneeup_shorts"}, {"skirt": "A", "shorts": "B"}
@@ -69,6 +70,7 @@ TAKES = {
     "kick_B_skirt": Take("B", "skirt", "kick_B", 12, PURPLE, start=120, frames=40),
     "walk_B_shorts": Take("B", "shorts", "walk_B", 13, PURPLE, start=200, frames=40),
     "legcross_B_skirt": Take("B", "skirt", "legcross_B", 14, GREEN, start=60, frames=40),
+    "kneeup_B_dark": Take("B", "skirt", "kneeup_B", 21, DARK, start=200, frames=40),
 }
 
 
