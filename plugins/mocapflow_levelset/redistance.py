@@ -9,10 +9,9 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from mocapflow.geometry.boundary_kernels import LANES
 from mocapflow.geometry.contours import WORD, find_crossed
 from mocapflow.records import F32
-
-LANES = 8  # pixels in a vector
 
 
 def redistance(level: F32, band_px: float) -> F32:
