@@ -2,26 +2,32 @@
 
 from pathlib import Path
 
+import mocapflow_levelset
 import pytest
 
 from mocapflow.digests import Digests
 
-CODE = Digests()  # of this process
-
 
 @pytest.fixture(scope="session", autouse=True)
-def code_is_read_once():
-    """Let new stores know the digests of code that others have read: reading it all takes a second for each.
+def code_is_known():
+    """Let every store begin with what is known of the code, as in a second run: reading it all takes a second.
 
-    What has no memory of its own, as in the tests of digests, reads for itself.
+    Size and time of change are looked at as ever; what has no memory of its own, as in the tests of keys, reads for
+    itself.
     """
+    code, plugins = Digests(), Path(mocapflow_levelset.__file__).parents[1]
+    code.core()
+    for package in plugins.glob("mocapflow_*"):
+        code.package(package.name)
 
-    def source(self: Digests, path: Path) -> tuple[str, list[str]]:
-        return real(self if self._memory is None else CODE, path)
+    def begin(self: Digests, memory: Path | None = None) -> None:
+        real(self, memory)
+        if memory is not None:
+            self._known = {**code._known, **self._known}
 
-    real = Digests._source
+    real = Digests.__init__
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Digests, "_source", source)
+        patch.setattr(Digests, "__init__", begin)
         yield
 
 

@@ -1,11 +1,13 @@
 """The loop with stub steps: it converges, it oscillates, it runs into its cap."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mocapflow.assets import Camera
 from mocapflow.components import PoseSolver
-from mocapflow.data import NO_CLOTH, Estimate, Frame, Moment, Past, Pose
+from mocapflow.data import NO_CLOTH, Estimate, Frame, Moment, Past, Pose, empty_matches
 from mocapflow.geometry.kinematics import chain, skin
 from mocapflow.loop import Steps, settle
 from mocapflow.model import ClothedModel
@@ -70,6 +72,13 @@ def test_what_the_pose_is_not_known_to_is_rest(frame):
     assert (result.steady, result.iterations) == (True, 3)  # a turn away from the prediction, then two calm ones
     assert result.change.sigmas == pytest.approx(0.05 * 0.95**2 * 0.5 / np.sqrt(8))  # of two angles among 8 unknowns
     assert go(frame, 0.05, sigmas=0.01).iterations == 8  # the first frame starts anywhere, and takes its time
+
+
+def test_the_matches_kept_are_those_that_the_solver_explains(frame, monkeypatch):
+    solve, said = Towards.solve, empty_matches()
+    assert len(go(frame, 1.0).state.matches.weight)  # where it does not say: those of the surface
+    monkeypatch.setattr(Towards, "solve", lambda self, *given: replace(solve(self, *given), matches=said))
+    assert go(frame, 1.0).state.matches is said
 
 
 def test_the_cap_holds(frame):

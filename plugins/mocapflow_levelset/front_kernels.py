@@ -41,6 +41,7 @@ def log_ratio(runs, values, weight, outside, known, gaussians, cell, first, clip
     """Add the log densities channel by channel along stretches between two cell centres."""
     rows, columns, _, entries = gaussians.shape
     zero, scale = np.float32(0), np.float32(1 / cell)
+    least = -clip if known else -np.float32(np.inf)  # of the person's density, beside a known room
     inside, beyond = np.empty(weight.shape[1], np.float32), np.empty(weight.shape[1], np.float32)
     n = 0
     for r in range(len(runs)):
@@ -62,7 +63,6 @@ def log_ratio(runs, values, weight, outside, known, gaussians, cell, first, clip
                     gaussians[i, :, 1], gaussians[below, :, 1], fy, j0, j1, start, scale, values, n, beyond[: stop - x]
                 )
             counts, ratio = weight[y, x:stop], out[y, x:stop]
-            least = -clip if known else -np.float32(np.inf)  # of the person's density, beside a known room
             for k in range(ratio.size):
                 ratio[k] = counts[k] * min(max(max(inside[k], least) - beyond[k], -clip), clip)
             n += stop - x
