@@ -8,8 +8,10 @@ from filecmp import cmp
 from functools import partial
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 from mocapflow.assets import Camera
+from mocapflow.components import Garment
 from mocapflow.errors import MocapflowError, UnknownComponent
 from mocapflow.io import agreement, folders
 from mocapflow.io.cameras import find_calibration, read_cameras
@@ -21,8 +23,8 @@ from mocapflow.io.plates import background
 from mocapflow.io.rigs import examine_rig, examine_view
 from mocapflow.io.subjects import examine_subject
 from mocapflow.io.video import Video, lost_frames, name_frames, open_video
-from mocapflow.measures import recorded_garment
-from mocapflow.registry import load_registry
+from mocapflow.measures import FILE, recorded_garment
+from mocapflow.registry import Registry, load_registry
 from mocapflow.synchrony import measure
 
 __all__ = ["Finding", "examine", "examine_timing"]
@@ -81,14 +83,30 @@ def examine_timing(folder: Path, write: bool = False) -> list[Finding]:
 
 
 def _garment(folder: Path) -> list[Finding]:
-    """Return what keeps the garment that the recording describes from being sewn."""
+    """Return what keeps the garment that the recording describes from being sewn, or what was mended at it."""
+    registry = load_registry()
     try:
-        recorded_garment(folder, load_registry())
+        garment = recorded_garment(folder, registry)
+        return [] if garment is None else _sewn(garment, folder, registry)
     except UnknownComponent as problem:  # its plugin may be on another machine
         return [warning(problem.message, problem.hint, problem.where)]
     except MocapflowError as problem:
-        return [error(problem.message, problem.hint, problem.where)]
-    return []
+        return [error(problem.message, problem.hint, problem.where or folder / FILE)]
+
+
+def _sewn(garment: Garment, folder: Path, registry: Registry) -> list[Finding]:
+    """Return what was mended when a garment was sewn to the scanned person.
+
+    Raises:
+        GarmentError: it can't be sewn.
+    """
+    scanned: Any = registry.get("body", "scanned")
+    try:
+        body = scanned().load(folder)
+    except MocapflowError:  # told of with the subject
+        return []
+    mesh = garment.sew(body)
+    return [warning(f"{mesh.name}: {said}", where=folder / FILE) for said in mesh.repairs]
 
 
 def _start(folder: Path, calibration: Path) -> list[Finding]:

@@ -24,6 +24,7 @@ from mocapflow.results import RunFolder
 from mocapflow.rows import Corrupted
 from mocapflow.scene import Scene
 from mocapflow.store import Artifact, Report, Store, remove, versions, with_versions
+from mocapflow.warned import warnings_logged
 from mocapflow.wiring import Source
 
 Value = TypeVar("Value")
@@ -105,7 +106,8 @@ class Execution:
 
     def _whole(self, step: Step) -> Any:
         value = self._run(step)
-        self._store.save(self._store.begin(step.label, step.key, step.recipe), value)
+        begun = self._store.begin(step.label, step.key, step.recipe)
+        self._store.save(begun, value, warnings=self.entries[step.label]["warnings"])
         return value
 
     def _chain(self, step: Step, started: Artifact | None, lock: Lock) -> Any:
@@ -140,8 +142,9 @@ class Execution:
         self._report(f"{step.label}: running {step.named.stage.name}")
         cpu, wall = time.process_time(), time.perf_counter()
         kept = (lambda: checkpoint.kept) if checkpoint else str
-        value = self._blaming(step.named.stage, lambda: step.named.stage.run(**inputs), kept)
-        self._entered(step, None, time.process_time() - cpu, time.perf_counter() - wall)
+        with warnings_logged() as said:
+            value = self._blaming(step.named.stage, lambda: step.named.stage.run(**inputs), kept)
+        self._entered(step, None, time.process_time() - cpu, time.perf_counter() - wall, said)
         return value
 
     def _input(self, step: Step, source: Source, checkpoint: Checkpoint | None) -> Any:
@@ -191,13 +194,18 @@ class Execution:
                 raise
             raise failure(error, component, self._pipeline.registry, kept(), self._out / "failed.log") from error
 
-    def _entered(self, step: Step, found: Artifact | None, cpu: float = 0.0, wall: float = 0.0) -> None:
+    def _entered(
+        self, step: Step, found: Artifact | None, cpu: float = 0.0, wall: float = 0.0, said: Sequence[str] = ()
+    ) -> None:
         if found is not None and step.label in self.entries:
             return
         if found is not None:
             self._report(f"{step.label}: from the store")
             self._warn_of_versions(step, found)
-        entry = {"label": step.label, "key": step.key, "cached": found is not None}
+            said = found.warnings
+            for warning in said:
+                self._report(f"warning: {warning}")
+        entry = {"label": step.label, "key": step.key, "cached": found is not None, "warnings": list(said)}
         self.entries[step.label] = {**entry, "seconds": cpu, "wall_seconds": wall}
         self._pipeline.registry.observers.stage_done(step.label, step.key, found is not None)
 

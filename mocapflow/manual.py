@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator
 from pydantic import BaseModel
 
 from mocapflow.describe import Setting, settings
+from mocapflow.errors import UnknownComponent, alternatives
 from mocapflow.experiment import ExperimentFile
 from mocapflow.pipeline import PipelineFile
 from mocapflow.registry import PROVIDERS, Registry
@@ -27,15 +28,22 @@ def manual(registry: Registry, distribution: str) -> str:
     Args:
         registry: whose components.
         distribution: only those of this package; empty: all.
+
+    Raises:
+        UnknownComponent: no component comes from such a package.
     """
+    provided = {role: [c for _, found in sorted(registry.provided(role).items()) for c in found] for role in PROVIDERS}
+    packages = {registry.origin(cls).distribution for classes in provided.values() for cls in classes}
+    if distribution not in {"", *packages}:
+        hint = alternatives(distribution, packages)
+        raise UnknownComponent(f"no component comes from a package '{distribution}'", hint=hint)
     lines = [INTRODUCTION]
     for file in (PipelineFile, ExperimentFile):
         lines += _entry(f"## {file.name}", file)
-    for role, (_, base) in PROVIDERS.items():
-        provided = [cls for _, classes in sorted(registry.provided(role).items()) for cls in classes]
-        chosen = [cls for cls in provided if distribution in {"", registry.origin(cls).distribution}]
+    for role, classes in provided.items():
+        chosen = [cls for cls in classes if distribution in {"", registry.origin(cls).distribution}]
         if chosen:
-            lines += [f"## {role}", "", _first_paragraph(base), ""]
+            lines += [f"## {role}", "", _first_paragraph(PROVIDERS[role][1]), ""]
         for cls in chosen:
             lines += _entry(f"### {cls.name}", cls, f" From {registry.origin(cls)}.")
     return "\n".join(lines)

@@ -11,7 +11,7 @@ import importlib.metadata
 import platform
 import shutil
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
@@ -55,6 +55,11 @@ class Artifact:
     def frames(self) -> int:
         """How many frames are committed; 0 for a result that is no chain of frames."""
         return int(self.attributes.get("frames_done", 0))
+
+    @property
+    def warnings(self) -> list[str]:
+        """What was warned of while it was made."""
+        return [str(said) for said in self.attributes.get("warnings", [])]
 
     @property
     def made_with(self) -> list[tuple[int, dict[str, str]]]:
@@ -137,8 +142,8 @@ class Store:
         for old in self._groups(f"*-{key[:SHORT]}"):
             remove(old)
 
-    def save(self, artifact: Artifact, value: Any) -> Artifact:
-        """Write a record into an artifact and finish it.
+    def save(self, artifact: Artifact, value: Any, warnings: Sequence[str] = ()) -> Artifact:
+        """Write a record into an artifact, with what was said while it was made, and finish it.
 
         Raises:
             StoreError: the store is full or can't be written.
@@ -151,7 +156,7 @@ class Store:
             group = zarr.open_group(str(artifact.path), mode="r+")
             save_record(group, value)
             flush_all(artifact.path)
-            group.update_attributes({"complete": True})
+            group.update_attributes({"complete": True, "warnings": list(warnings)})
         return reread(artifact)
 
     def load(self, artifact: Artifact, frames: int | None = None) -> Any:

@@ -257,7 +257,9 @@ def test_a_plugin_that_does_not_load_is_told(call, tmp_path, monkeypatch, comman
 def test_settings(call):
     said = call("settings", "mocapflow").stdout
     assert "| `steady.turns` | `int (> 0)` | `2` | | in a row within both tolerances" in said
-    assert "### contour_icp" not in call("settings", "someone-elses").stdout
+    other = call("settings", "mocapflo")
+    assert (other.exit_code, other.stdout) == (2, "")
+    assert "available: mocapflow — did you mean 'mocapflow'?" in other.stderr
 
 
 def test_show(call):

@@ -37,16 +37,17 @@ SHORTS = dict(
 
 @pytest.fixture
 def good(tmp_path):
-    """A good recording of a person who is a box, to be damaged."""
+    """A good recording of a person of three boxes in shorts, to be damaged."""
     subject = write_recording(tmp_path, frames=3) / "subject"
     subject.mkdir()
-    corners = np.array([[x, y, z] for x in (-0.2, 0.2) for y in (-0.1, 0.1) for z in (0.0, 1.8)])
-    faces = np.array([[a, b, c] for a in range(6) for b, c in [(a + 1, a + 2)]], np.int32)
+    trunk, *legs = ((-0.13, 0.13), (0.8, 1.8)), ((-0.13, -0.03), (0.0, 0.8)), ((0.03, 0.13), (0.0, 0.8))
+    corners = np.array([[x, y, z] for wide, high in (trunk, *legs) for x in wide for y in (-0.08, 0.08) for z in high])
+    faces = np.array([[a, a + 1, a + 2] for box in (0, 8, 16) for a in range(box, box + 6)], np.int32)
     rows = [f"v {x} {y} {z}\n" for x, y, z in corners] + [f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in faces]
     (subject / "body.obj").write_text("".join(rows))
     joints = [{"name": name, "parent": parent, "position": position(name)} for name, parent in CHAIN.items()]
     (subject / "skeleton.json").write_text(json.dumps({"joints": joints}))
-    np.savez(subject / "weights.npz", weights=np.full((8, len(CHAIN)), 0.25), names=list(CHAIN))
+    np.savez(subject / "weights.npz", weights=np.full((len(corners), len(CHAIN)), 0.25), names=list(CHAIN))
     (subject / "garment.json").write_text(json.dumps(SHORTS))
     pose = {"root_rotation": [0, 0, 0.1], "root_translation": [0, 0, 1], "joint_rotations": {"knee_l": [0.1, 0, 0]}}
     (tmp_path / "init.json").write_text(json.dumps(pose))
@@ -274,6 +275,19 @@ def test_garment(good, change, message, hint):
     assert finding.message.startswith(message)
     assert finding.hint.startswith(hint)
     assert "garment.json" in finding.where
+
+
+def test_a_garment_that_can_not_be_sewn(good):
+    edit(good / "subject" / "garment.json", lambda g: g.update(waist_circumference=0.5))
+    (finding,) = examine(good)
+    assert finding.severity == "error" and "garment.json" in finding.where
+    assert finding.message == "shorts: waist_circumference_m is 0.50 m, but the body measures 0.84 m there"
+
+
+def test_a_garment_that_is_mended(good):
+    edit(good / "subject" / "garment.json", lambda g: g.update(leg_opening_circumference=0.45))
+    (finding,) = examine(good)
+    assert finding.severity == "warning" and finding.message.startswith("shorts: leg_opening_circumference_m")
 
 
 @pytest.mark.parametrize(

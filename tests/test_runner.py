@@ -99,9 +99,22 @@ def test_later_stages_know_how_the_earlier_ones_were_made(tmp_path, path):
     recipe = json.loads((tmp_path / "out" / "results.json").read_text())["recipe"]
     assert list(recipe["stages"]) == ["background", "start", "track", "smooth"]
     assert recipe["stages"]["track"]["cached"] is True
-    assert set(recipe["stages"]["track"]) == {"label", "key", "cached", "seconds", "wall_seconds"}
+    assert set(recipe["stages"]["track"]) == {"label", "key", "cached", "seconds", "wall_seconds", "warnings"}
     assert recipe["versions"]["numpy"] == np.__version__
     assert recipe["settings"]["track"]["settings"]["segmenter"]["settings"]["sigma_px"] == "2.0"
+
+
+def test_what_a_stage_warned_of_is_told_again_when_it_comes_from_the_store(tmp_path, path, caplog):
+    far, said = "stages.start={use: tiny_start, angle_rad: 1.5}", "the first pose bends far"
+    run_tiny(path, tmp_path, far)
+    assert caplog.messages == [said]
+    for _ in range(2):
+        recipe = json.loads((tmp_path / "out" / "results.json").read_text())["recipe"]
+        assert {label: entry["warnings"] for label, entry in recipe["stages"].items() if entry["warnings"]} == {
+            "start": [said]
+        }
+        _, lines = run_tiny(path, tmp_path, far)
+        assert f"warning: {said}" in lines
 
 
 def test_a_body_made_by_a_stage_replaces_the_body_of_later_ones(tmp_path):

@@ -25,7 +25,7 @@ def summary(track: Track, series: AngleSeries, run_folder: RunFolder, warnings: 
     lost, said = lost_rows(track), by_frame(track.notes)
     return {
         "recipe": run_folder.recipe,
-        "warnings": list(warnings),
+        "warnings": [*warnings, *said_by_stages(run_folder.recipe)],
         "frames": {
             "count": len(track.frame),
             "first": int(track.frame[0]) if len(track.frame) else None,
@@ -45,6 +45,12 @@ def summary(track: Track, series: AngleSeries, run_folder: RunFolder, warnings: 
         "notes": list(track.notes),
         "per_frame": [_frame(track, row, bool(lost[row]), said) for row in range(len(track.frame))],
     }
+
+
+def said_by_stages(recipe: Mapping[str, Any]) -> list[str]:
+    """Return what the stages of a run warned of, each with the label of its stage."""
+    stages = recipe.get("stages", {}).items()
+    return [f"{label}: {warning}" for label, entry in stages for warning in entry.get("warnings", ())]
 
 
 def by_frame(notes: Sequence[str]) -> Mapping[int, list[str]]:

@@ -1,0 +1,27 @@
+"""What a stage warns of while it runs, kept: on the terminal it is gone with the next line."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+
+class _Keeper(logging.Handler):
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.said: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.said.append(record.getMessage())
+
+
+@contextmanager
+def warnings_logged() -> Iterator[list[str]]:
+    """Give a list that fills with what is logged to `mocapflow` as a warning, or worse, meanwhile."""
+    keeper, logger = _Keeper(), logging.getLogger("mocapflow")
+    logger.addHandler(keeper)
+    try:
+        yield keeper.said
+    finally:
+        logger.removeHandler(keeper)
