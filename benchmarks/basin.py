@@ -107,7 +107,7 @@ def error(scene: Scene, truth: Pose, start: Pose, matchers: Sequence[Matcher], r
     steps = Steps(
         segmenter=Given(), matchers=matchers, pose_solver=TwistGaussNewton(iterations=5),
         cloth_fitter=Fixed(), priors=[JointLimits(), RestPose(), SpineCoupling()],
-        steady=Steady(surface_mm=2.0, angle_deg=0.3, min_turns=1, turns=1),
+        steady=Steady(surface_mm=2.0, angle_deg=0.3, turns=1),
     )  # fmt: skip
 
     def settle_from(pose: Pose, parameters: F64) -> FrameResult:

@@ -21,6 +21,7 @@ import numpy.typing as npt
 from mocapflow import packing
 from mocapflow.data import (
     NO_CLOTH,
+    REMEMBERED,
     Cloth,
     Frame,
     FrameResult,
@@ -102,7 +103,7 @@ class Checkpoint:
 
     def past(self) -> Past:
         """Return what the next frame may know of earlier ones, bit by bit as it was."""
-        rows = range(max(0, self.done - 2), self.done)
+        rows = range(max(0, self.done - REMEMBERED), self.done)
         moments = tuple(self._moment(self._row(row), self._cloth(row)) for row in rows)
         return Past(moments=moments, appearance=self._appearance(self.done - 1) if rows else {})
 

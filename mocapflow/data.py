@@ -20,6 +20,7 @@ import numpy as np
 from mocapflow.records import F32, F64, I16, I32, U8, Bool, array, record
 
 BODY, CLOTH = 0, 1  # values of Surface.layer
+REMEMBERED = 3  # frames that later ones may know: a pose, its velocity, its acceleration
 BORDER = 3  # px along the image border where a silhouette is cut, not occluding
 
 
@@ -261,18 +262,18 @@ class Moment:
 
 @record
 class Past:
-    """Everything a frame may know of earlier frames: the last two, latest last, and the last appearance."""
+    """Everything a frame may know of earlier frames: the last three, latest last, and the last appearance."""
 
     moments: tuple[Moment, ...] = ()
     appearance: Mapping[str, F64] = field(default_factory=dict)
 
     def after(self, moment: Moment, appearance: Mapping[str, F64]) -> Past:
         """Return the past one frame later."""
-        return Past(moments=(*self.moments, moment)[-2:], appearance=appearance)
+        return Past(moments=(*self.moments, moment)[-REMEMBERED:], appearance=appearance)
 
     def believable(self) -> Past:
-        """Return the past, without moments where none of them shows the person: the next frame begins like a first."""
-        return Past(appearance=self.appearance) if all(moment.blind for moment in self.moments) else self
+        """Return the past, without moments where the last two do not show the person: the next begins like a first."""
+        return Past(appearance=self.appearance) if all(moment.blind for moment in self.moments[-2:]) else self
 
 
 @record

@@ -44,7 +44,7 @@ def settle(
     functional, watch = Functional(model, steps.priors, past), Stopwatch()
     steady = steps.steady
     if not past.moments:
-        steady = steady.model_copy(update={"sigmas": 0.0})  # the start may be far off
+        steady = steady.model_copy(update={"sigmas": ()})  # the start may be far off
     calm, turn = 0, Turn(index=0, cap=steady.max_turns)
     last = before_last = Shown(state.estimate.pose, model.surface(state.estimate.pose, state.cloth))
     energy = np.full((steady.max_turns, len(functional.terms)), np.nan)

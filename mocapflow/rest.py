@@ -18,17 +18,17 @@ class Steady(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
     surface_mm: PositiveFloat = 0.5  # largest move of a body vertex from turn to turn, RMS move of the cloth
     angle_deg: PositiveFloat = 0.1  # largest change of a joint angle
-    sigmas: NonNegativeFloat = 0.0  # of the pose, in the mean: a turn that moves it less is rest too,
-    min_turns: PositiveInt = 2  # from this turn on, and not in the first frame; the first moves it from a prediction
+    sigmas: tuple[NonNegativeFloat, ...] = ()  # by turn, then as the last: one that moves the pose less is rest too
     turns: PositiveInt = 2  # in a row within both tolerances, then the frame is at rest
     max_turns: PositiveInt = 8  # then the frame is left as it is
     halvings: NonNegativeInt = 0  # at most, of a step that raises the functional; 0: it is taken whole
 
     def holds(self, change: Change, turns: int) -> bool:
-        """True where a change is within both tolerances, or after so many turns less than the pose is known to."""
+        """True where a change is within both tolerances, or less than the pose is known to."""
         near = max(change.body, change.cloth) <= self.surface_mm / 1000
         exact = near and change.angles <= float(np.radians(self.angle_deg))
-        return exact or (turns >= self.min_turns and change.sigmas <= self.sigmas)
+        known = self.sigmas[min(turns, len(self.sigmas)) - 1] if self.sigmas else 0.0
+        return exact or change.sigmas < known
 
 
 class Shown(NamedTuple):

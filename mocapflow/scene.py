@@ -79,13 +79,26 @@ class Scene:
     @cached_property
     def near_garment(self) -> Bool:
         """Which body vertices (V,) a garment covers or ends close to, by the rest pose."""
+        return np.asarray(self._garment_at >= 0)
+
+    @cached_property
+    def covered(self) -> Bool:
+        """Which body vertices (V,) lie under a garment in the rest pose, not beyond its borders."""
         if self.garment is None:
-            return np.zeros(len(self.body.vertices), bool)
+            return self.near_garment
+        strands, border = self.garment.strands, np.zeros(len(self.garment.vertices), bool)
+        border[strands[:, 0]] = border[strands[np.arange(len(strands)), (strands >= 0).sum(axis=1) - 1]] = True
+        return self.near_garment & ~border[self._garment_at]
+
+    @cached_property
+    def _garment_at(self) -> I32:
+        """The garment vertex nearest to each body vertex (V,) at rest; -1: none is near."""
+        if self.garment is None:
+            return np.full(len(self.body.vertices), -1, np.int32)
         from scipy.spatial import cKDTree
 
-        away, _ = cKDTree(self.garment.vertices).query(self.body.vertices, distance_upper_bound=HEM_REACH)
-        near: Bool = np.isfinite(away)
-        return near
+        away, nearest = cKDTree(self.garment.vertices).query(self.body.vertices, distance_upper_bound=HEM_REACH)
+        return np.where(np.isfinite(away), nearest, -1).astype(np.int32)
 
     @cached_property
     def undressed(self) -> Scene:

@@ -7,7 +7,7 @@ import pytest
 
 from mocapflow.assets import Camera
 from mocapflow.components import PoseSolver
-from mocapflow.data import NO_CLOTH, Estimate, Frame, Moment, Past, Pose, empty_matches
+from mocapflow.data import NO_CLOTH, Change, Estimate, Frame, Moment, Past, Pose, empty_matches
 from mocapflow.geometry.kinematics import chain, skin
 from mocapflow.loop import Steps, settle
 from mocapflow.model import ClothedModel
@@ -36,7 +36,7 @@ def frame():
     return Frame(index=5, time=0.1, images=(image, image), usable=np.ones(2, bool))
 
 
-def go(frame, share, observe=lambda *_: None, max_turns=8, sigmas=0.0, past=None):
+def go(frame, share, observe=lambda *_: None, max_turns=8, sigmas=(), past=None):
     camera = Camera(
         name="cam01", size=np.array([24, 16], np.int32), intrinsics=np.eye(3), distortion=np.zeros(5),
         camera_from_world=np.eye(4),
@@ -68,10 +68,17 @@ def test_a_swing_between_two_states_is_told_from_creeping(frame):
 
 def test_what_the_pose_is_not_known_to_is_rest(frame):
     before = Past(moments=(Moment(time=0.0, pose=Pose(root=np.eye(4), angles=np.zeros(2)), cloth=NO_CLOTH),))
-    result = go(frame, 0.05, sigmas=0.01, past=before)  # the stub says that angles are known to 1 rad
+    result = go(frame, 0.05, sigmas=(0, 0.01), past=before)  # the stub says that angles are known to 1 rad
     assert (result.steady, result.iterations) == (True, 3)  # a turn away from the prediction, then two calm ones
     assert result.change.sigmas == pytest.approx(0.05 * 0.95**2 * 0.5 / np.sqrt(8))  # of two angles among 8 unknowns
-    assert go(frame, 0.05, sigmas=0.01).iterations == 8  # the first frame starts anywhere, and takes its time
+    assert go(frame, 0.05, sigmas=(0, 0.01)).iterations == 8  # the first frame starts anywhere, and takes its time
+
+
+def test_each_turn_has_its_own_measure_of_rest_and_later_ones_the_last():
+    moved = Change(body=0.1, cloth=0.0, angles=0.1, sigmas=0.5)
+    held = [Steady(sigmas=(0, 0.4, 0.6)).holds(moved, turns) for turns in (1, 2, 3, 4)]
+    assert held == [False, False, True, True]
+    assert not Steady().holds(moved, 8)
 
 
 def test_the_matches_kept_are_those_that_the_solver_explains(frame, monkeypatch):

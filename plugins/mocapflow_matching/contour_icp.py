@@ -59,6 +59,7 @@ class ContourIcp(Matcher):
     calm_mm: PositiveFloat = 15.0  # change of the body in a turn below which reach and loss are the later ones
     first_reach_px: PositiveFloat = 40.0  # pairs farther apart are left out
     later_reach_px: PositiveFloat = 10.0  # the same once it is calm
+    cloth_reach_px: PositiveFloat = float("inf")  # pairs on cloth reach no farther: a hem that swings turns the pelvis
     normal_angle_deg: Annotated[float, Field(gt=0, le=180)] = 60.0  # contours that differ more make no pair
     first_loss: Loss = "huber"  # of a pair by its distance
     later_loss: Loss = "geman_mcclure"  # the same once it is calm
@@ -87,6 +88,10 @@ class ContourIcp(Matcher):
         other = self.described(model.pixel, model.normal, curvature)
         asked, asking = self.direction != "backward", self.direction != "forward"  # the model, by the image; by it
         seen, shown = pairs(one, image.normal, other, model.normal, reach, cosine, asked, asking)
+        if reach > self.cloth_reach_px:
+            away = np.linalg.norm(image.pixel.take(seen, axis=0) - model.pixel.take(shown, axis=0), axis=1)
+            kept = (away <= self.cloth_reach_px) | ~surface.cloth.take(model.vertex.take(shown))
+            seen, shown = seen[kept], shown[kept]
         guard = self.hem_guard_px
         sigma = contour_sigma(model, surface, scene, self.sigma_px, self.cloth_sigma_px_per_m, guard)
         return self.weigh(silhouette.camera, image, model, seen, shown, sigma, turn)

@@ -25,6 +25,9 @@ class InnerContours(Matcher):
     much higher or lower than the tape measure says it sits all around does not count: its pairs are moved by that, to
     where the surface is, and so hold the height of the guess a little. It needs segmenter `layered`, which finds the
     ends of parts once a turn; without it there are no pairs.
+
+    Skin that the garment covers at rest is believed only where its edge is near: where the drape bares a thigh, the
+    true cloth may lie over it, and what looks like its edge is a fold.
     """
 
     name: ClassVar[str] = "inner_contours"
@@ -43,9 +46,16 @@ class InnerContours(Matcher):
         worn = surface.cloth[inner.vertex]
         higher = slipped(away, worn, inner, surface, scene)
         off = np.abs(away - higher) * np.sqrt(inner.weight)
-        loss = robust_weights(off, "geman_mcclure" if turn.calm(self.calm_mm) else "huber", self.scale)
+        late, early = (robust_weights(off, loss, self.scale) for loss in ("geman_mcclure", "huber"))
+        loss = np.where(turn.calm(self.calm_mm) | under_cloth(inner, scene), late, early)
         tell = ~worn if np.count_nonzero(worn) < FEWEST else np.ones(len(worn), bool)
         return replace(inner, pixel=inner.pixel - higher[:, None] * inner.direction, weight=inner.weight * loss * tell)
+
+
+def under_cloth(inner: Matches, scene: Scene) -> Bool:
+    """Return which pairs (M,) are of skin that the garment covers at rest."""
+    skin = inner.vertex < len(scene.covered)
+    return skin & scene.covered.take(np.where(skin, inner.vertex, 0))
 
 
 def slipped(away: F64, worn: Bool, inner: Matches, surface: Surface, scene: Scene) -> F64:

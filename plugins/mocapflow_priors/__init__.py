@@ -23,8 +23,9 @@ def mocapflow_priors() -> list[type[Prior]]:
 @hookimpl
 def mocapflow_predictors() -> list[type[Predictor]]:
     """Return the predictors of this plugin."""
+    from mocapflow_priors.constant_acceleration import ConstantAcceleration
     from mocapflow_priors.constant_velocity import ConstantVelocity
     from mocapflow_priors.hold import Hold
     from mocapflow_priors.image_flow import ImageFlowPredictor
 
-    return [ConstantVelocity, Hold, ImageFlowPredictor]
+    return [ConstantAcceleration, ConstantVelocity, Hold, ImageFlowPredictor]

@@ -9,7 +9,7 @@ from pydantic import Field
 from mocapflow.components import Predictor
 from mocapflow.data import Frame, Past, Pose
 from mocapflow.scene import Scene
-from mocapflow_priors.extrapolate import continued, interval
+from mocapflow_priors.extrapolate import ahead, continued
 
 
 class ConstantVelocity(Predictor):
@@ -21,8 +21,4 @@ class ConstantVelocity(Predictor):
 
     def predict(self, frame: Frame, past: Past, scene: Scene) -> Pose:
         """Return the last pose moved on to the time of the frame; the last pose itself if there is only one."""
-        step = interval(past)
-        if step == 0:
-            return past.moments[-1].pose
-        ahead = (frame.time - past.moments[-1].time) / step
-        return continued(past, self.kept * max(ahead, 0.0))
+        return continued(past, self.kept * ahead(frame, past))

@@ -113,7 +113,7 @@ def knee_error_deg(
         segmentation = cluttered(segmentation, clutter, seed)
     start = start_near(truth, off_deg, 0.0014 * off_deg, seed)
     state = replace(tiny_state(scene, start), segmentation=segmentation)
-    steady = Steady(min_turns=1, turns=1, max_turns=5)
+    steady = Steady(turns=1, max_turns=5)
     steps = Steps(
         segmenter=Given(), matchers=matchers, pose_solver=TwistGaussNewton(), cloth_fitter=Fixed(),
         priors=priors, steady=steady,

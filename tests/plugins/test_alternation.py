@@ -29,7 +29,7 @@ def settled():
         segmenter=LevelSet(), matchers=(ContourIcp(),),
         pose_solver=TwistGaussNewton(stop_sigmas=0.1),  # smaller steps are those of matches that change
         cloth_fitter=Fixed(), priors=(),
-        steady=Steady(surface_mm=2.0, angle_deg=0.3, min_turns=1, turns=1),
+        steady=Steady(surface_mm=2.0, angle_deg=0.3, turns=1),
     )  # fmt: skip
     cloth = scenes.tiny_cloth(SCENE, START)
     states = []

@@ -1,5 +1,7 @@
 """Contour pairs on exact silhouettes of the tiny body, alone and through the loop with the real solver."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matching_scenes import CALM, FIRST, FRAME, Cluttered, cluttered, knee_error_deg, seen
@@ -123,6 +125,26 @@ def test_hanging_cloth_counts_less(truth):
     np.testing.assert_allclose(matches.weight[~cloth], 1)
 
 
+def test_pairs_on_cloth_reach_less_far(truth):
+    """Of the same pairs those on cloth that are farther apart are left out, those on skin stay."""
+    surface, aside = surface_at(truth, DRESSED), np.array([0.03, 0.02, 0.0])
+    moved = replace(surface, vertices=surface.vertices + aside)
+    every, few = (
+        match(ContourIcp(cloth_reach_px=reach), moved, seen(surface, DRESSED), scene=DRESSED)
+        for reach in (float("inf"), 3.0)
+    )
+    cloth, kept = moved.cloth[every.vertex], moved.cloth[few.vertex]
+    image = np.array([
+        project(moved.vertices[[v]], DRESSED.cameras[c])[0]
+        for v, c in zip(every.vertex[cloth], every.camera[cloth], strict=True)
+    ])  # fmt: skip
+    near = np.linalg.norm(every.pixel[cloth] - image, axis=1) <= 3.0
+    assert 10 < near.sum() < 0.8 * len(near)
+    assert kept.sum() == near.sum()
+    assert np.array_equal(few.vertex[~kept], every.vertex[~cloth])
+    assert np.array_equal(few.pixel[kept], every.pixel[cloth][near])
+
+
 def test_skin_beside_a_hem_counts_as_the_cloth_there(truth):
     """Skin within 12 px of a cloth contour and near the garment at rest has the sigma of the nearest cloth."""
     surface = surface_at(truth, DRESSED)
@@ -182,3 +204,12 @@ def test_the_clutter_is_where_it_should_be(truth):
 
 def test_without_silhouettes_there_is_nothing_to_match(truth):
     assert len(match(ContourIcp(), SCENE.surface(truth, NO_CLOTH), Segmentation(silhouettes=())).vertex) == 0
+
+
+def test_what_a_garment_covers_ends_at_its_borders():
+    """Skin is covered between waistband and hem of the pattern, near it a little beyond; a bare body is neither."""
+    assert not SCENE.covered.any() and not SCENE.near_garment.any()
+    body, rows = DRESSED.body.vertices, DRESSED.garment.vertices[DRESSED.garment.strands]
+    low, high = rows[:, -1, 2].max(), rows[:, 0, 2].min()
+    assert DRESSED.covered.any() and (DRESSED.near_garment & ~DRESSED.covered).any()
+    assert (body[DRESSED.covered, 2] < high).all() and (body[DRESSED.covered, 2] > low).all()

@@ -15,7 +15,7 @@ from mocapflow_matching.layered_icp import LayeredIcp, another_s
 from test_layers import CLOTHS, SCENE, SKIN, dressed, learned, painted
 
 from mocapflow.components import pool
-from mocapflow.data import CLOTH, Matches, Past, Pose, Turn, empty_matches
+from mocapflow.data import CLOTH, Change, Matches, Past, Pose, Turn, empty_matches
 from mocapflow.geometry import twists
 from mocapflow.geometry.cameras import magnification, project
 from mocapflow.geometry.silhouettes import outline
@@ -189,6 +189,27 @@ def test_a_waistband_that_sits_lower_than_the_tape_says_pulls_at_nothing():
     cloth = SCENE.layer[slid.vertex] == CLOTH
     assert cloth.sum() > 10
     assert abs(np.median(off(slid, pose)[cloth])) < 0.3
+
+
+def test_skin_that_the_garment_covers_at_rest_is_believed_only_where_its_edge_is_near():
+    """The same edge, 6 px off, of a vertex under the garment and of one beyond its hem; of both when it is calm."""
+    pose, camera = leaning(0.0), SCENE.cameras[0]
+    under, beyond = np.flatnonzero(SCENE.covered)[0], np.flatnonzero(~SCENE.near_garment)[0]
+    surface, pair = surface_at(pose), np.array([under, beyond], np.int32)
+    across = np.tile([1.0, 0.0], (2, 1))
+    inner = replace(
+        empty_matches(), camera=np.zeros(2, np.int16), vertex=pair, direction=across, weight=np.ones(2),
+        pixel=project(surface.vertices[pair], camera) + 6 * across,
+    )  # fmt: skip
+    segmentation, frame = replace(tiny_segmentation(SCENE, pose), inner=inner), painted(dressed, pose)
+    moved = [Change(body=body, cloth=0.0, angles=0.0, sigmas=1.0) for body in (0.1, 0.001)]
+    wide, calm = (
+        InnerContours().match(frame, segmentation, surface, Past(), SCENE, Turn(index=1, cap=4, change=change)).weight
+        for change in moved
+    )
+    given_up = (2.0**2 / (2.0**2 + 6.0**2)) ** 2
+    assert wide == pytest.approx([given_up, 2 / 6])
+    assert calm == pytest.approx([given_up, given_up])
 
 
 def test_a_leg_of_the_cloth_s_colour_is_left_alone():

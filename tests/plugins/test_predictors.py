@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mocapflow_priors.constant_acceleration import ConstantAcceleration
 from mocapflow_priors.constant_velocity import ConstantVelocity
 from mocapflow_priors.hold import Hold
 from test_priors import make_past
 from twist_fixtures import make_pose, make_scene
 
-from mocapflow.data import NO_CLOTH, Frame, Moment, Past
+from mocapflow.data import NO_CLOTH, Frame, Moment, Past, Pose
 from mocapflow.model import moved
 from mocapflow.testing import PredictorConformance
 
@@ -26,6 +27,10 @@ class TestHoldConforms(PredictorConformance):
 
 class TestConstantVelocityConforms(PredictorConformance):
     predictor = ConstantVelocity()
+
+
+class TestConstantAccelerationConforms(PredictorConformance):
+    predictor = ConstantAcceleration()
 
 
 def frame(time: float) -> Frame:
@@ -94,3 +99,40 @@ def test_one_frame_or_equal_times_give_the_last_pose() -> None:
     one = Past(moments=(Moment(time=0.0, pose=FIRST, cloth=NO_CLOTH),))
     assert ConstantVelocity().predict(frame(1 / 30), one, make_scene()) is FIRST
     assert ConstantVelocity().predict(frame(1 / 30), make_past(FIRST, SECOND, 0.0), make_scene()) is SECOND
+
+
+def thrown(*times: float) -> Past:
+    """Return a past in which the root falls and every angle turns faster and faster: both go with the time squared."""
+    return Past(moments=tuple(Moment(time=t, pose=at(t), cloth=NO_CLOTH) for t in times))
+
+
+def at(time: float) -> Pose:
+    return moved(FIRST, np.concatenate([[0.0, 0.0, -4.9, 0.0, 0.0, 0.0], np.full(12, 3.0)]) * time**2)
+
+
+@pytest.mark.parametrize("times", [(0.0, 0.1, 0.2, 0.3), (0.0, 0.1, 0.3, 0.5), (0.0, 0.1, 0.2, 0.4)])
+def test_constant_acceleration_follows_a_parabola(times: tuple[float, ...]) -> None:
+    guess = ConstantAcceleration(kept=1.0).predict(frame(times[-1]), thrown(*times[:-1]), make_scene())
+    assert np.allclose(guess.root, at(times[-1]).root, atol=1e-12) and np.allclose(guess.angles, at(times[-1]).angles)
+
+
+def test_a_share_of_the_acceleration_can_be_kept() -> None:
+    past, scene = thrown(0.0, 0.1, 0.2), make_scene()
+    guesses = [ConstantAcceleration(kept=kept).predict(frame(0.3), past, scene).angles for kept in (0.0, 0.4, 1.0)]
+    assert guesses[0] == pytest.approx(ConstantVelocity().predict(frame(0.3), past, scene).angles)
+    assert guesses[1] == pytest.approx(0.6 * guesses[0] + 0.4 * guesses[2])
+
+
+def test_an_acceleration_is_not_believed_where_a_limb_jumped_or_nothing_showed_it() -> None:
+    moments = list(thrown(0.0, 0.1, 0.2).moments)
+    jump = replace(moments[0].pose, angles=moments[0].pose.angles - 2.5 * (np.arange(12) == 3))
+    jumped = Past(moments=(replace(moments[0], pose=jump), *moments[1:]))
+    blind = Past(moments=(replace(moments[0], observed=np.zeros(12)), *moments[1:]))
+    by_speed, by_change = (
+        predictor.predict(frame(0.3), jumped, make_scene()).angles
+        for predictor in (ConstantVelocity(), ConstantAcceleration(kept=1.0))
+    )
+    assert (by_speed == by_change).tolist() == (np.arange(12) == 3).tolist()
+    for past in (blind, thrown(0.1, 0.2), thrown(0.1, 0.1, 0.2)):
+        steady, bent = (p.predict(frame(0.3), past, make_scene()) for p in (ConstantVelocity(), ConstantAcceleration()))
+        assert np.array_equal(bent.root, steady.root) and np.array_equal(bent.angles, steady.angles)
