@@ -17,7 +17,7 @@ from mocapflow.records import F64
 from mocapflow_draping import samples
 from mocapflow_draping.outline import OutlineFitter
 
-FIRST_FRAMES = 2  # as many as a Past remembers
+FIRST_FRAMES = 2  # in which every direction is tried
 
 
 class SampledForces(OutlineFitter):

@@ -12,6 +12,7 @@ from mocapflow.once import once
 from mocapflow.records import F64, Bool
 
 FASTEST = np.radians(1200)  # per s, of a joint angle; in motion capture of kicks a knee reaches 1130
+SHARPEST = np.radians(15000)  # per s², likewise; walks reach 10000, kicks pass it for a moment
 LASTS = 0.05  # s, of a velocity that no image shows; in motion capture of walks and kicks longer guesses less well
 
 
@@ -82,10 +83,11 @@ def _change(past: Past, motion: Motion) -> Motion | None:
         return None
     ratio = interval(past) / took
     between = 2 * ratio / (1 + ratio)  # an interval, as a share of the time between the middles of the two
+    angles = between * (motion.angles - ratio * earlier.angles)
     return Motion(
         twist=between * (motion.twist - ratio * earlier.twist),
-        angles=between * (motion.angles - ratio * earlier.angles),
-        credible=motion.credible & earlier.credible,
+        angles=angles,
+        credible=motion.credible & earlier.credible & (np.abs(angles) < SHARPEST * interval(past) ** 2),
     )
 
 

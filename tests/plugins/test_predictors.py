@@ -123,6 +123,18 @@ def test_a_share_of_the_acceleration_can_be_kept() -> None:
     assert guesses[1] == pytest.approx(0.6 * guesses[0] + 0.4 * guesses[2])
 
 
+@pytest.mark.parametrize(("change_deg", "goes_on"), [(16.0, True), (18.0, False)])
+def test_an_acceleration_that_nobody_has_does_not_go_on(change_deg: float, goes_on: bool) -> None:
+    slow, fast = (np.concatenate([np.zeros(6), np.full(12, np.radians(deg))]) for deg in (2.0, 2.0 + change_deg))
+    second = moved(FIRST, slow)
+    moments = (Moment(time=k / 30, pose=p, cloth=NO_CLOTH) for k, p in enumerate((FIRST, second, moved(second, fast))))
+    past = Past(moments=tuple(moments))
+    steady, bent = (
+        p.predict(frame(0.1), past, make_scene()).angles for p in (ConstantVelocity(), ConstantAcceleration())
+    )
+    assert np.degrees(bent - steady) == pytest.approx(0.4 * change_deg if goes_on else 0.0)
+
+
 def test_an_acceleration_is_not_believed_where_a_limb_jumped_or_nothing_showed_it() -> None:
     moments = list(thrown(0.0, 0.1, 0.2).moments)
     jump = replace(moments[0].pose, angles=moments[0].pose.angles - 2.5 * (np.arange(12) == 3))
