@@ -105,7 +105,12 @@ def _sewn(garment: Garment, folder: Path, registry: Registry) -> list[Finding]:
         body = scanned().load(folder)
     except MocapflowError:  # told of with the subject
         return []
-    mesh = garment.sew(body)
+    try:
+        mesh = garment.sew(body)
+    except MocapflowError:
+        raise
+    except Exception as problem:  # a garment of somebody else's may raise anything
+        return [error(f"{garment.name} can't be sewn: {type(problem).__name__}: {problem}", where=folder / FILE)]
     return [warning(f"{mesh.name}: {said}", where=folder / FILE) for said in mesh.repairs]
 
 

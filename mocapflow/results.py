@@ -103,7 +103,7 @@ class RunFolder:
     """Where a run writes its results, and how it was made."""
 
     path: Path
-    recipe: Mapping[str, Any]  # pipeline, settings, versions, and per finished stage: key, cached, seconds
+    recipe: Mapping[str, Any]  # pipeline, settings, versions, and per finished stage: key, cached, seconds, warnings
     watch: Watch = unwatched  # to be told how many frames are written, of how many
 
 

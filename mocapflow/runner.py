@@ -42,7 +42,7 @@ class PlanLine:
 
 @dataclass(frozen=True)
 class RunSummary:
-    """What a run did; per stage: label, key, cached, seconds of CPU, wall_seconds."""
+    """What a run did; per stage: label, key, cached, seconds of CPU, wall_seconds, warnings."""
 
     out: Path
     store: Path

@@ -8,6 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from mocapflow_garments.shorts import Shorts
 
 from mocapflow.doctor import examine
 from mocapflow.geometry import twists
@@ -282,6 +283,15 @@ def test_a_garment_that_can_not_be_sewn(good):
     (finding,) = examine(good)
     assert finding.severity == "error" and "garment.json" in finding.where
     assert finding.message == "shorts: waist_circumference_m is 0.50 m, but the body measures 0.84 m there"
+
+
+def test_a_garment_that_raises_what_nobody_expects(good, monkeypatch):
+    def broken(self, body):
+        raise ZeroDivisionError("no strands")
+
+    monkeypatch.setattr(Shorts, "sew", broken)
+    (finding,) = examine(good)
+    assert (finding.severity, finding.message) == ("error", "shorts can't be sewn: ZeroDivisionError: no strands")
 
 
 def test_a_garment_that_is_mended(good):

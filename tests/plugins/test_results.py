@@ -34,7 +34,7 @@ def exported(track: Track, scene: Scene, recording: Recording, folder: Path, **s
     recipe = {
         "pipeline": Path("skirt.yaml"),
         "versions": {"numpy": np.__version__},
-        "stages": [{"seconds": np.float64(1.5)}],
+        "stages": {"start": {"seconds": np.float64(1.5), "warnings": ["a knee bends backwards"]}},
     }
     run_folder = RunFolder(path=folder, recipe=recipe)
     return Export(**settings).run(track=track, scene=scene, recording=recording, run_folder=run_folder)
@@ -68,7 +68,7 @@ def test_a_repaired_garment_is_told_in_run_json(recording: Recording, tmp_path: 
     mended = replace(scene, garment=replace(scene.garment, repairs=("waist_circumference_m 0.500 is tighter",)))
     exported(stepping(scene.body, 4), mended, recording, tmp_path)
     said = json.loads((tmp_path / layout.RUN).read_text())["warnings"]
-    assert f"{scene.garment.name}: waist_circumference_m 0.500 is tighter" in said
+    assert said == [f"{scene.garment.name}: waist_circumference_m 0.500 is tighter", "start: a knee bends backwards"]
 
 
 def test_raw_angles_are_those_before_smoothing(folder: Path) -> None:
