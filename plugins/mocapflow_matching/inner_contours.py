@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import PositiveFloat
@@ -27,11 +27,13 @@ class InnerContours(Matcher):
     ends of parts once a turn; without it there are no pairs.
 
     Skin that the garment covers at rest is believed only where its edge is near: where the drape bares a thigh, the
-    true cloth may lie over it, and what looks like its edge is a fold.
+    true cloth may lie over it, and what looks like its edge is a fold. `covered: far` believes it as other skin, where
+    frames are so far apart that only far edges find a leg.
     """
 
     name: ClassVar[str] = "inner_contours"
     calm_mm: PositiveFloat = 15.0  # change of the body in a turn below which far pairs are given up (Geman-McClure)
+    covered: Literal["near", "far"] = "near"  # far pairs of skin that the garment covers at rest are given up, or not
     scale: PositiveFloat = 2.0  # standard deviations at which the loss begins to give way; before it is calm: Huber
 
     def match(
@@ -47,7 +49,8 @@ class InnerContours(Matcher):
         higher = slipped(away, worn, inner, surface, scene)
         off = np.abs(away - higher) * np.sqrt(inner.weight)
         late, early = (robust_weights(off, loss, self.scale) for loss in ("geman_mcclure", "huber"))
-        loss = np.where(turn.calm(self.calm_mm) | under_cloth(inner, scene), late, early)
+        doubtful = under_cloth(inner, scene) & (self.covered == "near")
+        loss = np.where(turn.calm(self.calm_mm) | doubtful, late, early)
         tell = ~worn if np.count_nonzero(worn) < FEWEST else np.ones(len(worn), bool)
         return replace(inner, pixel=inner.pixel - higher[:, None] * inner.direction, weight=inner.weight * loss * tell)
 

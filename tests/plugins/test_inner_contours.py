@@ -203,12 +203,15 @@ def test_skin_that_the_garment_covers_at_rest_is_believed_only_where_its_edge_is
     )  # fmt: skip
     segmentation, frame = replace(tiny_segmentation(SCENE, pose), inner=inner), painted(dressed, pose)
     moved = [Change(body=body, cloth=0.0, angles=0.0, sigmas=1.0) for body in (0.1, 0.001)]
-    wide, calm = (
-        InnerContours().match(frame, segmentation, surface, Past(), SCENE, Turn(index=1, cap=4, change=change)).weight
-        for change in moved
-    )
+    wide, far, calm = (
+        matcher.match(frame, segmentation, surface, Past(), SCENE, Turn(index=1, cap=4, change=change)).weight
+        for matcher, change in (
+            (InnerContours(), moved[0]), (InnerContours(covered="far"), moved[0]), (InnerContours(), moved[1]),
+        )
+    )  # fmt: skip
     given_up = (2.0**2 / (2.0**2 + 6.0**2)) ** 2
     assert wide == pytest.approx([given_up, 2 / 6])
+    assert far == pytest.approx([2 / 6, 2 / 6])
     assert calm == pytest.approx([given_up, given_up])
 
 
