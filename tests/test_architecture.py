@@ -64,6 +64,7 @@ LAYERS = (  # a module imports only from its own layer or an earlier one; `io` a
     "recipes",
     "blame",
     "progress",
+    "warned",
     "execution",
     "runner",
     "testing",

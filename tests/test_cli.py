@@ -240,7 +240,7 @@ def test_a_run_folder_from_elsewhere_is_compared_with_what_is_given(call, tmp_pa
 
 def test_plugins(call):
     result = call("plugins")
-    assert "priors  (mocapflow 0.1.0)\n  predictor:    constant_velocity, hold" in result.stdout
+    assert "priors  (mocapflow 0.1.0)\n  predictor:    constant_acceleration, constant_velocity, hold" in result.stdout
     assert result.stderr == ""
 
 

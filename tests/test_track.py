@@ -195,7 +195,7 @@ def test_the_first_frame_that_shows_the_person_begins_like_a_first(tmp_path, mon
     stages = SHORT | {"track": SHORT["track"] | {"first_segmenter": "tiny_segmenter"}}
     path = write_pipeline(tmp_path, clip, stages=stages)
     run_tiny(path, tmp_path)
-    assert begun == [(2, 0), (2, 0), (3, 2), (6, 0), (6, 0), (7, 2)]
+    assert begun == [(2, 0), (2, 0), (3, 3), (6, 0), (6, 0), (7, 3)]
     assert [note for note in the_track(tmp_path).notes if "anew" in note] == [
         f"frame {index}: begun anew, like a first frame: the frames before do not show the person" for index in (2, 6)
     ]
