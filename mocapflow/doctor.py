@@ -10,6 +10,7 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any
 
+from mocapflow import measures
 from mocapflow.assets import Camera
 from mocapflow.components import Garment
 from mocapflow.errors import MocapflowError, UnknownComponent
@@ -23,7 +24,6 @@ from mocapflow.io.plates import background
 from mocapflow.io.rigs import examine_rig, examine_view
 from mocapflow.io.subjects import examine_subject
 from mocapflow.io.video import Video, lost_frames, name_frames, open_video
-from mocapflow.measures import FILE, recorded_garment
 from mocapflow.registry import Registry, load_registry
 from mocapflow.synchrony import measure
 
@@ -86,12 +86,12 @@ def _garment(folder: Path) -> list[Finding]:
     """Return what keeps the garment that the recording describes from being sewn, or what was mended at it."""
     registry = load_registry()
     try:
-        garment = recorded_garment(folder, registry)
+        garment = measures.recorded_garment(folder, registry)
         return [] if garment is None else _sewn(garment, folder, registry)
     except UnknownComponent as problem:  # its plugin may be on another machine
         return [warning(problem.message, problem.hint, problem.where)]
     except MocapflowError as problem:
-        return [error(problem.message, problem.hint, problem.where or folder / FILE)]
+        return [error(problem.message, problem.hint, problem.where or folder / measures.FILE)]
 
 
 def _sewn(garment: Garment, folder: Path, registry: Registry) -> list[Finding]:
@@ -110,8 +110,10 @@ def _sewn(garment: Garment, folder: Path, registry: Registry) -> list[Finding]:
     except MocapflowError:
         raise
     except Exception as problem:  # a garment of somebody else's may raise anything
-        return [error(f"{garment.name} can't be sewn: {type(problem).__name__}: {problem}", where=folder / FILE)]
-    return [warning(f"{mesh.name}: {said}", where=folder / FILE) for said in mesh.repairs]
+        return [
+            error(f"{garment.name} can't be sewn: {type(problem).__name__}: {problem}", where=folder / measures.FILE)
+        ]
+    return [warning(f"{mesh.name}: {said}", where=folder / measures.FILE) for said in mesh.repairs]
 
 
 def _start(folder: Path, calibration: Path) -> list[Finding]:

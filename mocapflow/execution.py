@@ -197,9 +197,9 @@ class Execution:
     def _entered(
         self, step: Step, found: Artifact | None, cpu: float = 0.0, wall: float = 0.0, said: Sequence[str] = ()
     ) -> None:
-        if found is not None and step.label in self.entries:
-            return
         if found is not None:
+            if step.label in self.entries:
+                return
             self._report(f"{step.label}: from the store")
             self._warn_of_versions(step, found)
             said = found.warnings

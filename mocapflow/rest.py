@@ -13,12 +13,16 @@ from mocapflow.records import F64
 
 
 class Steady(BaseModel):
-    """When the loop counts as at rest, how long it may go on, and how it is kept from getting worse."""
+    """When the loop counts as at rest, how long it may go on, and how it is kept from getting worse.
+
+    Turns beyond the last of `sigmas` are held against the last one; the first frame, which may start far off, against
+    none.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
     surface_mm: PositiveFloat = 0.5  # largest move of a body vertex from turn to turn, RMS move of the cloth
     angle_deg: PositiveFloat = 0.1  # largest change of a joint angle
-    sigmas: tuple[NonNegativeFloat, ...] = ()  # by turn, then as the last: one that moves the pose less is rest too
+    sigmas: tuple[NonNegativeFloat, ...] = ()  # of the pose, turn by turn: moves below are rest too
     turns: PositiveInt = 2  # in a row within both tolerances, then the frame is at rest
     max_turns: PositiveInt = 8  # then the frame is left as it is
     halvings: NonNegativeInt = 0  # at most, of a step that raises the functional; 0: it is taken whole
@@ -27,8 +31,8 @@ class Steady(BaseModel):
         """True where a change is within both tolerances, or less than the pose is known to."""
         near = max(change.body, change.cloth) <= self.surface_mm / 1000
         exact = near and change.angles <= float(np.radians(self.angle_deg))
-        known = self.sigmas[min(turns, len(self.sigmas)) - 1] if self.sigmas else 0.0
-        return exact or change.sigmas < known
+        allowed = self.sigmas[min(turns, len(self.sigmas)) - 1] if self.sigmas else 0.0
+        return exact or change.sigmas < allowed
 
 
 class Shown(NamedTuple):

@@ -83,12 +83,13 @@ class Scene:
 
     @cached_property
     def covered(self) -> Bool:
-        """Which body vertices (V,) lie under a garment in the rest pose, not beyond its borders."""
-        if self.garment is None:
-            return self.near_garment
-        strands, border = self.garment.strands, np.zeros(len(self.garment.vertices), bool)
-        border[strands[:, 0]] = border[strands[np.arange(len(strands)), (strands >= 0).sum(axis=1) - 1]] = True
-        return self.near_garment & ~border[self._garment_at]
+        """Which surface vertices (N,) are skin that lies under the garment in the rest pose, not beyond its borders."""
+        covered = np.zeros(len(self.layer), bool)
+        if self.garment is not None:
+            strands, border = self.garment.strands, np.zeros(len(self.garment.vertices), bool)
+            border[strands[:, 0]] = border[strands[np.arange(len(strands)), (strands >= 0).sum(axis=1) - 1]] = True
+            covered[: len(self.body.vertices)] = self.near_garment & ~border[self._garment_at]
+        return covered
 
     @cached_property
     def _garment_at(self) -> I32:

@@ -22,7 +22,7 @@ from mocapflow.data import (
 from mocapflow.geometry.contours import pairs
 from mocapflow.geometry.silhouettes import occluding_contour
 from mocapflow.once import once
-from mocapflow.records import F64, I32
+from mocapflow.records import F64, I32, Bool
 from mocapflow.scene import Scene
 from mocapflow_matching.robust import Loss, robust_weights
 from mocapflow_matching.uncertainty import contour_sigma
@@ -89,12 +89,16 @@ class ContourIcp(Matcher):
         asked, asking = self.direction != "backward", self.direction != "forward"  # the model, by the image; by it
         seen, shown = pairs(one, image.normal, other, model.normal, reach, cosine, asked, asking)
         if reach > self.cloth_reach_px:
-            away = np.linalg.norm(image.pixel.take(seen, axis=0) - model.pixel.take(shown, axis=0), axis=1)
-            kept = (away <= self.cloth_reach_px) | ~surface.cloth.take(model.vertex.take(shown))
+            kept = self.reached(image.pixel.take(seen, axis=0), model, shown, surface)
             seen, shown = seen[kept], shown[kept]
         guard = self.hem_guard_px
         sigma = contour_sigma(model, surface, scene, self.sigma_px, self.cloth_sigma_px_per_m, guard)
         return self.weigh(silhouette.camera, image, model, seen, shown, sigma, turn)
+
+    def reached(self, pixel: F64, model: Contour, shown: I32, surface: Surface) -> Bool:
+        """Return which pairs (M,) of image points (M, 2) px and model points are on skin, or near enough for cloth."""
+        away = np.linalg.norm(pixel - model.pixel.take(shown, axis=0), axis=1)
+        return np.asarray((away <= self.cloth_reach_px) | ~surface.cloth.take(model.vertex.take(shown)))
 
     def contours(
         self, silhouette: Silhouette, surface: Surface, scene: Scene, turn: Turn

@@ -49,16 +49,10 @@ class InnerContours(Matcher):
         higher = slipped(away, worn, inner, surface, scene)
         off = np.abs(away - higher) * np.sqrt(inner.weight)
         late, early = (robust_weights(off, loss, self.scale) for loss in ("geman_mcclure", "huber"))
-        doubtful = under_cloth(inner, scene) & (self.covered == "near")
+        doubtful = scene.covered.take(inner.vertex) & (self.covered == "near")
         loss = np.where(turn.calm(self.calm_mm) | doubtful, late, early)
         tell = ~worn if np.count_nonzero(worn) < FEWEST else np.ones(len(worn), bool)
         return replace(inner, pixel=inner.pixel - higher[:, None] * inner.direction, weight=inner.weight * loss * tell)
-
-
-def under_cloth(inner: Matches, scene: Scene) -> Bool:
-    """Return which pairs (M,) are of skin that the garment covers at rest."""
-    skin = inner.vertex < len(scene.covered)
-    return skin & scene.covered.take(np.where(skin, inner.vertex, 0))
 
 
 def slipped(away: F64, worn: Bool, inner: Matches, surface: Surface, scene: Scene) -> F64:

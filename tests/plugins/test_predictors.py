@@ -124,7 +124,7 @@ def test_a_share_of_the_acceleration_can_be_kept() -> None:
 
 
 @pytest.mark.parametrize(("change_deg", "goes_on"), [(16.0, True), (18.0, False)])
-def test_an_acceleration_that_nobody_has_does_not_go_on(change_deg: float, goes_on: bool) -> None:
+def test_a_jump_of_the_velocity_does_not_go_on(change_deg: float, goes_on: bool) -> None:
     slow, fast = (np.concatenate([np.zeros(6), np.full(12, np.radians(deg))]) for deg in (2.0, 2.0 + change_deg))
     second = moved(FIRST, slow)
     moments = (Moment(time=k / 30, pose=p, cloth=NO_CLOTH) for k, p in enumerate((FIRST, second, moved(second, fast))))
