@@ -79,6 +79,7 @@ class Checkpoint:
         self._attributes: dict[str, Any] = dict(artifact.attributes)
         self._wanted, self._fresh, self._cap = wanted, fresh, 0
         self._turns: list[Pose] | None = None  # of the frame at hand
+        self._earlier, self._said = artifact.warnings, list[str]()
         self._iteration_done, self._frame_done = iteration_done, frame_done
         self._arrays: dict[str, Rows] = {}
 
@@ -100,6 +101,15 @@ class Checkpoint:
         first, last = self._indices[0], self._indices[self.done - 1]
         again = "run the same command without --fresh" if self._fresh else "run the same command"
         return f"frames {first}–{last} are saved; {again} to continue at {self.next_index}"
+
+    @property
+    def warnings(self) -> list[str]:
+        """What was warned of in all runs that made the frames, each once."""
+        return list(dict.fromkeys([*self._earlier, *self._said]))
+
+    def keep_warnings(self, said: list[str]) -> None:
+        """Keep with the frames what this run warns of: a list that grows meanwhile."""
+        self._said = said
 
     def past(self) -> Past:
         """Return what the next frame may know of earlier ones, bit by bit as it was."""
@@ -139,7 +149,10 @@ class Checkpoint:
             self._write_seen(row, state.segmentation.silhouettes, state.matches)
             self._write_appearance(row, frame.index, appearance)
             self._write_trace(row)
-            news = {"notes": self._notes(frame.index, notes), "frames_done": row + 1, "complete": False}
+            news = {
+                "notes": self._notes(frame.index, notes), "warnings": self.warnings,
+                "frames_done": row + 1, "complete": False,
+            }  # fmt: skip
             write_json(self._path / "zarr.json", group_meta(self._attributes | news))
         self._attributes |= news
         self._frame_done(frame.index, result)
@@ -155,7 +168,8 @@ class Checkpoint:
             rows = self._open("live/rows")
             if self._attributes["cloth_vertices"]:
                 self._open("cloth").resize(self.done)
-            self._attributes = seal(self._path, self._attributes, rows, self._columns, self._indices[: self.done])
+            told = self._attributes | {"warnings": self.warnings}
+            self._attributes = seal(self._path, told, rows, self._columns, self._indices[: self.done])
         track: Track = self._store.load(Artifact(self._path, self._attributes), self._wanted or self.done)
         return track
 

@@ -23,7 +23,7 @@ from mocapflow.records import unwatched
 from mocapflow.results import RunFolder
 from mocapflow.rows import Corrupted
 from mocapflow.scene import Scene
-from mocapflow.store import Artifact, Report, Store, remove, versions, with_versions
+from mocapflow.store import Artifact, Report, Store, versions, with_versions
 from mocapflow.warned import warnings_logged
 from mocapflow.wiring import Source
 
@@ -100,7 +100,7 @@ class Execution:
             self._set_aside(damaged, Corrupted("its description can't be read"))
         started = self._store.find(step.key)
         if started is not None and self._fresh:
-            remove(started.path)
+            self._store.discard(started)
             return None
         return started
 
@@ -143,8 +143,11 @@ class Execution:
         cpu, wall = time.process_time(), time.perf_counter()
         kept = (lambda: checkpoint.kept) if checkpoint else str
         with warnings_logged() as said:
+            if checkpoint is not None:
+                checkpoint.keep_warnings(said)
             value = self._blaming(step.named.stage, lambda: step.named.stage.run(**inputs), kept)
-        self._entered(step, None, time.process_time() - cpu, time.perf_counter() - wall, said)
+        told = said if checkpoint is None else checkpoint.warnings
+        self._entered(step, None, time.process_time() - cpu, time.perf_counter() - wall, told)
         return value
 
     def _input(self, step: Step, source: Source, checkpoint: Checkpoint | None) -> Any:

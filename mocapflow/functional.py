@@ -34,7 +34,7 @@ class Functional:
     def terms(self) -> tuple[str, ...]:
         """The names (E,) of the terms: view and term, then the priors."""
         views = [f"{camera.name}.{term}" for camera in self.model.scene.cameras for term in IN_VIEW]
-        return (*views, *(prior.name for prior in self.priors))
+        return (*views, *told_apart([prior.name for prior in self.priors]))
 
     def values(self, state: FrameState, surface: Surface) -> F64:
         """Return the terms (E,) of a state with its surface; NaN where a view is not seen or has no such energy.
@@ -100,3 +100,9 @@ def halfway(one: Pose, other: Pose) -> Pose:
     """Return the pose in the middle of two."""
     between = twists.log(other.root @ np.linalg.inv(one.root))
     return moved(one, 0.5 * np.concatenate([between, other.angles - one.angles]))
+
+
+def told_apart(names: Sequence[str]) -> tuple[str, ...]:
+    """Return names of which each that stands there again has its number: parzen, parzen_2."""
+    counts = [names[: at + 1].count(name) for at, name in enumerate(names)]
+    return tuple(name if count == 1 else f"{name}_{count}" for name, count in zip(names, counts, strict=True))

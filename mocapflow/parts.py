@@ -23,8 +23,9 @@ def in_parts(pipeline: Pipeline, indices: range) -> Pipeline:
     """
     if pipeline.parts.count == 1:
         return pipeline
-    stages = [part for named in pipeline.stages for part in _parts(named, pipeline, indices)]
-    return replace(pipeline, stages=tuple(stages))
+    parts = [part for named in pipeline.stages for part in _parts(named, pipeline, indices)]
+    stages = {part.label: part for part in parts}  # two tracks of one start share those of its parts
+    return replace(pipeline, stages=tuple(stages.values()))
 
 
 def split(indices: range, count: int, overlap: int) -> list[range]:
@@ -48,12 +49,14 @@ def _parts(named: NamedStage, pipeline: Pipeline, indices: range) -> Iterator[Na
         yield named
         return
     start = next((other for other in pipeline.stages if other.label in sources and makes(other.stage) is Start), None)
-    for number, part in enumerate(split(indices, pipeline.parts.count, pipeline.parts.overlap), 1):
+    ranges = split(indices, pipeline.parts.count, pipeline.parts.overlap)
+    labels = tuple(f"{named.label}_{number}" for number in range(1, len(ranges) + 1))
+    for number, (label, part) in enumerate(zip(labels, ranges, strict=True), 1):
         wiring = named.wiring
         if start is not None and number > 1:
-            label = f"{start.label}_{number}"
-            wiring = {name: label if source == start.label else source for name, source in wiring.items()}
-            yield replace(start, label=label, stage=pipeline.parts.start or start.stage, part=part)
-        yield replace(named, label=f"{named.label}_{number}", wiring=wiring, part=part)
+            own = f"{start.label}_{number}"
+            wiring = {name: own if source == start.label else source for name, source in wiring.items()}
+            yield replace(start, label=own, stage=pipeline.parts.start or start.stage, part=part)
+        yield replace(named, label=label, wiring=wiring, part=part)
     assert pipeline.parts.join is not None
-    yield NamedStage(named.label, pipeline.parts.join, {}, named.where)
+    yield NamedStage(named.label, pipeline.parts.join, {}, named.where, joins=labels)

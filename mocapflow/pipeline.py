@@ -68,6 +68,7 @@ class NamedStage:
     wiring: Mapping[str, str]
     where: str
     part: range | None = None  # the frames it is for; None: those of the run
+    joins: tuple[str, ...] = ()  # the parts that it makes one of
 
 
 @dataclass(frozen=True)

@@ -111,7 +111,7 @@ def _inputs(steps: Mapping[str, Step], source: Source, of_chain: bool) -> Any:
 
 def _input(step: Step, of_chain: bool = False) -> dict[str, Any]:
     if of_chain and step.named.stage.causal:  # more frames only add to it
-        read = {name: value for name, value in step.recipe["recording"].items() if name != "stop"}
+        read = {name: value for name, value in step.recipe.get("recording", {}).items() if name != "stop"}
         return {"key": key_of({**step.recipe, "recording": read})}
     return {"key": step.key} | ({"frames": step.frames} if step.chain else {})
 

@@ -77,6 +77,11 @@ class SharedStore(Store):
         self._copies.remove(path.name.rpartition("-")[2])
         return super().set_aside(path)
 
+    def discard(self, artifact: Artifact) -> None:
+        """Remove an artifact that is to be made anew, with its copies: they would be taken for further than the new."""
+        self._copies.remove(artifact.key)
+        super().discard(artifact)
+
     def _fetch(self, key: str) -> None:
         """Bring the furthest copy here, if it is further; only with the right to write."""
         here, there = super().find(key), self._copies.find(key)

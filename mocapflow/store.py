@@ -182,6 +182,10 @@ class Store:
             path.rename(aside)
         return aside
 
+    def discard(self, artifact: Artifact) -> None:
+        """Remove an artifact that is to be made anew."""
+        remove(artifact.path)
+
     def damaged(self, key: str) -> Path | None:
         """Return the group of a key if even its attributes can't be read."""
         return next((p for p in self._groups(f"*-{key[:SHORT]}") if _open(p) is None), None)

@@ -37,7 +37,7 @@ from mocapflow.data import (
     blind,
     empty_matches,
 )
-from mocapflow.errors import ComponentFailed
+from mocapflow.errors import ComponentFailed, PipelineError
 from mocapflow.functional import Functional
 from mocapflow.keys import FREE
 from mocapflow.loop import Steps, settle
@@ -71,7 +71,7 @@ class CoupledLoop(Stage):
     priors: tuple[Prior, ...] = ()  # added to the matches
     recovery: Recovery | None = None  # looks again where a fit is lost
     steady: Steady = Steady()
-    keep: Annotated[Literal["final", "trace"], FREE] = "final"  # trace: also the pose of every turn
+    keep: Annotated[Literal["final", "trace"], FREE] = "final"  # trace: also the pose of every turn before recovery
     on_unsteady: Annotated[Literal["go_on", "stop"], FREE] = "go_on"  # after a frame that did not come to rest
 
     @model_validator(mode="after")
@@ -90,7 +90,14 @@ class CoupledLoop(Stage):
         flow: ImageFlow | None = None,
         checks: ViewChecks | None = None,
     ) -> Track:
-        """Return the track; frames that are already saved are not computed again."""
+        """Return the track; frames that are already saved are not computed again.
+
+        Raises:
+            PipelineError: there is a garment, and nothing that drapes it.
+        """
+        if scene.garment is not None and self.draper is None:
+            hint = "name a draper and a cloth_fitter, or track the bare body: garment: null"
+            raise PipelineError(f"the person wears a {scene.garment.name}, which the track does not drape", hint=hint)
         model = ClothedModel(scene=scene.with_background(background), draper=self.draper)
         if self.keep == "trace":
             checkpoint.keep_turns(self.steady.max_turns)

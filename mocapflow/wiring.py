@@ -65,19 +65,26 @@ def _wire_stage(named: NamedStage, earlier: Sequence[NamedStage], registry: Regi
 
 
 def _source(named: NamedStage, parameter: str, hint: Any, earlier: Sequence[NamedStage], registry: Registry) -> Source:
+    shown = [other for other in earlier if other.part in {None, named.part}]  # parts only see their own
     if get_origin(hint) is tuple:
-        return tuple(other.label for other in earlier if _fits(_told(other, makes, other.stage), get_args(hint)[0]))
+        return named.joins or _several(named, parameter, get_args(hint)[0], shown)
     wanted, optional = _without_none(hint)
-    earlier = [other for other in earlier if other.part in {None, named.part}]
     if parameter in named.wiring:
-        return _chosen(named, parameter, wanted, earlier)
+        return _chosen(named, parameter, wanted, shown)
     supplied = SUPPLIED.get(wanted.__name__) if wanted.__module__.startswith("mocapflow.") else None
-    source = _latest(wanted, earlier) or supplied
+    source = _latest(wanted, shown) or supplied
     if source is None and not optional:
         article = "an" if wanted.__name__[0] in "AEIOU" else "a"
         message = f"stage '{named.label}' needs {article} {wanted.__name__} but no earlier stage makes one"
         raise PipelineError(message, where=named.where, hint=alternatives("", _makers(wanted, registry)))
     return source
+
+
+def _several(named: NamedStage, parameter: str, wanted: type, earlier: Sequence[NamedStage]) -> tuple[str, ...]:
+    """Return all earlier stages that make a type, or the one that `from` names."""
+    if parameter in named.wiring:
+        return (_chosen(named, parameter, wanted, earlier),)
+    return tuple(other.label for other in earlier if _fits(_told(other, makes, other.stage), wanted))
 
 
 def _makers(wanted: type, registry: Registry) -> list[str]:

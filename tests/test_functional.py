@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mocapflow.data import FrameState, Matches, Past, Pose
-from mocapflow.functional import SHAPE_WEIGHT, Functional, area, contours, halfway
+from mocapflow.functional import SHAPE_WEIGHT, Functional, area, contours, halfway, told_apart
 from mocapflow.geometry.cameras import project
 from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.model import moved
@@ -78,3 +78,7 @@ def test_halfway_lies_in_the_middle():
     there = halfway(other, POSE)
     np.testing.assert_allclose(middle.root, there.root, atol=1e-12)
     assert isinstance(middle, Pose)
+
+
+def test_two_priors_of_one_name_are_told_apart():
+    assert told_apart(["parzen", "limits", "parzen", "parzen"]) == ("parzen", "limits", "parzen_2", "parzen_3")

@@ -7,7 +7,7 @@ from mocapflow.errors import PipelineError
 from mocapflow.parts import in_parts, split
 from mocapflow.runner import plan, run, tracks
 from mocapflow.wiring import wire
-from tests.fixtures.stores import actions, load, run_tiny, write_pipeline, write_recording
+from tests.fixtures.stores import STAGES, actions, load, run_tiny, write_pipeline, write_recording
 
 IN_TWO = ("parts.count=2", "parts.overlap=3")
 
@@ -36,6 +36,19 @@ def test_a_part_has_its_own_start_and_others_see_the_whole(path):
     assert wiring["track_2"]["background"] == "background"
     assert wiring["track"] == {"parts": ("track_1", "track_2"), "scene": "scene"}
     assert wiring["smooth"]["track"] == "track"
+
+
+def test_each_of_two_tracks_is_joined_of_its_own_parts(tmp_path):
+    stages = {label: STAGES[label] for label in ("background", "start")}
+    stages |= {"first": STAGES["track"], "track": STAGES["track"], "smooth": "tiny_smooth", "export": "tiny_export"}
+    clip = write_recording(tmp_path / "clip", frames=20)
+    path = write_pipeline(tmp_path, clip, stages=stages)
+    pipeline = in_parts(load(path, *IN_TWO), range(20))
+    labels, wiring = [named.label for named in pipeline.stages], wire(pipeline)
+    assert labels.count("start_2") == 1 and wiring["track_2"]["start"] == "start_2"
+    assert wiring["first"]["parts"] == ("first_1", "first_2")
+    assert wiring["track"]["parts"] == ("track_1", "track_2")
+    run_tiny(path, tmp_path, *IN_TWO, "stages.first.steady.max_turns=2")  # parts of both would not fit together
 
 
 def test_another_stage_starts_the_later_parts(path):

@@ -117,6 +117,22 @@ def test_what_a_stage_warned_of_is_told_again_when_it_comes_from_the_store(tmp_p
         assert f"warning: {said}" in lines
 
 
+def test_what_a_track_warned_of_is_kept_with_its_frames(tmp_path, path, monkeypatch, caplog):
+    def warned():
+        recipe = json.loads((tmp_path / "out" / "results.json").read_text())["recipe"]
+        return recipe["stages"]["track"]["warnings"]
+
+    monkeypatch.setenv("TINY_WARN_AT", "3")
+    run_tiny(path, tmp_path, frames=5)
+    monkeypatch.setenv("TINY_WARN_AT", "7")
+    run_tiny(path, tmp_path, frames=9)
+    both = ["frame 3 is dark", "frame 7 is dark"]  # each in several turns
+    assert warned() == both
+    monkeypatch.delenv("TINY_WARN_AT")
+    _, lines = run_tiny(path, tmp_path, frames=9)
+    assert warned() == both and f"warning: {both[0]}" in lines
+
+
 def test_a_body_made_by_a_stage_replaces_the_body_of_later_ones(tmp_path):
     body = {"use": "tiny_body", "size_m": 1.5}
     stages = {"start": "tiny_start", "grow": "tiny_grow", "track": STAGES["track"], "export": "tiny_export"}

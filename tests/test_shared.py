@@ -77,6 +77,17 @@ def test_a_run_that_stopped_goes_on_elsewhere(tmp_path, path, url, monkeypatch):
     assert len([name for name in copies(url) if name.startswith("track-")]) == 1  # the finished one
 
 
+def test_what_is_made_anew_takes_the_place_of_the_copy(tmp_path, path, url, monkeypatch):
+    shared(path, tmp_path / "one", url)
+    pipeline, folder = load(path), tmp_path / "one"
+    monkeypatch.setenv("TINY_RAISE_AT", "5")
+    with pytest.raises(ComponentFailed, match="failed at frame 5"):
+        run(pipeline, store=folder / "store.zarr", out=folder / "out", url=url, fresh=True)
+    monkeypatch.delenv("TINY_RAISE_AT")
+    _, lines = shared(path, folder, url)  # not the old copy
+    assert "track: going on after 5 frames" in lines
+
+
 def test_a_copy_that_never_arrived_is_not_seen(tmp_path, path, url, monkeypatch):
     def broken(self, path, value, **options):
         if path.endswith("zarr.json") and "track-" in path:

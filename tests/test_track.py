@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mocapflow.errors import ComponentFailed
+from mocapflow.errors import ComponentFailed, PipelineError
 from mocapflow.loop import settle
 from mocapflow.runner import run
 from mocapflow.store import Store
@@ -231,6 +231,13 @@ def test_without_a_garment_there_is_no_cloth(tmp_path):
     assert the_track(tmp_path).cloth.shape == (12, 0, 3)
     run_tiny(path, tmp_path / "whole")
     assert same(the_track(tmp_path / "whole"), the_track(tmp_path))
+
+
+def test_a_garment_that_nothing_drapes_is_refused(tmp_path):
+    stages = STAGES | {"track": STAGES["track"] | {"draper": None, "cloth_fitter": None}}
+    path = write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=stages)
+    with pytest.raises(PipelineError, match="wears a .*, which the track does not drape(.|\n)*garment: null"):
+        run_tiny(path, tmp_path, frames=5)
 
 
 def test_on_unsteady_stop(tmp_path, path):

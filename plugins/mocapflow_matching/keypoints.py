@@ -124,7 +124,7 @@ def spread_px(places: F64, spread: F64, cameras: tuple[Camera, ...]) -> F64:
 
 
 def _median_error(points: F64, projected: F64) -> float:
-    seen = points[:, 2] > 0
+    seen = (points[:, 2] > 0) & np.isfinite(projected).all(axis=1)  # what lies behind the camera is nowhere
     return float(np.median(np.linalg.norm(points[seen, :2] - projected[seen], axis=1))) if seen.any() else np.inf
 
 

@@ -93,7 +93,7 @@ class Corruption:
             images=tuple(images),
             usable=usable,
             reasons=() if usable.all() else tuple(reasons),
-            hidden=masks(events, images) or frame.hidden,
+            hidden=frame.also_hidden(masks(events, images)),
             keypoints=None if keypoints is None else tuple(keypoints),
         )
 

@@ -60,8 +60,7 @@ class Denoised:
         for frame in replace(source, indices=indices).frames():
             found = [self.settings.restore(image) for image in frame.images]
             images, hidden = zip(*found, strict=True)
-            known = frame.hidden or hidden
-            yield replace(frame, images=images, hidden=tuple(a | b for a, b in zip(known, hidden, strict=True)))
+            yield replace(frame, images=images, hidden=frame.also_hidden(hidden))
 
 
 def noise_share(kept: Bool) -> float:

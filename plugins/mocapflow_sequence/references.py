@@ -13,6 +13,7 @@ from mocapflow.io import markers
 from mocapflow.records import F64, array, record
 from mocapflow_sequence import marker_joints, tables
 from mocapflow_sequence.marker_names import FILE, landmarks
+from mocapflow_sequence.ours import SIGNED
 
 MOTION = {"knee_angle": "knee_flexion", "hip_flexion": "hip_flexion", "ankle_angle": "ankle", "elbow_flex": "elbow"}
 POSE2SIM = {
@@ -73,7 +74,7 @@ def _table(path: Path) -> Reference:
     clock = next((name for name in ("frame", "time") if name in columns), None)
     if clock is None:
         raise RecordingError("the reference has neither a column frame nor time", where=str(path))
-    curves = {name: values for name, values in columns.items() if name not in ("frame", "time")}
+    curves = {name: columns[name] for name in tables.angle_names(columns)}
     return Reference(curves=curves, at=columns[clock], by_frame=clock == "frame")
 
 
@@ -81,6 +82,7 @@ def _motion(path: Path) -> Reference:
     columns, time = markers.read_mot(path)
     named = {f"{theirs}_{side}": f"{ours}_{side}" for theirs, ours in MOTION.items() for side in ("l", "r")}
     curves = {ours: columns[theirs] for theirs, ours in named.items() if theirs in columns}
+    curves |= {name: columns[name] for name in SIGNED if name in columns}
     at, notes = from_zero(time)
     return Reference(curves=curves, at=at, by_frame=False, notes=notes)
 

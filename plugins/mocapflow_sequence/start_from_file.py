@@ -36,7 +36,7 @@ class StartFromFile(Stage):
     def inputs(self, recording: Path) -> Sequence[Path]:
         """Return the files that are read: their content is part of the cache key."""
         path = recording / self.file
-        return [path, *sorted(recording.glob(f"{path.stem}_*{path.suffix}"))]
+        return [path, *sorted(path.parent.glob(f"{path.stem}_*{path.suffix}"))]
 
     def run(self, recording: Recording, scene: Scene) -> Start:
         """Return the pose in the file; the cloth starts without forces.

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from keypoint_recording import DEMO, bystander_of, keypoints
 from mocapflow_bodies.scanned import Scanned
-from mocapflow_matching.keypoints import Keypoints, marks_on
+from mocapflow_matching.keypoints import Keypoints, _median_error, marks_on
 from mocapflow_sequence.landmarks import landmarks
 from mocapflow_sequence.start_from_file import read_pose
 from mocapflow_twist.solver import TwistGaussNewton
@@ -91,6 +91,13 @@ def test_the_pose_is_found_from_keypoints_alone():
 def test_a_bystander_is_not_meant():
     alone, crowded = match(frame_of(POSE)), match(frame_of(POSE, bystander=(0, 2)))
     np.testing.assert_allclose(crowded.pixel, alone.pixel)
+
+
+def test_a_landmark_behind_the_camera_says_nothing_of_the_others():
+    points = np.array([[10.0, 20, 1], [30, 40, 1], [50, 60, 1]])
+    projected = np.array([[13.0, 24], [np.nan, np.nan], [50, 65]])
+    assert _median_error(points, projected) == 5.0
+    assert _median_error(points, np.full((3, 2), np.nan)) == np.inf
 
 
 def test_somebody_far_away_is_not_taken():

@@ -210,3 +210,18 @@ def test_our_side_from_files_is_that_from_the_track(own: Ours, tmp_path: Path) -
     np.testing.assert_allclose(got.stick.places, own.stick.places, atol=1e-7)
     assert got.frame_rate == pytest.approx(RATE, abs=0.01)
     assert len(angles.definitions(got.stick.names)) == 8
+
+
+def test_another_run_is_a_reference_by_its_angles_alone(tmp_path: Path) -> None:
+    (tmp_path / "angles.csv").write_text(
+        "frame,time,knee_flexion_l,knee_flexion_l_sd,knee_flexion_l_observed\n0,0,1,2,1\n"
+    )
+    assert list(read_reference(tmp_path / "angles.csv").curves) == ["knee_flexion_l"]
+
+
+def test_a_knee_of_opensim_is_compared_as_signed_too(tmp_path: Path) -> None:
+    bend = np.array([-4.0, 0.0, 30.0])
+    markers.write_mot(tmp_path / "m.mot", {"knee_angle_l": bend}, np.arange(3) / 30)
+    curves = read_reference(tmp_path / "m.mot").curves
+    np.testing.assert_allclose(curves["knee_angle_l"], bend)
+    assert set(curves) == {"knee_angle_l", "knee_flexion_l"}

@@ -132,3 +132,11 @@ def test_a_later_part_has_a_file_of_its_own(recording, scene, caplog):
     moved = StartFromFile().run(later, scene).pose.root - StartFromFile().run(whole, scene).pose.root
     assert moved[0, 3] == pytest.approx(0.25)
     assert recording / "init_000012.json" in StartFromFile().inputs(recording)
+
+
+def test_starts_in_a_folder_of_their_own_are_inputs(recording):
+    (recording / "starts").mkdir()
+    for name in ("init.json", "init_000012.json"):
+        shutil.copy(recording / "init.json", recording / "starts" / name)
+    found = StartFromFile(file="starts/init.json").inputs(recording)
+    assert [path.relative_to(recording).as_posix() for path in found] == ["starts/init.json", "starts/init_000012.json"]
