@@ -16,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 from mocapflow_bodies.scanned import Scanned
 from mocapflow_draping.fixed import Fixed
+from mocapflow_fitting.start_from_file import read_pose
 from mocapflow_matching.contour_icp import ContourIcp
 from mocapflow_matching.fourier_icp import FourierIcp
 from mocapflow_matching.optical_flow import OpticalFlow
@@ -23,7 +24,6 @@ from mocapflow_priors.joint_limits import JointLimits
 from mocapflow_priors.rest_pose import RestPose
 from mocapflow_priors.spine_coupling import SpineCoupling
 from mocapflow_recovery.limb_search import LimbSearch
-from mocapflow_sequence.start_from_file import read_pose
 from mocapflow_twist.solver import TwistGaussNewton
 
 from mocapflow.assets import Background

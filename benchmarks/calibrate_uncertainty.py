@@ -3,7 +3,7 @@
 `python benchmarks/calibrate_uncertainty.py RUN … [--check RUN …]`: fits by how many millimetres an outline is off, on
 run folders that were compared with known motion, and says what the 90 % interval covers there, on every take by the
 fit to the others, on the runs to check, and how many single curves even exact deviations would leave badly covered.
-Put the value into mocapflow_sequence/uncertainty.py.
+Put the value into mocapflow_export/uncertainty.py.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
-from mocapflow_sequence import layout, tables
-from mocapflow_sequence.compare import NINETY, rms
-from mocapflow_sequence.ours import of_folder
-from mocapflow_sequence.uncertainty import OUTLINE_MM, excess, px_per_mm
+from mocapflow_evaluation.compare import NINETY, rms
+from mocapflow_evaluation.ours import of_folder
+from mocapflow_export import layout, tables
+from mocapflow_export.uncertainty import OUTLINE_MM, excess, px_per_mm
 
 from mocapflow.commands.again import recall
 from mocapflow.recording import open_recording

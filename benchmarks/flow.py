@@ -15,6 +15,7 @@ from itertools import islice
 
 import numpy as np
 from basin import bent, scene_of, shown
+from mocapflow_fitting.keypoint_layouts import LAYOUTS
 from mocapflow_matching.contour_icp import ContourIcp
 from mocapflow_matching.fourier_icp import FourierIcp
 from mocapflow_matching.keypoints import Keypoints, marks_on
@@ -22,7 +23,6 @@ from mocapflow_matching.optical_flow import OpticalFlow
 from mocapflow_priors.constant_velocity import ConstantVelocity
 from mocapflow_priors.image_flow import ImageFlowPredictor
 from mocapflow_sequence.flow import FollowPoints
-from mocapflow_sequence.keypoint_layouts import LAYOUTS
 
 from mocapflow.components import Matcher
 from mocapflow.data import NO_CLOTH, Change, Frame, Moment, Past, Pose, Turn

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 from limits import true_poses
-from mocapflow_sequence.calibrate_limbs import CalibrateLimbs
-from mocapflow_sequence.proportions import scaled
+from mocapflow_fitting.calibrate_limbs import CalibrateLimbs
+from mocapflow_fitting.proportions import scaled
 
 from mocapflow.assets import Body
 from mocapflow.data import Pose

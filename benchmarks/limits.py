@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
-from mocapflow_sequence.start_from_file import read_pose
+from mocapflow_fitting.start_from_file import read_pose
 
 from mocapflow.assets import Camera
 from mocapflow.components import Prior, Segmenter

@@ -13,10 +13,10 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from mocapflow_sequence import layout, tables
-from mocapflow_sequence.evaluate import evaluate, evaluate_run
-from mocapflow_sequence.ours import Ours
-from mocapflow_sequence.stick import Stick
+from mocapflow_evaluation.evaluate import evaluate, evaluate_run
+from mocapflow_evaluation.ours import Ours
+from mocapflow_evaluation.stick import Stick
+from mocapflow_export import layout, tables
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, filtfilt
 from scipy.spatial.transform import Rotation

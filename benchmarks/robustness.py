@@ -16,10 +16,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from mocapflow_fitting.start_from_file import StartFromFile
 from mocapflow_robustness.check_views import CheckViews
 from mocapflow_robustness.corrupt import Corrupt
 from mocapflow_robustness.events import Event
-from mocapflow_sequence.start_from_file import StartFromFile
 
 from mocapflow.data import Moment, Past, Pose
 from mocapflow.geometry.angles import measure

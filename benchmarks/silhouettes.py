@@ -15,7 +15,7 @@ from inspect import unwrap
 import cv2
 import numpy as np
 from mocapflow_bodies.scanned import Scanned
-from mocapflow_sequence.start_from_file import read_pose
+from mocapflow_fitting.start_from_file import read_pose
 
 from mocapflow.assets import Camera
 from mocapflow.data import CLOTH, NO_CLOTH, Surface

@@ -11,7 +11,7 @@ from figures import write
 from mocapflow_draping.fields import build_fields
 from mocapflow_draping.literal import settle_batch
 from mocapflow_draping.parts import posed_parts
-from mocapflow_sequence.portrait import portrait
+from mocapflow_report.portrait import portrait
 
 from mocapflow import Body, GarmentMesh, Pose, Scene
 from mocapflow.geometry import sewing

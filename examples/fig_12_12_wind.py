@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from figures import clothed, draped, posed, write
 from mocapflow_draping.kinematic import Kinematic
-from mocapflow_sequence.portrait import portrait
+from mocapflow_report.portrait import portrait
 
 TILT = 0.4  # rad, of the tails; a person at rest looks along -y, so wind from the front blows along +y
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 from figures import first_frame, write
-from mocapflow_sequence.overlay import Painter
+from mocapflow_report.overlay import Painter
 
 from mocapflow.geometry.cameras import project
 from mocapflow.loop import overlaps

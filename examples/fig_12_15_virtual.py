@@ -6,7 +6,7 @@ Run `python examples/fig_12_15_virtual.py [PICTURE.png]`.
 from __future__ import annotations
 
 from figures import first_frame, write
-from mocapflow_sequence.room import Room
+from mocapflow_report.room import Room
 
 from mocapflow.data import NO_CLOTH
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 from mocapflow_bodies.scanned import Scanned
-from mocapflow_sequence import drawing
-from mocapflow_sequence.start_from_file import StartFromFile
+from mocapflow_fitting.start_from_file import StartFromFile
+from mocapflow_report import drawing
 
 from mocapflow import (
     ClothedModel,

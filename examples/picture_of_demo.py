@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from mocapflow_sequence import layout
-from mocapflow_sequence.tables import read_columns
+from mocapflow_export import layout
+from mocapflow_export.tables import read_columns
 
 from mocapflow.records import F64, U8
 from mocapflow.shipped import shipped

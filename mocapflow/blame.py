@@ -8,13 +8,14 @@ from pathlib import Path
 from types import FrameType, TracebackType
 from typing import Any
 
+from mocapflow.answers import WrongAnswer
 from mocapflow.components import Component
 from mocapflow.data import Frame, Turn
 from mocapflow.errors import ComponentFailed
 from mocapflow.registry import Registry
 
 
-def failure(error: Exception, stage: Component, registry: Registry, saved: str, log: Path) -> ComponentFailed:
+def failure(error: BaseException, stage: Component, registry: Registry, saved: str, log: Path) -> ComponentFailed:
     """Return the error for people: the innermost frame of the traceback in a plugin names the culprit.
 
     Args:
@@ -25,7 +26,7 @@ def failure(error: Exception, stage: Component, registry: Registry, saved: str, 
         log: where to write the whole traceback.
     """
     calls = list(_calls(error.__traceback__))
-    component = _culprit(calls, registry) or stage
+    component = error.component if isinstance(error, WrongAnswer) else _culprit(calls, registry) or stage
     role, name = component.role.replace("_", " "), component.name
     message = f"{role} '{name}' ({registry.origin(type(component))}) failed{_moment(calls)}: {_said(error)}"
     hints = [saved, _keep(error, log)]
@@ -67,12 +68,12 @@ def _moment(calls: list[FrameType]) -> str:
     return f" at frame {frame.index}{iteration}"
 
 
-def _said(error: Exception) -> str:
+def _said(error: BaseException) -> str:
     text = str(error).strip().splitlines()
     return f"{type(error).__name__}: {text[0]}" if text else type(error).__name__
 
 
-def _keep(error: Exception, log: Path) -> str:
+def _keep(error: BaseException, log: Path) -> str:
     try:
         log.parent.mkdir(parents=True, exist_ok=True)
         log.write_text("".join(traceback.format_exception(error)), encoding="utf-8")

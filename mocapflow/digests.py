@@ -23,6 +23,7 @@ PARSER = threading.Lock()  # CPython 3.11 counts the parser's recursion across t
 MARK = "blake2b:"  # a digest reads "blake2b:<hex> <name>"; the name is for people and never counts
 
 CORE = (
+    "answers",
     "assets",
     "components",
     "data",

@@ -192,7 +192,7 @@ class Execution:
             return call()
         except ComponentFailed:
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             if isinstance(error, MocapflowError) and not isinstance(error, ShapeError | PluginError):
                 raise
             raise failure(error, component, self._pipeline.registry, kept(), self._out / "failed.log") from error

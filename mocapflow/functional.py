@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from mocapflow.answers import residual_of
 from mocapflow.assets import Camera
 from mocapflow.components import Prior
 from mocapflow.data import Cloth, Estimate, FrameState, Matches, Past, Pose, Segmentation, Silhouette, Surface
@@ -72,7 +73,7 @@ class Functional:
         return estimate, cloth
 
     def _priors(self, pose: Pose) -> list[float]:
-        return [prior.weight * prior.residual(pose, self.past, self.model.scene).energy for prior in self.priors]
+        return [prior.weight * residual_of(prior, pose, self.past, self.model.scene).energy for prior in self.priors]
 
 
 def area(surface: Surface, silhouette: Silhouette, camera: Camera) -> float:

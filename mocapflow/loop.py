@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from mocapflow.answers import matches_of
 from mocapflow.assets import Camera
 from mocapflow.components import ClothFitter, Matcher, Observe, PoseSolver, Prior, Segmenter, pool
 from mocapflow.data import NO_CLOTH, Frame, FrameResult, FrameState, Matches, Past, Segmentation, Surface, Turn
@@ -96,7 +97,7 @@ def pool_matches(
     surface: Surface,
 ) -> Matches:
     """Return the matches of all matchers together, each with its share, where nothing hides the person."""
-    found = pool([(m.share, m.match(frame, segmentation, surface, past, scene, turn)) for m in matchers])
+    found = pool([(m.share, matches_of(m, frame, segmentation, surface, past, scene, turn)) for m in matchers])
     return unhidden(found, frame, surface, scene.cameras)
 
 

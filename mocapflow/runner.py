@@ -104,6 +104,8 @@ def run(
         raise StoreError(f"can't write the run folder: {error.strerror}", where=str(out), hint=hint) from error
     execution = Execution(pipeline, kept, out, steps, fresh=fresh, report=report)
     with threadpool_limits(limits=1, user_api="blas"):  # a frame's matrices are small: threads wait for each other
+        for warning in dict.fromkeys(said for step in steps for said in step.recording.warnings):
+            report(f"warning: {warning}")
         for step in steps:
             if only is None or step.label == only:
                 execution.finish(step)

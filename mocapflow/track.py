@@ -9,6 +9,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
+from mocapflow.answers import pose_of
 from mocapflow.assets import Background
 from mocapflow.checkpoint import Checkpoint
 from mocapflow.components import (
@@ -136,7 +137,7 @@ class CoupledLoop(Stage):
         """Return what is believed of a frame before looking: the predicted pose, clothed."""
         pose, parameters = start.pose, start.parameters
         if past.moments:
-            pose = self.predictor.predict(frame, past, model.scene)
+            pose = pose_of(self.predictor, frame, past, model.scene)
             parameters = past.moments[-1].cloth.parameters
         watch.lap("predict")
         cloth = model.drape(pose, parameters, past)

@@ -34,6 +34,6 @@ def code_is_known():
 @pytest.fixture
 def unrendered(monkeypatch: pytest.MonkeyPatch) -> None:
     """Compose pictures of a comparison but don't render them, which takes a second each: for who reads its figures."""
-    from mocapflow_sequence import comparison_plots
+    from mocapflow_evaluation import comparison_plots
 
     monkeypatch.setattr(comparison_plots, "save", lambda figure, path: path)

@@ -30,6 +30,7 @@ LAYERS = (  # a module imports only from its own layer or an earlier one; `io` a
     "paired_views",
     "synchrony",
     "components",
+    "answers",
     "model",
     "timing",
     "functional",

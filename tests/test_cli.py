@@ -5,7 +5,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from mocapflow_sequence import layout, tables
+from mocapflow_export import layout, tables
 from typer.testing import CliRunner
 
 from mocapflow import cli, registry, runner

@@ -133,6 +133,12 @@ def test_what_a_track_warned_of_is_kept_with_its_frames(tmp_path, path, monkeypa
     assert warned() == both and f"warning: {both[0]}" in lines
 
 
+def test_what_is_odd_about_a_recording_is_told_when_it_is_run(tmp_path, path):
+    _, lines = run_tiny(path, tmp_path, frames=2)
+    (said,) = [line for line in lines if line.startswith("warning: ")]
+    assert said.startswith("warning: nothing says the frame rate: 30 frames per second assumed")
+
+
 def test_a_body_made_by_a_stage_replaces_the_body_of_later_ones(tmp_path):
     body = {"use": "tiny_body", "size_m": 1.5}
     stages = {"start": "tiny_start", "grow": "tiny_grow", "track": STAGES["track"], "export": "tiny_export"}

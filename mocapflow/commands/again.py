@@ -74,7 +74,7 @@ def recall(out: Path) -> Invocation:
     try:
         said = json.loads((out / FILE).read_text(encoding="utf-8"))
         return Invocation(**{**said, "changes": tuple(said["changes"])})
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         hint = f"a run folder is what `mocapflow run` writes; it holds {FILE}"
         raise PipelineError("this is no run folder", where=str(out), hint=hint) from None
     except (ValueError, TypeError, KeyError):

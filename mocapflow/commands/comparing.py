@@ -61,7 +61,7 @@ def compare(
 
 def show(folder: Path, cells: Sequence[Cell], failed: Mapping[Cell, str]) -> None:
     """Compare what has run, and print it with what has not."""
-    from mocapflow_sequence import variants
+    from mocapflow_evaluation import variants
 
     runs = [(cell.variant, cell.name, failed.get(cell) or place(folder, cell)) for cell in cells]
     rows = [{name: row[name] for name in SHOWN} for row in variants.compare(runs, folder)]

@@ -51,7 +51,7 @@ def draw_garment(registry: Registry, name: str, recording: Path | None, draper: 
 
 def poster(scene: Scene, garment: Garment, draper: Draper) -> U8:
     """Return the image (H, W, 3) BGR: rest from two sides, draped standing and with a knee raised, the pattern."""
-    from mocapflow_sequence import drawing, portrait
+    from mocapflow_report import drawing, portrait
 
     assert scene.garment is not None
     standing, raised = _pose(scene, {}), _pose(scene, RAISED)

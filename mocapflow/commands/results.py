@@ -29,7 +29,7 @@ def evaluate(run: Run, truth: Truth = None) -> None:
 
     Settings are those of the run. A folder whose pipeline is not here is compared with what is given by the defaults.
     """
-    from mocapflow_sequence.evaluate import evaluate_run
+    from mocapflow_evaluation.evaluate import evaluate_run
 
     reference, missing, longest_lag_s = _comparison(run, truth)
     if reference is None or not reference.is_file():
@@ -49,7 +49,7 @@ def evaluate(run: Run, truth: Truth = None) -> None:
 
 def _comparison(run: Path, truth: Path | None) -> tuple[Path | None, str, float]:
     """Return what a run is compared with, or why there is nothing, and the longest lag to look for (s)."""
-    from mocapflow_sequence.evaluate import LONGEST_LAG_S, Evaluate, chosen
+    from mocapflow_evaluation.evaluate import LONGEST_LAG_S, Evaluate, chosen
 
     try:
         pipeline = recall(run).load()

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from mocapflow_sequence import tables
-from mocapflow_sequence.uncertainty import measured
+from mocapflow_export import tables
+from mocapflow_export.uncertainty import measured
 
 from mocapflow_formats.result import Result, library
 

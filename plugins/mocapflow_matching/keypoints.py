@@ -6,10 +6,10 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from mocapflow_sequence.keypoint_layouts import LAYOUTS, Layout, layout_of
-from mocapflow_sequence.landmarks import landmarks
-from mocapflow_sequence.person import scale_of
-from mocapflow_sequence.triangulate import triangulate
+from mocapflow_fitting.keypoint_layouts import LAYOUTS, Layout, layout_of
+from mocapflow_fitting.landmarks import landmarks
+from mocapflow_fitting.person import scale_of
+from mocapflow_fitting.triangulate import triangulate
 from pydantic import PositiveFloat
 
 from mocapflow.assets import Body, Camera

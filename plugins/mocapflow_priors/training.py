@@ -28,7 +28,7 @@ COLUMNS = {  # of angles.csv: the screw that makes nearly all of each
     "ankle": "ankle.dorsiflexion",
     "elbow": "elbow.flexion",
 }
-COORDINATES = {  # of OpenSim, as `mocapflow_sequence.opensim` names them
+COORDINATES = {  # of OpenSim, as `mocapflow.io.opensim` names them
     "hip_flexion": "hip.flexion",
     "knee_angle": "knee.flexion",
     "ankle_angle": "ankle.dorsiflexion",
@@ -139,7 +139,7 @@ def from_opensim(path: Path, body: Body) -> Angles:
 
 def opensim_at_rest(body: Body) -> Mapping[str, float]:
     """Return what OpenSim calls the angles of the rest pose, in degrees."""
-    from mocapflow_sequence.opensim import coordinates
+    from mocapflow.io.opensim import coordinates
 
     found = coordinates(body, np.eye(4)[None], np.zeros((1, len(body.twists))))
     return {name: float(value[0]) for name, value in found.items()}

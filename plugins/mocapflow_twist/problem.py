@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mocapflow.answers import residual_of
 from mocapflow.assets import Body
 from mocapflow.components import Prior
 from mocapflow.data import Cloth, Past, Pose, Residual
@@ -136,5 +137,5 @@ class Problem(NamedTuple):
 
     def _residuals(self, guess: Guess) -> Sequence[Residual]:
         if guess.pose not in self.tried:
-            self.tried[guess.pose] = [p.residual(guess.pose, self.past, self.model.scene) for p in self.priors]
+            self.tried[guess.pose] = [residual_of(p, guess.pose, self.past, self.model.scene) for p in self.priors]
         return self.tried[guess.pose]

@@ -5,8 +5,8 @@ import shutil
 from pathlib import Path
 
 import numpy as np
-from mocapflow_sequence.keypoint_layouts import LAYOUTS
-from mocapflow_sequence.landmarks import landmarks
+from mocapflow_fitting.keypoint_layouts import LAYOUTS
+from mocapflow_fitting.landmarks import landmarks
 
 from mocapflow.data import Pose
 from mocapflow.geometry import kinematics

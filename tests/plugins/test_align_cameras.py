@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from keypoint_recording import DEMO, copy_demo, write
 from mocapflow_bodies.template import Template
-from mocapflow_sequence.align_cameras import AlignCameras, shift_px, turn
-from mocapflow_sequence.start_from_file import read_pose
+from mocapflow_fitting.align_cameras import AlignCameras, shift_px, turn
+from mocapflow_fitting.start_from_file import read_pose
 
 from mocapflow.data import Pose
 from mocapflow.geometry import twists

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mocapflow_sequence.alignment import Alignment, align, resampled
-from mocapflow_sequence.references import Reference
+from mocapflow_evaluation.alignment import Alignment, align, resampled
+from mocapflow_evaluation.references import Reference
 
 TIME = np.arange(120) / 30
 

@@ -9,12 +9,12 @@ import pytest
 from keypoint_recording import DEMO, copy_demo, write
 from mocapflow_bodies.template import Template
 from mocapflow_draping.kinematic import Kinematic
+from mocapflow_fitting.calibrate_limbs import CalibrateLimbs
+from mocapflow_fitting.pose_fit import velocities
+from mocapflow_fitting.proportions import scaled
+from mocapflow_fitting.start_from_file import read_pose
 from mocapflow_garments.skirt import Skirt
 from mocapflow_matching.contour_icp import ContourIcp
-from mocapflow_sequence.calibrate_limbs import CalibrateLimbs
-from mocapflow_sequence.pose_fit import velocities
-from mocapflow_sequence.proportions import scaled
-from mocapflow_sequence.start_from_file import read_pose
 from pydantic import ValidationError
 from results_scene import make_track
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mocapflow_sequence import compare, cycles
-from mocapflow_sequence.cycles import Cycle, gait_cycles
+from mocapflow_evaluation import compare, cycles
+from mocapflow_evaluation.cycles import Cycle, gait_cycles
 from results_scene import DEMO
 
 RATE = 60.0

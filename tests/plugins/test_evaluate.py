@@ -3,11 +3,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from mocapflow_sequence import compare, layout, tables
-from mocapflow_sequence.evaluate import Evaluate, evaluate, evaluate_run
-from mocapflow_sequence.ours import Ours
-from mocapflow_sequence.references import read_reference
-from mocapflow_sequence.stick import Stick
+from mocapflow_evaluation import compare
+from mocapflow_evaluation.evaluate import Evaluate, evaluate, evaluate_run
+from mocapflow_evaluation.ours import Ours
+from mocapflow_evaluation.references import read_reference
+from mocapflow_evaluation.stick import Stick
+from mocapflow_export import layout, tables
 from results_scene import DEMO, demo_scene, stepping
 from scipy.signal import lfilter
 

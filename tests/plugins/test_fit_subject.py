@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from keypoint_recording import DEMO, copy_demo, write
 from mocapflow_bodies.template import Template
-from mocapflow_sequence.fit_subject import FitSubject
-from mocapflow_sequence.proportions import PROPORTIONS, scaled
-from mocapflow_sequence.start_from_file import read_pose
+from mocapflow_fitting.fit_subject import FitSubject
+from mocapflow_fitting.proportions import PROPORTIONS, scaled
+from mocapflow_fitting.start_from_file import read_pose
 
 from mocapflow.data import Pose
 from mocapflow.geometry import angles

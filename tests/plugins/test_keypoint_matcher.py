@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from keypoint_recording import DEMO, bystander_of, keypoints
 from mocapflow_bodies.scanned import Scanned
+from mocapflow_fitting.landmarks import landmarks
+from mocapflow_fitting.start_from_file import read_pose
 from mocapflow_matching.keypoints import Keypoints, _median_error, marks_on
-from mocapflow_sequence.landmarks import landmarks
-from mocapflow_sequence.start_from_file import read_pose
 from mocapflow_twist.solver import TwistGaussNewton
 
 from mocapflow.data import NO_CLOTH, Frame, Past, Segmentation, Turn

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from keypoint_recording import copy_demo, write
 from mocapflow_bodies.template import Template
-from mocapflow_sequence.align_cameras import turn
-from mocapflow_sequence.evaluate import Evaluate
-from mocapflow_sequence.keypoint_reference import low_pass
-from mocapflow_sequence.landmarks import landmarks
+from mocapflow_evaluation.evaluate import Evaluate
+from mocapflow_evaluation.keypoint_reference import low_pass
+from mocapflow_fitting.align_cameras import turn
+from mocapflow_fitting.landmarks import landmarks
 from results_scene import DEMO, make_track, stepping
 
 from mocapflow.geometry import kinematics

@@ -11,8 +11,8 @@ from mocapflow_matching.shape_flow import register
 from mocapflow_priors.constant_velocity import ConstantVelocity
 from mocapflow_priors.image_flow import ImageFlowPredictor
 from mocapflow_priors.joint_limits import JointLimits
+from mocapflow_report.raster import Canvas
 from mocapflow_sequence.flow import FollowPoints
-from mocapflow_sequence.raster import Canvas
 
 from mocapflow.data import CLOTH, NO_CLOTH, Flow, Frame, Past, Segmentation
 from mocapflow.geometry.cameras import project

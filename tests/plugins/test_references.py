@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from marker_take import markers_of, write_c3d
-from mocapflow_sequence import layout, marker_joints, ours, tables
-from mocapflow_sequence.evaluate import chosen, evaluate
-from mocapflow_sequence.marker_names import landmarks
-from mocapflow_sequence.ours import Ours
-from mocapflow_sequence.references import Reference, read_reference
+from mocapflow_evaluation import marker_joints, ours
+from mocapflow_evaluation.evaluate import chosen, evaluate
+from mocapflow_evaluation.marker_names import landmarks
+from mocapflow_evaluation.ours import Ours
+from mocapflow_evaluation.references import Reference, read_reference
+from mocapflow_export import layout, tables
 from results_scene import demo_scene, stepping
 from scipy.spatial.transform import Rotation
 

@@ -11,9 +11,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from mocapflow_sequence import layout
-from mocapflow_sequence.evaluate import Evaluate
-from mocapflow_sequence.report import Report
+from mocapflow_evaluation.evaluate import Evaluate
+from mocapflow_export import layout
+from mocapflow_report.report import Report
 from results_scene import DEMO, demo_scene, stepping
 
 from mocapflow.recording import open_recording

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mocapflow_sequence import layout, runjson, tables
-from mocapflow_sequence.export import Export
+from mocapflow_export import layout, runjson, tables
+from mocapflow_export.export import Export
 from mocapflow_sequence.lost import lost_rows
 from mocapflow_sequence.smooth import Smooth
 from results_scene import DEMO, ball_body, cameras, demo_scene, stepping

@@ -2,11 +2,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mocapflow_sequence import opensim
 from results_scene import ball_body, start_pose, stepping
 
 from mocapflow.assets import Body
 from mocapflow.geometry import angles, twists
+from mocapflow.io import opensim
 
 
 def turned(body: Body, **turns_deg: float) -> dict[str, np.ndarray]:

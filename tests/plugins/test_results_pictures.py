@@ -6,13 +6,14 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 import pytest
-from mocapflow_sequence import drawing, layout, raster, report_rows
-from mocapflow_sequence.evaluate import Evaluate
-from mocapflow_sequence.overlay import Overlay, Painter
-from mocapflow_sequence.report import Report
+from mocapflow_evaluation.evaluate import Evaluate
+from mocapflow_export import layout
+from mocapflow_report import drawing, raster, report_rows
+from mocapflow_report.overlay import Overlay, Painter
+from mocapflow_report.report import Report
+from mocapflow_report.stills import chosen_rows, stills
+from mocapflow_report.virtual import Virtual
 from mocapflow_sequence.smooth import Smooth
-from mocapflow_sequence.stills import chosen_rows, stills
-from mocapflow_sequence.virtual import Virtual
 from results_scene import DEMO, demo_scene, stepping
 
 from mocapflow.errors import StoreError
@@ -80,8 +81,8 @@ def test_overlay_of_a_lost_view_says_so(scene: Scene, track: Track, recording: R
 
 def test_the_report_says_at_once_which_frames_the_images_contradict(track: Track) -> None:
     doubted = replace(track, doubted=np.arange(len(track.frame)) == 1)
-    said = "1 of 4 frames that the images contradict: don't trust these"
-    assert (said in report_rows.glance(track, None), said in report_rows.glance(doubted, None)) == (False, True)
+    said, names = "1 of 4 frames are doubted: the images contradict them", ["cam01", "cam02", "cam03", "cam04"]
+    assert said not in report_rows.glance(track, names, None) and said in report_rows.glance(doubted, names, None)
     assert report_rows.mishaps(track, {}) == []
     assert report_rows.mishaps(doubted, {}) == ["frames that the images contradict: 1"]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mocapflow_bodies.scanned import Scanned
-from mocapflow_sequence.start_from_file import StartFromFile
+from mocapflow_fitting.start_from_file import StartFromFile
 from scipy.spatial.transform import Rotation
 
 from mocapflow.errors import RecordingError

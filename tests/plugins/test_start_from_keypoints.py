@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from keypoint_recording import DEMO, NAMES, bystander_of, copy_demo, keypoints, write
 from mocapflow_bodies.template import Template
-from mocapflow_sequence.keypoint_layouts import LAYOUTS, layout_of
-from mocapflow_sequence.landmarks import landmarks
-from mocapflow_sequence.person import find_person
-from mocapflow_sequence.pose_fit import velocities
-from mocapflow_sequence.start_from_file import read_pose
-from mocapflow_sequence.start_from_keypoints import StartFromKeypoints
-from mocapflow_sequence.triangulate import triangulate
+from mocapflow_fitting.keypoint_layouts import LAYOUTS, layout_of
+from mocapflow_fitting.landmarks import landmarks
+from mocapflow_fitting.person import find_person
+from mocapflow_fitting.pose_fit import velocities
+from mocapflow_fitting.start_from_file import read_pose
+from mocapflow_fitting.start_from_keypoints import StartFromKeypoints
+from mocapflow_fitting.triangulate import triangulate
 
 from mocapflow.data import Pose
 from mocapflow.errors import RecordingError

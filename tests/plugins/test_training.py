@@ -7,16 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mocapflow_bodies.template import Template
+from mocapflow_export import tables
 from mocapflow_priors import training, training_bvh
 from mocapflow_priors.density import read
-from mocapflow_sequence import opensim, tables
 from typer.testing import CliRunner
 
 from mocapflow.assets import Body
 from mocapflow.cli import app
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import angles
-from mocapflow.io import markers
+from mocapflow.io import markers, opensim
 from tests.fixtures.turns import rotations_from_angles
 
 BENT = {"hip_l.flexion": 40.0, "knee_l.flexion": 70.0, "ankle_l.dorsiflexion": 12.0, "elbow_l.flexion": 50.0}

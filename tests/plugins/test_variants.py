@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mocapflow_sequence import layout, tables, variants
-from mocapflow_sequence.compare import rms
+from mocapflow_evaluation import variants
+from mocapflow_evaluation.compare import rms
+from mocapflow_export import layout, tables
 
 FRAMES = np.arange(90.0)
 SHARED = 3 * np.sin(FRAMES / 5)

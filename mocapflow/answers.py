@@ -1,0 +1,101 @@
+"""What components answer the loop with, looked at where it comes in: who answers wrongly is named, not who uses it."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+import numpy as np
+
+from mocapflow.components import Component, Matcher, Predictor, Prior
+from mocapflow.data import Frame, Matches, Past, Pose, Residual, Segmentation, Surface, Turn
+from mocapflow.errors import PluginError
+from mocapflow.records import F64
+from mocapflow.scene import Scene
+
+Answer = TypeVar("Answer")
+SQUARE = 1e-6  # by how much the columns of a rotation may fail to be orthonormal
+
+
+class WrongAnswer(PluginError):
+    """A component returned what its role can't."""
+
+    def __init__(self, component: Component, message: str) -> None:
+        self.component = component
+        super().__init__(f"{component.role} '{component.name}' returned {message}")
+
+
+def pose_of(predictor: Predictor, frame: Frame, past: Past, scene: Scene) -> Pose:
+    """Return the pose that a predictor begins a frame with.
+
+    Raises:
+        WrongAnswer: it is no pose of the body.
+    """
+    pose = _of_kind(predictor, predictor.predict(frame, past, scene), Pose)
+    if len(pose.angles) != len(scene.body.twists):
+        raise WrongAnswer(predictor, f"{len(pose.angles)} joint angles; the body has {len(scene.body.twists)}")
+    if not (_finite(pose.root) and _finite(pose.angles)):
+        raise WrongAnswer(predictor, "a pose that is not finite")
+    turn = pose.root[:3, :3]
+    if np.abs(turn @ turn.T - np.eye(3)).max() > SQUARE or np.linalg.det(turn) < 0:
+        raise WrongAnswer(predictor, "a root that is no rigid motion")
+    return pose
+
+
+def matches_of(
+    matcher: Matcher,
+    frame: Frame,
+    segmentation: Segmentation,
+    surface: Surface,
+    past: Past,
+    scene: Scene,
+    turn: Turn,
+) -> Matches:
+    """Return the pairs of a matcher.
+
+    Raises:
+        WrongAnswer: a pair is of a camera or a vertex that is not there, or not finite.
+    """
+    found = _of_kind(matcher, matcher.match(frame, segmentation, surface, past, scene, turn), Matches)
+    if not len(found.camera):
+        return found
+    for name, index, count in (
+        ("camera", found.camera, len(scene.cameras)),
+        ("vertex", found.vertex, len(surface.vertices)),
+    ):
+        if index.min() < 0 or index.max() >= count:
+            odd = index[(index < 0) | (index >= count)][0]
+            raise WrongAnswer(matcher, f"a pair of {name} {odd}; there are 0 to {count - 1}")
+    for name in ("pixel", "direction", "weight"):
+        if not _finite(getattr(found, name)):
+            raise WrongAnswer(matcher, f"a {name} that is not finite")
+    if found.weight.min() < 0:
+        raise WrongAnswer(matcher, "a weight below zero")
+    return found
+
+
+def residual_of(prior: Prior, pose: Pose, past: Past, scene: Scene) -> Residual:
+    """Return what a prior adds to the pose equations; an infinite energy rules a pose out.
+
+    Raises:
+        WrongAnswer: its rows are not finite, or do not have the columns (omega, v, angles).
+    """
+    said, least = _of_kind(prior, prior.residual(pose, past, scene), Residual), 6 + len(pose.angles)
+    if said.jacobian.shape[1] < least:
+        message = f"a jacobian of {said.jacobian.shape[1]} columns; (omega, v, angles) are {least}"
+        raise WrongAnswer(prior, message)
+    if not (_finite(said.error) and _finite(said.jacobian)):
+        raise WrongAnswer(prior, "an error or a jacobian that is not finite")
+    if not isinstance(said.energy, float | int | np.floating) or np.isnan(said.energy):
+        raise WrongAnswer(prior, f"the energy {said.energy!r}")
+    return said
+
+
+def _of_kind(component: Component, value: Any, kind: type[Answer]) -> Answer:
+    if not isinstance(value, kind):
+        raise WrongAnswer(component, f"{type(value).__name__}, not {kind.__name__}")
+    return value
+
+
+def _finite(values: F64) -> bool:
+    """True where all values are finite: their sum is not, if one is not, and takes a fraction of the time."""
+    return bool(np.isfinite(values.sum()))

@@ -1,0 +1,107 @@
+"""Pictures of two systems side by side: agreement, strides, stick models."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mocapflow_export import layout
+
+from mocapflow.records import F64
+from mocapflow_evaluation import compare, cycles
+from mocapflow_evaluation.cycles import PERCENT, Cycle
+from mocapflow_evaluation.panels import OURS, TRUTH, legend, panels, save, title
+from mocapflow_evaluation.stick import Stick
+
+MOMENTS = 6  # in which the stick models are drawn
+
+
+def draw(ours: Mapping[str, F64], reference: Mapping[str, F64], strides: Sequence[Cycle], folder: Path) -> list[Path]:
+    """Draw agreement, and strides where there are some, into a run folder and return the files."""
+    names = cycles.shared(ours, reference)
+    both = {name: _common_strides(strides, ours[name], reference[name], name) for name in names}
+    walked = {name: pair for name, pair in both.items() if len(pair["mocapflow"])}
+    agreement, cycle = (layout.place(folder, part) for part in (layout.AGREEMENT_PLOT, layout.CYCLES_PLOT))
+    for path in (agreement, cycle):
+        path.unlink(missing_ok=True)
+    drawn = [draw_agreement(agreement, {name: (ours[name], reference[name]) for name in names})] if names else []
+    return [*drawn, draw_cycles(cycle, walked)] if walked else drawn
+
+
+def draw_agreement(path: Path, pairs: Mapping[str, tuple[F64, F64]]) -> Path:
+    """Draw differences over means, with their mean and the limits of 95 %: Bland & Altman, Lancet 327 (1986), 307."""
+    figure, every = panels(len(pairs), 4, 2.4)
+    for panel, (name, (ours, reference)) in zip(every, pairs.items(), strict=True):
+        error = (ours - reference)[np.isfinite(ours - reference)]
+        low, high = compare.agreement(error).values()
+        panel.plot((ours + reference) / 2, ours - reference, ".", color=OURS, markersize=3, alpha=0.6)
+        for value, style in ((float(np.mean(error)), "-"), (low, "--"), (high, "--")):
+            panel.axhline(value, color=TRUTH, linewidth=0.9, linestyle=style)
+            panel.annotate(
+                f"{value:+.1f}", (1, value), xycoords=("axes fraction", "data"), fontsize=8, va="bottom", ha="right"
+            )
+        panel.set_title(title(name), fontsize=10, loc="left")
+        panel.margins(y=0.15)
+    figure.supxlabel("mean of both, deg", fontsize=10)
+    figure.supylabel("mocapflow − reference, deg", fontsize=10)
+    return save(figure, path)
+
+
+def draw_cycles(path: Path, strides: Mapping[str, Mapping[str, F64]]) -> Path:
+    """Draw every angle over the cycle, of each system (G, 101): strides thin, their mean thick."""
+    figure, every = panels(len(strides), 4, 2.2, sharex=True)
+    for panel, (name, systems) in zip(every, strides.items(), strict=True):
+        for label, curves in systems.items():
+            colour = TRUTH if label == "reference" else OURS
+            panel.plot(PERCENT, curves.T, color=colour, linewidth=0.5, alpha=0.4)
+            panel.plot(PERCENT, curves.mean(axis=0), color=colour, linewidth=1.8, label=label)
+            panel.set_title(f"{title(name)}   {len(curves)} strides", fontsize=10, loc="left")
+    legend(figure, every)
+    figure.supxlabel("% of the gait cycle, from heel strike to heel strike", fontsize=10)
+    figure.supylabel("deg", fontsize=10)
+    return save(figure, path)
+
+
+def draw_sticks(path: Path, ours: Stick, theirs: Stick, frame: F64) -> Path:
+    """Draw both stick models in a few of the frames (T,), seen from the front and from the side."""
+    known = np.flatnonzero(np.isfinite(theirs.places).all(axis=(1, 2)))
+    rows = known[np.linspace(0, len(known) - 1, MOMENTS).round().astype(int)] if len(known) else np.array([], int)
+    figure, every = panels(2 * MOMENTS, MOMENTS, 3.0, subplot_kw={"aspect": "equal"})
+    for panel in every:
+        panel.set_axis_off()
+    for column, row in enumerate(rows):
+        across = _across(theirs, row)
+        ahead = np.cross(across, [0.0, 0.0, 1.0])
+        for view, axis in enumerate((across, ahead)):
+            panel = every[view * MOMENTS + column]
+            for stick, colour, label in ((theirs, TRUTH, "reference"), (ours, OURS, "mocapflow")):
+                _draw_bones(panel, stick, stick.places[row] @ np.stack([axis, [0.0, 0.0, 1.0]], axis=1), colour, label)
+        every[column].set_title(f"frame {frame[row]:.0f}", fontsize=9)
+    if len(rows):
+        legend(figure, every)
+    return save(figure, path)
+
+
+def _draw_bones(panel: Any, stick: Stick, flat: F64, colour: str, label: str) -> None:
+    for number, bone in enumerate(stick.bones()):
+        panel.plot(
+            *flat[list(bone)].T, "o-", color=colour, markersize=2.5, linewidth=1.6, label=label if not number else None
+        )
+
+
+def _across(stick: Stick, row: int) -> F64:
+    """Return the level direction from the right to the left hip; the world's x where there are none."""
+    if not {"hip_l", "hip_r"} <= set(stick.names):
+        return np.array([1.0, 0.0, 0.0])
+    left = stick.places[row, stick.names.index("hip_l")] - stick.places[row, stick.names.index("hip_r")]
+    level: F64 = left * [1.0, 1.0, 0.0] / np.linalg.norm(left[:2])
+    return level
+
+
+def _common_strides(strides: Sequence[Cycle], ours: F64, reference: F64, name: str) -> dict[str, F64]:
+    """Return the strides (G, 101) that both systems have."""
+    a, b = cycles.normalised(strides, ours, name), cycles.normalised(strides, reference, name)
+    both = np.isfinite(a + b).all(axis=1)
+    return {"reference": b[both], "mocapflow": a[both]}

@@ -1,0 +1,130 @@
+"""Stage `evaluate`: our angles against a reference, one row per angle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+from mocapflow_export import layout, runjson, tables
+from pydantic import PositiveFloat
+
+from mocapflow.components import Stage
+from mocapflow.recording import Recording
+from mocapflow.records import F64
+from mocapflow.results import Evaluation, RunFolder, Track
+from mocapflow.scene import Scene
+from mocapflow_evaluation import compare, comparison_plots, cycles, findings, ours
+from mocapflow_evaluation.alignment import align, at_our_frames
+from mocapflow_evaluation.cycles import Cycle
+from mocapflow_evaluation.keypoint_reference import write_triangulated
+from mocapflow_evaluation.ours import Ours
+from mocapflow_evaluation.references import SUFFIXES, read_reference
+from mocapflow_evaluation.rigs import compare_rigs
+
+LONGEST_LAG_S = 0.5  # s
+Row = Mapping[str, float | str]
+
+
+class Evaluate(Stage):
+    """Compares with truth/angles.csv of the recording, with the one file in its reference/, or with another file.
+
+    `reference` is a .csv with our columns, an OpenSim .mot, or a .trc or .c3d of joint centres or of markers on bony
+    landmarks (relative to the recording), or a folder of 2D keypoints like keypoints/, which are triangulated with the
+    cameras of the run (`keypoint_reference`). Rows with frame numbers are matched by them, others interpolated at our
+    times.
+    Failures are not left out. A lag up to `longest_lag_s` that all angles share, and curves that count the other way,
+    are reported, and taken out in `rms_aligned_deg` alone.
+    Writes results/evaluation.csv and .json and, frame by frame, errors.csv; cycles.csv where somebody walks; and
+    against joint centres or markers joint_distances.csv and the reference's stick model.
+    """
+
+    name: ClassVar[str] = "evaluate"
+    reference: str = ""  # from the folder of the recording; empty: truth/angles.csv, or the one in reference/
+    longest_lag_s: PositiveFloat = LONGEST_LAG_S  # of one system behind the other, that is looked for
+
+    def run(self, track: Track, scene: Scene, recording: Recording, run_folder: RunFolder) -> Evaluation:
+        """Return the evaluation of the track."""
+        path, note = chosen(recording.folder, self.reference)
+        if path is None:
+            return Evaluation(reference="", rows=(), notes=(note,))
+        if path.is_dir():
+            path = write_triangulated(recording, path, scene.cameras, run_folder.path)
+        return evaluate(ours.of_track(track, scene), path, run_folder.path, self.longest_lag_s)
+
+
+def chosen(recording: Path, wanted: str) -> tuple[Path | None, str]:
+    """Return the file to compare with, or why there is none."""
+    truth = recording / "truth/angles.csv"
+    if wanted or truth.is_file():
+        return (recording / wanted if wanted else truth), ""
+    files = sorted((recording / "reference").glob("*"))
+    there = [path for path in files if path.suffix.lower() in SUFFIXES and path.name != layout.COMMON_POINTS]
+    if len(there) == 1:
+        return there[0], ""
+    if not there:
+        return None, "the recording has no truth/angles.csv and no reference/, and no reference is set"
+    names = ", ".join(path.name for path in there)
+    return None, f"reference/ holds {names}: name one, e.g. --set stages.evaluate.reference=reference/{there[0].name}"
+
+
+def evaluate_run(run_folder: Path, truth: Path, longest_lag_s: float = LONGEST_LAG_S) -> Evaluation:
+    """Compare the files of a run folder with a reference file; writes into the run folder.
+
+    Raises:
+        RecordingError: the run folder has no angles, or the reference can't be read.
+    """
+    return evaluate(ours.of_folder(run_folder), truth, run_folder, longest_lag_s)
+
+
+def evaluate(own: Ours, path: Path, folder: Path, longest_lag_s: float = LONGEST_LAG_S) -> Evaluation:
+    """Compare with a reference file; writes tables, what was found of both systems, and pictures into a run folder."""
+    reference = read_reference(path)
+    known = at_our_frames(reference, own.columns)
+    alignment = align(own.columns, reference, longest_lag_s)
+    aligned = at_our_frames(reference, own.columns, alignment.worth)
+    strides = cycles.gait_cycles(own.stick.names, own.stick.places, own.frame_rate)
+    rows = [
+        _row(own, name, known[name], alignment.signs[name] * aligned[name], strides) | {"sign": alignment.signs[name]}
+        for name in cycles.shared(own.columns, known)
+    ]
+    rigs = compare_rigs(own, reference, alignment.worth, path.parent / layout.COMMON_POINTS)
+    notes = [*reference.notes, *rigs.notes]
+    if rows:
+        notes += findings.said(own, reference, alignment, strides, longest_lag_s)
+    else:
+        ours = ", ".join(tables.angle_names(own.columns))
+        notes.append(f"the reference shares no angle and frame with the track, which has {ours}")
+    _write_tables(folder, own.columns, known, rows, strides)
+    found = {"reference": str(path), "lag_frames": alignment.lag, "signs": alignment.signs, "notes": notes}
+    runjson.write(layout.place(folder, layout.FINDINGS), {**found, "registration": rigs.figures})
+    written = rigs.write(folder, own.frame_rate, float(own.columns["time"][0]))
+    pictures = [*comparison_plots.draw(own.columns, known, strides, folder), *written]
+    return Evaluation(reference=str(path), rows=tuple(rows), notes=tuple(notes), pictures=tuple(pictures))
+
+
+def _write_tables(
+    folder: Path, columns: Mapping[str, F64], known: Mapping[str, F64], rows: Sequence[Row], strides: Sequence[Cycle]
+) -> None:
+    """Write the figures of each angle, its errors frame by frame, and the figures of each stride."""
+    errors = {name: columns[name] - known[name] for name in cycles.shared(columns, known)}
+    tables.write_rows(layout.place(folder, layout.EVALUATION), rows)
+    tables.write_columns(layout.place(folder, layout.ERRORS), {"frame": columns["frame"], **errors})
+    tables.write_rows_if_any(layout.place(folder, layout.CYCLES), cycles.rows(strides, columns, known))
+
+
+def _row(own: Ours, name: str, known: F64, aligned: F64, strides: Sequence[Cycle]) -> dict[str, float | str]:
+    """Return the figures of one angle against its reference as it is, and as aligned with us."""
+    curve, frame = own.columns[name], own.columns["frame"]
+    unknown = np.full(len(curve), np.nan)
+    sd, raw = own.columns.get(f"{name}_sd", unknown), own.raw.get(name, unknown)
+    error = (curve - aligned)[np.isfinite(curve - aligned)]
+    return {
+        "angle": name,
+        **compare.figures(curve, known, sd, frame, own.frame_rate),
+        "rms_unsmoothed_deg": compare.rms(raw - known),
+        "rms_aligned_deg": compare.rms(error - np.mean(error)) if len(error) else np.nan,
+        "cycles": len(cycles.own(strides, name)),
+        "cmc_cycles": cycles.across(strides, curve, known, name),
+    }

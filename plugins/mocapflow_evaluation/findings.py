@@ -1,0 +1,44 @@
+"""What a reader of an evaluation should know of the two systems, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mocapflow_evaluation.alignment import Alignment
+from mocapflow_evaluation.cycles import Cycle
+from mocapflow_evaluation.ours import Ours
+from mocapflow_evaluation.references import Reference
+
+BENT = 20.0  # deg that some angle of a person who moves exceeds
+
+
+def said(
+    own: Ours, reference: Reference, found: Alignment, strides: Sequence[Cycle], longest_lag_s: float
+) -> list[str]:
+    """Return how the reference came to our frames, its lag, the curves it counts the other way, and the strides."""
+    notes = []
+    if not reference.by_frame and len(reference.at) > 1:
+        notes.append(f"reference at {1 / reference.step:.4g} per second, interpolated at our {own.frame_rate:.4g}")
+    theirs, most = (
+        max((float(np.nanmax(np.abs(curve), initial=0.0)) for curve in curves), default=0.0)
+        for curves in (reference.curves.values(), [own.columns[name] for name in found.signs])
+    )
+    if theirs <= np.pi and most > BENT:
+        notes.append(f"no angle of the reference is above {theirs:.1f}, ours reach {most:.0f}: is it in radians?")
+    if np.isnan(found.lag):
+        notes.append(f"no lag within {longest_lag_s:g} s fits best; see longest_lag_s of stage evaluate")
+    elif found.worth:
+        when = "later" if found.lag > 0 else "earlier"
+        shift, late = abs(found.lag), 1000 * abs(found.lag) / own.frame_rate
+        notes.append(
+            f"we come {shift:.1f} frames ({late:.0f} ms) {when} than the reference; only 'aligned' takes it out"
+        )
+    turned = [name for name, sign in found.signs.items() if sign < 0]
+    if turned:
+        notes.append(f"the reference counts the other way: {', '.join(turned)}; only 'aligned' turns it round")
+    if strides:
+        count = {side: sum(c.side == side for c in strides) for side in ("l", "r")}
+        notes.append(f"strides, by heel strikes in our own joint centres: {count['l']} left, {count['r']} right")
+    return notes

@@ -1,0 +1,72 @@
+"""2D keypoints as a reference: triangulated with the cameras of a run, filtered, and written as a .trc."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from mocapflow_export import layout
+from mocapflow_fitting.detections import layout as names_of
+from mocapflow_fitting.detections import persons
+
+from mocapflow.assets import Camera
+from mocapflow.io import folders, markers
+from mocapflow.recording import Recording
+from mocapflow.records import F64
+
+LOG = logging.getLogger("mocapflow")
+CUT_OFF_HZ = 6.0
+ORDER = 4  # of both passes together
+MARGIN_S = 1.0  # s, looked at on both sides of the wanted frames: there the filter runs in
+
+
+def write_triangulated(recording: Recording, place: Path, cameras: Sequence[Camera], run_folder: Path) -> Path:
+    """Write the person's keypoints in space into a run folder; return the .trc.
+
+    Args:
+        recording: its frames, those between them, and the margin are looked at.
+        place: folder of keypoints, like keypoints/ of a recording.
+        cameras: pinhole cameras of the run, which may have been corrected since they were calibrated.
+        run_folder: of the run.
+
+    Raises:
+        RecordingError: there are no keypoints of two cameras, or in no frame two cameras see the same person.
+    """
+    found = tuple(folders.keypoint_folder(place, camera.name) for camera in cameras)
+    recording = replace(recording, keypoint_folders=found)
+    margin = round(MARGIN_S * recording.frame_rate)
+    first, after = max(0, recording.indices[0] - margin), min(recording.length, recording.indices[-1] + 1 + margin)
+    people = persons(recording, range(first, after), cameras)
+    names = names_of(recording, list(people), None)
+    places = np.full((after, len(names), 3), np.nan)  # from the first frame of the recording on, as times are counted
+    for index, person in people.items():
+        places[index] = person.points.position
+    off = np.concatenate([person.points.error for person in people.values()], axis=1)
+    LOG.info("keypoints of %d frames reproject within %.1f px (median)", len(people), np.nanmedian(off))
+    path = layout.place(run_folder, layout.KEYPOINTS)
+    ours = [name.replace("big_toe", "toe") for name in names]
+    smooth = low_pass(places, recording.frame_rate)
+    markers.write_trc(path, ours, markers.opensim_from_world(smooth), recording.frame_rate)
+    return path
+
+
+def low_pass(values: F64, rate: float) -> F64:
+    """Return values (T, ...) without what is faster than 6 Hz: a zero-lag Butterworth filter, as Pose2Sim has it.
+
+    Each stretch without a gap is filtered on its own; one shorter than the filter's reach stays as it is.
+    """
+    from scipy.signal import butter, filtfilt
+
+    if rate <= 2 * CUT_OFF_HZ:
+        return values
+    b, a = butter(ORDER // 2, CUT_OFF_HZ, fs=rate)
+    columns = values.reshape(len(values), -1).copy()
+    for column in columns.T:
+        known = np.flatnonzero(np.isfinite(column))
+        for stretch in np.split(known, np.flatnonzero(np.diff(known) > 1) + 1):
+            if len(stretch) > 3 * len(b):
+                column[stretch] = filtfilt(b, a, column[stretch])
+    return columns.reshape(values.shape)

@@ -1,0 +1,76 @@
+"""Our side of a comparison: angles and joint centres of a track, or of the files of a run folder."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from mocapflow_export import layout, tables
+from mocapflow_export.export import before_smoothing
+from mocapflow_export.uncertainty import measured
+
+from mocapflow.data import PoseBatch
+from mocapflow.errors import RecordingError
+from mocapflow.geometry import kinematics
+from mocapflow.io import markers, opensim
+from mocapflow.records import F64, record
+from mocapflow.results import Track, frame_rate_of
+from mocapflow.scene import Scene
+from mocapflow_evaluation.stick import Stick
+
+SIGNED = ("knee_angle_l", "knee_angle_r")  # of angles.mot: about the axis of the knee, not between joint centres
+
+
+@record
+class Ours:
+    """What is compared with a reference."""
+
+    columns: Mapping[str, F64]  # of angles.csv, and the signed angles of the knees
+    raw: Mapping[str, F64]  # the same before smoothing
+    stick: Stick
+
+    @property
+    def frame_rate(self) -> float:
+        """Frames per second, 30 where a single frame does not tell."""
+        return frame_rate_of(self.columns["time"])
+
+
+def of_track(track: Track, scene: Scene) -> Ours:
+    """Return what a track has."""
+    joints = kinematics.chain_batch(scene.body, PoseBatch(root=track.root, angles=track.angles))
+    places = kinematics.joint_positions(scene.body, joints)
+    columns, raw = (_columns(each, scene) for each in (track, before_smoothing(track)))
+    return Ours(columns=columns, raw=raw, stick=Stick(names=scene.body.joint_names, places=places))
+
+
+def of_folder(folder: Path) -> Ours:
+    """Return what the files of a run folder have.
+
+    Raises:
+        RecordingError: the run folder has no angles.
+    """
+    path = folder / layout.ANGLES
+    if not path.is_file():
+        raise RecordingError("no such run folder: it has no results/angles.csv", where=str(folder))
+    columns = tables.read_columns(path)
+    raw = folder / layout.RAW_ANGLES
+    motion = markers.read_mot(folder / layout.MOTION)[0] if (folder / layout.MOTION).is_file() else {}
+    return Ours(
+        columns=columns | {name: motion[name] for name in SIGNED if name in motion},
+        raw=tables.read_columns(raw) if raw.is_file() else columns,
+        stick=_stick(folder / layout.JOINTS, len(columns["frame"])),
+    )
+
+
+def _columns(track: Track, scene: Scene) -> dict[str, F64]:
+    coordinates = opensim.coordinates(scene.body, track.root, track.angles)
+    signed = {name: coordinates[name] for name in SIGNED if name in coordinates}
+    return tables.angle_columns(track, measured(track, scene)) | signed
+
+
+def _stick(path: Path, frames: int) -> Stick:
+    if not path.is_file():
+        return Stick(names=(), places=np.empty((frames, 0, 3)))
+    names, places, _, _ = markers.read_trc(path)
+    return Stick(names=names, places=markers.world_from_opensim(places))

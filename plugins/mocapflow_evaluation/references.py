@@ -1,0 +1,150 @@
+"""Reference curves to compare with: csv as in truth/, OpenSim motions, joint centres or markers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from mocapflow_export import tables
+
+from mocapflow.errors import RecordingError
+from mocapflow.geometry import angles
+from mocapflow.io import markers
+from mocapflow.records import F64, array, record
+from mocapflow_evaluation import marker_joints
+from mocapflow_evaluation.marker_names import FILE, landmarks
+from mocapflow_evaluation.ours import SIGNED
+
+MOTION = {"knee_angle": "knee_flexion", "hip_flexion": "hip_flexion", "ankle_angle": "ankle", "elbow_flex": "elbow"}
+POSE2SIM = {
+    "Hip": "hip", "Knee": "knee", "Ankle": "ankle", "BigToe": "toe", "Heel": "heel",
+    "Shoulder": "shoulder", "Elbow": "elbow", "Wrist": "wrist",
+}  # fmt: skip
+SUFFIXES = (".csv", ".mot", ".sto", ".trc", ".c3d")
+
+
+@record
+class Reference:
+    """What another system has measured."""
+
+    curves: Mapping[str, F64]  # (T,) deg by our names
+    at: F64 = array("T", unit="frames of the video or s, see by_frame")
+    by_frame: bool  # rows belong to frames; else to times
+    joint_names: tuple[str, ...] = ()
+    joints: F64 | None = array("T", "J", 3, unit="m, in the axes of its own rig, z up", default=None)
+    notes: tuple[str, ...] = ()  # how it was read, where that is not plain
+
+    @property
+    def step(self) -> float:
+        """From one sample to the next, in the unit of `at`; frames that are missing stay so."""
+        return 1.0 if self.by_frame or len(self.at) < 2 else float(np.median(np.diff(self.at)))
+
+
+def read_reference(path: Path) -> Reference:
+    """Return the reference in a file.
+
+    A csv has our columns, degrees, by frame or time. Of a .mot the columns that mean the same are taken, by OpenSim's
+    names; their zeros are the model's own, so that only knees and elbows compare without an offset. A .trc or .c3d
+    holds joint centres, named as ours (hip_l) or as Pose2Sim's (LHip), or markers on bony landmarks (`marker_names`),
+    from which joint centres and knee axes are found (`marker_joints`).
+
+    Raises:
+        RecordingError: the file is missing, of another kind, has none of our angles, or goes back in time.
+    """
+    readers = {".csv": _table, ".mot": _motion, ".sto": _motion, ".trc": _trc, ".c3d": _c3d}
+    if path.suffix.lower() not in readers:
+        raise RecordingError(
+            f"can't compare with a {path.suffix or 'file without ending'}",
+            where=str(path),
+            hint=f"known: {', '.join(SUFFIXES)}, and folders like keypoints/",
+        )
+    if not path.is_file():
+        raise RecordingError("no such reference", where=str(path))
+    reference = readers[path.suffix.lower()](path)
+    grows = np.diff(reference.at) > 0  # what is interpolated has to; nan does not
+    if not grows.all():
+        row, clock = int(np.argmin(grows)) + 1, "frame" if reference.by_frame else "time"
+        hint = "one row for each moment, in their order"
+        raise RecordingError(f"the {clock} does not grow from row {row} to row {row + 1}", where=str(path), hint=hint)
+    return reference
+
+
+def _table(path: Path) -> Reference:
+    columns = tables.read_columns(path)
+    clock = next((name for name in ("frame", "time") if name in columns), None)
+    if clock is None:
+        raise RecordingError("the reference has neither a column frame nor time", where=str(path))
+    curves = {name: columns[name] for name in tables.angle_names(columns)}
+    return Reference(curves=curves, at=columns[clock], by_frame=clock == "frame")
+
+
+def _motion(path: Path) -> Reference:
+    columns, time = markers.read_mot(path)
+    named = {f"{theirs}_{side}": f"{ours}_{side}" for theirs, ours in MOTION.items() for side in ("l", "r")}
+    curves = {ours: columns[theirs] for theirs, ours in named.items() if theirs in columns}
+    curves |= {name: columns[name] for name in SIGNED if name in columns}
+    at, notes = from_zero(time)
+    return Reference(curves=curves, at=at, by_frame=False, notes=notes)
+
+
+def _trc(path: Path) -> Reference:
+    names, positions, time, _ = markers.read_trc(path)
+    return _positions(path, names, markers.world_from_opensim(positions), time)
+
+
+def _c3d(path: Path) -> Reference:
+    names, positions, time, _ = markers.read_c3d(path)
+    return _positions(path, names, positions, time)
+
+
+def _positions(path: Path, labels: tuple[str, ...], positions: F64, time: F64) -> Reference:
+    """Return the angles between joint centres that a file has, or that its markers tell."""
+    known = {f"{s.upper()}{name}": f"{ours}_{s}" for name, ours in POSE2SIM.items() for s in ("l", "r")}
+    names = tuple(known.get(label, label) for label in labels)
+    at, notes = from_zero(time)
+    curves = _between(names, positions)
+    if not curves:
+        marks = {name: positions[:, index] for name, index in landmarks(labels, path.parent).items()}
+        centres = marker_joints.joint_centres(marks)
+        names = tuple(centres)
+        if not names:
+            hint = (
+                f'name the landmarks in {path.parent / FILE}: knee_lateral_l = "…"; the markers are {", ".join(labels)}'
+            )
+            raise RecordingError(
+                "these are neither joint centres nor markers that are known", where=str(path), hint=hint
+            )
+        positions = np.stack(list(centres.values()), axis=1)
+        curves = _between(names, positions) | _about_axes(marks, centres)
+        notes = (*notes, f"joint centres and knee axes from {len(marks)} markers on bony landmarks")
+    return Reference(curves=curves, at=at, by_frame=False, joint_names=names, joints=positions, notes=notes)
+
+
+def _between(names: tuple[str, ...], positions: F64) -> dict[str, F64]:
+    return {
+        wish.name: angles.three_point(positions[:, [names.index(p) for p in wish.points]]) + wish.offset
+        for wish in angles.definitions(names)
+        if len(wish.points) == 3
+    }
+
+
+def _about_axes(marks: Mapping[str, F64], centres: Mapping[str, F64]) -> dict[str, F64]:
+    """Return the angles that need more than joint centres: hip flexion, and the knee's turn about its own axis."""
+    found = {}
+    for side in ("l", "r"):
+        hip, knee, ankle = (centres.get(f"{joint}_{side}") for joint in ("hip", "knee", "ankle"))
+        if hip is not None and knee is not None:
+            found[f"hip_flexion_{side}"] = marker_joints.hip_flexion(hip, knee, marker_joints.pelvis_axes(marks))
+            if ankle is not None:
+                axis = marker_joints.knee_axis(marks, side)
+                found[f"knee_angle_{side}"] = marker_joints.signed_flexion(hip, knee, ankle, axis)
+    return found
+
+
+def from_zero(time: F64) -> tuple[F64, tuple[str, ...]]:
+    """Return times (T,) s, counted from 0 where they stood at one sample, as some programs write; and a note."""
+    step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    if step > 0 and abs(time[0] - step) < 0.01 * step:
+        return time - step, (f"the reference counts time from {time[0]:.4f} s, one sample: taken as 0",)
+    return time, ()

@@ -1,0 +1,114 @@
+"""Two rigs that saw one person: how they lie to each other, and how far apart the joint centres are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mocapflow_export import layout, tables
+
+from mocapflow.geometry.registration import Registration
+from mocapflow.io import markers
+from mocapflow.records import F64, array, record
+from mocapflow_evaluation import compare, comparison_plots, stick
+from mocapflow_evaluation.alignment import resampled
+from mocapflow_evaluation.ours import Ours
+from mocapflow_evaluation.references import Reference
+from mocapflow_evaluation.stick import Stick
+
+ODD = 0.01  # of scale
+
+
+@record
+class Rigs:
+    """What was found; without joint centres in the reference there is nothing."""
+
+    ours: Stick
+    frame: F64 = array("T", unit="frame index in the videos")
+    theirs: Stick | None = None  # in our world, at our frames
+    aligned: Stick | None = None  # the same without the lag between both
+    figures: Mapping[str, Any] | None = None
+    notes: tuple[str, ...] = ()
+
+    def write(self, folder: Path, frame_rate: float, start: float) -> list[Path]:
+        """Write the distances, the stick model as a .trc and as a picture into a run folder; return the pictures.
+
+        Args:
+            folder: the run folder.
+            frame_rate: per second.
+            start: time of the first frame, s.
+        """
+        if self.theirs is None or self.aligned is None:
+            for part in (layout.DISTANCES, layout.STICK, layout.STICK_PLOT):
+                (folder / part).unlink(missing_ok=True)  # of another reference
+            return []
+        rows = stick.distances(self.ours, self.theirs, self.aligned)
+        tables.write_rows(layout.place(folder, layout.DISTANCES), rows)
+        laid = stick.constant(self.theirs)
+        places = markers.opensim_from_world(laid.places)
+        markers.write_trc(layout.place(folder, layout.STICK), laid.names, places, frame_rate, start=start)
+        return [comparison_plots.draw_sticks(layout.place(folder, layout.STICK_PLOT), self.ours, laid, self.frame)]
+
+
+def compare_rigs(own: Ours, reference: Reference, lag: float, common_points: Path) -> Rigs:
+    """Return the registration of both rigs and the reference's joint centres in our world, at our frames.
+
+    It comes from a table of common points where there is one, else from the joint centres themselves, as they are
+    without the lag (frames) between both.
+
+    Raises:
+        RecordingError: the table can't be read.
+        MocapflowError: its points don't tell.
+    """
+    ours, frame = own.stick, own.columns["frame"]
+    if reference.joints is None:
+        return Rigs(ours=ours, frame=frame)
+    theirs, aligned = (_sampled(reference, own.columns["time"] - late / own.frame_rate) for late in (0.0, lag))
+    measured = common_points.is_file()
+    found = stick.between_points(common_points) if measured else stick.between_joints(ours, aligned)
+    if found is None:
+        return Rigs(ours=ours, frame=frame)
+    theirs, aligned = (Stick(names=each.names, places=found.apply(each.places)) for each in (theirs, aligned))
+    by = f"{len(found.residual)} points of {common_points.name}" if measured else "joint centres of both systems"
+    return Rigs(
+        ours=ours,
+        frame=frame,
+        theirs=theirs,
+        aligned=aligned,
+        figures=_figures(found, by),
+        notes=_notes(found, by, measured),
+    )
+
+
+def _sampled(reference: Reference, time: F64) -> Stick:
+    """Return the joint centres of a reference at times (T,) s."""
+    assert reference.joints is not None
+    columns = reference.joints.reshape(len(reference.at), -1).T
+    flat = np.stack([resampled(reference.at, column, time, reference.step) for column in columns], axis=1)
+    return Stick(names=reference.joint_names, places=flat.reshape(len(time), -1, 3))
+
+
+def _figures(found: Registration, by: str) -> dict[str, Any]:
+    return {
+        "by": by,
+        "rotation": found.rotation,
+        "translation_m": found.translation,
+        "scale": found.scale,
+        "residual_rms_mm": 1000 * compare.rms(found.residual),
+        "leave_one_out_rms_mm": 1000 * compare.rms(found.left_out),
+    }
+
+
+def _notes(found: Registration, by: str, measured: bool) -> tuple[str, ...]:
+    residual, left_out = 1000 * compare.rms(found.residual), 1000 * compare.rms(found.left_out)
+    said = (
+        f"rigs registered by {by}: residual {residual:.1f} mm, leave-one-out {left_out:.1f} mm, scale {found.scale:.4f}"
+    )
+    odd = (
+        "the scale is not applied: check units and calibrations of both"
+        if measured and abs(found.scale - 1) > ODD
+        else ""
+    )
+    return (said, odd) if odd else (said,)

@@ -1,0 +1,86 @@
+"""Stage `export`: the track as files that other programs read."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+from pathlib import Path
+from typing import ClassVar, Literal
+
+from mocapflow_formats import Result, write
+
+from mocapflow.components import Stage
+from mocapflow.io import markers, opensim
+from mocapflow.recording import Recording
+from mocapflow.results import Files, RunFolder, Track
+from mocapflow.scene import Scene
+from mocapflow_export import layout, runjson, tables
+from mocapflow_export.misgivings import misgivings
+from mocapflow_export.uncertainty import measured
+
+LOG = logging.getLogger("mocapflow")
+Format = Literal["csv", "mot", "trc", "bvh", "c3d", "gltf", "movement", "parquet", "rrd", "usd"]
+
+
+class Export(Stage):
+    """Writes results/angles.csv, angles_raw.csv and energy.csv, angles.mot, joints.trc and run.json.
+
+    The csv of angles hold one row per frame: the angles between joint centres in degrees (`geometry.angles`), their
+    calibrated standard deviations, and as `_observed` the share of each that the images determined; energy.csv
+    one per turn of the loop: the terms of the functional. The mot holds signed joint angles by OpenSim's names
+    (`opensim`), the trc joint centres.
+    Other formats are written by `mocapflow_formats`.
+    """
+
+    name: ClassVar[str] = "export"
+    formats: tuple[Format, ...] = ("csv", "mot", "trc")  # those beyond these three need their extra
+
+    def run(self, track: Track, scene: Scene, recording: Recording, run_folder: RunFolder) -> Files:
+        """Write the files and return their paths."""
+        result = Result(track=track, scene=scene, recording=recording)
+        paths = [path for name in self.formats for path in written(name, result, run_folder.path)]
+        doubts = misgivings(track, [camera.name for camera in scene.cameras])
+        for doubt in doubts:
+            LOG.warning(doubt)
+        warnings = (*recording.warnings, *scene.warnings, *doubts)
+        content = runjson.summary(track, measured(track, scene), run_folder, warnings)
+        return Files(paths=(*paths, runjson.write(layout.place(run_folder.path, layout.RUN), content)))
+
+
+def before_smoothing(track: Track) -> Track:
+    """Return the track as the loop left it."""
+    if track.raw_root is None or track.raw_angles is None:
+        return track
+    return replace(track, root=track.raw_root, angles=track.raw_angles)
+
+
+def written(name: str, result: Result, folder: Path) -> list[Path]:
+    """Write one format into a run folder and return its files."""
+    own = {"csv": write_angles, "mot": write_motion, "trc": write_joints}
+    return own[name](result, folder) if name in own else [write(name, result, folder / layout.RESULTS)]
+
+
+def write_angles(result: Result, folder: Path) -> list[Path]:
+    """Write angles.csv, angles_raw.csv and energy.csv into a run folder."""
+    track, scene = result.track, result.scene
+    columns = {
+        layout.ANGLES: tables.angle_columns(track, measured(track, scene)),
+        layout.RAW_ANGLES: tables.angle_columns(track, measured(before_smoothing(track), scene)),
+        layout.ENERGY: tables.energy_columns(track),
+    }
+    return [tables.write_columns(layout.place(folder, part), each) for part, each in columns.items()]
+
+
+def write_motion(result: Result, folder: Path) -> list[Path]:
+    """Write angles.mot into a run folder."""
+    path, track = layout.place(folder, layout.MOTION), result.track
+    markers.write_mot(path, opensim.coordinates(result.scene.body, track.root, track.angles), track.time)
+    return [path]
+
+
+def write_joints(result: Result, folder: Path) -> list[Path]:
+    """Write joints.trc into a run folder."""
+    path, track = layout.place(folder, layout.JOINTS), result.track
+    places = markers.opensim_from_world(result.places)
+    markers.write_trc(path, result.scene.body.joint_names, places, track.frame_rate, start=float(track.time[0]))
+    return [path]

@@ -1,0 +1,44 @@
+"""What of a whole track should make its user look twice."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from mocapflow_sequence.lost import lost_rows
+
+from mocapflow.records import F64
+from mocapflow.results import Track
+
+APART, BEHIND = 0.6, 0.2  # overlap of a view below which, and below the others by which, it shows something else
+POOR = 0.7  # median overlap of all views below which the model is not where the person is
+
+
+def misgivings(track: Track, cameras: Sequence[str]) -> list[str]:
+    """Return in words what to look at: frames that are guesses, views that show something else than the model."""
+    count, lost = len(track.frame), int(lost_rows(track).sum())
+    said = [f"{lost} of {count} frames are lost: their pose is a guess"] if lost else []
+    if track.doubted.any():
+        said.append(f"{track.doubted.sum()} of {count} frames are doubted: the images contradict them")
+    median = overlap_medians(track)
+    for index, (camera, own) in enumerate(zip(cameras, median, strict=True)):
+        others = middle(np.delete(median, index))
+        if own < min(APART, others - BEHIND):
+            said.append(
+                f"{camera} shows something else than the other views: overlap {own:.2f} there, {others:.2f} in them; "
+                "is its calibration right, and its video its own?"
+            )
+    if middle(median) < POOR:
+        said.append("model and person hardly overlap in most views: look at overlay/, at the calibration and the start")
+    return said
+
+
+def overlap_medians(track: Track) -> F64:
+    """Return the median overlap (C,) of model and image in each view; NaN where a view was never used."""
+    return np.array([middle(view) for view in track.overlap.T])
+
+
+def middle(values: F64) -> float:
+    """Return the median of the values that are finite, NaN where none is."""
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if len(known) else np.nan

@@ -1,0 +1,103 @@
+"""run.json: how a run was made and how it went, frame by frame."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mocapflow_sequence.lost import lost_rows
+
+from mocapflow.data import unseen
+from mocapflow.geometry.angles import AngleSeries
+from mocapflow.results import RunFolder, Track
+from mocapflow_export.misgivings import overlap_medians
+
+FRAME = re.compile(r"^frame (\d+): ?(.*)$")
+
+
+def summary(track: Track, series: AngleSeries, run_folder: RunFolder, warnings: tuple[str, ...]) -> dict[str, Any]:
+    """Return what run.json says: recipe, seconds per step, and per frame iterations, rest, overlap and mishaps."""
+    seconds = track.seconds
+    lost, said = lost_rows(track), by_frame(track.notes)
+    return {
+        "recipe": run_folder.recipe,
+        "warnings": [*warnings, *said_by_stages(run_folder.recipe)],
+        "frames": {
+            "count": len(track.frame),
+            "first": int(track.frame[0]) if len(track.frame) else None,
+            "last": int(track.frame[-1]) if len(track.frame) else None,
+            "not_at_rest": track.frame[~track.steady],
+            "lost": track.frame[lost],
+            "doubted": track.frame[track.doubted],
+            "bridged_by": "the neighbouring frames, in `smooth`" if lost.any() and track.raw_root is not None else None,
+            "held_by_priors": held_by_priors(series),
+        },
+        "cpu_seconds": {
+            "total": float(np.nansum(seconds)),
+            "per_frame_median": float(np.nanmedian(seconds.sum(axis=1))) if len(seconds) else None,
+            "per_step": dict(zip(track.step_names, np.nansum(seconds, axis=0), strict=True)),
+        },
+        "overlap_median": overlap_medians(track),
+        "notes": list(track.notes),
+        "per_frame": [_frame(track, row, bool(lost[row]), said) for row in range(len(track.frame))],
+    }
+
+
+def said_by_stages(recipe: Mapping[str, Any]) -> list[str]:
+    """Return what the stages of a run warned of, each with the label of its stage."""
+    stages = recipe.get("stages", {}).items()
+    return [f"{label}: {warning}" for label, entry in stages for warning in entry.get("warnings", ())]
+
+
+def by_frame(notes: Sequence[str]) -> Mapping[int, list[str]]:
+    """Return what the notes of a track say of each frame."""
+    said: dict[int, list[str]] = {}
+    for found in filter(None, map(FRAME.match, notes)):
+        said.setdefault(int(found[1]), []).append(found[2])
+    return said
+
+
+def held_by_priors(series: AngleSeries) -> dict[str, int]:
+    """Return in how many frames the priors decided an angle, for the angles where they did."""
+    counts = dict(zip(series.names, unseen(series.observed).sum(axis=0).tolist(), strict=True))
+    return {name: count for name, count in counts.items() if count}
+
+
+def write(path: Path, content: Mapping[str, Any]) -> Path:
+    """Write a summary as JSON; numbers that are not finite become null."""
+    path.write_text(json.dumps(plain(content), indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
+    return path
+
+
+def _frame(track: Track, row: int, lost: bool, said: Mapping[int, list[str]]) -> dict[str, Any]:
+    index = int(track.frame[row])
+    return {
+        "frame": index,
+        "time": round(float(track.time[row]), 6),
+        "iterations": int(track.iterations[row]),
+        "steady": bool(track.steady[row]),
+        "overlap": [round(float(v), 4) for v in track.overlap[row]],
+        "cpu_seconds": round(float(np.nansum(track.seconds[row])), 4),
+        **({"lost": True} if lost else {}),
+        **({"doubted": True} if track.doubted[row] else {}),
+        **({"unusable_views": np.flatnonzero(~track.usable[row])} if not track.usable[row].all() else {}),
+        **({"notes": said[index]} if index in said else {}),
+    }
+
+
+def plain(value: Any) -> Any:
+    """Return a value made of what JSON knows."""
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, np.ndarray | list | tuple | set | frozenset):
+        return [plain(v) for v in (value.tolist() if isinstance(value, np.ndarray) else value)]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if isinstance(value, str | int | bool | None) else str(value)

@@ -1,0 +1,117 @@
+"""Stage `calibrate_limbs`: the lengths and girth of limbs from silhouettes of many frames."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Annotated, ClassVar
+
+import numpy as np
+from pydantic import Field, PositiveFloat, PositiveInt
+
+from mocapflow.assets import Background, Body
+from mocapflow.components import Draper, Matcher, Segmenter, Stage
+from mocapflow.data import Change, Frame, Matches, Past, Pose, Segmentation, Turn
+from mocapflow.loop import pool_matches
+from mocapflow.model import ClothedModel
+from mocapflow.recording import Recording
+from mocapflow.records import F64
+from mocapflow.results import Track
+from mocapflow.scene import Scene
+from mocapflow.track import believed
+from mocapflow_fitting.detections import layout, persons, seen, spread
+from mocapflow_fitting.keypoint_fit import fit
+from mocapflow_fitting.landmarks import landmarks
+from mocapflow_fitting.pose_fit import Solution, Spreads
+from mocapflow_fitting.proportions import Proportion, scaled
+from mocapflow_fitting.silhouette_fit import refine
+
+LOG = logging.getLogger("mocapflow")
+# near the solution matchers reach less far and give up what is off
+AT_REST = Change(body=0.0, cloth=0.0, angles=0.0, sigmas=0.0)
+
+
+class CalibrateLimbs(Stage):
+    """Fits proportions that all frames share, and the pose of each, to the contours of some frames.
+
+    A thigh 2 % too long costs 2-3 degrees of the knee; one frame can't tell it from a pose, many can. The poses come
+    from an earlier track or, without one, from keypoints.
+    """
+
+    name: ClassVar[str] = "calibrate_limbs"
+    segmenter: Segmenter  # as in the track
+    matchers: Annotated[tuple[Matcher, ...], Field(min_length=1)]  # as in the track
+    draper: Draper | None = None  # as in the track; without one the body is fitted bare
+    # contours see neither hip nor shoulder: without the trunk, the thigh would take up what the trunk is wrong by
+    proportions: tuple[Proportion, ...] = (  # those that are fitted
+        "girth", "trunk", "shoulder_width", "thigh", "shank", "foot", "upper_arm", "forearm",
+    )  # fmt: skip
+    spread: PositiveFloat = 0.02  # standard deviation of a log proportion about a scan's; 0.05 about a template's
+    frames: PositiveInt = 10  # spread over the recording
+    passes: PositiveInt = 3  # times that the images are segmented; after the first, matching is calm
+    rounds: PositiveInt = 3  # matchings a pass
+    independent: Annotated[float, Field(gt=0, le=1)] = 1.0  # share of a frame's contour pairs; all frames count as one
+
+    def run(
+        self, recording: Recording, scene: Scene, background: Background | None = None, track: Track | None = None
+    ) -> Body:
+        """Return the scene's body with fitted proportions.
+
+        Raises:
+            RecordingError: neither a track nor keypoints say where the person is.
+        """
+        scene = (scene if self.draper else scene.undressed).with_background(background)
+        indices, poses, clothes = self._from_track(track) if track else self._from_keypoints(recording, scene)
+        spreads: Spreads = {name: self.spread for name in self.proportions}
+        body = scene.body
+        share = self.independent / len(indices)  # contours err alike in all frames: more of them tell no more
+        solution = Solution(np.zeros(len(spreads)), tuple(poses))
+        for done in range(self.passes):
+            model = self._model(scene, scaled(body, solution.factors(spreads)))
+            views = self._segmented(recording, model, indices, solution.poses, clothes)
+            turn = Turn(index=done, cap=self.passes, change=AT_REST if done else None)
+            matchers = [partial(self._match, scene, *view, turn) for view in views]
+            solution = refine(body, matchers, solution, scene.cameras, spreads, share, self.rounds)
+        factors = solution.factors(spreads)
+        LOG.info("proportions: %s", ", ".join(f"{name} {factor:.3f}" for name, factor in factors.items()))
+        return scaled(body, factors)
+
+    def _from_track(self, track: Track) -> tuple[list[int], list[Pose], list[F64]]:
+        good = np.flatnonzero(track.usable.all(axis=1) & track.steady & ~track.doubted)
+        good = good if len(good) >= self.frames else np.arange(len(track.frame))
+        rows = good[np.unique(np.linspace(0, len(good) - 1, self.frames).round().astype(int))]
+        clothes = [track.cloth_parameters[r].copy() for r in rows]
+        return [int(track.frame[r]) for r in rows], [track.pose(int(r)) for r in rows], clothes
+
+    def _from_keypoints(self, recording: Recording, scene: Scene) -> tuple[list[int], list[Pose], list[F64]]:
+        found = persons(recording, spread(recording.indices, self.frames), scene.cameras)
+        names, order = landmarks(scene.body).names, layout(recording, list(found), None)
+        _, poses = fit(scene.body, [seen(person, order, names) for person in found.values()], scene.cameras)
+        return list(found), list(poses), [scene.calm] * len(found)
+
+    def _model(self, scene: Scene, body: Body) -> ClothedModel:
+        return ClothedModel(scene=replace(scene, body=body), draper=self.draper)
+
+    def _segmented(
+        self, recording: Recording, model: ClothedModel, indices: Sequence[int], poses: Sequence[Pose],
+        clothes: Sequence[F64],
+    ) -> list[tuple[Frame, Segmentation, F64]]:  # fmt: skip
+        """Return the silhouettes of the chosen frames; the images are let go at once."""
+        views, past = [], Past()
+        wanted = {index: (pose, cloth) for index, pose, cloth in zip(indices, poses, clothes, strict=True)}
+        for frame in recording.until(max(indices)).frames(since=min(indices)):
+            if frame.index in wanted:
+                pose, cloth = wanted[frame.index]
+                state = believed(pose, cloth, model.drape(pose, cloth, past))
+                found = self.segmenter.segment(frame, state, past, model.scene, Turn(index=0, cap=1))
+                views.append((replace(frame, images=(), flow=None), found, cloth))
+        return views
+
+    def _match(
+        self, scene: Scene, frame: Frame, segmentation: Segmentation, cloth: F64, turn: Turn, body: Body, pose: Pose
+    ) -> Matches:
+        model, past = self._model(scene, body), Past()
+        surface = model.surface(pose, model.drape(pose, cloth, past))
+        return pool_matches(self.matchers, frame, segmentation, past, model.scene, turn, surface)

@@ -1,0 +1,77 @@
+"""The person's keypoints of a frame, found among all detections and triangulated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mocapflow.assets import Camera
+from mocapflow.errors import RecordingError
+from mocapflow.recording import Recording
+from mocapflow_fitting.keypoint_fit import Seen
+from mocapflow_fitting.keypoint_layouts import LAYOUTS, Layout, layout_of
+from mocapflow_fitting.person import Person, find_person
+
+LEAST_POINTS = 8  # triangulated keypoints that make a usable frame
+
+
+def need_keypoints(recording: Recording) -> None:
+    """Check that at least two cameras have keypoints.
+
+    Raises:
+        RecordingError: they have not.
+    """
+    if sum(folder is not None for folder in recording.keypoint_folders) >= 2:
+        return
+    there = ", ".join(sorted(path.name for path in recording.folder.iterdir()))
+    raise RecordingError(
+        "there are no 2D keypoints of two cameras or more", where=str(recording.folder / "keypoints"),
+        hint=f"expected keypoints/cam01_json/*.json as OpenPose writes them; the recording has: {there}\n"
+        "with a pose of the first frame in init.json, use the stage start_from_file",
+    )  # fmt: skip
+
+
+def person_at(recording: Recording, index: int, cameras: Sequence[Camera]) -> Person | None:
+    """Return the person in a frame; None where too few keypoints can be triangulated."""
+    person = find_person(recording.people(index), cameras)
+    found = 0 if person is None else np.isfinite(person.points.position).all(axis=1).sum()
+    return person if found >= LEAST_POINTS else None
+
+
+def spread(indices: range, count: int) -> list[int]:
+    """Return `count` frames spread evenly, or all of them if there are fewer."""
+    rows = np.unique(np.linspace(0, len(indices) - 1, count).round().astype(int))
+    return [indices[row] for row in rows]
+
+
+def persons(recording: Recording, indices: Sequence[int], cameras: Sequence[Camera]) -> dict[int, Person]:
+    """Return the person in each frame where there is one.
+
+    Raises:
+        RecordingError: there are no keypoints, or nobody is found in any frame.
+    """
+    need_keypoints(recording)
+    found = {index: person for index in indices if (person := person_at(recording, index, cameras)) is not None}
+    if not found:
+        hint = "check that keypoints and cameras belong together (`mocapflow doctor`)"
+        where = str(recording.folder / "keypoints")
+        raise RecordingError("in no frame two cameras see the same person", where=where, hint=hint)
+    return found
+
+
+def layout(recording: Recording, indices: Sequence[int], wanted: Layout | None) -> tuple[str, ...]:
+    """Return the names of the keypoints, in the order of the files."""
+    detections = [points for index in indices for view in recording.people(index) for points in view]
+    return LAYOUTS[wanted or layout_of(detections)]
+
+
+def seen(person: Person, names: Sequence[str], wanted: Sequence[str]) -> Seen:
+    """Return a person's keypoints (named `names`) in the order of the landmarks `wanted`."""
+    row = np.array([names.index(name) if name in names else -1 for name in wanted])
+    known = row >= 0
+    return Seen(
+        position=np.where(known[:, None], person.points.position[row], np.nan),
+        pixels=person.pixels[:, row],
+        confidence=np.where(known, person.confidence[:, row], 0.0),
+    )

@@ -1,0 +1,88 @@
+"""Which detections, one per camera, are the same person: those that reproject best together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mocapflow.assets import Camera
+from mocapflow.records import F64, array, record
+from mocapflow_fitting.triangulate import Points, triangulate
+
+ALIKE_PX_SHARE = 0.05  # of the height of a detection: keypoints of one person reproject within about this
+
+
+@record
+class Person:
+    """One person's detections over the cameras, and the points they give."""
+
+    chosen: tuple[int, ...]  # per camera the row of the detection, -1 where the person is not seen
+    pixels: F64 = array("C", "K", 2, unit="px")
+    confidence: F64 = array("C", "K", unit="1, zero where unseen")
+    points: Points
+    support: float  # confidence of all observations that agree, summed
+
+
+def find_person(detections: Sequence[F64], cameras: Sequence[Camera]) -> Person | None:
+    """Return the person whom most confident keypoints of most cameras support; None: nobody is seen by two cameras.
+
+    Args:
+        detections: per camera (N people, K, 3) px, px, confidence.
+        cameras: pinhole cameras.
+
+    Every pair of detections of two cameras proposes a person; each further camera joins with the detection that lies
+    closest to the projected points, if any does. A bystander seen by fewer cameras, smaller or less clearly loses.
+    """
+    best: Person | None = None
+    seen: set[tuple[int, ...]] = set()
+    for a in range(len(cameras)):
+        for b in range(a + 1, len(cameras)):
+            for i in range(len(detections[a])):
+                for j in range(len(detections[b])):
+                    chosen = _joined(detections, cameras, {a: i, b: j})
+                    if chosen in seen:
+                        continue
+                    seen.add(chosen)
+                    person = _person(detections, cameras, chosen)
+                    if best is None or person.support > best.support:
+                        best = person
+    return best if best is not None and best.support > 0 else None
+
+
+def _joined(detections: Sequence[F64], cameras: Sequence[Camera], pair: dict[int, int]) -> tuple[int, ...]:
+    person = _person(detections, cameras, tuple(pair.get(c, -1) for c in range(len(cameras))))
+    chosen = []
+    for c, camera in enumerate(cameras):
+        agreement = [_agreement(person.points.position, points, camera) for points in detections[c]]
+        row = pair.get(c, int(np.argmax(agreement)) if agreement and max(agreement) > 0.25 else -1)
+        chosen.append(row)
+    return tuple(chosen)
+
+
+def _agreement(position: F64, points: F64, camera: Camera) -> float:
+    """Return the share of a detection's confidence that lies near the projected points."""
+    from mocapflow.geometry.cameras import project
+
+    error = np.linalg.norm(project(position, camera) - points[:, :2], axis=1)
+    near = 1 / (1 + (error / scale_of(points)) ** 2)
+    return float(np.nansum(points[:, 2] * near) / max(points[:, 2].sum(), 1e-9))
+
+
+def _person(detections: Sequence[F64], cameras: Sequence[Camera], chosen: tuple[int, ...]) -> Person:
+    count = max((d.shape[1] for d in detections if len(d)), default=0)
+    rows = np.stack([detections[c][row] if row >= 0 else np.zeros((count, 3)) for c, row in enumerate(chosen)])
+    sizes = [scale_of(points) for points in rows if points[:, 2].any()]
+    points = triangulate(rows[..., :2], rows[..., 2], cameras, scale_px=float(np.median(sizes)))
+    found = np.isfinite(points.position).all(axis=1)
+    support = float(points.weight[:, found].sum())
+    return Person(
+        chosen=chosen, pixels=rows[..., :2].copy(), confidence=rows[..., 2].copy(), points=points, support=support
+    )
+
+
+def scale_of(points: F64) -> float:
+    """Return the error (px) at which a keypoint no longer counts as the same person's."""
+    seen = points[points[:, 2] > 0, :2]
+    height = float(np.linalg.norm(np.ptp(seen, axis=0))) if len(seen) else 0.0
+    return max(ALIKE_PX_SHARE * height / 3, 2.0)

@@ -1,0 +1,47 @@
+"""Stage `start_from_keypoints`: the first pose from 2D keypoints of the first usable frame."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from mocapflow.components import Stage
+from mocapflow.data import Start
+from mocapflow.errors import RecordingError
+from mocapflow.recording import Recording
+from mocapflow.scene import Scene
+from mocapflow_fitting.detections import layout, need_keypoints, person_at, seen
+from mocapflow_fitting.keypoint_fit import fit
+from mocapflow_fitting.keypoint_layouts import Layout
+from mocapflow_fitting.landmarks import landmarks
+
+
+class StartFromKeypoints(Stage):
+    """Finds the person whose detections reproject best, and the pose of the body that explains them.
+
+    Only the first frame is used; where keypoints of fewer than two cameras agree, the next one of the first ten.
+    """
+
+    name: ClassVar[str] = "start_from_keypoints"
+    extent: ClassVar[Literal["beginning"]] = "beginning"
+    layout: Layout | None = None  # order of the keypoints; null: told by their number
+
+    def run(self, recording: Recording, scene: Scene) -> Start:
+        """Return the pose of the first usable frame; the cloth starts without forces.
+
+        Raises:
+            RecordingError: there are no keypoints, or no frame in which two cameras see the same person.
+        """
+        need_keypoints(recording)
+        names = landmarks(scene.body).names
+        for index in recording.indices:
+            person = person_at(recording, index, scene.cameras)
+            if person is not None:
+                points = seen(person, layout(recording, [index], self.layout), names)
+                _, (pose,) = fit(scene.body, [points], scene.cameras)
+                return Start(pose=pose, parameters=scene.calm)
+        first, last = recording.indices[0], recording.indices[-1]
+        raise RecordingError(
+            f"in frames {first} to {last} no two cameras see the same person",
+            where=str(recording.folder / "keypoints"),
+            hint="check that keypoints and cameras belong together (`mocapflow doctor`), or write init.json",
+        )

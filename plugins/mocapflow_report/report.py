@@ -1,0 +1,102 @@
+"""Stage `report`: one page that shows what a run did and how well."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import ClassVar
+
+from mocapflow_evaluation import comparison_plots, cycles, ours
+from mocapflow_evaluation.alignment import at_our_frames
+from mocapflow_evaluation.references import read_reference
+from mocapflow_export import layout, runjson, tables
+from mocapflow_export.export import before_smoothing
+from mocapflow_export.uncertainty import measured
+from mocapflow_sequence.lost import lost_rows
+
+from mocapflow.components import Stage
+from mocapflow.recording import Recording
+from mocapflow.records import F64
+from mocapflow.results import Evaluation, Files, RunFolder, Track
+from mocapflow.scene import Scene
+from mocapflow_report import page, plots, report_rows
+from mocapflow_report.stills import stills
+
+CAPTIONS = {
+    layout.AGREEMENT_PLOT.name: "Agreement: difference over mean, with the mean difference and the limits of 95 % "
+    "(Bland and Altman). Neighbouring frames hang together, so the limits are of this take.",
+    layout.CYCLES_PLOT.name: "Over the gait cycle: every stride thin, their mean thick.",
+    layout.STICK_PLOT.name: "Stick models from the front and from the side: ours, and the reference's in our rig.",
+}
+
+
+class Report(Stage):
+    """Writes report.html, which holds everything it shows, results/angles.png and results/overlap.png."""
+
+    name: ClassVar[str] = "report"
+
+    def run(
+        self,
+        track: Track,
+        scene: Scene,
+        recording: Recording,
+        run_folder: RunFolder,
+        evaluation: Evaluation | None = None,
+    ) -> Files:
+        """Write the report and return its paths."""
+        columns = tables.angle_columns(track, measured(track, scene))
+        pictures = draw(track, scene, columns, evaluation, run_folder.path)
+        warnings = recording.warnings + scene.warnings
+        summary = runjson.plain(runjson.summary(track, measured(track, scene), run_folder, warnings))
+        mishaps = report_rows.mishaps(track, summary["frames"]["held_by_priors"])
+        recipe = summary["recipe"]
+        names = [camera.name for camera in scene.cameras]
+        sections = [
+            ("At a glance", page.listing(report_rows.glance(track, names, evaluation))),
+            ("Angles", _shown(pictures[:1]) + page.table(report_rows.ranges(columns))),
+            ("Gait cycle", _shown(pictures[2:])),
+            ("Deviation from the reference", _deviations(evaluation)),
+            ("Overlay", "\n".join(page.picture(jpeg, "jpeg", said) for said, jpeg in stills(track, scene, recording))),
+            ("Overlap of model and image", _shown(pictures[1:2])),
+            ("What happened", page.listing([*summary["warnings"], *mishaps, *report_rows.notes(track)])),
+            ("CPU time", page.table(report_rows.times(track))),
+            ("Versions", page.listing([f"{name} {version}" for name, version in recipe.get("versions", {}).items()])),
+            ("Settings and recipe", page.code(json.dumps(recipe, indent=1, ensure_ascii=False))),
+        ]
+        counts = f"{len(track.frame)} frames, {len(scene.cameras)} cameras, {recording.frame_rate:g} per second"
+        subtitle = f"{recording.folder.name}: {counts}"
+        path = layout.place(run_folder.path, layout.REPORT)
+        path.write_text(page.page(run_folder.path.resolve().name, subtitle, sections), encoding="utf-8")
+        return Files(paths=(path, *pictures))
+
+
+def draw(
+    track: Track, scene: Scene, columns: Mapping[str, F64], evaluation: Evaluation | None, folder: Path
+) -> list[Path]:
+    """Draw angles, overlap and, of somebody who walks without a reference, the gait cycle; return the files."""
+    known: Mapping[str, F64] = {}
+    if evaluation is not None and evaluation.rows:
+        known = at_our_frames(read_reference(Path(evaluation.reference)), columns)
+    raw, lost = tables.angle_columns(track, measured(before_smoothing(track), scene)), lost_rows(track)
+    curves, overlap = layout.place(folder, layout.PLOT), layout.place(folder, layout.OVERLAP)
+    plots.plot_angles(curves, columns, raw, known, evaluation, lost)
+    plots.plot_overlap(overlap, track, [camera.name for camera in scene.cameras], lost)
+    stick = ours.of_track(track, scene).stick
+    strides = [] if known else cycles.gait_cycles(stick.names, stick.places, track.frame_rate)
+    names = [name for name in tables.angle_names(columns) if cycles.own(strides, name)]
+    if not names:
+        return [curves, overlap]
+    walked = {name: {"mocapflow": cycles.normalised(strides, columns[name], name)} for name in names}
+    return [curves, overlap, comparison_plots.draw_cycles(layout.place(folder, layout.CYCLES_PLOT), walked)]
+
+
+def _shown(pictures: Sequence[Path]) -> str:
+    return "\n".join(page.picture(path.read_bytes(), "png", CAPTIONS.get(path.name, "")) for path in pictures)
+
+
+def _deviations(evaluation: Evaluation | None) -> str:
+    if evaluation is None or not evaluation.rows:
+        return page.listing(evaluation.notes if evaluation else [])
+    rows, said = report_rows.deviations(evaluation), report_rows.against(evaluation)
+    return page.table(rows) + page.listing(said) + _shown(evaluation.pictures)

@@ -1,0 +1,160 @@
+"""What components answer is looked at: a wrong answer names who gave it, and nothing wrong goes on."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mocapflow.answers import WrongAnswer, matches_of, pose_of, residual_of
+from mocapflow.components import Matcher, Predictor, Prior
+from mocapflow.data import NO_CLOTH, Matches, Past, Pose, Residual, Turn
+from mocapflow.errors import ComponentFailed
+from mocapflow.testing import pictures, scenes
+from tests.fixtures.stores import STAGES, load, run_tiny, write_pipeline, write_recording
+
+SCENE = scenes.tiny_scene()
+POSE = scenes.tiny_pose(SCENE)
+FRAME, SEEN = pictures.tiny_frame(SCENE, POSE), pictures.tiny_segmentation(SCENE, POSE)
+SURFACE, WIDTH = SCENE.surface(POSE, NO_CLOTH), 6 + len(POSE.angles)
+GOOD = Matches(
+    camera=np.zeros(3, np.int16), pixel=np.ones((3, 2)), direction=np.zeros((3, 2)),
+    vertex=np.arange(3, dtype=np.int32), weight=np.ones(3),
+)  # fmt: skip
+
+
+class Saying(Matcher, Predictor, Prior):
+    """Says what it is told to."""
+
+    name = "saying"
+    answer: object
+
+    def match(self, frame, segmentation, surface, past, scene, turn):
+        return self.answer
+
+    def predict(self, frame, past, scene):
+        return self.answer
+
+    def residual(self, pose, past, scene):
+        return self.answer
+
+
+def matches(answer):
+    return matches_of(Saying(answer=answer), FRAME, SEEN, SURFACE, Past(), SCENE, Turn(index=0, cap=1))
+
+
+def residual(error=0.0, jacobian=0.0, energy=0.0, width=WIDTH):
+    answer = Residual(error=np.full(2, error), jacobian=np.full((2, width), jacobian), energy=energy)
+    return residual_of(Saying(answer=answer), POSE, Past(), SCENE)
+
+
+def other(name, value):
+    values = np.array(getattr(GOOD, name))
+    values[1] = value
+    return replace(GOOD, **{name: values})
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        (None, "NoneType, not Matches"),
+        (other("vertex", -1), "a pair of vertex -1; there are 0 to"),
+        (other("vertex", 10**6), "a pair of vertex 1000000; there are 0 to"),
+        (other("camera", 9), "a pair of camera 9; there are 0 to"),
+        (other("pixel", np.nan), "a pixel that is not finite"),
+        (other("direction", np.inf), "a direction that is not finite"),
+        (other("weight", np.inf), "a weight that is not finite"),
+        (other("weight", -1.0), "a weight below zero"),
+    ],
+)
+def test_pairs_that_are_none(answer, said):
+    with pytest.raises(WrongAnswer, match=f"'saying' returned {said}"):
+        matches(answer)
+
+
+def test_pairs_that_are_some():
+    assert matches(GOOD) is GOOD
+    none = replace(GOOD, **{name: getattr(GOOD, name)[:0] for name in GOOD.__dataclass_fields__})
+    assert matches(none) is none
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        (dict(error=np.nan), "an error or a jacobian that is not finite"),
+        (dict(jacobian=-np.inf), "an error or a jacobian that is not finite"),
+        (dict(energy=np.nan), "the energy nan"),
+        (dict(energy="0"), "the energy '0'"),
+        (dict(width=WIDTH - 6), rf"a jacobian of {WIDTH - 6} columns; \(omega, v, angles\) are {WIDTH}"),
+    ],
+)
+def test_residuals_that_are_none(answer, said):
+    with pytest.raises(WrongAnswer, match=f"'saying' returned {said}"):
+        residual(**answer)
+
+
+def test_an_infinite_energy_rules_a_pose_out():
+    assert residual(energy=np.inf).energy == np.inf
+    assert residual(width=WIDTH + 2).jacobian.shape == (2, WIDTH + 2)  # of the cloth, too
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        (POSE.root, "ndarray, not Pose"),
+        (Pose(root=POSE.root, angles=POSE.angles[:-1]), "joint angles; the body has"),
+        (Pose(root=POSE.root, angles=POSE.angles * np.nan), "a pose that is not finite"),
+        (Pose(root=np.diag([-1.0, 1, 1, 1]), angles=POSE.angles), "a root that is no rigid motion"),
+        (Pose(root=np.diag([2.0, 2, 2, 1]), angles=POSE.angles), "a root that is no rigid motion"),
+    ],
+)
+def test_poses_that_are_none(answer, said):
+    with pytest.raises(WrongAnswer, match=f"'saying' returned .*{said}"):
+        pose_of(Saying(answer=answer), FRAME, Past(), SCENE)
+
+
+PLUGIN = """
+import numpy as np
+from mocapflow import Prior, Residual, hookimpl
+
+
+class Nan(Prior):
+    \"\"\"Says nothing of use.\"\"\"
+
+    name = "nan"
+
+    def residual(self, pose, past, scene):
+        count = len(pose.angles)
+        return Residual(error=np.full(count, np.nan), jacobian=np.zeros((count, 6 + count)), energy=0.0)
+
+
+class Leaves(Prior):
+    \"\"\"Ends the program.\"\"\"
+
+    name = "leaves"
+
+    def residual(self, pose, past, scene):
+        raise SystemExit(0)
+
+
+@hookimpl
+def mocapflow_priors():
+    return [Nan, Leaves]
+"""
+
+
+@pytest.mark.parametrize(
+    ("prior", "said"),
+    [
+        ("nan", r"prior 'nan' \(.*\) failed at frame 0, iteration 1: .*returned an error or a jacobian"),
+        ("leaves", r"prior 'leaves' \(.*\) failed at frame 0, iteration 1: SystemExit: 0"),
+    ],
+)
+def test_a_run_names_who_answers_wrongly(tmp_path, prior, said):
+    (tmp_path / "bad.py").write_text(PLUGIN)
+    stages = STAGES | {"track": STAGES["track"] | {"priors": [prior]}}
+    path = write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=stages)
+    content = path.read_text().replace("plugins:\n", f"plugins:\n- {tmp_path / 'bad.py'}\n")
+    path.write_text(content)
+    assert load(path)
+    with pytest.raises(ComponentFailed, match=said):
+        run_tiny(path, tmp_path, frames=2)
