@@ -186,8 +186,9 @@ def _lost(cameras: Sequence[Camera], videos: Sequence[Video]) -> Iterator[Findin
     for camera, video in zip(cameras, videos, strict=True):
         lost = [index for index in lost_frames(video) if index < video.frames]
         if lost:
+            why = "missing, damaged or of another size" if video.path.is_dir() else "can't be decoded"
             yield warning(
-                f"{camera.name}: {name_frames(lost)} can't be decoded",
+                f"{camera.name}: {name_frames(lost)} {why}",
                 "the view is not used in these frames; the others keep their places",
                 video.path,
             )

@@ -48,7 +48,9 @@ def good(tmp_path):
     (subject / "body.obj").write_text("".join(rows))
     joints = [{"name": name, "parent": parent, "position": position(name)} for name, parent in CHAIN.items()]
     (subject / "skeleton.json").write_text(json.dumps({"joints": joints}))
-    np.savez(subject / "weights.npz", weights=np.full((len(corners), len(CHAIN)), 0.25), names=list(CHAIN))
+    movers = [f"{dict({0.0: 'toe', 0.8: 'knee', 1.8: 'shoulder'})[z]}_{'l' if x > 0 else 'r'}" for x, _, z in corners]
+    weights = np.array([[float(name == mover) for name in CHAIN] for mover in movers])
+    np.savez(subject / "weights.npz", weights=weights, names=list(CHAIN))
     (subject / "garment.json").write_text(json.dumps(SHORTS))
     pose = {"root_rotation": [0, 0, 0.1], "root_translation": [0, 0, 1], "joint_rotations": {"knee_l": [0.1, 0, 0]}}
     (tmp_path / "init.json").write_text(json.dumps(pose))
@@ -210,6 +212,25 @@ def test_lost_frames_are_named(tmp_path):
     assert errors(tmp_path) == []
 
 
+def test_images_that_are_damaged_missing_or_of_another_size_are_named(tmp_path):
+    write_recording(tmp_path, frames=8)
+    folder, images = tmp_path / "videos" / "cam02", np.zeros((48, 64, 3), np.uint8)
+    (tmp_path / "videos" / "cam02.mp4").unlink()
+    folder.mkdir()
+    for index in (0, 1, 2, 3, 5, 6, 7):
+        cv2.imwrite(str(folder / f"{index:06}.png"), images if index != 6 else images[:40])
+    (folder / "000002.png").write_bytes(b"no picture")
+    assert "cam02: frames 2, 4, 6 missing, damaged or of another size" in messages(tmp_path, "warning")
+
+
+def test_two_cameras_with_one_calibration(tmp_path):
+    write_recording(tmp_path, frames=3)
+    cameras = ring()
+    write_cameras(tmp_path / "cameras.toml", [replace(cameras[1], name=cameras[0].name), *cameras[1:]])
+    one, other = (camera.name for camera in cameras[:2])
+    assert f"{one} and {other} stand in one place and look the same way" in errors(tmp_path)
+
+
 def test_a_video_that_breaks_off(tmp_path):
     write_recording(tmp_path, frames=20, ending="avi", codec="MJPG")
     path = tmp_path / "videos" / "cam02.avi"
@@ -350,6 +371,8 @@ def test_weights_of_another_mesh(good):
     assert errors(good) == ["this is no .npz file of numbers and names"]
     np.savez(path, weights=weights)  # without names: in the order of the skeleton
     assert errors(good) == []
+    np.savez(path, weights=weights[:, ::-1])
+    assert errors(good) == ["what 'knee_l' moves lies at 'pelvis'"]
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from mocapflow.records import F64, Bool
 OPPOSED = 165.0  # deg between two viewing directions
 NEAREST, FARTHEST = 0.3, 30.0  # m from a camera, where something to be filmed may stand
 DEPTHS = np.geomspace(NEAREST, FARTHEST, 40)  # m
+SAME_PLACE, SAME_TURN = 0.02, 1.0  # m and deg, within which two cameras are one
 RAYS = 9  # per side of an image
 UPRIGHT = 0.7  # length of the mean "up" of the images from which they agree on a direction
 
@@ -27,6 +28,7 @@ def examine_rig(cameras: Sequence[Camera]) -> Iterator[Finding]:
         return
     yield from _common_view(cameras)
     yield from _world_up(cameras)
+    yield from _doubles(cameras)
     for (a, va), (b, vb) in combinations([(camera.name, _forward(camera)) for camera in cameras], 2):
         angle = np.degrees(np.arccos(np.clip(va @ vb, -1, 1)))
         if angle > OPPOSED:
@@ -47,6 +49,16 @@ def examine_view(cameras: Sequence[Camera], point: F64, what: str) -> Iterator[F
         yield problem(f"no camera sees {what}", hint)
     elif blind:
         yield warning(f"{', '.join(blind)} {'do' if len(blind) > 1 else 'does'} not see {what}", hint)
+
+
+def _doubles(cameras: Sequence[Camera]) -> Iterator[Finding]:
+    """Yield which cameras stand in one place and look the same way, turned alike."""
+    for one, other in combinations(cameras, 2):
+        turn = one.camera_from_world[:3, :3] @ other.camera_from_world[:3, :3].T
+        angle = np.degrees(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1)))
+        if np.linalg.norm(centre(one) - centre(other)) < SAME_PLACE and angle < SAME_TURN:
+            hint = "one of them has the other's numbers: copy each camera's own calibration"
+            yield problem(f"{one.name} and {other.name} stand in one place and look the same way", hint)
 
 
 def _common_view(cameras: Sequence[Camera]) -> Iterator[Finding]:

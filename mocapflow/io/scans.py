@@ -1,12 +1,10 @@
-"""The files of a scan beside its mesh, `skeleton.json` and `weights.npz`, and whether they belong to it."""
+"""The skeleton of a scan beside its mesh, `skeleton.json`, and whether it belongs to it."""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 
@@ -16,7 +14,6 @@ from mocapflow.io.typed import place, read_json
 from mocapflow.records import F64
 
 FORM = 'expected {"joints": [{"name": "pelvis", "parent": null, "position": [x, y, z] in m}, …]}, parents first'
-WEIGHTS = "expected arrays `weights` (V, J) and, if need be, `names` (J); without the file weights are computed"
 TALLEST, SMALLEST = 3.0, 0.3  # m, extents of a plausible body
 SHORTEST = 0.01  # m, a bone between joints whose angle is measured, and the way from one hip to the other
 LIMBS = ("knee", "ankle", "elbow", "wrist")  # joints that end such a bone
@@ -43,37 +40,6 @@ def read_skeleton(path: Path) -> Skeleton:
         raise RecordingError(f"this is not a skeleton: {error!r}", where=str(path), hint=FORM) from error
     _check_limbs(skeleton, path)
     return skeleton
-
-
-def read_weights(path: Path, skeleton: Skeleton, vertices: int) -> F64:
-    """Return the weights (V, J) of a `weights.npz` in the order of the skeleton; without names they have it.
-
-    Raises:
-        RecordingError: the file can't be read, or contradicts the mesh or the skeleton.
-    """
-    try:
-        with np.load(path) as content:
-            weights = np.asarray(content["weights"], np.float64)
-            names = [str(name) for name in content["names"]] if "names" in content else list(skeleton.names)
-    except KeyError:
-        raise RecordingError("there are no skin weights in it", where=str(path), hint=WEIGHTS) from None
-    except (OSError, ValueError, TypeError, EOFError, BadZipFile):  # what numpy says of it is about pickles
-        raise RecordingError("this is no .npz file of numbers and names", where=str(path), hint=WEIGHTS) from None
-    if weights.shape != (vertices, len(names)):
-        expected = f"({vertices} vertices, {len(names)} joints)"
-        raise RecordingError(f"the weights have the shape {weights.shape}; expected {expected}", where=str(path))
-    if not np.isfinite(weights).all() or (weights < 0).any() or (weights.sum(axis=1) == 0).any():
-        what = "skin weights have to be numbers of at least 0, one of each vertex above"
-        raise RecordingError(what, where=str(path), hint=WEIGHTS)
-    for name, count in Counter(names).items():
-        if count > 1:
-            raise RecordingError(f"weights for '{name}' are there more than once", where=str(path), hint=WEIGHTS)
-        if name not in skeleton.names:
-            what = f"weights for '{name}', which is no joint of the skeleton"
-            raise RecordingError(what, where=str(path), hint=alternatives(name, skeleton.names))
-    ordered = np.zeros((vertices, len(skeleton.names)))
-    ordered[:, [skeleton.names.index(name) for name in names]] = weights
-    return ordered
 
 
 def check_size(vertices: F64, skeleton: Skeleton, where: str) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -94,13 +95,13 @@ def read_frames(video: Video, indices: range) -> Iterator[tuple[U8 | None, str]]
 
 
 def lost_frames(video: Video) -> list[int]:
-    """Return the numbers of the frames that the file should have and lacks; decodes the whole file."""
+    """Return the numbers of the frames that there should be and that can't be used; decodes all of them."""
+    wanted = range(video.declared)
     if video.path.is_dir():
-        there = set(numbered(video.path, IMAGES))
-    else:
-        with open_capture(video.path) as capture:
-            there = set(_decoded(capture, video))
-    return sorted(set(range(video.declared)) - there)
+        punctual = replace(video, late=0)
+        return [index for index, (image, _) in zip(wanted, read_frames(punctual, wanted), strict=True) if image is None]
+    with open_capture(video.path) as capture:
+        return sorted(set(wanted) - set(_decoded(capture, video)))
 
 
 def _file_pictures(video: Video, indices: range) -> Iterator[tuple[U8 | None, str]]:

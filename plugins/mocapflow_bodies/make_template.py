@@ -9,7 +9,8 @@ import numpy as np
 
 from mocapflow.geometry.skeleton import Skeleton, body_directions
 from mocapflow.io.meshes import read_mesh
-from mocapflow.io.scans import read_skeleton, read_weights
+from mocapflow.io.scans import read_skeleton
+from mocapflow.io.weights import read_weights
 from mocapflow.records import F64
 from mocapflow_bodies.template import FILE, UNIT
 from mocapflow_bodies.weights import strongest

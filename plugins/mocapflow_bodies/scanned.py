@@ -14,7 +14,8 @@ from mocapflow.assets import Body
 from mocapflow.components import BodyModel
 from mocapflow.errors import PipelineError, RecordingError, alternatives
 from mocapflow.io.meshes import read_mesh
-from mocapflow.io.scans import check_size, read_skeleton, read_weights
+from mocapflow.io.scans import check_size, read_skeleton
+from mocapflow.io.weights import check_weights, read_weights
 from mocapflow.records import F64
 from mocapflow_bodies.assemble import Part, assemble
 from mocapflow_bodies.weights import heat_weights
@@ -64,6 +65,7 @@ class Scanned(BodyModel):
         check_size(vertices, skeleton, str(subject / "body.obj"))
         if (subject / "weights.npz").exists():
             weights = read_weights(subject / "weights.npz", skeleton, len(vertices))
+            check_weights(vertices, weights, skeleton, str(subject / "weights.npz"))
         else:
             weights = heat_weights(vertices, faces, skeleton)
         if self.morph is None:
