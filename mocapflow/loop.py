@@ -46,10 +46,11 @@ def settle(
     steady = steps.steady
     if not past.moments:
         steady = steady.model_copy(update={"sigmas": ()})  # the start may be far off
-    calm, turn = 0, Turn(index=0, cap=steady.max_turns)
+    most = steady.max_turns if past.moments else steady.cap
+    calm, turn = 0, Turn(index=0, cap=most)
     last = before_last = Shown(state.estimate.pose, model.surface(state.estimate.pose, state.cloth))
-    energy = np.full((steady.max_turns, len(functional.terms)), np.nan)
-    for index in range(steady.max_turns):
+    energy = np.full((steady.cap, len(functional.terms)), np.nan)
+    for index in range(most):
         turn = Turn(index=index, cap=turn.cap, change=turn.change)
         segmentation = steps.segmenter.segment(frame, state, past, model.scene, turn)
         watch.lap("segment")

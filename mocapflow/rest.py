@@ -25,7 +25,13 @@ class Steady(BaseModel):
     sigmas: tuple[NonNegativeFloat, ...] = ()  # of the pose, turn by turn: moves below are rest too
     turns: PositiveInt = 2  # in a row within both tolerances, then the frame is at rest
     max_turns: PositiveInt = 8  # then the frame is left as it is
+    first_turns: NonNegativeInt = 0  # the same, if more, of a first frame, and of one after frames that were lost
     halvings: NonNegativeInt = 0  # at most, of a step that raises the functional; 0: it is taken whole
+
+    @property
+    def cap(self) -> int:
+        """How many turns a frame takes at most."""
+        return max(self.max_turns, self.first_turns)
 
     def holds(self, change: Change, turns: int) -> bool:
         """True where a change is within both tolerances, or less than the pose is known to."""

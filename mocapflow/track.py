@@ -101,7 +101,7 @@ class CoupledLoop(Stage):
             raise PipelineError(f"the person wears a {scene.garment.name}, which the track does not drape", hint=hint)
         model = ClothedModel(scene=scene.with_background(background), draper=self.draper)
         if self.keep == "trace":
-            checkpoint.keep_turns(self.steady.max_turns)
+            checkpoint.keep_turns(self.steady.cap)
         past, watch = checkpoint.past(), Stopwatch()
         for picture in recording.frames(since=checkpoint.next_index):
             frame = checks.passed(picture) if checks else picture
@@ -205,7 +205,7 @@ def lost(
         oscillating=False,
         change=Change(body=0.0, cloth=0.0, angles=0.0, sigmas=0.0),
         overlap=np.full(len(frame.usable), np.nan),
-        energy=np.full((steps.steady.max_turns, len(terms)), np.nan),
+        energy=np.full((steps.steady.cap, len(terms)), np.nan),
         energy_terms=terms,
     )
 

@@ -36,7 +36,7 @@ def frame():
     return Frame(index=5, time=0.1, images=(image, image), usable=np.ones(2, bool))
 
 
-def go(frame, share, observe=lambda *_: None, max_turns=8, sigmas=(), past=None):
+def go(frame, share, observe=lambda *_: None, max_turns=8, sigmas=(), past=None, first_turns=0):
     camera = Camera(
         name="cam01", size=np.array([24, 16], np.int32), intrinsics=np.eye(3), distortion=np.zeros(5),
         camera_from_world=np.eye(4),
@@ -45,7 +45,7 @@ def go(frame, share, observe=lambda *_: None, max_turns=8, sigmas=(), past=None)
     steps = Steps(
         segmenter=TinySegmenter(), matchers=(TinyMatcher(),), pose_solver=Towards(share=share),
         cloth_fitter=None, priors=(),
-        steady=Steady(sigmas=sigmas, max_turns=max_turns),
+        steady=Steady(sigmas=sigmas, max_turns=max_turns, first_turns=first_turns),
     )  # fmt: skip
     pose = Pose(root=np.eye(4), angles=np.array([0.3, -0.4]))
     start = believed(pose, np.empty(0), model.drape(pose, np.empty(0), Past()))
@@ -90,6 +90,14 @@ def test_the_matches_kept_are_those_that_the_solver_explains(frame, monkeypatch)
 
 def test_the_cap_holds(frame):
     assert go(frame, 0.05, max_turns=3).iterations == 3
+
+
+def test_a_frame_that_begins_like_a_first_may_take_more_turns(frame):
+    before = Past(moments=(Moment(time=0.0, pose=Pose(root=np.eye(4), angles=np.zeros(2)), cloth=NO_CLOTH),))
+    first, later = (go(frame, 0.05, max_turns=3, first_turns=6, past=past) for past in (Past(), before))
+    assert (first.iterations, later.iterations) == (6, 3)
+    assert len(first.energy) == len(later.energy) == 6  # as long in every frame: the rows of one array
+    assert go(frame, 0.05, max_turns=3, first_turns=2).iterations == 3
 
 
 def test_onlookers_see_every_turn_in_order(frame):
