@@ -71,6 +71,8 @@ TAKES = {
     "walk_B_shorts": Take("B", "shorts", "walk_B", 13, PURPLE, start=200, frames=40),
     "legcross_B_skirt": Take("B", "skirt", "legcross_B", 14, GREEN, start=60, frames=40),
     "kneeup_B_dark": Take("B", "skirt", "kneeup_B", 21, DARK, start=200, frames=40),
+    "squat_B_skirt": Take("B", "skirt", "kneebend_A", 32, GREEN, start=60, frames=80),
+    "dance_A_skirt": Take("A", "skirt", "dance", 31, GREY, frames=100),
 }
 
 
