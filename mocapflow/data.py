@@ -11,7 +11,7 @@ parameters, M matches, T frames, S = 6 + D + Q unknowns of a frame.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import field
 from functools import cached_property
 
@@ -44,12 +44,6 @@ class Frame:
     hidden: tuple[Bool, ...] = ()  # C x (H, W) True where a picture shows nothing of the scene; empty: nowhere
     flow: tuple[Flow, ...] | None = None  # from the previous frame, C x
     keypoints: tuple[F64, ...] | None = None  # C x (N people, K, 3) px, px, confidence; undistorted
-
-    def also_hidden(self, masks: Sequence[Bool]) -> tuple[Bool, ...]:
-        """Return where something hides the scene in each view (H, W): as before, or by masks; none of them: no more."""
-        if not self.hidden or not masks:
-            return tuple(masks) or self.hidden
-        return tuple(before | now for before, now in zip(self.hidden, masks, strict=True))
 
     def hidden_in(self, camera: int) -> Bool | None:
         """Return where a view (H, W) shows nothing of the scene; None: it does everywhere."""

@@ -43,14 +43,11 @@ def settle(
     Source: Rosenhahn 2008, Fig. 12.14
     """
     functional, watch = Functional(model, steps.priors, past), Stopwatch()
-    steady = steps.steady
-    if not past.moments:
-        steady = steady.model_copy(update={"sigmas": ()})  # the start may be far off
-    most = steady.max_turns if past.moments else steady.cap
-    calm, turn = 0, Turn(index=0, cap=most)
+    steady = steps.steady if past.moments else steps.steady.beginning
+    calm, turn = 0, Turn(index=0, cap=steady.max_turns)
     last = before_last = Shown(state.estimate.pose, model.surface(state.estimate.pose, state.cloth))
-    energy = np.full((steady.cap, len(functional.terms)), np.nan)
-    for index in range(most):
+    energy = np.full((steps.steady.cap, len(functional.terms)), np.nan)
+    for index in range(steady.max_turns):
         turn = Turn(index=index, cap=turn.cap, change=turn.change)
         segmentation = steps.segmenter.segment(frame, state, past, model.scene, turn)
         watch.lap("segment")

@@ -19,12 +19,15 @@ def in_parts(pipeline: Pipeline, indices: range) -> Pipeline:
     """Return a pipeline whose tracks are made in as many parts as it wants.
 
     Raises:
-        PipelineError: the parts would be shorter than what they share.
+        PipelineError: the parts would be shorter than what they share, or another stage has the label of one.
     """
     if pipeline.parts.count == 1:
         return pipeline
     parts = [part for named in pipeline.stages for part in _parts(named, pipeline, indices)]
-    stages = {part.label: part for part in parts}  # two tracks of one start share those of its parts
+    stages: dict[str, NamedStage] = {}
+    for part in parts:  # two tracks of one start share those of its parts
+        if stages.setdefault(part.label, part) != part:
+            raise PipelineError(f"no stage can be called '{part.label}': a part has that name", where=part.where)
     return replace(pipeline, stages=tuple(stages.values()))
 
 

@@ -30,8 +30,13 @@ class Steady(BaseModel):
 
     @property
     def cap(self) -> int:
-        """How many turns a frame takes at most."""
+        """How many turns any frame takes at most."""
         return max(self.max_turns, self.first_turns)
+
+    @property
+    def beginning(self) -> Steady:
+        """What holds for a frame that begins like a first: it may start far off, and how sure it is says little."""
+        return self.model_copy(update={"sigmas": (), "max_turns": self.cap})
 
     def holds(self, change: Change, turns: int) -> bool:
         """True where a change is within both tolerances, or less than the pose is known to."""

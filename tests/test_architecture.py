@@ -193,3 +193,17 @@ def test_importing_mocapflow_is_light():
 @pytest.mark.parametrize("path", sources(ROOT, PLUGINS), ids=lambda path: path.name)
 def test_every_module_says_what_it_is(path):
     assert ast.get_docstring(ast.parse(path.read_text()))
+
+
+def test_what_tracks_are_made_of_has_no_code_that_shows_them():
+    """An edit of the report, of a comparison or of a file format must not make anybody track anew."""
+    shows = {"mocapflow_report", "mocapflow_evaluation", "mocapflow_export", "mocapflow_formats"}
+    makes = ("levelset", "matching", "twist", "draping", "priors", "recovery", "garments", "bodies", "fitting")
+    for name in makes:
+        used, unseen = set(), {f"mocapflow_{name}"}
+        while unseen:
+            used.add(package := unseen.pop())
+            for path in sources(PLUGINS / package):
+                found = {target.partition(".")[0] for target in imported(ast.parse(path.read_text()))}
+                unseen |= {target for target in found if target.startswith("mocapflow_")} - used
+        assert not used & shows, f"mocapflow_{name} imports {used & shows}"

@@ -91,6 +91,8 @@ def test_what_a_run_is_writing_is_not_pruned(call):
          "       a run folder is what `mocapflow run` writes; it holds command.json\n"),
         (("evaluate", "nowhere"), "error: nowhere  this is no run folder\n"
          "       a run folder is what `mocapflow run` writes; it holds command.json\n"),
+        (("status", "start.yaml"), "error: start.yaml  this is no run folder\n"
+         "       a run folder is what `mocapflow run` writes; it holds command.json\n"),
     ],
 )  # fmt: skip
 def test_what_the_user_can_mend_ends_with_2(call, words, message):

@@ -40,16 +40,6 @@ def test_a_match_behind_what_hides_the_scene_is_left_out():
     assert barred.hidden_in(0)[100:110].all() and not barred.hidden_in(1).any()
 
 
-def test_what_hides_the_scene_adds_up():
-    scene = scenes.tiny_scene()
-    frame = pictures.tiny_frame(scene, scenes.tiny_pose(scene))
-    bars = [behind_bar(frame, slice(first, first + 10)) for first in (20, 40)]
-    assert frame.also_hidden(()) == ()
-    assert frame.also_hidden(bars[0].hidden) == bars[0].hidden
-    assert bars[0].also_hidden(()) == bars[0].hidden
-    assert bars[0].also_hidden(bars[1].hidden)[0][:, 0].nonzero()[0].tolist() == [*range(20, 30), *range(40, 50)]
-
-
 def test_a_hidden_point_of_the_model_takes_no_contour_that_is_seen():
     """A leg behind a bar would take the other leg's contour, the nearest that is left."""
     scene = scenes.tiny_scene()

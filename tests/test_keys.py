@@ -4,6 +4,7 @@ import ast
 import os
 import shutil
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -309,3 +310,16 @@ def test_digesting_the_code_is_quick():
     start = time.process_time()
     Digests().core()
     assert time.process_time() - start < 1.0  # a plan must not wait for it
+
+
+def test_a_causal_input_of_a_track_need_not_read_the_recording():
+    causal = SimpleNamespace(stage=SimpleNamespace(causal=True))
+    keys = {
+        part: recipes._input(SimpleNamespace(named=causal, recipe={"component": 1} | part_of, key="k"), of_chain=True)
+        for part, part_of in {
+            "none": {},
+            "short": {"recording": {"stop": 5}},
+            "long": {"recording": {"stop": 9}},
+        }.items()
+    }
+    assert keys["short"] == keys["long"] and set(keys["none"]) == {"key"}

@@ -51,6 +51,14 @@ def test_each_of_two_tracks_is_joined_of_its_own_parts(tmp_path):
     run_tiny(path, tmp_path, *IN_TWO, "stages.first.steady.max_turns=2")  # parts of both would not fit together
 
 
+def test_a_stage_with_the_label_of_a_part_is_refused(tmp_path):
+    stages = {"background": "tiny_background", "start": "tiny_start", "start_2": "tiny_start", "track": STAGES["track"]}
+    path = write_pipeline(tmp_path, write_recording(tmp_path / "clip", frames=20), stages=stages)
+    wired = "stages.track.from={start: start}"
+    with pytest.raises(PipelineError, match="no stage can be called 'start_2': a part has that name"):
+        in_parts(load(path, *IN_TWO, wired), range(20))
+
+
 def test_another_stage_starts_the_later_parts(path):
     pipeline = in_parts(load(path, *IN_TWO, "parts.start={use: tiny_start, angle_rad: 1.0}"), range(20))
     assert [named.stage.angle_rad for named in pipeline.stages if named.label.startswith("start")] == [0.0, 1.0]

@@ -11,7 +11,7 @@ from mocapflow.io.first_pose import odd_pose
 from mocapflow.io.meshes import read_mesh
 from mocapflow.io.scans import check_size, read_skeleton
 from mocapflow.io.typed import read_json
-from mocapflow.io.weights import check_weights, read_weights
+from mocapflow.io.weights import read_weights
 
 
 def examine_subject(folder: Path) -> list[Finding]:
@@ -41,7 +41,5 @@ def _examine_scan(subject: Path, findings: list[Finding]) -> Sequence[str]:
         vertices = mesh[0]
         attempt(lambda: check_size(vertices, skeleton, str(body)), findings)
         if skin.exists():
-            weights = attempt(lambda: read_weights(skin, skeleton, len(vertices)), findings)
-            if weights is not None:
-                attempt(lambda: check_weights(vertices, weights, skeleton, str(skin)), findings)
+            attempt(lambda: read_weights(skin, skeleton, vertices), findings)
     return skeleton.names

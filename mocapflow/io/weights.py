@@ -16,11 +16,11 @@ WEIGHTS = "expected arrays `weights` (V, J) and, if need be, `names` (J); withou
 ELSEWHERE = 0.1  # m that what a joint moves may lie nearer to another joint's bones
 
 
-def read_weights(path: Path, skeleton: Skeleton, vertices: int) -> F64:
+def read_weights(path: Path, skeleton: Skeleton, vertices: F64) -> F64:
     """Return the weights (V, J) of a `weights.npz` in the order of the skeleton; without names they have it.
 
     Raises:
-        RecordingError: the file can't be read, or contradicts the mesh or the skeleton.
+        RecordingError: the file can't be read, or contradicts the mesh (V, 3) or the skeleton.
     """
     try:
         with np.load(path) as content:
@@ -30,8 +30,8 @@ def read_weights(path: Path, skeleton: Skeleton, vertices: int) -> F64:
         raise RecordingError("there are no skin weights in it", where=str(path), hint=WEIGHTS) from None
     except (OSError, ValueError, TypeError, EOFError, BadZipFile):  # what numpy says of it is about pickles
         raise RecordingError("this is no .npz file of numbers and names", where=str(path), hint=WEIGHTS) from None
-    if weights.shape != (vertices, len(names)):
-        expected = f"({vertices} vertices, {len(names)} joints)"
+    if weights.shape != (len(vertices), len(names)):
+        expected = f"({len(vertices)} vertices, {len(names)} joints)"
         raise RecordingError(f"the weights have the shape {weights.shape}; expected {expected}", where=str(path))
     if not np.isfinite(weights).all() or (weights < 0).any() or (weights.sum(axis=1) == 0).any():
         what = "skin weights have to be numbers of at least 0, one of each vertex above"
@@ -42,12 +42,13 @@ def read_weights(path: Path, skeleton: Skeleton, vertices: int) -> F64:
         if name not in skeleton.names:
             what = f"weights for '{name}', which is no joint of the skeleton"
             raise RecordingError(what, where=str(path), hint=alternatives(name, skeleton.names))
-    ordered = np.zeros((vertices, len(skeleton.names)))
+    ordered = np.zeros((len(vertices), len(skeleton.names)))
     ordered[:, [skeleton.names.index(name) for name in names]] = weights
+    _check_places(vertices, ordered, skeleton, path)
     return ordered
 
 
-def check_weights(vertices: F64, weights: F64, skeleton: Skeleton, where: str) -> None:
+def _check_places(vertices: F64, weights: F64, skeleton: Skeleton, path: Path) -> None:
     """Check that the vertices (V, 3) that each joint moves, by the weights (V, J), lie about its own bones.
 
     Raises:
@@ -59,7 +60,7 @@ def check_weights(vertices: F64, weights: F64, skeleton: Skeleton, where: str) -
         if away[joint] > away.min() + ELSEWHERE:
             own, other = skeleton.names[joint], skeleton.names[int(away.argmin())]
             hint = "the columns of `weights` are in another order than `names`, or than the joints of skeleton.json"
-            raise RecordingError(f"what '{own}' moves lies at '{other}'", where=where, hint=hint)
+            raise RecordingError(f"what '{own}' moves lies at '{other}'", where=str(path), hint=hint)
 
 
 def _from_bones(point: F64, joint: int, skeleton: Skeleton) -> float:

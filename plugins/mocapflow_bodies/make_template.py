@@ -38,7 +38,7 @@ def pack(first: Path, second: Path, out: Path) -> None:
     if not np.array_equal(meshes[0][1], meshes[1][1]) or skeletons[0].names != skeletons[1].names:
         raise SystemExit("the subjects differ in faces or joints")
     weights = [
-        read_weights(folder / "weights.npz", skeleton, len(mesh[0]))
+        read_weights(folder / "weights.npz", skeleton, mesh[0])
         for folder, skeleton, mesh in zip((first, second), skeletons, meshes, strict=True)
     ]
     skin_joint, skin_weight = strongest((weights[0] + weights[1]) / 2)

@@ -15,7 +15,7 @@ from mocapflow.components import BodyModel
 from mocapflow.errors import PipelineError, RecordingError, alternatives
 from mocapflow.io.meshes import read_mesh
 from mocapflow.io.scans import check_size, read_skeleton
-from mocapflow.io.weights import check_weights, read_weights
+from mocapflow.io.weights import read_weights
 from mocapflow.records import F64
 from mocapflow_bodies.assemble import Part, assemble
 from mocapflow_bodies.weights import heat_weights
@@ -64,8 +64,7 @@ class Scanned(BodyModel):
         skeleton = read_skeleton(subject / "skeleton.json")
         check_size(vertices, skeleton, str(subject / "body.obj"))
         if (subject / "weights.npz").exists():
-            weights = read_weights(subject / "weights.npz", skeleton, len(vertices))
-            check_weights(vertices, weights, skeleton, str(subject / "weights.npz"))
+            weights = read_weights(subject / "weights.npz", skeleton, vertices)
         else:
             weights = heat_weights(vertices, faces, skeleton)
         if self.morph is None:

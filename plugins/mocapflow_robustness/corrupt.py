@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, Literal
 from zlib import crc32
@@ -14,9 +14,10 @@ from mocapflow.components import Stage
 from mocapflow.data import Frame
 from mocapflow.errors import RecordingError, alternatives
 from mocapflow.recording import Recording
-from mocapflow.records import U8, Bool
+from mocapflow.records import U8
 from mocapflow_robustness import pixels
 from mocapflow_robustness.events import Event
+from mocapflow_robustness.hiding import masks, together
 from mocapflow_robustness.tape import Tape
 
 Share = Annotated[float, Field(ge=0, le=1)]
@@ -93,7 +94,7 @@ class Corruption:
             images=tuple(images),
             usable=usable,
             reasons=() if usable.all() else tuple(reasons),
-            hidden=frame.also_hidden(masks(events, images)),
+            hidden=together(frame.hidden, masks(events, images)),
             keypoints=None if keypoints is None else tuple(keypoints),
         )
 
@@ -122,17 +123,6 @@ class Corruption:
         camera = (names.index(view) + (event.what == "other_camera")) % len(names)
         tape = tapes.setdefault((event, view), Tape(self.whole.seen_by(camera)))
         return fitted(tape.at(event.source(frame.index, self.whole.length)).images[0], image)
-
-
-def masks(events: Sequence[Event | None], images: Sequence[U8]) -> tuple[Bool, ...]:
-    """Return where pictures (H, W, 3) are covered, (H, W) each; nothing where none is."""
-    if not any(event is not None and event.what == "covered" for event in events):
-        return ()
-    hidden = [np.zeros(image.shape[:2], bool) for image in images]
-    for event, mask in zip(events, hidden, strict=True):
-        if event is not None and event.what == "covered":
-            mask[event.first_covered(len(mask)) :] = True
-    return tuple(hidden)
 
 
 def fitted(image: U8, like: U8) -> U8:

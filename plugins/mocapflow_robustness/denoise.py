@@ -14,6 +14,7 @@ from mocapflow.components import Stage
 from mocapflow.data import Frame
 from mocapflow.recording import Recording
 from mocapflow.records import U8, Bool
+from mocapflow_robustness.hiding import together
 
 BLOCK_PX = 16  # noise is everywhere alike: its share is the median over blocks of the picture
 LEAST_NOISE = 0.02  # share of lonely pixels; fine texture makes 0.004 at most on the recordings that we have
@@ -60,7 +61,7 @@ class Denoised:
         for frame in replace(source, indices=indices).frames():
             found = [self.settings.restore(image) for image in frame.images]
             images, hidden = zip(*found, strict=True)
-            yield replace(frame, images=images, hidden=frame.also_hidden(hidden))
+            yield replace(frame, images=images, hidden=together(frame.hidden, hidden))
 
 
 def noise_share(kept: Bool) -> float:

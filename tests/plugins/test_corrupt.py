@@ -5,6 +5,7 @@ import pytest
 from mocapflow_robustness import pixels
 from mocapflow_robustness.corrupt import Corrupt
 from mocapflow_robustness.events import Event
+from mocapflow_robustness.hiding import together
 
 from mocapflow.errors import RecordingError
 from mocapflow.recording import open_recording
@@ -100,6 +101,17 @@ def test_a_picture_that_is_spoiled_or_missing(clip):
     assert frames[6].reasons == ("dropped", "")
     assert frames[8].usable.all()
     assert all(equal(frames[k].images[1:], plain[k][1:]) for k in frames)
+
+
+def test_a_covered_picture_stays_hidden_where_it_was(clip):
+    lower = dict(what="covered", first=3)
+    once, twice = disturbed(clip, lower), Corrupt().run(disturbed(clip, lower))
+    assert [frame.hidden_in(0) is not None for frame in twice.frames()] == [index >= 3 for index in range(FRAMES)]
+    assert (twice.frame(5).hidden_in(0) == once.frame(5).hidden_in(0)).all()
+    rows = [np.zeros((4, 2), bool) for _ in range(2)]
+    rows[0][1], rows[1][2] = True, True
+    assert together(rows[:1], rows[1:])[0][:, 0].tolist() == [False, True, True, False]
+    assert together((), rows) == tuple(rows) == together(rows, ()) and together((), ()) == ()
 
 
 def test_a_camera_that_is_not_there_is_named(clip):
