@@ -219,5 +219,5 @@ def notes_on(frame: Frame, scene: Scene, past: Past, result: FrameResult) -> Seq
         return [*notes, f"lost, fewer than {VIEWS} views; the prediction is kept"]
     if blind(result.state.estimate.observed):
         return [*notes, "no view shows the person; the prediction is kept"]
-    anew = past.moments and not past.believable().moments
-    return [*notes, "begun anew, like a first frame: the frames before do not show the person"] if anew else notes
+    anew = "begun anew, like a first frame: the frames before do not show the person"
+    return [*notes, anew] if past.believable().lost else notes

@@ -20,7 +20,7 @@ from mocapflow.records import F64
 from mocapflow_recovery.certain import View, small_room, views
 from mocapflow_recovery.coarse import coarse_body
 from mocapflow_recovery.disagreement import distance
-from mocapflow_recovery.judge import Judge, Reach, stray_of
+from mocapflow_recovery.judge import Judge, Reach, Stray, stray_of
 from mocapflow_recovery.sampling import Plan, Spread, put_back, search, seen_samples, without_idle_parts
 
 
@@ -32,6 +32,8 @@ class LimbSearch(Recovery):
     before, that of the frame before, and poses that people were seen in. Around it poses are sampled part by part, and
     limbs as people were seen to hold them. A part moves only if that brings what strays together: a leg must not take
     a new place under the skirt because an arm was lost. The loop settles again from there.
+    After frames that did not show the person it looks in any case: a leg swings on for 20° in two of them, and may then
+    come to rest on the contour of another part.
     It needs the empty scene; without one every fit is taken as it is.
     """
 
@@ -70,16 +72,20 @@ class LimbSearch(Recovery):
         room, surface = small_room(background, model.scene.cameras, self.rows), surface_of(model, result)
         seen = views(frame, surface, room, self.near_m)
         stray = stray_of(surface, model.scene, seen, self._reach())
-        if not stray.doubtful(self.uncovered_cm2, self.floating_cm2):
+        doubtful = self._doubtful(stray)
+        if not (doubtful or past.lost):
             return result
         found = self._search(frame, state, result.state, seen, past, model)
         other = settle(found, result.state.cloth.parameters)
         again = surface_of(model, other)
+        why = f"fit doubted, {stray}" if doubtful else "looked for the limbs after a gap"
         if distance(again, seen, self.cap_m) >= (1 - self.gain) * distance(surface, seen, self.cap_m):
-            return noted(result, f"fit doubted, {stray}: search found nothing better", doubted=True)
+            return noted(result, f"{why}: search found nothing better", doubted=doubtful)
         then = stray_of(again, model.scene, seen, self._reach())
-        still = then.doubtful(self.uncovered_cm2, self.floating_cm2)
-        return noted(other, f"fit doubted, {stray}: found again by search; then {then}", doubted=still)
+        return noted(other, f"{why}: found again by search; then {then}", doubted=self._doubtful(then))
+
+    def _doubtful(self, stray: Stray) -> bool:
+        return stray.doubtful(self.uncovered_cm2, self.floating_cm2)
 
     def _search(
         self, frame: Frame, state: FrameState, settled: FrameState, seen: Sequence[View], past: Past,

@@ -12,7 +12,7 @@ from mocapflow_recovery.disagreement import distance, floating_area, uncovered_a
 from mocapflow_recovery.limb_search import LimbSearch
 from mocapflow_recovery.sampling import Plan, Spread, parts, put_back, samples, search, seen_samples, without_idle_parts
 
-from mocapflow.data import NO_CLOTH, Pose
+from mocapflow.data import NO_CLOTH, Past, Pose
 from mocapflow.geometry.cameras import project
 from mocapflow.testing import pictures, scenes, template_body
 from mocapflow.testing.recovery import settled
@@ -194,6 +194,18 @@ def test_a_fit_that_still_strays_is_doubted(end, doubted) -> None:
     lost = pictures.tiny_state(SCENE, astray(0.9), POSE)
     past, model = scenes.tiny_past(SCENE, POSE), scenes.tiny_model(SCENE)
     assert LimbSearch().recover(FRAME, lost, settled(lost), past, model, settle).doubted == doubted
+
+
+@pytest.mark.parametrize("lost", [False, True], ids=["frame by frame", "after a gap"])
+def test_after_a_gap_a_limb_is_looked_for_that_nothing_doubts(lost) -> None:
+    def settle(pose, parameters):
+        return settled(pictures.tiny_state(SCENE, POSE, POSE))
+
+    near = pictures.tiny_state(SCENE, astray(0.06), POSE)
+    past = Past(lost=True) if lost else scenes.tiny_past(SCENE, POSE)
+    found = LimbSearch().recover(FRAME, near, settled(near), past, scenes.tiny_model(SCENE), settle)
+    assert (found.state.estimate.pose.angles == POSE.angles).all() == lost
+    assert not found.doubted and bool(found.notes) == lost
 
 
 def test_seen_samples_bend_what_was_seen_and_nothing_else() -> None:
