@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, ClassVar
 
 import numpy as np
-from mocapflow_priors.density import read
+from mocapflow_priors.density import Density, read
 from mocapflow_priors.parzen import SHIPPED
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
@@ -21,6 +22,7 @@ from mocapflow_recovery.certain import View, small_room, views
 from mocapflow_recovery.coarse import coarse_body
 from mocapflow_recovery.disagreement import distance
 from mocapflow_recovery.judge import Judge, Reach, Stray, stray_of
+from mocapflow_recovery.leaps import leapt
 from mocapflow_recovery.sampling import Plan, Spread, put_back, search, seen_samples, without_idle_parts
 
 
@@ -32,14 +34,15 @@ class LimbSearch(Recovery):
     before, that of the frame before, and poses that people were seen in. Around it poses are sampled part by part, and
     limbs as people were seen to hold them. A part moves only if that brings what strays together: a leg must not take
     a new place under the skirt because an arm was lost. The loop settles again from there.
-    After frames that did not show the person it looks in any case: a leg swings on for 20° in two of them, and may then
-    come to rest on the contour of another part.
+    It also looks where images need not contradict a leg that rests on the contour of the other one: after frames that
+    did not show the person, and where a limb has leapt into a pose that nobody was seen in.
     It needs the empty scene; without one every fit is taken as it is.
     """
 
     name: ClassVar[str] = "limb_search"
     uncovered_cm2: PositiveFloat = 60.0  # of the person off the model, in all views: more, and the fit is doubted
     floating_cm2: PositiveFloat = 60.0  # likewise, of skin in empty space
+    leap_deg: PositiveFloat = 20.0  # from what was believed and from all `poses`: a limb so far from both is doubted
     reach_m: PositiveFloat = 0.06  # what lies nearer to the other does not count
     cloth_m: PositiveFloat = 0.2  # what lies so near to the garment may be the garment, wherever it swings
     gain: Annotated[float, Field(ge=0, lt=1)] = 0.1  # share that a fit is nearer, and that each part mends
@@ -72,17 +75,25 @@ class LimbSearch(Recovery):
         room, surface = small_room(background, model.scene.cameras, self.rows), surface_of(model, result)
         seen = views(frame, surface, room, self.near_m)
         stray = stray_of(surface, model.scene, seen, self._reach())
-        doubtful = self._doubtful(stray)
-        if not (doubtful or past.lost):
+        why = self._why(stray, result.state.estimate.pose, state.estimate.pose, past, model.scene.body)
+        if not why:
             return result
         found = self._search(frame, state, result.state, seen, past, model)
         other = settle(found, result.state.cloth.parameters)
         again = surface_of(model, other)
-        why = f"fit doubted, {stray}" if doubtful else "looked for the limbs after a gap"
         if distance(again, seen, self.cap_m) >= (1 - self.gain) * distance(surface, seen, self.cap_m):
-            return noted(result, f"{why}: search found nothing better", doubted=doubtful)
+            return noted(result, f"{why}: search found nothing better", doubted=self._doubtful(stray))
         then = stray_of(again, model.scene, seen, self._reach())
         return noted(other, f"{why}: found again by search; then {then}", doubted=self._doubtful(then))
+
+    def _why(self, stray: Stray, fitted: Pose, believed: Pose, past: Past, body: Body) -> str:
+        """Return why the limbs are looked for, or nothing."""
+        if self._doubtful(stray):
+            return f"fit doubted, {stray}"
+        if past.lost:
+            return "looked for the limbs after a gap"
+        leap = leapt(fitted, believed, body, self._density.on(body.screw_names), np.radians(self.leap_deg))
+        return "fit doubted, a limb leapt into a pose that nobody was seen in" if leap else ""
 
     def _doubtful(self, stray: Stray) -> bool:
         return stray.doubtful(self.uncovered_cm2, self.floating_cm2)
@@ -106,7 +117,11 @@ class LimbSearch(Recovery):
 
     def _plan(self, body: Body) -> Plan:
         spread = Spread(np.radians(self.spread_deg), np.radians(self.root_spread_deg), self.root_spread_m)
-        return Plan(spread, self.shares, self.samples, read(self.poses).on(body.screw_names), self.seen_samples)
+        return Plan(spread, self.shares, self.samples, self._density.on(body.screw_names), self.seen_samples)
+
+    @cached_property
+    def _density(self) -> Density:
+        return read(self.poses)
 
     def _reach(self) -> Reach:
         return Reach(self.reach_m, self.cloth_m, self.cap_m)

@@ -9,6 +9,7 @@ import pytest
 from mocapflow_recovery.certain import shrunk, small_room, views
 from mocapflow_recovery.coarse import coarse_body
 from mocapflow_recovery.disagreement import distance, floating_area, uncovered_area
+from mocapflow_recovery.leaps import leapt
 from mocapflow_recovery.limb_search import LimbSearch
 from mocapflow_recovery.sampling import Plan, Spread, parts, put_back, samples, search, seen_samples, without_idle_parts
 
@@ -206,6 +207,17 @@ def test_after_a_gap_a_limb_is_looked_for_that_nothing_doubts(lost) -> None:
     found = LimbSearch().recover(FRAME, near, settled(near), past, scenes.tiny_model(SCENE), settle)
     assert (found.state.estimate.pose.angles == POSE.angles).all() == lost
     assert not found.doubted and bool(found.notes) == lost
+
+
+@pytest.mark.parametrize(
+    ("believed", "seen_at", "leap"),
+    [(0.0, 0.0, True), (0.0, 0.5, False), (0.5, 0.0, False), (0.0, np.nan, False)],
+    ids=["far from both", "as somebody was seen", "as believed", "nobody was seen"],
+)
+def test_a_leap_ends_far_from_what_was_believed_and_from_what_was_seen(believed, seen_at, leap) -> None:
+    seen_poses = np.full((2, len(POSE.angles)), np.nan)
+    seen_poses[0, 1] = astray(seen_at).angles[1]
+    assert leapt(astray(0.6), astray(believed), SCENE.body, seen_poses, 0.4) == leap
 
 
 def test_seen_samples_bend_what_was_seen_and_nothing_else() -> None:

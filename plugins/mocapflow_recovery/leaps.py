@@ -1,0 +1,33 @@
+"""Limbs that have leapt to where nobody was seen to hold them: between two frames a leg took the other's contour."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mocapflow.assets import Body
+from mocapflow.data import Pose
+from mocapflow.records import F64
+from mocapflow_recovery.sampling import parts
+
+
+def leapt(fitted: Pose, believed: Pose, body: Body, seen: F64, least: float) -> bool:
+    """Return whether a part of the body is far from where it was believed and as far from all that was seen of it.
+
+    Either alone is nothing to wonder at: fast legs leave what was believed, and nobody has seen everything.
+
+    Args:
+        fitted: the pose that is asked about.
+        believed: what was believed before looking.
+        body: whose parts are tried.
+        seen: (N, D) rad, poses that people were seen in, NaN where an angle is not known.
+        least: rad, what counts as far: for the angle that changed most, and for all angles of a part together.
+    """
+    change = np.abs(fitted.angles - believed.angles)
+    far = (part for part in parts(body) if part is not None and change[part].max() > least)
+    return any(_apart(fitted.angles[part], seen[:, part]) > least for part in far)
+
+
+def _apart(angles: F64, seen: F64) -> float:
+    """Return how far (rad) some angles (K,) are from the nearest ones seen (N, K); 0 where none were seen."""
+    squared = np.nansum((seen - angles) ** 2, axis=1)
+    return float(np.sqrt(squared[~np.isnan(seen).all(axis=1)].min(initial=np.inf))) if (~np.isnan(seen)).any() else 0.0
