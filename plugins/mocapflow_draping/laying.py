@@ -77,7 +77,7 @@ def lay(
     from mocapflow_draping.blowing import blow_batch
     from mocapflow_draping.swing import fall_batch
 
-    roots, facing, links = where
+    roots, facing, links = (np.ascontiguousarray(each) for each in where)  # other strides would be compiled again
     shape = strands.vertex.shape
     fallen, lying = np.empty((len(parts), *shape, 3)), np.empty((len(parts), *shape), np.int32)
     fall_batch(
@@ -104,9 +104,10 @@ def follow(
     (roots, facing, links), (back, towards, _) = near, blown(near[1], *winds)
     begin, down = rates(roots, moved.steps), np.broadcast_to(DOWN, facing.shape)
     for first, out, to in ((strands.first, facing, down), (laid.pivot[0], back, towards)):
+        here, there = (np.ascontiguousarray(way[-1]) for way in (out, to))  # other strides would be compiled again
         follow_swing(
-            laid.grid[0], laid.held[0], out[-1], np.ascontiguousarray(to[-1]), begin, rates(out, moved.steps),
-            rates(to, moved.steps), links[-1], first, strands.last, parts[0], fields.values, moved.carry,
+            laid.grid[0], laid.held[0], here, there, begin, rates(out, moved.steps),
+            rates(to, moved.steps), links[-1], first.copy(), strands.last, parts[0], fields.values, moved.carry,
             moved.swell, moved.grow, rate,
         )  # fmt: skip
         begin = rate[np.arange(len(rate)), laid.pivot[0]]
