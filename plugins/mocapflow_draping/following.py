@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 
 import numba
+import numpy as np
 
 from mocapflow_draping.distance import outwards
 
@@ -41,6 +42,7 @@ def follow_swing(  # type: ignore[no-untyped-def]
         grow: (S,) rate of the logarithm of the bars' length.
         rate: (N, L, 3, S), written.
     """
+    bar, reached = np.empty((2, *rate.shape[2:]))
     for n in range(len(grid)):
         pivot = first[n]
         rate[n, pivot] = roots[n]
@@ -53,24 +55,25 @@ def follow_swing(  # type: ignore[no-untyped-def]
             ux, uy, uz = (p[0] - x[0]) / arm, (p[1] - x[1]) / arm, (p[2] - x[2]) / arm
             f, d = facing[n], down[n]
             sine, cosine = ux * f[0] + uy * f[1] + uz * f[2], ux * d[0] + uy * d[1] + uz * d[2]
-            bar = sine * facing_rate[n] + cosine * down_rate[n]
-            bar[0] += ux * grow
-            bar[1] += uy * grow
-            bar[2] += uz * grow
+            for a, u in enumerate((ux, uy, uz)):
+                for s in range(len(grow)):
+                    bar[a, s] = sine * facing_rate[n, a, s] + cosine * down_rate[n, a, s] + u * grow[s]
+                    reached[a, s] = rate[n, pivot, a, s] + arm * bar[a, s]
             if held[n, end] > 0:
                 part = held[n, end] - 1
-                gx, gy, gz = outwards(p[0], p[1], p[2], part, parts, values)
+                g = outwards(p[0], p[1], p[2], part, parts, values)
                 tx, ty, tz = cosine * f[0] - sine * d[0], cosine * f[1] - sine * d[1], cosine * f[2] - sine * d[2]
-                slope = arm * max(gx * tx + gy * ty + gz * tz, GRAZING)
-                reached = rate[n, pivot] + arm * bar
-                turn = lack((gx, gy, gz), p, reached, carry[part], swell) / slope
-                bar[0] += turn * tx
-                bar[1] += turn * ty
-                bar[2] += turn * tz
+                slope = arm * max(g[0] * tx + g[1] * ty + g[2] * tz, GRAZING)
+                turn = lack(g, p, reached, carry[part], swell)
+                for a, t in enumerate((tx, ty, tz)):
+                    for s in range(len(grow)):
+                        bar[a, s] += turn[s] / slope * t
             away = 0.0
             for k in range(pivot + 1, end + 1):
                 away += links[n, k - 1]
-                rate[n, k] = rate[n, pivot] + away * bar
+                for a in range(3):
+                    for s in range(len(grow)):
+                        rate[n, k, a, s] = rate[n, pivot, a, s] + away * bar[a, s]
             pivot = end
 
 
