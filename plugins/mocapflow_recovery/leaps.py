@@ -22,12 +22,14 @@ def leapt(fitted: Pose, believed: Pose, body: Body, seen: F64, least: float) -> 
         seen: (N, D) rad, poses that people were seen in, NaN where an angle is not known.
         least: rad, what counts as far: for the angle that changed most, and for all angles of a part together.
     """
-    change = np.abs(fitted.angles - believed.angles)
-    far = (part for part in parts(body) if part is not None and change[part].max() > least)
-    return any(_apart(fitted.angles[part], seen[:, part]) > least for part in far)
+    far = np.abs(fitted.angles - believed.angles) > least
+    if not far.any():  # nearly always
+        return False
+    leaping = (part for part in parts(body) if part is not None and far[part].any())
+    return any(_apart(fitted.angles[part], seen[:, part]) > least for part in leaping)
 
 
 def _apart(angles: F64, seen: F64) -> float:
     """Return how far (rad) some angles (K,) are from the nearest ones seen (N, K); 0 where none were seen."""
-    squared = np.nansum((seen - angles) ** 2, axis=1)
-    return float(np.sqrt(squared[~np.isnan(seen).all(axis=1)].min(initial=np.inf))) if (~np.isnan(seen)).any() else 0.0
+    known = seen[~np.isnan(seen).all(axis=1)]
+    return float(np.sqrt(np.nansum((known - angles) ** 2, axis=1).min())) if len(known) else 0.0
