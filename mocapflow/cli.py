@@ -13,7 +13,7 @@ import typer
 import typer.core
 
 from mocapflow.commands import cache, comparing, looking, new, prior, results, running
-from mocapflow.errors import MocapflowError
+from mocapflow.errors import MocapflowError, unwritable
 
 
 class Commands(typer.core.TyperGroup):
@@ -24,13 +24,21 @@ class Commands(typer.core.TyperGroup):
         try:
             return super().invoke(ctx)
         except MocapflowError as error:
-            typer.echo(f"error: {error}", err=True)
-            raise typer.Exit(error.exit_status) from None
+            raise self._told(error) from None
+        except OSError as error:
+            if (said := unwritable(error)) is None:
+                raise
+            raise self._told(said) from None
         except KeyboardInterrupt:
             words = [word for word in sys.argv[1:] if word != "--fresh"]  # it would remove what is saved
             again = shlex.join(["mocapflow", *words])
             typer.echo(f"\ninterrupted; finished frames are saved. To go on: {again}", err=True)
             raise typer.Exit(130) from None
+
+    @staticmethod
+    def _told(error: MocapflowError) -> typer.Exit:
+        typer.echo(f"error: {error}", err=True)
+        return typer.Exit(error.exit_status)
 
 
 app = typer.Typer(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Collection, Iterable
 from difflib import get_close_matches
 
@@ -54,6 +55,14 @@ class StoreError(MocapflowError):
     """The store can't be read or written."""
 
     exit_status = 1
+
+
+def unwritable(error: OSError) -> StoreError | None:
+    """Return what is said where a file can't be written: the drive is full, or it may not be; None for other errors."""
+    if error.errno not in {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM} or not error.strerror:
+        return None
+    hint = "free some space, then run the same command" if error.errno in {errno.ENOSPC, errno.EDQUOT} else ""
+    return StoreError(f"can't be written or read: {error.strerror}", where=str(error.filename or ""), hint=hint)
 
 
 class ComponentFailed(MocapflowError):

@@ -13,7 +13,7 @@ from mocapflow.blame import failure
 from mocapflow.checkpoint import Checkpoint
 from mocapflow.components import Component, Garment
 from mocapflow.data import FrameResult
-from mocapflow.errors import ComponentFailed, GarmentError, MocapflowError, PluginError, ShapeError
+from mocapflow.errors import ComponentFailed, GarmentError, MocapflowError, PluginError, ShapeError, unwritable
 from mocapflow.locks import Lock
 from mocapflow.pipeline import Pipeline
 from mocapflow.progress import Progress
@@ -195,6 +195,8 @@ class Execution:
         except (Exception, SystemExit) as error:
             if isinstance(error, MocapflowError) and not isinstance(error, ShapeError | PluginError):
                 raise
+            if isinstance(error, OSError) and (said := unwritable(error)):  # not the component's fault
+                raise said from error
             raise failure(error, component, self._pipeline.registry, kept(), self._out / "failed.log") from error
 
     def _entered(
@@ -221,6 +223,7 @@ class Execution:
             "scale": pipeline.scale,
             "versions": versions(),
             "settings": {label: step.recipe["component"] for label, step in self._steps.items()},
+            "keys": {label: step.key for label, step in self._steps.items()},
             "stages": dict(self.entries),
         }
 

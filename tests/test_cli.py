@@ -1,4 +1,6 @@
+import errno
 import json
+import os
 import sys
 from pathlib import Path
 
@@ -168,6 +170,19 @@ def test_the_demo_runs_what_is_shipped_from_any_folder(call, monkeypatch):
     assert options["out"] == Path("runs/demo")
     assert options["store"] == Path("runs/store.zarr")
     assert {"export", "overlay"} <= {named.label for named in pipeline.stages}
+
+
+def test_a_full_drive_is_told_and_a_bug_shows_itself(call, monkeypatch):
+    def fails(*_, **__):
+        raise OSError(number, os.strerror(number), "run.json")
+
+    monkeypatch.setattr(runner, "run", fails)
+    number = errno.ENOSPC
+    full = call("run", "start.yaml")
+    assert full.exit_code == 1
+    assert full.stderr.startswith("error: run.json  can't be written or read: No space left on device\n")
+    number = errno.ENOTTY
+    assert isinstance(call("run", "start.yaml").exception, OSError)
 
 
 @pytest.mark.long

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -59,14 +64,38 @@ def placed(store: str | None, default: Path) -> tuple[str, str | None]:
     return (str(default), store) if store and "://" in store else (store or str(default), None)
 
 
+@contextmanager
+def alone(out: Path) -> Iterator[None]:
+    """Keep other runs out of a run folder: they wait, for what one writes must not lie beside what another has."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        folder = os.open(out, os.O_RDONLY)
+    except OSError as error:
+        raise unwritable(out, error) from None
+    try:
+        try:
+            fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            print(f"{out}: waiting for another run that writes into it", file=sys.stderr, flush=True)
+            fcntl.flock(folder, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(folder)
+
+
 def remember(invocation: Invocation, out: Path) -> None:
     """Write an invocation into its run folder."""
     try:
         out.mkdir(parents=True, exist_ok=True)
         (out / FILE).write_text(json.dumps(asdict(invocation.absolute()), indent=1) + "\n", encoding="utf-8")
     except OSError as error:
-        hint = "name another with --out"
-        raise StoreError(f"can't write the run folder: {error.strerror}", where=str(out), hint=hint) from None
+        raise unwritable(out, error) from None
+
+
+def unwritable(out: Path, error: OSError) -> StoreError:
+    """Return what is said of a run folder that can't be written."""
+    hint = "name another with --out"
+    return StoreError(f"can't write the run folder: {error.strerror}", where=str(out), hint=hint)
 
 
 def recall(out: Path) -> Invocation:

@@ -38,7 +38,9 @@ def noted(report: Callable[[str], None], folder: Path) -> Iterator[Callable[[str
     try:
         yield show
     finally:
-        path.unlink(missing_ok=True)
+        with suppress(OSError):
+            path.unlink(missing_ok=True)
+            part.unlink(missing_ok=True)
 
 
 def last_word(folder: Path) -> str:

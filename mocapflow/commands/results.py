@@ -6,12 +6,16 @@ import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mocapflow.commands.again import recall
-from mocapflow.errors import MocapflowError, RecordingError
+from mocapflow.commands.again import alone, recall
+from mocapflow.commands.former import differing
+from mocapflow.errors import MocapflowError, PipelineError, RecordingError
+
+if TYPE_CHECKING:
+    from mocapflow.pipeline import NamedStage
 
 Run = Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")]
 Truth = Annotated[
@@ -65,16 +69,37 @@ def _comparison(run: Path, truth: Path | None) -> tuple[Path | None, str, float]
 
 def export(run: Run, format_: Format) -> None:
     """Write the track of a run in other formats, into the run folder."""
-    from mocapflow.commands.running import carry_out
+    from mocapflow.commands.running import carry_out, keys
     from mocapflow.results import Evaluation, Files
     from mocapflow.wiring import makes
 
     invocation = recall(run)
     writers = [named for named in invocation.load().stages if issubclass(makes(named.stage), Files | Evaluation)]
-    silent = [f"stages.{named.label}=null" for named in writers]
-    wanted = f"stages.export={{use: export, formats: [{', '.join(format_)}]}}"
-    exporting = invocation.changed(*silent, wanted)
-    typer.echo(carry_out(exporting.load(), exporting, run))
+    exporting = invocation.changed(*_only_exporting(writers, format_))
+    pipeline = exporting.load()
+    with alone(run):
+        now = keys(pipeline, exporting)
+        if changed := set(differing(run, now)) & now.keys() - {named.label for named in writers} - {"export"}:
+            hint = "run it again, then export: else its files would show two tracks"
+            raise PipelineError(
+                f"pipeline or recording have changed since this run: {', '.join(sorted(changed))}",
+                where=str(run),
+                hint=hint,
+            )
+        typer.echo(carry_out(pipeline, exporting, run))
+
+
+def _only_exporting(writers: Sequence[NamedStage], formats: Sequence[str]) -> list[str]:
+    """Return the changes that leave the stages `export` as all that writes, from what they took, in other formats."""
+    from mocapflow_export.export import Export
+
+    exports = [named.label for named in writers if isinstance(named.stage, Export)]
+    silent = [f"stages.{named.label}=null" for named in writers if named.label not in exports]
+    wanted = f"[{', '.join(formats)}]"
+    changes = [
+        change for label in exports for change in (f"stages.{label}.formats={wanted}", f"stages.{label}.record=false")
+    ]
+    return [*silent, *(changes or [f"stages.export={{use: export, formats: {wanted}}}"])]
 
 
 def view(

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mocapflow.commands.again import Invocation, placed, recall, remember
+from mocapflow.commands.again import Invocation, alone, placed, recall, remember
+from mocapflow.commands.former import differing, set_aside
 from mocapflow.commands.progress import last_word, noted, reporter
 from mocapflow.commands.workers import Scheduler, Workers, finished
 from mocapflow.errors import PipelineError
@@ -98,11 +99,12 @@ def side_by_side(invocation: Invocation, out: Path, workers: int, scheduler: str
     labels = runner.tracks(invocation.load(), store=Path(invocation.store))
     if len(labels) < 2:
         raise PipelineError("there is nothing for several workers to do", hint="--parts N tracks in N parts")
-    remember(invocation, out)
     tasks = {label: partial(track, invocation.absolute(), out.absolute(), label) for label in labels}
-    for number, (label, result) in enumerate(finished(tasks, workers, scheduler), 1):
-        result()
-        typer.echo(f"{number} of {len(labels)}  {label}", err=True)
+    with alone(out):
+        remember(invocation, out)
+        for number, (label, result) in enumerate(finished(tasks, workers, scheduler), 1):
+            result()
+            typer.echo(f"{number} of {len(labels)}  {label}", err=True)
 
 
 def track(invocation: Invocation, out: Path, label: str) -> None:
@@ -114,10 +116,16 @@ def track(invocation: Invocation, out: Path, label: str) -> None:
 
 
 def execute(invocation: Invocation, out: Path, fresh: bool) -> RunSummary:
-    """Run what an invocation says, have the run folder remember it, and return the summary."""
+    """Run what an invocation says, have the run folder remember it, and return the summary.
+
+    What lies there of another run is set aside first.
+    """
     pipeline = invocation.load()
-    remember(invocation, out)
-    return carry_out(pipeline, invocation, out, fresh)
+    with alone(out):
+        if differing(out, keys(pipeline, invocation)):
+            typer.echo(f"the results of the run before are now in {set_aside(out)}", err=True)
+        remember(invocation, out)
+        return carry_out(pipeline, invocation, out, fresh)
 
 
 def carry_out(pipeline: Pipeline, invocation: Invocation, out: Path, fresh: bool = False) -> RunSummary:
@@ -127,6 +135,14 @@ def carry_out(pipeline: Pipeline, invocation: Invocation, out: Path, fresh: bool
     with noted(reporter(), out) as report:
         store = Path(invocation.store)
         return runner.run(pipeline, store=store, url=invocation.url, out=out, fresh=fresh, report=report)
+
+
+def keys(pipeline: Pipeline, invocation: Invocation) -> dict[str, str]:
+    """Return the key of what each stage of an invocation's pipeline would make."""
+    from mocapflow import runner
+
+    lines = runner.plan(pipeline, store=Path(invocation.store), url=invocation.url)
+    return {line.label: line.key for line in lines}
 
 
 def _print_plan(invocation: Invocation) -> None:

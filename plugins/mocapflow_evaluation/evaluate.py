@@ -91,11 +91,11 @@ def evaluate(own: Ours, path: Path, folder: Path, longest_lag_s: float = LONGEST
     ]
     rigs = compare_rigs(own, reference, alignment.worth, path.parent / layout.COMMON_POINTS)
     notes = [*reference.notes, *rigs.notes]
-    if rows:
-        notes += findings.said(own, reference, alignment, strides, longest_lag_s)
-    else:
+    if not rows:  # a comparison that was written before stays
         ours = ", ".join(tables.angle_names(own.columns))
         notes.append(f"the reference shares no angle and frame with the track, which has {ours}")
+        return Evaluation(reference=str(path), rows=(), notes=tuple(notes))
+    notes += findings.said(own, reference, alignment, strides, longest_lag_s)
     _write_tables(folder, own.columns, known, rows, strides)
     found = {"reference": str(path), "lag_frames": alignment.lag, "signs": alignment.signs, "notes": notes}
     runjson.write(layout.place(folder, layout.FINDINGS), {**found, "registration": rigs.figures})

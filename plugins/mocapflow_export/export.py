@@ -34,11 +34,14 @@ class Export(Stage):
 
     name: ClassVar[str] = "export"
     formats: tuple[Format, ...] = ("csv", "mot", "trc")  # those beyond these three need their extra
+    record: bool = True  # also run.json: how the run was made and how it went
 
     def run(self, track: Track, scene: Scene, recording: Recording, run_folder: RunFolder) -> Files:
         """Write the files and return their paths."""
         result = Result(track=track, scene=scene, recording=recording)
         paths = [path for name in self.formats for path in written(name, result, run_folder.path)]
+        if not self.record:
+            return Files(paths=tuple(paths))
         doubts = misgivings(track, [camera.name for camera in scene.cameras])
         for doubt in doubts:
             LOG.warning(doubt)

@@ -26,6 +26,7 @@ OVERLAP = RESULTS / "overlap.png"
 RUN = Path("run.json")
 REPORT = Path("report.html")
 VIRTUAL = Path("virtual/virtual.mp4")
+WRITTEN = (RESULTS, RUN, REPORT, VIRTUAL.parent, Path("overlay"))
 
 
 def overlay(camera: str) -> Path:

@@ -133,6 +133,18 @@ def test_a_run_folder_is_evaluated_from_its_files(tmp_path: Path) -> None:
     assert all(r["rms_deg"] == pytest.approx(1.5, abs=1e-3) for r in got.rows)
 
 
+def test_a_comparison_stays_where_another_has_nothing_to_compare(tmp_path: Path) -> None:
+    ours = {"frame": np.arange(3.0), "time": np.arange(3.0) / 30, "knee_flexion_l": np.arange(3.0)}
+    tables.write_columns(layout.place(tmp_path, layout.ANGLES), ours)
+    truth, elsewhere = tmp_path / "truth.csv", tmp_path / "elsewhere.csv"
+    tables.write_columns(truth, ours)
+    tables.write_columns(elsewhere, {**ours, "frame": ours["frame"] + 100})
+    evaluate_run(tmp_path, truth)
+    before = {path: path.read_bytes() for path in (tmp_path / layout.RESULTS).iterdir()}
+    assert not evaluate_run(tmp_path, elsewhere).rows
+    assert {path: path.read_bytes() for path in (tmp_path / layout.RESULTS).iterdir()} == before
+
+
 def test_a_reference_in_radians_or_out_of_order_is_told(tmp_path: Path) -> None:
     columns = tables.read_columns(DEMO / "truth" / "angles.csv")
     clock = {"frame": columns.pop("frame")}

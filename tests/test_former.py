@@ -1,0 +1,118 @@
+"""No result passes for one of another run: results in a run folder belong to the run that it remembers."""
+
+import json
+import threading
+from pathlib import Path
+
+import pytest
+import yaml
+from mocapflow_export import layout
+from typer.testing import CliRunner
+
+from mocapflow import cli
+from mocapflow.commands.again import alone
+from mocapflow.commands.former import FORMER, differing, set_aside
+from tests.fixtures.stores import STAGES, write_pipeline, write_recording
+
+OUT = Path("out")
+
+
+@pytest.fixture
+def call(tmp_path, monkeypatch):
+    """Calls the command line beside a pipeline that writes angles.csv and run.json of three frames."""
+    monkeypatch.chdir(tmp_path)
+    write_pipeline(tmp_path, write_recording(tmp_path / "clip", 3), stages={**STAGES, "export": "export"})
+
+    def invoke(*words):
+        return CliRunner().invoke(cli.app, words, prog_name="mocapflow")
+
+    return invoke
+
+
+def run(call, *changes):
+    done = call("run", "tiny.yaml", "--out", "out", *changes)
+    assert done.exit_code == 0, done.output
+    return done
+
+
+def change(**settings):
+    content = yaml.safe_load(Path("tiny.yaml").read_text())
+    content["stages"]["track"] |= settings
+    Path("tiny.yaml").write_text(yaml.safe_dump(content, sort_keys=False))
+
+
+def test_results_of_another_run_are_set_aside(call):
+    run(call)
+    (OUT / layout.ERRORS).write_text("of the first run")
+    assert "the run before" not in run(call).stderr
+    assert (OUT / layout.ERRORS).exists()
+    other = run(call, "--frames", "0:2")
+    assert "the results of the run before are now in out/former" in other.stderr
+    assert not (OUT / layout.ERRORS).exists()
+    assert len((OUT / layout.ANGLES).read_text().splitlines()) == 3
+    assert len((OUT / FORMER / layout.ANGLES).read_text().splitlines()) == 4
+
+
+def test_a_run_that_fails_leaves_no_results_of_another(call):
+    run(call)
+    failed = call("run", "tiny.yaml", "--out", "out", "--set", "stages.evaluate={use: evaluate, reference: none.csv}")
+    assert failed.exit_code == 2 and "none.csv" in failed.stderr
+    assert json.loads((OUT / layout.RUN).read_text())["recipe"]["keys"]["evaluate"]
+    assert json.loads((OUT / FORMER / layout.RUN).read_text())["recipe"]["keys"].keys() == STAGES.keys()
+
+
+def test_only_what_is_there_is_moved_and_one_run_is_kept(tmp_path):
+    for said in ("one", "two"):
+        (tmp_path / layout.RUN).write_text(said)
+        assert (set_aside(tmp_path) / layout.RUN).read_text() == said
+    assert [path.name for path in (tmp_path / FORMER).iterdir()] == ["run.json"]
+
+
+def test_what_differs_is_named(tmp_path):
+    assert differing(tmp_path, {"track": "a"}) == []
+    (tmp_path / layout.RUN).write_text(json.dumps({"recipe": {"keys": {"track": "a", "smooth": "b"}}}))
+    assert differing(tmp_path, {"track": "a", "smooth": "b"}) == []
+    assert differing(tmp_path, {"track": "c", "smooth": "b"}) == ["track"]
+    assert differing(tmp_path, {"track": "a", "smooth": "b", "export": "d"}) == ["export"]
+    (tmp_path / layout.RUN).write_text("{")
+    assert differing(tmp_path, {"track": "a"}) == ["track"]
+
+
+def test_an_export_is_of_the_track_that_was_exported(call):
+    run(call, "--set", "stages.export={use: export, from: {track: track}, formats: [csv]}")
+    files = (OUT / layout.ANGLES).read_text(), (OUT / layout.RUN).read_text()
+    assert call("export", "out", "--format", "csv", "--format", "trc").exit_code == 0
+    assert ((OUT / layout.ANGLES).read_text(), (OUT / layout.RUN).read_text()) == files
+    assert (OUT / layout.JOINTS).exists()
+
+
+def test_an_export_after_an_edit_is_refused(call):
+    run(call)
+    change(steady={"max_turns": 3})
+    refused = call("export", "out", "--format", "trc")
+    assert refused.exit_code == 2
+    assert refused.stderr.startswith("error: out  pipeline or recording have changed since this run: smooth, track\n")
+
+
+def test_one_run_at_a_time_writes_into_a_folder(tmp_path, capsys):
+    entered = threading.Event()
+
+    def other():
+        with alone(tmp_path):
+            entered.set()
+
+    waiting = threading.Thread(target=other)
+    with alone(tmp_path):
+        waiting.start()
+        assert not entered.wait(0.2)
+    waiting.join(10)
+    assert entered.is_set()
+    assert "waiting for another run that writes into it" in capsys.readouterr().err
+
+
+def test_a_stage_is_not_blamed_for_a_full_drive(call):
+    OUT.mkdir()
+    (OUT / "results.json").symlink_to("/dev/full")
+    told = call("run", "tiny.yaml", "--out", "out", "--set", "stages.export=tiny_export")
+    assert told.exit_code == 1
+    assert "can't be written or read: No space left on device" in told.stderr and "plugin" not in told.stderr
