@@ -78,7 +78,7 @@ class LimbSearch(Recovery):
         why = self._why(stray, result.state.estimate.pose, state.estimate.pose, past, model.scene.body)
         if not why:
             return result
-        found = self._search(frame, state, result.state, seen, past, model)
+        found = self._search(frame, state, result.state, seen, past, model, self._doubtful(stray))
         other = settle(found, result.state.cloth.parameters)
         again = surface_of(model, other)
         if distance(again, seen, self.cap_m) >= (1 - self.gain) * distance(surface, seen, self.cap_m):
@@ -100,7 +100,7 @@ class LimbSearch(Recovery):
 
     def _search(
         self, frame: Frame, state: FrameState, settled: FrameState, seen: Sequence[View], past: Past,
-        model: ClothedModel,
+        model: ClothedModel, astray: bool,
     ) -> Pose:  # fmt: skip
         """Return the pose that agrees best with the views, sampled around those at hand."""
         body, fitted, believed = model.scene.body, settled.estimate.pose, state.estimate.pose
@@ -112,7 +112,8 @@ class LimbSearch(Recovery):
         begins += seen_samples(Pose(root=believed.root, angles=at_rest), every, body, plan, rng)
         begin = begins[int(judge.apart(begins).argmin())]
         found = search(judge.apart, begin, body, plan, rng)
-        found = without_idle_parts(judge.stray, found, fitted, body, self.gain)
+        measure = judge.stray if astray else judge.apart  # by what strays a fit that is not astray has only idle parts
+        found = without_idle_parts(measure, found, fitted, body, self.gain)
         return put_back(judge.apart, found, [fitted, believed], body, self.tolerance)
 
     def _plan(self, body: Body) -> Plan:

@@ -74,7 +74,7 @@ def without_idle_parts(stray: Cost, found: Pose, fitted: Pose, body: Body, share
     A search fits every part, also to what no pose explains, such as cloth that flies.
 
     Args:
-        stray: how much of person and model lie apart, the measure by which the fit was doubted.
+        stray: how far person and model are apart, by a measure that the search brought down.
         found: the pose that a search ended in.
         fitted: the pose in doubt.
         body: whose parts are tried.
