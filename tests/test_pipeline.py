@@ -80,6 +80,7 @@ def test_frames(folder):
     assert (pipeline.start, pipeline.stop, pipeline.step) == (2, 9, 1)
     pipeline = load("frames={start: 2, stop: 9}", frames=slice(None, 60, 2))
     assert (pipeline.start, pipeline.stop, pipeline.step) == (0, 60, 2)
+    assert load("frames.stop=010").stop == 10
 
 
 @pytest.mark.parametrize(
