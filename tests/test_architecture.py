@@ -59,6 +59,7 @@ LAYERS = (  # a module imports only from its own layer or an earlier one; `io` a
     "measures",
     "doctor",
     "pipeline",
+    "levels",
     "experiment",
     "wiring",
     "parts",
