@@ -29,7 +29,9 @@ def finished(folder: Path, error: np.ndarray, lost: int = 0, frames: np.ndarray 
         }
         for row in range(len(frames))
     ]
-    layout.place(folder, layout.RUN).write_text(json.dumps({"per_frame": per_frame, "overlap_median": [0.9, None, 0.8]}))
+    layout.place(folder, layout.RUN).write_text(
+        json.dumps({"per_frame": per_frame, "overlap_median": [0.9, None, 0.8]})
+    )
     return folder
 
 
