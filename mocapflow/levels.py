@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from mocapflow.documents import BEFORE, Document, Steps
 from mocapflow.errors import PipelineError
 
-FILES = ("compare.csv", "runs.csv", "compare.png")  # of an experiment, beside the folders of its variants
+FILES = ("compare.csv", "runs.csv", "compare.png")  # that stand beside the folders of the variants
 LONGEST = 255  # bytes of the name of a folder
 
 

@@ -12,6 +12,8 @@ from mocapflow_evaluation import variants
 from mocapflow_evaluation.compare import rms
 from mocapflow_export import layout, tables
 
+from mocapflow import levels
+
 FRAMES = np.arange(90.0)
 SHARED = 3 * np.sin(FRAMES / 5)
 
@@ -47,6 +49,7 @@ def test_figures_of_two_variants(tmp_path: Path) -> None:
     assert float(runs[0]["overlap"]) == pytest.approx(0.85)
     assert float(runs[0]["not_at_rest"]) == pytest.approx(0.5)
     assert (tmp_path / "compare.png").stat().st_size > 5000
+    assert {path.name for path in tmp_path.iterdir() if path.is_file()} == set(levels.FILES)  # no variant is called so
 
 
 def test_a_paired_difference_is_sharper_than_its_parts() -> None:
