@@ -14,9 +14,9 @@ from pydantic import Field
 
 from mocapflow.errors import PipelineError
 from mocapflow.levels import changes_at, levels_at, variant_of
-from mocapflow.pipeline import Strict
 from mocapflow.registry import Registry
 from mocapflow.resolve import Resolver
+from mocapflow.settings import Settings
 from mocapflow.yamlfile import read
 
 PIPELINE = "pipeline"  # in a level: another pipeline file instead of a change
@@ -25,7 +25,7 @@ Changes = dict[str, Any]  # PATH: value, as in --set
 Factors = dict[str, Annotated[dict[str, Changes | None], Field(min_length=1)]]
 
 
-class ExperimentFile(Strict):
+class ExperimentFile(Settings):
     """What an experiment file may say."""
 
     name: ClassVar[str] = "an experiment"

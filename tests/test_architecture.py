@@ -20,6 +20,7 @@ LAYERS = (  # a module imports only from its own layer or an earlier one; `io` a
     "once",
     "series",
     "records",
+    "settings",
     "assets",
     "data",
     "results",
