@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, NonNegativeFloat, PositiveFloat
+from pydantic import NonNegativeFloat, PositiveFloat
 
 from mocapflow.assets import Body, GarmentMesh
 from mocapflow.data import (
@@ -32,6 +32,7 @@ from mocapflow.data import (
 )
 from mocapflow.geometry.differences import drape_differences
 from mocapflow.records import F64, I32, Bool
+from mocapflow.settings import Settings
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -40,10 +41,9 @@ if TYPE_CHECKING:
     from mocapflow.scene import Scene
 
 
-class Component(BaseModel, ABC):
+class Component(Settings, ABC):
     """Anything a pipeline can name; `role` is set by the role base, `name` by the component."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     role: ClassVar[str]
     name: ClassVar[str]
 

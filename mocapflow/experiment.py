@@ -5,18 +5,18 @@ from __future__ import annotations
 import itertools
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
-from mocapflow.documents import Document
 from mocapflow.errors import PipelineError
-from mocapflow.pipeline import Strict
+from mocapflow.levels import changes_at, levels_at, variant_of
 from mocapflow.registry import Registry
 from mocapflow.resolve import Resolver
+from mocapflow.settings import Settings
 from mocapflow.yamlfile import read
 
 PIPELINE = "pipeline"  # in a level: another pipeline file instead of a change
@@ -25,7 +25,7 @@ Changes = dict[str, Any]  # PATH: value, as in --set
 Factors = dict[str, Annotated[dict[str, Changes | None], Field(min_length=1)]]
 
 
-class ExperimentFile(Strict):
+class ExperimentFile(Settings):
     """What an experiment file may say."""
 
     name: ClassVar[str] = "an experiment"
@@ -46,6 +46,7 @@ class Cell:
     pipeline: Path
     recording: Path
     changes: tuple[str, ...]  # as in --set
+    places: tuple[str, ...]  # where the experiment says each of them
     folder: Path  # of the experiment: paths in changes start there
     frames: str | None
 
@@ -59,7 +60,8 @@ def load_experiment(path: Path, recordings: Sequence[Path] = (), frames: str | N
         frames: instead of those of the file.
 
     Raises:
-        PipelineError: the file says something else than an experiment does; with its line.
+        PipelineError: the file says something else than an experiment does, or has factors that change the same; with
+            its line.
     """
     document = read(path)
     resolver = Resolver(document, Registry())
@@ -69,28 +71,21 @@ def load_experiment(path: Path, recordings: Sequence[Path] = (), frames: str | N
         resolver.file(name, ("recordings", index)) for index, name in enumerate(said.recordings)
     )
     names = short_names(folders)
+    common = changes_at(said.change, ("change",), document)
+    factors = [levels_at(said.factors[name], ("factors", name), document) for name in said.factors]
     cells = []
-    for combination in itertools.product(*(levels(said, factor, document) for factor in said.factors)):
-        variant = "+".join(name for name, _ in combination)
-        chosen = {target: value for _, level in combination for target, value in level.items()}
-        changes = said.change | chosen
-        pipeline = str(changes.pop(PIPELINE, said.pipeline))
-        file = resolver.file(pipeline, (PIPELINE,))
-        written = tuple(f"{target}={json.dumps(value)}" for target, value in changes.items())
+    for combination in itertools.product(*factors):
+        variant = variant_of(combination)
+        changes = common | {target: change for level in combination for target, change in level.changes.items()}
+        other = changes.pop(PIPELINE, None)
+        file = resolver.file(str(other.value) if other else said.pipeline, (PIPELINE,))
+        written = tuple(f"{target}={json.dumps(change.value)}" for target, change in changes.items())
+        places = tuple(change.where for change in changes.values())
         cells += [
-            Cell(variant, name, file, recording, written, path.parent, frames or said.frames)
+            Cell(variant, name, file, recording, written, places, path.parent, frames or said.frames)
             for name, recording in zip(names, folders, strict=True)
         ]
     return tuple(cells)
-
-
-def levels(said: ExperimentFile, factor: str, document: Document) -> list[tuple[str, Mapping[str, Any]]]:
-    """Return the levels of a factor with what each changes."""
-    for name in said.factors[factor]:
-        if "/" in name or "+" in name or not name.strip("."):
-            where = document.place(("factors", factor, name)).text
-            raise PipelineError(f"a level can't be called '{name}': it names folders and columns", where=where)
-    return [(name, changes or {}) for name, changes in said.factors[factor].items()]
 
 
 def short_names(folders: Sequence[Path]) -> list[str]:

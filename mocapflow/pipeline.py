@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt, PositiveInt
+from pydantic import Field, NonNegativeInt, PositiveInt
 
 from mocapflow.components import BodyModel, Garment, Stage
 from mocapflow.documents import Document, Place, changed
@@ -16,18 +16,13 @@ from mocapflow.errors import PipelineError, RecordingError
 from mocapflow.measures import garment_of, place_of
 from mocapflow.registry import Registry, load_registry
 from mocapflow.resolve import Resolver
+from mocapflow.settings import Settings
 from mocapflow.yamlfile import read
 
 LABEL = re.compile(r"[\w-]+")  # of a stage
 
 
-class Strict(BaseModel):
-    """A part of the file that takes no other names than its own."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Frames(Strict):
+class Frames(Settings):
     """The part of the recording to work on: `start` up to, without, `stop`."""
 
     start: NonNegativeInt = 0  # the first frame
@@ -35,7 +30,7 @@ class Frames(Strict):
     step: PositiveInt = 1  # takes every so many-th frame
 
 
-class PartsFile(Strict):
+class PartsFile(Settings):
     """A long recording in parts that are tracked each from a start of its own, and joined."""
 
     count: PositiveInt = 1  # how many; they can be tracked side by side
@@ -44,7 +39,7 @@ class PartsFile(Strict):
     join: Any = "join"  # a component `stage`
 
 
-class PipelineFile(Strict):
+class PipelineFile(Settings):
     """What a pipeline file may say beside `extends: FILE` and `change: {PATH: value, stages.NEW before OLD: stage}`."""
 
     name: ClassVar[str] = "a pipeline"
@@ -154,6 +149,9 @@ def load_pipeline(
 
 def _registry_with(plugins: tuple[str, ...], resolver: Resolver) -> Registry:
     files = [resolver.file(plugin, ("plugins", index)) for index, plugin in enumerate(plugins)]
+    for index, file in enumerate(files):
+        if file in files[:index]:
+            raise resolver.located(PipelineError("this file is named twice"), ("plugins", index))
     registry = load_registry(files)
     for failure in registry.failures:
         for index, file in enumerate(files):

@@ -14,6 +14,7 @@ from mocapflow.components import Component
 from mocapflow.documents import Document, Steps, dotted
 from mocapflow.errors import MocapflowError, PipelineError, guess
 from mocapflow.registry import Registry
+from mocapflow.settings import plain_parts
 
 
 class Resolver:
@@ -84,7 +85,9 @@ class Resolver:
             return None
         if base is None:
             return (
-                self.file(value, steps).absolute() if isinstance(value, str) and Path in _parts(annotation) else value
+                self.file(value, steps).absolute()
+                if isinstance(value, str) and Path in plain_parts(annotation)
+                else value
             )
         if not _takes_several(annotation):
             return self.component(base.role, value, steps)
@@ -120,15 +123,8 @@ def _title(cls: type[BaseModel]) -> str:
     return str(getattr(cls, "name", cls.__name__.lower()))
 
 
-def _parts(annotation: Any) -> set[Any]:
-    """Return the plain types an annotation is made of."""
-    if get_origin(annotation) is None:
-        return {annotation}
-    return set().union(*(_parts(part) for part in get_args(annotation)))
-
-
 def _component_base(annotation: Any) -> type[Component] | None:
-    bases = [part for part in _parts(annotation) if isinstance(part, type) and issubclass(part, Component)]
+    bases = [part for part in plain_parts(annotation) if isinstance(part, type) and issubclass(part, Component)]
     return bases[0] if bases else None
 
 
@@ -139,6 +135,6 @@ def _takes_several(annotation: Any) -> bool:
 def _model_at(cls: type[BaseModel], location: tuple[str | int, ...]) -> type[BaseModel]:
     for step in location:
         inner = cls.model_fields[step].annotation if step in cls.model_fields else None
-        models = [part for part in _parts(inner) if isinstance(part, type) and issubclass(part, BaseModel)]
+        models = [part for part in plain_parts(inner) if isinstance(part, type) and issubclass(part, BaseModel)]
         cls = models[0] if models else cls
     return cls

@@ -5,21 +5,21 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
+from pydantic import NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
 from mocapflow.data import Change, Pose, Surface
 from mocapflow.geometry import twists
 from mocapflow.records import F64
+from mocapflow.settings import Settings
 
 
-class Steady(BaseModel):
+class Steady(Settings):
     """When the loop counts as at rest, how long it may go on, and how it is kept from getting worse.
 
     Turns beyond the last of `sigmas` are held against the last one; the first frame, which may start far off, against
     none.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     surface_mm: PositiveFloat = 0.5  # largest move of a body vertex from turn to turn, RMS move of the cloth
     angle_deg: PositiveFloat = 0.1  # largest change of a joint angle
     sigmas: tuple[NonNegativeFloat, ...] = ()  # of the pose, turn by turn: moves below are rest too

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Hashable, Iterable
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,8 @@ import yaml
 
 from mocapflow.documents import Document, Place, Steps, changed, dotted
 from mocapflow.errors import PipelineError, alternatives
+
+LEADING_ZERO = re.compile(r"[-+]?0[0-9_]")  # 0x10 and 0b10 say themselves what they are
 
 
 def read(path: Path, changes: Iterable[str] = (), folder: Path = Path()) -> Document:
@@ -68,7 +71,8 @@ def _parse(text: str, file: str, path: Path | None) -> Document:
 
     def plain(node: yaml.Node) -> Any:
         base_60 = node.tag.endswith((":int", ":float")) and ":" in node.value  # of YAML 1.1: it makes 10:20 620
-        if base_60 or node.tag.endswith(":timestamp"):
+        octal = node.tag.endswith(":int") and LEADING_ZERO.match(node.value)  # likewise: it makes 010 8
+        if base_60 or octal or node.tag.endswith(":timestamp"):
             return node.value
         try:
             return loader.construct_object(node)

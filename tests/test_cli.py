@@ -347,5 +347,15 @@ def test_a_picture_that_can_not_be_written(call, monkeypatch, out):
     assert f"error: {out}  the picture can't be written" in shown.stderr
 
 
+@pytest.mark.parametrize(
+    ("draper", "message"), [("xpbd", "draper xpbd needs the simulator newton"), ("xpdb", "no draper named 'xpdb'")]
+)
+def test_a_draper_that_can_not_be_made_is_told(call, monkeypatch, draper, message):
+    monkeypatch.setattr("mocapflow_physics.xpbd.find_spec", lambda name: None)
+    shown = call("show", "garment", "skirt", "--draper", draper, "--out", "garment.png")
+    assert shown.exit_code == 2
+    assert f"error: show garment skirt  {message}" in shown.stderr
+
+
 def test_only_a_garment_has_a_picture(call):
     assert "only a garment has a picture" in call("show", "matcher", "contour_icp", "--out", "it.png").output

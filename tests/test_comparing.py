@@ -73,3 +73,21 @@ def test_what_cannot_be_loaded_is_told_before_anything_runs(compare):
     Path("grid.yaml").write_text(text)
     assert compare().exit_code == 2
     assert not Path("grid").exists()
+
+
+def test_a_wrong_setting_is_told_where_the_experiment_says_it(compare):
+    text = Path("grid.yaml").read_text().replace("stages.track.draper: other_draper", "stages.track.nope: 3")
+    Path("grid.yaml").write_text(text)
+    line = text.splitlines().index("      stages.track.nope: 3") + 1
+    done = compare()
+    assert done.exit_code == 2
+    assert f"grid.yaml:{line}:7  variant 'other': stages.track.nope: unknown setting" in done.stderr
+    assert "--set" not in done.stderr
+
+
+def test_a_variant_that_exports_nothing_is_told_before_anything_runs(compare):
+    Path("grid.yaml").write_text(Path("grid.yaml").read_text() + "change: {stages.export: null}\n")
+    done = compare()
+    assert done.exit_code == 2
+    assert "variant 'one': the pipeline has no stage `export`" in done.stderr
+    assert not Path("grid").exists()

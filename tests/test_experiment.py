@@ -45,6 +45,41 @@ def test_every_combination_on_every_recording(tmp_path: Path) -> None:
     )
 
 
+def test_each_change_knows_where_it_is_said(tmp_path: Path) -> None:
+    last = load_experiment(written(tmp_path, GRID))[-1]
+    assert [place.removeprefix(f"{tmp_path}/") for place in last.places] == [
+        "grid.yaml:5:10",
+        "grid.yaml:9:15",
+        "grid.yaml:12:12",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        ("stages.track.draper", "stages.track.draper"),
+        ("stages.track.draper.sweeps", "stages.track.draper"),
+        ("stages.corrupt before track", "stages.corrupt"),
+        ("pipeline", "pipeline"),
+    ],
+)
+def test_factors_that_change_the_same_are_refused_with_both_lines(tmp_path: Path, first: str, second: str) -> None:
+    text = GRID.replace("stages.track.draper:", f"{first}:").replace("stages.track.matchers:", f"{second}:")
+    with pytest.raises(PipelineError) as caught:
+        load_experiment(written(tmp_path, text.replace(", pipeline: other.yaml", "")))
+    said = str(caught.value)
+    assert f"grid.yaml:12:12  '{second}' would take the place of '{first}', which another factor changes" in said
+    assert "grid.yaml:9:15\n" in said
+
+
+def test_a_factor_may_set_a_part_of_what_an_earlier_one_chose(tmp_path: Path) -> None:
+    last = load_experiment(written(tmp_path, GRID.replace("track.matchers:", "track.draper.gap:")))[-1]
+    assert last.changes[1:] == (
+        'stages.track.draper={"use": "kinematic", "sweeps": 0}',
+        'stages.track.draper.gap=["contour_icp", "optical_flow"]',
+    )
+
+
 def test_a_date_in_a_change_is_text(tmp_path: Path) -> None:
     text = GRID.replace("change: {stages.overlay: null}", "change: {stages.track.file: 2024-02-03}")
     assert load_experiment(written(tmp_path, text))[0].changes == ('stages.track.file="2024-02-03"',)
@@ -84,6 +119,9 @@ def test_recordings_that_cannot_be_told_apart_are_refused(tmp_path: Path, folder
         ("frames:", "frame:", r"grid\.yaml:4:1  frame: unknown setting of an experiment"),
         ("    rings:", "    a/b:", r"grid\.yaml:8:5  a level can't be called 'a/b'"),
         ("    rings:", "    ..:", r"grid\.yaml:8:5  a level can't be called '\.\.'"),
+        ("    rings:", "    runs.csv:", r"grid\.yaml:8:5  a level can't be called 'runs\.csv'"),
+        ("    rings:", '    "a\\0":', r"grid\.yaml:8:5  a level can't be called 'a\\x00'"),
+        ("    rings:", f"    {'a' * 250}:", r"grid\.yaml:8:5  a variant's name has 259 bytes, more than 255"),
     ],
 )
 def test_what_is_wrong_is_told_by_line(tmp_path: Path, old: str, new: str, message: str) -> None:

@@ -80,6 +80,7 @@ def test_frames(folder):
     assert (pipeline.start, pipeline.stop, pipeline.step) == (2, 9, 1)
     pipeline = load("frames={start: 2, stop: 9}", frames=slice(None, 60, 2))
     assert (pipeline.start, pipeline.stop, pipeline.step) == (0, 60, 2)
+    assert load("frames.stop=010").stop == 10
 
 
 @pytest.mark.parametrize(
@@ -101,6 +102,14 @@ def test_the_version_of_a_file_that_extends_another_counts(folder):
     Path("other.yaml").write_text("mocapflow: 99\nextends: skirt.yaml\n")
     with pytest.raises(MocapflowError, match="other.yaml:1:1  mocapflow: input should be 1, not 99"):
         load_pipeline(Path("other.yaml"), small_plugins.registry())
+
+
+def test_a_plugin_file_is_named_once(folder):
+    Path("dress.py").write_text("")
+    Path("skirt.yaml").write_text("plugins: [dress.py, ./dress.py]\n" + TEXT)
+    with pytest.raises(MocapflowError) as caught:
+        load_pipeline(Path("skirt.yaml"))
+    assert str(caught.value) == "skirt.yaml:1:21  plugins.1: this file is named twice"
 
 
 def test_a_stage_is_left_out_by_null(folder):
@@ -135,6 +144,10 @@ def test_a_plugin_file_named_by_the_pipeline(folder):
          "waist_circumference_m, waist_height_m)\n       did you mean 'length_m'?"),
         ("share: 0.5", "share: -1",
          "skirt.yaml:8:48  stages.track.matchers.1.share: input should be greater than 0, not -1"),
+        ("share: 0.5", "share: yes",
+         "skirt.yaml:8:48  stages.track.matchers.1.share: input should be a number, not true or false"),
+        ("share: 0.5", "share: .inf",
+         "skirt.yaml:8:48  stages.track.matchers.1.share: input should be a finite number, not inf"),
         ("turns: 3", "turns: many",
          "skirt.yaml:9:14  stages.track.steady.turns: input should be a valid integer, unable to parse string as an "
          "integer, not 'many'"),

@@ -81,6 +81,11 @@ def test_what_looks_like_a_date_or_a_time_is_text(folder):
     assert values == {"recording": "2024-02-30", "2024-02-03": "10:20", "point": "1:20.5"}
 
 
+def test_a_number_with_leading_zeros_is_text_and_no_octal(folder):
+    values = read(write("zeros.yaml", "stop: 060\nback: -010\nlong: 0_10\nnone: 0\nhex: 0x10\n"), ["bins=010"]).values
+    assert values == {"stop": "060", "back": "-010", "long": "0_10", "none": 0, "hex": 16, "bins": "010"}
+
+
 def test_paths_of_changes_start_at_a_folder(folder):
     document = read(Path("base.yaml"), ["recording=clip", "stages.track.file=a.npz"], Path("/there"))
     assert document.place(("recording",)).folder == document.place(("stages", "track", "file")).folder == Path("/there")

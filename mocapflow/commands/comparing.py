@@ -13,7 +13,7 @@ from mocapflow.commands.again import Invocation, placed
 from mocapflow.commands.results import table
 from mocapflow.commands.running import Frames, execute
 from mocapflow.commands.workers import Scheduler, Workers, finished
-from mocapflow.errors import MocapflowError
+from mocapflow.errors import MocapflowError, PipelineError
 
 if TYPE_CHECKING:
     from mocapflow.experiment import Cell
@@ -44,8 +44,8 @@ def compare(
     cells = load_experiment(experiment, recordings or (), frames)
     kept, url = placed(store, folder.parent / "store.zarr")
     invocations = {cell: invocation(cell, kept, url) for cell in cells}
-    for each in invocations.values():
-        each.load()  # tells what is wrong with any variant before the first one runs
+    for cell, each in invocations.items():
+        check(cell, each)  # all of them before the first one runs
     tasks = {cell: partial(finish, each, place(folder, cell).absolute()) for cell, each in invocations.items()}
     failed = {}
     for number, (cell, result) in enumerate(finished(tasks, workers, scheduler), 1):
@@ -59,6 +59,25 @@ def compare(
         raise typer.Exit(1)
 
 
+def check(cell: Cell, invocation: Invocation) -> None:
+    """Check that a cell can run and will leave what is compared.
+
+    Raises:
+        MocapflowError: it can't, or won't; with the variant, and the line of the experiment that says so.
+    """
+    from mocapflow_export.export import Export
+
+    said_at = {f"--set {change}": place for change, place in zip(cell.changes, cell.places, strict=True)}
+    try:
+        stages = invocation.load().stages
+        if not any(isinstance(named.stage, Export) for named in stages):
+            hint = "add one: what it writes into run.json is compared"
+            raise PipelineError("the pipeline has no stage `export`", where=invocation.pipeline, hint=hint)
+    except MocapflowError as error:
+        where = said_at.get(error.where, error.where)
+        raise type(error)(f"variant '{cell.variant}': {error.message}", where=where, hint=error.hint) from None
+
+
 def show(folder: Path, cells: Sequence[Cell], failed: Mapping[Cell, str]) -> None:
     """Compare what has run, and print it with what has not."""
     from mocapflow_evaluation import variants
@@ -70,7 +89,7 @@ def show(folder: Path, cells: Sequence[Cell], failed: Mapping[Cell, str]) -> Non
         typer.echo(table(rows))
     for cell, message in failed.items():
         typer.echo(f"failed: {cell.variant} on {cell.name}: {message}")
-    typer.echo(f"all figures: {folder}/compare.csv, runs.csv and compare.png")
+    typer.echo(f"all figures: {folder}/{', '.join(name for name in variants.FILES if (folder / name).is_file())}")
 
 
 def place(folder: Path, cell: Cell) -> Path:

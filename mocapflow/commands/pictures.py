@@ -28,7 +28,8 @@ def draw_garment(registry: Registry, name: str, recording: Path | None, draper: 
     """Write the picture of a garment on the person of a recording and return lines to print.
 
     Raises:
-        MocapflowError: the garment needs measures that the recording does not have, or can't be sewn from them.
+        MocapflowError: the garment needs measures that the recording does not have, or can't be sewn from them; or the
+            draper can't be made.
         StoreError: the picture can't be written.
     """
     import cv2
@@ -39,7 +40,7 @@ def draw_garment(registry: Registry, name: str, recording: Path | None, draper: 
     body: Any = registry.get("body", "scanned")()
     loaded = body.load(recording)
     scene = Scene(cameras=(), body=loaded, garment=garment.sew(loaded))
-    image = poster(scene, garment, registry.get("draper", draper)())  # type: ignore[arg-type]
+    image = poster(scene, garment, resolver.component("draper", draper, ()))
     if not (out.parent.is_dir() and cv2.haveImageWriter(str(out)) and cv2.imwrite(str(out), image)):
         hint = "--out names a .png, in a folder that is there"
         raise StoreError("the picture can't be written", where=str(out), hint=hint)

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
 
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import model_validator
 
 from mocapflow.assets import Body
 from mocapflow.components import BodyModel
@@ -17,14 +17,14 @@ from mocapflow.io.meshes import read_mesh
 from mocapflow.io.scans import check_size, read_skeleton
 from mocapflow.io.weights import read_weights
 from mocapflow.records import F64
+from mocapflow.settings import Settings
 from mocapflow_bodies.assemble import Part, assemble
 from mocapflow_bodies.weights import heat_weights
 
 
-class Morph(BaseModel):
+class Morph(Settings):
     """A second shape of the same mesh, blended in as one angle goes through a range (method: local morphing)."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     mesh: str  # path inside the recording, with the vertices of body.obj in the same order
     angle: str  # e.g. knee_l.flexion
     from_deg: float  # where the shape of body.obj begins to change

@@ -52,7 +52,8 @@ def at_our_frames(reference: Reference, columns: Mapping[str, F64], lag: float =
     """Return the curves (T,) of a reference at our frames, or a lag in frames before; NaN where it has nothing."""
     clock = columns["frame" if reference.by_frame else "time"]
     earlier = clock - lag * (float(np.median(np.diff(clock))) if len(clock) > 1 else 0.0)
-    return {name: resampled(reference.at, curve, earlier, reference.step) for name, curve in reference.curves.items()}
+    at = reference.moments(clock)
+    return {name: resampled(at, curve, earlier, reference.step) for name, curve in reference.curves.items()}
 
 
 def align(columns: Mapping[str, F64], reference: Reference, longest_lag_s: float) -> Alignment:

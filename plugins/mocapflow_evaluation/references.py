@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ POSE2SIM = {
     "Hip": "hip", "Knee": "knee", "Ankle": "ankle", "BigToe": "toe", "Heel": "heel",
     "Shoulder": "shoulder", "Elbow": "elbow", "Wrist": "wrist",
 }  # fmt: skip
+SLACK = 0.01  # of a sample: times in files are rounded
 SUFFIXES = (".csv", ".mot", ".sto", ".trc", ".c3d")
 
 
@@ -34,11 +36,16 @@ class Reference:
     joint_names: tuple[str, ...] = ()
     joints: F64 | None = array("T", "J", 3, unit="m, in the axes of its own rig, z up", default=None)
     notes: tuple[str, ...] = ()  # how it was read, where that is not plain
+    counted_from: float = 0.0  # s; some programs begin to count time at one sample
 
     @property
     def step(self) -> float:
         """From one sample to the next, in the unit of `at`; frames that are missing stay so."""
         return 1.0 if self.by_frame or len(self.at) < 2 else float(np.median(np.diff(self.at)))
+
+    def moments(self, ours: F64) -> F64:
+        """Return its `at` (T,) as our clock (U,) has it: counted from 0, but for a run that begins where it does."""
+        return self.at if abs(ours[0] - self.at[0]) < SLACK * self.step else self.at - self.counted_from
 
 
 def read_reference(path: Path) -> Reference:
@@ -84,13 +91,15 @@ def _motion(path: Path) -> Reference:
     named = {f"{theirs}_{side}": f"{ours}_{side}" for theirs, ours in MOTION.items() for side in ("l", "r")}
     curves = {ours: columns[theirs] for theirs, ours in named.items() if theirs in columns}
     curves |= {name: columns[name] for name in SIGNED if name in columns}
-    at, notes = from_zero(time)
-    return Reference(curves=curves, at=at, by_frame=False, notes=notes)
+    start, notes = counted_from(time)
+    return Reference(curves=curves, at=time, by_frame=False, notes=notes, counted_from=start)
 
 
 def _trc(path: Path) -> Reference:
     names, positions, time, _ = markers.read_trc(path)
-    return _positions(path, names, markers.world_from_opensim(positions), time)
+    start, notes = counted_from(time)
+    reference = _positions(path, names, markers.world_from_opensim(positions), time)
+    return replace(reference, notes=(*notes, *reference.notes), counted_from=start)
 
 
 def _c3d(path: Path) -> Reference:
@@ -102,8 +111,8 @@ def _positions(path: Path, labels: tuple[str, ...], positions: F64, time: F64) -
     """Return the angles between joint centres that a file has, or that its markers tell."""
     known = {f"{s.upper()}{name}": f"{ours}_{s}" for name, ours in POSE2SIM.items() for s in ("l", "r")}
     names = tuple(known.get(label, label) for label in labels)
-    at, notes = from_zero(time)
     curves = _between(names, positions)
+    notes: tuple[str, ...] = ()
     if not curves:
         marks = {name: positions[:, index] for name, index in landmarks(labels, path.parent).items()}
         centres = marker_joints.joint_centres(marks)
@@ -117,8 +126,8 @@ def _positions(path: Path, labels: tuple[str, ...], positions: F64, time: F64) -
             )
         positions = np.stack(list(centres.values()), axis=1)
         curves = _between(names, positions) | _about_axes(marks, centres)
-        notes = (*notes, f"joint centres and knee axes from {len(marks)} markers on bony landmarks")
-    return Reference(curves=curves, at=at, by_frame=False, joint_names=names, joints=positions, notes=notes)
+        notes = (f"joint centres and knee axes from {len(marks)} markers on bony landmarks",)
+    return Reference(curves=curves, at=time, by_frame=False, joint_names=names, joints=positions, notes=notes)
 
 
 def _between(names: tuple[str, ...], positions: F64) -> dict[str, F64]:
@@ -142,9 +151,12 @@ def _about_axes(marks: Mapping[str, F64], centres: Mapping[str, F64]) -> dict[st
     return found
 
 
-def from_zero(time: F64) -> tuple[F64, tuple[str, ...]]:
-    """Return times (T,) s, counted from 0 where they stood at one sample, as some programs write; and a note."""
+def counted_from(time: F64) -> tuple[float, tuple[str, ...]]:
+    """Return where times (T,) s seem to be counted from: one sample where they begin there; and a note."""
     step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
-    if step > 0 and abs(time[0] - step) < 0.01 * step:
-        return time - step, (f"the reference counts time from {time[0]:.4f} s, one sample: taken as 0",)
-    return time, ()
+    if step > 0 and abs(time[0] - step) < SLACK * step:
+        said = (
+            f"the reference counts time from {time[0]:.4f} s, one sample: taken as 0, unless our first frame is there"
+        )
+        return step, (said,)
+    return 0.0, ()

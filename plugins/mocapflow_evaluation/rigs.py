@@ -65,7 +65,7 @@ def compare_rigs(own: Ours, reference: Reference, lag: float, common_points: Pat
     ours, frame = own.stick, own.columns["frame"]
     if reference.joints is None:
         return Rigs(ours=ours, frame=frame)
-    theirs, aligned = (_sampled(reference, own.columns["time"] - late / own.frame_rate) for late in (0.0, lag))
+    theirs, aligned = (_sampled(reference, own.columns["time"], late / own.frame_rate) for late in (0.0, lag))
     measured = common_points.is_file()
     found = stick.between_points(common_points) if measured else stick.between_joints(ours, aligned)
     if found is None:
@@ -82,12 +82,13 @@ def compare_rigs(own: Ours, reference: Reference, lag: float, common_points: Pat
     )
 
 
-def _sampled(reference: Reference, time: F64) -> Stick:
-    """Return the joint centres of a reference at times (T,) s."""
+def _sampled(reference: Reference, ours: F64, lag: float = 0.0) -> Stick:
+    """Return the joint centres of a reference at our times (T,) s, or a lag (s) before."""
     assert reference.joints is not None
     columns = reference.joints.reshape(len(reference.at), -1).T
-    flat = np.stack([resampled(reference.at, column, time, reference.step) for column in columns], axis=1)
-    return Stick(names=reference.joint_names, places=flat.reshape(len(time), -1, 3))
+    at = reference.moments(ours)
+    flat = np.stack([resampled(at, column, ours - lag, reference.step) for column in columns], axis=1)
+    return Stick(names=reference.joint_names, places=flat.reshape(len(ours), -1, 3))
 
 
 def _figures(found: Registration, by: str) -> dict[str, Any]:

@@ -13,40 +13,37 @@ from mocapflow.records import F64
 from mocapflow.results import frame_rate_of
 from mocapflow_evaluation import panels
 from mocapflow_evaluation.compare import drawn_blocks, rms, rms_interval
+from mocapflow_evaluation.run_errors import angle_errors
 
 Run = tuple[str, str, Path | str]  # variant, recording, run folder or why it failed
 Row = dict[str, float | str]
+COMPARED, RUNS, PICTURE = FILES = ("compare.csv", "runs.csv", "compare.png")  # `mocapflow.levels` keeps these names
 WENT = ("overlap", "cpu_seconds_per_frame", "iterations", "lost", "not_at_rest")
 
 
 def compare(runs: Sequence[Run], folder: Path) -> list[Row]:
     """Write compare.csv, runs.csv and compare.png of runs and return the rows of the first.
 
-    The first variant is the baseline. Differences of RMS are paired: the same blocks of frames are drawn from both.
-    A run that failed has a row in runs.csv that says why.
+    The first variant is the baseline. Differences of RMS are paired, over the frames that both have: the same blocks of
+    frames are drawn from both. A run that failed has a row in runs.csv that says why.
     """
     folder.mkdir(parents=True, exist_ok=True)
     rows: list[Row] = []
     baseline = runs[0][0]
     errors = {(variant, recording): angle_errors(path) for variant, recording, path in runs}
     for variant, recording, path in runs:
-        ours, base = errors[variant, recording], errors[baseline, recording]
-        rate = frame_rate(Path(path)) if ours else np.nan
-        for angle, error in ours.items():
+        ours = errors[variant, recording]
+        base = errors[baseline, recording].at(ours.frame)
+        rate = frame_rate(Path(path)) if ours.angles else np.nan
+        for angle, error in ours.angles.items():
             found = figures(error, base.get(angle), rate)
             rows.append({"recording": recording, "variant": variant, "angle": angle, **found})
-    tables.write_rows(folder / "compare.csv", rows)
-    tables.write_rows(folder / "runs.csv", [{"recording": r, "variant": v, **run_figures(path)} for v, r, path in runs])
+    tables.write_rows(folder / COMPARED, rows)
+    tables.write_rows(folder / RUNS, [{"recording": r, "variant": v, **run_figures(path)} for v, r, path in runs])
+    (folder / PICTURE).unlink(missing_ok=True)
     if rows:
-        plot(folder / "compare.png", rows)
+        plot(folder / PICTURE, rows)
     return rows
-
-
-def angle_errors(run: Path | str) -> dict[str, F64]:
-    """Return the errors (T,) in degrees of each angle that was compared in a run; none without a reference."""
-    if isinstance(run, str) or not (run / layout.ERRORS).is_file():
-        return {}
-    return {name: error for name, error in tables.read_columns(run / layout.ERRORS).items() if name != "frame"}
 
 
 def frame_rate(run: Path) -> float:
@@ -60,7 +57,7 @@ def figures(error: F64, base: F64 | None, rate: float) -> Row:
 
     Args:
         error: (T,) deg.
-        base: (T,) deg, of the baseline; None where it has no such angle.
+        base: (T,) deg, of the baseline at the same frames; None where it has no such angle.
         rate: frames per second.
     """
     seen = np.isfinite(error)
@@ -68,8 +65,7 @@ def figures(error: F64, base: F64 | None, rate: float) -> Row:
     row: Row = {"frames": int(seen.sum()), "rms_deg": rms(error[seen]), "rms_low_deg": low, "rms_high_deg": high}
     row["mae_deg"] = float(np.abs(error[seen]).mean())
     difference = (np.nan,) * 3
-    if base is not None and len(base) == len(error):
-        both = seen & np.isfinite(base)
+    if base is not None and (both := seen & np.isfinite(base)).any():
         difference = paired_difference(error[both], base[both], rate)
     return row | dict(zip(("difference_deg", "difference_low_deg", "difference_high_deg"), difference, strict=True))
 

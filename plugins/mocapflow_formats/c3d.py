@@ -10,13 +10,18 @@ from mocapflow_formats.result import Result, library
 
 
 def write(result: Result, path: Path) -> None:
-    """Write the joint centres."""
+    """Write the joint centres at the frames of the video, of which the format only knows the first and the rate.
+
+    Frames between, that the run left out, are those of markers that were not seen.
+    """
     file = library("ezc3d", "c3d").c3d()
-    points = np.ones((4, result.places.shape[1], len(result.places)))
-    points[:3] = 1000 * np.transpose(result.places, (2, 1, 0))
+    first, last = int(result.track.frame[0]), int(result.track.frame[-1])
+    points = np.full((4, result.places.shape[1], last - first + 1), np.nan)
+    points[:3, :, result.track.frame - first] = 1000 * np.transpose(result.places, (2, 1, 0))
     point = file["parameters"]["POINT"]
     point["LABELS"]["value"] = list(result.scene.body.joint_names)
-    point["RATE"]["value"] = [result.track.frame_rate]
+    point["RATE"]["value"] = [result.recording.frame_rate]
     point["UNITS"]["value"] = ["mm"]
+    file["header"]["points"]["first_frame"] = first
     file["data"]["points"] = points
     file.write(str(path))

@@ -105,7 +105,21 @@ def from_table(path: Path, body: Body) -> Angles:
     degrees = {name: np.array([float(row[name] or "nan") for row in rows]) for name in names}
     if degrees and all(np.nanmax(np.abs(values), initial=0.0) <= np.pi for values in degrees.values()):
         raise RecordingError("no angle in it is above 3.14: it seems to be in radians", where=str(path), hint=DEGREES)
-    return from_columns(degrees, body)
+    return from_columns(possible(degrees, path), body)
+
+
+def possible(degrees: Mapping[str, F64], path: Path) -> Mapping[str, F64]:
+    """Return the columns (T,) of a file, each in degrees; NaN where an angle is not known.
+
+    Raises:
+        RecordingError: one of them is infinite or more than half a turn.
+    """
+    for name, values in degrees.items():
+        if (beyond := np.abs(values) > 180).any():
+            row = int(np.argmax(beyond))
+            hint = "angles are in degrees, from -180 to 180; nan where one is not known"
+            raise RecordingError(f"{name} is {values[row]:g} in row {row + 1}", where=str(path), hint=hint)
+    return degrees
 
 
 def from_joints(path: Path, body: Body) -> Angles:
@@ -134,7 +148,9 @@ def from_opensim(path: Path, body: Body) -> Angles:
     """Read an OpenSim motion: degrees from the straight limb."""
     columns, _ = markers.read_mot(path)
     rest = opensim_at_rest(body)
-    return named({name: columns[name] - rest[name] for name in rest if name in columns}, COORDINATES)
+    angles_only = {name: values for name, values in columns.items() if name[:-2] in COORDINATES and name in rest}
+    degrees = possible(angles_only, path)
+    return named({name: values - rest[name] for name, values in degrees.items()}, COORDINATES)
 
 
 def opensim_at_rest(body: Body) -> Mapping[str, float]:

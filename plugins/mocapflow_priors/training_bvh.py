@@ -12,7 +12,7 @@ from mocapflow.errors import RecordingError
 from mocapflow.geometry.angles import three_point
 from mocapflow.records import F64
 
-ALIASES: Mapping[str, tuple[str, ...]] = {  # ours: those of CMU and HDM05 conversions, Mixamo, MotionBuilder
+ALIASES: Mapping[str, tuple[str, ...]] = {  # ours: also those of CMU and HDM05 conversions, Mixamo, MotionBuilder
     "hip_l": ("leftupleg", "lefthip", "lhipjoint", "lefthipjoint", "lfemur"),
     "knee_l": ("leftleg", "leftknee", "leftlowleg", "ltibia"),
     "ankle_l": ("leftfoot", "leftankle", "lfoot"),
@@ -91,10 +91,11 @@ def our_names(names: Sequence[str]) -> dict[str, int]:
     for ours, others in ALIASES.items():
         sides = ("l", "r") if ours.endswith("_l") else ("",)
         for side in sides:
-            called = [mirrored(other) if side == "r" else other for other in others]
+            own = ours[:-1] + side if side else ours
+            called = [own.replace("_", ""), *(mirrored(other) if side == "r" else other for other in others)]
             index = next((plain.index(name) for name in called if name in plain), None)
             if index is not None:
-                found[ours[:-1] + side if side else ours] = index
+                found[own] = index
     return found
 
 

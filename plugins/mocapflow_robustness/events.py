@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, NonNegativeInt, PositiveInt
+from pydantic import Field, NonNegativeInt, PositiveInt
+
+from mocapflow.settings import Settings
 
 
-class Event(BaseModel):
+class Event(Settings):
     """Something that happens to some cameras over some frames."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     what: Literal[
         "black", "torn", "covered", "frozen", "late", "other_time", "other_camera", "dropped"
     ]  # to the pictures

@@ -15,6 +15,7 @@ from results_scene import DEMO, demo_scene, stepping
 
 from mocapflow.errors import PipelineError
 from mocapflow.geometry import angles
+from mocapflow.io import markers
 from mocapflow.recording import open_recording
 
 NEAR = 1e-4  # m
@@ -76,6 +77,23 @@ def test_c3d_has_the_frame_rate(result: Result, tmp_path: Path) -> None:
 
     with write("c3d", result, tmp_path).open("rb") as file:
         assert c3d.Reader(file).point_rate == pytest.approx(result.track.frame_rate)
+
+
+@pytest.mark.filterwarnings("ignore:No analog data")
+@pytest.mark.parametrize(("first", "step"), [(0, 1), (1, 1), (10, 3)])
+def test_c3d_has_the_times_of_the_track(result: Result, tmp_path: Path, first: int, step: int) -> None:
+    import c3d
+
+    frame = first + step * result.track.frame
+    track = replace(result.track, frame=frame, time=frame / result.recording.frame_rate)
+    path = write("c3d", replace(result, track=track), tmp_path)
+    names, places, time, _ = markers.read_c3d(path)
+    seen = np.isfinite(places).all(axis=(1, 2))
+    assert names == result.scene.body.joint_names
+    np.testing.assert_allclose(time[seen], track.time, atol=1e-6)  # s; single precision
+    np.testing.assert_allclose(places[seen], result.places, atol=NEAR)
+    with path.open("rb") as file:
+        assert c3d.Reader(file).first_frame == first + 1  # the format counts from 1
 
 
 def test_parquet(result: Result, tmp_path: Path) -> None:

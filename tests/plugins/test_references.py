@@ -9,17 +9,20 @@ import numpy as np
 import pytest
 from marker_take import markers_of, write_c3d
 from mocapflow_evaluation import marker_joints, ours
+from mocapflow_evaluation.alignment import at_our_frames
 from mocapflow_evaluation.evaluate import chosen, evaluate
 from mocapflow_evaluation.marker_names import landmarks
 from mocapflow_evaluation.ours import Ours
 from mocapflow_evaluation.references import Reference, read_reference
 from mocapflow_export import layout, tables
-from results_scene import demo_scene, stepping
+from mocapflow_formats import Result, write
+from results_scene import DEMO, demo_scene, make_track, stepping
 from scipy.spatial.transform import Rotation
 
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import angles
 from mocapflow.io import markers
+from mocapflow.recording import open_recording
 
 SCENE = demo_scene()
 TRACK = stepping(SCENE.body, 60)
@@ -176,10 +179,35 @@ def test_a_faster_marker_system_that_started_later(own: Ours, tmp_path: Path) ->
     assert any("reference at 100 per second, interpolated at our 30" in note for note in got.notes)
 
 
+@pytest.mark.usefixtures("unrendered")
+@pytest.mark.parametrize("kept", [slice(1, 20), slice(3, 60, 3), slice(10, 60, 3)], ids=str)
+@pytest.mark.parametrize("name", ["joints.c3d", "joints.trc", "angles.mot"])
+def test_a_run_against_its_own_files_is_off_by_nothing(tmp_path: Path, name: str, kept: slice) -> None:
+    pytest.importorskip("ezc3d")
+    track = make_track(TRACK.root[kept], TRACK.angles[kept])
+    track = replace(track, frame=TRACK.frame[kept], time=TRACK.time[kept])
+    own = ours.of_track(track, SCENE)
+    if name == "joints.c3d":
+        write("c3d", Result(track=track, scene=SCENE, recording=open_recording(DEMO)), tmp_path)
+    elif name == "joints.trc":
+        places = markers.opensim_from_world(own.stick.places)
+        markers.write_trc(tmp_path / name, own.stick.names, places, track.frame_rate, start=track.time[0])
+    else:
+        markers.write_mot(tmp_path / name, {"hip_flexion_l": own.columns["hip_flexion_l"]}, track.time)
+    rows = evaluate(own, tmp_path / name, tmp_path).rows
+    assert {row["frames"] for row in rows} == {len(track.frame)}
+    for row in rows:
+        assert float(row["rms_deg"]) < 0.01, row["angle"]
+
+
 def test_times_that_begin_at_one_sample_are_told(tmp_path: Path) -> None:
     curve = 30 + np.arange(50.0)
     markers.write_mot(tmp_path / "m.mot", {"knee_angle_r": curve}, np.arange(1, 51) / 60)
-    assert "counts time from 0.0167 s, one sample: taken as 0" in read_reference(tmp_path / "m.mot").notes[0]
+    reference = read_reference(tmp_path / "m.mot")
+    assert "counts time from 0.0167 s, one sample: taken as 0, unless our first frame is there" in reference.notes[0]
+    for first in (0, 1):
+        ours = {"time": np.arange(first, 50) / 60}
+        np.testing.assert_allclose(at_our_frames(reference, ours)["knee_angle_r"][: 50 - first], curve[: 50 - first])
 
 
 def test_the_file_in_reference_is_found(tmp_path: Path) -> None:

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from mocapflow_bodies.template import Template
 from mocapflow_export import tables
+from mocapflow_formats import Result, write
 from mocapflow_priors import training, training_bvh
 from mocapflow_priors.density import read
+from results_scene import DEMO, demo_scene, stepping
 from typer.testing import CliRunner
 
 from mocapflow.assets import Body
@@ -17,6 +19,7 @@ from mocapflow.cli import app
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import angles
 from mocapflow.io import markers, opensim
+from mocapflow.recording import open_recording
 from tests.fixtures.turns import rotations_from_angles
 
 BENT = {"hip_l.flexion": 40.0, "knee_l.flexion": 70.0, "ankle_l.dorsiflexion": 12.0, "elbow_l.flexion": 50.0}
@@ -111,6 +114,16 @@ def test_a_table_in_radians(body: Body, tmp_path: Path) -> None:
         training.read_angles(tmp_path / "angles.csv", body)
 
 
+@pytest.mark.parametrize("value", [np.inf, -np.inf, 400.0])
+@pytest.mark.parametrize("file", ["angles.csv", "angles.mot"])
+def test_an_angle_that_no_joint_has(body: Body, tmp_path: Path, file: str, value: float) -> None:
+    bend = np.array([10.0, np.nan, value, 40.0])
+    tables.write_columns(tmp_path / "angles.csv", {"knee_flexion_l": bend})
+    markers.write_mot(tmp_path / "angles.mot", {"knee_angle_l": bend}, np.arange(4) / 30)
+    with pytest.raises(RecordingError, match=rf"{file}  knee_(flexion|angle)_l is {value:g} in row 3\n"):
+        training.read_angles(tmp_path / file, body)
+
+
 def test_an_opensim_motion(body: Body, motion: np.ndarray, tmp_path: Path) -> None:
     columns = opensim.coordinates(body, np.tile(np.eye(4), (12, 1, 1)), motion)
     markers.write_mot(tmp_path / "angles.mot", columns, np.arange(12) / 30)
@@ -126,6 +139,16 @@ def test_a_bvh_motion(tmp_path: Path) -> None:
     expected = {"hip_flexion_l": 30, "knee_flexion_l": 70, "ankle_l": 15, "hip_flexion_r": 0, "knee_flexion_r": 0}
     for name, degrees in expected.items():
         assert found[name] == pytest.approx([degrees], abs=1e-3), name
+
+
+def test_our_own_bvh(tmp_path: Path) -> None:
+    pytest.importorskip("bvhio")
+    scene = demo_scene()
+    track = stepping(scene.body, 12)
+    path = write("bvh", Result(track=track, scene=scene, recording=open_recording(DEMO)), tmp_path)
+    found, series = training_bvh.columns(path), angles.measure(scene.body, track.root, track.angles)
+    for name in ("knee_flexion_l", "knee_flexion_r", "ankle_l", "ankle_r", "elbow_l", "elbow_r"):
+        np.testing.assert_allclose(found[name], series.value[:, series.names.index(name)], atol=1e-3, err_msg=name)
 
 
 @pytest.mark.parametrize(

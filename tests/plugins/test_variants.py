@@ -12,14 +12,16 @@ from mocapflow_evaluation import variants
 from mocapflow_evaluation.compare import rms
 from mocapflow_export import layout, tables
 
+from mocapflow import levels
+
 FRAMES = np.arange(90.0)
 SHARED = 3 * np.sin(FRAMES / 5)
 
 
-def finished(folder: Path, error: np.ndarray, lost: int = 0) -> Path:
+def finished(folder: Path, error: np.ndarray, lost: int = 0, frames: np.ndarray = FRAMES) -> Path:
     """Write what a run leaves behind."""
-    tables.write_columns(layout.place(folder, layout.ERRORS), {"frame": FRAMES, "knee_flexion_l": error})
-    frames = [
+    tables.write_columns(layout.place(folder, layout.ERRORS), {"frame": frames, "knee_flexion_l": error})
+    per_frame = [
         {
             "time": row / 30,
             "iterations": 3,
@@ -27,9 +29,11 @@ def finished(folder: Path, error: np.ndarray, lost: int = 0) -> Path:
             "cpu_seconds": 0.2,
             **({"lost": True} if row < lost else {}),
         }
-        for row in range(len(FRAMES))
+        for row in range(len(frames))
     ]
-    layout.place(folder, layout.RUN).write_text(json.dumps({"per_frame": frames, "overlap_median": [0.9, None, 0.8]}))
+    layout.place(folder, layout.RUN).write_text(
+        json.dumps({"per_frame": per_frame, "overlap_median": [0.9, None, 0.8]})
+    )
     return folder
 
 
@@ -45,6 +49,7 @@ def test_figures_of_two_variants(tmp_path: Path) -> None:
     assert float(runs[0]["overlap"]) == pytest.approx(0.85)
     assert float(runs[0]["not_at_rest"]) == pytest.approx(0.5)
     assert (tmp_path / "compare.png").stat().st_size > 5000
+    assert {path.name for path in tmp_path.iterdir() if path.is_file()} == set(levels.FILES)  # no variant is called so
 
 
 def test_a_paired_difference_is_sharper_than_its_parts() -> None:
@@ -55,11 +60,25 @@ def test_a_paired_difference_is_sharper_than_its_parts() -> None:
     assert low > 0
 
 
+@pytest.mark.parametrize(("first", "step"), [(1, 1), (0, 2)])
+def test_differences_are_of_the_same_frames(tmp_path: Path, first: int, step: int) -> None:
+    base = finished(tmp_path / "base", SHARED[:40], frames=FRAMES[:40])
+    kept = slice(first, first + 40 * step, step)
+    other = finished(tmp_path / "other", SHARED[kept], frames=FRAMES[kept])
+    _, row = variants.compare([("base", "take", base), ("other", "take", other)], tmp_path)
+    assert (row["difference_deg"], row["difference_low_deg"], row["difference_high_deg"]) == (0, 0, 0)
+    apart = finished(tmp_path / "apart", SHARED[40:80], frames=FRAMES[40:80])
+    _, row = variants.compare([("base", "take", base), ("apart", "take", apart)], tmp_path)
+    assert np.isnan(float(row["difference_deg"]))
+
+
 def test_runs_without_a_reference_have_no_angles(tmp_path: Path) -> None:
     run = finished(tmp_path / "run", SHARED)
+    variants.compare([("only", "take", run)], tmp_path)
     (run / layout.ERRORS).unlink()
     assert variants.compare([("only", "take", run)], tmp_path) == []
     assert (tmp_path / "runs.csv").is_file()
+    assert not (tmp_path / "compare.png").exists()
 
 
 def test_a_run_that_failed_is_a_row_and_the_others_are_compared(tmp_path: Path) -> None:
