@@ -22,6 +22,8 @@ from mocapflow.io.plates import background
 from mocapflow.io.video import Video, read_frames
 from mocapflow.records import F64, Watch, record, unwatched
 
+LEAST_PX = 8  # from side to side; nobody is seen in fewer
+
 
 class FrameChange(Protocol):
     """Changes frames as they are read: what a stage that returns a `Recording` puts between it and later stages.
@@ -166,6 +168,10 @@ def open_recording(
     if not 0 < scale <= 1:
         raise RecordingError(f"the scale is {scale:g}; expected more than 0 and at most 1")
     parts = folders.gather(folder, calibration)
+    side = min(int(lens.size.min()) for lens in parts.lenses)
+    if scale < 1 and scale * side < LEAST_PX:
+        hint = f"the smallest images have {side} pixels from side to side"
+        raise RecordingError(f"the scale {scale:g} leaves images of less than {LEAST_PX} pixels", hint=hint)
     indices = range(start, parts.length if stop is None else stop, step)
     if not indices or start < 0 or indices[-1] >= parts.length:
         raise RecordingError(

@@ -276,6 +276,7 @@ def test_wrong_arguments(tmp_path):
     assert refused(tmp_path / "nowhere").endswith("nowhere  no such recording folder")
     write_recording(tmp_path)
     assert refused(tmp_path, scale=2).startswith("the scale is 2; expected")
+    assert refused(tmp_path, scale=0.01).startswith("the scale 0.01 leaves images of less than 8 pixels")
     with pytest.raises(RecordingError, match="no frame 10: the videos have frames 0 to 9"):
         open_recording(tmp_path).frame(10)
 

@@ -11,6 +11,7 @@ from mocapflow_evaluation.cycles import Cycle
 from mocapflow_evaluation.ours import Ours
 from mocapflow_evaluation.references import Reference
 
+HALF = 0.5  # frames of the video; times that differ less are the same
 BENT = 20.0  # deg that some angle of a person who moves exceeds
 
 
@@ -18,7 +19,7 @@ def said(
     own: Ours, reference: Reference, found: Alignment, strides: Sequence[Cycle], longest_lag_s: float
 ) -> list[str]:
     """Return how the reference came to our frames, its lag, the curves it counts the other way, and the strides."""
-    notes = []
+    notes = apart_in_time(own, reference)
     if not reference.by_frame and len(reference.at) > 1:
         notes.append(f"reference at {1 / reference.step:.4g} per second, interpolated at our {own.frame_rate:.4g}")
     theirs, most = (
@@ -42,3 +43,15 @@ def said(
         count = {side: sum(c.side == side for c in strides) for side in ("l", "r")}
         notes.append(f"strides, by heel strikes in our own joint centres: {count['l']} left, {count['r']} right")
     return notes
+
+
+def apart_in_time(own: Ours, reference: Reference) -> list[str]:
+    """Return what to doubt where a reference has other times at our frames than we do."""
+    frame, time = own.columns["frame"], own.columns["time"]
+    _, ours, theirs = np.intersect1d(frame, reference.at, return_indices=True)
+    if not reference.by_frame or reference.time is None or not len(ours) or len(frame) < 2:
+        return []
+    late = float(np.median(reference.time[theirs] - time[ours]))
+    if abs(late) * np.median(np.diff(frame) / np.diff(time)) > HALF:
+        return [f"frames are matched by number, but the reference's time is off by {late:.4f} s: does it count from 1?"]
+    return []

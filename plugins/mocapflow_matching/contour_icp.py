@@ -27,6 +27,8 @@ from mocapflow.scene import Scene
 from mocapflow_matching.robust import Loss, robust_weights
 from mocapflow_matching.uncertainty import contour_sigma
 
+Reach = Annotated[PositiveFloat, Field(allow_inf_nan=True)]  # infinite where nothing is too far
+
 
 class ImageContour(NamedTuple):
     """Points of the image contour (K,) sorted by row: pixels, unit normals outward, curvature where it is known."""
@@ -59,7 +61,7 @@ class ContourIcp(Matcher):
     calm_mm: PositiveFloat = 15.0  # change of the body in a turn below which reach and loss are the later ones
     first_reach_px: PositiveFloat = 40.0  # pairs farther apart are left out
     later_reach_px: PositiveFloat = 10.0  # the same once it is calm
-    cloth_reach_px: PositiveFloat = float("inf")  # pairs on cloth reach no farther: a hem that swings turns the pelvis
+    cloth_reach_px: Reach = float("inf")  # pairs on cloth reach no farther: a hem that swings turns the pelvis
     normal_angle_deg: Annotated[float, Field(gt=0, le=180)] = 60.0  # contours that differ more make no pair
     first_loss: Loss = "huber"  # of a pair by its distance
     later_loss: Loss = "geman_mcclure"  # the same once it is calm

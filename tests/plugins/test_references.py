@@ -210,6 +210,15 @@ def test_times_that_begin_at_one_sample_are_told(tmp_path: Path) -> None:
         np.testing.assert_allclose(at_our_frames(reference, ours)["knee_angle_r"][: 50 - first], curve[: 50 - first])
 
 
+@pytest.mark.usefixtures("unrendered")
+@pytest.mark.parametrize("first", [0, 1])
+def test_frames_that_count_from_one_are_told_by_their_times(own: Ours, tmp_path: Path, first: int) -> None:
+    columns = {name: own.columns[name] for name in ("frame", "time", "knee_flexion_l")}
+    tables.write_columns(tmp_path / "other.csv", columns | {"frame": columns["frame"] + first})
+    notes = evaluate(own, tmp_path / "other.csv", tmp_path).notes
+    assert any("the reference's time is off by -0.0333 s: does it count from 1?" in note for note in notes) == first
+
+
 def test_the_file_in_reference_is_found(tmp_path: Path) -> None:
     assert chosen(tmp_path, "")[0] is None
     (tmp_path / "reference").mkdir()
