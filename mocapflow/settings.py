@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, get_args, get_origin
+from typing import Annotated, Any, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, ValidationInfo, field_validator
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, ValidationInfo, field_validator
+
+PositiveOrInf = Annotated[PositiveFloat, Field(allow_inf_nan=True)]  # where the largest of all has a meaning
 
 
 class Settings(BaseModel):

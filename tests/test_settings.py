@@ -5,7 +5,7 @@ from typing import Any, Literal
 import pytest
 from pydantic import PositiveInt, ValidationError
 
-from mocapflow.settings import Settings
+from mocapflow.settings import PositiveOrInf, Settings
 
 
 class Some(Settings):
@@ -16,6 +16,7 @@ class Some(Settings):
     drawn: bool = False
     either: bool | int = 0
     any_: Any = None
+    reach_px: PositiveOrInf = 1.0
 
 
 @pytest.mark.parametrize(
@@ -37,3 +38,10 @@ def test_what_is_right_is_taken() -> None:
     some = Some(drawn=True, either=True, any_=True, length_m="1e-3", each=[1, 2.5], count=2)  # type: ignore[arg-type]
     assert (some.drawn, some.either, some.any_) == (True, True, True)
     assert (some.length_m, some.each, some.count) == (0.001, (1.0, 2.5), 2)
+
+
+def test_infinity_is_taken_where_it_has_a_meaning() -> None:
+    assert Some(reach_px=float("inf")).reach_px == float("inf")
+    for wrong in (float("nan"), -float("inf"), True):
+        with pytest.raises(ValidationError):
+            Some(reach_px=wrong)

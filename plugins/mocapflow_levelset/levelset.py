@@ -15,6 +15,7 @@ from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.once import once
 from mocapflow.records import F32, Bool
 from mocapflow.scene import Scene
+from mocapflow.settings import PositiveOrInf
 from mocapflow_levelset.channels import ChannelName
 from mocapflow_levelset.contact import contact_zone
 from mocapflow_levelset.evolve import Rhythm, Weights
@@ -49,7 +50,7 @@ class LevelSet(Segmenter):
 
     channels: tuple[ChannelName, ...] = Field(("lab",), min_length=1)  # independent, their likelihoods add
     decorrelate: bool = True  # turn the channels to the image's principal axes, where no empty scene is known
-    rho_px: PositiveFloat = 12.0  # Gaussian window of the local statistics at full size; inf: one Gaussian per region
+    rho_px: PositiveOrInf = 12.0  # Gaussian window of the local statistics at full size; inf: one Gaussian per region
     cell_px: PositiveInt = 8  # the statistics are summed over cells of this size
     stride_px: PositiveInt = 4  # and taken from every so many-th pixel; 1: from all
     variance_floor: PositiveFloat = 0.03  # smallest standard deviation inside and outside, share of a channel's range

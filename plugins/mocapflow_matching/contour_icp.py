@@ -24,10 +24,9 @@ from mocapflow.geometry.silhouettes import occluding_contour
 from mocapflow.once import once
 from mocapflow.records import F64, I32, Bool
 from mocapflow.scene import Scene
+from mocapflow.settings import PositiveOrInf
 from mocapflow_matching.robust import Loss, robust_weights
 from mocapflow_matching.uncertainty import contour_sigma
-
-Reach = Annotated[PositiveFloat, Field(allow_inf_nan=True)]  # infinite where nothing is too far
 
 
 class ImageContour(NamedTuple):
@@ -61,7 +60,7 @@ class ContourIcp(Matcher):
     calm_mm: PositiveFloat = 15.0  # change of the body in a turn below which reach and loss are the later ones
     first_reach_px: PositiveFloat = 40.0  # pairs farther apart are left out
     later_reach_px: PositiveFloat = 10.0  # the same once it is calm
-    cloth_reach_px: Reach = float("inf")  # pairs on cloth reach no farther: a hem that swings turns the pelvis
+    cloth_reach_px: PositiveOrInf = float("inf")  # pairs on cloth reach no farther: a hem that swings turns the pelvis
     normal_angle_deg: Annotated[float, Field(gt=0, le=180)] = 60.0  # contours that differ more make no pair
     first_loss: Loss = "huber"  # of a pair by its distance
     later_loss: Loss = "geman_mcclure"  # the same once it is calm
