@@ -10,6 +10,13 @@ from pathlib import Path
 FORMER = "former"
 
 
+def has_results(out: Path) -> bool:
+    """Return whether a run has been finished in a run folder."""
+    from mocapflow_export import layout
+
+    return (out / layout.RUN).is_file()
+
+
 def differing(out: Path, keys: Mapping[str, str]) -> list[str]:
     """Return the stages whose results in a run folder were made otherwise than by these keys; none if there are none.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mocapflow.commands.again import Invocation, alone, placed, recall, remember
-from mocapflow.commands.former import differing, set_aside
+from mocapflow.commands.former import differing, has_results, set_aside
 from mocapflow.commands.progress import last_word, noted, reporter
 from mocapflow.commands.workers import Scheduler, Workers, finished
 from mocapflow.errors import PipelineError
@@ -122,7 +122,7 @@ def execute(invocation: Invocation, out: Path, fresh: bool) -> RunSummary:
     """
     pipeline = invocation.load()
     with alone(out):
-        if differing(out, keys(pipeline, invocation)):
+        if has_results(out) and differing(out, keys(pipeline, invocation)):
             typer.echo(f"the results of the run before are now in {set_aside(out)}", err=True)
         remember(invocation, out)
         return carry_out(pipeline, invocation, out, fresh)
