@@ -266,7 +266,7 @@ class Past:
 
     moments: tuple[Moment, ...] = ()
     appearance: Mapping[str, F64] = field(default_factory=dict)
-    lost: bool = False  # there were frames, and the last do not show the person
+    after_gap: bool = False  # there were frames, and the last do not show the person
 
     def after(self, moment: Moment, appearance: Mapping[str, F64]) -> Past:
         """Return the past one frame later."""
@@ -274,8 +274,8 @@ class Past:
 
     def believable(self) -> Past:
         """Return the past, without moments where the last two do not show the person: the next begins like a first."""
-        lost = bool(self.moments) and all(moment.blind for moment in self.moments[-2:])
-        return Past(appearance=self.appearance, lost=True) if lost else self
+        blind = bool(self.moments) and all(moment.blind for moment in self.moments[-2:])
+        return Past(appearance=self.appearance, after_gap=True) if blind else self
 
 
 @record

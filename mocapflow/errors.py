@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 from collections.abc import Collection, Iterable
 from difflib import get_close_matches
+from pathlib import Path
 
 
 class MocapflowError(Exception):
@@ -57,12 +58,20 @@ class StoreError(MocapflowError):
     exit_status = 1
 
 
+def no_run_folder(out: Path, error: OSError) -> StoreError:
+    """Return what is said where a run folder can't be made or written."""
+    hint = "name another with --out"
+    return StoreError(f"can't write the run folder: {error.strerror}", where=str(out), hint=hint)
+
+
 def unwritable(error: OSError) -> StoreError | None:
     """Return what is said where a file can't be written: the drive is full, or it may not be; None for other errors."""
     if error.errno not in {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM} or not error.strerror:
         return None
-    hint = "free some space, then run the same command" if error.errno in {errno.ENOSPC, errno.EDQUOT} else ""
-    return StoreError(f"can't be written or read: {error.strerror}", where=str(error.filename or ""), hint=hint)
+    full = error.errno in {errno.ENOSPC, errno.EDQUOT}
+    hint = "free some space, then run the same command" if full else ""
+    what = "can't be written or read" if error.filename else "a file can't be written or read"
+    return StoreError(f"{what}: {error.strerror}", where=str(error.filename or ""), hint=hint)
 
 
 class ComponentFailed(MocapflowError):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -28,6 +29,7 @@ from mocapflow.warned import warnings_logged
 from mocapflow.wiring import Source
 
 Value = TypeVar("Value")
+FULL = {errno.ENOSPC, errno.EDQUOT, errno.EROFS}  # what the system says of a drive, whoever writes
 
 
 def is_hit(step: Step, artifact: Artifact) -> bool:
@@ -195,8 +197,8 @@ class Execution:
         except (Exception, SystemExit) as error:
             if isinstance(error, MocapflowError) and not isinstance(error, ShapeError | PluginError):
                 raise
-            if isinstance(error, OSError) and (said := unwritable(error)):  # not the component's fault
-                raise said from error
+            if isinstance(error, OSError) and error.errno in FULL and (said := unwritable(error)):
+                raise said from error  # no component's fault
             raise failure(error, component, self._pipeline.registry, kept(), self._out / "failed.log") from error
 
     def _entered(
@@ -223,7 +225,6 @@ class Execution:
             "scale": pipeline.scale,
             "versions": versions(),
             "settings": {label: step.recipe["component"] for label, step in self._steps.items()},
-            "keys": {label: step.key for label, step in self._steps.items()},
             "stages": dict(self.entries),
         }
 

@@ -76,7 +76,8 @@ def load_experiment(path: Path, recordings: Sequence[Path] = (), frames: str | N
     cells = []
     for combination in itertools.product(*factors):
         variant = variant_of(combination)
-        changes = common | {target: change for level in combination for target, change in level.changes.items()}
+        chosen = {target: change for level in combination for target, change in level.changes.items()}
+        changes = {target: change for target, change in common.items() if target not in chosen} | chosen  # in order
         other = changes.pop(PIPELINE, None)
         file = resolver.file(str(other.value) if other else said.pipeline, (PIPELINE,))
         written = tuple(f"{target}={json.dumps(change.value)}" for target, change in changes.items())

@@ -9,7 +9,7 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from mocapflow.errors import StoreError
+from mocapflow.errors import no_run_folder
 from mocapflow.execution import Execution, is_hit
 from mocapflow.keys import explain
 from mocapflow.pipeline import Pipeline
@@ -62,6 +62,14 @@ def plan(pipeline: Pipeline, *, store: Path, url: str | None = None) -> list[Pla
     return lines
 
 
+def keys(pipeline: Pipeline, *, store: Path, url: str | None = None) -> dict[str, str]:
+    """Return the key of what each stage would make, by label."""
+    kept = open_store(store, url)
+    found = {step.label: step.key for step in steps_of(pipeline, kept.digests)}
+    kept.digests.save()
+    return found
+
+
 def tracks(pipeline: Pipeline, *, store: Path) -> list[str]:
     """Return the labels of the stages that go on frame by frame; none needs another's result."""
     return [step.label for step in steps_of(pipeline, Store(store).digests) if step.chain]
@@ -100,8 +108,7 @@ def run(
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        hint = "name another with --out"
-        raise StoreError(f"can't write the run folder: {error.strerror}", where=str(out), hint=hint) from error
+        raise no_run_folder(out, error) from error
     execution = Execution(pipeline, kept, out, steps, fresh=fresh, report=report)
     with threadpool_limits(limits=1, user_api="blas"):  # a frame's matrices are small: threads wait for each other
         for warning in dict.fromkeys(said for step in steps for said in step.recording.warnings):

@@ -220,4 +220,4 @@ def notes_on(frame: Frame, scene: Scene, past: Past, result: FrameResult) -> Seq
     if blind(result.state.estimate.observed):
         return [*notes, "no view shows the person; the prediction is kept"]
     anew = "begun anew, like a first frame: the frames before do not show the person"
-    return [*notes, anew] if past.believable().lost else notes
+    return [*notes, anew] if past.believable().after_gap else notes

@@ -204,7 +204,7 @@ def test_a_run_is_evaluated_and_exported(call):
 
 def test_what_the_pipeline_compares_with_is_compared_with_again(call, tmp_path):
     changes = ("stages.evaluate.reference=truth",)  # a folder
-    remember(Invocation(str(shipped("pipelines", "bare.yaml")), str(CLIP), changes, None, "store"), tmp_path)
+    remember(Invocation(str(shipped("pipelines", "bare.yaml")), str(CLIP), changes, None, "store"), tmp_path, {})
     missing = call("evaluate", str(tmp_path))
     assert missing.stderr.startswith(f"error: {CLIP / 'truth'}  there is nothing to compare with\n")
     assert "--set stages.evaluate.reference=keypoints" in missing.stderr
@@ -238,7 +238,7 @@ def test_a_comparison_is_made_as_in_the_run(call, tmp_path, truth):
     lags = []
     for longest in (0.4, 0.1):  # s
         changes = (f"stages.evaluate.longest_lag_s={longest}",)
-        remember(Invocation(str(shipped("pipelines", "bare.yaml")), str(CLIP), changes, None, "store"), tmp_path)
+        remember(Invocation(str(shipped("pipelines", "bare.yaml")), str(CLIP), changes, None, "store"), tmp_path, {})
         assert call("evaluate", str(tmp_path), *truth).exit_code == 0
         lags.append(json.loads(layout.place(tmp_path, layout.FINDINGS).read_text())["lag_frames"])
     assert lags[0] == pytest.approx(8, abs=0.5)
@@ -248,7 +248,7 @@ def test_a_comparison_is_made_as_in_the_run(call, tmp_path, truth):
 def test_a_run_folder_from_elsewhere_is_compared_with_what_is_given(call, tmp_path):
     known = tables.read_columns(CLIP / "truth/angles.csv")
     tables.write_columns(layout.place(tmp_path, layout.ANGLES), {**known, "time": known["frame"] / 30})
-    remember(Invocation("/elsewhere/bare.yaml", None, (), None, "store"), tmp_path)
+    remember(Invocation("/elsewhere/bare.yaml", None, (), None, "store"), tmp_path, {})
     assert call("evaluate", str(tmp_path)).stderr.startswith("error: /elsewhere/bare.yaml  there is no such file")
     compared = call("evaluate", str(tmp_path), "--truth", str(CLIP / "truth/angles.csv"))
     assert compared.exit_code == 0

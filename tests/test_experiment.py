@@ -80,6 +80,15 @@ def test_a_factor_may_set_a_part_of_what_an_earlier_one_chose(tmp_path: Path) ->
     )
 
 
+def test_a_level_holds_after_what_all_variants_change(tmp_path: Path) -> None:
+    path = "stages.track.draper"
+    said = GRID.replace("{stages.overlay: null}", f"{{{path}.sweeps: 1}}")
+    said = said.replace("    rings:\n", f"    rings: {{{path}: kinematic}}\n")
+    said = said.replace("    contours:\n", f"    contours: {{{path}.sweeps: 9}}\n")
+    cells = load_experiment(written(tmp_path, said))
+    assert cells[0].changes == (f'{path}="kinematic"', f"{path}.sweeps=9")
+
+
 def test_a_date_in_a_change_is_text(tmp_path: Path) -> None:
     text = GRID.replace("change: {stages.overlay: null}", "change: {stages.track.file: 2024-02-03}")
     assert load_experiment(written(tmp_path, text))[0].changes == ('stages.track.file="2024-02-03"',)

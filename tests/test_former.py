@@ -1,6 +1,5 @@
 """No result passes for one of another run: results in a run folder belong to the run that it remembers."""
 
-import json
 import threading
 from pathlib import Path
 
@@ -35,12 +34,6 @@ def run(call, *changes):
     return done
 
 
-def change(**settings):
-    content = yaml.safe_load(Path("tiny.yaml").read_text())
-    content["stages"]["track"] |= settings
-    Path("tiny.yaml").write_text(yaml.safe_dump(content, sort_keys=False))
-
-
 def test_results_of_another_run_are_set_aside(call):
     run(call)
     (OUT / layout.ERRORS).write_text("of the first run")
@@ -57,41 +50,61 @@ def test_a_run_that_fails_leaves_no_results_of_another(call):
     run(call)
     failed = call("run", "tiny.yaml", "--out", "out", "--set", "stages.evaluate={use: evaluate, reference: none.csv}")
     assert failed.exit_code == 2 and "none.csv" in failed.stderr
-    assert json.loads((OUT / layout.RUN).read_text())["recipe"]["keys"]["evaluate"]
-    assert json.loads((OUT / FORMER / layout.RUN).read_text())["recipe"]["keys"].keys() == STAGES.keys()
+    assert (OUT / layout.RUN).exists() and (OUT / FORMER / layout.RUN).exists()
+
+
+def test_what_a_failed_run_has_left_is_no_result_of_the_next(call):
+    (OUT / layout.RESULTS).mkdir(parents=True)
+    (OUT / layout.ERRORS).write_text("of a run that failed before it wrote run.json")
+    run(call)
+    assert not (OUT / layout.ERRORS).exists() and (OUT / FORMER / layout.ERRORS).exists()
 
 
 def test_only_what_is_there_is_moved_and_one_run_is_kept(tmp_path):
+    assert set_aside(tmp_path) is None and not list(tmp_path.iterdir())
     for said in ("one", "two"):
         (tmp_path / layout.RUN).write_text(said)
         assert (set_aside(tmp_path) / layout.RUN).read_text() == said
     assert [path.name for path in (tmp_path / FORMER).iterdir()] == ["run.json"]
+    assert [path.name for path in tmp_path.iterdir()] == [FORMER]
 
 
-def test_what_differs_is_named(tmp_path):
-    assert differing(tmp_path, {"track": "a"}) == []
-    (tmp_path / layout.RUN).write_text(json.dumps({"recipe": {"keys": {"track": "a", "smooth": "b"}}}))
-    assert differing(tmp_path, {"track": "a", "smooth": "b"}) == []
-    assert differing(tmp_path, {"track": "c", "smooth": "b"}) == ["track"]
-    assert differing(tmp_path, {"track": "a", "smooth": "b", "export": "d"}) == ["export"]
-    (tmp_path / layout.RUN).write_text("{")
-    assert differing(tmp_path, {"track": "a"}) == ["track"]
+def test_what_differs_is_named():
+    assert differing({"track": "a", "smooth": "b"}, {"track": "a", "smooth": "b"}) == []
+    assert differing({"track": "a", "smooth": "b"}, {"track": "c", "smooth": "b"}) == ["track"]
+    assert differing({"track": "a", "smooth": "b"}, {"track": "a", "export": "d"}) == ["smooth", "export"]
 
 
 def test_an_export_is_of_the_track_that_was_exported(call):
     run(call, "--set", "stages.export={use: export, from: {track: track}, formats: [csv]}")
     files = (OUT / layout.ANGLES).read_text(), (OUT / layout.RUN).read_text()
-    assert call("export", "out", "--format", "csv", "--format", "trc").exit_code == 0
+    exported = call("export", "out", "--format", "csv", "--format", "trc")
+    assert exported.exit_code == 0 and "export: running write_formats" in exported.stderr
     assert ((OUT / layout.ANGLES).read_text(), (OUT / layout.RUN).read_text()) == files
     assert (OUT / layout.JOINTS).exists()
+    again = run(call, "--set", "stages.export={use: export, from: {track: track}, formats: [csv]}")
+    assert "the run before" not in again.stderr
 
 
-def test_an_export_after_an_edit_is_refused(call):
+@pytest.mark.parametrize(
+    ("edit", "changed"),
+    [
+        ({"track": {**STAGES["track"], "steady": {"max_turns": 3}}}, "track, smooth, export"),
+        ({"smooth": None}, "export, smooth"),
+        ({"export": {"use": "export", "from": {"track": "track"}}}, "export"),
+    ],
+    ids=["a setting", "a stage removed", "another track exported"],
+)
+def test_an_export_after_an_edit_is_refused(call, edit, changed):
     run(call)
-    change(steady={"max_turns": 3})
+    content = yaml.safe_load(Path("tiny.yaml").read_text())
+    stages = {label: stage for label, stage in (content["stages"] | edit).items() if stage}
+    Path("tiny.yaml").write_text(yaml.safe_dump(content | {"stages": stages}, sort_keys=False))
     refused = call("export", "out", "--format", "trc")
     assert refused.exit_code == 2
-    assert refused.stderr.startswith("error: out  pipeline or recording have changed since this run: smooth, track\n")
+    what = "pipeline, recording or mocapflow have changed since this run"
+    said, _, labels = refused.stderr.splitlines()[0].rpartition(": ")
+    assert said == f"error: out  {what}" and set(labels.split(", ")) == set(changed.split(", "))
 
 
 def test_one_run_at_a_time_writes_into_a_folder(tmp_path, capsys):

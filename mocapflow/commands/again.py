@@ -6,13 +6,13 @@ import fcntl
 import json
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mocapflow.errors import PipelineError, StoreError
+from mocapflow.errors import PipelineError, no_run_folder
 
 if TYPE_CHECKING:
     from mocapflow.pipeline import Pipeline
@@ -71,7 +71,7 @@ def alone(out: Path) -> Iterator[None]:
         out.mkdir(parents=True, exist_ok=True)
         folder = os.open(out, os.O_RDONLY)
     except OSError as error:
-        raise unwritable(out, error) from None
+        raise no_run_folder(out, error) from None
     try:
         try:
             fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -83,31 +83,35 @@ def alone(out: Path) -> Iterator[None]:
         os.close(folder)
 
 
-def remember(invocation: Invocation, out: Path) -> None:
-    """Write an invocation into its run folder."""
+def remember(invocation: Invocation, out: Path, keys: Mapping[str, str]) -> None:
+    """Write an invocation into its run folder, with the keys of what its stages make."""
+    said = {**asdict(invocation.absolute()), "keys": keys}
     try:
-        out.mkdir(parents=True, exist_ok=True)
-        (out / FILE).write_text(json.dumps(asdict(invocation.absolute()), indent=1) + "\n", encoding="utf-8")
+        (out / FILE).write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
     except OSError as error:
-        raise unwritable(out, error) from None
-
-
-def unwritable(out: Path, error: OSError) -> StoreError:
-    """Return what is said of a run folder that can't be written."""
-    hint = "name another with --out"
-    return StoreError(f"can't write the run folder: {error.strerror}", where=str(out), hint=hint)
+        raise no_run_folder(out, error) from None
 
 
 def recall(out: Path) -> Invocation:
     """Return the invocation a run folder was made by."""
     try:
         said = json.loads((out / FILE).read_text(encoding="utf-8"))
-        return Invocation(**{**said, "changes": tuple(said["changes"])})
+        known = {name: value for name, value in said.items() if name != "keys"}
+        return Invocation(**{**known, "changes": tuple(said["changes"])})
     except (FileNotFoundError, NotADirectoryError):
         hint = f"a run folder is what `mocapflow run` writes; it holds {FILE}"
         raise PipelineError("this is no run folder", where=str(out), hint=hint) from None
     except (ValueError, TypeError, KeyError):
         raise PipelineError("this file is damaged", where=str(out / FILE), hint="run the pipeline again") from None
+
+
+def recalled_keys(out: Path) -> dict[str, str]:
+    """Return the keys of what the stages of a run folder's command make; none where they are not known."""
+    try:
+        keys = json.loads((out / FILE).read_text(encoding="utf-8"))["keys"]
+        return dict(keys)
+    except (OSError, ValueError, LookupError, TypeError):
+        return {}
 
 
 def parse_frames(text: str | None) -> slice | None:

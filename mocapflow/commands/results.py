@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mocapflow.commands.again import alone, recall
+from mocapflow.commands.again import alone, recall, recalled_keys
 from mocapflow.commands.former import differing
 from mocapflow.errors import MocapflowError, PipelineError, RecordingError
 
 if TYPE_CHECKING:
-    from mocapflow.pipeline import NamedStage
+    from mocapflow.pipeline import Pipeline
 
 Run = Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")]
 Truth = Annotated[
@@ -70,36 +70,32 @@ def _comparison(run: Path, truth: Path | None) -> tuple[Path | None, str, float]
 def export(run: Run, format_: Format) -> None:
     """Write the track of a run in other formats, into the run folder."""
     from mocapflow.commands.running import carry_out, keys
+
+    invocation = recall(run)
+    pipeline = invocation.load()
+    with alone(run):
+        if changed := differing(recalled_keys(run), keys(pipeline, invocation)):
+            what = f"pipeline, recording or mocapflow have changed since this run: {', '.join(changed)}"
+            hint = "run it again, then export: else its files would show two tracks"
+            raise PipelineError(what, where=str(run), hint=hint)
+        exporting = invocation.changed(*_only_formats(pipeline, format_))
+        typer.echo(carry_out(exporting.load(), exporting, run))
+
+
+def _only_formats(pipeline: Pipeline, formats: Sequence[str]) -> list[str]:
+    """Return the changes that leave nothing that writes but the track of each stage `export`, in other formats."""
+    from mocapflow_export.export import Export
+
     from mocapflow.results import Evaluation, Files
     from mocapflow.wiring import makes
 
-    invocation = recall(run)
-    writers = [named for named in invocation.load().stages if issubclass(makes(named.stage), Files | Evaluation)]
-    exporting = invocation.changed(*_only_exporting(writers, format_))
-    pipeline = exporting.load()
-    with alone(run):
-        now = keys(pipeline, exporting)
-        if changed := set(differing(run, now)) & now.keys() - {named.label for named in writers} - {"export"}:
-            hint = "run it again, then export: else its files would show two tracks"
-            raise PipelineError(
-                f"pipeline or recording have changed since this run: {', '.join(sorted(changed))}",
-                where=str(run),
-                hint=hint,
-            )
-        typer.echo(carry_out(pipeline, exporting, run))
-
-
-def _only_exporting(writers: Sequence[NamedStage], formats: Sequence[str]) -> list[str]:
-    """Return the changes that leave the stages `export` as all that writes, from what they took, in other formats."""
-    from mocapflow_export.export import Export
-
-    exports = [named.label for named in writers if isinstance(named.stage, Export)]
-    silent = [f"stages.{named.label}=null" for named in writers if named.label not in exports]
     wanted = f"[{', '.join(formats)}]"
-    changes = [
-        change for label in exports for change in (f"stages.{label}.formats={wanted}", f"stages.{label}.record=false")
-    ]
-    return [*silent, *(changes or [f"stages.export={{use: export, formats: {wanted}}}"])]
+    writers = [named for named in pipeline.stages if issubclass(makes(named.stage), Files | Evaluation)]
+    exports = [named.label for named in writers if isinstance(named.stage, Export)]
+    changes = [f"stages.{named.label}=null" for named in writers if named.label not in exports]
+    for label in exports:
+        changes += [f"stages.{label}.use=write_formats", f"stages.{label}.formats={wanted}"]
+    return changes if exports else [*changes, f"stages.export={{use: write_formats, formats: {wanted}}}"]
 
 
 def view(

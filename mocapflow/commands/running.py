@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mocapflow.commands.again import Invocation, alone, placed, recall, remember
-from mocapflow.commands.former import differing, has_results, set_aside
+from mocapflow.commands.again import Invocation, alone, placed, recall, recalled_keys, remember
+from mocapflow.commands.former import differing, set_aside
 from mocapflow.commands.progress import last_word, noted, reporter
 from mocapflow.commands.workers import Scheduler, Workers, finished
 from mocapflow.errors import PipelineError
@@ -53,9 +55,13 @@ def run(
     folder = _out(pipeline, out)
     split = [f"parts.count={parts}"] if parts else []
     invocation = _invocation(pipeline, recording, folder, store, [*(changes or []), *split], frames)
-    if scheduler is not None or workers > 1:
-        side_by_side(invocation, folder, workers, scheduler, fresh)
-    typer.echo(execute(invocation, folder, fresh))
+    if scheduler is None and workers == 1:
+        typer.echo(execute(invocation, folder, fresh))
+        return
+    labels = side_by_side(invocation, fresh)
+    with begun(invocation, folder) as loaded:
+        make_parts(labels, invocation, folder, workers, scheduler)
+        typer.echo(carry_out(loaded, invocation, folder))
 
 
 def plan(
@@ -86,8 +92,8 @@ def demo(out: Annotated[Path, typer.Option(help="The run folder.")] = Path("runs
     typer.echo(f"joint angles    {out / 'results' / 'angles.csv'}")
 
 
-def side_by_side(invocation: Invocation, out: Path, workers: int, scheduler: str | None, fresh: bool) -> None:
-    """Make the parts of a track on workers; a run finds them in the store.
+def side_by_side(invocation: Invocation, fresh: bool) -> list[str]:
+    """Return the labels of the parts of a track that workers can make.
 
     Raises:
         PipelineError: there are no parts, or all is to be made anew.
@@ -99,12 +105,15 @@ def side_by_side(invocation: Invocation, out: Path, workers: int, scheduler: str
     labels = runner.tracks(invocation.load(), store=Path(invocation.store))
     if len(labels) < 2:
         raise PipelineError("there is nothing for several workers to do", hint="--parts N tracks in N parts")
+    return labels
+
+
+def make_parts(labels: Sequence[str], invocation: Invocation, out: Path, workers: int, scheduler: str | None) -> None:
+    """Make the parts of a track on workers; a run finds them in the store."""
     tasks = {label: partial(track, invocation.absolute(), out.absolute(), label) for label in labels}
-    with alone(out):
-        remember(invocation, out)
-        for number, (label, result) in enumerate(finished(tasks, workers, scheduler), 1):
-            result()
-            typer.echo(f"{number} of {len(labels)}  {label}", err=True)
+    for number, (label, result) in enumerate(finished(tasks, workers, scheduler), 1):
+        result()
+        typer.echo(f"{number} of {len(labels)}  {label}", err=True)
 
 
 def track(invocation: Invocation, out: Path, label: str) -> None:
@@ -116,16 +125,21 @@ def track(invocation: Invocation, out: Path, label: str) -> None:
 
 
 def execute(invocation: Invocation, out: Path, fresh: bool) -> RunSummary:
-    """Run what an invocation says, have the run folder remember it, and return the summary.
+    """Run what an invocation says, have the run folder remember it, and return the summary."""
+    with begun(invocation, out) as pipeline:
+        return carry_out(pipeline, invocation, out, fresh)
 
-    What lies there of another run is set aside first.
-    """
+
+@contextmanager
+def begun(invocation: Invocation, out: Path) -> Iterator[Pipeline]:
+    """Give the pipeline of an invocation, and its run folder to it alone; what lies there of another is set aside."""
     pipeline = invocation.load()
     with alone(out):
-        if has_results(out) and differing(out, keys(pipeline, invocation)):
-            typer.echo(f"the results of the run before are now in {set_aside(out)}", err=True)
-        remember(invocation, out)
-        return carry_out(pipeline, invocation, out, fresh)
+        now = keys(pipeline, invocation)
+        if differing(recalled_keys(out), now) and (former := set_aside(out)):
+            typer.echo(f"the results of the run before are now in {former}", err=True)
+        remember(invocation, out, now)
+        yield pipeline
 
 
 def carry_out(pipeline: Pipeline, invocation: Invocation, out: Path, fresh: bool = False) -> RunSummary:
@@ -141,8 +155,7 @@ def keys(pipeline: Pipeline, invocation: Invocation) -> dict[str, str]:
     """Return the key of what each stage of an invocation's pipeline would make."""
     from mocapflow import runner
 
-    lines = runner.plan(pipeline, store=Path(invocation.store), url=invocation.url)
-    return {line.label: line.key for line in lines}
+    return runner.keys(pipeline, store=Path(invocation.store), url=invocation.url)
 
 
 def _print_plan(invocation: Invocation) -> None:

@@ -104,7 +104,8 @@ def follow(
     (roots, facing, links), (back, towards, _) = near, blown(near[1], *winds)
     begin, down = rates(roots, moved.steps), np.broadcast_to(DOWN, facing.shape)
     for first, out, to in ((strands.first, facing, down), (laid.pivot[0], back, towards)):
-        here, there = (np.ascontiguousarray(way[-1]) for way in (out, to))  # other strides would be compiled again
+        # other strides, or rows that can't be written, would be compiled again
+        here, there = (np.ascontiguousarray(way[-1]) for way in (out, to))
         follow_swing(
             laid.grid[0], laid.held[0], here, there, begin, rates(out, moved.steps),
             rates(to, moved.steps), links[-1], first.copy(), strands.last, parts[0], fields.values, moved.carry,

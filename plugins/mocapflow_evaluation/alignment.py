@@ -9,9 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from mocapflow.records import F64
-from mocapflow_evaluation.references import Reference
+from mocapflow_evaluation.references import SLACK, Reference
 
-SLACK = 0.03  # of a sample: times in files are rounded
 GAP = 1.5  # samples; across a longer one nothing is interpolated
 LEAST = 0.5  # of our frames must have a counterpart at every shift that is tried
 HALF = 0.5  # frames; a smaller lag is lost in the resampling

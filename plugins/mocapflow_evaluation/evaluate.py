@@ -46,6 +46,7 @@ class Evaluate(Stage):
 
     def run(self, track: Track, scene: Scene, recording: Recording, run_folder: RunFolder) -> Evaluation:
         """Return the evaluation of the track."""
+        layout.forget_comparison(run_folder.path)
         path, note = chosen(recording.folder, self.reference)
         if path is None:
             return Evaluation(reference="", rows=(), notes=(note,))
@@ -91,7 +92,7 @@ def evaluate(own: Ours, path: Path, folder: Path, longest_lag_s: float = LONGEST
     ]
     rigs = compare_rigs(own, reference, alignment.worth, path.parent / layout.COMMON_POINTS)
     notes = [*reference.notes, *rigs.notes]
-    if not rows:  # a comparison that was written before stays
+    if not rows:  # a comparison that a command wrote before stays
         ours = ", ".join(tables.angle_names(own.columns))
         notes.append(f"the reference shares no angle and frame with the track, which has {ours}")
         return Evaluation(reference=str(path), rows=(), notes=tuple(notes))

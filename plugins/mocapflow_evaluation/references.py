@@ -22,7 +22,7 @@ POSE2SIM = {
     "Hip": "hip", "Knee": "knee", "Ankle": "ankle", "BigToe": "toe", "Heel": "heel",
     "Shoulder": "shoulder", "Elbow": "elbow", "Wrist": "wrist",
 }  # fmt: skip
-SLACK = 0.01  # of a sample: times in files are rounded
+SLACK = 0.03  # of a sample: times in files are rounded
 SUFFIXES = (".csv", ".mot", ".sto", ".trc", ".c3d")
 
 
@@ -46,7 +46,8 @@ class Reference:
 
     def moments(self, ours: F64) -> F64:
         """Return its `at` (T,) as our clock (U,) has it: counted from 0, but for a run that begins where it does."""
-        return self.at if abs(ours[0] - self.at[0]) < SLACK * self.step else self.at - self.counted_from
+        begins_with_us = len(self.at) > 0 and abs(ours[0] - self.at[0]) < SLACK * self.step
+        return self.at if begins_with_us else self.at - self.counted_from
 
 
 def read_reference(path: Path) -> Reference:

@@ -66,7 +66,8 @@ def figures(error: F64, base: F64 | None, rate: float) -> Row:
     row["mae_deg"] = float(np.abs(error[seen]).mean())
     difference = (np.nan,) * 3
     if base is not None and (both := seen & np.isfinite(base)).any():
-        difference = paired_difference(error[both], base[both], rate)
+        shared = rate * both.sum() / seen.sum()  # frames per second that both have
+        difference = paired_difference(error[both], base[both], float(shared))
     return row | dict(zip(("difference_deg", "difference_low_deg", "difference_high_deg"), difference, strict=True))
 
 

@@ -9,6 +9,6 @@ from mocapflow.hookspecs import hookimpl
 @hookimpl
 def mocapflow_stages() -> list[type[Stage]]:
     """Return the stages of this package."""
-    from mocapflow_export.export import Export
+    from mocapflow_export.export import Export, WriteFormats
 
-    return [Export]
+    return [Export, WriteFormats]

@@ -22,7 +22,19 @@ LOG = logging.getLogger("mocapflow")
 Format = Literal["csv", "mot", "trc", "bvh", "c3d", "gltf", "movement", "parquet", "rrd", "usd"]
 
 
-class Export(Stage):
+class WriteFormats(Stage):
+    """Writes the track in further formats, and nothing else: what `mocapflow export` does with a finished run."""
+
+    name: ClassVar[str] = "write_formats"
+    formats: tuple[Format, ...] = ("csv", "mot", "trc")  # those beyond these three need their extra
+
+    def run(self, track: Track, scene: Scene, recording: Recording, run_folder: RunFolder) -> Files:
+        """Write the files and return their paths."""
+        result = Result(track=track, scene=scene, recording=recording)
+        return Files(paths=tuple(path for name in self.formats for path in written(name, result, run_folder.path)))
+
+
+class Export(WriteFormats):
     """Writes results/angles.csv, angles_raw.csv and energy.csv, angles.mot, joints.trc and run.json.
 
     The csv of angles hold one row per frame: the angles between joint centres in degrees (`geometry.angles`), their
@@ -33,21 +45,16 @@ class Export(Stage):
     """
 
     name: ClassVar[str] = "export"
-    formats: tuple[Format, ...] = ("csv", "mot", "trc")  # those beyond these three need their extra
-    record: bool = True  # also run.json: how the run was made and how it went
 
     def run(self, track: Track, scene: Scene, recording: Recording, run_folder: RunFolder) -> Files:
         """Write the files and return their paths."""
-        result = Result(track=track, scene=scene, recording=recording)
-        paths = [path for name in self.formats for path in written(name, result, run_folder.path)]
-        if not self.record:
-            return Files(paths=tuple(paths))
+        files = super().run(track, scene, recording, run_folder)
         doubts = misgivings(track, [camera.name for camera in scene.cameras])
         for doubt in doubts:
             LOG.warning(doubt)
         warnings = (*recording.warnings, *scene.warnings, *doubts)
         content = runjson.summary(track, measured(track, scene), run_folder, warnings)
-        return Files(paths=(*paths, runjson.write(layout.place(run_folder.path, layout.RUN), content)))
+        return Files(paths=(*files.paths, runjson.write(layout.place(run_folder.path, layout.RUN), content)))
 
 
 def before_smoothing(track: Track) -> Track:

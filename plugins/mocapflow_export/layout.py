@@ -20,6 +20,18 @@ STICK = RESULTS / "stick_model.trc"
 STICK_PLOT = RESULTS / "stick_model.png"
 AGREEMENT_PLOT = RESULTS / "agreement.png"
 CYCLES_PLOT = RESULTS / "cycles.png"
+COMPARISON = (
+    EVALUATION,
+    ERRORS,
+    CYCLES,
+    FINDINGS,
+    KEYPOINTS,
+    DISTANCES,
+    STICK,
+    STICK_PLOT,
+    AGREEMENT_PLOT,
+    CYCLES_PLOT,
+)
 COMMON_POINTS = "registration.csv"  # in reference/ of the recording: points that both rigs have measured
 PLOT = RESULTS / "angles.png"
 OVERLAP = RESULTS / "overlap.png"
@@ -32,6 +44,12 @@ WRITTEN = (RESULTS, RUN, REPORT, VIRTUAL.parent, Path("overlay"))
 def overlay(camera: str) -> Path:
     """Return the overlay video of a camera."""
     return Path("overlay") / f"{camera}.mp4"
+
+
+def forget_comparison(run_folder: Path) -> None:
+    """Remove what a comparison has written: of another reference, it is none of this run."""
+    for part in COMPARISON:
+        (run_folder / part).unlink(missing_ok=True)
 
 
 def place(run_folder: Path, part: Path) -> Path:

@@ -6,7 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from mocapflow.errors import PipelineError
 from mocapflow_formats.result import Result, library
+
+LAST = 65535  # frame that the header can name
 
 
 def write(result: Result, path: Path) -> None:
@@ -18,6 +21,8 @@ def write(result: Result, path: Path) -> None:
     first, last = int(result.track.frame[0]), int(result.track.frame[-1])
     points = np.full((4, result.places.shape[1], last - first + 1), np.nan)
     points[:3, :, result.track.frame - first] = 1000 * np.transpose(result.places, (2, 1, 0))
+    if first > LAST:
+        raise PipelineError(f"C3D can't say that a track begins at frame {first}", hint=f"it counts frames to {LAST}")
     point = file["parameters"]["POINT"]
     point["LABELS"]["value"] = list(result.scene.body.joint_names)
     point["RATE"]["value"] = [result.recording.frame_rate]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from mocapflow_priors.density import Density
 
 from mocapflow.assets import Body
 from mocapflow.data import Pose
@@ -10,7 +11,7 @@ from mocapflow.records import F64
 from mocapflow_recovery.sampling import parts
 
 
-def leapt(fitted: Pose, believed: Pose, body: Body, seen: F64, least: float) -> bool:
+def leapt(fitted: Pose, believed: Pose, body: Body, density: Density, least: float) -> bool:
     """Return whether a part of the body is far from where it was believed and as far from all that was seen of it.
 
     Either alone is nothing to wonder at: fast legs leave what was believed, and nobody has seen everything.
@@ -19,12 +20,13 @@ def leapt(fitted: Pose, believed: Pose, body: Body, seen: F64, least: float) -> 
         fitted: the pose that is asked about.
         believed: what was believed before looking.
         body: whose parts are tried.
-        seen: (N, D) rad, poses that people were seen in, NaN where an angle is not known.
+        density: its training poses are what people were seen in; the angles it does not know count as seen.
         least: rad, what counts as far: for the angle that changed most, and for all angles of a part together.
     """
     far = np.abs(fitted.angles - believed.angles) > least
     if not far.any():  # nearly always
         return False
+    seen = density.on(body.screw_names)
     leaping = (part for part in parts(body) if part is not None and far[part].any())
     return any(_apart(fitted.angles[part], seen[:, part]) > least for part in leaping)
 

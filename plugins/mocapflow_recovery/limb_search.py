@@ -18,6 +18,7 @@ from mocapflow.components import Recovery
 from mocapflow.data import Frame, FrameResult, FrameState, Past, Pose, Surface
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
+from mocapflow.settings import PositiveOrInf
 from mocapflow_recovery.certain import View, small_room, views
 from mocapflow_recovery.coarse import coarse_body
 from mocapflow_recovery.disagreement import distance
@@ -35,14 +36,16 @@ class LimbSearch(Recovery):
     limbs as people were seen to hold them. A part moves only if that brings what strays together: a leg must not take
     a new place under the skirt because an arm was lost. The loop settles again from there.
     It also looks where images need not contradict a leg that rests on the contour of the other one: after frames that
-    did not show the person, and where a limb has leapt into a pose that nobody was seen in.
+    did not show the person, and where a limb has leapt into a pose that nobody was seen in. There a part moves only if
+    that brings person and model together.
     It needs the empty scene; without one every fit is taken as it is.
     """
 
     name: ClassVar[str] = "limb_search"
     uncovered_cm2: PositiveFloat = 60.0  # of the person off the model, in all views: more, and the fit is doubted
     floating_cm2: PositiveFloat = 60.0  # likewise, of skin in empty space
-    leap_deg: PositiveFloat = 20.0  # from what was believed and from all `poses`: a limb so far from both is doubted
+    after_gap: bool = True  # limbs are looked for in the first frame that shows the person again
+    leap_deg: PositiveOrInf = 20.0  # from what was believed and from all `poses`: a limb so far from both is looked for
     reach_m: PositiveFloat = 0.06  # what lies nearer to the other does not count
     cloth_m: PositiveFloat = 0.2  # what lies so near to the garment may be the garment, wherever it swings
     gain: Annotated[float, Field(ge=0, lt=1)] = 0.1  # share that a fit is nearer, and that each part mends
@@ -90,10 +93,10 @@ class LimbSearch(Recovery):
         """Return why the limbs are looked for, or nothing."""
         if self._doubtful(stray):
             return f"fit doubted, {stray}"
-        if past.lost:
+        if past.after_gap and self.after_gap:
             return "looked for the limbs after a gap"
-        leap = leapt(fitted, believed, body, self._density.on(body.screw_names), np.radians(self.leap_deg))
-        return "fit doubted, a limb leapt into a pose that nobody was seen in" if leap else ""
+        leap = leapt(fitted, believed, body, self._density, np.radians(self.leap_deg))
+        return "a limb leapt into a pose that nobody was seen in" if leap else ""
 
     def _doubtful(self, stray: Stray) -> bool:
         return stray.doubtful(self.uncovered_cm2, self.floating_cm2)

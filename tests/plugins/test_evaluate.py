@@ -107,9 +107,12 @@ def run_folder(path: Path) -> RunFolder:
 def test_without_reference_there_is_a_note_and_no_error(tmp_path: Path) -> None:
     scene = demo_scene()
     recording = SimpleNamespace(folder=tmp_path)
+    former = layout.place(tmp_path, layout.ERRORS)
+    former.write_text("of another reference")
     got = Evaluate().run(track=stepping(scene.body), scene=scene, recording=recording, run_folder=run_folder(tmp_path))
     assert (got.rows, got.reference) == ((), "")
     assert "truth/angles.csv" in got.notes[0]
+    assert not former.exists()
 
 
 def test_demo_truth_is_found(tmp_path: Path) -> None:

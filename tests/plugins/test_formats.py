@@ -96,6 +96,12 @@ def test_c3d_has_the_times_of_the_track(result: Result, tmp_path: Path, first: i
         assert c3d.Reader(file).first_frame == first + 1  # the format counts from 1
 
 
+def test_c3d_says_what_it_can_not_count(result: Result, tmp_path: Path) -> None:
+    track = replace(result.track, frame=result.track.frame + 65536)
+    with pytest.raises(PipelineError, match="C3D can't say that a track begins at frame 65536"):
+        write("c3d", replace(result, track=track), tmp_path)
+
+
 def test_parquet(result: Result, tmp_path: Path) -> None:
     table = readers.parquet(write("parquet", result, tmp_path))
     assert list(table)[:4] == ["frame", "time", "knee_flexion_l", "knee_flexion_l_sd"]

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mocapflow_priors.density import Density, write
 from mocapflow_recovery.certain import shrunk, small_room, views
 from mocapflow_recovery.coarse import coarse_body
 from mocapflow_recovery.disagreement import distance, floating_area, uncovered_area
@@ -203,7 +204,7 @@ def test_after_a_gap_a_limb_is_looked_for_that_nothing_doubts(lost) -> None:
         return settled(pictures.tiny_state(SCENE, POSE, POSE))
 
     near = pictures.tiny_state(SCENE, astray(0.06), POSE)
-    past = Past(lost=True) if lost else scenes.tiny_past(SCENE, POSE)
+    past = Past(after_gap=True) if lost else scenes.tiny_past(SCENE, POSE)
     found = LimbSearch().recover(FRAME, near, settled(near), past, scenes.tiny_model(SCENE), settle)
     assert (found.state.estimate.pose.angles == POSE.angles).all() == lost
     assert not found.doubted and bool(found.notes) == lost
@@ -215,9 +216,24 @@ def test_after_a_gap_a_limb_is_looked_for_that_nothing_doubts(lost) -> None:
     ids=["far from both", "as somebody was seen", "as believed", "nobody was seen"],
 )
 def test_a_leap_ends_far_from_what_was_believed_and_from_what_was_seen(believed, seen_at, leap) -> None:
-    seen_poses = np.full((2, len(POSE.angles)), np.nan)
-    seen_poses[0, 1] = astray(seen_at).angles[1]
-    assert leapt(astray(0.6), astray(believed), SCENE.body, seen_poses, 0.4) == leap
+    names = ("hip_l.abduction",) if np.isfinite(seen_at) else ("elbow_l.flexion",)
+    density = Density(names=names, poses=np.array([[astray(seen_at).angles[1]]]), bandwidth=0.1)
+    assert leapt(astray(0.6), astray(believed), SCENE.body, density, 0.4) == leap
+
+
+@pytest.mark.parametrize(("leap_deg", "looked"), [(2.0, True), (10.0, False), (np.inf, False)])
+def test_a_limb_that_leapt_is_looked_for_though_nothing_strays(tmp_path, leap_deg, looked) -> None:
+    def settle(pose, parameters):
+        return settled(pictures.tiny_state(SCENE, POSE, POSE))
+
+    seen_pose = Density(names=SCENE.body.screw_names, poses=POSE.angles[None], bandwidth=0.1)
+    write(tmp_path / "seen.npz", seen_pose)
+    search = LimbSearch(poses=tmp_path / "seen.npz", leap_deg=leap_deg)
+    believed, near = (pictures.tiny_state(SCENE, pose, POSE) for pose in (POSE, astray(0.06)))  # by 3.4°
+    past, model = scenes.tiny_past(SCENE, POSE), scenes.tiny_model(SCENE)
+    found = search.recover(FRAME, believed, settled(near), past, model, settle)
+    assert (found.state.estimate.pose.angles == POSE.angles).all() == looked
+    assert not found.doubted and bool(found.notes) == looked
 
 
 def test_seen_samples_bend_what_was_seen_and_nothing_else() -> None:

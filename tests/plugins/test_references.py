@@ -200,14 +200,21 @@ def test_a_run_against_its_own_files_is_off_by_nothing(tmp_path: Path, name: str
         assert float(row["rms_deg"]) < 0.01, row["angle"]
 
 
-def test_times_that_begin_at_one_sample_are_told(tmp_path: Path) -> None:
+@pytest.mark.parametrize("decimals", [8, 3])
+def test_times_that_begin_at_one_sample_are_told(tmp_path: Path, decimals: int) -> None:
     curve = 30 + np.arange(50.0)
-    markers.write_mot(tmp_path / "m.mot", {"knee_angle_r": curve}, np.arange(1, 51) / 60)
+    markers.write_mot(tmp_path / "m.mot", {"knee_angle_r": curve}, np.round(np.arange(1, 51) / 60, decimals))
     reference = read_reference(tmp_path / "m.mot")
-    assert "counts time from 0.0167 s, one sample: taken as 0, unless our first frame is there" in reference.notes[0]
+    assert "one sample: taken as 0, unless our first frame is there" in reference.notes[0]
     for first in (0, 1):
         ours = {"time": np.arange(first, 50) / 60}
-        np.testing.assert_allclose(at_our_frames(reference, ours)["knee_angle_r"][: 50 - first], curve[: 50 - first])
+        found = at_our_frames(reference, ours)["knee_angle_r"][1:-1]  # the ends may be a rounding outside
+        np.testing.assert_allclose(found, curve[1 : 49 - first], atol=0.1)
+
+
+def test_a_reference_without_rows_shares_nothing(own: Ours, tmp_path: Path) -> None:
+    markers.write_mot(tmp_path / "m.mot", {"knee_angle_r": np.empty(0)}, np.empty(0))
+    assert "shares no angle and frame" in evaluate(own, tmp_path / "m.mot", tmp_path).notes[-1]
 
 
 @pytest.mark.usefixtures("unrendered")

@@ -23,7 +23,7 @@ def finished(folder: Path, error: np.ndarray, lost: int = 0, frames: np.ndarray 
     tables.write_columns(layout.place(folder, layout.ERRORS), {"frame": frames, "knee_flexion_l": error})
     per_frame = [
         {
-            "time": row / 30,
+            "time": float(frames[row]) / 30,
             "iterations": 3,
             "steady": row % 2 == 0,
             "cpu_seconds": 0.2,
@@ -70,6 +70,14 @@ def test_differences_are_of_the_same_frames(tmp_path: Path, first: int, step: in
     apart = finished(tmp_path / "apart", SHARED[40:80], frames=FRAMES[40:80])
     _, row = variants.compare([("base", "take", base), ("apart", "take", apart)], tmp_path)
     assert np.isnan(float(row["difference_deg"]))
+
+
+def test_an_interval_is_of_the_frames_that_both_have(tmp_path: Path) -> None:
+    every, second = slice(0, 80), slice(0, 80, 2)
+    base = finished(tmp_path / "base", SHARED[second], frames=FRAMES[second])
+    runs = [finished(tmp_path / str(kept.step), 1.2 * SHARED[kept], frames=FRAMES[kept]) for kept in (every, second)]
+    rows = [variants.compare([("base", "take", base), ("other", "take", run)], tmp_path)[1] for run in runs]
+    assert rows[0]["difference_low_deg"] == rows[1]["difference_low_deg"] < rows[1]["difference_high_deg"]
 
 
 def test_runs_without_a_reference_have_no_angles(tmp_path: Path) -> None:
