@@ -9,7 +9,7 @@ from mocapflow_export import layout
 from typer.testing import CliRunner
 
 from mocapflow import cli
-from mocapflow.commands.again import alone
+from mocapflow.commands.again import FILE, alone
 from mocapflow.commands.former import FORMER, differing, set_aside
 from tests.fixtures.stores import STAGES, write_pipeline, write_recording
 
@@ -40,33 +40,42 @@ def test_results_of_another_run_are_set_aside(call):
     assert "the run before" not in run(call).stderr
     assert (OUT / layout.ERRORS).exists()
     other = run(call, "--frames", "0:2")
-    assert "the results of the run before are now in out/former" in other.stderr
+    assert "the results of the run before are now in out/former/1" in other.stderr
     assert not (OUT / layout.ERRORS).exists()
     assert len((OUT / layout.ANGLES).read_text().splitlines()) == 3
-    assert len((OUT / FORMER / layout.ANGLES).read_text().splitlines()) == 4
+    assert len((OUT / FORMER / "1" / layout.ANGLES).read_text().splitlines()) == 4
 
 
 def test_a_run_that_fails_leaves_no_results_of_another(call):
     run(call)
     failed = call("run", "tiny.yaml", "--out", "out", "--set", "stages.evaluate={use: evaluate, reference: none.csv}")
     assert failed.exit_code == 2 and "none.csv" in failed.stderr
-    assert (OUT / layout.RUN).exists() and (OUT / FORMER / layout.RUN).exists()
+    assert (OUT / layout.RUN).exists() and (OUT / FORMER / "1" / layout.RUN).exists()
 
 
 def test_what_a_failed_run_has_left_is_no_result_of_the_next(call):
     (OUT / layout.RESULTS).mkdir(parents=True)
     (OUT / layout.ERRORS).write_text("of a run that failed before it wrote run.json")
+    (OUT / FILE).write_text("{}")
     run(call)
-    assert not (OUT / layout.ERRORS).exists() and (OUT / FORMER / layout.ERRORS).exists()
+    assert not (OUT / layout.ERRORS).exists() and (OUT / FORMER / "1" / layout.ERRORS).exists()
 
 
-def test_only_what_is_there_is_moved_and_one_run_is_kept(tmp_path):
+def test_a_folder_that_nothing_was_run_in_is_left_as_it_is(call):
+    (OUT / layout.RESULTS).mkdir(parents=True)
+    (OUT / layout.RESULTS / "mine.txt").write_text("notes")
+    run(call)
+    assert (OUT / layout.RESULTS / "mine.txt").exists() and not (OUT / FORMER).exists()
+
+
+def test_only_what_is_there_is_moved_and_every_run_is_kept(tmp_path):
     assert set_aside(tmp_path) is None and not list(tmp_path.iterdir())
     for said in ("one", "two"):
         (tmp_path / layout.RUN).write_text(said)
+        (tmp_path / "mine.txt").write_text("notes")
         assert (set_aside(tmp_path) / layout.RUN).read_text() == said
-    assert [path.name for path in (tmp_path / FORMER).iterdir()] == ["run.json"]
-    assert [path.name for path in tmp_path.iterdir()] == [FORMER]
+    assert sorted(path.name for path in (tmp_path / FORMER).iterdir()) == ["1", "2"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [FORMER, "mine.txt"]
 
 
 def test_what_differs_is_named():

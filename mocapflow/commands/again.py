@@ -105,11 +105,13 @@ def recall(out: Path) -> Invocation:
         raise PipelineError("this file is damaged", where=str(out / FILE), hint="run the pipeline again") from None
 
 
-def recalled_keys(out: Path) -> dict[str, str]:
-    """Return the keys of what the stages of a run folder's command make; none where they are not known."""
+def recalled_keys(out: Path) -> dict[str, str] | None:
+    """Return the keys of what the stages of a run folder's command make, none if unknown; None: it is no run folder."""
     try:
         keys = json.loads((out / FILE).read_text(encoding="utf-8"))["keys"]
         return dict(keys)
+    except FileNotFoundError:
+        return None
     except (OSError, ValueError, LookupError, TypeError):
         return {}
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -15,19 +14,18 @@ def differing(one: Mapping[str, str], other: Mapping[str, str]) -> list[str]:
 
 
 def set_aside(out: Path) -> Path | None:
-    """Move what a run has written into a folder of its own, in place of what lay there, and return that.
+    """Move what a run has written into a numbered folder of its own and return that; None if there is nothing.
 
-    None if there is nothing. Killed on the way, it goes on the next time.
+    Nothing is ever removed: people keep files of their own beside results.
     """
     from mocapflow_export import layout
 
     written = [part for part in layout.WRITTEN if (out / part).exists()]
     if not written:
         return None
-    former, moving = out / FORMER, out / f"{FORMER}.part"
-    moving.mkdir(exist_ok=True)
+    before = [int(path.name) for path in (out / FORMER).glob("*") if path.name.isdecimal()]
+    former = out / FORMER / str(max(before, default=0) + 1)
+    former.mkdir(parents=True)
     for part in written:
-        (out / part).rename(moving / part)
-    if former.exists():
-        shutil.rmtree(former)
-    return moving.rename(former)
+        (out / part).rename(former / part)
+    return former

@@ -74,7 +74,7 @@ def export(run: Run, format_: Format) -> None:
     invocation = recall(run)
     pipeline = invocation.load()
     with alone(run):
-        if changed := differing(recalled_keys(run), keys(pipeline, invocation)):
+        if changed := differing(recalled_keys(run) or {}, keys(pipeline, invocation)):
             what = f"pipeline, recording or mocapflow have changed since this run: {', '.join(changed)}"
             hint = "run it again, then export: else its files would show two tracks"
             raise PipelineError(what, where=str(run), hint=hint)

@@ -58,7 +58,7 @@ def run(
     if scheduler is None and workers == 1:
         typer.echo(execute(invocation, folder, fresh))
         return
-    labels = side_by_side(invocation, fresh)
+    labels = parts_of(invocation, fresh)
     with begun(invocation, folder) as loaded:
         make_parts(labels, invocation, folder, workers, scheduler)
         typer.echo(carry_out(loaded, invocation, folder))
@@ -92,7 +92,7 @@ def demo(out: Annotated[Path, typer.Option(help="The run folder.")] = Path("runs
     typer.echo(f"joint angles    {out / 'results' / 'angles.csv'}")
 
 
-def side_by_side(invocation: Invocation, fresh: bool) -> list[str]:
+def parts_of(invocation: Invocation, fresh: bool) -> list[str]:
     """Return the labels of the parts of a track that workers can make.
 
     Raises:
@@ -136,7 +136,8 @@ def begun(invocation: Invocation, out: Path) -> Iterator[Pipeline]:
     pipeline = invocation.load()
     with alone(out):
         now = keys(pipeline, invocation)
-        if differing(recalled_keys(out), now) and (former := set_aside(out)):
+        before = recalled_keys(out)
+        if before is not None and differing(before, now) and (former := set_aside(out)):
             typer.echo(f"the results of the run before are now in {former}", err=True)
         remember(invocation, out, now)
         yield pipeline
