@@ -7,6 +7,8 @@ from collections.abc import Collection, Iterable
 from difflib import get_close_matches
 from pathlib import Path
 
+FULL = frozenset({errno.ENOSPC, errno.EDQUOT})  # what the system says of a drive that is
+
 
 class MocapflowError(Exception):
     """A problem the user can mend; the command line prints it without a traceback.
@@ -66,10 +68,9 @@ def no_run_folder(out: Path, error: OSError) -> StoreError:
 
 def unwritable(error: OSError) -> StoreError | None:
     """Return what is said where a file can't be written: the drive is full, or it may not be; None for other errors."""
-    if error.errno not in {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM} or not error.strerror:
+    if error.errno not in {*FULL, errno.EROFS, errno.EACCES, errno.EPERM} or not error.strerror:
         return None
-    full = error.errno in {errno.ENOSPC, errno.EDQUOT}
-    hint = "free some space, then run the same command" if full else ""
+    hint = "free some space, then run the same command" if error.errno in FULL else ""
     what = "can't be written or read" if error.filename else "a file can't be written or read"
     return StoreError(f"{what}: {error.strerror}", where=str(error.filename or ""), hint=hint)
 

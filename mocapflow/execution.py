@@ -14,7 +14,7 @@ from mocapflow.blame import failure
 from mocapflow.checkpoint import Checkpoint
 from mocapflow.components import Component, Garment
 from mocapflow.data import FrameResult
-from mocapflow.errors import ComponentFailed, GarmentError, MocapflowError, PluginError, ShapeError, unwritable
+from mocapflow.errors import FULL, ComponentFailed, GarmentError, MocapflowError, PluginError, ShapeError, unwritable
 from mocapflow.locks import Lock
 from mocapflow.pipeline import Pipeline
 from mocapflow.progress import Progress
@@ -29,7 +29,6 @@ from mocapflow.warned import warnings_logged
 from mocapflow.wiring import Source
 
 Value = TypeVar("Value")
-FULL = {errno.ENOSPC, errno.EDQUOT, errno.EROFS}  # what the system says of a drive, whoever writes
 
 
 def is_hit(step: Step, artifact: Artifact) -> bool:
@@ -197,7 +196,7 @@ class Execution:
         except (Exception, SystemExit) as error:
             if isinstance(error, MocapflowError) and not isinstance(error, ShapeError | PluginError):
                 raise
-            if isinstance(error, OSError) and error.errno in FULL and (said := unwritable(error)):
+            if isinstance(error, OSError) and error.errno in {*FULL, errno.EROFS} and (said := unwritable(error)):
                 raise said from error  # no component's fault
             raise failure(error, component, self._pipeline.registry, kept(), self._out / "failed.log") from error
 

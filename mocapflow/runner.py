@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -84,6 +84,7 @@ def run(
     fresh: bool = False,
     only: str | None = None,
     report: Report = lambda line: None,
+    begin: Callable[[Mapping[str, str]], None] = lambda keys: None,
 ) -> RunSummary:
     """Run a pipeline and return what was done.
 
@@ -95,6 +96,7 @@ def run(
         fresh: compute everything anew.
         only: the label of one stage: make that and what it needs.
         report: told lines of progress.
+        begin: told the key of what each stage makes, by label, before any does.
 
     Raises:
         ComponentFailed: a component raised; committed frames are kept.
@@ -103,6 +105,7 @@ def run(
     """
     kept = open_store(store, url)
     steps = steps_of(pipeline, kept.digests)
+    begin({step.label: step.key for step in steps})
     kept.create()
     kept.digests.save()
     try:

@@ -6,7 +6,6 @@ the fill value.
 
 from __future__ import annotations
 
-import errno
 import importlib.metadata
 import platform
 import shutil
@@ -19,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from mocapflow.digests import Digests
-from mocapflow.errors import StoreError
+from mocapflow.errors import FULL, StoreError
 from mocapflow.keys import Recipe
 from mocapflow.locks import Lock, acquire, held
 from mocapflow.rows import Corrupted, flush_all, read_json, write_json
@@ -246,7 +245,7 @@ def writing(where: Path, saved: str = "") -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        full = error.errno in {errno.ENOSPC, errno.EDQUOT}
+        full = error.errno in FULL
         message = (
             f"the store {where} is full" if full else f"can't write to the store {where}: {error.strerror or error}"
         )

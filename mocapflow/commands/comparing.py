@@ -82,6 +82,8 @@ def show(folder: Path, cells: Sequence[Cell], failed: Mapping[Cell, str]) -> Non
     """Compare what has run, and print it with what has not."""
     from mocapflow_evaluation import variants
 
+    from mocapflow.levels import FILES
+
     runs = [(cell.variant, cell.name, failed.get(cell) or place(folder, cell)) for cell in cells]
     rows = [{name: row[name] for name in SHOWN} for row in variants.compare(runs, folder)]
     rows += [{**dict.fromkeys(SHOWN, ""), "recording": c.name, "variant": c.variant, "angle": "failed"} for c in failed]
@@ -89,7 +91,7 @@ def show(folder: Path, cells: Sequence[Cell], failed: Mapping[Cell, str]) -> Non
         typer.echo(table(rows))
     for cell, message in failed.items():
         typer.echo(f"failed: {cell.variant} on {cell.name}: {message}")
-    typer.echo(f"all figures: {folder}/{', '.join(name for name in variants.FILES if (folder / name).is_file())}")
+    typer.echo(f"all figures: {folder}/{', '.join(name for name in FILES if (folder / name).is_file())}")
 
 
 def place(folder: Path, cell: Cell) -> Path:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -59,7 +58,9 @@ def run(
         typer.echo(execute(invocation, folder, fresh))
         return
     labels = parts_of(invocation, fresh)
-    with begun(invocation, folder) as loaded:
+    loaded = invocation.load()
+    with alone(folder):
+        begin(invocation, folder, keys(loaded, invocation))
         make_parts(labels, invocation, folder, workers, scheduler)
         typer.echo(carry_out(loaded, invocation, folder))
 
@@ -126,30 +127,32 @@ def track(invocation: Invocation, out: Path, label: str) -> None:
 
 def execute(invocation: Invocation, out: Path, fresh: bool) -> RunSummary:
     """Run what an invocation says, have the run folder remember it, and return the summary."""
-    with begun(invocation, out) as pipeline:
-        return carry_out(pipeline, invocation, out, fresh)
-
-
-@contextmanager
-def begun(invocation: Invocation, out: Path) -> Iterator[Pipeline]:
-    """Give the pipeline of an invocation, and its run folder to it alone; what lies there of another is set aside."""
     pipeline = invocation.load()
     with alone(out):
-        now = keys(pipeline, invocation)
-        before = recalled_keys(out)
-        if before is not None and differing(before, now) and (former := set_aside(out)):
-            typer.echo(f"the results of the run before are now in {former}", err=True)
-        remember(invocation, out, now)
-        yield pipeline
+        return carry_out(pipeline, invocation, out, fresh, partial(begin, invocation, out))
 
 
-def carry_out(pipeline: Pipeline, invocation: Invocation, out: Path, fresh: bool = False) -> RunSummary:
-    """Run the pipeline of an invocation and return the summary."""
+def begin(invocation: Invocation, out: Path, keys: Mapping[str, str]) -> None:
+    """Have a run folder remember what is run in it; what lies there of another run is set aside."""
+    before = recalled_keys(out)
+    if before is not None and differing(before, keys) and (former := set_aside(out)):
+        typer.echo(f"the results of the run before are now in {former}", err=True)
+    remember(invocation, out, keys)
+
+
+def carry_out(
+    pipeline: Pipeline,
+    invocation: Invocation,
+    out: Path,
+    fresh: bool = False,
+    begin: Callable[[Mapping[str, str]], None] = lambda keys: None,
+) -> RunSummary:
+    """Run the pipeline of an invocation and return the summary; see `runner.run`."""
     from mocapflow import runner
 
     with noted(reporter(), out) as report:
         store = Path(invocation.store)
-        return runner.run(pipeline, store=store, url=invocation.url, out=out, fresh=fresh, report=report)
+        return runner.run(pipeline, store=store, url=invocation.url, out=out, fresh=fresh, report=report, begin=begin)
 
 
 def keys(pipeline: Pipeline, invocation: Invocation) -> dict[str, str]:

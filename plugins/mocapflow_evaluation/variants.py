@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from mocapflow_export import layout, tables
 
+from mocapflow.levels import FILES
 from mocapflow.records import F64
 from mocapflow.results import frame_rate_of
 from mocapflow_evaluation import panels
@@ -17,7 +18,7 @@ from mocapflow_evaluation.run_errors import angle_errors
 
 Run = tuple[str, str, Path | str]  # variant, recording, run folder or why it failed
 Row = dict[str, float | str]
-COMPARED, RUNS, PICTURE = FILES = ("compare.csv", "runs.csv", "compare.png")  # `mocapflow.levels` keeps these names
+COMPARED, RUNS, PICTURE = FILES
 WENT = ("overlap", "cpu_seconds_per_frame", "iterations", "lost", "not_at_rest")
 
 

@@ -78,25 +78,24 @@ class LimbSearch(Recovery):
         room, surface = small_room(background, model.scene.cameras, self.rows), surface_of(model, result)
         seen = views(frame, surface, room, self.near_m)
         stray = stray_of(surface, model.scene, seen, self._reach())
-        why = self._why(stray, result.state.estimate.pose, state.estimate.pose, past, model.scene.body)
+        doubtful = self._doubtful(stray)
+        why = f"fit doubted, {stray}" if doubtful else self._suspicion(result.state, state, past, model.scene.body)
         if not why:
             return result
-        found = self._search(frame, state, result.state, seen, past, model, self._doubtful(stray))
+        found = self._search(frame, state, result.state, seen, past, model, doubtful)
         other = settle(found, result.state.cloth.parameters)
         again = surface_of(model, other)
         if distance(again, seen, self.cap_m) >= (1 - self.gain) * distance(surface, seen, self.cap_m):
-            return noted(result, f"{why}: search found nothing better", doubted=self._doubtful(stray))
+            return noted(result, f"{why}: search found nothing better", doubted=doubtful)
         then = stray_of(again, model.scene, seen, self._reach())
         return noted(other, f"{why}: found again by search; then {then}", doubted=self._doubtful(then))
 
-    def _why(self, stray: Stray, fitted: Pose, believed: Pose, past: Past, body: Body) -> str:
-        """Return why the limbs are looked for, or nothing."""
-        if self._doubtful(stray):
-            return f"fit doubted, {stray}"
+    def _suspicion(self, fitted: FrameState, believed: FrameState, past: Past, body: Body) -> str:
+        """Return why limbs are looked for that images do not contradict, or nothing."""
         if past.after_gap and self.after_gap:
             return "looked for the limbs after a gap"
-        leap = leapt(fitted, believed, body, self._density, np.radians(self.leap_deg))
-        return "a limb leapt into a pose that nobody was seen in" if leap else ""
+        poses, least = (fitted.estimate.pose, believed.estimate.pose), np.radians(self.leap_deg)
+        return "a limb leapt into a pose that nobody was seen in" if leapt(*poses, body, self._density, least) else ""
 
     def _doubtful(self, stray: Stray) -> bool:
         return stray.doubtful(self.uncovered_cm2, self.floating_cm2)
