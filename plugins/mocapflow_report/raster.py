@@ -13,6 +13,7 @@ from mocapflow.records import F32, F64, I32
 NEAR, FAR = 0.1, 200.0  # m
 LIGHT = np.array([0.35, -0.45, 0.82]) / np.linalg.norm([0.35, -0.45, 0.82])
 SKY = 0.42  # share of the light that comes from all of the sky
+CUT = 0.03  # m by which the wide triangles of a cloth may cut through the round body they lie on
 
 
 def look_at(place: F64, target: F64, size: tuple[int, int], field_of_view_deg: float) -> Camera:
@@ -56,10 +57,13 @@ class Canvas:
         self.picture, self.depth = np.asarray(picture, np.float32), np.asarray(depth, np.float32)
 
     def veil(self, vertices: F64, faces: I32, colours: F32, opacity: float) -> None:
-        """Draw triangles that let shine through what is behind them; only their nearest layer counts."""
+        """Draw triangles that let shine through what lies behind, or up to `CUT` before, their nearest layer."""
         behind, depth = self.picture.copy(), self.depth.copy()
+        reach = np.minimum(depth + np.float32(CUT), np.float32(FAR))
+        self.depth = reach.copy()
         self.draw(vertices, faces, colours)
-        covered = self.depth < depth
+        covered = self.depth < reach
+        self.depth = np.minimum(self.depth, depth)
         self.picture[covered] = opacity * self.picture[covered] + (1 - opacity) * behind[covered]
 
     def _field_of_view(self) -> float:

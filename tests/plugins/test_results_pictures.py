@@ -221,3 +221,16 @@ def test_unwritable_video_is_an_error_for_people(tmp_path: Path) -> None:
     video = drawing.Video(tmp_path / "no" / "folder.mp4", 30.0, "mp4v")
     with pytest.raises(StoreError, match="can't write a video with codec mp4v"):
         video.write(np.zeros((64, 64, 3), np.uint8))
+
+
+def test_cloth_that_cuts_through_the_skin_it_lies_on_covers_it_and_cloth_behind_it_does_not() -> None:
+    camera = raster.look_at(np.array([0.0, -3.0, 0.0]), np.zeros(3), (64, 64), 40.0)
+    square = np.array([[-1.0, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]])
+    faces, white = np.array([[0, 1, 2], [0, 2, 3]], np.int32), np.ones((4, 3), np.float32)
+    for deeper, shade in ((-0.5, 0.5), (raster.CUT / 2, 0.5), (2 * raster.CUT, 1.0)):
+        canvas = raster.Canvas(np.full((64, 64, 3), 0.2, np.float32), camera)
+        canvas.draw(square * 0.5, faces, white)
+        canvas.veil(square + [0, deeper, 0], faces, np.zeros((4, 3), np.float32), 0.5)
+        np.testing.assert_allclose(canvas.picture[32, 32], shade, atol=1e-3)
+        np.testing.assert_allclose(canvas.picture[4, 32], 0.1, atol=1e-3)  # nothing behind it but the room
+        assert canvas.depth[32, 32] <= 3.0 + 1e-3
