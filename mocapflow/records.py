@@ -20,10 +20,11 @@ F64 = npt.NDArray[np.float64]
 F32 = npt.NDArray[np.float32]
 I32 = npt.NDArray[np.int32]
 I16 = npt.NDArray[np.int16]
+I8 = npt.NDArray[np.int8]
 U8 = npt.NDArray[np.uint8]
 Bool = npt.NDArray[np.bool_]
 
-DTYPES = {"F64": "f8", "Wide": "f8", "F32": "f4", "I32": "i4", "I16": "i2", "U8": "u1", "Bool": "?"}
+DTYPES = {"F64": "f8", "Wide": "f8", "F32": "f4", "I32": "i4", "I16": "i2", "I8": "i1", "U8": "u1", "Bool": "?"}
 
 Class = TypeVar("Class", bound=type)
 Watch = Callable[[int, int], None]  # told how many frames are done, of how many

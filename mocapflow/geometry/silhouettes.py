@@ -16,7 +16,7 @@ from mocapflow.geometry import boundary_kernels, span_kernels
 from mocapflow.geometry import silhouette_kernels as kernels
 from mocapflow.geometry.cameras import projection
 from mocapflow.once import once
-from mocapflow.records import F32, F64, I32, Bool, array, record
+from mocapflow.records import F32, F64, I8, I32, Bool, array, record
 
 PIECE = 4.0  # px; longer edges are judged piece by piece, for a part of one may be hidden
 
@@ -35,18 +35,34 @@ class Outline:
     pixel: F64 = array("B", 2, 2, unit="px, the two ends of the piece")
 
 
+@record
+class Projected:
+    """A surface projected into one view."""
+
+    image: F64 = array("N", 2, unit="px, NaN behind the camera")
+    depth: F64 = array("N", unit="m")
+    facing: I8 = array("F", unit="1 faces that look at the camera, -1 away from it, 0 partly behind it")
+
+
+@once
+def projected(surface: Surface, camera: Camera) -> Projected:
+    """Return where the vertices of a surface project, and which of its faces look at the camera."""
+    image, depth = np.empty((len(surface.vertices), 2)), np.empty(len(surface.vertices))
+    kernels.project(surface.vertices, projection(camera), image, depth)
+    facing = np.empty(len(surface.faces), np.int8)
+    kernels.face_directions(image, surface.faces, facing)
+    return Projected(image=image, depth=depth, facing=facing)
+
+
 @once
 def outline(surface: Surface, camera: Camera) -> Outline:
     """Return the boundary of the silhouette of a surface, parts outside the image included.
 
     Edges that lie inside the silhouette (a leg before the other) are not part of the boundary.
     """
-    pixels, depth = np.empty((len(surface.vertices), 2)), np.empty(len(surface.vertices))
-    kernels.project(surface.vertices, projection(camera), pixels, depth)
-    facing = np.empty(len(surface.faces), np.int8)
-    kernels.face_directions(pixels, surface.faces, facing)
-    vertex, layers = kernels.occluding_edges(surface.edges, facing, surface.cloth)
-    image = pixels.take(vertex, axis=0)  # several times faster than pixels[vertex]
+    view = projected(surface, camera)
+    vertex, layers = kernels.occluding_edges(surface.edges, view.facing, surface.cloth)
+    image = view.image.take(vertex, axis=0)  # several times faster than view.image[vertex]
     return _bounded(vertex, image, layers, span_kernels.crossings(image, camera.size), camera)
 
 

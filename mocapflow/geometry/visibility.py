@@ -9,8 +9,7 @@ import numpy as np
 
 from mocapflow.assets import Camera
 from mocapflow.data import Surface
-from mocapflow.geometry import silhouette_kernels as kernels
-from mocapflow.geometry.cameras import projection
+from mocapflow.geometry.silhouettes import projected
 from mocapflow.records import F64, I32
 
 CELL = 4.0  # px, about the size of a face: points are looked up by squares of this size
@@ -26,15 +25,14 @@ def front_vertices(surface: Surface, camera: Camera, points: F64) -> tuple[I32, 
         vertex (P,): the nearest corner of the foremost triangle over each point, -1 where there is none;
         image (N, 2) px: where every vertex of the surface projects.
     """
-    image, depth = np.empty((len(surface.vertices), 2)), np.empty(len(surface.vertices))
-    kernels.project(surface.vertices, projection(camera), image, depth)
+    view = projected(surface, camera)
     vertex = np.full(len(points), -1, np.int32)
     if len(points):
         low = np.floor(points.min(axis=0) / CELL).astype(np.int64)
         width, height = (np.floor(points.max(axis=0) / CELL).astype(np.int64) - low + 1).tolist()
         first, after = _in_cells(points, low, np.full((height, width), -1, np.int32))
-        _front(image, depth, surface.faces, surface.cloth, points, low, first, after, vertex)
-    return vertex, image
+        _front(view.image, view.depth, view.facing, surface.faces, surface.cloth, points, low, first, after, vertex)
+    return vertex, view.image
 
 
 @numba.njit(cache=True)
@@ -49,7 +47,7 @@ def _in_cells(points, low, first):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _front(image, depth, faces, cloth, points, low, first, after, vertex):  # type: ignore[no-untyped-def]
+def _front(image, depth, facing, faces, cloth, points, low, first, after, vertex):  # type: ignore[no-untyped-def]
     height, width = first.shape
     cells = np.full((len(image), 2), BEHIND, np.int32)  # of every vertex
     for v in range(len(image)):
@@ -58,10 +56,10 @@ def _front(image, depth, faces, cloth, points, low, first, after, vertex):  # ty
     nearest = np.zeros(len(points))  # one over the depth, which is linear in the image
     for f in range(len(faces)):
         a, b, c = index(faces[f, 0]), index(faces[f, 1]), index(faces[f, 2])
+        if facing[f] == 0 or (facing[f] < 0 and not cloth[a]):
+            continue
         (ax, ay), (bx, by), (cx, cy) = image[a], image[b], image[c]
         area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
-        if not area < 0.0 and not (area > 0.0 and cloth[a]):
-            continue  # turned away
         left, right = _span(cells[a, 0], cells[b, 0], cells[c, 0], width)
         top, bottom = _span(cells[a, 1], cells[b, 1], cells[c, 1], height)
         for row in range(top, bottom + 1):
