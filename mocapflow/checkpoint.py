@@ -1,10 +1,10 @@
 """A track that grows frame by frame on disk and goes on where it stopped.
 
 Layout of its group: `live/rows` holds all numbers of a frame in one row of float64, `cloth` one chunk per frame,
-`silhouettes/<layer>/<camera>` int8 at 1/8 px, `matches/<capacity>` one padded row per frame, and
-`live/appearance-<size>` the last two appearances in turns, each behind the number of its frame. `Checkpoint.track`
-writes the rows out as the named arrays of `Track`. A frame counts once `frames_done` says so, which is written last
-and in one step, when the rest is on the drive.
+`silhouettes/<layer>/<camera>` int8 at 1/8 px, `matches/<capacity>` one padded row per frame, `trace` the poses of a
+frame's turns where they are kept, and `live/appearance-<size>` the last two appearances in turns, each behind the
+number of its frame. `Checkpoint.track` writes the rows out as the named arrays of `Track`. A frame counts once
+`frames_done` says so, which is written last and in one step, when the rest is on the drive.
 """
 
 from __future__ import annotations

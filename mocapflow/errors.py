@@ -62,7 +62,7 @@ class StoreError(MocapflowError):
 
 def no_run_folder(out: Path, error: OSError) -> StoreError:
     """Return what is said where a run folder can't be made or written."""
-    hint = "name another with --out"
+    hint = "name another folder, or make it writable"
     return StoreError(f"can't write the run folder: {error.strerror}", where=str(out), hint=hint)
 
 

@@ -53,22 +53,21 @@ class Execution:
         """See to it that the result of a stage exists; a cached one is not even read."""
         if step.label in self.entries:
             return
-        found = self._find(step)
-        if found is None or self._fresh:
-            self._result(step.label)
-        else:
+        if found := self._find(step):
             self._entered(step, found)
+        else:
+            self._result(step.label)
 
     def _result(self, label: str) -> Any:
         """Return the result of a stage, from the store or by running it."""
         if label not in self._results:
             step = self._steps[label]
-            found = None if self._fresh else self._find(step)
+            found = self._find(step)
             self._results[label] = self._made(step) if found is None else self._loaded(step, found)
         return self._results[label]
 
     def _find(self, step: Step) -> Artifact | None:
-        found = self._store.find(step.key) if step.stored else None
+        found = self._store.find(step.key) if step.stored and not self._fresh else None
         return found if found is not None and is_hit(step, found) else None
 
     def _loaded(self, step: Step, found: Artifact) -> Any:

@@ -1,6 +1,6 @@
 """Frozen dataclasses whose array fields declare axes, unit and kind once.
 
-The declaration drives the check on construction, the dimension names in the store and the help text.
+The declaration drives the check on construction and the dimension names in the store.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -70,11 +70,6 @@ def keys(pipeline: Pipeline, *, store: Path, url: str | None = None) -> dict[str
     return found
 
 
-def tracks(pipeline: Pipeline, *, store: Path) -> list[str]:
-    """Return the labels of the stages that go on frame by frame; none needs another's result."""
-    return [step.label for step in steps_of(pipeline, Store(store).digests) if step.chain]
-
-
 def run(
     pipeline: Pipeline,
     *,
@@ -84,7 +79,7 @@ def run(
     fresh: bool = False,
     only: str | None = None,
     report: Report = lambda line: None,
-    begin: Callable[[Mapping[str, str]], None] = lambda keys: None,
+    begin: Callable[[Sequence[Step]], None] = lambda steps: None,
 ) -> RunSummary:
     """Run a pipeline and return what was done.
 
@@ -96,7 +91,7 @@ def run(
         fresh: compute everything anew.
         only: the label of one stage: make that and what it needs.
         report: told lines of progress.
-        begin: told the key of what each stage makes, by label, before any does.
+        begin: told the steps, one for each stage, before any is made.
 
     Raises:
         ComponentFailed: a component raised; committed frames are kept.
@@ -105,9 +100,9 @@ def run(
     """
     kept = open_store(store, url)
     steps = steps_of(pipeline, kept.digests)
-    begin({step.label: step.key for step in steps})
     kept.create()
     kept.digests.save()
+    begin(steps)
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -141,7 +141,7 @@ class Store:
         for old in self._groups(f"*-{key[:SHORT]}"):
             remove(old)
 
-    def save(self, artifact: Artifact, value: Any, warnings: Sequence[str] = ()) -> Artifact:
+    def save(self, artifact: Artifact, value: Any, warnings: Sequence[str] = ()) -> None:
         """Write a record into an artifact, with what was said while it was made, and finish it.
 
         Raises:
@@ -156,7 +156,6 @@ class Store:
             save_record(group, value)
             flush_all(artifact.path)
             group.update_attributes({"complete": True, "warnings": list(warnings)})
-        return reread(artifact)
 
     def load(self, artifact: Artifact, frames: int | None = None) -> Any:
         """Return the record of an artifact, or the first `frames` rows of it.
@@ -199,11 +198,6 @@ class Store:
 def group_meta(attributes: Mapping[str, Any]) -> dict[str, Any]:
     """Return the metadata of a zarr group."""
     return {"attributes": attributes, "zarr_format": 3, "node_type": "group"}
-
-
-def reread(artifact: Artifact) -> Artifact:
-    """Return an artifact with its attributes as they are now."""
-    return Artifact(artifact.path, read_json(artifact.path / "zarr.json").get("attributes", {}))
 
 
 def with_versions(artifact: Artifact) -> Artifact:
@@ -250,7 +244,7 @@ def writing(where: Path, saved: str = "") -> Iterator[None]:
             f"the store {where} is full" if full else f"can't write to the store {where}: {error.strerror or error}"
         )
         todo = "free some space" if full else "make it writable"
-        hint = "\n".join(filter(None, [f"{todo}, or name another with --store", saved]))
+        hint = "\n".join(filter(None, [f"{todo}, or name another store", saved]))
         raise StoreError(message, hint=hint) from error
 
 

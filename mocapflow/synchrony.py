@@ -34,7 +34,7 @@ class Lateness:
 
     @property
     def sure(self) -> bool:
-        """True where it is more than chance, and more than whole frames can mend."""
+        """True where it is more than chance, and so much that whole frames can mend it."""
         return abs(self.frames) > max(LEAST, SURE * self.sd)
 
 

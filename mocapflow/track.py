@@ -107,7 +107,8 @@ class CoupledLoop(Stage):
             frame = checks.passed(picture) if checks else picture
             frame = replace(frame, flow=flow.into(frame.index)) if flow else frame
             watch.lap("decode")
-            known, state = past.believable(), self.begin(frame, past, start, model, watch)
+            known = past.believable()
+            state = self.begin(frame, past, known, start, model, watch)
             settled = settle if seen(frame) else lost
             result = settled(frame, state, known, self.steps, model, checkpoint.observe)
             spent = result.seconds
@@ -115,7 +116,7 @@ class CoupledLoop(Stage):
             result = self.recovered(frame, state, result, known, model)
             watch.lap("recover")
             seconds = {step: watch.seconds.get(step, 0.0) + spent.get(step, 0.0) for step in STEPS}
-            notes = [*notes_on(frame, scene, past, result), *result.notes]
+            notes = [*notes_on(frame, scene, known, result), *result.notes]
             past = checkpoint.commit(frame, past, replace(result, seconds=seconds), notes)
             self.complain(frame, result)
             watch = Stopwatch()
@@ -133,7 +134,9 @@ class CoupledLoop(Stage):
             steady=self.steady,
         )
 
-    def begin(self, frame: Frame, past: Past, start: Start, model: ClothedModel, watch: Stopwatch) -> FrameState:
+    def begin(
+        self, frame: Frame, past: Past, known: Past, start: Start, model: ClothedModel, watch: Stopwatch
+    ) -> FrameState:
         """Return what is believed of a frame before looking: the predicted pose, clothed."""
         pose, parameters = start.pose, start.parameters
         if past.moments:
@@ -142,7 +145,7 @@ class CoupledLoop(Stage):
         watch.lap("predict")
         cloth = model.drape(pose, parameters, past)
         watch.lap("drape")
-        state, known = believed(pose, parameters, cloth), past.believable()
+        state = believed(pose, parameters, cloth)
         return state if known.moments else self.approach(frame, state, known, model)
 
     def approach(self, frame: Frame, state: FrameState, past: Past, model: ClothedModel) -> FrameState:
@@ -210,8 +213,8 @@ def lost(
     )
 
 
-def notes_on(frame: Frame, scene: Scene, past: Past, result: FrameResult) -> Sequence[str]:
-    """Return what went wrong with the views of a frame and with those before it."""
+def notes_on(frame: Frame, scene: Scene, known: Past, result: FrameResult) -> Sequence[str]:
+    """Return what went wrong with the views of a frame and with those before it; see `Past.believable`."""
     reasons = frame.reasons or ("",) * len(frame.usable)
     views = zip(scene.cameras, frame.usable, reasons, strict=True)
     notes = [f"{camera.name} not usable: {reason or 'no image'}" for camera, usable, reason in views if not usable]
@@ -220,4 +223,4 @@ def notes_on(frame: Frame, scene: Scene, past: Past, result: FrameResult) -> Seq
     if blind(result.state.estimate.observed):
         return [*notes, "no view shows the person; the prediction is kept"]
     anew = "begun anew, like a first frame: the frames before do not show the person"
-    return [*notes, anew] if past.believable().after_gap else notes
+    return [*notes, anew] if known.after_gap else notes

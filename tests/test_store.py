@@ -43,7 +43,8 @@ def path(tmp_path):
 
 
 def put(store, value, key="1" * 32):
-    return store.save(store.begin("some", key, RECIPE), value)
+    store.save(store.begin("some", key, RECIPE), value)
+    return store.find(key)
 
 
 def equal(one, other):
@@ -357,7 +358,7 @@ def test_a_full_store_says_so_and_keeps_the_frames(tmp_path, path, monkeypatch):
         run_tiny(path, tmp_path)
     store = tmp_path / "store.zarr"
     assert str(raised.value) == (
-        f"the store {store} is full\n       free some space, or name another with --store\n"
+        f"the store {store} is full\n       free some space, or name another store\n"
         "       frames 0–2 are saved; run the same command to continue at 3"
     )
     assert raised.value.exit_status == 1
@@ -377,7 +378,7 @@ def test_an_unwritable_store_says_so(tmp_path, path, monkeypatch):
         run_tiny(path, tmp_path)
     assert str(raised.value) == (
         f"can't write to the store {tmp_path / 'store.zarr'}: Permission denied\n"
-        "       make it writable, or name another with --store"
+        "       make it writable, or name another store"
     )
 
 

@@ -69,12 +69,14 @@ def _comparison(run: Path, truth: Path | None) -> tuple[Path | None, str, float]
 
 def export(run: Run, format_: Format) -> None:
     """Write the track of a run in other formats, into the run folder."""
-    from mocapflow.commands.running import carry_out, keys
+    from mocapflow import runner
+    from mocapflow.commands.running import carry_out
 
     invocation = recall(run)
     pipeline = invocation.load()
     with alone(run):
-        if changed := differing(recalled_keys(run) or {}, keys(pipeline, invocation)):
+        now = runner.keys(pipeline, store=Path(invocation.store), url=invocation.url)
+        if changed := differing(recalled_keys(run) or {}, now):
             what = f"pipeline, recording or mocapflow have changed since this run: {', '.join(changed)}"
             hint = "run it again, then export: else its files would show two tracks"
             raise PipelineError(what, where=str(run), hint=hint)

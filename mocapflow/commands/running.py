@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -17,6 +17,7 @@ from mocapflow.errors import PipelineError
 
 if TYPE_CHECKING:
     from mocapflow.pipeline import Pipeline
+    from mocapflow.recipes import Step
     from mocapflow.runner import RunSummary
 
 File = Annotated[Path, typer.Argument(metavar="PIPELINE", help="A pipeline file (.yaml).")]
@@ -57,12 +58,16 @@ def run(
     if scheduler is None and workers == 1:
         typer.echo(execute(invocation, folder, fresh))
         return
-    labels = parts_of(invocation, fresh)
-    loaded = invocation.load()
-    with alone(folder):
-        begin(invocation, folder, keys(loaded, invocation))
+    if fresh:
+        raise PipelineError("--fresh does not go with several workers", hint="name a new store with --store")
+
+    def begin_with_parts(steps: Sequence[Step]) -> None:
+        labels = parts_of(steps)
+        begin(invocation, folder, steps)
         make_parts(labels, invocation, folder, workers, scheduler)
-        typer.echo(carry_out(loaded, invocation, folder))
+
+    with alone(folder):
+        typer.echo(carry_out(invocation.load(), invocation, folder, begin=begin_with_parts))
 
 
 def plan(
@@ -93,17 +98,13 @@ def demo(out: Annotated[Path, typer.Option(help="The run folder.")] = Path("runs
     typer.echo(f"joint angles    {out / 'results' / 'angles.csv'}")
 
 
-def parts_of(invocation: Invocation, fresh: bool) -> list[str]:
-    """Return the labels of the parts of a track that workers can make.
+def parts_of(steps: Sequence[Step]) -> list[str]:
+    """Return the labels of the parts of a track, which workers can make: none needs another's result.
 
     Raises:
-        PipelineError: there are no parts, or all is to be made anew.
+        PipelineError: there are no parts.
     """
-    if fresh:
-        raise PipelineError("--fresh does not go with several workers", hint="name a new store with --store")
-    from mocapflow import runner
-
-    labels = runner.tracks(invocation.load(), store=Path(invocation.store))
+    labels = [step.label for step in steps if step.chain]
     if len(labels) < 2:
         raise PipelineError("there is nothing for several workers to do", hint="--parts N tracks in N parts")
     return labels
@@ -132,12 +133,12 @@ def execute(invocation: Invocation, out: Path, fresh: bool) -> RunSummary:
         return carry_out(pipeline, invocation, out, fresh, partial(begin, invocation, out))
 
 
-def begin(invocation: Invocation, out: Path, keys: Mapping[str, str]) -> None:
+def begin(invocation: Invocation, out: Path, steps: Sequence[Step]) -> None:
     """Have a run folder remember what is run in it; what lies there of another run is set aside."""
-    before = recalled_keys(out)
-    if before is not None and differing(before, keys) and (former := set_aside(out)):
+    before, now = recalled_keys(out), {step.label: step.key for step in steps}
+    if before is not None and differing(before, now) and (former := set_aside(out)):
         typer.echo(f"the results of the run before are now in {former}", err=True)
-    remember(invocation, out, keys)
+    remember(invocation, out, now)
 
 
 def carry_out(
@@ -145,7 +146,7 @@ def carry_out(
     invocation: Invocation,
     out: Path,
     fresh: bool = False,
-    begin: Callable[[Mapping[str, str]], None] = lambda keys: None,
+    begin: Callable[[Sequence[Step]], None] = lambda steps: None,
 ) -> RunSummary:
     """Run the pipeline of an invocation and return the summary; see `runner.run`."""
     from mocapflow import runner
@@ -153,13 +154,6 @@ def carry_out(
     with noted(reporter(), out) as report:
         store = Path(invocation.store)
         return runner.run(pipeline, store=store, url=invocation.url, out=out, fresh=fresh, report=report, begin=begin)
-
-
-def keys(pipeline: Pipeline, invocation: Invocation) -> dict[str, str]:
-    """Return the key of what each stage of an invocation's pipeline would make."""
-    from mocapflow import runner
-
-    return runner.keys(pipeline, store=Path(invocation.store), url=invocation.url)
 
 
 def _print_plan(invocation: Invocation) -> None:

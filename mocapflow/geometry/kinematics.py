@@ -87,6 +87,11 @@ def joint_positions(body: Body, joints: F64) -> F64:
     return positions
 
 
+def joint_centres(body: Body, root: F64, angles: F64) -> F64:
+    """Return the joint centres (T, J, 3) m of a motion: root (T, 4, 4) m and angles (T, D) rad."""
+    return joint_positions(body, chain_batch(body, PoseBatch(root=root, angles=angles)))
+
+
 def root_position(body: Body, root: F64) -> F64:
     """Return where the root joint is (..., 3) m for roots (..., 4, 4).
 

@@ -1,4 +1,4 @@
-"""Triangle meshes: edges with their faces, vertex normals, grids."""
+"""Triangle meshes: edges with their faces, vertex normals."""
 
 from __future__ import annotations
 

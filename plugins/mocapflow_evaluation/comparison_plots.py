@@ -24,8 +24,6 @@ def draw(ours: Mapping[str, F64], reference: Mapping[str, F64], strides: Sequenc
     both = {name: _common_strides(strides, ours[name], reference[name], name) for name in names}
     walked = {name: pair for name, pair in both.items() if len(pair["mocapflow"])}
     agreement, cycle = (layout.place(folder, part) for part in (layout.AGREEMENT_PLOT, layout.CYCLES_PLOT))
-    for path in (agreement, cycle):
-        path.unlink(missing_ok=True)
     drawn = [draw_agreement(agreement, {name: (ours[name], reference[name]) for name in names})] if names else []
     return [*drawn, draw_cycles(cycle, walked)] if walked else drawn
 

@@ -96,6 +96,7 @@ def evaluate(own: Ours, path: Path, folder: Path, longest_lag_s: float = LONGEST
         ours = ", ".join(tables.angle_names(own.columns))
         notes.append(f"the reference shares no angle and frame with the track, which has {ours}")
         return Evaluation(reference=str(path), rows=(), notes=tuple(notes))
+    layout.forget_comparison(folder, but=path)
     notes += findings.said(own, reference, alignment, strides, longest_lag_s)
     _write_tables(folder, own.columns, known, rows, strides)
     found = {"reference": str(path), "lag_frames": alignment.lag, "signs": alignment.signs, "notes": notes}
@@ -112,7 +113,8 @@ def _write_tables(
     errors = {name: columns[name] - known[name] for name in cycles.shared(columns, known)}
     tables.write_rows(layout.place(folder, layout.EVALUATION), rows)
     tables.write_columns(layout.place(folder, layout.ERRORS), {"frame": columns["frame"], **errors})
-    tables.write_rows_if_any(layout.place(folder, layout.CYCLES), cycles.rows(strides, columns, known))
+    if walked := cycles.rows(strides, columns, known):
+        tables.write_rows(layout.place(folder, layout.CYCLES), walked)
 
 
 def _row(own: Ours, name: str, known: F64, aligned: F64, strides: Sequence[Cycle]) -> dict[str, float | str]:

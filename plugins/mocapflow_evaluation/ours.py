@@ -10,7 +10,6 @@ from mocapflow_export import layout, tables
 from mocapflow_export.export import before_smoothing
 from mocapflow_export.uncertainty import measured
 
-from mocapflow.data import PoseBatch
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import kinematics
 from mocapflow.io import markers, opensim
@@ -38,8 +37,7 @@ class Ours:
 
 def of_track(track: Track, scene: Scene) -> Ours:
     """Return what a track has."""
-    joints = kinematics.chain_batch(scene.body, PoseBatch(root=track.root, angles=track.angles))
-    places = kinematics.joint_positions(scene.body, joints)
+    places = kinematics.joint_centres(scene.body, track.root, track.angles)
     columns, raw = (_columns(each, scene) for each in (track, before_smoothing(track)))
     return Ours(columns=columns, raw=raw, stick=Stick(names=scene.body.joint_names, places=places))
 

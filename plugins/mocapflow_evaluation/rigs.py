@@ -41,8 +41,6 @@ class Rigs:
             start: time of the first frame, s.
         """
         if self.theirs is None or self.aligned is None:
-            for part in (layout.DISTANCES, layout.STICK, layout.STICK_PLOT):
-                (folder / part).unlink(missing_ok=True)  # of another reference
             return []
         rows = stick.distances(self.ours, self.theirs, self.aligned)
         tables.write_rows(layout.place(folder, layout.DISTANCES), rows)

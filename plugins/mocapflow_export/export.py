@@ -7,14 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar, Literal
 
-from mocapflow_formats import Result, write
-
 from mocapflow.components import Stage
 from mocapflow.io import markers, opensim
 from mocapflow.recording import Recording
 from mocapflow.results import Files, RunFolder, Track
 from mocapflow.scene import Scene
 from mocapflow_export import layout, runjson, tables
+from mocapflow_export.formats import Result, write
 from mocapflow_export.misgivings import misgivings
 from mocapflow_export.uncertainty import measured
 
@@ -41,7 +40,7 @@ class Export(WriteFormats):
     calibrated standard deviations, and as `_observed` the share of each that the images determined; energy.csv
     one per turn of the loop: the terms of the functional. The mot holds signed joint angles by OpenSim's names
     (`opensim`), the trc joint centres.
-    Other formats are written by `mocapflow_formats`.
+    Other formats are written by `mocapflow_export.formats`.
     """
 
     name: ClassVar[str] = "export"

@@ -46,10 +46,12 @@ def overlay(camera: str) -> Path:
     return Path("overlay") / f"{camera}.mp4"
 
 
-def forget_comparison(run_folder: Path) -> None:
-    """Remove what a comparison has written: of another reference, it is none of this run."""
+def forget_comparison(run_folder: Path, but: Path | None = None) -> None:
+    """Remove what a comparison with another reference has written, but not the file that is now compared with."""
+    kept = but and but.resolve()
     for part in COMPARISON:
-        (run_folder / part).unlink(missing_ok=True)
+        if (run_folder / part).resolve() != kept:
+            (run_folder / part).unlink(missing_ok=True)
 
 
 def place(run_folder: Path, part: Path) -> Path:

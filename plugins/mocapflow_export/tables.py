@@ -82,11 +82,3 @@ def write_rows(path: Path, rows: Sequence[Mapping[str, float | str]]) -> Path:
         for row in rows:
             writer.writerow([f"{v:.4f}" if isinstance(v, float) else v for v in row.values()])
     return path
-
-
-def write_rows_if_any(path: Path, rows: Sequence[Mapping[str, float | str]]) -> None:
-    """Write one line per mapping; without any, leave no file of an earlier time."""
-    if rows:
-        write_rows(path, rows)
-    else:
-        path.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""The segmentation energy on full arrays, exactly as printed: the reference for the kernels, and the report."""
+"""The segmentation energy on full arrays, exactly as printed: the reference for the kernels."""
 
 from __future__ import annotations
 

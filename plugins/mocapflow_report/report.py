@@ -45,12 +45,17 @@ class Report(Stage):
         evaluation: Evaluation | None = None,
     ) -> Files:
         """Write the report and return its paths."""
-        columns = tables.angle_columns(track, measured(track, scene))
+        series = measured(track, scene)
+        columns = tables.angle_columns(track, series)
         pictures = draw(track, scene, columns, evaluation, run_folder.path)
-        warnings = recording.warnings + scene.warnings
-        summary = runjson.plain(runjson.summary(track, measured(track, scene), run_folder, warnings))
-        mishaps = report_rows.mishaps(track, summary["frames"]["held_by_priors"])
-        recipe = summary["recipe"]
+        recipe = runjson.plain(run_folder.recipe)
+        happened = [
+            *recording.warnings,
+            *scene.warnings,
+            *runjson.said_by_stages(recipe),
+            *report_rows.mishaps(track, runjson.held_by_priors(series)),
+            *report_rows.notes(track),
+        ]
         names = [camera.name for camera in scene.cameras]
         sections = [
             ("At a glance", page.listing(report_rows.glance(track, names, evaluation))),
@@ -59,7 +64,7 @@ class Report(Stage):
             ("Deviation from the reference", _deviations(evaluation)),
             ("Overlay", "\n".join(page.picture(jpeg, "jpeg", said) for said, jpeg in stills(track, scene, recording))),
             ("Overlap of model and image", _shown(pictures[1:2])),
-            ("What happened", page.listing([*summary["warnings"], *mishaps, *report_rows.notes(track)])),
+            ("What happened", page.listing(happened)),
             ("CPU time", page.table(report_rows.times(track))),
             ("Versions", page.listing([f"{name} {version}" for name, version in recipe.get("versions", {}).items()])),
             ("Settings and recipe", page.code(json.dumps(recipe, indent=1, ensure_ascii=False))),

@@ -10,7 +10,6 @@ import numpy as np
 from pydantic import PositiveFloat
 
 from mocapflow.components import Stage
-from mocapflow.data import PoseBatch
 from mocapflow.errors import PipelineError
 from mocapflow.geometry import kinematics
 from mocapflow.records import F64, I32, Bool, array_fields
@@ -68,7 +67,8 @@ def disagreement(one: Track, other: Track, scene: Scene) -> tuple[I32, F64]:
     if not len(common):
         hint = "parts that are joined need frames in common: parts.overlap says how many"
         raise PipelineError(f"frames {one.frame[-1]} and {other.frame[0]} have nothing between them", hint=hint)
-    places = [_places(cut(track, np.isin(track.frame, common)), scene) for track in (one, other)]
+    shared = [cut(track, np.isin(track.frame, common)) for track in (one, other)]
+    places = [kinematics.joint_centres(scene.body, track.root, track.angles) for track in shared]
     return common.astype(np.int32), np.linalg.norm(places[0] - places[1], axis=2).mean(axis=1)
 
 
@@ -95,9 +95,3 @@ def _by_frame(track: Track) -> list[str]:
     """Return the names of the arrays with a row per frame."""
     declared = array_fields(Track).items()
     return [name for name, field in declared if field.axes[0] == "T" and getattr(track, name) is not None]
-
-
-def _places(track: Track, scene: Scene) -> F64:
-    """Return the joint centres: (T, J, 3) m."""
-    poses = PoseBatch(root=track.root, angles=track.angles)
-    return kinematics.joint_positions(scene.body, kinematics.chain_batch(scene.body, poses))

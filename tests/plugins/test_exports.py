@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import readers
-from mocapflow_formats import FILES
+from mocapflow_export.formats import FILES
 
 from mocapflow.geometry import angles
 from mocapflow.shipped import shipped

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 import readers
-from mocapflow_formats import FILES, Result, write
+from mocapflow_export.formats import FILES, Result, write
 from results_scene import DEMO, demo_scene, stepping
 
 from mocapflow.errors import PipelineError

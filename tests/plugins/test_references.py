@@ -15,7 +15,7 @@ from mocapflow_evaluation.marker_names import landmarks
 from mocapflow_evaluation.ours import Ours
 from mocapflow_evaluation.references import Reference, read_reference
 from mocapflow_export import layout, tables
-from mocapflow_formats import Result, write
+from mocapflow_export.formats import Result, write
 from results_scene import DEMO, demo_scene, make_track, stepping
 from scipy.spatial.transform import Rotation
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mocapflow_bodies.template import Template
 from mocapflow_export import tables
-from mocapflow_formats import Result, write
+from mocapflow_export.formats import Result, write
 from mocapflow_priors import training, training_bvh
 from mocapflow_priors.density import read
 from results_scene import DEMO, demo_scene, stepping

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from mocapflow.errors import PipelineError
-from mocapflow_formats.result import Result, library
+from mocapflow_export.formats.result import Result, library
 
 LAST = 65535  # frame that the header can name
 

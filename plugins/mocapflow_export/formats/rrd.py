@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mocapflow.geometry import angles, silhouettes
-from mocapflow_formats.result import Result, library
+from mocapflow_export.formats.result import Result, library
 
 BODY, GARMENT, OUTLINE = (200, 160, 135), (60, 120, 130), (255, 200, 0)
 QUALITY = 80  # of the images, per cent

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from mocapflow.assets import Body
 from mocapflow.records import F64
-from mocapflow_formats.result import Result
+from mocapflow_export.formats.result import Result
 
 CM = 100.0
 Y_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # from the z-up world

@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from mocapflow_export import tables
+from mocapflow_export.formats.result import Result, library
 from mocapflow_export.uncertainty import measured
-
-from mocapflow_formats.result import Result, library
 
 
 def write(result: Result, path: Path) -> None:

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from mocapflow.geometry import meshes
 from mocapflow.records import F64, I32
 from mocapflow.series import Wide
-from mocapflow_formats.result import Result, library
+from mocapflow_export.formats.result import Result, library
 
 Z_UP = [-np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]  # quaternion x y z w, to glTF's y up
 SHAPES = 240  # shapes of the garment at most: each is stored whole, viewers blend between two

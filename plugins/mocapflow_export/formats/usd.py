@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from mocapflow.assets import Body
 from mocapflow.records import F64, I32
-from mocapflow_formats.result import Result, library
+from mocapflow_export.formats.result import Result, library
 
 PERSON = "/World/Person"
 SKIN, CLOTH = (0.78, 0.6, 0.5), (0.2, 0.45, 0.5)  # RGB

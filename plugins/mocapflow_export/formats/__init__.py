@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
 
-from mocapflow_formats.result import Result
+from mocapflow_export.formats.result import Result
 
 __all__ = ["FILES", "Result", "write"]
 FILES: Mapping[str, str] = {  # format, which is the module's name: its file in results/
@@ -24,5 +24,5 @@ def write(name: str, result: Result, folder: Path) -> Path:
     """Write a result in one of the formats into a folder and return the path."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / FILES[name]
-    import_module(f"mocapflow_formats.{name}").write(result, path)
+    import_module(f"mocapflow_export.formats.{name}").write(result, path)
     return path

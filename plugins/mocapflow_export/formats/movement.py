@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mocapflow_formats.result import Result, library
+from mocapflow_export.formats.result import Result, library
 
 
 def write(result: Result, path: Path) -> None:
