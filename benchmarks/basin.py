@@ -34,9 +34,9 @@ from mocapflow.io.cameras import read_cameras
 from mocapflow.loop import Steps, settle
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
-from mocapflow.rest import Steady
 from mocapflow.scene import Scene
 from mocapflow.shipped import shipped
+from mocapflow.steady import Steady
 from mocapflow.track import believed
 
 CLIPS = ("skirt_steps", "shorts_steps")

@@ -20,7 +20,7 @@ from mocapflow_evaluation.ours import of_folder
 from mocapflow_export import layout, tables
 from mocapflow_export.uncertainty import OUTLINE_MM, excess, px_per_mm
 
-from mocapflow.commands.again import recall
+from mocapflow.commands.invocation import recall
 from mocapflow.recording import open_recording
 from mocapflow.records import F64
 

@@ -18,12 +18,13 @@ from mocapflow.io import agreement, folders
 from mocapflow.io.cameras import find_calibration, read_cameras
 from mocapflow.io.findings import Finding, attempt, error, note, warning
 from mocapflow.io.first_pose import read_first_pose
+from mocapflow.io.images import name_frames
 from mocapflow.io.lateness import TIMING, late_frames, timing_text, write_late_frames
 from mocapflow.io.lenses import View
 from mocapflow.io.plates import background
 from mocapflow.io.rigs import examine_rig, examine_view
 from mocapflow.io.subjects import examine_subject
-from mocapflow.io.video import Video, lost_frames, name_frames, open_video
+from mocapflow.io.video import Video, lost_frames, open_video
 from mocapflow.registry import Registry, load_registry
 from mocapflow.synchrony import measure
 

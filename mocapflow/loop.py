@@ -18,8 +18,8 @@ from mocapflow.geometry.cameras import project
 from mocapflow.geometry.contours import at_nearest
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64, record
-from mocapflow.rest import Shown, Steady, measure_change
 from mocapflow.scene import Scene
+from mocapflow.steady import Shown, Steady, measure_change
 from mocapflow.timing import Stopwatch
 
 

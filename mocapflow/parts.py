@@ -6,13 +6,13 @@ the parts are joined to, which has the label of the whole.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from mocapflow.data import Start
 from mocapflow.errors import PipelineError
 from mocapflow.pipeline import NamedStage, Pipeline
-from mocapflow.wiring import makes, wire
+from mocapflow.wiring import Source, makes, wire
 
 
 def in_parts(pipeline: Pipeline, indices: range) -> Pipeline:
@@ -23,7 +23,8 @@ def in_parts(pipeline: Pipeline, indices: range) -> Pipeline:
     """
     if pipeline.parts.count == 1:
         return pipeline
-    parts = [part for named in pipeline.stages for part in _parts(named, pipeline, indices)]
+    wiring = wire(pipeline)
+    parts = [part for named in pipeline.stages for part in _parts(named, wiring[named.label], pipeline, indices)]
     stages: dict[str, NamedStage] = {}
     for part in parts:  # two tracks of one start share those of its parts
         if stages.setdefault(part.label, part) != part:
@@ -45,13 +46,13 @@ def split(indices: range, count: int, overlap: int) -> list[range]:
     return [indices[max(a - overlap, 0) : b] for a, b in pairs]
 
 
-def _parts(named: NamedStage, pipeline: Pipeline, indices: range) -> Iterator[NamedStage]:
+def _parts(named: NamedStage, inputs: Mapping[str, Source], pipeline: Pipeline, indices: range) -> Iterator[NamedStage]:
     """Yield what a stage becomes: itself, or if it goes on frame by frame, its parts and their join."""
-    sources = set(wire(pipeline)[named.label].values())
+    sources = set(inputs.values())
     if "checkpoint" not in sources:
         yield named
         return
-    start = next((other for other in pipeline.stages if other.label in sources and makes(other.stage) is Start), None)
+    start = next((other for other in pipeline.stages if other.label in sources and makes(other, Start)), None)
     ranges = split(indices, pipeline.parts.count, pipeline.parts.overlap)
     labels = tuple(f"{named.label}_{number}" for number in range(1, len(ranges) + 1))
     for number, (label, part) in enumerate(zip(labels, ranges, strict=True), 1):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from types import UnionType
 from typing import Any
 
 from mocapflow.assets import Background, Body, Camera, Rig
@@ -16,7 +15,7 @@ from mocapflow.parts import in_parts
 from mocapflow.pipeline import NamedStage, Pipeline
 from mocapflow.recording import Recording, open_recording
 from mocapflow.results import Evaluation, Files
-from mocapflow.wiring import Source, body_source, makes, rig_source, wire
+from mocapflow.wiring import Source, latest, makes, wire
 
 BEGINNING = 10  # frames
 SEEN = {Start: "first", Background: "all", Rig: "all", Body: "all", Recording: "all"}  # of a stage that says none
@@ -52,12 +51,12 @@ class Step:
     @property
     def stored(self) -> bool:
         """False for a stage that writes files or compares: it always runs."""
-        return not _makes(self.named, Files | Evaluation) and not self.passes_frames
+        return not makes(self.named, Files | Evaluation) and not self.passes_frames
 
     @property
     def passes_frames(self) -> bool:
         """True for a stage that only says how frames are to be read."""
-        return _makes(self.named, Recording)
+        return makes(self.named, Recording)
 
 
 def steps_of(pipeline: Pipeline, digests: Digests) -> list[Step]:
@@ -67,9 +66,9 @@ def steps_of(pipeline: Pipeline, digests: Digests) -> list[Step]:
     )
     pipeline = in_parts(pipeline, recording.indices)
     wiring, steps, core = wire(pipeline), dict[str, Step](), digests.core()
-    for named in pipeline.stages:
-        sources = wiring[named.label]
-        body, rig = body_source(pipeline, named.label), rig_source(pipeline, named.label)
+    for at, named in enumerate(pipeline.stages):
+        sources, earlier = wiring[named.label], pipeline.stages[:at]
+        body, rig = latest(Body, earlier), latest(Rig, earlier)
         chain = "checkpoint" in sources.values()
         whole = recording if named.part is None else replace(recording, indices=named.part)
         part = replace(whole, indices=_extent(named, whole))
@@ -91,16 +90,11 @@ def steps_of(pipeline: Pipeline, digests: Digests) -> list[Step]:
 
 
 def _extent(named: NamedStage, recording: Recording) -> range:
-    kinds = [extent for cls, extent in SEEN.items() if _makes(named, cls)]
+    kinds = [extent for cls, extent in SEEN.items() if makes(named, cls)]
     extent = named.stage.extent or (kinds[0] if kinds else "run")
     run = recording.indices
     onward = range(run.start, recording.length, run.step)
     return {"first": run[:1], "beginning": onward[:BEGINNING], "run": run, "all": range(recording.length)}[extent]
-
-
-def _makes(named: NamedStage, wanted: type | UnionType) -> bool:
-    made = makes(named.stage)
-    return isinstance(made, type) and issubclass(made, wanted)
 
 
 def _inputs(steps: Mapping[str, Step], source: Source, of_chain: bool) -> Any:

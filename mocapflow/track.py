@@ -45,9 +45,9 @@ from mocapflow.loop import Steps, settle
 from mocapflow.model import ClothedModel
 from mocapflow.recording import Recording
 from mocapflow.records import F64
-from mocapflow.rest import Steady
 from mocapflow.results import ImageFlow, Track, ViewChecks
 from mocapflow.scene import Scene
+from mocapflow.steady import Steady
 from mocapflow.timing import Stopwatch
 
 STEPS = ("decode", "predict", "drape", "segment", "solve", "cloth", "match", "recover")

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from types import NoneType, UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
-from mocapflow.assets import Body, Rig
 from mocapflow.components import Stage
 from mocapflow.errors import MocapflowError, PipelineError, PluginError, alternatives
 from mocapflow.pipeline import NamedStage, Pipeline
@@ -24,7 +23,7 @@ def wire(pipeline: Pipeline) -> dict[str, dict[str, Source]]:
 
     A source is the label of an earlier stage (a tuple of all that make the type, where `run` takes a tuple), `scene`,
     `recording`, `checkpoint` or `run folder` (supplied by the runner where no earlier stage makes one), or None for an
-    optional input that nobody makes. See also `body_source` and `rig_source`.
+    optional input that nobody makes.
 
     Raises:
         PipelineError: no earlier stage makes what a stage needs, or `from` names a wrong one.
@@ -33,24 +32,16 @@ def wire(pipeline: Pipeline) -> dict[str, dict[str, Source]]:
     return {named.label: _wire_stage(named, stages[:at], pipeline.registry) for at, named in enumerate(stages)}
 
 
-def body_source(pipeline: Pipeline, label: str) -> str | None:
-    """Return the latest stage before `label` that makes a Body, which replaces the scene's; None: the pipeline's."""
-    return _latest(Body, _before(pipeline, label))
+def latest(wanted: type, earlier: Sequence[NamedStage]) -> str | None:
+    """Return the label of the last stage that makes a type: a Body replaces the scene's, a Rig its cameras."""
+    makers = [named.label for named in earlier if makes(named, wanted)]
+    return makers[-1] if makers else None
 
 
-def rig_source(pipeline: Pipeline, label: str) -> str | None:
-    """Return the latest stage before `label` that makes a Rig, which replaces the recording's cameras, or None."""
-    return _latest(Rig, _before(pipeline, label))
-
-
-def makes(stage: Stage) -> Any:
-    """Return the type a stage makes."""
-    return _hints(stage).get("return")
-
-
-def _before(pipeline: Pipeline, label: str) -> Sequence[NamedStage]:
-    labels = [named.label for named in pipeline.stages]
-    return pipeline.stages[: labels.index(label)]
+def makes(named: NamedStage, wanted: type | UnionType) -> bool:
+    """True where a stage makes a type, or one of several."""
+    made = _told(named, _hints, named.stage)["return"]
+    return isinstance(made, type) and issubclass(made, wanted)
 
 
 def _wire_stage(named: NamedStage, earlier: Sequence[NamedStage], registry: Registry) -> dict[str, Source]:
@@ -72,7 +63,7 @@ def _source(named: NamedStage, parameter: str, hint: Any, earlier: Sequence[Name
     if parameter in named.wiring:
         return _chosen(named, parameter, wanted, shown)
     supplied = SUPPLIED.get(wanted.__name__) if wanted.__module__.startswith("mocapflow.") else None
-    source = _latest(wanted, shown) or supplied
+    source = latest(wanted, shown) or supplied
     if source is None and not optional:
         article = "an" if wanted.__name__[0] in "AEIOU" else "a"
         message = f"stage '{named.label}' needs {article} {wanted.__name__} but no earlier stage makes one"
@@ -84,7 +75,7 @@ def _several(named: NamedStage, parameter: str, wanted: type, earlier: Sequence[
     """Return all earlier stages that make a type, or the one that `from` names."""
     if parameter in named.wiring:
         return (_chosen(named, parameter, wanted, earlier),)
-    return tuple(other.label for other in earlier if _fits(_told(other, makes, other.stage), wanted))
+    return tuple(other.label for other in earlier if makes(other, wanted))
 
 
 def _makers(wanted: type, registry: Registry) -> list[str]:
@@ -96,20 +87,11 @@ def _makers(wanted: type, registry: Registry) -> list[str]:
 
 def _chosen(named: NamedStage, parameter: str, wanted: type, earlier: Sequence[NamedStage]) -> str:
     label = named.wiring[parameter]
-    fitting = [other.label for other in earlier if _fits(makes(other.stage), wanted)]
+    fitting = [other.label for other in earlier if makes(other, wanted)]
     if label not in fitting:
         message = f"stage '{named.label}' wants its {parameter} from '{label}', but no earlier '{label}' makes one"
         raise PipelineError(message, where=named.where, hint=alternatives(label, fitting))
     return label
-
-
-def _latest(wanted: type, earlier: Sequence[NamedStage]) -> str | None:
-    makers = [named.label for named in earlier if _fits(_told(named, makes, named.stage), wanted)]
-    return makers[-1] if makers else None
-
-
-def _fits(made: Any, wanted: type) -> bool:
-    return isinstance(made, type) and issubclass(made, wanted)
 
 
 def _without_none(hint: Any) -> tuple[type, bool]:

@@ -35,7 +35,7 @@ LAYERS = (  # a module imports only from its own layer or an earlier one; `io` a
     "model",
     "timing",
     "functional",
-    "rest",
+    "steady",
     "loop",
     "hookspecs",
     "observers",

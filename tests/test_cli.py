@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from mocapflow import cli, registry, runner
 from mocapflow.commands import pictures, results
-from mocapflow.commands.again import FILE, Invocation, remember
+from mocapflow.commands.invocation import FILE, Invocation, remember
 from mocapflow.commands.progress import reporter
 from mocapflow.locks import myself
 from mocapflow.shipped import shipped

@@ -9,8 +9,8 @@ from mocapflow_export import layout
 from typer.testing import CliRunner
 
 from mocapflow import cli
-from mocapflow.commands.again import FILE, alone
 from mocapflow.commands.former import FORMER, differing, set_aside
+from mocapflow.commands.invocation import FILE, alone
 from tests.fixtures.stores import STAGES, write_pipeline, write_recording
 
 OUT = Path("out")

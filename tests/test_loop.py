@@ -11,8 +11,8 @@ from mocapflow.data import NO_CLOTH, Change, Estimate, Frame, Moment, Past, Pose
 from mocapflow.geometry.kinematics import chain, skin
 from mocapflow.loop import Steps, settle
 from mocapflow.model import ClothedModel
-from mocapflow.rest import Steady
 from mocapflow.scene import Scene
+from mocapflow.steady import Steady
 from mocapflow.track import believed
 from tests.fixtures.tiny_plugin import TinyMatcher, TinySegmenter, tiny_body
 

@@ -3,12 +3,13 @@ from pathlib import Path
 
 import pytest
 
+from mocapflow.assets import Body
 from mocapflow.errors import MocapflowError
 from mocapflow.experiment import load_experiment
 from mocapflow.pipeline import load_pipeline
 from mocapflow.registry import load_registry
 from mocapflow.shipped import shipped
-from mocapflow.wiring import body_source, wire
+from mocapflow.wiring import latest, wire
 from tests.fixtures import small_plugins
 
 TEXT = """\
@@ -248,9 +249,9 @@ def test_from_overrides_the_nearest(folder):
 def test_a_stage_that_makes_a_body_replaces_it_for_later_stages(folder):
     Path("skirt.yaml").write_text(TEXT.replace("  start: start\n", "  start: start\n  fit: fit\n"))
     pipeline = load()
-    assert body_source(pipeline, "start") is None
-    assert body_source(pipeline, "fit") is None
-    assert body_source(pipeline, "track") == "fit"
+    labels = [named.label for named in pipeline.stages]
+    assert latest(Body, pipeline.stages[: labels.index("fit")]) is None
+    assert latest(Body, pipeline.stages[: labels.index("track")]) == "fit"
 
 
 @pytest.mark.parametrize(

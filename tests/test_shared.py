@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import zarr
 
-from mocapflow.commands.again import placed
+from mocapflow.commands.invocation import placed
 from mocapflow.copies import Copies
 from mocapflow.errors import ComponentFailed, StoreError
 from mocapflow.runner import plan, run

@@ -13,8 +13,8 @@ from functools import partial
 
 import pytest
 
-from mocapflow.commands.again import Invocation
 from mocapflow.commands.comparing import finish
+from mocapflow.commands.invocation import Invocation
 from mocapflow.commands.workers import finished
 from mocapflow.errors import PipelineError
 from mocapflow.store import Store

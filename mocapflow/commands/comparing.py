@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mocapflow.commands.again import Invocation, placed
+from mocapflow.commands.invocation import Invocation, placed
 from mocapflow.commands.results import table
 from mocapflow.commands.running import Frames, execute
 from mocapflow.commands.workers import Scheduler, Workers, finished

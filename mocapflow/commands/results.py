@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mocapflow.commands.again import alone, recall, recalled_keys
 from mocapflow.commands.former import differing
+from mocapflow.commands.invocation import alone, recall, recalled_keys
 from mocapflow.errors import MocapflowError, PipelineError, RecordingError
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def _only_formats(pipeline: Pipeline, formats: Sequence[str]) -> list[str]:
     from mocapflow.wiring import makes
 
     wanted = f"[{', '.join(formats)}]"
-    writers = [named for named in pipeline.stages if issubclass(makes(named.stage), Files | Evaluation)]
+    writers = [named for named in pipeline.stages if makes(named, Files | Evaluation)]
     exports = [named.label for named in writers if isinstance(named.stage, Export)]
     changes = [f"stages.{named.label}=null" for named in writers if named.label not in exports]
     for label in exports:

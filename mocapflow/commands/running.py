@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mocapflow.commands.again import Invocation, alone, placed, recall, recalled_keys, remember
 from mocapflow.commands.former import differing, set_aside
+from mocapflow.commands.invocation import Invocation, alone, placed, recall, recalled_keys, remember
 from mocapflow.commands.progress import last_word, noted, reporter
 from mocapflow.commands.workers import Scheduler, Workers, finished
 from mocapflow.errors import PipelineError

@@ -12,9 +12,10 @@ import numpy as np
 from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.io.cameras import metadata
+from mocapflow.io.images import name_frames
 from mocapflow.io.lateness import TIMING
 from mocapflow.io.typed import place
-from mocapflow.io.video import Video, name_frames
+from mocapflow.io.video import Video
 
 CUT = 0.02  # share of the width or height that a video may lack against its calibration
 USUAL_RATE = 30.0  # frames per second, where nothing says it

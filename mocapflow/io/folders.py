@@ -10,9 +10,10 @@ from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.io import agreement
 from mocapflow.io.cameras import find_calibration, read_cameras
+from mocapflow.io.images import IMAGES
 from mocapflow.io.keypoints import odd_keypoints
 from mocapflow.io.lateness import late_frames
-from mocapflow.io.video import IMAGES, VIDEOS, Video, open_video
+from mocapflow.io.video import VIDEOS, Video, open_video
 from mocapflow.records import record
 
 KEYPOINTS = "keypoints"

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from mocapflow.errors import RecordingError
+from mocapflow.io.images import name_frames, numbered
 from mocapflow.io.typed import read_json
-from mocapflow.io.video import name_frames, numbered
 from mocapflow.records import F64
 
 FORM = 'expected OpenPose\'s format: {"people": [{"pose_keypoints_2d": [x, y, confidence, ...]}]}'

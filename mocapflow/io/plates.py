@@ -10,8 +10,9 @@ import numpy as np
 from mocapflow.assets import Background
 from mocapflow.errors import RecordingError
 from mocapflow.io.folders import plates
+from mocapflow.io.images import check_depth
 from mocapflow.io.lenses import View
-from mocapflow.io.video import Video, check_depth, read_frames
+from mocapflow.io.video import Video, read_frames
 from mocapflow.records import F32, U8
 
 LEAST_SPREAD = 1.0  # grey levels; the rounding of 8-bit pictures alone makes 0.3

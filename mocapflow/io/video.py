@@ -8,8 +8,7 @@ the same pixels.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,14 +16,11 @@ from typing import Any
 import numpy as np
 
 from mocapflow.errors import RecordingError
+from mocapflow.io.images import IMAGES, check_depth, check_numbers, numbered
 from mocapflow.io.stamps import grabs, number_frames, open_capture, read_stamps
 from mocapflow.records import F64, I32, U8, array, record
 
-IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 VIDEOS = (".mp4", ".avi", ".mov", ".mkv", ".m4v", ".webm", ".mpg")
-DARK = 8192  # of 65535: a picture of 16 bits a pixel that reaches no more holds the 10 or 12 bits of a camera
-NAMED = 5  # frames that a message lists
-SPARSE = 1000  # frames for each image of a folder, above which the numbers are no frames
 
 
 @record
@@ -137,51 +133,6 @@ def _decoded(capture: Any, video: Video) -> Iterator[int]:
         yield int(video.numbers[count if by_count else np.abs(video.stamps - now).argmin()])
 
 
-def numbered(folder: Path, suffixes: tuple[str, ...]) -> dict[int, Path]:
-    """Return the files of a folder by frame number: the last run of digits in the name; hidden files are left out.
-
-    Raises:
-        RecordingError: two files have one number.
-    """
-    found: dict[int, Path] = {}
-    for path in sorted(folder.iterdir()):
-        digits = re.findall(r"\d+", path.stem)
-        if not digits or path.suffix.lower() not in suffixes or path.name.startswith("."):
-            continue
-        if (other := found.setdefault(int(digits[-1]), path)) != path:
-            raise RecordingError(
-                f"two files for frame {int(digits[-1])}: {other.name}, {path.name}",
-                where=str(folder),
-                hint="the last digits of a name are its frame, as in cam01_000012.png: rename the files, "
-                "or remove those that are too many",
-            )
-    return found
-
-
-def check_depth(path: Path) -> None:
-    """Check that a picture of 16 bits a pixel uses them: of the higher 8, which are taken, nearly all would be 0.
-
-    Raises:
-        RecordingError: it does not.
-    """
-    import cv2
-
-    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    if image is not None and image.dtype == np.uint16 and 0 < image.max() < DARK:
-        raise RecordingError(
-            f"a picture of 16 bits a pixel that reaches {image.max()} of 65535: as 8 bits it is nearly black",
-            where=str(path),
-            hint="save it as 8 bits, or multiply its values so that they use all 16: 12 bits by 16, 10 bits by 64",
-        )
-
-
-def name_frames(indices: Sequence[int]) -> str:
-    """Return e.g. `frames 3, 4, 9 and 20 more`."""
-    first = ", ".join(str(index) for index in indices[:NAMED])
-    more = f" and {len(indices) - NAMED} more" if len(indices) > NAMED else ""
-    return f"{'frame' if len(indices) == 1 else 'frames'} {first}{more}"
-
-
 def _open_folder(path: Path) -> Video:
     import cv2
 
@@ -195,13 +146,7 @@ def _open_folder(path: Path) -> Video:
             hint="images are named by frame: 000000.png, 000001.png",
         )
     check_depth(first)
-    last = max(files)
-    if last > SPARSE * (len(files) + NAMED):  # every frame that lacks would be told, one by one
-        raise RecordingError(
-            f"{len(files)} images, and {files[last].name} would be frame {last}",
-            where=str(path),
-            hint="the last digits of a name are its frame, not its time or date: rename to 000000.png, 000001.png",
-        )
+    check_numbers(files, path)
     height, width = image.shape[:2]
     numbers = np.array(sorted(files), np.int32)
     return Video(
@@ -209,7 +154,7 @@ def _open_folder(path: Path) -> Video:
         width=width,
         height=height,
         frame_rate=0.0,
-        declared=last + 1,
+        declared=max(files) + 1,
         stamps=np.arange(len(numbers), dtype=np.float64),
         numbers=numbers,
     )

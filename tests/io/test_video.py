@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from mocapflow.errors import RecordingError
+from mocapflow.io.images import name_frames, numbered
 from mocapflow.io.stamps import number_frames
-from mocapflow.io.video import lost_frames, name_frames, numbered, open_video, read_frames
+from mocapflow.io.video import lost_frames, open_video, read_frames
 from tests.fixtures.recordings import avi_frames, number_of, picture, write_video
 
 FRAMES = 20

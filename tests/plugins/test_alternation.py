@@ -11,7 +11,7 @@ from mocapflow.data import Past, Turn
 from mocapflow.functional import Functional
 from mocapflow.loop import Steps, settle
 from mocapflow.model import moved
-from mocapflow.rest import Steady
+from mocapflow.steady import Steady
 from mocapflow.testing import pictures, scenes
 from mocapflow.track import believed
 
