@@ -51,7 +51,7 @@ class Tracker:
         start = StartFromFile().run(recording, self.model.scene)
         for picture in recording.frames(since):
             frame = checks.passed(picture)
-            state = self.stage.begin(frame, past, past.believable(), start, self.model, Stopwatch())
+            state = self.stage.begin(frame, past, start, self.model, Stopwatch())
             settled = settle if seen(frame) else lost
             result = settled(frame, state, past, self.stage.steps, self.model, lambda *_: None)
             found = self.stage.recovered(frame, state, result, past, self.model).state

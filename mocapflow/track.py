@@ -107,8 +107,7 @@ class CoupledLoop(Stage):
             frame = checks.passed(picture) if checks else picture
             frame = replace(frame, flow=flow.into(frame.index)) if flow else frame
             watch.lap("decode")
-            known = past.believable()
-            state = self.begin(frame, past, known, start, model, watch)
+            known, state = past.believable(), self.begin(frame, past, start, model, watch)
             settled = settle if seen(frame) else lost
             result = settled(frame, state, known, self.steps, model, checkpoint.observe)
             spent = result.seconds
@@ -134,9 +133,7 @@ class CoupledLoop(Stage):
             steady=self.steady,
         )
 
-    def begin(
-        self, frame: Frame, past: Past, known: Past, start: Start, model: ClothedModel, watch: Stopwatch
-    ) -> FrameState:
+    def begin(self, frame: Frame, past: Past, start: Start, model: ClothedModel, watch: Stopwatch) -> FrameState:
         """Return what is believed of a frame before looking: the predicted pose, clothed."""
         pose, parameters = start.pose, start.parameters
         if past.moments:
@@ -145,7 +142,7 @@ class CoupledLoop(Stage):
         watch.lap("predict")
         cloth = model.drape(pose, parameters, past)
         watch.lap("drape")
-        state = believed(pose, parameters, cloth)
+        state, known = believed(pose, parameters, cloth), past.believable()
         return state if known.moments else self.approach(frame, state, known, model)
 
     def approach(self, frame: Frame, state: FrameState, past: Past, model: ClothedModel) -> FrameState:

@@ -109,7 +109,7 @@ def followed(scene, begin, frames):
     stage = next(named.stage for named in stages if isinstance(named.stage, CoupledLoop))
     model, past, start = ClothedModel(scene=scene), Past(), Start(pose=begin, parameters=np.empty(0))
     for frame in frames:
-        state = stage.begin(frame, past, past.believable(), start, model, Stopwatch())
+        state = stage.begin(frame, past, start, model, Stopwatch())
         result = settle(frame, state, past, stage.steps, model, lambda *_: None)
         found = stage.recovered(frame, state, result, past, model).state.estimate
         past = past.after(Moment(time=frame.time, pose=found.pose, cloth=NO_CLOTH, observed=found.observed), {})
