@@ -96,7 +96,7 @@ def evaluate(own: Ours, path: Path, folder: Path, longest_lag_s: float = LONGEST
         ours = ", ".join(tables.angle_names(own.columns))
         notes.append(f"the reference shares no angle and frame with the track, which has {ours}")
         return Evaluation(reference=str(path), rows=(), notes=tuple(notes))
-    layout.forget_comparison(folder, but=path)
+    layout.forget_comparison(folder, but=layout.KEYPOINTS)  # it may be what is compared with, and can be again
     notes += findings.said(own, reference, alignment, strides, longest_lag_s)
     _write_tables(folder, own.columns, known, rows, strides)
     found = {"reference": str(path), "lag_frames": alignment.lag, "signs": alignment.signs, "notes": notes}

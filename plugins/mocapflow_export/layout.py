@@ -47,10 +47,9 @@ def overlay(camera: str) -> Path:
 
 
 def forget_comparison(run_folder: Path, but: Path | None = None) -> None:
-    """Remove what a comparison with another reference has written, but not the file that is now compared with."""
-    kept = but and but.resolve()
+    """Remove what a comparison has written, but one part: of another reference, it is none of this run."""
     for part in COMPARISON:
-        if (run_folder / part).resolve() != kept:
+        if part != but:
             (run_folder / part).unlink(missing_ok=True)
 
 

@@ -57,7 +57,7 @@ class Canvas:
         self.picture, self.depth = np.asarray(picture, np.float32), np.asarray(depth, np.float32)
 
     def veil(self, vertices: F64, faces: I32, colours: F32, opacity: float) -> None:
-        """Draw triangles that let shine through what lies behind, or up to `CUT` before, their nearest layer."""
+        """Draw the nearest layer of triangles, which let shine through what is behind, or up to `CUT` before them."""
         behind, depth = self.picture.copy(), self.depth.copy()
         reach = np.minimum(depth + np.float32(CUT), np.float32(FAR))
         self.depth = reach.copy()
