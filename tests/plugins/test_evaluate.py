@@ -148,6 +148,21 @@ def test_a_comparison_stays_where_another_has_nothing_to_compare(tmp_path: Path)
     assert {path: path.read_bytes() for path in (tmp_path / layout.RESULTS).iterdir()} == before
 
 
+@pytest.mark.usefixtures("unrendered")
+def test_a_comparison_forgets_what_another_reference_left_but_the_keypoints(tmp_path: Path) -> None:
+    ours = {"frame": np.arange(3.0), "time": np.arange(3.0) / 30, "knee_flexion_l": np.arange(3.0)}
+    tables.write_columns(layout.place(tmp_path, layout.ANGLES), ours)
+    tables.write_columns(tmp_path / "truth.csv", ours)
+    for part in (layout.STICK, layout.CYCLES, layout.KEYPOINTS):
+        (tmp_path / part).write_text("of another")
+    assert evaluate_run(tmp_path, tmp_path / "truth.csv").rows
+    assert [(tmp_path / part).exists() for part in (layout.STICK, layout.CYCLES, layout.KEYPOINTS)] == [
+        False,
+        False,
+        True,
+    ]
+
+
 def test_a_reference_in_radians_or_out_of_order_is_told(tmp_path: Path) -> None:
     columns = tables.read_columns(DEMO / "truth" / "angles.csv")
     clock = {"frame": columns.pop("frame")}
