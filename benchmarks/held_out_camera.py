@@ -48,8 +48,9 @@ def main() -> None:
 
 def tracked(recording: Path, frames: int) -> tuple[list[FrameState], ClothedModel]:
     """Return what is known of each frame, and the model."""
+    name = "shorts" if "shorts" in recording.name else "skirt"
     pipeline = load_pipeline(
-        Path("pipelines/skirt.yaml"), recording=recording, changes=TRACK_ONLY, frames=slice(0, frames)
+        Path(f"pipelines/{name}.yaml"), recording=recording, changes=TRACK_ONLY, frames=slice(0, frames)
     )
     states: list[FrameState] = []
     observers: Any = pipeline.registry.observers

@@ -9,7 +9,7 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from mocapflow.errors import no_run_folder
+from mocapflow.errors import PipelineError, no_run_folder
 from mocapflow.execution import Execution, is_hit
 from mocapflow.keys import explain
 from mocapflow.pipeline import Pipeline
@@ -17,6 +17,9 @@ from mocapflow.recipes import Step, steps_of
 from mocapflow.shared import open_store
 from mocapflow.store import Report, Store
 from mocapflow.wiring import SUPPLIED, Source
+
+# what a recording holds; files of a run in there would be taken for its own
+INPUTS = ("videos", "background", "subject", "keypoints", "static", "truth", "reference")
 
 
 @dataclass(frozen=True)
@@ -70,6 +73,19 @@ def keys(pipeline: Pipeline, *, store: Path, url: str | None = None) -> dict[str
     return found
 
 
+def check_apart(out: Path, recording: Path) -> None:
+    """Check that a run does not write among the files of the recording that it reads.
+
+    Raises:
+        PipelineError: the run folder is the recording folder, or lies in one of its folders.
+    """
+    folder = recording.resolve()
+    if out.resolve() != folder and not any(out.resolve().is_relative_to(folder / name) for name in INPUTS):
+        return
+    hint = f"give results a folder of their own: --out {Path('runs') / folder.name}"
+    raise PipelineError("the results would lie among the files of the recording", where=str(out), hint=hint)
+
+
 def run(
     pipeline: Pipeline,
     *,
@@ -98,6 +114,7 @@ def run(
         StoreError: the store is full or can't be written; committed frames are kept.
         MocapflowError: the pipeline or an input is wrong.
     """
+    check_apart(out, pipeline.recording)
     kept = open_store(store, url)
     steps = steps_of(pipeline, kept.digests)
     kept.create()

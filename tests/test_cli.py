@@ -45,6 +45,16 @@ def test_a_run_is_made_once_and_then_found(call):
     assert " run " in call("plan", "start.yaml", "--store", "elsewhere.zarr").stdout
 
 
+@pytest.mark.parametrize("more", [[], ["--workers", "2"]])
+def test_a_run_folder_within_the_recording_is_refused_before_it_is_made(call, tmp_path, more):
+    write_pipeline(tmp_path, write_recording(tmp_path / "clip"))
+    (tmp_path / "clip" / "videos").mkdir(exist_ok=True)
+    refused = call("run", str(tmp_path / "tiny.yaml"), "--out", "clip/videos/run", *more)
+    assert refused.exit_code == 2
+    assert "give results a folder of their own: --out runs/clip" in refused.stderr
+    assert not Path("clip/videos/run").exists()
+
+
 def test_the_store(call):
     call("run", "start.yaml", "--out", "first/run")
     assert Path("first/store.zarr").is_dir()

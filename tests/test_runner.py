@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from mocapflow.errors import ComponentFailed, GarmentError, StoreError
+from mocapflow.errors import ComponentFailed, GarmentError, PipelineError, StoreError
 from mocapflow.hookspecs import hookimpl
 from mocapflow.runner import plan, run
 from tests.fixtures.stores import STAGES, actions, load, run_tiny, write_pipeline, write_recording
@@ -25,6 +25,16 @@ def path(tmp_path):
 def outlook(path, folder, *changes, frames=None):
     lines = plan(load(path, *changes, frames=frames), store=folder / "store.zarr")
     return {line.label: (line.action, line.why) for line in lines}
+
+
+@pytest.mark.parametrize("out", ["clip", "clip/videos", "elsewhere/../clip/background/run"])
+def test_a_run_folder_among_the_files_of_its_recording_is_refused(tmp_path, path, out):
+    (tmp_path / "elsewhere").mkdir()
+    before = sorted((tmp_path / "clip").rglob("*"))
+    with pytest.raises(PipelineError, match="among the files of the recording"):
+        run(load(path), store=tmp_path / "store.zarr", out=tmp_path / out)
+    assert sorted((tmp_path / "clip").rglob("*")) == before
+    run(load(path, frames=2), store=tmp_path / "store.zarr", out=tmp_path / "clip" / "runs" / "mine")
 
 
 def test_a_plan_says_what_a_run_does(tmp_path, path):

@@ -66,8 +66,9 @@ def run(
         begin(invocation, folder, steps)
         make_parts(labels, invocation, folder, workers, scheduler)
 
+    loaded = _loaded(invocation, folder)
     with alone(folder):
-        typer.echo(carry_out(invocation.load(), invocation, folder, begin=begin_with_parts))
+        typer.echo(carry_out(loaded, invocation, folder, begin=begin_with_parts))
 
 
 def plan(
@@ -128,7 +129,7 @@ def track(invocation: Invocation, out: Path, label: str) -> None:
 
 def execute(invocation: Invocation, out: Path, fresh: bool) -> RunSummary:
     """Run what an invocation says, have the run folder remember it, and return the summary."""
-    pipeline = invocation.load()
+    pipeline = _loaded(invocation, out)
     with alone(out):
         return carry_out(pipeline, invocation, out, fresh, partial(begin, invocation, out))
 
@@ -154,6 +155,15 @@ def carry_out(
     with noted(reporter(), out) as report:
         store = Path(invocation.store)
         return runner.run(pipeline, store=store, url=invocation.url, out=out, fresh=fresh, report=report, begin=begin)
+
+
+def _loaded(invocation: Invocation, out: Path) -> Pipeline:
+    """Return the pipeline, before anything is written; a run folder within its recording is refused."""
+    from mocapflow.runner import check_apart
+
+    pipeline = invocation.load()
+    check_apart(out, pipeline.recording)
+    return pipeline
 
 
 def _print_plan(invocation: Invocation) -> None:
