@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -60,6 +61,14 @@ def shrink(image: U8, factor: int) -> U8:
     return np.asarray(_shrunk(image, factor), np.uint8)
 
 
+def pyramid(image: U8, factors: Iterable[int]) -> dict[int, U8]:
+    """Return an image (H, W, 3) at 1 / factor of its size by factors, each a multiple of the one before."""
+    images, factor = {1: image}, 1
+    for wanted in sorted(factors):
+        images[wanted], factor = shrink(images[factor], wanted // factor), wanted
+    return images
+
+
 def shrink_values(image: F32, factor: int) -> F32:
     """Return an array (H, W, ...) at 1 / factor of its size, the mean of each square of pixels."""
     return np.asarray(_shrunk(image, factor), np.float32)
@@ -92,4 +101,6 @@ def _shrunk(image: U8 | F32, factor: int) -> np.ndarray:
         return image
     height, width = image.shape[0] // factor, image.shape[1] // factor
     whole = image[: height * factor, : width * factor]
+    if factor > 2 and factor % 2 == 0:  # twice halved takes a fifth of the time of a quarter at once
+        return _shrunk(_shrunk(whole, 2), factor // 2)
     return np.asarray(cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA))

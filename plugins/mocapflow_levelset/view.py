@@ -94,10 +94,11 @@ def find(view: View, levels: Sequence[Level], method: Method, band_px: float) ->
         return Found(whole, Costs(0.0, 0.0, 0.0))
     front, factor = crop.of(view.start), 1
     image = crop.of(view.image)
+    images = crops.pyramid(image, [level.factor for level in levels])
     for level in levels:
         prior = crops.coarser(crop.of(view.prior), level.factor)
         front = _brought(front, factor, level.factor, method.weights.band_px)
-        evidence = _evidence(image, view, crop, level, method)
+        evidence = _evidence(images[level.factor], view, crop, level, method)
         settled = settle(without_islands(front, evidence), prior, evidence, level.window, method.weights, level.rhythm)
         front, factor = settled.level, level.factor
     if view.contact is not None:
@@ -159,9 +160,9 @@ def _brought(level: F32, factor: int, wanted: int, band_px: float) -> F32:
     return redistance(crops.coarser(level, wanted // factor), band_px)
 
 
-def _evidence(image: U8, view: View, crop: Crop, level: Level, method: Method) -> Evidence:
-    """Return what the image within the crop says at one resolution."""
-    factor, small = level.factor, crops.shrink(image, level.factor)
+def _evidence(small: U8, view: View, crop: Crop, level: Level, method: Method) -> Evidence:
+    """Return what the image within the crop says at one resolution, to which it is shrunk."""
+    factor = level.factor
     empty = view.empty if level.use_plate else None
     weight = crops.shrink_mask(crop.of(view.counted), factor).astype(np.float32)
     turned = method.decorrelate and empty is None
