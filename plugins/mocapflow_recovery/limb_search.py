@@ -35,16 +35,17 @@ class LimbSearch(Recovery):
     before, that of the frame before, and poses that people were seen in. Around it poses are sampled part by part, and
     limbs as people were seen to hold them. A part moves only if that brings what strays together: a leg must not take
     a new place under the skirt because an arm was lost. The loop settles again from there.
-    It also looks where images need not contradict a leg that rests on the contour of the other one: after frames that
-    did not show the person, and where a limb has leapt into a pose that nobody was seen in. There a part moves only if
-    that brings person and model together.
+    It also looks where images need not contradict a limb that is elsewhere: in the first frame and after frames that
+    did not show the person, where a leg may rest on the contour of the other one and a foot lie turned in its own; and
+    where a limb has leapt into a pose that nobody was seen in. There a part moves only if that brings person and model
+    together.
     It needs the empty scene; without one every fit is taken as it is.
     """
 
     name: ClassVar[str] = "limb_search"
     uncovered_cm2: PositiveFloat = 60.0  # of the person off the model, in all views: more, and the fit is doubted
     floating_cm2: PositiveFloat = 60.0  # likewise, of skin in empty space
-    after_gap: bool = True  # limbs are looked for in the first frame that shows the person again
+    beginnings: bool = True  # limbs are looked for in the first frame, and in the first one after a gap
     leap_deg: PositiveOrInf = 20.0  # from what was believed and from all `poses`: a limb so far from both is looked for
     reach_m: PositiveFloat = 0.06  # what lies nearer to the other does not count
     cloth_m: PositiveFloat = 0.2  # what lies so near to the garment may be the garment, wherever it swings
@@ -86,14 +87,14 @@ class LimbSearch(Recovery):
         other = settle(found, result.state.cloth.parameters)
         again = surface_of(model, other)
         if distance(again, seen, self.cap_m) >= (1 - self.gain) * distance(surface, seen, self.cap_m):
-            return noted(result, f"{why}: search found nothing better", doubted=doubtful)
+            return noted(result, f"{why}: search found nothing better", doubted=True) if doubtful else result
         then = stray_of(again, model.scene, seen, self._reach())
         return noted(other, f"{why}: found again by search; then {then}", doubted=self._doubtful(then))
 
     def _suspicion(self, fitted: FrameState, believed: FrameState, past: Past, body: Body) -> str:
         """Return why limbs are looked for that images do not contradict, or nothing."""
-        if past.after_gap and self.after_gap:
-            return "looked for the limbs after a gap"
+        if self.beginnings and not past.moments:
+            return f"looked for the limbs {'after a gap' if past.after_gap else 'of a first frame'}"
         poses, least = (fitted.estimate.pose, believed.estimate.pose), np.radians(self.leap_deg)
         return "a limb leapt into a pose that nobody was seen in" if leapt(*poses, body, self._density, least) else ""
 

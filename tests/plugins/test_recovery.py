@@ -198,16 +198,27 @@ def test_a_fit_that_still_strays_is_doubted(end, doubted) -> None:
     assert LimbSearch().recover(FRAME, lost, settled(lost), past, model, settle).doubted == doubted
 
 
-@pytest.mark.parametrize("lost", [False, True], ids=["frame by frame", "after a gap"])
-def test_after_a_gap_a_limb_is_looked_for_that_nothing_doubts(lost) -> None:
+@pytest.mark.parametrize(
+    ("past", "looked"),
+    [(scenes.tiny_past(SCENE, POSE), False), (Past(after_gap=True), True), (Past(), True)],
+    ids=["frame by frame", "after a gap", "first frame"],
+)
+def test_where_frames_begin_a_limb_is_looked_for_that_nothing_doubts(past, looked) -> None:
     def settle(pose, parameters):
         return settled(pictures.tiny_state(SCENE, POSE, POSE))
 
-    near = pictures.tiny_state(SCENE, astray(0.06), POSE)
-    past = Past(after_gap=True) if lost else scenes.tiny_past(SCENE, POSE)
-    found = LimbSearch().recover(FRAME, near, settled(near), past, scenes.tiny_model(SCENE), settle)
-    assert (found.state.estimate.pose.angles == POSE.angles).all() == lost
-    assert not found.doubted and bool(found.notes) == lost
+    near, model = pictures.tiny_state(SCENE, astray(0.06), POSE), scenes.tiny_model(SCENE)
+    found = LimbSearch().recover(FRAME, near, settled(near), past, model, settle)
+    assert (found.state.estimate.pose.angles == POSE.angles).all() == looked
+    assert not found.doubted and bool(found.notes) == looked
+    kept = LimbSearch(beginnings=False).recover(FRAME, near, settled(near), past, model, settle)
+    assert kept.state.estimate.pose is near.estimate.pose and not kept.notes
+
+
+def test_a_first_frame_that_is_right_says_nothing_of_the_search() -> None:
+    right, model = pictures.tiny_state(SCENE, POSE, POSE), scenes.tiny_model(SCENE)
+    found = LimbSearch().recover(FRAME, right, settled(right), Past(), model, lambda *_: settled(right))
+    assert found.state.estimate.pose is right.estimate.pose and not found.notes
 
 
 @pytest.mark.parametrize(
