@@ -52,6 +52,7 @@ from mocapflow.timing import Stopwatch
 
 STEPS = ("decode", "predict", "drape", "segment", "solve", "cloth", "match", "recover")
 VIEWS = 2  # fewer than these do not fix a pose in space
+MOVING = 2  # frames before that tell how the person moves
 UNKNOWN = np.pi**2  # rad^2 and m^2, the variance where nothing was seen
 
 
@@ -64,7 +65,7 @@ class CoupledLoop(Stage):
     name: ClassVar[str] = "coupled_loop"
     predictor: Predictor  # where each frame begins
     segmenter: Segmenter  # of every turn
-    first_segmenter: Segmenter | None = None  # settles the first frame beforehand: one that needs no good pose
+    first_segmenter: Segmenter | None = None  # settles the first two frames beforehand: one that needs no good pose
     matchers: Annotated[tuple[Matcher, ...], Field(min_length=1)]  # their pairs are pooled
     pose_solver: PoseSolver  # of every turn
     draper: Draper | None = None  # needed with a garment
@@ -143,10 +144,13 @@ class CoupledLoop(Stage):
         cloth = model.drape(pose, parameters, past)
         watch.lap("drape")
         state, known = believed(pose, parameters, cloth), past.believable()
-        return state if known.moments else self.approach(frame, state, known, model)
+        return state if len(known.moments) >= MOVING else self.approach(frame, state, known, model)
 
     def approach(self, frame: Frame, state: FrameState, past: Past, model: ClothedModel) -> FrameState:
-        """Return a first frame's state moved near the person by the first segmenter, if there is one."""
+        """Return a first or second frame's state moved near the person by the first segmenter, if there is one.
+
+        Of the second it is not known yet how the person moves: somebody may run.
+        """
         if self.first_segmenter is None or not seen(frame):
             return state
         steps = replace(self.steps, segmenter=self.first_segmenter)

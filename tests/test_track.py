@@ -180,15 +180,27 @@ def test_lost_frames_keep_the_prediction_and_say_so(tmp_path):
     assert same(track, the_track(tmp_path / "two"))
 
 
-def test_the_first_frame_that_shows_the_person_begins_like_a_first(tmp_path, monkeypatch):
-    """However many lost frames come before it: with the first segmenter, and without a past."""
-    begun = []
+@pytest.fixture
+def begun(monkeypatch):
+    """The frames that were settled, each time with how many before it were known."""
+    settled = []
 
     def spy(frame, state, past, *rest):
-        begun.append((frame.index, len(past.moments)))
+        settled.append((frame.index, len(past.moments)))
         return settle(frame, state, past, *rest)
 
     monkeypatch.setattr("mocapflow.track.settle", spy)
+    return settled
+
+
+def test_the_first_segmenter_settles_frames_before_which_no_velocity_is_known(tmp_path, begun):
+    stages = SHORT | {"track": SHORT["track"] | {"first_segmenter": "tiny_segmenter"}}
+    run_tiny(write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=stages), tmp_path, frames=4)
+    assert begun == [(0, 0), (0, 0), (1, 1), (1, 1), (2, 2), (3, 3)]
+
+
+def test_the_first_frame_that_shows_the_person_begins_like_a_first(tmp_path, begun):
+    """However many lost frames come before it: with the first segmenter, and without a past."""
     clip = write_recording(tmp_path / "clip", frames=8)
     for index in (0, 1, 4, 5):
         (clip / "videos" / "cam01" / f"{index:06}.png").write_bytes(b"")
