@@ -11,13 +11,15 @@ from mocapflow_matching.robust import robust_weights
 from mocapflow_twist.solver import TwistGaussNewton
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
-from mocapflow.components import PoseSolver, Predictor
+from mocapflow.components import PoseSolver, Predictor, Prior
 from mocapflow.data import CLOTH, NO_CLOTH, Frame, Matches, Past, Pose, Surface, Turn
 from mocapflow.geometry.cameras import project_each
 from mocapflow.model import ClothedModel
 from mocapflow.scene import Scene
 from mocapflow.track import believed
 from mocapflow_priors.constant_velocity import ConstantVelocity
+from mocapflow_priors.joint_limits import JointLimits
+from mocapflow_priors.rest_pose import RestPose
 
 
 class ImageFlowPredictor(Predictor):
@@ -31,6 +33,7 @@ class ImageFlowPredictor(Predictor):
 
     otherwise: Predictor = ConstantVelocity()  # guesses what no point shows
     pose_solver: PoseSolver = TwistGaussNewton(iterations=8, angle_damping_deg=20.0)  # of the pose that the points show
+    priors: tuple[Prior, ...] = (JointLimits(), RestPose())  # points on one side of a limb do not tell how it is turned
     sigma_px: PositiveFloat = 1.0  # standard deviation of a tracked point
     scale: PositiveFloat = 2.0  # standard deviations beyond which a point pulls no harder (Huber)
     cloth_share: NonNegativeFloat = 0.2  # of a point on cloth that touches the skin; other cloth: none
@@ -53,7 +56,7 @@ class ImageFlowPredictor(Predictor):
             return replace(followed, weight=followed.weight * robust / self.sigma_px**2)
 
         state = believed(guess, np.empty(0), NO_CLOTH)
-        pose = self.pose_solver.solve(match, state, model, (), past, Turn(index=0, cap=1)).pose
+        pose = self.pose_solver.solve(match, state, model, self.priors, past, Turn(index=0, cap=1)).pose
         reached = distances(followed, model.surface(pose, NO_CLOTH), scene)
         return pose if np.mean(reached < self.agreeing_px) >= self.least_agreement else guess
 

@@ -24,7 +24,7 @@ from mocapflow_recovery.coarse import coarse_body
 from mocapflow_recovery.disagreement import distance
 from mocapflow_recovery.judge import Judge, Reach, Stray, stray_of
 from mocapflow_recovery.leaps import leapt
-from mocapflow_recovery.sampling import Plan, Spread, put_back, search, seen_samples, without_idle_parts
+from mocapflow_recovery.sampling import Cost, Plan, Spread, put_back, search, seen_samples, without_idle_parts
 
 
 class LimbSearch(Recovery):
@@ -33,7 +33,8 @@ class LimbSearch(Recovery):
     A level set that starts from the model can't find a limb the model has lost, so the two agree in their error.
     Where large parts of person and model lie far apart, the best is taken of the fitted pose, the one that was believed
     before, that of the frame before, and poses that people were seen in. Around it poses are sampled part by part, and
-    limbs as people were seen to hold them. A part moves only if that brings what strays together: a leg must not take
+    limbs as people were seen to hold them; then around that of the frame before, where trunk and legs have not yet gone
+    astray together. A part moves only if that brings what strays together: a leg must not take
     a new place under the skirt because an arm was lost. The loop settles again from there.
     It also looks where images need not contradict a limb that is elsewhere: in the first frame and after frames that
     did not show the person, where a leg may rest on the contour of the other one and a foot lie turned in its own; and
@@ -43,13 +44,15 @@ class LimbSearch(Recovery):
     """
 
     name: ClassVar[str] = "limb_search"
-    uncovered_cm2: PositiveFloat = 60.0  # of the person off the model, in all views: more, and the fit is doubted
-    floating_cm2: PositiveFloat = 60.0  # likewise, of skin in empty space
+    uncovered_cm2: PositiveFloat = 30.0  # of the person off the model, in all views: more, and the fit is doubted
+    floating_cm2: PositiveFloat = 30.0  # likewise, of skin in empty space
     beginnings: bool = True  # limbs are looked for in the first frame, and in the first one after a gap
     leap_deg: PositiveOrInf = 20.0  # from what was believed and from all `poses`: a limb so far from both is looked for
     reach_m: PositiveFloat = 0.06  # what lies nearer to the other does not count
     cloth_m: PositiveFloat = 0.2  # what lies so near to the garment may be the garment, wherever it swings
-    gain: Annotated[float, Field(ge=0, lt=1)] = 0.1  # share that a fit is nearer, and that each part mends
+    gain: Annotated[float, Field(ge=0, lt=1)] = (
+        0.1  # share that each part mends, and a fit is nearer that cures no doubt
+    )
     tolerance: NonNegativeFloat = 0.03  # by which share a part may be farther that stays as it was fitted
     rows: Annotated[int, Field(ge=50)] = 160  # images are shrunk to about this height
     faces: Annotated[int, Field(ge=200)] = 2600  # of the body that is searched with
@@ -86,10 +89,12 @@ class LimbSearch(Recovery):
         found = self._search(frame, state, result.state, seen, past, model, doubtful)
         other = settle(found, result.state.cloth.parameters)
         again = surface_of(model, other)
-        if distance(again, seen, self.cap_m) >= (1 - self.gain) * distance(surface, seen, self.cap_m):
-            return noted(result, f"{why}: search found nothing better", doubted=True) if doubtful else result
         then = stray_of(again, model.scene, seen, self._reach())
-        return noted(other, f"{why}: found again by search; then {then}", doubted=self._doubtful(then))
+        cured = doubtful and not self._doubtful(then)
+        least = 1.0 if cured else 1 - self.gain
+        if distance(again, seen, self.cap_m) < least * distance(surface, seen, self.cap_m):
+            return noted(other, f"{why}: found again by search; then {then}", doubted=self._doubtful(then))
+        return noted(result, f"{why}: search found nothing better", doubted=True) if doubtful else result
 
     def _suspicion(self, fitted: FrameState, believed: FrameState, past: Past, body: Body) -> str:
         """Return why limbs are looked for that images do not contradict, or nothing."""
@@ -111,10 +116,10 @@ class LimbSearch(Recovery):
         judge = Judge(model, replace(model.scene, body=few), seen, settled.cloth.parameters, past, self._reach())
         plan, rng = self._plan(body), np.random.default_rng(frame.index)
         at_rest, every = np.zeros(len(body.twists)), np.arange(len(body.twists), dtype=np.int32)
-        begins = [fitted, believed, *(moment.pose for moment in past.moments[-1:])]
-        begins += seen_samples(Pose(root=believed.root, angles=at_rest), every, body, plan, rng)
-        begin = begins[int(judge.apart(begins).argmin())]
-        found = search(judge.apart, begin, body, plan, rng)
+        before = [moment.pose for moment in past.moments[-1:]]
+        seen_poses = seen_samples(Pose(root=believed.root, angles=at_rest), every, body, plan, rng)
+        begins = [nearest(judge.apart, [fitted, believed, *before, *seen_poses]), *before]
+        found = nearest(judge.apart, [search(judge.apart, begin, body, plan, rng) for begin in dict.fromkeys(begins)])
         measure = judge.stray if astray else judge.apart  # by what strays a fit that is not astray has only idle parts
         found = without_idle_parts(measure, found, fitted, body, self.gain)
         return put_back(judge.apart, found, [fitted, believed], body, self.tolerance)
@@ -129,6 +134,11 @@ class LimbSearch(Recovery):
 
     def _reach(self) -> Reach:
         return Reach(self.reach_m, self.cloth_m, self.cap_m)
+
+
+def nearest(cost: Cost, poses: Sequence[Pose]) -> Pose:
+    """Return the pose of least cost."""
+    return poses[int(cost(poses).argmin())]
 
 
 def surface_of(model: ClothedModel, result: FrameResult) -> Surface:

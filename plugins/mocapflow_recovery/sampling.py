@@ -7,6 +7,7 @@ all at once would need millions for (annealed and partitioned sampling; Deutsche
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import cycle
 from typing import NamedTuple
 
 import numpy as np
@@ -142,7 +143,10 @@ def parts(body: Body) -> list[I32 | None]:
 def samples(
     pose: Pose, part: I32 | None, body: Body, spread: Spread, share: float, count: int, rng: np.random.Generator
 ) -> Iterator[Pose]:
-    """Yield poses around a pose that differ from it in one part, within the limits of the joints."""
+    """Yield poses around a pose that differ from it in one part, within the limits of the joints.
+
+    By turns the whole part is tried, and what lies from each further joint on: a leg may be right but for its foot.
+    """
     angles = len(pose.angles)
     if part is None:
         middle = root_position(body, pose.root)
@@ -155,9 +159,10 @@ def samples(
             yield moved(pose, increment)
         return
     deviation = share * np.minimum(body.rest_spread[part], spread.angle)
-    for change in rng.normal(size=(count, len(part))):
+    joint = body.screw_joint[part]
+    for change, first in zip(rng.normal(size=(count, len(part))), cycle(np.unique(joint))):
         bent = pose.angles.copy()
-        bent[part] = np.clip(bent[part] + deviation * change, *body.limits[part].T)
+        bent[part] = np.clip(bent[part] + deviation * change * (joint >= first), *body.limits[part].T)
         yield Pose(root=pose.root, angles=bent)
 
 

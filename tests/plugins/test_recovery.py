@@ -158,6 +158,13 @@ def test_what_fits_about_as_well_stays_as_it_was() -> None:
     assert found.angles[second].all() and not np.delete(found.angles, second).any()
 
 
+def test_a_limb_is_also_sampled_from_each_further_joint_on() -> None:
+    leg = parts(SCENE.body)[2]
+    joint, rng = SCENE.body.screw_joint[leg], np.random.default_rng(0)
+    tried = [pose.angles[leg] != POSE.angles[leg] for pose in samples(POSE, leg, SCENE.body, SPREAD, 1.0, 20, rng)]
+    assert {int(joint[moved].min()) for moved in tried} == set(joint)
+
+
 def test_a_leg_stays_where_an_arm_was_lost() -> None:
     """The leg takes the place of cloth that flies: it lies nearer to the person, but nothing of it had strayed."""
     body = template_body()
@@ -196,6 +203,21 @@ def test_a_fit_that_still_strays_is_doubted(end, doubted) -> None:
     lost = pictures.tiny_state(SCENE, astray(0.9), POSE)
     past, model = scenes.tiny_past(SCENE, POSE), scenes.tiny_model(SCENE)
     assert LimbSearch().recover(FRAME, lost, settled(lost), past, model, settle).doubted == doubted
+
+
+def test_a_doubt_that_is_cured_is_gain_enough(monkeypatch) -> None:
+    """A foot found again brings a whole person together by less than a tenth."""
+
+    def settle(pose, parameters):
+        return settled(pictures.tiny_state(SCENE, astray(0.25), POSE))
+
+    lost, past = pictures.tiny_state(SCENE, astray(0.26), POSE), scenes.tiny_past(SCENE, POSE)
+    uncovered = 1e4 * np.array([uncovered_area(surface(astray(angle)), seen(), 0.06, 0.2) for angle in (0.25, 0.26)])
+    assert uncovered[0] < uncovered[1]
+    for line, cured in ((uncovered.mean(), True), (uncovered[0] / 2, False)):
+        search = LimbSearch(gain=0.9, uncovered_cm2=line, floating_cm2=1e6)
+        found = search.recover(FRAME, lost, settled(lost), past, scenes.tiny_model(SCENE), settle)
+        assert (found.state.estimate.pose is not lost.estimate.pose) == cured and found.doubted != cured
 
 
 @pytest.mark.parametrize(
