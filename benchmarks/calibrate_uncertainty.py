@@ -21,6 +21,7 @@ from mocapflow_export import layout, tables
 from mocapflow_export.uncertainty import OUTLINE_MM, excess, px_per_mm
 
 from mocapflow.commands.invocation import recall
+from mocapflow.io.columns import read_columns
 from mocapflow.recording import open_recording
 from mocapflow.records import F64
 
@@ -77,7 +78,7 @@ def main() -> None:
 
 def curves_of(run: Path) -> list[Curve]:
     """Return the curves of a run folder that were compared with a reference."""
-    ours, errors, pipeline = of_folder(run), tables.read_columns(run / layout.ERRORS), recall(run).load()
+    ours, errors, pipeline = of_folder(run), read_columns(run / layout.ERRORS), recall(run).load()
     size = px_per_mm(ours.stick.places[:, 0], open_recording(pipeline.recording, scale=pipeline.scale).cameras)
     curves = []
     for name in tables.angle_names(errors):

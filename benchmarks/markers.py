@@ -16,13 +16,14 @@ import numpy as np
 from mocapflow_evaluation.evaluate import evaluate, evaluate_run
 from mocapflow_evaluation.ours import Ours
 from mocapflow_evaluation.stick import Stick
-from mocapflow_export import layout, tables
+from mocapflow_export import layout
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, filtfilt
 from scipy.spatial.transform import Rotation
 
 from mocapflow.geometry import angles
 from mocapflow.geometry.registration import register
+from mocapflow.io.columns import read_columns
 from mocapflow.records import F64
 
 NOISE, SKIN, DELAY = 0.001, (0.005, 0.010), 0.05  # m, m, s
@@ -39,7 +40,7 @@ CGM2 = {
 
 def main() -> None:
     recording, run = Path(sys.argv[1]), Path(sys.argv[2])
-    truth = tables.read_columns(recording / "truth/angles.csv")
+    truth = read_columns(recording / "truth/angles.csv")
     archive = np.load(recording / "truth/joints.npz")
     at = {str(name): archive["positions"][:, k].astype(float) for k, name in enumerate(archive["names"])}
     time = np.arange(len(truth["frame"])) / 30.0

@@ -13,8 +13,8 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from mocapflow_export import layout
-from mocapflow_export.tables import read_columns
 
+from mocapflow.io.columns import read_columns
 from mocapflow.records import F64, U8
 from mocapflow.shipped import shipped
 

@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
 
-from mocapflow.components import Component, Matcher, Predictor, Prior
-from mocapflow.data import Frame, Matches, Past, Pose, Residual, Segmentation, Surface, Turn
+from mocapflow.components import Component, Matcher, PoseSolver, Predictor, Prior
+from mocapflow.data import (
+    Estimate,
+    Frame,
+    FrameState,
+    Matches,
+    Past,
+    Pose,
+    Residual,
+    Segmentation,
+    Surface,
+    Turn,
+)
 from mocapflow.errors import PluginError
+from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow.scene import Scene
 
@@ -30,14 +43,39 @@ def pose_of(predictor: Predictor, frame: Frame, past: Past, scene: Scene) -> Pos
     Raises:
         WrongAnswer: it is no pose of the body.
     """
-    pose = _of_kind(predictor, predictor.predict(frame, past, scene), Pose)
+    return _possible(predictor, of_kind(predictor, predictor.predict(frame, past, scene), Pose), scene)
+
+
+def estimate_of(
+    solver: PoseSolver,
+    match: Callable[[Surface], Matches],
+    state: FrameState,
+    model: ClothedModel,
+    priors: Sequence[Prior],
+    past: Past,
+    turn: Turn,
+) -> Estimate:
+    """Return the estimate of a pose solver.
+
+    Raises:
+        WrongAnswer: its pose is none of the body, or another number is not finite.
+    """
+    found = of_kind(solver, solver.solve(match, state, model, priors, past, turn), Estimate)
+    _possible(solver, found.pose, model.scene)
+    for name in ("parameters", "covariance", "observed"):
+        if not _finite(getattr(found, name)):
+            raise WrongAnswer(solver, f"{name} that are not finite")
+    return found
+
+
+def _possible(component: Component, pose: Pose, scene: Scene) -> Pose:
     if len(pose.angles) != len(scene.body.twists):
-        raise WrongAnswer(predictor, f"{len(pose.angles)} joint angles; the body has {len(scene.body.twists)}")
+        raise WrongAnswer(component, f"{len(pose.angles)} joint angles; the body has {len(scene.body.twists)}")
     if not (_finite(pose.root) and _finite(pose.angles)):
-        raise WrongAnswer(predictor, "a pose that is not finite")
+        raise WrongAnswer(component, "a pose that is not finite")
     turn = pose.root[:3, :3]
     if np.abs(turn @ turn.T - np.eye(3)).max() > SQUARE or np.linalg.det(turn) < 0:
-        raise WrongAnswer(predictor, "a root that is no rigid motion")
+        raise WrongAnswer(component, "a root that is no rigid motion")
     return pose
 
 
@@ -55,7 +93,7 @@ def matches_of(
     Raises:
         WrongAnswer: a pair is of a camera or a vertex that is not there, or not finite.
     """
-    found = _of_kind(matcher, matcher.match(frame, segmentation, surface, past, scene, turn), Matches)
+    found = of_kind(matcher, matcher.match(frame, segmentation, surface, past, scene, turn), Matches)
     if not len(found.camera):
         return found
     for name, index, count in (
@@ -79,7 +117,7 @@ def residual_of(prior: Prior, pose: Pose, past: Past, scene: Scene) -> Residual:
     Raises:
         WrongAnswer: its rows are not finite, or do not have the columns (omega, v, angles).
     """
-    said, least = _of_kind(prior, prior.residual(pose, past, scene), Residual), 6 + len(pose.angles)
+    said, least = of_kind(prior, prior.residual(pose, past, scene), Residual), 6 + len(pose.angles)
     if said.jacobian.shape[1] < least:
         message = f"a jacobian of {said.jacobian.shape[1]} columns; (omega, v, angles) are {least}"
         raise WrongAnswer(prior, message)
@@ -90,9 +128,14 @@ def residual_of(prior: Prior, pose: Pose, past: Past, scene: Scene) -> Residual:
     return said
 
 
-def _of_kind(component: Component, value: Any, kind: type[Answer]) -> Answer:
+def of_kind(component: Component, value: Any, kind: type[Answer]) -> Answer:
+    """Return what a component answered.
+
+    Raises:
+        WrongAnswer: it is something else than its role returns.
+    """
     if not isinstance(value, kind):
-        raise WrongAnswer(component, f"{type(value).__name__}, not {kind.__name__}")
+        raise WrongAnswer(component, f"{type(value).__name__}, not {getattr(kind, '__name__', kind)}")
     return value
 
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+from mocapflow.answers import of_kind
 from mocapflow.assets import Body, GarmentMesh
 from mocapflow.blame import failure
 from mocapflow.checkpoint import Checkpoint
@@ -26,7 +27,7 @@ from mocapflow.rows import Corrupted
 from mocapflow.scene import Scene
 from mocapflow.store import Artifact, Report, Store, versions, with_versions
 from mocapflow.warned import warnings_logged
-from mocapflow.wiring import Source
+from mocapflow.wiring import Source, made_by
 
 Value = TypeVar("Value")
 
@@ -140,12 +141,12 @@ class Execution:
     def _run(self, step: Step, checkpoint: Checkpoint | None = None) -> Any:
         inputs = {name: self._input(step, source, checkpoint) for name, source in step.sources.items()}
         self._report(f"{step.label}: running {step.named.stage.name}")
-        cpu, wall = time.process_time(), time.perf_counter()
+        cpu, wall, stage = time.process_time(), time.perf_counter(), step.named.stage
         kept = (lambda: checkpoint.kept) if checkpoint else str
         with warnings_logged() as said:
             if checkpoint is not None:
                 checkpoint.keep_warnings(said)
-            value = self._blaming(step.named.stage, lambda: step.named.stage.run(**inputs), kept)
+            value = self._blaming(stage, lambda: of_kind(stage, stage.run(**inputs), made_by(step.named)), kept)
         told = said if checkpoint is None else checkpoint.warnings
         self._entered(step, None, time.process_time() - cpu, time.perf_counter() - wall, told)
         return value
@@ -172,7 +173,11 @@ class Execution:
         place = step.body, step.rig
         if place not in self._scenes:
             model, garment, folder = self._pipeline.body, self._pipeline.garment, self._pipeline.recording
-            body = self._result(step.body) if step.body else self._blaming(model, lambda: model.load(folder))
+            body = (
+                self._result(step.body)
+                if step.body
+                else self._blaming(model, lambda: of_kind(model, model.load(folder), Body))
+            )
             sewn = self._sewn(garment, body) if garment else None
             cameras = self._result(step.rig).cameras if step.rig else step.recording.cameras
             scene = self._scenes[place] = Scene(cameras=cameras, body=body, garment=sewn)
@@ -182,7 +187,7 @@ class Execution:
 
     def _sewn(self, garment: Garment, body: Body) -> GarmentMesh:
         try:
-            return self._blaming(garment, lambda: garment.sew(body))
+            return self._blaming(garment, lambda: of_kind(garment, garment.sew(body), GarmentMesh))
         except GarmentError as error:
             raise GarmentError(error.message, where=self._pipeline.garment_where, hint=error.hint) from None
 

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from mocapflow.answers import matches_of
+from mocapflow.answers import estimate_of, matches_of
 from mocapflow.assets import Camera
 from mocapflow.components import ClothFitter, Matcher, Observe, PoseSolver, Prior, Segmenter, pool
 from mocapflow.data import NO_CLOTH, Frame, FrameResult, FrameState, Matches, Past, Segmentation, Surface, Turn
@@ -52,7 +52,7 @@ def settle(
         segmentation = steps.segmenter.segment(frame, state, past, model.scene, turn)
         watch.lap("segment")
         match = partial(pool_matches, steps.matchers, frame, segmentation, past, model.scene, turn)
-        estimate = steps.pose_solver.solve(match, state, model, steps.priors, past, turn)
+        estimate = estimate_of(steps.pose_solver, match, state, model, steps.priors, past, turn)
         watch.lap("solve")
         fitter = steps.cloth_fitter
         cloth = fitter.fit(frame, segmentation, estimate, model, past, turn) if fitter else NO_CLOTH

@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, NonNegativeInt, PositiveInt
 
 from mocapflow.components import BodyModel, Garment, Stage
-from mocapflow.documents import Document, Place, changed
+from mocapflow.documents import Document, Place, Steps, changed
 from mocapflow.errors import PipelineError, RecordingError
 from mocapflow.measures import garment_of, place_of
 from mocapflow.registry import Registry, load_registry
@@ -112,14 +112,14 @@ def load_pipeline(
         recording: replaces the recording of the file.
         changes: `PATH=VALUE` as in `--set`.
         folder: where relative paths in changes start.
-        frames: replaces the frames of the file.
+        frames: replaces first and last frame of the file, and the step where it has one.
 
     Raises:
         MocapflowError: what is wrong, at which line, and what exists instead.
     """
     document = read(Path(path), changes, folder)
     if frames is not None:
-        document = changed(document, "frames", _given(frames))
+        document = _with_frames(document, frames)
     plain = Resolver(document, Registry())
     said = plain.build(PipelineFile, document.values, ())
     assert isinstance(said, PipelineFile)
@@ -166,12 +166,16 @@ def _recording(said: PipelineFile, resolver: Resolver) -> Path:
     return resolver.file(said.recording, ("recording",))
 
 
-def _given(part: slice) -> Document:
-    """Return frames as the value that they replace, written in --frames."""
-    said = {"start": part.start, "stop": part.stop, "step": part.step}
-    written = ":".join("" if value is None else str(value) for value in said.values())
-    place = Place(f"--frames {written.removesuffix(':')}", Path())
-    return Document({name: value for name, value in said.items() if value is not None}, {(): place})
+def _with_frames(document: Document, part: slice) -> Document:
+    """Return the document with frames as they were written in --frames; a step stays that is not."""
+    parts = (part.start, part.stop, part.step)
+    written = ":".join("" if value is None else str(value) for value in parts)
+    said = {"start": part.start or 0, "stop": part.stop} | ({} if part.step is None else {"step": part.step})
+    before = document.values.get("frames")
+    places: dict[Steps, Place] = {(): Place(f"--frames {written.removesuffix(':')}", Path())}
+    if part.step is None and isinstance(before, dict) and "step" in before:
+        said["step"], places["step",] = before["step"], document.place(("frames", "step"))
+    return changed(document, "frames", Document(said, places))
 
 
 def _parts(said: PartsFile, resolver: Resolver) -> Parts:

@@ -73,17 +73,17 @@ def keys(pipeline: Pipeline, *, store: Path, url: str | None = None) -> dict[str
     return found
 
 
-def check_apart(out: Path, recording: Path) -> None:
+def check_apart(out: Path, store: Path, recording: Path) -> None:
     """Check that a run does not write among the files of the recording that it reads.
 
     Raises:
-        PipelineError: the run folder is the recording folder, or lies in one of its folders.
+        PipelineError: the run folder or the store is the recording folder, or lies in one of its folders.
     """
     folder = recording.resolve()
-    if out.resolve() != folder and not any(out.resolve().is_relative_to(folder / name) for name in INPUTS):
-        return
-    hint = f"give results a folder of their own: --out {Path('runs') / folder.name}"
-    raise PipelineError("the results would lie among the files of the recording", where=str(out), hint=hint)
+    for what, path, option in (("results", out, "--out"), ("stored results", store, "--store")):
+        if path.resolve() == folder or any(path.resolve().is_relative_to(folder / name) for name in INPUTS):
+            hint = f"give {what} a folder of their own: {option} {Path('runs') / folder.name}"
+            raise PipelineError(f"the {what} would lie among the files of the recording", where=str(path), hint=hint)
 
 
 def run(
@@ -114,7 +114,7 @@ def run(
         StoreError: the store is full or can't be written; committed frames are kept.
         MocapflowError: the pipeline or an input is wrong.
     """
-    check_apart(out, pipeline.recording)
+    check_apart(out, store, pipeline.recording)
     kept = open_store(store, url)
     steps = steps_of(pipeline, kept.digests)
     kept.create()

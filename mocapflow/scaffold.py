@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from string import Template
 from typing import NamedTuple
@@ -40,14 +41,16 @@ def write_plugin(name: str, role: str, folder: Path) -> list[Path]:
     """Write a plugin package into a new folder and return its files.
 
     Raises:
-        PluginError: the name can't be one, nobody wrote templates for the role, the folder is there already, or
-            can't be written.
+        PluginError: the name can't be one, nobody wrote templates for the role, the package or the folder is there
+            already, or the folder can't be written.
     """
     if role not in KINDS:
         raise PluginError(f"there are no templates for a {role}", hint=alternatives(role, KINDS))
     if not NAME.fullmatch(name):
         hint = "lower-case letters, digits and single hyphens, a letter first: my-dress"
         raise PluginError(f"'{name}' can't be the name of a package", hint=hint)
+    if find_spec(package := f"mocapflow_{name.replace('-', '_')}"):
+        raise PluginError(f"there is a package {package} already", hint="plugins of one name hide each other")
     if folder.exists():
         raise PluginError("there is something already", where=str(folder), hint="name another folder with --out")
     module, kind = name.replace("-", "_"), KINDS[role]

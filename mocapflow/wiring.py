@@ -40,8 +40,13 @@ def latest(wanted: type, earlier: Sequence[NamedStage]) -> str | None:
 
 def makes(named: NamedStage, wanted: type | UnionType) -> bool:
     """True where a stage makes a type, or one of several."""
-    made = _told(named, _hints, named.stage)["return"]
+    made = made_by(named)
     return isinstance(made, type) and issubclass(made, wanted)
+
+
+def made_by(named: NamedStage) -> Any:
+    """Return the type that a stage says it makes."""
+    return _told(named, _hints, named.stage)["return"]
 
 
 def _wire_stage(named: NamedStage, earlier: Sequence[NamedStage], registry: Registry) -> dict[str, Source]:

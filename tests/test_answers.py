@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mocapflow.answers import WrongAnswer, matches_of, pose_of, residual_of
-from mocapflow.components import Matcher, Predictor, Prior
+from mocapflow.answers import WrongAnswer, estimate_of, matches_of, of_kind, pose_of, residual_of
+from mocapflow.components import Matcher, PoseSolver, Predictor, Prior
 from mocapflow.data import NO_CLOTH, Matches, Past, Pose, Residual, Turn
 from mocapflow.errors import ComponentFailed
 from mocapflow.testing import pictures, scenes
@@ -22,7 +22,7 @@ GOOD = Matches(
 )  # fmt: skip
 
 
-class Saying(Matcher, Predictor, Prior):
+class Saying(Matcher, PoseSolver, Predictor, Prior):
     """Says what it is told to."""
 
     name = "saying"
@@ -35,6 +35,9 @@ class Saying(Matcher, Predictor, Prior):
         return self.answer
 
     def residual(self, pose, past, scene):
+        return self.answer
+
+    def solve(self, match, state, model, priors, past, turn):
         return self.answer
 
 
@@ -158,3 +161,25 @@ def test_a_run_names_who_answers_wrongly(tmp_path, prior, said):
     assert load(path)
     with pytest.raises(ComponentFailed, match=said):
         run_tiny(path, tmp_path, frames=2)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"pose": Pose(root=np.full((4, 4), np.nan), angles=POSE.angles)}, "a pose that is not finite"),
+        ({"pose": Pose(root=np.zeros((4, 4)), angles=POSE.angles)}, "a root that is no rigid motion"),
+        ({"pose": Pose(root=POSE.root, angles=POSE.angles[1:])}, "the body has"),
+        ({"observed": np.full(len(POSE.angles), np.nan)}, "observed that are not finite"),
+    ],
+)
+def test_an_estimate_that_is_none_names_the_solver(change, said) -> None:
+    good = pictures.tiny_state(SCENE, POSE, POSE).estimate
+    asked = (None, None, scenes.tiny_model(SCENE), (), Past(), Turn(index=0, cap=1))
+    assert estimate_of(Saying(answer=good), *asked) is good
+    with pytest.raises(WrongAnswer, match=f"'saying' returned .*{said}"):
+        estimate_of(Saying(answer=replace(good, **change)), *asked)
+
+
+def test_what_is_of_another_kind_names_who_made_it() -> None:
+    with pytest.raises(WrongAnswer, match="'saying' returned NoneType, not Matches"):
+        of_kind(Saying(answer=None), None, Matches)

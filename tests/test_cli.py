@@ -14,6 +14,7 @@ from mocapflow import cli, registry, runner
 from mocapflow.commands import pictures, results
 from mocapflow.commands.invocation import FILE, Invocation, remember
 from mocapflow.commands.progress import reporter
+from mocapflow.io.columns import read_columns
 from mocapflow.locks import myself
 from mocapflow.shipped import shipped
 from tests.fixtures.stores import STAGES, write_pipeline, write_recording
@@ -53,6 +54,8 @@ def test_a_run_folder_within_the_recording_is_refused_before_it_is_made(call, tm
     assert refused.exit_code == 2
     assert "give results a folder of their own: --out runs/clip" in refused.stderr
     assert not Path("clip/videos/run").exists()
+    stored = call("run", str(tmp_path / "tiny.yaml"), "--out", "run", "--store", "clip/videos", *more)
+    assert stored.exit_code == 2 and "the stored results would lie among the files" in stored.stderr
 
 
 def test_the_store(call):
@@ -242,7 +245,7 @@ def test_paths_of_changes_start_where_the_run_was_begun(call, tmp_path, monkeypa
 
 @pytest.mark.parametrize("truth", [[], ["--truth", str(CLIP / "truth/angles.csv")]])
 def test_a_comparison_is_made_as_in_the_run(call, tmp_path, truth):
-    known = tables.read_columns(CLIP / "truth/angles.csv")
+    known = read_columns(CLIP / "truth/angles.csv")
     late = {name: np.roll(column, 8) if name != "frame" else column for name, column in known.items()}
     tables.write_columns(layout.place(tmp_path, layout.ANGLES), {**late, "time": known["frame"] / 30})
     lags = []
@@ -256,7 +259,7 @@ def test_a_comparison_is_made_as_in_the_run(call, tmp_path, truth):
 
 
 def test_a_run_folder_from_elsewhere_is_compared_with_what_is_given(call, tmp_path):
-    known = tables.read_columns(CLIP / "truth/angles.csv")
+    known = read_columns(CLIP / "truth/angles.csv")
     tables.write_columns(layout.place(tmp_path, layout.ANGLES), {**known, "time": known["frame"] / 30})
     remember(Invocation("/elsewhere/bare.yaml", None, (), None, "store"), tmp_path, {})
     assert call("evaluate", str(tmp_path)).stderr.startswith("error: /elsewhere/bare.yaml  there is no such file")

@@ -84,6 +84,13 @@ def test_frames(folder):
     assert load("frames.stop=010").stop == 10
 
 
+def test_frames_that_are_given_keep_the_step_of_the_file(folder):
+    Path("skirt.yaml").write_text(TEXT + "frames: {start: 2, step: 3}\n")
+    kept, given = load(frames=slice(0, 6)), load(frames=slice(None, 6, 1))
+    assert (kept.start, kept.stop, kept.step) == (0, 6, 3)
+    assert (given.start, given.stop, given.step) == (0, 6, 1)
+
+
 @pytest.mark.parametrize(
     ("frames", "message"),
     [

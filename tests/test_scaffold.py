@@ -37,5 +37,7 @@ def test_errors(tmp_path: Path) -> None:
         write_plugin("My Dress", "garment", tmp_path / "new")
     with pytest.raises(PluginError, match=r"there is something already\n.*--out"):
         write_plugin("dress", "garment", tmp_path)
+    with pytest.raises(PluginError, match=r"there is a package mocapflow_levelset already\n"):
+        write_plugin("levelset", "matcher", tmp_path / "other")
     with pytest.raises(PluginError, match=r"there are no templates for a stage\n.*garment"):
         write_plugin("dress", "stage", tmp_path / "new")

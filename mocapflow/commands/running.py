@@ -158,11 +158,11 @@ def carry_out(
 
 
 def _loaded(invocation: Invocation, out: Path) -> Pipeline:
-    """Return the pipeline, before anything is written; a run folder within its recording is refused."""
+    """Return the pipeline, before anything is written; a run folder or store within its recording is refused."""
     from mocapflow.runner import check_apart
 
     pipeline = invocation.load()
-    check_apart(out, pipeline.recording)
+    check_apart(out, Path(invocation.store), pipeline.recording)
     return pipeline
 
 

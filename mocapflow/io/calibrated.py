@@ -32,7 +32,7 @@ def make_camera(
     """
     motion = np.eye(4)
     motion[:3, 3] = numbers(translation, (3,), "translation", name, where)
-    if np.size(rotation) == 9:
+    if _count(rotation) == 9:
         motion[:3, :3] = numbers(rotation, (3, 3), "rotation", name, where)
     else:
         vector = numbers(rotation, (3,), "rotation", name, where)
@@ -53,13 +53,21 @@ def make_camera(
 
 def _coefficients(distortion: Any, fisheye: bool, name: str, where: Path) -> F64:
     """Return at most 5 coefficients of a lens, without the zeros behind those that are known."""
-    found = numbers(distortion, (np.size(distortion),), "distortions", name, where)
+    found = numbers(distortion, (_count(distortion),), "distortions", name, where)
     known = 4 if fisheye else 5
     # three may be k1 k2 k3 or k1 k2 p1: OpenCV has no such list
     if found[known:].any() or (len(found) == 3 and found[2]):
         hint = "a fisheye has 4: k1 k2 k3 k4" if fisheye else "write 2, 4 or 5 of them, in this order: k1 k2 p1 p2 k3"
         raise bad(name, where, f"has {len(found)} distortion coefficients", hint)
     return found[:known]
+
+
+def _count(value: Any) -> int:
+    """Return how many numbers a field holds; 0 where rows of it have other lengths than others."""
+    try:
+        return int(np.size(value))
+    except ValueError:
+        return 0
 
 
 def numbers(value: Any, shape: tuple[int, ...], field: str, name: str, where: Path) -> F64:

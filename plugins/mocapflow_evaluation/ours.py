@@ -13,6 +13,7 @@ from mocapflow_export.uncertainty import measured
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import kinematics
 from mocapflow.io import markers, opensim
+from mocapflow.io.columns import read_columns
 from mocapflow.records import F64, record
 from mocapflow.results import Track, frame_rate_of
 from mocapflow.scene import Scene
@@ -51,12 +52,12 @@ def of_folder(folder: Path) -> Ours:
     path = folder / layout.ANGLES
     if not path.is_file():
         raise RecordingError("no such run folder: it has no results/angles.csv", where=str(folder))
-    columns = tables.read_columns(path)
+    columns = read_columns(path)
     raw = folder / layout.RAW_ANGLES
     motion = markers.read_mot(folder / layout.MOTION)[0] if (folder / layout.MOTION).is_file() else {}
     return Ours(
         columns=columns | {name: motion[name] for name in SIGNED if name in motion},
-        raw=tables.read_columns(raw) if raw.is_file() else columns,
+        raw=read_columns(raw) if raw.is_file() else columns,
         stick=_stick(folder / layout.JOINTS, len(columns["frame"])),
     )
 

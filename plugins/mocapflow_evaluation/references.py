@@ -12,6 +12,7 @@ from mocapflow_export import tables
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import angles
 from mocapflow.io import markers
+from mocapflow.io.columns import read_columns
 from mocapflow.records import F64, array, record
 from mocapflow_evaluation import marker_joints
 from mocapflow_evaluation.marker_names import FILE, landmarks
@@ -80,7 +81,7 @@ def read_reference(path: Path) -> Reference:
 
 
 def _table(path: Path) -> Reference:
-    columns = tables.read_columns(path)
+    columns = read_columns(path)
     clock = next((name for name in ("frame", "time") if name in columns), None)
     if clock is None:
         raise RecordingError("the reference has neither a column frame nor time", where=str(path))

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from mocapflow_export import layout, tables
+from mocapflow_export import layout
 
+from mocapflow.io.columns import read_columns
 from mocapflow.records import F64
 
 
@@ -31,5 +32,5 @@ def angle_errors(run: Path | str) -> Errors:
     """Return the errors of each angle that was compared in a run; none without a reference, or where it failed."""
     if isinstance(run, str) or not (run / layout.ERRORS).is_file():
         return Errors(np.empty(0), {})
-    columns = tables.read_columns(run / layout.ERRORS)
+    columns = read_columns(run / layout.ERRORS)
     return Errors(columns.pop("frame"), columns)

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from mocapflow_export import tables
 
 from mocapflow.errors import MocapflowError, RecordingError
 from mocapflow.geometry.registration import Registration, register
+from mocapflow.io.columns import read_columns
 from mocapflow.records import F64, array, record
 
 BONES = tuple(
@@ -51,7 +51,7 @@ def between_points(path: Path) -> Registration:
         RecordingError: the table can't be read or lacks a column.
         MocapflowError: the points don't tell.
     """
-    columns, needed = tables.read_columns(path), [f"{rig}{axis}" for rig in ("", "marker_") for axis in "xyz"]
+    columns, needed = read_columns(path), [f"{rig}{axis}" for rig in ("", "marker_") for axis in "xyz"]
     missing = [name for name in needed if name not in columns]
     if missing:
         raise RecordingError(

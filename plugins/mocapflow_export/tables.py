@@ -8,13 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from mocapflow.errors import RecordingError
 from mocapflow.geometry.angles import AngleSeries
-from mocapflow.io.markers import numbers
 from mocapflow.records import F64
 from mocapflow.results import Track
-
-FORM = "expected UTF-8 text, commas between the columns, a point in a number"
 
 
 def angle_columns(track: Track, series: AngleSeries) -> dict[str, F64]:
@@ -46,31 +42,6 @@ def write_columns(path: Path, columns: Mapping[str, F64]) -> Path:
     rows = np.column_stack(list(columns.values()))
     np.savetxt(path, rows, fmt=styles, delimiter=",", header=",".join(columns), comments="")
     return path
-
-
-def read_columns(path: Path) -> dict[str, F64]:
-    """Read a table of numbers; empty cells are NaN.
-
-    Raises:
-        RecordingError: the file is missing or no UTF-8 text, two columns have one name, or a row has other cells than
-            the header or a cell is no number.
-    """
-    if not path.is_file():
-        raise RecordingError("no such table", where=str(path))
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = [row for row in csv.reader(file) if row]
-    except UnicodeDecodeError:
-        raise RecordingError("is not UTF-8 text", where=str(path), hint=FORM) from None
-    if len(rows) < 2:
-        raise RecordingError("the table has no rows", where=str(path))
-    header = [name.strip() for name in rows[0]]
-    if len(header) == 1 and ";" in header[0]:
-        raise RecordingError("the columns are divided by semicolons", where=f"{path}:1", hint=FORM)
-    if twice := next((name for name in header if header.count(name) > 1), None):
-        raise RecordingError(f"two columns are called '{twice}'", where=f"{path}:1", hint="which one is meant?")
-    values = np.array([numbers(row, len(header), f"{path}:{number}") for number, row in enumerate(rows[1:], 2)])
-    return {name: values[:, column].copy() for column, name in enumerate(header)}
 
 
 def write_rows(path: Path, rows: Sequence[Mapping[str, float | str]]) -> Path:

@@ -74,7 +74,8 @@ def bandwidth(poses: F64, percentile: float = 100.0) -> float:
 def write(path: Path, density: Density) -> None:
     """Write a density; poses are kept to about 0.001 degrees."""
     content = {"names": np.array(density.names), "poses": density.poses.astype(np.float32)}
-    np.savez_compressed(path, allow_pickle=False, bandwidth=np.array(density.bandwidth), **content)
+    with path.open("wb") as file:  # by its name alone numpy would add a suffix
+        np.savez_compressed(file, allow_pickle=False, bandwidth=np.array(density.bandwidth), **content)
 
 
 def read(path: Path) -> Density:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from zipfile import BadZipFile
@@ -14,6 +13,7 @@ from mocapflow.errors import RecordingError
 from mocapflow.geometry import angles
 from mocapflow.geometry.joints import angles_from_rotations
 from mocapflow.io import markers
+from mocapflow.io.columns import read_columns
 from mocapflow.records import F64
 from mocapflow_priors import training_bvh
 from mocapflow_priors.density import Density, bandwidth
@@ -99,10 +99,7 @@ def from_rotations(path: Path, body: Body) -> Angles:
 
 def from_table(path: Path, body: Body) -> Angles:
     """Read an angles.csv: degrees between joint centres, as a run writes them."""
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        rows = list(csv.DictReader(file))
-    names = {name for name in rows[0] if name and name[:-2] in COLUMNS} if rows else set()
-    degrees = {name: np.array([float(row[name] or "nan") for row in rows]) for name in names}
+    degrees = {name: values for name, values in read_columns(path).items() if name[:-2] in COLUMNS}
     if degrees and all(np.nanmax(np.abs(values), initial=0.0) <= np.pi for values in degrees.values()):
         raise RecordingError("no angle in it is above 3.14: it seems to be in radians", where=str(path), hint=DEGREES)
     return from_columns(possible(degrees, path), body)

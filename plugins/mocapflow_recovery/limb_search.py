@@ -50,9 +50,7 @@ class LimbSearch(Recovery):
     leap_deg: PositiveOrInf = 20.0  # from what was believed and from all `poses`: a limb so far from both is looked for
     reach_m: PositiveFloat = 0.06  # what lies nearer to the other does not count
     cloth_m: PositiveFloat = 0.2  # what lies so near to the garment may be the garment, wherever it swings
-    gain: Annotated[float, Field(ge=0, lt=1)] = (
-        0.1  # share that each part mends, and a fit is nearer that cures no doubt
-    )
+    gain: Annotated[float, Field(ge=0, lt=1)] = 0.1  # share that each part mends, and a fit that cures no doubt
     tolerance: NonNegativeFloat = 0.03  # by which share a part may be farther that stays as it was fitted
     rows: Annotated[int, Field(ge=50)] = 160  # images are shrunk to about this height
     faces: Annotated[int, Field(ge=200)] = 2600  # of the body that is searched with

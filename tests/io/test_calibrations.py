@@ -178,6 +178,8 @@ def test_nan(tmp_path):
         ("size = [64, 48]", "size = [64]", "has 1 numbers in size; expected 2"),
         ("size = [64, 48]", "size = [-64, 48]", "has the size -64 x 48"),
         ("size = [64, 48]", 'size = ["big", 48]', r"has no numbers in size: \['big', 48\]"),
+        ("rotation = [", "rotation = [[1.0, 0.0], [0.0, 1.0, 0.0]] # [", "has no numbers in rotation"),
+        ("distortions = [0.0, 0.0, 0.0, 0.0]", "distortions = [[0.0], 0.0]", "has no numbers in distortions"),
         ("matrix = [[60.0", "matrix = [[-60.0", "has no camera matrix"),
         ("fisheye = false", 'fisheye = "false"', "has fisheye = 'false'\n       write true or false"),
         ("fisheye = false", "fisheye = 1", "has fisheye = 1\n"),

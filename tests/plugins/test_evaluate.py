@@ -15,6 +15,7 @@ from scipy.signal import lfilter
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import angles
 from mocapflow.io import markers
+from mocapflow.io.columns import read_columns
 from mocapflow.results import RunFolder
 
 FRAMES = np.arange(120.0)
@@ -127,7 +128,7 @@ def test_demo_truth_is_found(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("unrendered")
 def test_a_run_folder_is_evaluated_from_its_files(tmp_path: Path) -> None:
     truth = DEMO / "truth" / "angles.csv"
-    columns = tables.read_columns(truth)
+    columns = read_columns(truth)
     ours = {"frame": columns["frame"], "time": columns["frame"] / 30}
     ours |= {n: v + 1.5 for n, v in columns.items() if n != "frame"}
     tables.write_columns(layout.place(tmp_path, layout.ANGLES), ours)
@@ -164,7 +165,7 @@ def test_a_comparison_forgets_what_another_reference_left_but_the_keypoints(tmp_
 
 
 def test_a_reference_in_radians_or_out_of_order_is_told(tmp_path: Path) -> None:
-    columns = tables.read_columns(DEMO / "truth" / "angles.csv")
+    columns = read_columns(DEMO / "truth" / "angles.csv")
     clock = {"frame": columns.pop("frame")}
     tables.write_columns(layout.place(tmp_path, layout.ANGLES), clock | {"time": clock["frame"] / 30} | columns)
     turned = tables.write_columns(tmp_path / "turned.csv", clock | {n: np.radians(v) for n, v in columns.items()})
@@ -225,7 +226,7 @@ def test_joint_centres_give_three_point_angles(tmp_path: Path, style: str) -> No
     theirs = {"hip_l": "LHip", "knee_l": "LKnee", "ankle_l": "LAnkle"}
     shown = names if style == "ours" else [theirs.get(n, n) for n in names]
     markers.write_trc(tmp_path / "j.trc", shown, markers.opensim_from_world(places), 30.0)
-    truth = tables.read_columns(DEMO / "truth" / "angles.csv")
+    truth = read_columns(DEMO / "truth" / "angles.csv")
     assert np.abs(read_reference(tmp_path / "j.trc").curves["knee_flexion_l"] - truth["knee_flexion_l"]).max() < 0.01
 
 

@@ -13,6 +13,7 @@ from results_scene import DEMO, ball_body, cameras, demo_scene, stepping
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import kinematics
 from mocapflow.io import markers
+from mocapflow.io.columns import read_columns
 from mocapflow.recording import Recording, open_recording
 from mocapflow.results import Files, RunFolder, Track
 from mocapflow.scene import Scene
@@ -57,7 +58,7 @@ def test_angles_have_the_columns_of_the_truth_each_with_its_deviation(folder: Pa
         *(f"{name}_observed" for name in COLUMNS),
     ]
     assert tables.angle_names(header) == COLUMNS
-    columns = tables.read_columns(folder / layout.ANGLES)
+    columns = read_columns(folder / layout.ANGLES)
     assert (columns["frame"] == np.arange(40)).all()
     assert all(np.isfinite(v).all() for v in columns.values())
 
@@ -72,14 +73,14 @@ def test_a_repaired_garment_is_told_in_run_json(recording: Recording, tmp_path: 
 
 
 def test_raw_angles_are_those_before_smoothing(folder: Path) -> None:
-    smooth, raw = (tables.read_columns(folder / part) for part in (layout.ANGLES, layout.RAW_ANGLES))
+    smooth, raw = (read_columns(folder / part) for part in (layout.ANGLES, layout.RAW_ANGLES))
     assert list(smooth) == list(raw)
     jitter = [np.abs(np.diff(t["knee_flexion_l"], 2)).mean() for t in (smooth, raw)]
     assert jitter[0] < jitter[1]
 
 
 def test_energy_has_a_row_per_frame_and_turn(folder: Path) -> None:
-    columns = tables.read_columns(folder / layout.ENERGY)
+    columns = read_columns(folder / layout.ENERGY)
     assert list(columns) == ["frame", "turn", "cam01.data", "rest_pose"]
     assert columns["frame"][:4].tolist() == [0, 0, 1, 1]  # the third turn of the test's track was not needed
     assert columns["turn"][:4].tolist() == [0, 1, 0, 1]
@@ -164,7 +165,7 @@ def test_plain_makes_json_of_what_a_recipe_may_hold() -> None:
 def test_legs_alone_export(recording: Recording, tmp_path: Path) -> None:
     body = ball_body(("pelvis", "hip_l", "knee_l", "ankle_l", "toe_l", "hip_r", "knee_r", "ankle_r", "toe_r"))
     exported(stepping(body, 4), Scene(cameras=cameras(), body=body), recording, tmp_path)
-    assert tables.angle_names(tables.read_columns(tmp_path / layout.ANGLES)) == COLUMNS[:6]
+    assert tables.angle_names(read_columns(tmp_path / layout.ANGLES)) == COLUMNS[:6]
 
 
 @pytest.mark.parametrize(
@@ -178,10 +179,10 @@ def test_legs_alone_export(recording: Recording, tmp_path: Path) -> None:
 def test_tables_of_other_forms(tmp_path: Path, text: bytes, message: str) -> None:
     (tmp_path / "t.csv").write_bytes(text)
     with pytest.raises(RecordingError, match=message):
-        tables.read_columns(tmp_path / "t.csv")
+        read_columns(tmp_path / "t.csv")
 
 
 def test_table_with_a_missing_cell_says_where(tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text("frame,knee_flexion_l\n0,1.5\n1\n")
     with pytest.raises(Exception, match=r"t\.csv:3  1 columns; expected 2"):
-        tables.read_columns(tmp_path / "t.csv")
+        read_columns(tmp_path / "t.csv")

@@ -114,6 +114,21 @@ def test_a_table_in_radians(body: Body, tmp_path: Path) -> None:
         training.read_angles(tmp_path / "angles.csv", body)
 
 
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("knee_flexion_l,knee_flexion_r\n0,9,7,8\n", "angles.csv:2  4 columns; expected 2"),
+        ("knee_flexion_l;knee_flexion_r\n9;7\n", "divided by semicolons"),
+        ("knee_flexion_l,knee_flexion_l\n9,7\n", "two columns are called"),
+    ],
+    ids=["decimal commas", "semicolons", "twice"],
+)
+def test_a_table_that_can_be_misread_is_refused(tmp_path, body, text, message):
+    (tmp_path / "angles.csv").write_text(text)
+    with pytest.raises(RecordingError, match=message):
+        training.read_angles(tmp_path / "angles.csv", body)
+
+
 @pytest.mark.parametrize("value", [np.inf, -np.inf, 400.0])
 @pytest.mark.parametrize("file", ["angles.csv", "angles.mot"])
 def test_an_angle_that_no_joint_has(body: Body, tmp_path: Path, file: str, value: float) -> None:
