@@ -32,10 +32,10 @@ CORE = (
     "loop",
     "model",
     "records",
-    "rest",
     "results",
     "scene",
     "series",
+    "steady",
     "track",
 )
 PYTHON = f" {sys.version_info.major}.{sys.version_info.minor}"  # another minor version writes syntax trees otherwise

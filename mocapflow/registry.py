@@ -108,7 +108,12 @@ class Registry:
         raise UnknownComponent(f"no {role} named '{name}'", hint=hint)
 
     def origin(self, cls: type[Component]) -> Origin:
-        """Return the plugin that provides a component class."""
+        """Return the plugin that provides a component class; its role may not have been asked for yet.
+
+        Raises:
+            KeyError: no plugin provides it.
+        """
+        self.provided(cls.role)
         return self._origins[cls]
 
     def add(self, origin: Origin, load: Callable[[], Any]) -> None:

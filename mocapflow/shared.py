@@ -33,11 +33,12 @@ class SharedStore(Store):
     def __init__(self, path: Path, copies: Copies) -> None:
         super().__init__(path)
         self._copies = copies
+        self._writing: set[str] = set()  # keys this process has the right to write: what is here counts, and is fetched
 
     def find(self, key: str) -> Artifact | None:
         """Return the artifact made under a key, here or at the URL: whichever is further."""
         here = super().find(key)
-        if here is not None and here.complete and not here.frames:
+        if key in self._writing or (here is not None and here.complete and not here.frames):
             return here
         there = self._copies.find(key)
         if there is None or (here is not None and not further(there.attributes, here.attributes)):
@@ -62,6 +63,7 @@ class SharedStore(Store):
         """Hold the right to write the artifact of a key in this folder; what was made is sent to the URL at the end."""
         with super().writer(key, name, report) as lock:
             self._fetch(key)
+            self._writing.add(key)
             try:
                 yield lock
             except BaseException:
@@ -70,6 +72,8 @@ class SharedStore(Store):
                 except StoreError as error:  # all is saved here, and why the run ends matters more
                     report(f"warning: {error.message}")
                 raise
+            finally:
+                self._writing.discard(key)
             self._send(key)
 
     def set_aside(self, path: Path) -> Path:

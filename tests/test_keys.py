@@ -223,20 +223,26 @@ def test_the_core_covers_what_every_result_depends_on(monkeypatch):
     meaning = Digests._source
     monkeypatch.setattr(Digests, "_source", lambda self, path: (read.append(path.stem), meaning(self, path))[1])
     Digests().core()
-    assert {"twists", "kinematics", "scene", "model", "loop", "track", "data", "components"} <= set(read)
+    assert {"twists", "kinematics", "scene", "model", "loop", "track", "data", "components", "steady"} <= set(read)
     assert not {"cli", "store", "runner", "keys", "registry", "checkpoint"} & set(read)
 
 
-def test_all_of_mocapflow_that_a_plugin_imports_counts():
-    """What finds plugins, what refuses and what is computed once change no result."""
-    free = {"errors", "hookspecs", "levels", "once", "settings"}
+def test_every_part_of_the_core_exists():
+    assert all(list(sources.python_files(f"mocapflow.{part}")) for part in (*digests.CORE, *sources.SHARED))
+
+
+def test_all_of_mocapflow_that_a_plugin_or_the_core_imports_counts():
+    """What finds plugins, refuses, is computed once, saves and takes the time changes no result."""
+    free = {"checkpoint", "errors", "hookspecs", "keys", "levels", "once", "settings", "timing"}
+    plugins = (PLUGIN.parents[2] / "plugins").rglob("*.py")
+    core = (path for part in digests.CORE for _, path in sources.python_files(f"mocapflow.{part}"))
     imported = {
         name.split(".")[1]
-        for path in (PLUGIN.parents[2] / "plugins").rglob("*.py")
+        for path in (*plugins, *core)
         for name in sources.imports(ast.parse(path.read_text()))
         if name.startswith("mocapflow.")
     }
-    assert {"series", "geometry"} <= imported
+    assert {"series", "geometry", "steady", "checkpoint"} <= imported
     assert imported - free <= {*digests.CORE, *sources.SHARED}
 
 

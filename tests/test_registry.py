@@ -29,6 +29,12 @@ def test_a_component_is_found_with_its_origin():
     assert registry.plugins == (OURS,)
 
 
+def test_the_origin_of_a_component_is_known_before_its_role_is_asked_for():
+    assert registry_of((OURS, broken_plugins.good)).origin(broken_plugins.Cape) == OURS
+    with pytest.raises(KeyError):
+        registry_of((OTHER, broken_plugins.import_error)).origin(broken_plugins.Cape)
+
+
 def test_unknown_component_lists_what_exists_and_the_nearest():
     registry = registry_of((OURS, broken_plugins.good))
     with pytest.raises(UnknownComponent) as caught:

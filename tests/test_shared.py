@@ -12,6 +12,7 @@ from mocapflow.commands.invocation import placed
 from mocapflow.copies import Copies
 from mocapflow.errors import ComponentFailed, StoreError
 from mocapflow.runner import plan, run
+from mocapflow.shared import open_store
 from mocapflow.store import Store
 from tests.fixtures.stores import actions, load, run_tiny, same, the_track, write_pipeline, write_recording
 
@@ -75,6 +76,20 @@ def test_a_run_that_stopped_goes_on_elsewhere(tmp_path, path, url, monkeypatch):
     run_tiny(path, tmp_path / "alone")
     assert same(the_track(tmp_path / "two"), the_track(tmp_path / "alone"))
     assert len([name for name in copies(url) if name.startswith("track-")]) == 1  # the finished one
+
+
+def test_who_writes_looks_at_what_is_here(tmp_path, path, url):
+    """A copy that arrives while somebody makes the same must not be fetched under the maker's own lock."""
+    shared(path, tmp_path / "one", url)
+    key = the_track_key(tmp_path / "one")
+    name = Copies(url).find(key).group
+    Copies(url).remove(key)
+    store = open_store(tmp_path / "two" / "store.zarr", url)
+    store.create()
+    with store.writer(key, name, lambda _: None):
+        Copies(url).send(tmp_path / "one" / "store.zarr" / name)
+        assert store.find(key) is None
+    assert store.load(store.find(key)) is not None
 
 
 def test_what_is_made_anew_takes_the_place_of_the_copy(tmp_path, path, url, monkeypatch):

@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from mocapflow.assets import Body
 from mocapflow.data import Pose, PoseBatch
-from mocapflow.records import F64, Bool
+from mocapflow.geometry.twists import hat
+from mocapflow.records import F64, I32, Bool
 
 
 def chain(body: Body, pose: Pose) -> tuple[F64, F64]:
@@ -66,6 +67,14 @@ def rest_shape(body: Body, angles: F64 | None) -> F64:
     return shape
 
 
+def morph_rate(body: Body, angles: F64) -> F64 | None:
+    """Return how the vertices at rest change with the angle that drives the morph: (V, 3) m/rad; None outside it."""
+    start, stop = body.morph_range
+    if body.morph_offset is None or not start < angles[body.morph_screw] < stop:
+        return None
+    return body.morph_offset / (stop - start)
+
+
 def screw_velocities(screws: F64, points: F64, share: F64 | Bool) -> F64:
     """Return how points (N, 3) m in the world move with a unit change of each angle: (N, 3, D) m.
 
@@ -77,6 +86,35 @@ def screw_velocities(screws: F64, points: F64, share: F64 | Bool) -> F64:
     """
     rate = (np.cross(screws[None, :, :3], points[:, None]) + screws[None, :, 3:]) * share[..., None]
     velocities: F64 = np.swapaxes(rate, 1, 2)
+    return velocities
+
+
+def skin_velocities(body: Body, joints: F64, screws: F64, angles: F64, vertices: I32 | None = None) -> F64:
+    """Return how skinned vertices move with an increment (omega, v, angles): (N, 3, 6 + D) m.
+
+    Each joint that carries a vertex moves its share of it as if it were fixed to that joint; an angle that changes the
+    shape moves it besides.
+
+    Args:
+        body: at rest.
+        joints: (J, 4, 4) m, see `chain`.
+        screws: (D, 6), see `chain`.
+        angles: (D,) rad.
+        vertices: (N,), which ones; all of them without.
+    """
+    some = np.arange(len(body.vertices)) if vertices is None else vertices
+    rest, carriers, weights = rest_shape(body, angles)[some], body.skin_joint[some], body.skin_weight[some]
+    below = descendants(body.parents)[body.screw_joint]  # (D, J)
+    velocities = np.zeros((len(some), 3, 6 + len(screws)))
+    for joint, weight in zip(carriers.T, weights.T, strict=True):
+        turns, shifts = joints[joint, :3, :3], joints[joint, :3, 3]
+        place = np.einsum("nab,nb->na", turns, rest) + shifts
+        velocities[:, :, :3] -= weight[:, None, None] * hat(place)
+        velocities[:, :, 3:6] += weight[:, None, None] * np.eye(3)
+        velocities[:, :, 6:] += screw_velocities(screws, place, (below[:, joint] * weight).T)
+        if (rate := morph_rate(body, angles)) is not None:
+            moved = np.einsum("nab,nb->na", turns, rate[some])
+            velocities[:, :, 6 + body.morph_screw] += weight[:, None] * moved
     return velocities
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from mocapflow.assets import Body
 from mocapflow.data import Pose
-from mocapflow.geometry import kinematics, twists
+from mocapflow.geometry import kinematics
 from mocapflow.model import moved
 from mocapflow.records import F64, I32
 from mocapflow_fitting.proportions import scaled
@@ -147,14 +147,6 @@ def velocities(body: Body, pose: Pose, logs: F64, spreads: Spreads) -> tuple[F64
         return other, kinematics.skin(other, joints, pose.angles), joints, screws
 
     now, points, joints, screws = at(np.zeros(len(logs)))
-    moves = np.zeros((len(points), 3, len(logs) + 6 + len(screws)))
-    for k, step in enumerate(STEP * np.eye(len(logs))):
-        moves[:, :, k] = (at(step)[1] - at(-step)[1]) / (2 * STEP)
-    free = moves[:, :, len(logs) :]
-    free[:, :, :3], free[:, :, 3:6] = -twists.hat(points), np.eye(3)
-    below = kinematics.descendants(body.parents)[body.screw_joint]  # (D, J)
-    for k in range(body.skin_joint.shape[1]):
-        own, weight = body.skin_joint[:, k], body.skin_weight[:, k]
-        carried = np.einsum("vab,vb->va", joints[own, :3, :3], now.vertices) + joints[own, :3, 3]
-        free[:, :, 6:] += kinematics.screw_velocities(screws, carried, (below[:, own] * weight).T)
-    return points, moves
+    by_logs = [(at(step)[1] - at(-step)[1]) / (2 * STEP) for step in STEP * np.eye(len(logs))]
+    by_pose = kinematics.skin_velocities(now, joints, screws, pose.angles)
+    return points, np.concatenate([*(rate[..., None] for rate in by_logs), by_pose], axis=2)

@@ -28,9 +28,9 @@ def lowest_points(body: Body, pose: Pose, parts: tuple[str, ...]) -> tuple[F64, 
     heights, slopes = [], []
     for part in _parts(body, parts):
         height = kinematics.skin(part, joints, pose.angles)[:, 2]
-        lowest = int(height.argmin())
-        heights.append(height[lowest])
-        slopes.append(vertex_velocity(part, joints, screws, lowest, pose.angles)[2])
+        lowest = np.array([height.argmin()])
+        heights.append(height[lowest[0]])
+        slopes.append(kinematics.skin_velocities(part, joints, screws, pose.angles, lowest)[0, 2])
     return np.array(heights, np.float64), np.array(slopes, np.float64).reshape(-1, 6 + len(pose.angles))
 
 
@@ -40,19 +40,3 @@ def _parts(body: Body, names: tuple[str, ...]) -> list[Body]:
     carrier = body.main_joint
     found = [np.flatnonzero(carrier == body.joint(name)) for name in names if name in body.joint_names]
     return [kinematics.part_of(body, vertices) for vertices in found if len(vertices)]
-
-
-def vertex_velocity(body: Body, joints: F64, screws: F64, vertex: int, angles: F64) -> F64:
-    """Return how a skinned vertex moves with an increment (omega, v, angles): (3, 6 + D) m.
-
-    Each joint that carries it moves its share of it as if it were fixed to that joint.
-    """
-    rest = np.append(kinematics.rest_shape(body, angles)[vertex], 1.0)
-    below = kinematics.descendants(body.parents)[body.screw_joint]  # (D, J)
-    velocity = np.zeros((3, 6 + len(screws)))
-    for joint, weight in zip(body.skin_joint[vertex], body.skin_weight[vertex], strict=True):
-        place = joints[joint, :3] @ rest
-        velocity[:, :3] += weight * np.cross(np.eye(3), place).T
-        velocity[:, 3:6] += weight * np.eye(3)
-        velocity[:, 6:] += kinematics.screw_velocities(screws, place[None], weight * below[None, :, joint])[0]
-    return velocity

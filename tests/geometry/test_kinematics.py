@@ -11,6 +11,7 @@ from scipy.linalg import expm
 from mocapflow.data import Pose, PoseBatch
 from mocapflow.geometry import kinematics, twists
 from mocapflow.geometry.joints import angles_from_rotations, decompose
+from mocapflow.model import moved
 from tests.fixtures.turns import rotations_from_angles
 
 RECORDING = Path(__file__).parents[2] / "examples" / "data" / "skirt_steps"
@@ -60,22 +61,6 @@ def test_one_joint_moves_only_its_subtree(body):
     np.testing.assert_allclose(joints[~below], np.broadcast_to(np.eye(4), joints[~below].shape), atol=1e-12)
 
 
-def test_screws_are_the_derivative_of_the_skin(body, pose):
-    joints, screws = kinematics.chain(body, pose)
-    below = kinematics.descendants(body.parents)
-    step = 1e-6
-    for screw in range(0, len(screws), 5):
-        moves = [replace(pose, angles=pose.angles + s * step * np.eye(len(screws))[screw]) for s in (1, -1)]
-        plus, minus = (kinematics.skin(body, kinematics.chain(body, move)[0]) for move in moves)
-        carried = np.where(below[body.screw_joint[screw]][body.skin_joint], body.skin_weight, 0.0)
-        turned = np.zeros_like(plus)  # each joint's share of a vertex moves with the joint, if it is below
-        for k in range(5):
-            rigid = joints[body.skin_joint[:, k]]
-            at = np.einsum("vab,vb->va", rigid[:, :3, :3], body.vertices) + rigid[:, :3, 3]
-            turned += carried[:, k, None] * (np.cross(screws[screw, :3], at) + screws[screw, 3:])
-        np.testing.assert_allclose((plus - minus) / (2 * step), turned, atol=1e-8)
-
-
 def test_batch_equals_one_by_one(body, pose):
     poses = PoseBatch(root=np.stack([np.eye(4), pose.root]), angles=np.stack([0 * pose.angles, pose.angles]))
     np.testing.assert_array_equal(kinematics.chain_batch(body, poses)[1], kinematics.chain(body, pose)[0])
@@ -100,6 +85,24 @@ def test_morph_changes_the_shape_with_its_angle(body, pose):
         np.testing.assert_allclose(kinematics.skin(morphing, joints, angles), expected, atol=1e-12)
     with pytest.raises(ValueError, match="pass the angles"):
         kinematics.skin(morphing, joints)
+
+
+@pytest.mark.parametrize("morphing", [False, True])
+def test_velocities_are_the_derivative_of_the_skin(body, pose, morphing):
+    step, some = 1e-6, np.arange(0, len(body.vertices), 97, np.int32)
+    if morphing:
+        screw = body.screw_names.index("knee_l.flexion")
+        offset = np.random.default_rng(2).normal(scale=0.02, size=body.vertices.shape)
+        near = pose.angles[screw]
+        body = replace(body, morph_offset=offset, morph_screw=screw, morph_range=(near - 0.3, near + 0.5))
+
+    def places(shift):
+        at = moved(pose, shift)
+        return kinematics.skin(body, kinematics.chain(body, at)[0], at.angles)[some]
+
+    found = kinematics.skin_velocities(body, *kinematics.chain(body, pose), pose.angles, some)
+    numeric = [(places(step * way) - places(-step * way)) / (2 * step) for way in np.eye(found.shape[2])]
+    np.testing.assert_allclose(found, np.stack(numeric, axis=2), atol=1e-8)
 
 
 def test_three_screws_reach_any_rotation_exactly(body):

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 from mocapflow_priors.ground_plane import GroundPlane
-from mocapflow_priors.soles import vertex_velocity
 from twist_fixtures import make_body, make_pose, make_scene
 
 from mocapflow.data import Past, Pose
@@ -49,19 +48,6 @@ def test_derivatives() -> None:
     errors = [[prior.residual(moved(pose, s * step * c), Past(), scene).error for s in (1, -1)] for c in np.eye(18)]
     numeric = np.stack([(ahead - behind) / (2 * step) for ahead, behind in errors], axis=1)
     np.testing.assert_allclose(residual.jacobian, numeric, atol=1e-6 * np.abs(numeric).max())
-
-
-def test_velocity_of_a_vertex() -> None:
-    body, pose, step = make_body(), make_pose(2), 1e-6
-    joints, screws = kinematics.chain(body, pose)
-    for vertex in (0, 17, 200):
-        velocity = vertex_velocity(body, joints, screws, vertex, pose.angles)
-        places = [
-            [kinematics.skin(body, kinematics.chain(body, moved(pose, s * step * c))[0])[vertex] for s in (1, -1)]
-            for c in np.eye(18)
-        ]
-        numeric = np.stack([(ahead - behind) / (2 * step) for ahead, behind in places], axis=1)
-        np.testing.assert_allclose(velocity, numeric, atol=1e-7)
 
 
 def test_a_body_without_feet_has_no_rows() -> None:
