@@ -47,16 +47,20 @@ def waistband(garment: str, body: Body, height: float, around: float) -> tuple[F
     """Return the torso's outline (N, 2) m at a height and how far outside it a band of a given length lies.
 
     Raises:
-        GarmentError: there is no body at that height, or the band is far too wide to stay up.
+        GarmentError: there is no body at that height or only legs, or the band is far too wide to stay up.
     """
-    found = sections.sections(body, sections.level(height))
-    outlines = [sections.outline(points) for points in found]
+    outlines = _outlines(body, height)
     if not outlines:
         raise GarmentError(
             f"{garment}: there is no body at waist_height_m = {height:.2f}",
             hint=f"the rest body ends at {body.vertices[:, 2].max():.2f} m; the height is metres above the floor",
         )
     torso = max(outlines, key=sections.perimeter)
+    if not _holds_middle(torso, outlines):
+        raise GarmentError(
+            f"{garment}: at waist_height_m = {height:.2f} the legs have parted already",
+            hint="the height is metres above the floor, of the upper edge: above the body's crotch",
+        )
     tape = sections.perimeter(torso)
     away = (around - tape) / (2 * math.pi)
     if away > LARGEST_ROOM:
@@ -79,13 +83,17 @@ def hip_rings(body: Body, height: float, rows: F64, around: F64, away: float) ->
     """
     around = around.copy()
     for row, below in enumerate(rows):
-        found = sections.sections(body, sections.level(height - below))
-        outlines = [sections.outline(points) for points in found]
+        outlines = _outlines(body, height - below)
         middle = [closed for closed in outlines if _holds_middle(closed, outlines)]
         if not middle:  # the legs have parted
             break
         around[row] = max(around[row], sections.perimeter(middle[0]) + 2 * math.pi * away)
     return np.maximum.accumulate(around)
+
+
+def _outlines(body: Body, height: float) -> list[F64]:
+    """Return the outlines (N, 2) m of all that a level plane cuts."""
+    return [sections.outline(points) for points in sections.sections(body, sections.level(height))]
 
 
 def _holds_middle(closed: F64, outlines: list[F64]) -> bool:

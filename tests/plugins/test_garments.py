@@ -94,6 +94,7 @@ def test_a_measure_that_is_no_length_in_metres_is_refused(garment, measures, val
     [
         (dict(length_m=1.2), "below the floor"),
         (dict(waist_height_m=2.5), "there is no body at waist_height_m = 2.50"),
+        (dict(waist_height_m=0.6, length_m=0.3), "at waist_height_m = 0.60 the legs have parted"),
         (dict(waist_circumference_m=1.9), "can't stay up on a body"),
         (dict(waist_circumference_m=0.5), "but the body measures"),
         (dict(hem_circumference_m=3.9, length_m=0.3), "wider than a full circle"),
