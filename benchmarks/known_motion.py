@@ -73,6 +73,13 @@ TAKES = {
     "kneeup_B_dark": Take("B", "skirt", "kneeup_B", 21, DARK, start=200, frames=40),
     "squat_B_skirt": Take("B", "skirt", "kneebend_A", 32, GREEN, start=60, frames=80),
     "dance_A_skirt": Take("A", "skirt", "dance", 31, GREY, frames=100),
+    "jump_A_shorts": Take("A", "shorts", "jump_A", 41, GREEN, start=14, frames=30, flight=(13, 24)),
+    "kneeup_A_shorts": Take("A", "shorts", "kneeup_A", 42, PURPLE, start=40, frames=60),
+    "walk_A_shorts": Take("A", "shorts", "walk_A", 43, GREY, start=60, frames=60),
+    "legcross_A_skirt2": Take("A", "skirt", "legcross_A", 44, GREEN, start=20, frames=90),
+    "kick_B_shorts2": Take("B", "shorts", "kick_B", 45, GREEN, start=60, frames=60),
+    "kneeup_B_skirt": Take("B", "skirt", "kneeup_B", 46, GREY, start=60, frames=80),
+    "squat_B_shorts": Take("B", "shorts", "kneebend_A", 47, PURPLE, start=120, frames=60),
 }
 
 
