@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from mocapflow.components import Component, Matcher, PoseSolver, Predictor, Prior
+from mocapflow.components import Component, Matcher, PoseSolver, Predictor, Prior, Recovery, Segmenter
 from mocapflow.data import (
     Estimate,
     Frame,
+    FrameResult,
     FrameState,
     Matches,
     Past,
@@ -21,9 +22,11 @@ from mocapflow.data import (
     Turn,
 )
 from mocapflow.errors import PluginError
-from mocapflow.model import ClothedModel
-from mocapflow.records import F64
+from mocapflow.records import F32, F64
 from mocapflow.scene import Scene
+
+if TYPE_CHECKING:  # the model asks its draper through `cloth_answers`
+    from mocapflow.model import ClothedModel
 
 Answer = TypeVar("Answer")
 SQUARE = 1e-6  # by how much the columns of a rotation may fail to be orthonormal
@@ -63,7 +66,7 @@ def estimate_of(
     found = of_kind(solver, solver.solve(match, state, model, priors, past, turn), Estimate)
     _possible(solver, found.pose, model.scene)
     for name in ("parameters", "covariance", "observed"):
-        if not _finite(getattr(found, name)):
+        if not finite(getattr(found, name)):
             raise WrongAnswer(solver, f"{name} that are not finite")
     return found
 
@@ -71,7 +74,7 @@ def estimate_of(
 def _possible(component: Component, pose: Pose, scene: Scene) -> Pose:
     if len(pose.angles) != len(scene.body.twists):
         raise WrongAnswer(component, f"{len(pose.angles)} joint angles; the body has {len(scene.body.twists)}")
-    if not (_finite(pose.root) and _finite(pose.angles)):
+    if not (finite(pose.root) and finite(pose.angles)):
         raise WrongAnswer(component, "a pose that is not finite")
     turn = pose.root[:3, :3]
     if np.abs(turn @ turn.T - np.eye(3)).max() > SQUARE or np.linalg.det(turn) < 0:
@@ -104,7 +107,7 @@ def matches_of(
             odd = index[(index < 0) | (index >= count)][0]
             raise WrongAnswer(matcher, f"a pair of {name} {odd}; there are 0 to {count - 1}")
     for name in ("pixel", "direction", "weight"):
-        if not _finite(getattr(found, name)):
+        if not finite(getattr(found, name)):
             raise WrongAnswer(matcher, f"a {name} that is not finite")
     if found.weight.min() < 0:
         raise WrongAnswer(matcher, "a weight below zero")
@@ -121,11 +124,44 @@ def residual_of(prior: Prior, pose: Pose, past: Past, scene: Scene) -> Residual:
     if said.jacobian.shape[1] < least:
         message = f"a jacobian of {said.jacobian.shape[1]} columns; (omega, v, angles) are {least}"
         raise WrongAnswer(prior, message)
-    if not (_finite(said.error) and _finite(said.jacobian)):
+    if not (finite(said.error) and finite(said.jacobian)):
         raise WrongAnswer(prior, "an error or a jacobian that is not finite")
     if not isinstance(said.energy, float | int | np.floating) or np.isnan(said.energy):
         raise WrongAnswer(prior, f"the energy {said.energy!r}")
     return said
+
+
+def segmentation_of(
+    segmenter: Segmenter, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn
+) -> Segmentation:
+    """Return the silhouettes of a segmenter.
+
+    Raises:
+        WrongAnswer: one is of a camera that is not there, of another size than its picture, or not finite.
+    """
+    found = of_kind(segmenter, segmenter.segment(frame, state, past, scene, turn), Segmentation)
+    for silhouette in found.silhouettes:
+        if not 0 <= silhouette.camera < len(scene.cameras):
+            message = f"a silhouette of camera {silhouette.camera}; there are 0 to {len(scene.cameras) - 1}"
+            raise WrongAnswer(segmenter, message)
+        width, height = scene.cameras[silhouette.camera].size
+        if silhouette.distance.shape != (height, width):
+            rows, columns = silhouette.distance.shape
+            raise WrongAnswer(segmenter, f"a silhouette of {columns} x {rows} px; the picture is {width} x {height}")
+        if not np.isfinite(silhouette.distance.sum()):  # a sum costs a fifth of a look at every pixel
+            raise WrongAnswer(segmenter, "a silhouette that is not finite")
+    return found
+
+
+def result_of(recovery: Recovery, found: Any, scene: Scene) -> FrameResult:
+    """Return what a recovery answered.
+
+    Raises:
+        WrongAnswer: it is no result, or its pose none of the body.
+    """
+    result = of_kind(recovery, found, FrameResult)
+    _possible(recovery, result.state.estimate.pose, scene)
+    return result
 
 
 def of_kind(component: Component, value: Any, kind: type[Answer]) -> Answer:
@@ -139,5 +175,6 @@ def of_kind(component: Component, value: Any, kind: type[Answer]) -> Answer:
     return value
 
 
-def _finite(values: F64) -> bool:
+def finite(values: F64 | F32) -> bool:
+    """Return whether all values are finite."""
     return bool(np.isfinite(values).all())

@@ -25,6 +25,7 @@ MARK = "blake2b:"  # a digest reads "blake2b:<hex> <name>"; the name is for peop
 CORE = (
     "answers",
     "assets",
+    "cloth_answers",
     "components",
     "data",
     "functional",

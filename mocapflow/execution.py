@@ -13,6 +13,7 @@ from mocapflow.answers import of_kind
 from mocapflow.assets import Body, GarmentMesh
 from mocapflow.blame import failure
 from mocapflow.checkpoint import Checkpoint
+from mocapflow.cloth_answers import mesh_of
 from mocapflow.components import Component, Garment
 from mocapflow.data import FrameResult
 from mocapflow.errors import FULL, ComponentFailed, GarmentError, MocapflowError, PluginError, ShapeError, unwritable
@@ -187,7 +188,7 @@ class Execution:
 
     def _sewn(self, garment: Garment, body: Body) -> GarmentMesh:
         try:
-            return self._blaming(garment, lambda: of_kind(garment, garment.sew(body), GarmentMesh))
+            return self._blaming(garment, lambda: mesh_of(garment, body))
         except GarmentError as error:
             raise GarmentError(error.message, where=self._pipeline.garment_where, hint=error.hint) from None
 

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from mocapflow.documents import BEFORE, Document, Steps
 from mocapflow.errors import PipelineError
 
+ELSEWHERE = "recording"  # of a pipeline: an experiment says in `recordings` what it runs on
 FILES = ("compare.csv", "runs.csv", "compare.png")  # that stand beside the folders of the variants
 LONGEST = 255  # bytes of the name of a folder
 
@@ -29,8 +30,16 @@ class Level(NamedTuple):
 
 
 def changes_at(said: Mapping[str, Any] | None, steps: Steps, document: Document) -> dict[str, Change]:
-    """Return what is said at a place of the file as changes, each with where it is written."""
-    return {path: Change(value, document.place((*steps, path)).text) for path, value in (said or {}).items()}
+    """Return what is said at a place of the file as changes, each with where it is written.
+
+    Raises:
+        PipelineError: one would name a recording.
+    """
+    changes = {path: Change(value, document.place((*steps, path)).text) for path, value in (said or {}).items()}
+    if ELSEWHERE in changes:
+        hint = "write the folder under `recordings`: every variant runs on each of them"
+        raise PipelineError(f"a variant can't change '{ELSEWHERE}'", where=changes[ELSEWHERE].where, hint=hint)
+    return changes
 
 
 def levels_at(said: Mapping[str, Mapping[str, Any] | None], steps: Steps, document: Document) -> list[Level]:

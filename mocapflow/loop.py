@@ -8,8 +8,9 @@ from functools import partial
 
 import numpy as np
 
-from mocapflow.answers import estimate_of, matches_of
+from mocapflow.answers import estimate_of, matches_of, segmentation_of
 from mocapflow.assets import Camera
+from mocapflow.cloth_answers import cloth_of
 from mocapflow.components import ClothFitter, Matcher, Observe, PoseSolver, Prior, Segmenter, pool
 from mocapflow.data import NO_CLOTH, Frame, FrameResult, FrameState, Matches, Past, Segmentation, Surface, Turn
 from mocapflow.functional import Functional
@@ -49,13 +50,13 @@ def settle(
     energy = np.full((steps.steady.cap, len(functional.terms)), np.nan)
     for index in range(steady.max_turns):
         turn = Turn(index=index, cap=turn.cap, change=turn.change)
-        segmentation = steps.segmenter.segment(frame, state, past, model.scene, turn)
+        segmentation = segmentation_of(steps.segmenter, frame, state, past, model.scene, turn)
         watch.lap("segment")
         match = partial(pool_matches, steps.matchers, frame, segmentation, past, model.scene, turn)
         estimate = estimate_of(steps.pose_solver, match, state, model, steps.priors, past, turn)
         watch.lap("solve")
         fitter = steps.cloth_fitter
-        cloth = fitter.fit(frame, segmentation, estimate, model, past, turn) if fitter else NO_CLOTH
+        cloth = cloth_of(fitter, frame, segmentation, estimate, model, past, turn) if fitter else NO_CLOTH
         estimate, cloth = functional.step(state, segmentation, estimate, cloth, steady.halvings)
         watch.lap("cloth")
         surface = model.surface(estimate.pose, cloth)

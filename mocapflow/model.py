@@ -6,6 +6,7 @@ from weakref import ref
 
 import numpy as np
 
+from mocapflow.cloth_answers import drape_of, velocity_of
 from mocapflow.components import Draper
 from mocapflow.data import NO_CLOTH, Cloth, Past, Pose, PoseBatch, Surface
 from mocapflow.geometry import twists
@@ -40,7 +41,7 @@ class ClothedModel:
         poses = PoseBatch(
             root=np.repeat(pose.root[None], count, axis=0), angles=np.repeat(pose.angles[None], count, axis=0)
         )
-        return self.draper.drape(poses, parameters, past, self.scene)
+        return drape_of(self.draper, poses, parameters, past, self.scene)
 
     def surface(self, pose: Pose, cloth: Cloth) -> Surface:
         """Return body and given cloth posed in the world."""
@@ -50,7 +51,7 @@ class ClothedModel:
         """Return the velocities (M, 3, 6 + D + Q) of cloth vertices (M,), numbered within the garment."""
         if self.draper is None:
             return np.zeros((len(vertices), 3, 6 + len(pose.angles)))
-        return self.draper.velocity(pose, cloth.parameters, vertices, past, self.scene)
+        return velocity_of(self.draper, pose, cloth.parameters, vertices, past, self.scene)
 
 
 @once

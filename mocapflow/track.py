@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from mocapflow.answers import pose_of
+from mocapflow.answers import pose_of, result_of
 from mocapflow.assets import Background
 from mocapflow.checkpoint import Checkpoint
 from mocapflow.components import (
@@ -168,7 +168,8 @@ class CoupledLoop(Stage):
             begun = believed(pose, parameters, model.drape(pose, parameters, past))
             return settle(frame, begun, past, self.steps, model, lambda *_: None)
 
-        return self.recovery.recover(frame, state, result, past, model, settle_from)
+        found = self.recovery.recover(frame, state, result, past, model, settle_from)
+        return result_of(self.recovery, found, model.scene)
 
     def complain(self, frame: Frame, result: FrameResult) -> None:
         """Stop at a frame that did not settle, if that is wanted."""

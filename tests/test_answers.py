@@ -5,8 +5,28 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mocapflow.answers import WrongAnswer, estimate_of, matches_of, of_kind, pose_of, residual_of
-from mocapflow.components import Matcher, PoseSolver, Predictor, Prior
+from mocapflow.answers import (
+    WrongAnswer,
+    estimate_of,
+    matches_of,
+    of_kind,
+    pose_of,
+    residual_of,
+    result_of,
+    segmentation_of,
+)
+from mocapflow.cloth_answers import cloth_of, mesh_of
+from mocapflow.components import (
+    ClothFitter,
+    Draper,
+    Garment,
+    Matcher,
+    PoseSolver,
+    Predictor,
+    Prior,
+    Recovery,
+    Segmenter,
+)
 from mocapflow.data import NO_CLOTH, Matches, Past, Pose, Residual, Turn
 from mocapflow.errors import ComponentFailed
 from mocapflow.testing import pictures, scenes
@@ -183,3 +203,120 @@ def test_an_estimate_that_is_none_names_the_solver(change, said) -> None:
 def test_what_is_of_another_kind_names_who_made_it() -> None:
     with pytest.raises(WrongAnswer, match="'saying' returned NoneType, not Matches"):
         of_kind(Saying(answer=None), None, Matches)
+
+
+CLOTHED = scenes.tiny_scene(clothed=True)
+MODEL = scenes.tiny_model(CLOTHED)
+CLOTH = scenes.tiny_cloth(CLOTHED, POSE)
+STATE = pictures.tiny_state(SCENE, POSE)
+
+
+class Dressing(Draper, ClothFitter, Garment, Segmenter):
+    """Says what it is told to."""
+
+    name = "dressing"
+    answer: object
+
+    def drape(self, poses, parameters, past, scene):
+        return self.answer
+
+    def velocity(self, pose, parameters, vertices, past, scene):
+        return self.answer
+
+    def fit(self, frame, segmentation, estimate, model, past, turn):
+        return self.answer
+
+    def sew(self, body):
+        return self.answer
+
+    def segment(self, frame, state, past, scene, turn):
+        return self.answer
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda v: None, "NoneType, not ndarray"),
+        (lambda v: v[:, 1:], "cloth of shape .*, not"),
+        (lambda v: v * np.nan, "cloth that is not finite"),
+    ],
+)
+def test_drapes_that_are_none(change, said):
+    model = replace(MODEL, draper=Dressing(answer=change(CLOTH.vertices[None])))
+    with pytest.raises(WrongAnswer, match=f"draper 'dressing' returned {said}"):
+        model.drapes(POSE, CLOTH.parameters[None], Past())
+    model = replace(MODEL, draper=Dressing(answer=CLOTH.vertices[None]))
+    assert np.array_equal(model.drapes(POSE, CLOTH.parameters[None], Past())[0], CLOTH.vertices)
+
+
+def test_velocities_that_are_none():
+    vertices, width = np.arange(2, dtype=np.int32), WIDTH + len(CLOTH.parameters)
+    for answer, said in ((np.zeros((2, 3, WIDTH - 1)), "shape"), (np.full((2, 3, width), np.inf), "are not finite")):
+        with pytest.raises(WrongAnswer, match=f"returned velocities .*{said}"):
+            replace(MODEL, draper=Dressing(answer=answer)).velocity(POSE, CLOTH, vertices, Past())
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        (CLOTH.vertices, "ndarray, not Cloth"),
+        (NO_CLOTH, r"cloth of shape \(0, 3\), not"),
+        (replace(CLOTH, vertices=CLOTH.vertices * np.nan), "cloth that is not finite"),
+        (replace(CLOTH, parameters=np.zeros(9)), r"cloth parameters of shape \(9,\)"),
+    ],
+)
+def test_fitted_cloth_that_is_none(answer, said):
+    asked = (FRAME, SEEN, STATE.estimate, MODEL, Past(), Turn(index=0, cap=1))
+    assert cloth_of(Dressing(answer=CLOTH), *asked) is CLOTH
+    with pytest.raises(WrongAnswer, match=f"'dressing' returned {said}"):
+        cloth_of(Dressing(answer=answer), *asked)
+
+
+MESH = CLOTHED.garment
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"pinned_to": MESH.pinned_to + 10**6}, "cloth pinned to vertex .*; the body has 0 to"),
+        ({"carried_by": MESH.carried_by - 1}, "cloth carried by joint -1; the body has 0 to"),
+        ({"parameter_names": ()}, "3 bounds of parameters for the names none"),
+        ({"parameter_bounds": MESH.parameter_bounds[:, ::-1]}, "the bounds .* of parameter"),
+        ({"parameter_bounds": np.full_like(MESH.parameter_bounds, np.inf)}, "the bounds .* of parameter"),
+    ],
+)
+def test_garments_that_are_none(change, said):
+    assert mesh_of(Dressing(answer=MESH), CLOTHED.body) is MESH
+    with pytest.raises(WrongAnswer, match=f"'dressing' returned {said}"):
+        mesh_of(Dressing(answer=replace(MESH, **change)), CLOTHED.body)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"camera": 7}, "a silhouette of camera 7; there are 0 to 3"),
+        ({"distance": SEEN.silhouettes[1].distance[1:]}, "a silhouette of .* px; the picture is"),
+        ({"distance": SEEN.silhouettes[1].distance * np.float32(np.nan)}, "a silhouette that is not finite"),
+    ],
+)
+def test_silhouettes_that_are_none(change, said):
+    asked = (FRAME, STATE, Past(), SCENE, Turn(index=0, cap=1))
+    assert segmentation_of(Dressing(answer=SEEN), *asked) is SEEN
+    one, two, *rest = SEEN.silhouettes
+    wrong = replace(SEEN, silhouettes=(one, replace(two, **change), *rest))
+    with pytest.raises(WrongAnswer, match=f"'dressing' returned {said}"):
+        segmentation_of(Dressing(answer=wrong), *asked)
+
+
+class Lost(Recovery):
+    """Finds nothing."""
+
+    name = "lost"
+
+    def recover(self, frame, state, result, past, model, settle_from):
+        return None
+
+
+def test_a_recovery_that_answers_with_nothing():
+    with pytest.raises(WrongAnswer, match="recovery 'lost' returned NoneType, not FrameResult"):
+        result_of(Lost(), None, SCENE)

@@ -43,7 +43,7 @@ def good(tmp_path):
     subject.mkdir()
     trunk, *legs = ((-0.13, 0.13), (0.8, 1.8)), ((-0.13, -0.03), (0.0, 0.8)), ((0.03, 0.13), (0.0, 0.8))
     corners = np.array([[x, y, z] for wide, high in (trunk, *legs) for x in wide for y in (-0.08, 0.08) for z in high])
-    faces = np.array([[a, a + 1, a + 2] for box in (0, 8, 16) for a in range(box, box + 6)], np.int32)
+    faces = np.array([[a + a % 2, a + (a + 1) % 2, a + 2] for box in (0, 8, 16) for a in range(box, box + 6)])
     rows = [f"v {x} {y} {z}\n" for x, y, z in corners] + [f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in faces]
     (subject / "body.obj").write_text("".join(rows))
     joints = [{"name": name, "parent": parent, "position": position(name)} for name, parent in CHAIN.items()]
@@ -109,6 +109,12 @@ def test_several_faults_are_found_at_once_errors_first(good):
 def test_nothing_there(tmp_path):
     assert errors(tmp_path / "nowhere") == ["no such recording folder"]
     assert errors(tmp_path) == ["no calibration file"]
+
+
+def test_faces_that_look_both_ways(good):
+    body = good / "subject" / "body.obj"
+    body.write_text(body.read_text().replace("f 1 2 3\n", "f 2 1 3\n"))
+    assert errors(good) == ["its faces look both inward and outward: at 2 % of the edges two disagree"]
 
 
 def test_mesh_without_skeleton(good):

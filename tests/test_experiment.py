@@ -126,6 +126,8 @@ def test_recordings_that_cannot_be_told_apart_are_refused(tmp_path: Path, folder
         ("pipeline: base.yaml\n", "", r"grid\.yaml:1:1  an experiment needs pipeline"),
         ("recordings: [takes/a, b]", "recordings: []", r"grid\.yaml:3:13?.*recordings"),
         ("frames:", "frame:", r"grid\.yaml:4:1  frame: unknown setting of an experiment"),
+        ("change: {stages", "change: {recording: c, stages", r"grid\.yaml:5:10  a variant can't change 'recording'"),
+        ("    rings:", "    rings: {recording: c}", r"grid\.yaml:8:13  a variant can't change 'recording'"),
         ("    rings:", "    a/b:", r"grid\.yaml:8:5  a level can't be called 'a/b'"),
         ("    rings:", "    ..:", r"grid\.yaml:8:5  a level can't be called '\.\.'"),
         ("    rings:", "    runs.csv:", r"grid\.yaml:8:5  a level can't be called 'runs\.csv'"),

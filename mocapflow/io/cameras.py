@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from mocapflow.assets import Camera
-from mocapflow.errors import RecordingError
+from mocapflow.errors import RecordingError, guess
 from mocapflow.geometry import twists
 from mocapflow.io.calibrated import bad, make_camera
 from mocapflow.io.typed import place, read_toml
@@ -19,6 +19,7 @@ FARTHEST = 100.0  # m; a camera further from the origin is one calibrated in cen
 MILLIMETRES = 1000.0  # m; beyond, in millimetres
 YAML = (".yml", ".yaml")
 FIELDS = ("size", "matrix", "distortions", "rotation", "translation")
+OPTIONAL = ("name", "fisheye")
 
 
 def read_cameras(path: Path) -> tuple[Camera, ...]:
@@ -108,6 +109,9 @@ def _from_table(key: str, table: Mapping[str, Any], path: Path) -> Camera:
         hint = f"each camera needs {', '.join(FIELDS)}; tables other than [metadata] are cameras"
         raise bad(name, path, f"lacks {', '.join(missing)}", hint)
     size, matrix, distortion, rotation, translation = (table[field] for field in FIELDS)
+    for field in set(table) - {*FIELDS, *OPTIONAL}:  # other programs add fields of their own
+        if meant := guess(field, (*FIELDS, *OPTIONAL)):
+            raise bad(name, path, f"has a field '{field}', which nobody reads", meant)
     fisheye = table.get("fisheye", False)
     if not isinstance(fisheye, bool):
         raise bad(name, path, f"has fisheye = {fisheye!r}", "write true or false, without quotes")

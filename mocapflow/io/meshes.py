@@ -14,6 +14,7 @@ import numpy as np
 from mocapflow.errors import RecordingError
 from mocapflow.records import F64, I32
 
+OPPOSED = 0.01  # of the edges of a mesh, that two triangles go along the same way; a scan has a few
 OPEN3D_FORMATS = (".ply", ".stl", ".off", ".gltf", ".glb")
 
 
@@ -88,3 +89,16 @@ def _checked(
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise RecordingError(f"a face names a vertex that is not there; the file has {len(vertices)}", where=str(path))
     return vertices, faces.astype(np.int32)
+
+
+def check_winding(faces: I32, where: str) -> None:
+    """Check that the triangles (F, 3) of a mesh agree on which side is outside.
+
+    Raises:
+        RecordingError: many edges have two triangles that go along them in the same direction: one is inside out.
+    """
+    _, count = np.unique(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=0, return_counts=True)
+    if (share := float(np.mean(count > 1))) > OPPOSED:
+        hint = "let a mesh program turn them all outward, e.g. Blender: Mesh > Normals > Recalculate Outside"
+        message = f"its faces look both inward and outward: at {100 * share:.0f} % of the edges two disagree"
+        raise RecordingError(message, where=where, hint=hint)

@@ -22,6 +22,8 @@ THIN = 4  # every so many-th pixel tells the tone of a frame
 FITS = 8  # of a line to the pixels that agree with the last one
 FARTHEST = 2.5  # standard deviations within which a pixel agrees
 MOST_GAIN = 1.5  # between a plate and a frame of one recording
+BLOCK = 8  # px, a side of the squares whose mean colours are looked at: noise has colours too
+GREY, COLOURED = 6.0, 20.0  # grey levels between the channels of a block, exceeded by one in a hundred; codecs make 3
 SAME_ROOM = 10.0  # grey levels, median difference of a frame and its toned plate: above, it shows something else
 
 
@@ -35,7 +37,7 @@ def background(folder: Path, views: Sequence[View], videos: Sequence[Video]) -> 
 
     Raises:
         RecordingError: a camera has no plate though others do, or a plate has another size than the video,
-            or is far too dark.
+            is far too dark, or in colour beside a grey video.
     """
     found = [plates(folder, view.lens.name) for view in views]
     if not any(found):
@@ -57,6 +59,7 @@ def _one(files: Sequence[Path], view: View, video: Video) -> tuple[F32, F32]:
     frame = None if first is None else view.image(first).astype(np.float32)
     mean = pictures.mean(axis=0)
     if frame is not None:
+        _check_colours(mean, frame, files[0])
         mean = toned(mean, frame)
     if len(files) > 1:
         each = pictures.std(axis=0, ddof=1)
@@ -94,6 +97,18 @@ def _line(here: F32, there: F32) -> tuple[float, float] | None:
         gain = float(np.mean((x - x.mean()) * (y - y.mean())) / x.var()) if x.var() > LEAST_SPREAD else 1.0
         offset = float(y.mean() - gain * x.mean())
     return (gain, offset) if 1 / MOST_GAIN < gain < MOST_GAIN and np.median(off) < SAME_ROOM else None
+
+
+def _check_colours(plate: F32, frame: F32, path: Path) -> None:
+    """Refuse a plate in colour beside a grey video: nothing in it would look like the room."""
+    import cv2
+
+    size = (max(plate.shape[1] // BLOCK, 1), max(plate.shape[0] // BLOCK, 1))
+    blocks = (cv2.resize(picture, size, interpolation=cv2.INTER_AREA) for picture in (plate, frame))
+    room, seen = (float(np.percentile(np.ptp(block, axis=2), 99)) for block in blocks)
+    if seen < GREY and room > COLOURED:
+        hint = "film with the camera that took the plate, in colour; or give it a grey plate"
+        raise RecordingError("this clean plate is in colour, the video is grey", where=str(path), hint=hint)
 
 
 def _read(path: Path, view: View) -> U8:

@@ -8,7 +8,7 @@ from pathlib import Path
 from mocapflow.geometry.angles import unmeasured
 from mocapflow.io.findings import Finding, attempt, error, warning
 from mocapflow.io.first_pose import odd_pose
-from mocapflow.io.meshes import read_mesh
+from mocapflow.io.meshes import check_winding, read_mesh
 from mocapflow.io.scans import check_size, read_skeleton
 from mocapflow.io.typed import read_json
 from mocapflow.io.weights import read_weights
@@ -38,7 +38,8 @@ def _examine_scan(subject: Path, findings: list[Finding]) -> Sequence[str]:
     if lacking := unmeasured(skeleton.names):
         findings.append(warning(lacking, "angles are measured between joints of these names only", bones))
     if mesh is not None:
-        vertices = mesh[0]
+        vertices, faces = mesh
+        attempt(lambda: check_winding(faces, str(body)), findings)
         attempt(lambda: check_size(vertices, skeleton, str(body)), findings)
         if skin.exists():
             attempt(lambda: read_weights(skin, skeleton, vertices), findings)

@@ -13,7 +13,7 @@ from pydantic import model_validator
 from mocapflow.assets import Body
 from mocapflow.components import BodyModel
 from mocapflow.errors import PipelineError, RecordingError, alternatives
-from mocapflow.io.meshes import read_mesh
+from mocapflow.io.meshes import check_winding, read_mesh
 from mocapflow.io.scans import check_size, read_skeleton
 from mocapflow.io.weights import read_weights
 from mocapflow.records import F64
@@ -56,11 +56,12 @@ class Scanned(BodyModel):
         """Return the body at rest.
 
         Raises:
-            RecordingError: a file is missing, malformed, not in metres, or contradicts another.
+            RecordingError: a file is missing, malformed, not in metres, inside out in part, or contradicts another.
             PipelineError: the morph names an angle the body lacks.
         """
         subject = recording / "subject"
         vertices, faces = read_mesh(subject / "body.obj")
+        check_winding(faces, str(subject / "body.obj"))
         skeleton = read_skeleton(subject / "skeleton.json")
         check_size(vertices, skeleton, str(subject / "body.obj"))
         if (subject / "weights.npz").exists():

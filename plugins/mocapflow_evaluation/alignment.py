@@ -12,6 +12,7 @@ from mocapflow.records import F64
 from mocapflow_evaluation.references import SLACK, Reference
 
 GAP = 1.5  # samples; across a longer one nothing is interpolated
+FEWEST = 10  # frames that both must have; fewer are alike, or opposed, by chance
 LEAST = 0.5  # of our frames must have a counterpart at every shift that is tried
 HALF = 0.5  # frames; a smaller lag is lost in the resampling
 LIKE = 0.5  # correlation below which two systems show no common lag
@@ -97,7 +98,7 @@ def _summit(score: F64, shifts: npt.NDArray[np.intp], best: int) -> float:
 def _products(ours: F64, theirs: F64) -> tuple[float, float, float]:
     """Return the products of two curves about their means: of both, of ours, of theirs; 0 where too few have both."""
     both = np.isfinite(ours) & np.isfinite(theirs)
-    if both.sum() < max(3, LEAST * len(ours)):
+    if both.sum() < max(FEWEST, LEAST * len(ours)):
         return 0.0, 0.0, 0.0
     a, b = ours[both] - ours[both].mean(), theirs[both] - theirs[both].mean()
     return float(a @ b), float(a @ a), float(b @ b)

@@ -90,7 +90,12 @@ def rms_interval(error: F64, rate: float) -> tuple[float, float]:
     of 8 s 77, of 4 s 70, of 2 s 60 %), at any frame rate.
     """
     drawn = np.sqrt(np.mean(error[drawn_blocks(len(error), rate)] ** 2, axis=1))
-    low, high = np.percentile(drawn, [2.5, 97.5])
+    return middle_95(drawn, len(error))
+
+
+def middle_95(drawn: F64, count: int) -> tuple[float, float]:
+    """Return between which values 95 % of draws (DRAWS,) from so many frames lie; NaN of too few to draw from."""
+    low, high = np.percentile(drawn, [2.5, 97.5]) if count >= LEAST_BLOCKS else (np.nan, np.nan)
     return float(low), float(high)
 
 

@@ -24,6 +24,7 @@ POSE2SIM = {
     "Shoulder": "shoulder", "Elbow": "elbow", "Wrist": "wrist",
 }  # fmt: skip
 SLACK = 0.03  # of a sample: times in files are rounded
+AROUND = 360.0  # deg; no angle between two bones is larger
 SUFFIXES = (".csv", ".mot", ".sto", ".trc", ".c3d")
 
 
@@ -60,7 +61,8 @@ def read_reference(path: Path) -> Reference:
     from which joint centres and knee axes are found (`marker_joints`).
 
     Raises:
-        RecordingError: the file is missing, of another kind, has none of our angles, or goes back in time.
+        RecordingError: the file is missing, of another kind, has none of our angles, or one that turns more than once
+            around, or goes back in time.
     """
     readers = {".csv": _table, ".mot": _motion, ".sto": _motion, ".trc": _trc, ".c3d": _c3d}
     if path.suffix.lower() not in readers:
@@ -77,6 +79,10 @@ def read_reference(path: Path) -> Reference:
         row, clock = int(np.argmin(grows)) + 1, "frame" if reference.by_frame else "time"
         hint = "one row for each moment, in their order"
         raise RecordingError(f"the {clock} does not grow from row {row} to row {row + 1}", where=str(path), hint=hint)
+    for name, curve in reference.curves.items():
+        if (size := float(np.nanmax(np.abs(curve), initial=0.0))) > AROUND:
+            hint = "angles are in degrees; mend or leave out this column"
+            raise RecordingError(f"{name} reaches {size:.0f}°, more than once around", where=str(path), hint=hint)
     return reference
 
 

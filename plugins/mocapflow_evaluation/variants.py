@@ -13,7 +13,7 @@ from mocapflow.levels import FILES
 from mocapflow.records import F64
 from mocapflow.results import frame_rate_of
 from mocapflow_evaluation import panels
-from mocapflow_evaluation.compare import drawn_blocks, rms, rms_interval
+from mocapflow_evaluation.compare import drawn_blocks, middle_95, rms, rms_interval
 from mocapflow_evaluation.run_errors import angle_errors
 
 Run = tuple[str, str, Path | str]  # variant, recording, run folder or why it failed
@@ -76,8 +76,7 @@ def paired_difference(error: F64, base: F64, rate: float) -> tuple[float, float,
     """Return by how much the RMS of one error exceeds that of another, and its 95 % interval."""
     rows = drawn_blocks(len(error), rate)
     drawn = np.sqrt(np.mean(error[rows] ** 2, axis=1)) - np.sqrt(np.mean(base[rows] ** 2, axis=1))
-    low, high = np.percentile(drawn, [2.5, 97.5])
-    return rms(error) - rms(base), float(low), float(high)
+    return rms(error) - rms(base), *middle_95(drawn, len(error))
 
 
 def run_figures(run: Path | str) -> Row:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +15,7 @@ from mocapflow.assets import Body, Camera
 from mocapflow.components import Matcher
 from mocapflow.data import Frame, Matches, Past, Segmentation, Surface, Turn, empty_matches
 from mocapflow.geometry.cameras import centre, project, project_each
+from mocapflow.once import once
 from mocapflow.records import F64, I32
 from mocapflow.scene import Scene
 from mocapflow_matching.robust import robust_weights
@@ -95,7 +95,7 @@ class Marks(NamedTuple):
     spread: F64
 
 
-@lru_cache(maxsize=4)
+@once
 def marks_on(body: Body) -> Marks:
     """Return the landmarks of a body, each as the mean of vertices around it that comes nearest to it."""
     from scipy.optimize import nnls

@@ -19,7 +19,6 @@ from mocapflow_twist import solve
 from mocapflow_twist.constraint import image_rows
 from mocapflow_twist.normal_equations import Equations, dense_equations
 
-RAISED, LOWERED = 10.0, 0.1  # what a rejected and an accepted step do to the damping
 TRIALS = 4  # times that the damping is raised before a step is given up
 
 
@@ -54,9 +53,9 @@ class GaussNewton(ClothFitter):
                 trial = task.moved(before, equations, damping)
                 reached = task.energy(trial)
                 if reached < energy:
-                    cloth, energy, damping = trial, reached, LOWERED * damping
+                    cloth, energy, damping = trial, reached, solve.LOWERED * damping
                     break
-                damping *= RAISED
+                damping *= solve.RAISED
             if cloth is before:
                 break
         return cloth

@@ -12,6 +12,8 @@ ROOT_LEVER = 0.3  # m a radian of the root moves the surface: makes turning and 
 ANGLE_LEVER = 0.2  # m a radian of a joint moves the surface
 CLOTH_LEVER = 0.1  # m the range of a cloth parameter moves the surface
 
+RAISED, LOWERED = 10.0, 0.1  # what a rejected and an accepted step do to the damping
+
 
 def levers(angles: int, ranges: F64) -> F64:
     """Return how far (m) a unit of each unknown moves the surface: (6 + D + Q,)."""

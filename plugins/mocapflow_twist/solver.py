@@ -21,7 +21,6 @@ from mocapflow_twist.normal_equations import Equations
 from mocapflow_twist.problem import Anchor, Data, Guess, Problem, Quadratic
 
 TRIALS = 8  # times that the damping is raised before a step is given up
-RAISED, LOWERED = 10.0, 0.1  # what a rejected and an accepted step do to the damping
 LEAST_GAIN = 1e-14  # share of the energy below which a step is only rounding
 
 
@@ -134,8 +133,8 @@ class TwistGaussNewton(PoseSolver):
                 return guess, damping
             trial = motion.moved(guess, solve.about_origin(problem.centre(guess), len(increment)) @ increment)
             if sum(problem.energies(trial).values()) <= equations.energy:
-                return trial, LOWERED * damping
-            damping = max(RAISED * damping, 1e-6)
+                return trial, solve.LOWERED * damping
+            damping = max(solve.RAISED * damping, 1e-6)
         return guess, damping
 
     def _estimate(self, problem: Problem, guess: Guess, found: Quadratic, matches: Matches) -> Estimate:

@@ -183,6 +183,7 @@ def test_nan(tmp_path):
         ("matrix = [[60.0", "matrix = [[-60.0", "has no camera matrix"),
         ("fisheye = false", 'fisheye = "false"', "has fisheye = 'false'\n       write true or false"),
         ("fisheye = false", "fisheye = 1", "has fisheye = 1\n"),
+        ("fisheye = false", "fish_eye = true", "has a field 'fish_eye', .*\n.* did you mean 'fisheye'"),
         ("rotation = [", "rotation = [[2, 0, 0], [0, 1, 0], [0, 0, 1]] # [", "has a matrix that is not a rotation"),
         ("distortions = [0.0, 0.0, 0.0, 0.0]", "distortions = [0, 0, 0, 0, 0, 0.1]", "has 6 distortion coefficients"),
         ("distortions = [0.0, 0.0, 0.0, 0.0]", "distortions = [0.1, 0, 0.1]", "has 3 distortion .*\n.* k1 k2 p1 p2 k3"),

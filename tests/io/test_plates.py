@@ -95,6 +95,17 @@ def test_plates_are_scaled_with_the_frames(tmp_path):
     assert open_recording(tmp_path, scale=0.5).background().mean[0].shape == (24, 32, 3)
 
 
+def test_a_plate_in_colour_beside_a_grey_video(tmp_path):
+    write_recording(tmp_path, frames=2)
+    for name in NAMES:
+        plate(tmp_path / "background" / f"{name}.png", noise=12.0)  # of a grey room, however noisy
+    assert open_recording(tmp_path).background() is not None
+    room = np.full((48, 64, 3), (30, 60, 90), np.uint8)
+    cv2.imwrite(str(tmp_path / "background" / "cam02.png"), room)
+    with pytest.raises(RecordingError, match=r"cam02\.png  this clean plate is in colour, the video is grey\n"):
+        open_recording(tmp_path).background()
+
+
 def test_bad_plates(tmp_path):
     write_recording(tmp_path, frames=2)
     for name in NAMES[:2]:

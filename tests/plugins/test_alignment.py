@@ -53,6 +53,12 @@ def test_what_may_be_chance_is_not_taken_out() -> None:
     assert late.worth == late.lag
 
 
+def test_a_few_frames_are_alike_or_opposed_by_chance() -> None:
+    for count, sign in ((9, 1), (40, -1)):
+        reference = Reference(curves={"a": -TIME[:count]}, at=TIME[:count], by_frame=False)
+        assert align({"time": TIME[:count], "a": TIME[:count]}, reference, 0.1).signs == {"a": sign}
+
+
 def test_a_lag_without_which_too_few_frames_have_both() -> None:
     at = np.arange(66, 240) / 30  # of our 120 frames 54 without the lag, 63 with it
     found = aligned(motion(TIME), motion(at - 9 / 30), at)

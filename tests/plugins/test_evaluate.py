@@ -80,6 +80,11 @@ def test_the_interval_of_an_rms_does_not_hang_on_the_frame_rate(rate: float) -> 
     assert 0.72 < np.mean((low <= np.sqrt(2)) & (np.sqrt(2) <= high)) < 0.95
 
 
+@pytest.mark.parametrize("count", [1, 3])
+def test_a_few_frames_tell_no_interval(count: int) -> None:
+    assert np.isnan(compare.rms_interval(np.ones(count), 30.0)).all()
+
+
 def test_coverage_counts_our_own_intervals() -> None:
     truth = np.zeros(120)
     error = np.random.default_rng(0).normal(size=120)
@@ -171,6 +176,9 @@ def test_a_reference_in_radians_or_out_of_order_is_told(tmp_path: Path) -> None:
     turned = tables.write_columns(tmp_path / "turned.csv", clock | {n: np.radians(v) for n, v in columns.items()})
     assert any(note.endswith("is it in radians?") for note in evaluate_run(tmp_path, turned).notes)
     assert not any("radians" in note for note in evaluate_run(tmp_path, DEMO / "truth" / "angles.csv").notes)
+    tables.write_columns(turned, clock | columns | {"knee_flexion_l": 10 * columns["knee_flexion_l"]})
+    with pytest.raises(RecordingError, match=r"turned\.csv  knee_flexion_l reaches \d+°, more than once around\n"):
+        evaluate_run(tmp_path, turned)
     clock["frame"][5] = 4
     tables.write_columns(turned, clock | columns)
     with pytest.raises(RecordingError, match=r"turned\.csv  the frame does not grow from row 5 to row 6\n"):

@@ -1,0 +1,91 @@
+"""What garments, drapers and cloth fitters answer, looked at where it comes in: see `answers`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mocapflow.answers import WrongAnswer, finite, of_kind
+from mocapflow.assets import Body, GarmentMesh
+from mocapflow.components import ClothFitter, Draper, Garment
+from mocapflow.data import Cloth, Estimate, Frame, Past, Pose, PoseBatch, Segmentation, Turn
+from mocapflow.records import F64, I32
+from mocapflow.scene import Scene
+
+if TYPE_CHECKING:  # the model asks its draper through this module
+    from mocapflow.model import ClothedModel
+
+
+def mesh_of(garment: Garment, body: Body) -> GarmentMesh:
+    """Return what a garment sews on a body.
+
+    Raises:
+        WrongAnswer: it hangs from what the body lacks, or its parameters have no bounds.
+    """
+    mesh = of_kind(garment, garment.sew(body), GarmentMesh)
+    for what, index, count in (
+        ("pinned to vertex", mesh.pinned_to, len(body.vertices)),
+        ("carried by joint", mesh.carried_by, len(body.parents)),
+    ):
+        odd = index[(index < 0) | (index >= count)]
+        if len(odd):
+            raise WrongAnswer(garment, f"cloth {what} {odd[0]}; the body has 0 to {count - 1}")
+    names, bounds = mesh.parameter_names, mesh.parameter_bounds
+    if len(set(names)) != len(bounds):
+        raise WrongAnswer(garment, f"{len(bounds)} bounds of parameters for the names {', '.join(names) or 'none'}")
+    for name, (low, high) in zip(names, bounds, strict=True):
+        if not (np.isfinite([low, high]).all() and low <= high):
+            raise WrongAnswer(garment, f"the bounds {low:g} to {high:g} of parameter '{name}'")
+    return mesh
+
+
+def drape_of(draper: Draper, poses: PoseBatch, parameters: F64, past: Past, scene: Scene) -> F64:
+    """Return cloth vertices (B, W, 3) as a draper lays them.
+
+    Raises:
+        WrongAnswer: they are of another shape, or not finite.
+    """
+    assert scene.garment is not None
+    laid = of_kind(draper, draper.drape(poses, parameters, past, scene), np.ndarray)
+    return _array(draper, laid, (len(parameters), *scene.garment.vertices.shape), "cloth")
+
+
+def velocity_of(draper: Draper, pose: Pose, parameters: F64, vertices: I32, past: Past, scene: Scene) -> F64:
+    """Return the velocities (M, 3, 6 + D + Q) of cloth vertices (M,) as a draper tells them.
+
+    Raises:
+        WrongAnswer: they are of another shape, or not finite.
+    """
+    told = of_kind(draper, draper.velocity(pose, parameters, vertices, past, scene), np.ndarray)
+    return _array(draper, told, (len(vertices), 3, 6 + len(pose.angles) + len(parameters)), "velocities")
+
+
+def cloth_of(
+    fitter: ClothFitter,
+    frame: Frame,
+    segmentation: Segmentation,
+    estimate: Estimate,
+    model: ClothedModel,
+    past: Past,
+    turn: Turn,
+) -> Cloth:
+    """Return the cloth that a fitter chooses.
+
+    Raises:
+        WrongAnswer: it is not that of the garment, or not finite.
+    """
+    cloth = of_kind(fitter, fitter.fit(frame, segmentation, estimate, model, past, turn), Cloth)
+    garment = model.scene.garment
+    vertices, parameters = (0, 0) if garment is None else (len(garment.vertices), len(garment.parameter_names))
+    _array(fitter, cloth.vertices, (vertices, 3), "cloth")
+    _array(fitter, cloth.parameters, (parameters,), "cloth parameters")
+    return cloth
+
+
+def _array(component: Draper | ClothFitter, values: F64, shape: tuple[int, ...], what: str) -> F64:
+    if values.shape != shape:
+        raise WrongAnswer(component, f"{what} of shape {values.shape}, not {shape}")
+    if not finite(values):
+        raise WrongAnswer(component, f"{what} that {'are' if what.endswith('s') else 'is'} not finite")
+    return values
