@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from drape_bodies import SKIN, SKIRT, leg_poses, legs
+from drape_bodies import EYE, SKIN, SKIRT, leg_poses, legs, lying_cylinder, prepared
 from mocapflow_draping.following import FASTEST
 from mocapflow_draping.kinematic import Kinematic
+from mocapflow_draping.pushes import CLEAR, lift
 from mocapflow_garments.cylinder import Cylinder
 from mocapflow_garments.skirt import Skirt
 
@@ -46,3 +47,31 @@ def test_rings_that_buckle_move_no_faster_than_a_reach():
         pose = Pose(root=np.eye(4), angles=np.array([flexion, 0.0, 0.5 * flexion, 0.0]))
         rates = draper.velocity(pose, calm, every, Past(), scene)[..., 6:]
         assert np.linalg.norm(rates, axis=1).max() <= FASTEST + 1e-9
+
+
+def lifted(grid, rate):
+    """Lift the link between two particles beside a cylinder that lies in its middle; return them and their rates."""
+    values, posed = prepared(lying_cylinder(0.05), EYE)
+    parts, strands = posed[0], len(grid)
+    grid, rate, own = grid.copy(), rate.copy(), np.zeros((len(parts), 3, 4, rate.shape[-1]))
+    seen, room, near = np.zeros((strands, 3)), np.full(strands, -1.0), np.zeros(strands, np.int64)
+    still = np.zeros(rate.shape[-1])
+    lift(
+        grid, np.zeros(strands, np.int32), np.ones(strands, np.int32), np.array([[-1, 1], [-1, -1]], np.int32), 1,
+        seen, room, near, seen.copy(), room.copy(), parts, values, (rate, rate, own, still, still),
+    )  # fmt: skip
+    return grid, rate
+
+
+def test_a_link_lifted_off_a_limb_moves_as_its_ends_do():
+    grid = np.zeros((2, 2, 3))
+    middle = 0.048 * np.array([0.3, 0, 0.954])  # 2 mm inside: deeper, the turning of the normal would count
+    grid[:, 0], grid[:, 1] = [[-0.07, 0, 0.2], [0.07, 0, 0.2]], [middle - [0.07, 0, 0], middle + [0.07, 0, 0]]
+    rate = np.random.default_rng(0).normal(size=(2, 2, 3, 4))
+    after, rates = lifted(grid, rate)
+    assert np.linalg.norm(after[:, 1].mean(axis=0)[[0, 2]]) == pytest.approx(0.05 + CLEAR, abs=1e-3)
+    for column in range(4):
+        step = 1e-5 * rate[..., column]
+        slope = (lifted(grid + step, rate)[0] - lifted(grid - step, rate)[0]) / 2e-5
+        np.testing.assert_allclose(rates[..., column], slope, atol=0.15)
+    assert np.abs(rates - rate).max() > 0.3

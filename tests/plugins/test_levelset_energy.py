@@ -3,7 +3,7 @@
 import numpy as np
 from levelset_scenes import ellipse
 from mocapflow_levelset.energy import curvature, delta, descent, energy, heaviside, length
-from mocapflow_levelset.evolve import Weights, advance, near
+from mocapflow_levelset.evolve import Settled, Weights, advance, costs, near
 from mocapflow_levelset.redistance import redistance
 
 SIGMA = 1.5
@@ -85,3 +85,13 @@ def test_the_kernel_takes_the_step_of_the_equation():
     wanted = (level + push + 2 * 0.05 * prior) / (1 + 2 * 0.05)  # the shape term is taken at the new time
     touched = np.abs(level) < 5
     np.testing.assert_allclose(moved[touched], wanted[touched], atol=2e-4)
+
+
+def test_the_logged_costs_are_those_of_the_equation():
+    random = np.random.default_rng(3)
+    level, prior = (np.clip(circle(r, 48, x, 23), -7, 7).astype(np.float32) for r, x in ((14, 24), (15, 26)))
+    ratio = random.uniform(-2, 6, level.shape).astype(np.float32)
+    everywhere = np.array([[y, 0, 48] for y in range(48)], np.int32)
+    found = costs(Settled(level, ratio, everywhere), prior, Weights(SIGMA, 0.5, 0.05, 6.0, 1.0, 7.0))
+    wanted = energy(level, ratio, np.zeros_like(ratio), prior, SIGMA, 0.5, 0.05)
+    np.testing.assert_allclose(found, wanted, rtol=2e-3)

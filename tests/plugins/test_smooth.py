@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mocapflow_sequence.banded import difference_weights, minimise
-from mocapflow_sequence.smooth import Smooth
+from mocapflow_sequence.smooth import Smooth, _about
 from results_scene import ball_body, make_track, start_pose, stepping
 
 from mocapflow.assets import Body
@@ -190,3 +190,13 @@ def test_what_is_wide_is_never_in_memory_as_a_whole() -> None:
     for part in blocks(len(curves)):
         np.testing.assert_array_equal(smoothed.covariance[part], expected.covariance[part])
         np.testing.assert_array_equal(smoothed.cloth[part], expected.cloth[part])
+
+
+def test_an_increment_moves_a_point_of_the_root_as_its_twist_does() -> None:
+    random = np.random.default_rng(2)
+    points, increment = random.normal(size=(3, 3)), 1e-6 * random.normal(size=8)
+    moved = (_about(points, 8) @ increment)[:, 3:6]
+    motion = twists.exp(increment[:6])
+    np.testing.assert_allclose(moved, points @ motion[:3, :3].T + motion[:3, 3] - points, atol=1e-11)
+    kept = [0, 1, 2, 6, 7]
+    np.testing.assert_array_equal((_about(points, 8) @ increment)[:, kept], np.tile(increment[kept], (3, 1)))

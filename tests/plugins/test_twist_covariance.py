@@ -97,3 +97,12 @@ def test_what_only_a_prior_links_to_the_images_counts_as_far_as_the_link_holds()
     data = np.diag([1e6, 0.0])  # only the first is seen
     for prior, share in ((loose, 0.0), (tight, 1.0)):
         assert observed(np.linalg.inv(data + prior), prior) == pytest.approx([1.0, share], abs=1e-3)
+
+
+def test_what_the_data_fix_is_not_free_to_tell_the_noise() -> None:
+    """Unknowns that nothing couples: each spends the share of one measurement that the data have in it."""
+    data, prior, energy, measurements = np.array([4.0, 1.0, 0.0]), np.array([1.0, 1.0, 2.0]), 30.0, 8.0
+    spent = (data / (data + prior)).sum()
+    s2 = (10.0 + 2 * energy) / (10.0 + measurements - spent)
+    found = covariance(np.diag(data), np.diag(prior), energy, measurements)
+    assert found == pytest.approx(np.diag(1 / (data / s2 + prior)))
