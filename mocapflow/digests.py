@@ -62,6 +62,8 @@ class Digests:
 
     def __init__(self, memory: Path | None = None) -> None:
         self._memory = memory
+        reader = Path(sources.__file__).stat()  # what it finds in a file is remembered, too
+        self._reader = f"{PYTHON} {reader.st_size} {reader.st_mtime_ns}"
         self._known: dict[str, list[Any]] = _read(memory)  # path -> stamp, then what was found
         self._packages: dict[str, str] = {}
 
@@ -126,7 +128,7 @@ class Digests:
             imports = sorted(set(sources.imports(tree)))  # before `meaning`, which cuts the tree
             return [hashlib.blake2b(sources.meaning(tree).encode(), digest_size=16).hexdigest(), imports]
 
-        code, imports = self._remembered(path, PYTHON, read)
+        code, imports = self._remembered(path, self._reader, read)
         return code, imports
 
     def _remembered(self, path: Path, kind: str, read: Callable[[], list[Any]]) -> list[Any]:

@@ -31,6 +31,17 @@ def links_of(garment: GarmentMesh) -> tuple[I32, F64, F64]:
     return pairs, length, np.repeat([1.0, SHEAR], [threads, len(across)])
 
 
+def drawn_in(garment: GarmentMesh, remaining: F64) -> F64:
+    """Return the rest lengths (B, K) m of links of which strands keep a share (B,), in the order of `links_of`.
+
+    Folds and gathers take up the rest; rings and what lies across keep theirs.
+    """
+    threads = int((garment.strands[:, 1:] >= 0).sum())
+    lengths: F64 = np.tile(links_of(garment)[1], (len(remaining), 1))
+    lengths[:, :threads] *= remaining[:, None]
+    return lengths
+
+
 def _without(edges: I32, known: I32) -> I32:
     """Return the sorted edges that are not among the known ones."""
     size = int(edges.max()) + 1

@@ -50,7 +50,15 @@ class Simulation:
         self._moved, self._step, self._damping = ~pinned, step, np.exp(-step / CALM)
 
     def settle(
-        self, cloth: F64, pins: Sequence[F64], parts: Sequence[F64], values: F32, skin: F64, pull: F64, every: int
+        self,
+        cloth: F64,
+        pins: Sequence[F64],
+        parts: Sequence[F64],
+        values: F32,
+        skin: F64,
+        pull: F64,
+        length: F64,
+        every: int,
     ) -> F64:
         """Return the cloth (B, W, 3) m after it has been carried through a motion.
 
@@ -61,12 +69,14 @@ class Simulation:
             values: their voxels.
             skin: (B,) m, contact distance.
             pull: (B, W, 3) m/s^2, acceleration besides gravity.
+            length: (B, K) m, rest lengths of the links.
             every: steps of the solver per moment.
         """
         import newton
 
         from mocapflow_physics.contacts import find_contacts
 
+        self._model.spring_rest_length.assign(length.ravel().astype(np.float32))
         state, after = self._model.state(), self._model.state()
         contacts, control = newton.Contacts(0, cloth.shape[0] * cloth.shape[1], device="cpu"), self._model.control()
         contacts.soft_contact_shape.fill_(0)

@@ -6,7 +6,7 @@ from importlib.util import find_spec
 from typing import Annotated, ClassVar
 from weakref import WeakKeyDictionary
 
-from mocapflow_draping.forces import thickness
+from mocapflow_draping.forces import remaining_length, thickness
 from mocapflow_draping.kinematic import Fitting, Kinematic
 from mocapflow_draping.parts import posed_parts
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PrivateAttr, model_validator
@@ -18,7 +18,7 @@ from mocapflow.errors import PluginError
 from mocapflow.geometry.kinematics import chain_batch
 from mocapflow.records import F64, I32, Bool
 from mocapflow.scene import Scene
-from mocapflow_physics.cloth import links_of, pinned_of, pins_at, pull_of
+from mocapflow_physics.cloth import drawn_in, links_of, pinned_of, pins_at, pull_of
 from mocapflow_physics.motion import beginning, between, centred
 from mocapflow_physics.simulation import Simulation
 
@@ -66,6 +66,7 @@ class Xpbd(Draper):
             fitting.fields.values,
             self.skin_m + thickness(garment, parameters) / 2,
             pull_of(strands, garment, parameters, chains[-1]),
+            drawn_in(garment, remaining_length(garment, parameters)),
             EVERY,
         )
         return settled + centre[:, None]

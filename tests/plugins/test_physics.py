@@ -92,6 +92,19 @@ def test_wind_blows_all_strands_the_same_way():
 
 
 @installed
+def test_what_folds_take_up_the_hem_hangs_higher():
+    names, bounds = SCENE.garment.parameter_names, SCENE.garment.parameter_bounds
+    garment = replace(
+        SCENE.garment, parameter_names=(*names, "take_up"), parameter_bounds=np.concatenate([bounds, [[0, 0.15]]])
+    )
+    parameters = np.array([[0, 0, 0, 0.0], [0, 0, 0, 0.1]])
+    whole, taken = xpbd.Xpbd().drape(rest(2), parameters, Past(), replace(SCENE, garment=garment))
+    strands = garment.strands
+    lengths = [np.linalg.norm(np.diff(cloth[strands], axis=1), axis=2).sum(axis=1) for cloth in (whole, taken)]
+    np.testing.assert_allclose(lengths[1] / lengths[0], 0.9, rtol=0.03)
+
+
+@installed
 def test_it_is_repeatable_and_goes_on_from_the_last_frame():
     draper, parameters = xpbd.Xpbd(), np.zeros((1, 3))
     raised = rest()
