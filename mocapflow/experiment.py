@@ -14,6 +14,7 @@ from pydantic import Field
 
 from mocapflow.errors import PipelineError
 from mocapflow.levels import changes_at, levels_at, variant_of
+from mocapflow.pipeline import frames_of
 from mocapflow.registry import Registry
 from mocapflow.resolve import Resolver
 from mocapflow.settings import Settings
@@ -67,6 +68,8 @@ def load_experiment(path: Path, recordings: Sequence[Path] = (), frames: str | N
     resolver = Resolver(document, Registry())
     said = resolver.build(ExperimentFile, document.values, ())
     assert isinstance(said, ExperimentFile)
+    if said.frames is not None:
+        frames_of(said.frames, resolver.place(("frames",)))  # told once, by its line, not by every run
     folders = tuple(recordings) or tuple(
         resolver.file(name, ("recordings", index)) for index, name in enumerate(said.recordings)
     )

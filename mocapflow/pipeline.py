@@ -30,6 +30,18 @@ class Frames(Settings):
     step: PositiveInt = 1  # takes every so many-th frame
 
 
+def frames_of(text: str, where: str) -> slice:
+    """Return the frames of `A:B` or `A:B:STEP`, as people write them on the command line.
+
+    Raises:
+        PipelineError: it is written otherwise.
+    """
+    parts = text.split(":")
+    if len(parts) not in {2, 3} or not all(part.isdecimal() or not part for part in parts):
+        raise PipelineError("frames are written A:B or A:B:STEP; either end may be left out", where=where)
+    return slice(*(int(part) if part else None for part in parts))
+
+
 class PartsFile(Settings):
     """A long recording in parts that are tracked each from a start of its own, and joined."""
 

@@ -127,6 +127,7 @@ def test_recordings_that_cannot_be_told_apart_are_refused(tmp_path: Path, folder
         ("recordings: [takes/a, b]", "recordings: []", r"grid\.yaml:3:13?.*recordings"),
         ("frames:", "frame:", r"grid\.yaml:4:1  frame: unknown setting of an experiment"),
         ("change: {stages", "change: {recording: c, stages", r"grid\.yaml:5:10  a variant can't change 'recording'"),
+        ("frames: 0:20", "frames: 0-20", r"grid\.yaml:4:1  frames are written A:B or A:B:STEP"),
         ("    rings:", "    rings: {recording: c}", r"grid\.yaml:8:13  a variant can't change 'recording'"),
         ("    rings:", "    a/b:", r"grid\.yaml:8:5  a level can't be called 'a/b'"),
         ("    rings:", "    ..:", r"grid\.yaml:8:5  a level can't be called '\.\.'"),

@@ -34,14 +34,14 @@ class Invocation:
 
     def load(self) -> Pipeline:
         """Return the pipeline."""
-        from mocapflow.pipeline import load_pipeline
+        from mocapflow.pipeline import frames_of, load_pipeline
 
         return load_pipeline(
             Path(self.pipeline),
             recording=Path(self.recording) if self.recording else None,
             changes=self.changes,
             folder=Path(self.folder),
-            frames=parse_frames(self.frames),
+            frames=None if self.frames is None else frames_of(self.frames, f"--frames {self.frames}"),
         )
 
     def absolute(self) -> Invocation:
@@ -114,13 +114,3 @@ def recalled_keys(out: Path) -> dict[str, str] | None:
         return None
     except (OSError, ValueError, LookupError, TypeError):
         return {}
-
-
-def parse_frames(text: str | None) -> slice | None:
-    """Return the frames of `A:B` or `A:B:STEP`."""
-    if text is None:
-        return None
-    parts = text.split(":")
-    if len(parts) not in {2, 3} or not all(part.isdecimal() or not part for part in parts):
-        raise PipelineError("frames are written A:B or A:B:STEP; either end may be left out", where=f"--frames {text}")
-    return slice(*(int(part) if part else None for part in parts))
