@@ -129,12 +129,12 @@ def test_a_wrong_recording_json_is_explained(tmp_path, text, said):
 def test_the_standard_deviation_of_a_lag_is_that_of_repeated_noise():
     random, t = np.random.default_rng(0), np.arange(200)
     true = np.stack([np.sin(t / 9), np.cos(t / 13)], axis=1)
-    lags, informations = [], []
+    lags, told = [], []
     for _ in range(200):
         noise = np.repeat(0.1 * random.normal(size=(2, 40, 2)), synchrony.ALIKE, axis=1)  # alike for so many frames
         lag, information = synchrony.best_lag(true + noise[0], true + noise[1], 10)
         lags.append(lag)
-        informations.append(information)
-    stated = np.mean(informations) ** -0.5
+        told.append(information)
+    stated = np.mean(told) ** -0.5
     assert abs(np.mean(lags)) < 4 * stated / np.sqrt(len(lags))
     assert 0.6 < np.std(lags) / stated < 1.6
