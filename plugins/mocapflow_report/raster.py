@@ -58,13 +58,23 @@ class Canvas:
 
     def veil(self, vertices: F64, faces: I32, colours: F32, opacity: float) -> None:
         """Draw the nearest layer of triangles, which let shine through what is behind, or up to `CUT` before them."""
-        behind, depth = self.picture.copy(), self.depth.copy()
+        box = self.box(vertices)
+        behind, depth = self.picture[box].copy(), self.depth[box].copy()
         reach = np.minimum(depth + np.float32(CUT), np.float32(FAR))
-        self.depth = reach.copy()
+        self.depth[box] = reach
         self.draw(vertices, faces, colours)
-        covered = self.depth < reach
-        self.depth = np.minimum(self.depth, depth)
-        self.picture[covered] = opacity * self.picture[covered] + (1 - opacity) * behind[covered]
+        covered = self.depth[box] < reach
+        self.depth[box] = np.minimum(self.depth[box], depth)
+        mixed = np.float32(opacity) * self.picture[box] + np.float32(1 - opacity) * behind
+        np.copyto(self.picture[box], mixed, where=covered[..., None])
+
+    def box(self, vertices: F64, margin: int = 1) -> tuple[slice, slice]:
+        """Return the rows and columns of the pixels that triangles may cover, and a margin; most of a room is empty."""
+        pixels = cameras.project(vertices, self._camera)
+        if np.isnan(pixels).any():  # behind the camera
+            return slice(None), slice(None)
+        low, high = np.clip([pixels.min(0) - margin, pixels.max(0) + margin + 1], 0, self._camera.size).astype(int)
+        return slice(low[1], high[1]), slice(low[0], high[0])
 
     def _field_of_view(self) -> float:
         return float(2 * np.arctan(self._camera.size[1] / 2 / self._camera.intrinsics[1, 1]))

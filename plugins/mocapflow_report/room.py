@@ -107,8 +107,11 @@ class Room:
         flat[:, 2] = self._floor
         shadow = raster.Canvas(np.zeros_like(self._empty), self._camera)
         shadow.draw(flat, body.faces, np.ones(flat.shape, np.float32))
-        soft = cv2.GaussianBlur(shadow.picture[..., 0], (0, 0), 4.0 * SMOOTH)
-        return np.asarray(self._empty * (1 - 0.28 * soft[..., None]), np.float32)
+        box = shadow.box(flat, margin=16 * SMOOTH)
+        soft = cv2.GaussianBlur(np.ascontiguousarray(shadow.picture[box][..., 0]), (0, 0), 4.0 * SMOOTH)
+        shaded = self._empty.copy()
+        shaded[box] *= 1 - np.float32(0.28) * soft[..., None]
+        return shaded
 
     def _stick(self, image: U8, body: Surface) -> None:
         """Draw the skeleton beside the body."""
