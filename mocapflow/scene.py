@@ -9,7 +9,7 @@ import numpy as np
 
 from mocapflow.assets import Background, Body, Camera, GarmentMesh
 from mocapflow.data import BODY, CLOTH, Cloth, Pose, Surface
-from mocapflow.geometry import kinematics, meshes
+from mocapflow.geometry import kinematics, meshes, simplify
 from mocapflow.geometry.angles import unmeasured
 from mocapflow.once import once
 from mocapflow.records import F64, I32, U8, Bool, record
@@ -37,6 +37,18 @@ class Scene:
     def with_background(self, background: Background | None) -> Scene:
         """Return the scene with the empty room known."""
         return replace(self, background=background)
+
+    def simplified(self, faces: int) -> Scene:
+        """Return the scene with a body of about so many faces if it has more, the garment pinned to the same places."""
+        if len(self.body.faces) <= faces:
+            return self
+        body, garment = simplify.simplified(self.body, faces), self.garment
+        if garment is not None:
+            from scipy.spatial import cKDTree
+
+            _, nearest = cKDTree(body.vertices).query(self.body.vertices[garment.pinned_to])
+            garment = replace(garment, pinned_to=nearest.astype(np.int32))
+        return replace(self, body=body, garment=garment)
 
     @cached_property
     def faces(self) -> I32:

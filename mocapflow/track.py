@@ -73,6 +73,7 @@ class CoupledLoop(Stage):
     priors: tuple[Prior, ...] = ()  # added to the matches
     recovery: Recovery | None = None  # looks again where a fit is lost
     steady: Steady = Steady()
+    body_faces: Annotated[int, Field(ge=2000)] = 12_000  # that are tracked: more take longer for the same angles
     keep: Annotated[Literal["final", "trace"], FREE] = "final"  # trace: also the pose of every turn before recovery
     on_unsteady: Annotated[Literal["go_on", "stop"], FREE] = "go_on"  # after a frame that did not come to rest
 
@@ -100,7 +101,8 @@ class CoupledLoop(Stage):
         if scene.garment is not None and self.draper is None:
             hint = "name a draper and a cloth_fitter, or track the bare body: garment: null"
             raise PipelineError(f"the person wears a {scene.garment.name}, which the track does not drape", hint=hint)
-        model = ClothedModel(scene=scene.with_background(background), draper=self.draper)
+        scene = scene.with_background(background).simplified(self.body_faces)
+        model = ClothedModel(scene=scene, draper=self.draper)
         if self.keep == "trace":
             checkpoint.keep_turns(self.steady.cap)
         past, watch = checkpoint.past(), Stopwatch()

@@ -20,7 +20,6 @@ from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow.settings import PositiveOrInf
 from mocapflow_recovery.certain import View, small_room, views
-from mocapflow_recovery.coarse import coarse_body
 from mocapflow_recovery.disagreement import distance
 from mocapflow_recovery.judge import Judge, Reach, Stray, stray_of
 from mocapflow_recovery.leaps import leapt
@@ -110,8 +109,8 @@ class LimbSearch(Recovery):
     ) -> Pose:  # fmt: skip
         """Return the pose that agrees best with the views, sampled around those at hand."""
         body, fitted, believed = model.scene.body, settled.estimate.pose, state.estimate.pose
-        few = coarse_body(body, self.faces) if len(body.faces) > self.faces else body
-        judge = Judge(model, replace(model.scene, body=few), seen, settled.cloth.parameters, past, self._reach())
+        coarse = model.scene.simplified(self.faces)
+        judge = Judge(model, coarse, seen, settled.cloth.parameters, past, self._reach())
         plan, rng = self._plan(body), np.random.default_rng(frame.index)
         at_rest, every = np.zeros(len(body.twists)), np.arange(len(body.twists), dtype=np.int32)
         before = [moment.pose for moment in past.moments[-1:]]

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from mocapflow_priors.density import Density, write
 from mocapflow_recovery.certain import shrunk, small_room, views
-from mocapflow_recovery.coarse import coarse_body
 from mocapflow_recovery.disagreement import distance, floating_area, uncovered_area
 from mocapflow_recovery.leaps import leapt
 from mocapflow_recovery.limb_search import LimbSearch
@@ -279,14 +278,6 @@ def test_seen_samples_bend_what_was_seen_and_nothing_else() -> None:
     assert all(pose.angles[leg[0]] in seen_poses[:, leg[0]] for pose in tried)
     assert all((np.delete(pose.angles, leg[0]) == np.delete(POSE.angles, leg[0])).all() for pose in tried)
     assert not seen_samples(POSE, parts(SCENE.body)[1], SCENE.body, plan, np.random.default_rng(0))
-
-
-def test_a_coarse_body_moves_like_the_full_one() -> None:
-    body = template_body()
-    few = coarse_body(body, 2600)
-    assert len(few.faces) < 3000
-    np.testing.assert_allclose(few.vertices.max(axis=0), body.vertices.max(axis=0), atol=0.01)
-    np.testing.assert_allclose(few.skin_weight.sum(axis=1), 1.0)
 
 
 def test_a_view_without_the_room_shows_nothing_surely() -> None:

@@ -1,4 +1,4 @@
-"""A body of few triangles that moves like the full one: a pose is judged in a fraction of the time."""
+"""A body of fewer triangles that moves like the full one: what is done face by face takes a fraction of the time."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from mocapflow.assets import Body
+from mocapflow.geometry.kinematics import part_of
 from mocapflow.once import once
 
 
 @once
-def coarse_body(body: Body, faces: int) -> Body:
+def simplified(body: Body, faces: int) -> Body:
     """Return a body of about as many faces, each vertex moved like the one of the full body that is nearest at rest.
 
     It is made once and forgotten with the full one.
@@ -23,12 +24,4 @@ def coarse_body(body: Body, faces: int) -> Body:
     mesh = o3d.geometry.TriangleMesh(points, triangles).simplify_quadric_decimation(faces)
     vertices = np.array(mesh.vertices, np.float64)
     nearest = cKDTree(body.vertices).query(vertices)[1]
-    return replace(
-        body,
-        vertices=vertices,
-        faces=np.array(mesh.triangles, np.int32),
-        skin_joint=body.skin_joint[nearest],
-        skin_weight=body.skin_weight[nearest],
-        cut=body.cut[nearest],
-        morph_offset=None,
-    )
+    return replace(part_of(body, nearest), vertices=vertices, faces=np.array(mesh.triangles, np.int32))
