@@ -46,8 +46,8 @@ class Scene:
         if garment is not None:
             from scipy.spatial import cKDTree
 
-            _, nearest = cKDTree(body.vertices).query(self.body.vertices[garment.pinned_to])
-            garment = replace(garment, pinned_to=nearest.astype(np.int32))
+            nearest = cKDTree(body.vertices).query(self.body.vertices[garment.pinned_to])[1]
+            garment = replace(garment, pinned_to=np.asarray(nearest, np.int32))
         return replace(self, body=body, garment=garment)
 
     @cached_property

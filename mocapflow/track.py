@@ -112,7 +112,8 @@ class CoupledLoop(Stage):
             watch.lap("decode")
             known, state = past.believable(), self.begin(frame, past, start, model, watch)
             settled = settle if seen(frame) else lost
-            result = settled(frame, state, known, self.steps, model, checkpoint.observe)
+            near = self.approach(frame, state, known, model) if len(known.moments) < MOVING else state
+            result = settled(frame, near, known, self.steps, model, checkpoint.observe)
             spent = result.seconds
             watch.lap("loop")
             result = self.recovered(frame, state, result, known, model)
@@ -145,8 +146,7 @@ class CoupledLoop(Stage):
         watch.lap("predict")
         cloth = model.drape(pose, parameters, past)
         watch.lap("drape")
-        state, known = believed(pose, parameters, cloth), past.believable()
-        return state if len(known.moments) >= MOVING else self.approach(frame, state, known, model)
+        return believed(pose, parameters, cloth)
 
     def approach(self, frame: Frame, state: FrameState, past: Past, model: ClothedModel) -> FrameState:
         """Return a first or second frame's state moved near the person by the first segmenter, if there is one.

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mocapflow.data import NO_CLOTH, Cloth, Past, Pose, PoseBatch, Surface
+from mocapflow.data import NO_CLOTH, Cloth, FrameResult, Past, Pose, PoseBatch, Surface
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow.scene import Scene
@@ -45,6 +45,25 @@ def stray_of(surface: Surface, scene: Scene, seen: Sequence[View], reach: Reach)
     )
 
 
+class Fit(NamedTuple):
+    """A result, and how well it agrees with what the images surely show."""
+
+    result: FrameResult
+    stray: Stray
+    apart: float  # see `Judge.apart`
+
+
+class Given(NamedTuple):
+    """A pose that was given beforehand, about right: of two that fit alike the one nearer to it is taken."""
+
+    pose: Pose
+    sd: float  # rad, of its angles
+
+    def strain(self, pose: Pose) -> float:
+        """Return the factor by which a pose counts as farther from the person for being far from the given one."""
+        return 1.0 + float(np.sqrt(np.mean(((pose.angles - self.pose.angles) / self.sd) ** 2)))
+
+
 class Judge(NamedTuple):
     """Measures poses of a coarse body in the garment as it is believed."""
 
@@ -54,10 +73,17 @@ class Judge(NamedTuple):
     parameters: F64  # of the cloth
     past: Past
     reach: Reach
+    given: Given | None  # None: nothing was
+
+    def of(self, result: FrameResult) -> Fit:
+        """Return a result judged by its full surface."""
+        pose, surface = result.state.estimate.pose, surface_of(self.model, result)
+        stray = stray_of(surface, self.model.scene, self.seen, self.reach)
+        return Fit(result, stray, self._apart(pose, surface))
 
     def apart(self, poses: Sequence[Pose]) -> F64:
-        """Return for each pose (B,) how far surface and person are apart, m per unit of the person's area."""
-        return np.array([distance(surface, self.seen, self.reach.cap_m) for surface in self._surfaces(poses)])
+        """Return for each pose (B,) how far surface and person are apart, m per unit of its area, times the strain."""
+        return np.array([self._apart(*each) for each in zip(poses, self._surfaces(poses), strict=True)])
 
     def stray(self, poses: Sequence[Pose]) -> F64:
         """Return for each pose (B,) how much of surface and person strays, cm²."""
@@ -65,9 +91,17 @@ class Judge(NamedTuple):
             sum(stray_of(surface, self.coarse, self.seen, self.reach)) for surface in self._surfaces(poses)
         ])  # fmt: skip
 
+    def _apart(self, pose: Pose, surface: Surface) -> float:
+        return distance(surface, self.seen, self.reach.cap_m) * (self.given.strain(pose) if self.given else 1.0)
+
     def _surfaces(self, poses: Sequence[Pose]) -> list[Surface]:
         clothes = drapes(self.model, poses, self.parameters, self.past)
         return [self.coarse.surface(pose, cloth) for pose, cloth in zip(poses, clothes, strict=True)]
+
+
+def surface_of(model: ClothedModel, result: FrameResult) -> Surface:
+    """Return the surface that a result believes in."""
+    return model.surface(result.state.estimate.pose, result.state.cloth)
 
 
 def drapes(model: ClothedModel, poses: Sequence[Pose], parameters: F64, past: Past) -> list[Cloth]:

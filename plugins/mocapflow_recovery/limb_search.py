@@ -15,13 +15,12 @@ from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, Pos
 
 from mocapflow.assets import Body
 from mocapflow.components import Recovery
-from mocapflow.data import Frame, FrameResult, FrameState, Past, Pose, Surface
+from mocapflow.data import Frame, FrameResult, FrameState, Past, Pose
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow.settings import PositiveOrInf
 from mocapflow_recovery.certain import View, small_room, views
-from mocapflow_recovery.disagreement import distance
-from mocapflow_recovery.judge import Judge, Reach, Stray, stray_of
+from mocapflow_recovery.judge import Fit, Given, Judge, Reach, Stray, stray_of, surface_of
 from mocapflow_recovery.leaps import leapt
 from mocapflow_recovery.sampling import Cost, Plan, Spread, put_back, search, seen_samples, without_idle_parts
 
@@ -39,6 +38,8 @@ class LimbSearch(Recovery):
     did not show the person, where a leg may rest on the contour of the other one and a foot lie turned in its own; and
     where a limb has leapt into a pose that nobody was seen in. There a part moves only if that brings person and model
     together.
+    The first frame starts from a pose that was given and is about right (`start_deg`). So it is searched near that one
+    first, and of two poses that fit alike the nearer one is taken: crossed legs look the same exchanged.
     It needs the empty scene; without one every fit is taken as it is.
     """
 
@@ -59,6 +60,7 @@ class LimbSearch(Recovery):
     poses: Path = SHIPPED  # that people were seen in, made by `mocapflow prior fit`: limbs are tried as they are there
     seen_samples: NonNegativeInt = 100  # of each limb in the first round, from `poses`
     shares: Annotated[tuple[PositiveFloat, ...], Field(min_length=1)] = (1.0, 0.6, 0.4, 0.25, 0.12)  # of the spread
+    start_deg: PositiveFloat = 6.0  # how far off, in each angle, the pose may be that the first frame starts from
     spread_deg: PositiveFloat = 25.0  # standard deviation of the first samples; less where a joint at rest hardly bends
     root_spread_deg: PositiveFloat = 8.0  # likewise, of the root's turn
     root_spread_m: PositiveFloat = 0.06  # likewise, of its place
@@ -83,15 +85,21 @@ class LimbSearch(Recovery):
         why = f"fit doubted, {stray}" if doubtful else self._suspicion(result.state, state, past, model.scene.body)
         if not why:
             return result
-        found = self._search(frame, state, result.state, seen, past, model, doubtful)
-        other = settle(found, result.state.cloth.parameters)
-        again = surface_of(model, other)
-        then = stray_of(again, model.scene, seen, self._reach())
-        cured = doubtful and not self._doubtful(then)
-        least = 1.0 if cured else 1 - self.gain
-        if distance(again, seen, self.cap_m) < least * distance(surface, seen, self.cap_m):
-            return noted(other, f"{why}: found again by search; then {then}", doubted=self._doubtful(then))
-        return noted(result, f"{why}: search found nothing better", doubted=True) if doubtful else result
+        judge = self._judge(state, result, seen, past, model)
+        fit = judge.of(result)
+        best = fit
+        looks = ([self._near] if judge.given else []) + ([self._far] if doubtful or not judge.given else [])
+        for look in looks:
+            found = look(frame.index, state.estimate.pose, result.state.estimate.pose, judge, doubtful)
+            best = self._better(judge.of(settle(found, judge.parameters)), best)
+        if best is fit:
+            return noted(result, f"{why}: search found nothing better", doubted=True) if doubtful else result
+        return noted(best.result, f"{why}: found again by search; then {best.stray}", self._doubtful(best.stray))
+
+    def _better(self, other: Fit, fit: Fit) -> Fit:
+        """Return another fit if it is clearly nearer to the person, or nearer and doubted no more."""
+        cured = self._doubtful(fit.stray) and not self._doubtful(other.stray)
+        return other if other.apart < (1.0 if cured else 1 - self.gain) * fit.apart else fit
 
     def _suspicion(self, fitted: FrameState, believed: FrameState, past: Past, body: Body) -> str:
         """Return why limbs are looked for that images do not contradict, or nothing."""
@@ -103,23 +111,38 @@ class LimbSearch(Recovery):
     def _doubtful(self, stray: Stray) -> bool:
         return stray.doubtful(self.uncovered_cm2, self.floating_cm2)
 
-    def _search(
-        self, frame: Frame, state: FrameState, settled: FrameState, seen: Sequence[View], past: Past,
-        model: ClothedModel, astray: bool,
-    ) -> Pose:  # fmt: skip
-        """Return the pose that agrees best with the views, sampled around those at hand."""
-        body, fitted, believed = model.scene.body, settled.estimate.pose, state.estimate.pose
-        coarse = model.scene.simplified(self.faces)
-        judge = Judge(model, coarse, seen, settled.cloth.parameters, past, self._reach())
-        plan, rng = self._plan(body), np.random.default_rng(frame.index)
+    def _near(self, frame: int, believed: Pose, fitted: Pose, judge: Judge, astray: bool) -> Pose:
+        """Return the pose that agrees best with the views near the one that was given."""
+        body, rng = judge.model.scene.body, np.random.default_rng(frame)
+        spread = Spread(2 * np.radians(self.start_deg), np.radians(self.root_spread_deg), self.root_spread_m)
+        plan = self._plan(body)._replace(spread=spread, seen_samples=0)
+        found = search(judge.apart, Pose(root=fitted.root, angles=believed.angles), body, plan, rng)
+        return self._tidied(found, fitted, believed, judge, judge.apart)
+
+    def _far(self, frame: int, believed: Pose, fitted: Pose, judge: Judge, astray: bool) -> Pose:
+        """Return the pose that agrees best with the views, sampled around those at hand and as people were seen."""
+        body, rng = judge.model.scene.body, np.random.default_rng(frame)
+        judge = judge._replace(given=None)  # it may have been far off
+        plan, before = self._plan(body), [moment.pose for moment in judge.past.moments[-1:]]
         at_rest, every = np.zeros(len(body.twists)), np.arange(len(body.twists), dtype=np.int32)
-        before = [moment.pose for moment in past.moments[-1:]]
         seen_poses = seen_samples(Pose(root=believed.root, angles=at_rest), every, body, plan, rng)
         begins = [nearest(judge.apart, [fitted, believed, *before, *seen_poses]), *before]
         found = nearest(judge.apart, [search(judge.apart, begin, body, plan, rng) for begin in dict.fromkeys(begins)])
-        measure = judge.stray if astray else judge.apart  # by what strays a fit that is not astray has only idle parts
+        # by what strays a fit that is not astray has only idle parts
+        return self._tidied(found, fitted, believed, judge, judge.stray if astray else judge.apart)
+
+    def _tidied(self, found: Pose, fitted: Pose, believed: Pose, judge: Judge, measure: Cost) -> Pose:
+        """Return a pose that was found with those parts as they were that need not have moved."""
+        body = judge.model.scene.body
         found = without_idle_parts(measure, found, fitted, body, self.gain)
         return put_back(judge.apart, found, [fitted, believed], body, self.tolerance)
+
+    def _judge(
+        self, state: FrameState, result: FrameResult, seen: Sequence[View], past: Past, model: ClothedModel
+    ) -> Judge:
+        given = None if past.moments or past.after_gap else Given(state.estimate.pose, np.radians(self.start_deg))
+        coarse = model.scene.simplified(self.faces)
+        return Judge(model, coarse, seen, result.state.cloth.parameters, past, self._reach(), given)
 
     def _plan(self, body: Body) -> Plan:
         spread = Spread(np.radians(self.spread_deg), np.radians(self.root_spread_deg), self.root_spread_m)
@@ -136,11 +159,6 @@ class LimbSearch(Recovery):
 def nearest(cost: Cost, poses: Sequence[Pose]) -> Pose:
     """Return the pose of least cost."""
     return poses[int(cost(poses).argmin())]
-
-
-def surface_of(model: ClothedModel, result: FrameResult) -> Surface:
-    """Return the surface that a result believes in."""
-    return model.surface(result.state.estimate.pose, result.state.cloth)
 
 
 def noted(result: FrameResult, note: str, doubted: bool) -> FrameResult:

@@ -9,6 +9,7 @@ import pytest
 from mocapflow_priors.density import Density, write
 from mocapflow_recovery.certain import shrunk, small_room, views
 from mocapflow_recovery.disagreement import distance, floating_area, uncovered_area
+from mocapflow_recovery.judge import Given
 from mocapflow_recovery.leaps import leapt
 from mocapflow_recovery.limb_search import LimbSearch
 from mocapflow_recovery.sampling import Plan, Spread, parts, put_back, samples, search, seen_samples, without_idle_parts
@@ -234,6 +235,27 @@ def test_where_frames_begin_a_limb_is_looked_for_that_nothing_doubts(past, looke
     assert not found.doubted and bool(found.notes) == looked
     kept = LimbSearch(beginnings=False).recover(FRAME, near, settled(near), past, model, settle)
     assert kept.state.estimate.pose is near.estimate.pose and not kept.notes
+
+
+@pytest.mark.parametrize(("past", "found"), [(Past(), True), (Past(after_gap=True), False)], ids=["first", "gap"])
+def test_a_first_frame_is_searched_near_the_pose_it_starts_from(past, found) -> None:
+    """No sample reaches the leg where the fit has it; from the start it is near."""
+
+    def settle(pose, parameters):
+        return settled(pictures.tiny_state(SCENE, pose, POSE))
+
+    start, lost = (pictures.tiny_state(SCENE, astray(angle), POSE) for angle in (0.25, 1.2))
+    search = LimbSearch(spread_deg=1e-3, root_spread_deg=1e-3, root_spread_m=1e-6, seen_samples=0, uncovered_cm2=1e4,
+                        floating_cm2=1e4)  # fmt: skip
+    pose = search.recover(FRAME, start, settled(lost), past, scenes.tiny_model(SCENE), settle).state.estimate.pose
+    assert (np.abs(pose.angles - POSE.angles).max() < 0.12) == found
+
+
+def test_of_two_fits_alike_the_one_nearer_to_the_start_is_taken() -> None:
+    given = Given(astray(0.2), np.radians(6))
+    others = np.array([given.strain(astray(0.2 + angle)) for angle in (0.0, 0.1, 0.4)])
+    assert others[0] == 1 and np.all(np.diff(others) > 0)
+    assert given.strain(Pose(root=POSE.root, angles=given.pose.angles + np.radians(6))) == pytest.approx(2)
 
 
 def test_a_first_frame_that_is_right_says_nothing_of_the_search() -> None:
