@@ -23,7 +23,6 @@ from mocapflow_robustness.events import Event
 
 from mocapflow.data import Moment, Past, Pose
 from mocapflow.geometry.angles import measure
-from mocapflow.loop import settle
 from mocapflow.model import ClothedModel
 from mocapflow.pipeline import load_pipeline
 from mocapflow.recording import Recording, open_recording
@@ -31,7 +30,7 @@ from mocapflow.records import F64
 from mocapflow.results import ViewChecks
 from mocapflow.scene import Scene
 from mocapflow.timing import Stopwatch
-from mocapflow.track import CoupledLoop, lost, seen
+from mocapflow.track import CoupledLoop
 
 BEFORE, AFTER = 20, 5  # frames
 KINDS = ("other_time", "other_camera", "torn", "black")
@@ -51,10 +50,7 @@ class Tracker:
         start = StartFromFile().run(recording, self.model.scene)
         for picture in recording.frames(since):
             frame = checks.passed(picture)
-            state = self.stage.begin(frame, past, start, self.model, Stopwatch())
-            settled = settle if seen(frame) else lost
-            result = settled(frame, state, past, self.stage.steps, self.model, lambda *_: None)
-            found = self.stage.recovered(frame, state, result, past, self.model).state
+            found = self.stage.fit(frame, past, start, self.model, lambda *_: None, Stopwatch()).state
             estimate = found.estimate
             moment = Moment(time=frame.time, pose=estimate.pose, cloth=found.cloth, observed=estimate.observed)
             past = past.after(moment, found.segmentation.appearance or past.appearance)

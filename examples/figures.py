@@ -70,8 +70,8 @@ def first_frame(changes: tuple[str, ...] = ()) -> tuple[ClothedModel, Frame, Fra
     scene = Scene(cameras=recording.cameras, body=body, garment=pipeline.garment.sew(body))
     model = ClothedModel(scene=scene.with_background(recording.background()), draper=loop.draper)
     frame, start = recording.frame(0), StartFromFile().run(recording, scene)
-    state = loop.begin(frame, Past(), start, model, Stopwatch())
-    return model, frame, settle(frame, state, Past(), loop.steps, model, lambda *_: None).state
+    begun = loop.approach(frame, loop.begin(frame, Past(), start, model, Stopwatch()), Past(), model)
+    return model, frame, settle(frame, begun, Past(), loop.steps, model, lambda *_: None).state
 
 
 def write(panels: dict[str, U8]) -> None:

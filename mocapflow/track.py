@@ -110,17 +110,9 @@ class CoupledLoop(Stage):
             frame = checks.passed(picture) if checks else picture
             frame = replace(frame, flow=flow.into(frame.index)) if flow else frame
             watch.lap("decode")
-            known, state = past.believable(), self.begin(frame, past, start, model, watch)
-            settled = settle if seen(frame) else lost
-            near = self.approach(frame, state, known, model) if len(known.moments) < MOVING else state
-            result = settled(frame, near, known, self.steps, model, checkpoint.observe)
-            spent = result.seconds
-            watch.lap("loop")
-            result = self.recovered(frame, state, result, known, model)
-            watch.lap("recover")
-            seconds = {step: watch.seconds.get(step, 0.0) + spent.get(step, 0.0) for step in STEPS}
-            notes = [*notes_on(frame, scene, known, result), *result.notes]
-            past = checkpoint.commit(frame, past, replace(result, seconds=seconds), notes)
+            result = self.fit(frame, past, start, model, checkpoint.observe, watch)
+            notes = [*notes_on(frame, scene, past.believable(), result), *result.notes]
+            past = checkpoint.commit(frame, past, result, notes)
             self.complain(frame, result)
             watch = Stopwatch()
         return checkpoint.track()
@@ -136,6 +128,22 @@ class CoupledLoop(Stage):
             priors=self.priors,
             steady=self.steady,
         )
+
+    def fit(
+        self, frame: Frame, past: Past, start: Start, model: ClothedModel, observe: Observe, watch: Stopwatch
+    ) -> FrameResult:
+        """Return what is found of one frame: begun where it is believed, settled, and looked for if it was lost."""
+        known, state = past.believable(), self.begin(frame, past, start, model, watch)
+        near = state if len(known.moments) >= MOVING else self.approach(frame, state, known, model)
+        watch.lap("predict")
+        settled = settle if seen(frame) else lost
+        result = settled(frame, near, known, self.steps, model, observe)
+        spent = result.seconds
+        watch.lap("loop")
+        result = self.recovered(frame, state, result, known, model)
+        watch.lap("recover")
+        seconds = {step: watch.seconds.get(step, 0.0) + spent.get(step, 0.0) for step in STEPS}
+        return replace(result, seconds=seconds)
 
     def begin(self, frame: Frame, past: Past, start: Start, model: ClothedModel, watch: Stopwatch) -> FrameState:
         """Return what is believed of a frame before looking: the predicted pose, clothed."""

@@ -14,7 +14,6 @@ from mocapflow_priors.parzen import SHIPPED
 
 from mocapflow.data import NO_CLOTH, Moment, Past, Start
 from mocapflow.geometry import twists
-from mocapflow.loop import settle
 from mocapflow.model import ClothedModel
 from mocapflow.pipeline import load_pipeline
 from mocapflow.shipped import shipped
@@ -109,8 +108,6 @@ def followed(scene, begin, frames):
     stage = next(named.stage for named in stages if isinstance(named.stage, CoupledLoop))
     model, past, start = ClothedModel(scene=scene), Past(), Start(pose=begin, parameters=np.empty(0))
     for frame in frames:
-        state = stage.begin(frame, past, start, model, Stopwatch())
-        result = settle(frame, state, past, stage.steps, model, lambda *_: None)
-        found = stage.recovered(frame, state, result, past, model).state.estimate
+        found = stage.fit(frame, past, start, model, lambda *_: None, Stopwatch()).state.estimate
         past = past.after(Moment(time=frame.time, pose=found.pose, cloth=NO_CLOTH, observed=found.observed), {})
         yield found.pose
