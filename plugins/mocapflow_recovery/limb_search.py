@@ -24,6 +24,8 @@ from mocapflow_recovery.judge import Fit, Given, Judge, Reach, Stray, stray_of, 
 from mocapflow_recovery.leaps import leapt
 from mocapflow_recovery.sampling import Cost, Plan, Spread, put_back, search, seen_samples, without_idle_parts
 
+CURED = 2.0  # times as far apart may be what is doubted no more: a leg lay where a skirt flew
+
 
 class LimbSearch(Recovery):
     """Compares the fitted model with what the images surely show, which does not depend on the model.
@@ -97,9 +99,9 @@ class LimbSearch(Recovery):
         return noted(best.result, f"{why}: found again by search; then {best.stray}", self._doubtful(best.stray))
 
     def _better(self, other: Fit, fit: Fit) -> Fit:
-        """Return another fit if it is clearly nearer to the person, or nearer and doubted no more."""
+        """Return another fit if it is clearly nearer to the person, or doubted no more and not much farther."""
         cured = self._doubtful(fit.stray) and not self._doubtful(other.stray)
-        return other if other.apart < (1.0 if cured else 1 - self.gain) * fit.apart else fit
+        return other if other.apart < (CURED if cured else 1 - self.gain) * fit.apart else fit
 
     def _suspicion(self, fitted: FrameState, believed: FrameState, past: Past, body: Body) -> str:
         """Return why limbs are looked for that images do not contradict, or nothing."""
