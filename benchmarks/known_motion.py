@@ -79,6 +79,9 @@ TAKES = {
     "legcross_A_skirt2": Take("A", "skirt", "legcross_A", 44, GREEN, start=20, frames=90),
     "kick_B_shorts2": Take("B", "shorts", "kick_B", 45, GREEN, start=60, frames=60),
     "kneeup_B_skirt": Take("B", "skirt", "kneeup_B", 46, GREY, start=60, frames=80),
+    "legcross_B_skirt2": Take("B", "skirt", "legcross_B", 51, GREY, start=200, frames=60),
+    "dance_B_shorts": Take("B", "shorts", "dance", 52, PURPLE, frames=60),
+    "walk_A_skirt2": Take("A", "skirt", "walk_A", 53, DARK, start=220, frames=60),
     "squat_B_shorts": Take("B", "shorts", "kneebend_A", 47, PURPLE, start=120, frames=60),
 }
 

@@ -33,6 +33,7 @@ class Shown(NamedTuple):
 
     ratio: F32  # (L, BINS) log density in a layer over the greatest in any layer unlike it; 0: nothing is known
     apart: Bool  # (L, L) True where two layers are told apart by colour
+    likely: F64  # (L, BINS) log density in a layer, part of which may have any colour
 
 
 @once
@@ -96,7 +97,22 @@ def shown(past: Past) -> Shown:
     ratio = np.zeros(counts.shape, np.float32)
     for layer in np.flatnonzero(apart.any(axis=1)):
         ratio[layer] = np.clip(likely[layer] - likely[apart[layer]].max(axis=0), -CLIP, CLIP)
-    return Shown(ratio, apart)
+    return Shown(ratio, apart, likely)
+
+
+def garment_told(past: Past, scene: Scene) -> F64 | None:
+    """Return the log density (BINS,) of colours on the garment over that on any part that is mostly outside of it.
+
+    Parts under the garment have shown its colours themselves, where it hung otherwise than it was drawn. None without a
+    garment, and where no frame has shown it yet.
+    """
+    if scene.garment is None or COLOURS not in past.appearance:
+        return None
+    layers, likely = layer_of(scene), shown(past).likely
+    skin = layers[: len(scene.body.vertices)]
+    outside = np.bincount(skin, scene.near_garment, len(likely)) < 0.5 * np.bincount(skin, minlength=len(likely))
+    told: F64 = likely[layers[-1]] - likely[outside].max(axis=0)
+    return told
 
 
 def densities(counts: F64) -> F64:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from mocapflow_levelset import crops
 from mocapflow_levelset.channels import ChannelName, features
+from mocapflow_levelset.colours import bins_of
 from mocapflow_levelset.plates import Plate, Shadow, density_of, plate_of
 from mocapflow_levelset.shadows import floor_around
 
@@ -16,7 +17,7 @@ from mocapflow.data import Frame, Surface
 from mocapflow.geometry.cameras import magnification, scaled
 from mocapflow.geometry.silhouettes import mask, outline
 from mocapflow.once import once
-from mocapflow.records import F32, U8, Bool
+from mocapflow.records import F32, F64, U8, Bool
 
 CHANNELS: tuple[ChannelName, ...] = ("lab",)
 SHADOW = Shadow(floor=0.012, share=0.2, darkest=0.5, chroma=0.005)
@@ -24,6 +25,7 @@ EMPTY = 3.0  # standard deviations within which a pixel is that of the empty roo
 FLOOR_REACH = 2.0  # m, from the person, where their shadow may fall
 SPECK = 0.01  # of the largest part's area: smaller parts are noise
 MOST = 3.0  # of the model's area: more can't be the person
+SURELY = 1.0  # log density of a colour on the garment over that elsewhere from which on it is the garment's
 SEAM = np.ones((5, 5), np.uint8)  # gaps in the person so narrow are the person's
 
 
@@ -39,6 +41,7 @@ class View(NamedTuple):
 
     camera: Camera
     person: Bool  # (h, w) surely no empty room, lit or in a shadow
+    cloth: Bool  # (h, w) pixels of the person that show the garment, by its colours; none are known in a first frame
     away: F32  # (h, w) px to the nearest pixel that may be the person; 0 on it
     pixel_m: float  # how large a pixel is where the person stands
 
@@ -57,7 +60,7 @@ def shrunk(camera: Camera, factor: int) -> Camera:
     return scaled(replace(camera, size=camera.size // factor * factor), 1 / factor)
 
 
-def views(frame: Frame, surface: Surface, room: Room, near_m: float) -> list[View]:
+def views(frame: Frame, surface: Surface, room: Room, near_m: float, garment: F64 | None = None) -> list[View]:
     """Return what the usable views of a frame surely show, each at the size of its camera.
 
     A view that is unlike the empty room nearly everywhere shows nothing surely and is left out.
@@ -67,6 +70,7 @@ def views(frame: Frame, surface: Surface, room: Room, near_m: float) -> list[Vie
         surface: the person as believed: parts further away than `near_m` in the image are somebody else.
         room: the empty room, small.
         near_m: see `surface`.
+        garment: (BINS,) log density of colours on the garment over that on any other part; None: it is not known.
     """
     found, middle = [], surface.vertices.mean(axis=0)
     for number in np.flatnonzero(frame.usable):
@@ -74,11 +78,13 @@ def views(frame: Frame, surface: Surface, room: Room, near_m: float) -> list[Vie
         model, size = mask(outline(surface, camera), camera), 1 / magnification(camera, middle)
         image, hidden = frame.images[number], frame.hidden_in(int(number))
         factor = image.shape[1] // int(camera.size[0])
-        changed, same = _compared(crops.shrink(image, factor), plate, floor_around(surface, camera, FLOOR_REACH))
+        small = crops.shrink(image, factor)
+        changed, same = _compared(small, plate, floor_around(surface, camera, FLOOR_REACH))
         told = True if hidden is None else crops.shrink_values(hidden.astype(np.float32), factor) == 0
         person = _near(changed & told, model, near_m / size)
         if np.count_nonzero(person) < MOST * np.count_nonzero(model):
-            found.append(View(camera, person, _away(same & told, person), size))
+            cloth = np.zeros(person.shape, bool) if garment is None else person & (garment[bins_of(small)] > SURELY)
+            found.append(View(camera, person, cloth, _away(same & told, person), size))
     return found
 
 

@@ -33,11 +33,11 @@ def distance(surface: Surface, views: Sequence[View], cap_m: float) -> float:
 def uncovered_area(surface: Surface, views: Sequence[View], reach_m: float, cloth_m: float) -> float:
     """Return the area (m²), all views together, of the person further than `reach_m` from the model.
 
-    Cloth may fly: what is within `cloth_m` of the garment does not count.
+    Cloth may fly: what shows its colours does not count, nor what is within `cloth_m` of the garment.
     """
     total = 0.0
     for view in views:
-        stray = view.person & (_of(surface, view)[1] > reach_m / view.pixel_m)
+        stray = view.person & ~view.cloth & (_of(surface, view)[1] > reach_m / view.pixel_m)
         stray &= _from_cloth(surface, view) > cloth_m / view.pixel_m
         total += np.count_nonzero(stray) * view.pixel_m**2
     return total

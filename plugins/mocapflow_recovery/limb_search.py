@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Annotated, ClassVar
 
 import numpy as np
+from mocapflow_levelset.layers import garment_told
 from mocapflow_priors.density import Density, read
 from mocapflow_priors.parzen import SHIPPED
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
@@ -81,7 +82,7 @@ class LimbSearch(Recovery):
         if background is None:
             return result
         room, surface = small_room(background, model.scene.cameras, self.rows), surface_of(model, result)
-        seen = views(frame, surface, room, self.near_m)
+        seen = views(frame, surface, room, self.near_m, garment_told(past, model.scene))
         stray = stray_of(surface, model.scene, seen, self._reach())
         doubtful = self._doubtful(stray)
         why = f"fit doubted, {stray}" if doubtful else self._suspicion(result.state, state, past, model.scene.body)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mocapflow_levelset.colours import BINS, bins_of
 from mocapflow_levelset.layered import Layered
-from mocapflow_levelset.layers import COLOURS, gathered, layer_of, shown
+from mocapflow_levelset.layers import COLOURS, garment_told, gathered, layer_of, shown
 
 from mocapflow.data import BODY, CLOTH, Frame, Past, Turn
 from mocapflow.geometry.visibility import front_vertices
@@ -67,6 +67,17 @@ def test_what_is_apart_is_told_and_what_is_alike_is_not():
     assert not told.apart[:-1, :-1].any()  # all skin
     same = shown(Past(appearance={COLOURS: learned(painted(lambda layer: SKIN))}))
     assert not same.apart.any() and not same.ratio.any()
+
+
+def test_the_garment_is_told_from_every_part_outside_of_it_or_not_at_all():
+    skin, cloth = (int(bins_of(np.array(colour, np.uint8))) for colour in (SKIN, CLOTHS))
+    told = garment_told(Past(appearance={COLOURS: learned(painted(dressed))}), SCENE)
+    assert told[cloth] > 2 and told[skin] < -2
+    socks = layer_of(SCENE)[SCENE.body.vertices[:, 2].argmin()]  # of the garment's colour
+    alike = painted(lambda layer: CLOTHS if layer == socks else dressed(layer))
+    told = garment_told(Past(appearance={COLOURS: learned(alike)}), SCENE)
+    assert told[cloth] < 0.5
+    assert garment_told(Past(), SCENE) is None
 
 
 def test_old_colours_are_forgotten():

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mocapflow_levelset.colours import BINS
 from mocapflow_priors.density import Density, write
 from mocapflow_recovery.certain import shrunk, small_room, views
 from mocapflow_recovery.disagreement import distance, floating_area, uncovered_area
@@ -97,6 +98,13 @@ def test_a_leg_astray_counts_by_its_area_and_by_its_way(angle) -> None:
     ways = [distance(surface(astray(part * angle)), seen(), 0.2) for part in (0, 0.5, 1)]
     assert ways == sorted(ways)
     assert ways[2] > 3 * ways[0]
+
+
+@pytest.mark.parametrize(("told", "lost"), [(4.0, False), (-4.0, True)], ids=["the garment's", "a limb's"])
+def test_what_shows_the_colours_of_the_garment_is_no_lost_limb(told, lost) -> None:
+    looked = views(FRAME, surface(POSE), ROOM, 0.35, np.full(BINS, told))
+    assert (uncovered_area(surface(astray(0.8)), looked, 0.06, 0.2) > 150e-4) == lost
+    assert all((view.cloth == (view.person & (told > 0))).all() for view in looked)
 
 
 def test_parts_of_a_person() -> None:
