@@ -1,4 +1,4 @@
-"""Limbs that have leapt to where nobody was seen to hold them: between two frames a leg took the other's contour."""
+"""Poses that betray a lost limb: between two frames a leg took the other's contour, a foot its own turned over."""
 
 from __future__ import annotations
 
@@ -29,6 +29,12 @@ def leapt(fitted: Pose, believed: Pose, body: Body, density: Density, least: flo
     seen = density.on(body.screw_names)
     leaping = (part for part in parts(body) if part is not None and far[part].any())
     return any(_apart(fitted.angles[part], seen[:, part]) > least for part in leaping)
+
+
+def overbent(pose: Pose, body: Body, least: float) -> bool:
+    """Return whether a joint is bent beyond its limits by more than `least` (rad)."""
+    low, high = body.limits.T
+    return bool(np.any((pose.angles > high + least) | (pose.angles < low - least)))
 
 
 def _apart(angles: F64, seen: F64) -> float:

@@ -22,7 +22,7 @@ from mocapflow.records import F64
 from mocapflow.settings import PositiveOrInf
 from mocapflow_recovery.certain import View, small_room, views
 from mocapflow_recovery.judge import Fit, Given, Judge, Reach, Stray, stray_of, surface_of
-from mocapflow_recovery.leaps import leapt
+from mocapflow_recovery.leaps import leapt, overbent
 from mocapflow_recovery.sampling import Cost, Plan, Spread, put_back, search, seen_samples, without_idle_parts
 
 CURED = 2.0  # times as far apart may be what is doubted no more: a leg lay where a skirt flew
@@ -38,9 +38,9 @@ class LimbSearch(Recovery):
     astray together. A part moves only if that brings what strays together: a leg must not take
     a new place under the skirt because an arm was lost. The loop settles again from there.
     It also looks where images need not contradict a limb that is elsewhere: in the first frame and after frames that
-    did not show the person, where a leg may rest on the contour of the other one and a foot lie turned in its own; and
-    where a limb has leapt into a pose that nobody was seen in. There a part moves only if that brings person and model
-    together.
+    did not show the person, where a leg may rest on the contour of the other one and a foot lie turned in its own;
+    where a joint is bent beyond its limits; and where a limb has leapt into a pose that nobody was seen in. There a
+    part moves only if that brings person and model together.
     The first frame starts from a pose that was given and is about right (`start_deg`). So it is searched near that one
     first, and of two poses that fit alike the nearer one is taken: crossed legs look the same exchanged.
     It needs the empty scene; without one every fit is taken as it is.
@@ -51,6 +51,7 @@ class LimbSearch(Recovery):
     floating_cm2: PositiveFloat = 30.0  # likewise, of skin in empty space
     beginnings: bool = True  # limbs are looked for in the first frame, and in the first one after a gap
     leap_deg: PositiveOrInf = 20.0  # from what was believed and from all `poses`: a limb so far from both is looked for
+    overbent_deg: PositiveOrInf = 5.0  # of a joint, beyond its limits: they are soft, and what is lost goes there
     reach_m: PositiveFloat = 0.06  # what lies nearer to the other does not count
     cloth_m: PositiveFloat = 0.2  # what lies so near to the garment may be the garment, wherever it swings
     gain: Annotated[float, Field(ge=0, lt=1)] = 0.1  # share that each part mends, and a fit that cures no doubt
@@ -108,6 +109,8 @@ class LimbSearch(Recovery):
         """Return why limbs are looked for that images do not contradict, or nothing."""
         if self.beginnings and not past.moments:
             return f"looked for the limbs {'after a gap' if past.after_gap else 'of a first frame'}"
+        if overbent(fitted.estimate.pose, body, np.radians(self.overbent_deg)):
+            return "a joint is bent beyond its limits"
         poses, least = (fitted.estimate.pose, believed.estimate.pose), np.radians(self.leap_deg)
         return "a limb leapt into a pose that nobody was seen in" if leapt(*poses, body, self._density, least) else ""
 

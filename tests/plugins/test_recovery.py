@@ -283,6 +283,22 @@ def test_a_leap_ends_far_from_what_was_believed_and_from_what_was_seen(believed,
     assert leapt(astray(0.6), astray(believed), SCENE.body, density, 0.4) == leap
 
 
+@pytest.mark.parametrize(("beyond", "looked"), [(0.07, False), (0.12, True)])
+def test_a_joint_beyond_its_limits_is_looked_for_though_nothing_strays(beyond, looked) -> None:
+    """5 degrees are 0.09: a limit is soft."""
+
+    def settle(pose, parameters):
+        return settled(pictures.tiny_state(SCENE, POSE, POSE))
+
+    limits = SCENE.body.limits.copy()
+    limits[1] = POSE.angles[1] - 1, POSE.angles[1] + 0.06 - beyond
+    body, near = replace(SCENE.body, limits=limits), pictures.tiny_state(SCENE, astray(0.06), POSE)
+    past, model = scenes.tiny_past(SCENE, POSE), scenes.tiny_model(replace(SCENE, body=body))
+    found = LimbSearch().recover(FRAME, near, settled(near), past, model, settle)
+    assert (found.state.estimate.pose.angles == POSE.angles).all() == looked
+    assert bool(found.notes) == looked
+
+
 @pytest.mark.parametrize(("leap_deg", "looked"), [(2.0, True), (10.0, False), (np.inf, False)])
 def test_a_limb_that_leapt_is_looked_for_though_nothing_strays(tmp_path, leap_deg, looked) -> None:
     def settle(pose, parameters):
