@@ -104,15 +104,14 @@ def garment_told(past: Past, scene: Scene) -> F64 | None:
     """Return the log density (BINS,) of colours on the garment over that on any part that is mostly outside of it.
 
     Parts under the garment have shown its colours themselves, where it hung otherwise than it was drawn. None without a
-    garment, and where no frame has shown it yet.
+    garment, where it leaves no part outside, and before a frame has shown it.
     """
     if scene.garment is None or COLOURS not in past.appearance:
         return None
     layers, likely = layer_of(scene), shown(past).likely
     skin = layers[: len(scene.body.vertices)]
     outside = np.bincount(skin, scene.near_garment, len(likely)) < 0.5 * np.bincount(skin, minlength=len(likely))
-    told: F64 = likely[layers[-1]] - likely[outside].max(axis=0)
-    return told
+    return likely[layers[-1]] - likely[outside].max(axis=0) if outside.any() else None
 
 
 def densities(counts: F64) -> F64:
