@@ -81,7 +81,7 @@ def test_the_garment_is_told_from_every_part_outside_of_it_or_not_at_all():
 
 
 def test_a_garment_that_leaves_no_part_outside_is_not_told(monkeypatch):
-    monkeypatch.setattr(type(SCENE), "near_garment", np.ones(len(SCENE.body.vertices), bool))
+    monkeypatch.setitem(vars(SCENE), "near_garment", np.ones(len(SCENE.body.vertices), bool))
     assert garment_told(Past(appearance={COLOURS: learned(painted(dressed))}), SCENE) is None
 
 
