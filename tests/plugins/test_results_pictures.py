@@ -132,6 +132,20 @@ def test_nearest_triangle_is_seen_and_a_veil_shines_through() -> None:
     assert canvas.picture[32, 32, 0] == pytest.approx(0.4 * 0.5 + 0.6)
 
 
+def test_a_canvas_knows_what_triangles_may_cover() -> None:
+    view = raster.look_at(np.array([0.0, -3.0, 0.0]), np.zeros(3), (64, 48), 40.0)
+    corners, faces = np.array([[0.0, 0, 0], [2.0, 0, 0], [0.0, 0, 0.3]]), np.array([[0, 1, 2]], np.int32)
+    drawn, veiled = (raster.Canvas(np.zeros((48, 64, 3), np.float32), view) for _ in range(2))
+    drawn.draw(corners, faces, np.ones((3, 3), np.float32))
+    veiled.veil(corners, faces, np.ones((3, 3), np.float32), 0.5)
+    np.testing.assert_allclose(veiled.picture, 0.5 * drawn.picture)
+    rows, columns = np.nonzero(drawn.picture[..., 0])
+    box = veiled.box(corners)
+    assert box[0].start <= rows.min() <= rows.max() < box[0].stop <= rows.max() + 4
+    assert box[1].start <= columns.min() and columns.max() == 63 and box[1].stop == 64  # it leaves the picture
+    assert veiled.box(corners - [0, 4.0, 0]) == (slice(None), slice(None))  # behind the camera: anything may be
+
+
 def test_report_holds_everything(scene: Scene, track: Track, recording: Recording, tmp_path: Path) -> None:
     run_folder = RunFolder(path=tmp_path, recipe={"pipeline": "<skirt>", "versions": {"numpy": "2"}})
     observed = track.observed.copy()
