@@ -30,17 +30,19 @@ def distance(surface: Surface, views: Sequence[View], cap_m: float) -> float:
     return total / max(len(views), 1)
 
 
-def uncovered_area(surface: Surface, views: Sequence[View], reach_m: float, cloth_m: float) -> float:
-    """Return the area (m²), all views together, of the person further than `reach_m` from the model.
+def uncovered_area(surface: Surface, views: Sequence[View], reach_m: float, cloth_m: float) -> tuple[float, float]:
+    """Return the area (m²), all views together, of the person further than `reach_m` from the model: skin, and cloth.
 
-    Cloth may fly: what shows its colours does not count, nor what is within `cloth_m` of the garment.
+    What is within `cloth_m` of the garment counts as neither: cloth swings. Cloth is what shows the garment's colours.
     """
-    total = 0.0
+    skin = cloth = 0.0
     for view in views:
-        stray = view.person & ~view.cloth & (_of(surface, view)[1] > reach_m / view.pixel_m)
+        stray = view.person & (_of(surface, view)[1] > reach_m / view.pixel_m)
         stray &= _from_cloth(surface, view) > cloth_m / view.pixel_m
-        total += np.count_nonzero(stray) * view.pixel_m**2
-    return total
+        worn = np.count_nonzero(stray & view.cloth)
+        skin += (np.count_nonzero(stray) - worn) * view.pixel_m**2
+        cloth += worn * view.pixel_m**2
+    return skin, cloth
 
 
 def floating_area(bare: Surface, views: Sequence[View], reach_m: float) -> float:

@@ -28,21 +28,19 @@ class Stray(NamedTuple):
 
     uncovered: float
     floating: float
-
-    def doubtful(self, uncovered: float, floating: float) -> bool:
-        """True where one of the two is larger than it may be."""
-        return self.uncovered > uncovered or self.floating > floating
+    cloth: float  # uncovered as well; a limb may hold it there, or it flies
 
     def __str__(self) -> str:
-        return f"{self.uncovered:.0f} cm² of the person uncovered, {self.floating:.0f} cm² of skin in empty space"
+        worn = f" ({self.cloth:.0f} of it cloth)" if self.cloth >= 0.5 else ""
+        area = self.uncovered + self.cloth
+        return f"{area:.0f} cm² of the person uncovered{worn}, {self.floating:.0f} cm² of skin in empty space"
 
 
 def stray_of(surface: Surface, scene: Scene, seen: Sequence[View], reach: Reach) -> Stray:
     """Return how much of the person lies off a surface of the scene, and of its skin off the person."""
-    return Stray(
-        uncovered=1e4 * uncovered_area(surface, seen, reach.reach_m, reach.cloth_m),
-        floating=1e4 * floating_area(scene.bare(surface), seen, reach.reach_m),
-    )
+    skin, cloth = uncovered_area(surface, seen, reach.reach_m, reach.cloth_m)
+    floating = floating_area(scene.bare(surface), seen, reach.reach_m)
+    return Stray(uncovered=1e4 * skin, floating=1e4 * floating, cloth=1e4 * cloth)
 
 
 class Fit(NamedTuple):
@@ -86,10 +84,9 @@ class Judge(NamedTuple):
         return np.array([self._apart(*each) for each in zip(poses, self._surfaces(poses), strict=True)])
 
     def stray(self, poses: Sequence[Pose]) -> F64:
-        """Return for each pose (B,) how much of surface and person strays, cm²."""
-        return np.array([
-            sum(stray_of(surface, self.coarse, self.seen, self.reach)) for surface in self._surfaces(poses)
-        ])  # fmt: skip
+        """Return for each pose (B,) how much of surface and person strays, without cloth, cm²."""
+        strays = [stray_of(surface, self.coarse, self.seen, self.reach) for surface in self._surfaces(poses)]
+        return np.array([stray.uncovered + stray.floating for stray in strays])
 
     def _apart(self, pose: Pose, surface: Surface) -> float:
         return distance(surface, self.seen, self.reach.cap_m) * (self.given.strain(pose) if self.given else 1.0)

@@ -85,7 +85,7 @@ class LimbSearch(Recovery):
         room, surface = small_room(background, model.scene.cameras, self.rows), surface_of(model, result)
         seen = views(frame, surface, room, self.near_m, garment_told(past, model.scene))
         stray = stray_of(surface, model.scene, seen, self._reach())
-        doubtful = self._doubtful(stray)
+        doubtful = self._doubtful(stray, stray.cloth)
         why = f"fit doubted, {stray}" if doubtful else self._suspicion(result.state, state, past, model.scene.body)
         if not why:
             return result
@@ -94,10 +94,10 @@ class LimbSearch(Recovery):
         best = fit
         looks = ([self._near] if judge.given else []) + ([self._far] if doubtful or not judge.given else [])
         for look in looks:
-            found = look(frame.index, state.estimate.pose, result.state.estimate.pose, judge, doubtful)
+            found = look(frame.index, state.estimate.pose, result.state.estimate.pose, judge, self._doubtful(stray))
             best = self._better(judge.of(settle(found, judge.parameters)), best)
         if best is fit:
-            return noted(result, f"{why}: search found nothing better", doubted=True) if doubtful else result
+            return noted(result, f"{why}: search found nothing better", self._doubtful(stray)) if doubtful else result
         return noted(best.result, f"{why}: found again by search; then {best.stray}", self._doubtful(best.stray))
 
     def _better(self, other: Fit, fit: Fit) -> Fit:
@@ -114,8 +114,9 @@ class LimbSearch(Recovery):
         poses, least = (fitted.estimate.pose, believed.estimate.pose), np.radians(self.leap_deg)
         return "a limb leapt into a pose that nobody was seen in" if leapt(*poses, body, self._density, least) else ""
 
-    def _doubtful(self, stray: Stray) -> bool:
-        return stray.doubtful(self.uncovered_cm2, self.floating_cm2)
+    def _doubtful(self, stray: Stray, cloth: float = 0.0) -> bool:
+        """Return whether too much strays; cloth calls for a search alone, for it may fly."""
+        return stray.uncovered + cloth > self.uncovered_cm2 or stray.floating > self.floating_cm2
 
     def _near(self, frame: int, believed: Pose, fitted: Pose, judge: Judge, astray: bool) -> Pose:
         """Return the pose that agrees best with the views near the one that was given."""
