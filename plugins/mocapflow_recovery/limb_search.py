@@ -85,8 +85,8 @@ class LimbSearch(Recovery):
         room, surface = small_room(background, model.scene.cameras, self.rows), surface_of(model, result)
         seen = views(frame, surface, room, self.near_m, garment_told(past, model.scene))
         stray = stray_of(surface, model.scene, seen, self._reach())
-        doubtful = self._doubtful(stray, stray.cloth)
-        why = f"fit doubted, {stray}" if doubtful else self._suspicion(result.state, state, past, model.scene.body)
+        doubtful, fitted = self._doubtful(stray), result.state.estimate.pose
+        why = f"fit doubted, {stray}" if doubtful else self._suspicion(stray, fitted, state, past, model.scene.body)
         if not why:
             return result
         judge = self._judge(state, result, seen, past, model)
@@ -94,10 +94,10 @@ class LimbSearch(Recovery):
         best = fit
         looks = ([self._near] if judge.given else []) + ([self._far] if doubtful or not judge.given else [])
         for look in looks:
-            found = look(frame.index, state.estimate.pose, result.state.estimate.pose, judge, self._doubtful(stray))
+            found = look(frame.index, state.estimate.pose, fitted, judge, doubtful)
             best = self._better(judge.of(settle(found, judge.parameters)), best)
         if best is fit:
-            return noted(result, f"{why}: search found nothing better", self._doubtful(stray)) if doubtful else result
+            return noted(result, f"{why}: search found nothing better", doubted=True) if doubtful else result
         return noted(best.result, f"{why}: found again by search; then {best.stray}", self._doubtful(best.stray))
 
     def _better(self, other: Fit, fit: Fit) -> Fit:
@@ -105,18 +105,22 @@ class LimbSearch(Recovery):
         cured = self._doubtful(fit.stray) and not self._doubtful(other.stray)
         return other if other.apart < (CURED if cured else 1 - self.gain) * fit.apart else fit
 
-    def _suspicion(self, fitted: FrameState, believed: FrameState, past: Past, body: Body) -> str:
-        """Return why limbs are looked for that images do not contradict, or nothing."""
+    def _suspicion(self, stray: Stray, fitted: Pose, believed: FrameState, past: Past, body: Body) -> str:
+        """Return why limbs are looked for that images do not contradict, or nothing.
+
+        Cloth that strays is no contradiction, for it may fly; but a raised knee may hold it there.
+        """
+        if stray.uncovered + stray.cloth > self.uncovered_cm2:
+            return f"cloth off the model, {stray}"
         if self.beginnings and not past.moments:
             return f"looked for the limbs {'after a gap' if past.after_gap else 'of a first frame'}"
-        if overbent(fitted.estimate.pose, body, np.radians(self.overbent_deg)):
+        if overbent(fitted, body, np.radians(self.overbent_deg)):
             return "a joint is bent beyond its limits"
-        poses, least = (fitted.estimate.pose, believed.estimate.pose), np.radians(self.leap_deg)
-        return "a limb leapt into a pose that nobody was seen in" if leapt(*poses, body, self._density, least) else ""
+        leap = leapt(fitted, believed.estimate.pose, body, self._density, np.radians(self.leap_deg))
+        return "a limb leapt into a pose that nobody was seen in" if leap else ""
 
-    def _doubtful(self, stray: Stray, cloth: float = 0.0) -> bool:
-        """Return whether too much strays; cloth calls for a search alone, for it may fly."""
-        return stray.uncovered + cloth > self.uncovered_cm2 or stray.floating > self.floating_cm2
+    def _doubtful(self, stray: Stray) -> bool:
+        return stray.uncovered > self.uncovered_cm2 or stray.floating > self.floating_cm2
 
     def _near(self, frame: int, believed: Pose, fitted: Pose, judge: Judge, astray: bool) -> Pose:
         """Return the pose that agrees best with the views near the one that was given."""
