@@ -70,7 +70,7 @@ def views(frame: Frame, surface: Surface, room: Room, near_m: float, garment: F6
         surface: the person as believed: parts further away than `near_m` in the image are somebody else.
         room: the empty room, small.
         near_m: see `surface`.
-        garment: (BINS,) log density of colours on the garment over that on any other part; None: it is not known.
+        garment: (BINS,) log density of colours on the garment over that on parts outside of it; None: it is not known.
     """
     found, middle = [], surface.vertices.mean(axis=0)
     for number in np.flatnonzero(frame.usable):

@@ -43,6 +43,7 @@ class LimbSearch(Recovery):
     part moves only if that brings person and model together.
     The first frame starts from a pose that was given and is about right (`start_deg`). So it is searched near that one
     first, and of two poses that fit alike the nearer one is taken: crossed legs look the same exchanged.
+    What shows the garment's colours calls for a search where it strays, but moves no part and is no doubt: it may fly.
     It needs the empty scene; without one every fit is taken as it is.
     """
 

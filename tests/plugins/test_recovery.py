@@ -10,7 +10,7 @@ from mocapflow_levelset.colours import BINS
 from mocapflow_priors.density import Density, write
 from mocapflow_recovery.certain import shrunk, small_room, views
 from mocapflow_recovery.disagreement import distance, floating_area, uncovered_area
-from mocapflow_recovery.judge import Given
+from mocapflow_recovery.judge import Fit, Given, Stray
 from mocapflow_recovery.leaps import leapt
 from mocapflow_recovery.limb_search import LimbSearch
 from mocapflow_recovery.sampling import Plan, Spread, parts, put_back, samples, search, seen_samples, without_idle_parts
@@ -258,6 +258,17 @@ def test_a_first_frame_is_searched_near_the_pose_it_starts_from(past, found) -> 
                         floating_cm2=1e4)  # fmt: skip
     pose = search.recover(FRAME, start, settled(lost), past, scenes.tiny_model(SCENE), settle).state.estimate.pose
     assert (np.abs(pose.angles - POSE.angles).max() < 0.12) == found
+
+
+@pytest.mark.parametrize(
+    ("strays", "apart", "taken"),
+    [(0.0, 1.9, True), (0.0, 2.1, False), (90.0, 1.9, False), (90.0, 0.8, True)],
+    ids=["cured", "cured but far off", "as doubtful", "clearly nearer"],
+)
+def test_a_doubt_that_is_cured_may_cost_distance(strays, apart, taken) -> None:
+    result = settled(pictures.tiny_state(SCENE, POSE, POSE))
+    fit, other = (Fit(result, Stray(area, 0.0, 0.0), far) for area, far in ((100.0, 1.0), (strays, apart)))
+    assert (LimbSearch()._better(other, fit) is other) == taken
 
 
 def test_of_two_fits_alike_the_one_nearer_to_the_start_is_taken() -> None:
