@@ -23,7 +23,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 from known_garments import measures_for, sew
-from known_poses import RATE, Body, Motion, angles, chain, dance, ground, read_body, skin, squat
+from known_poses import RATE, SCRIPTS, Body, Motion, angles, chain, ground, read_body, skin
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation, Slerp
 
@@ -43,7 +43,7 @@ RECORDINGS, OWNER = {"A": "walk_skirt", "B": "kneeup_shorts"}, {"skirt": "A", "s
 
 @dataclass(frozen=True)
 class Take:
-    """Who wears what and moves how: a file of DATA/motions from a frame on, squat or dance."""
+    """Who wears what and moves how: a file of DATA/motions from a frame on, or one of `SCRIPTS`."""
 
     subject: str
     garment: str
@@ -82,6 +82,10 @@ TAKES = {
     "legcross_B_skirt2": Take("B", "skirt", "legcross_B", 51, GREY, start=200, frames=60),
     "dance_B_shorts": Take("B", "shorts", "dance", 52, PURPLE, frames=60),
     "walk_A_skirt2": Take("A", "skirt", "walk_A", 53, DARK, start=220, frames=60),
+    "lunge_A_skirt": Take("A", "skirt", "lunge", 54, GREEN, frames=60),
+    "spin_B_skirt": Take("B", "skirt", "spin", 55, GREY, frames=60),
+    "spin_A_skirt": Take("A", "skirt", "spin", 56, PURPLE, frames=60),
+    "lunge_B_shorts": Take("B", "shorts", "lunge", 57, GREY, frames=60),
     "squat_B_shorts": Take("B", "shorts", "kneebend_A", 47, PURPLE, start=120, frames=60),
 }
 
@@ -100,7 +104,7 @@ cameras these are; frames are {tone:g} times as bright as the clean plates.
 
 def rotations_of(take: Take, body: Body, data: Path) -> tuple[np.ndarray, int]:
     """Return rotation vectors (T,J,3), the root's first, and how many frames of a run-up they begin with."""
-    if script := {"squat": squat, "dance": dance}.get(take.motion):
+    if script := SCRIPTS.get(take.motion):
         turn = script(body, np.arange(take.frames) / RATE)
         return np.stack([turn[name] for name in body.names], axis=1), 0
     file, before = np.load(data / "motions" / f"{take.motion}.npz"), min(take.start, RUN_UP)

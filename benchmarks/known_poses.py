@@ -138,6 +138,41 @@ def dance(body: Body, t: np.ndarray) -> dict[str, np.ndarray]:
     return turn
 
 
+def lunge(body: Body, t: np.ndarray) -> dict[str, np.ndarray]:
+    """Return rotation vectors (T,3) per joint of lunges with either leg by turns, the arms raised above the head."""
+    turn = {name: np.zeros((len(t), 3)) for name in body.names}
+    phase = np.sin(2 * np.pi * t / 2.4)
+    deep = np.abs(phase) ** 1.5
+    turn["pelvis"], turn["spine"] = np.outer(deep, [0.15, 0, 0]), np.outer(phase, [0, 0, 0.15])
+    turn["chest"] = np.outer(phase, [0, 0, 0.15]) - np.outer(deep, [0.1, 0, 0])
+    for side, sign in (("_l", 1), ("_r", -1)):
+        ahead, behind = np.clip(sign * phase, 0, 1) ** 1.5, np.clip(-sign * phase, 0, 1) ** 1.5
+        hip, knee = -0.05 - 1.2 * ahead + 0.2 * behind, 0.1 + 1.3 * ahead + 0.8 * behind
+        turn["hip" + side] = np.stack([hip, 0 * t, sign * 0.1 * deep], axis=1)
+        turn["knee" + side][:, 0], turn["ankle" + side][:, 0] = knee, -hip - knee - turn["pelvis"][:, 0] + 0.7 * behind
+        turn["shoulder" + side] = _reach(body, side, [[sign * (1 - 0.7 * d), -0.5, 1.6 * d - 0.8] for d in deep])
+        turn["elbow" + side] = np.outer(1 - deep, [-0.7, 0, 0])
+    return turn
+
+
+def spin(body: Body, t: np.ndarray) -> dict[str, np.ndarray]:
+    """Return rotation vectors (T,3) per joint of one turn about the vertical in small steps, the arms spread."""
+    turn = {name: np.zeros((len(t), 3)) for name in body.names}
+    step, lean = np.sin(2 * np.pi * t / 0.8), np.sin(2 * np.pi * t / t[-1])
+    turn["pelvis"][:, 2] = 2 * np.pi * (t / t[-1] - np.sin(2 * np.pi * t / t[-1]) / (2 * np.pi))
+    turn["spine"] = np.stack([0.08 + 0 * t, 0.1 * lean, 0.12 * step], axis=1)
+    for side, sign in (("_l", 1), ("_r", -1)):
+        lift = np.clip(sign * step, 0, 1)
+        turn["hip" + side] = np.stack([-0.1 - 0.45 * lift, 0 * t, sign * 0.1 * lift], axis=1)
+        turn["knee" + side][:, 0], turn["ankle" + side][:, 0] = 0.2 + 0.8 * lift, -0.1 + 0.2 * lift
+        turn["shoulder" + side] = _reach(body, side, [[sign, -0.3 * sign * u, 0.1 + 0.4 * sign * u] for u in lean])
+        turn["elbow" + side] = np.stack([-0.3 - 0.3 * lift, 0 * t, 0 * t], axis=1)
+    return turn
+
+
+SCRIPTS = {"squat": squat, "dance": dance, "lunge": lunge, "spin": spin}
+
+
 def _reach(body: Body, side: str, towards: list[list[float]]) -> np.ndarray:
     """Return rotation vectors (T,3) of a shoulder that point the upper arm these ways."""
     arm = body.joint("elbow" + side) - body.joint("shoulder" + side)

@@ -61,13 +61,16 @@ def estimate_of(
     """Return the estimate of a pose solver.
 
     Raises:
-        WrongAnswer: its pose is none of the body, or another number is not finite.
+        WrongAnswer: its pose is none of the body, or what it says besides has another shape or is not finite.
     """
     found = of_kind(solver, solver.solve(match, state, model, priors, past, turn), Estimate)
     _possible(solver, found.pose, model.scene)
-    for name in ("parameters", "covariance", "observed"):
-        if not finite(getattr(found, name)):
-            raise WrongAnswer(solver, f"{name} that are not finite")
+    array_of(solver, found.parameters, state.estimate.parameters.shape, "parameters")
+    array_of(solver, found.observed, found.pose.angles.shape, "observed shares")
+    size, least = len(found.covariance), 6 + len(found.pose.angles)
+    array_of(solver, found.covariance, (max(size, least),) * 2, "a covariance")  # unknowns of the cloth may follow
+    if size and np.diag(found.covariance).min() <= 0:
+        raise WrongAnswer(solver, "a variance that is not above zero")
     return found
 
 
@@ -173,6 +176,19 @@ def of_kind(component: Component, value: Any, kind: type[Answer]) -> Answer:
     if not isinstance(value, kind):
         raise WrongAnswer(component, f"{type(value).__name__}, not {getattr(kind, '__name__', kind)}")
     return value
+
+
+def array_of(component: Component, values: F64, shape: tuple[int, ...], what: str) -> F64:
+    """Return an array that a component answered.
+
+    Raises:
+        WrongAnswer: it has another shape, or is not finite.
+    """
+    if values.shape != shape:
+        raise WrongAnswer(component, f"{what} of shape {values.shape}, not {shape}")
+    if not finite(values):
+        raise WrongAnswer(component, f"{what} that {'are' if what.endswith('s') else 'is'} not finite")
+    return values
 
 
 def finite(values: F64 | F32) -> bool:

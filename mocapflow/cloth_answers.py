@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mocapflow.answers import WrongAnswer, finite, of_kind
+from mocapflow.answers import WrongAnswer, array_of, of_kind
 from mocapflow.assets import Body, GarmentMesh
 from mocapflow.components import ClothFitter, Draper, Garment
 from mocapflow.data import Cloth, Estimate, Frame, Past, Pose, PoseBatch, Segmentation, Turn
@@ -48,7 +48,7 @@ def drape_of(draper: Draper, poses: PoseBatch, parameters: F64, past: Past, scen
     """
     assert scene.garment is not None
     laid = of_kind(draper, draper.drape(poses, parameters, past, scene), np.ndarray)
-    return _array(draper, laid, (len(parameters), *scene.garment.vertices.shape), "cloth")
+    return array_of(draper, laid, (len(parameters), *scene.garment.vertices.shape), "cloth")
 
 
 def velocity_of(draper: Draper, pose: Pose, parameters: F64, vertices: I32, past: Past, scene: Scene) -> F64:
@@ -58,7 +58,7 @@ def velocity_of(draper: Draper, pose: Pose, parameters: F64, vertices: I32, past
         WrongAnswer: they are of another shape, or not finite.
     """
     told = of_kind(draper, draper.velocity(pose, parameters, vertices, past, scene), np.ndarray)
-    return _array(draper, told, (len(vertices), 3, 6 + len(pose.angles) + len(parameters)), "velocities")
+    return array_of(draper, told, (len(vertices), 3, 6 + len(pose.angles) + len(parameters)), "velocities")
 
 
 def cloth_of(
@@ -78,14 +78,6 @@ def cloth_of(
     cloth = of_kind(fitter, fitter.fit(frame, segmentation, estimate, model, past, turn), Cloth)
     garment = model.scene.garment
     vertices, parameters = (0, 0) if garment is None else (len(garment.vertices), len(garment.parameter_names))
-    _array(fitter, cloth.vertices, (vertices, 3), "cloth")
-    _array(fitter, cloth.parameters, (parameters,), "cloth parameters")
+    array_of(fitter, cloth.vertices, (vertices, 3), "cloth")
+    array_of(fitter, cloth.parameters, (parameters,), "cloth parameters")
     return cloth
-
-
-def _array(component: Draper | ClothFitter, values: F64, shape: tuple[int, ...], what: str) -> F64:
-    if values.shape != shape:
-        raise WrongAnswer(component, f"{what} of shape {values.shape}, not {shape}")
-    if not finite(values):
-        raise WrongAnswer(component, f"{what} that {'are' if what.endswith('s') else 'is'} not finite")
-    return values

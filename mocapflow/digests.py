@@ -68,10 +68,10 @@ class Digests:
         self._packages: dict[str, str] = {}
 
     def file(self, path: Path, name: str = "") -> str:
-        """Return the digest of a file's content, or of all files in a folder with their names."""
+        """Return the digest of a file's content, or of all visible files in a folder with their names."""
         if path.is_dir():
-            inside = sorted(p for p in path.rglob("*") if p.is_file())
-            return digest("\n".join(f"{p.relative_to(path)} {self._content(p)}" for p in inside).encode(), name)
+            inside = (f"{p.relative_to(path)} {self._content(p)}" for p in sources.visible(path))
+            return digest("\n".join(inside).encode(), name)
         return f"{MARK}{self._content(path)} {name}".rstrip()
 
     def save(self) -> None:

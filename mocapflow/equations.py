@@ -42,7 +42,7 @@ def table() -> list[Row]:
 
 def definitions(
     tree: ast.Module,
-) -> Iterator[tuple[str, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef]]:
+) -> Iterator[tuple[str, ast.FunctionDef | ast.ClassDef]]:
     """Yield the functions, classes and methods of a module with their names; methods as `Class.method`."""
     for node in tree.body:
         if isinstance(node, ast.FunctionDef | ast.ClassDef):

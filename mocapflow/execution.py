@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import errno
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from mocapflow.answers import of_kind
 from mocapflow.assets import Body, GarmentMesh
@@ -29,8 +30,6 @@ from mocapflow.scene import Scene
 from mocapflow.store import Artifact, Report, Store, versions, with_versions
 from mocapflow.warned import warnings_logged
 from mocapflow.wiring import Source, made_by
-
-Value = TypeVar("Value")
 
 
 def is_hit(step: Step, artifact: Artifact) -> bool:
@@ -143,11 +142,10 @@ class Execution:
         inputs = {name: self._input(step, source, checkpoint) for name, source in step.sources.items()}
         self._report(f"{step.label}: running {step.named.stage.name}")
         cpu, wall, stage = time.process_time(), time.perf_counter(), step.named.stage
-        kept = (lambda: checkpoint.kept) if checkpoint else str
-        with warnings_logged() as said:
+        with warnings_logged() as said, self._blaming(stage, checkpoint):
             if checkpoint is not None:
                 checkpoint.keep_warnings(said)
-            value = self._blaming(stage, lambda: of_kind(stage, stage.run(**inputs), made_by(step.named)), kept)
+            value = of_kind(stage, stage.run(**inputs), made_by(step.named))
         told = said if checkpoint is None else checkpoint.warnings
         self._entered(step, None, time.process_time() - cpu, time.perf_counter() - wall, told)
         return value
@@ -173,29 +171,31 @@ class Execution:
         """Return the cameras and the body that hold at this place in the pipeline, and the garment sewn to it."""
         place = step.body, step.rig
         if place not in self._scenes:
-            model, garment, folder = self._pipeline.body, self._pipeline.garment, self._pipeline.recording
-            body = (
-                self._result(step.body)
-                if step.body
-                else self._blaming(model, lambda: of_kind(model, model.load(folder), Body))
-            )
-            sewn = self._sewn(garment, body) if garment else None
+            body = self._result(step.body) if step.body else self._body()
+            sewn = self._sewn(self._pipeline.garment, body) if self._pipeline.garment else None
             cameras = self._result(step.rig).cameras if step.rig else step.recording.cameras
             scene = self._scenes[place] = Scene(cameras=cameras, body=body, garment=sewn)
             for warning in scene.warnings:
                 self._report(f"warning: {warning}")
         return self._scenes[place]
 
+    def _body(self) -> Body:
+        model = self._pipeline.body
+        with self._blaming(model):
+            return of_kind(model, model.load(self._pipeline.recording), Body)
+
     def _sewn(self, garment: Garment, body: Body) -> GarmentMesh:
         try:
-            return self._blaming(garment, lambda: mesh_of(garment, body))
+            with self._blaming(garment):
+                return mesh_of(garment, body)
         except GarmentError as error:
             raise GarmentError(error.message, where=self._pipeline.garment_where, hint=error.hint) from None
 
-    def _blaming(self, component: Component, call: Callable[[], Value], kept: Callable[[], str] = str) -> Value:
-        """Return what a component makes; if it raises, say who it was, what is saved and how to go on."""
+    @contextmanager
+    def _blaming(self, component: Component, checkpoint: Checkpoint | None = None) -> Iterator[None]:
+        """If a component raises, say who it was, what is saved and how to go on."""
         try:
-            return call()
+            yield
         except ComponentFailed:
             raise
         except (Exception, SystemExit) as error:
@@ -203,7 +203,8 @@ class Execution:
                 raise
             if isinstance(error, OSError) and error.errno in {*FULL, errno.EROFS} and (said := unwritable(error)):
                 raise said from error  # no component's fault
-            raise failure(error, component, self._pipeline.registry, kept(), self._out / "failed.log") from error
+            kept = checkpoint.kept if checkpoint else ""
+            raise failure(error, component, self._pipeline.registry, kept, self._out / "failed.log") from error
 
     def _entered(
         self, step: Step, found: Artifact | None, cpu: float = 0.0, wall: float = 0.0, said: Sequence[str] = ()
@@ -233,12 +234,14 @@ class Execution:
         }
 
     def _warn_of_versions(self, step: Step, artifact: Artifact) -> None:
-        now = versions()
+        now, frames, first = versions(), step.recording.indices, 0
         for last, made in artifact.made_with:
             other = [f"{name} {was}, now {now.get(name)}" for name, was in made.items() if now.get(name) != was]
             if other:
-                what = f"frames 0–{last - 1} of {step.label}" if step.chain else step.label
+                begin, end = (frames.start + frames.step * count for count in (first, last - 1))
+                what = f"frames {begin}–{end} of {step.label}" if step.chain else step.label
                 self._report(f"warning: {what} were made with {'; '.join(other)}")
+            first = last
 
     def _set_aside(self, path: Path, error: Corrupted) -> None:
         aside = self._store.set_aside(path)

@@ -12,14 +12,14 @@ from mocapflow.answers import residual_of
 from mocapflow.assets import Camera
 from mocapflow.components import Prior
 from mocapflow.data import Cloth, Estimate, FrameState, Matches, Past, Pose, Segmentation, Silhouette, Surface
-from mocapflow.geometry import silhouettes, twists
+from mocapflow.geometry import silhouettes
 from mocapflow.geometry.cameras import project_each
-from mocapflow.model import ClothedModel, moved
+from mocapflow.model import ClothedModel, increment, moved
 from mocapflow.records import F32, F64
 
 SHAPE_WEIGHT = 0.05  # lambda, px^-2; a segmenter may descend with another one
 BAND_PX = 12.0  # around both contours, at most; beyond, the area term does not grow
-SLACK = 0.01  # share by which a step may raise what it is judged by: contours are matched, the area is not
+SLACK = 0.01  # share that the area may rise by in a step: what a step lowers is the error of contours
 IN_VIEW = ("data", "length", "shape", "contour")  # contour: what the pose solver lowers; not part of the sum
 
 
@@ -99,8 +99,7 @@ def contours(surface: Surface, matches: Matches, cameras: Sequence[Camera]) -> F
 
 def halfway(one: Pose, other: Pose) -> Pose:
     """Return the pose in the middle of two."""
-    between = twists.log(other.root @ np.linalg.inv(one.root))
-    return moved(one, 0.5 * np.concatenate([between, other.angles - one.angles]))
+    return moved(one, 0.5 * increment(one, other))
 
 
 def told_apart(names: Sequence[str]) -> tuple[str, ...]:

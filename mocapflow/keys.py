@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from pydantic import BaseModel
@@ -20,6 +20,7 @@ from pydantic import BaseModel
 from mocapflow.components import Component
 from mocapflow.digests import MARK, Digests, digest_array
 from mocapflow.errors import PluginError
+from mocapflow.registry import Registry
 
 FORMAT = 2  # of recipes and groups: another number makes everything anew
 Recipe = Mapping[str, Any]
@@ -33,41 +34,34 @@ class Free:
 FREE = Free()
 
 
-class Origins(Protocol):
-    """What keys ask of the registry."""
-
-    def origin(self, cls: type[Component]) -> Any:
-        """Return where a component class comes from: plugin, distribution, version."""
-
-
 def key_of(recipe: Recipe) -> str:
     """Return the key of a recipe: 32 hexadecimal digits."""
     text = json.dumps(_unnamed(recipe), sort_keys=True, separators=(",", ":"))
     return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
 
 
-def component_recipe(component: Component, origins: Origins, digests: Digests) -> dict[str, Any]:
+def component_recipe(component: Component, registry: Registry, digests: Digests) -> dict[str, Any]:
     """Return role, name, code and all settings of a component, nested components the same way."""
     cls = type(component)
-    origin = origins.origin(cls)
+    origin = registry.origin(cls)
     return {
         "role": component.role,
         "name": component.name,
         "distribution": origin.distribution if origin.version else "file",
         "code": digests.package(cls.__module__),
-        "settings": _settings(component, origins, digests),
+        "settings": _settings(component, registry, digests),
     }
 
 
-def _settings(model: BaseModel, origins: Origins, digests: Digests) -> dict[str, Any]:
+def _settings(model: BaseModel, registry: Registry, digests: Digests) -> dict[str, Any]:
     return {
-        name: _plain(getattr(model, name), f"{type(model).__name__}.{name}", origins, digests)
+        name: _plain(getattr(model, name), f"{type(model).__name__}.{name}", registry, digests)
         for name, declared in type(model).model_fields.items()
         if not any(isinstance(mark, Free) for mark in declared.metadata)
     }
 
 
-def _plain(value: Any, where: str, origins: Origins, digests: Digests) -> Any:  # noqa: PLR0911  one line per kind
+def _plain(value: Any, where: str, registry: Registry, digests: Digests) -> Any:  # noqa: PLR0911  one line per kind
     if value is None or isinstance(value, bool | int | str) and not isinstance(value, Enum):
         return value
     if isinstance(value, float):
@@ -77,17 +71,17 @@ def _plain(value: Any, where: str, origins: Origins, digests: Digests) -> Any:  
     if isinstance(value, Path):
         return digests.file(value, value.name) if value.exists() else f"no file {value.name}"
     if isinstance(value, Component):
-        return component_recipe(value, origins, digests)
+        return component_recipe(value, registry, digests)
     if isinstance(value, BaseModel):
-        return _settings(value, origins, digests)
+        return _settings(value, registry, digests)
     if isinstance(value, np.ndarray):
         return digest_array(value)
     if isinstance(value, Mapping):
-        return {str(k): _plain(v, where, origins, digests) for k, v in value.items()}
+        return {str(k): _plain(v, where, registry, digests) for k, v in value.items()}
     if isinstance(value, Sequence):
-        return [_plain(v, where, origins, digests) for v in value]
+        return [_plain(v, where, registry, digests) for v in value]
     if isinstance(value, set | frozenset):
-        return sorted(json.dumps(_plain(v, where, origins, digests), sort_keys=True) for v in value)
+        return sorted(json.dumps(_plain(v, where, registry, digests), sort_keys=True) for v in value)
     raise PluginError(f"setting {where} is a {type(value).__name__}, which has no place in a cache key")
 
 

@@ -62,6 +62,11 @@ def _laid(pose: Pose, parameters: tuple[float, ...], past: ref[Past], model: Clo
     return Cloth(vertices=model.drapes(pose, values[None], known)[0], parameters=values)
 
 
+def increment(one: Pose, other: Pose) -> F64:
+    """Return the increment (6 + D,) that leads from one pose to another; see `moved`."""
+    return np.concatenate([twists.log(other.root @ np.linalg.inv(one.root)), other.angles - one.angles])
+
+
 def moved(pose: Pose, increment: F64) -> Pose:
     """Return a pose after an increment (6 + D,): the twist is left-multiplied, the angles are added."""
     return Pose(root=twists.exp(increment[:6]) @ pose.root, angles=pose.angles + increment[6:])

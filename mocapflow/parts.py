@@ -6,12 +6,12 @@ the parts are joined to, which has the label of the whole.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from mocapflow.data import Start
 from mocapflow.errors import PipelineError
-from mocapflow.pipeline import NamedStage, Pipeline
+from mocapflow.pipeline import NamedStage, Parts, Pipeline
 from mocapflow.wiring import Source, makes, wire
 
 
@@ -21,10 +21,14 @@ def in_parts(pipeline: Pipeline, indices: range) -> Pipeline:
     Raises:
         PipelineError: the parts would be shorter than what they share, or another stage has the label of one.
     """
-    if pipeline.parts.count == 1:
+    if pipeline.parts is None:
         return pipeline
     wiring = wire(pipeline)
-    parts = [part for named in pipeline.stages for part in _parts(named, wiring[named.label], pipeline, indices)]
+    parts = [
+        part
+        for named in pipeline.stages
+        for part in _parts(named, wiring[named.label], pipeline.stages, pipeline.parts, indices)
+    ]
     stages: dict[str, NamedStage] = {}
     for part in parts:  # two tracks of one start share those of its parts
         if stages.setdefault(part.label, part) != part:
@@ -46,21 +50,22 @@ def split(indices: range, count: int, overlap: int) -> list[range]:
     return [indices[max(a - overlap, 0) : b] for a, b in pairs]
 
 
-def _parts(named: NamedStage, inputs: Mapping[str, Source], pipeline: Pipeline, indices: range) -> Iterator[NamedStage]:
+def _parts(
+    named: NamedStage, inputs: Mapping[str, Source], stages: Sequence[NamedStage], parts: Parts, indices: range
+) -> Iterator[NamedStage]:
     """Yield what a stage becomes: itself, or if it goes on frame by frame, its parts and their join."""
     sources = set(inputs.values())
     if "checkpoint" not in sources:
         yield named
         return
-    start = next((other for other in pipeline.stages if other.label in sources and makes(other, Start)), None)
-    ranges = split(indices, pipeline.parts.count, pipeline.parts.overlap)
+    start = next((other for other in stages if other.label in sources and makes(other, Start)), None)
+    ranges = split(indices, parts.count, parts.overlap)
     labels = tuple(f"{named.label}_{number}" for number in range(1, len(ranges) + 1))
     for number, (label, part) in enumerate(zip(labels, ranges, strict=True), 1):
         wiring = named.wiring
         if start is not None and number > 1:
             own = f"{start.label}_{number}"
             wiring = {name: own if source == start.label else source for name, source in wiring.items()}
-            yield replace(start, label=own, stage=pipeline.parts.start or start.stage, part=part)
+            yield replace(start, label=own, stage=parts.start or start.stage, part=part)
         yield replace(named, label=label, wiring=wiring, part=part)
-    assert pipeline.parts.join is not None
-    yield NamedStage(named.label, pipeline.parts.join, {}, named.where, joins=labels)
+    yield NamedStage(named.label, parts.join, {}, named.where, joins=labels)

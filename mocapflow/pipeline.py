@@ -82,10 +82,10 @@ class NamedStage:
 class Parts:
     """How a recording is tracked in parts."""
 
-    count: int = 1
-    overlap: int = 1  # frames
-    start: Stage | None = None
-    join: Stage | None = None
+    count: int
+    overlap: int  # frames
+    start: Stage | None
+    join: Stage
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class Pipeline:
     stop: int | None = None
     step: int = 1
     scale: float = 1.0  # of the images
-    parts: Parts = Parts()
+    parts: Parts | None = None  # None: in one piece
 
 
 def load_pipeline(
@@ -190,9 +190,9 @@ def _with_frames(document: Document, part: slice) -> Document:
     return changed(document, "frames", Document(said, places))
 
 
-def _parts(said: PartsFile, resolver: Resolver) -> Parts:
+def _parts(said: PartsFile, resolver: Resolver) -> Parts | None:
     if said.count == 1:
-        return Parts()
+        return None
     start = None if said.start is None else resolver.component("stage", said.start, ("parts", "start"))
     join = resolver.component("stage", said.join, ("parts", "join"))
     return Parts(count=said.count, overlap=said.overlap, start=start, join=join)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from mocapflow.assets import Background, Body, Camera, Rig
-from mocapflow.components import Component
 from mocapflow.data import Start
 from mocapflow.digests import Digests, digest_array
 from mocapflow.keys import FORMAT, Recipe, component_recipe, key_of
@@ -83,8 +83,7 @@ def steps_of(pipeline: Pipeline, digests: Digests) -> list[Step]:
             recipe["recording"] = _frames(part, pipeline, chain) | _content(part, digests)
         if "scene" in sources.values():
             recipe["scene"] = _scene(pipeline, recording, steps.get(body or ""), steps.get(rig or ""), digests)
-        files = [path for path in named.stage.inputs(recording.folder) if path.exists()]
-        recipe["files"] = [digests.file(path, path.name) for path in files]
+        recipe["files"] = _files(named.stage.inputs(recording.folder), digests)
         steps[named.label] = Step(named, sources, body, rig, part, recipe, key_of(recipe))
     return list(steps.values())
 
@@ -135,19 +134,19 @@ def _content(part: Recording, digests: Digests) -> dict[str, Any]:
 def _scene(
     pipeline: Pipeline, recording: Recording, body: Step | None, rig: Step | None, digests: Digests
 ) -> dict[str, Any]:
-    garment = pipeline.garment
+    garment, registry = pipeline.garment, pipeline.registry
+    loaded = component_recipe(pipeline.body, registry, digests) | {
+        "files": _files(pipeline.body.inputs(pipeline.recording), digests)
+    }
     return {
         "cameras": _input(rig) if rig else {camera.name: _camera(camera) for camera in recording.cameras},
-        "body": _input(body) if body else _asset(pipeline.body, pipeline, digests),
-        "garment": None if garment is None else component_recipe(garment, pipeline.registry, digests),
+        "body": _input(body) if body else loaded,
+        "garment": None if garment is None else component_recipe(garment, registry, digests),
     }
 
 
-def _asset(component: Component, pipeline: Pipeline, digests: Digests) -> dict[str, Any]:
-    files = pipeline.body.inputs(pipeline.recording)
-    return component_recipe(component, pipeline.registry, digests) | {
-        "files": [digests.file(path, path.name) for path in files if path.exists()]
-    }
+def _files(paths: Iterable[Path], digests: Digests) -> list[str]:
+    return [digests.file(path, path.name) for path in paths if path.exists()]
 
 
 def _camera(camera: Camera) -> list[str]:

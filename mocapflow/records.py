@@ -39,7 +39,7 @@ class Axes(NamedTuple):
 
     axes: tuple[str | int, ...]
     unit: str
-    dtype: np.dtype[Any] | None
+    dtype: np.dtype[Any]
     optional: bool
     wide: bool
 

@@ -1,4 +1,4 @@
-"""Zarr arrays with one chunk per frame, written and read without zarr's event loop.
+"""Zarr arrays of whole rows to a chunk, mostly one frame each, written and read without zarr's event loop.
 
 A write through zarr's own interface costs 1.1 ms of CPU however small it is, the same chunk written here 0.1 ms
 (benchmarks/store_commit.py). The files are plain zarr v3: bytes, then zstd level 1 with its checksum.
@@ -30,7 +30,10 @@ class Corrupted(StoreError):
 
 
 class Rows:
-    """One array of shape (T, ...) whose chunks are single rows; zarr reads what was never written as `fill`."""
+    """One array of shape (T, ...); zarr reads what was never written as `fill`.
+
+    Rows are read and replaced where each is a chunk of its own; a sealed array is only created.
+    """
 
     def __init__(self, path: Path) -> None:
         meta = read_json(path / "zarr.json")

@@ -39,7 +39,7 @@ class PlanLine:
             for name, source in self.sources.items()
             if source not in supplied and source != name
         )
-        text = f"{self.label:<12}{self.action:<8}{self.key[:4]}…  {self.why}"
+        text = f"{self.label:<11} {self.action:<8}{self.key[:4]}…  {self.why}"
         return f"{text:<63} {f'({wiring})' if wiring else ''}".rstrip()
 
 
@@ -53,7 +53,7 @@ class RunSummary:
 
     def __str__(self) -> str:
         spent = ["from the store" if s["cached"] else f"{s['seconds']:.1f} s of CPU" for s in self.stages]
-        lines = [f"{s['label']:<12}{text}" for s, text in zip(self.stages, spent, strict=True)]
+        lines = [f"{s['label']:<11} {text}" for s, text in zip(self.stages, spent, strict=True)]
         return "\n".join([*lines, f"results: {self.out}"])
 
 

@@ -54,6 +54,6 @@ def _array(path: Path, name: str, shape: tuple[int, ...], rows: int, sealed: int
         return made
     declared = array_fields(Track).get(name)
     axes = axis_names(name, declared.axes if declared else ("T",), 1 + len(shape))
-    dtype = declared.dtype if declared and declared.dtype else np.dtype(float)
+    dtype = declared.dtype if declared else np.dtype(float)
     unit = {"unit": declared.unit} if declared else {}
     return Rows.create(path / name, (rows, *shape), dtype.name, 0, axes, unit, BLOCK)

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
-from mocapflow.copies import META, Copies, further
+from mocapflow.copies import META, Copies, Copy, further
 from mocapflow.errors import StoreError
 from mocapflow.locks import Lock
 from mocapflow.rows import Corrupted, flush_all
@@ -40,10 +40,8 @@ class SharedStore(Store):
         here = super().find(key)
         if key in self._writing or (here is not None and here.complete and not here.frames):
             return here
-        there = self._copies.find(key)
-        if there is None or (here is not None and not further(there.attributes, here.attributes)):
-            return here
-        return Artifact(self.path / there.group, there.attributes)
+        there = self._ahead(key, here)
+        return here if there is None else Artifact(self.path / there.group, there.attributes)
 
     def load(self, artifact: Artifact, frames: int | None = None) -> Any:
         """Return the record of an artifact, fetched first if it is not here; see `Store.load`."""
@@ -86,10 +84,16 @@ class SharedStore(Store):
         self._copies.remove(artifact.key)
         super().discard(artifact)
 
+    def _ahead(self, key: str, here: Artifact | None) -> Copy | None:
+        """Return the copy at the URL, if it is further than what is here."""
+        there = self._copies.find(key)
+        behind = there is None or (here is not None and not further(there.attributes, here.attributes))
+        return None if behind else there
+
     def _fetch(self, key: str) -> None:
         """Bring the furthest copy here, if it is further; only with the right to write."""
-        here, there = super().find(key), self._copies.find(key)
-        if there is None or (here is not None and not further(there.attributes, here.attributes)):
+        there = self._ahead(key, super().find(key))
+        if there is None:
             return
         part = self.path / f".{uuid4().hex}"
         try:

@@ -43,13 +43,21 @@ def unit_of(module: str) -> str:
     return ".".join(parts[:2] if parts[0] == "mocapflow" else parts[:1])
 
 
+def visible(folder: Path) -> Iterator[Path]:
+    """Yield the files below a folder in order, without those that file browsers and editors leave there."""
+    for path in sorted(folder.rglob("*")):
+        hidden = any(part.startswith(".") for part in path.relative_to(folder).parts) or path.name == "Thumbs.db"
+        if path.is_file() and not hidden:
+            yield path
+
+
 def data_files(unit: str) -> Iterable[tuple[str, Path]]:
     """Yield the files of a plugin package that are no code, such as a template body."""
     origin = _origin(unit)
     if origin is None or origin.name != "__init__.py" or unit.startswith("mocapflow."):
         return
-    for path in sorted(origin.parent.rglob("*")):
-        if path.is_file() and path.suffix != ".py" and "__pycache__" not in path.parts:
+    for path in visible(origin.parent):
+        if path.suffix != ".py" and "__pycache__" not in path.parts:
             yield path.relative_to(origin.parent).as_posix(), path
 
 

@@ -106,14 +106,15 @@ class CoupledLoop(Stage):
         if self.keep == "trace":
             checkpoint.keep_turns(self.steady.cap)
         past, watch = checkpoint.past(), Stopwatch()
-        for picture in recording.frames(since=checkpoint.next_index):
-            frame = checks.passed(picture) if checks else picture
-            frame = replace(frame, flow=flow.into(frame.index)) if flow else frame
+        for raw in recording.frames(since=checkpoint.next_index):
+            # `frame` is what failures are told of: here it would still be the one before
+            picture = checks.passed(raw) if checks else raw
+            picture = replace(picture, flow=flow.into(picture.index)) if flow else picture
             watch.lap("decode")
-            result = self.fit(frame, past, start, model, checkpoint.observe, watch)
-            notes = [*notes_on(frame, scene, past.believable(), result), *result.notes]
-            past = checkpoint.commit(frame, past, result, notes)
-            self.complain(frame, result)
+            result = self.fit(picture, past, start, model, checkpoint.observe, watch)
+            notes = [*notes_on(picture, scene, past.believable(), result), *result.notes]
+            past = checkpoint.commit(picture, past, result, notes)
+            self.complain(picture, result)
             watch = Stopwatch()
         return checkpoint.track()
 

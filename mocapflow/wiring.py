@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from types import NoneType, UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
-from mocapflow.components import Stage
-from mocapflow.errors import MocapflowError, PipelineError, PluginError, alternatives
+from mocapflow.errors import PipelineError, PluginError, alternatives
 from mocapflow.pipeline import NamedStage, Pipeline
 from mocapflow.registry import Registry
 
@@ -46,13 +45,13 @@ def makes(named: NamedStage, wanted: type | UnionType) -> bool:
 
 def made_by(named: NamedStage) -> Any:
     """Return the type that a stage says it makes."""
-    return _told(named, _hints, named.stage)["return"]
+    return _hints(named)["return"]
 
 
 def _wire_stage(named: NamedStage, earlier: Sequence[NamedStage], registry: Registry) -> dict[str, Source]:
     if named.label in SUPPLIED.values():
         raise PipelineError(f"no stage can be called '{named.label}': inputs have that name", where=named.where)
-    hints = {name: hint for name, hint in _told(named, _hints, named.stage).items() if name != "return"}
+    hints = {name: hint for name, hint in _hints(named).items() if name != "return"}
     for parameter in named.wiring:
         if parameter not in hints:
             message = f"stage '{named.label}' has no input '{parameter}'"
@@ -106,21 +105,15 @@ def _without_none(hint: Any) -> tuple[type, bool]:
     return hint, False
 
 
-def _told(named: NamedStage, ask: Any, stage: Stage) -> Any:
-    try:
-        return ask(stage)
-    except MocapflowError as error:
-        raise type(error)(f"stage '{named.label}': {error.message}", where=named.where, hint=error.hint) from None
-
-
-def _hints(stage: Stage) -> Mapping[str, Any]:
-    run = type(stage).run
+def _hints(named: NamedStage) -> Mapping[str, Any]:
+    """Return the types of the parameters of a stage's `run`, and of what it returns."""
+    run, who = type(named.stage).run, f"stage '{named.label}': {named.stage.name}"
     try:
         hints = get_type_hints(run)
     except NameError as error:
         hint = "import the types that run names when the module is imported, not under TYPE_CHECKING"
-        raise PluginError(f"the inputs of {stage.name} can't be read: {error}", hint=hint) from None
+        raise PluginError(f"{who}: its inputs can't be read: {error}", where=named.where, hint=hint) from None
     parameters = [name for name in inspect.signature(run).parameters if name != "self"]
     if missing := [name for name in [*parameters, "return"] if name not in hints]:
-        raise PluginError(f"{stage.name}: run needs a type for {', '.join(missing)}")
+        raise PluginError(f"{who}: run needs a type for {', '.join(missing)}", where=named.where)
     return {name: hints[name] for name in [*parameters, "return"]}

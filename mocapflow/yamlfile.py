@@ -94,7 +94,8 @@ def _parse(text: str, file: str, path: Path | None) -> Document:
     try:
         loader = yaml.SafeLoader(text)
         node = loader.get_single_node()
-        return Document(build(node, ()) if node else {}, places or {(): Place(f"{file}:1:1" if path else file, folder)})
+        value: Any = build(node, ()) if node else ({} if path else None)
+        return Document(value, places or {(): Place(f"{file}:1:1" if path else file, folder)})
     except yaml.MarkedYAMLError as error:
         where = mark(error.problem_mark) if error.problem_mark else file
         context = f" ({error.context})" if error.context else ""

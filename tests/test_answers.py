@@ -189,12 +189,17 @@ def test_a_run_names_who_answers_wrongly(tmp_path, prior, said):
         ({"pose": Pose(root=np.full((4, 4), np.nan), angles=POSE.angles)}, "a pose that is not finite"),
         ({"pose": Pose(root=np.zeros((4, 4)), angles=POSE.angles)}, "a root that is no rigid motion"),
         ({"pose": Pose(root=POSE.root, angles=POSE.angles[1:])}, "the body has"),
-        ({"observed": np.full(len(POSE.angles), np.nan)}, "observed that are not finite"),
+        ({"observed": np.full(len(POSE.angles), np.nan)}, "observed shares that are not finite"),
+        ({"observed": np.ones(1)}, "observed shares of shape"),
+        ({"parameters": np.ones(3)}, "parameters of shape"),
+        ({"covariance": np.eye(4)}, "a covariance of shape"),
+        ({"covariance": np.zeros((WIDTH, WIDTH))}, "a variance that is not above zero"),
     ],
 )
 def test_an_estimate_that_is_none_names_the_solver(change, said) -> None:
-    good = pictures.tiny_state(SCENE, POSE, POSE).estimate
-    asked = (None, None, scenes.tiny_model(SCENE), (), Past(), Turn(index=0, cap=1))
+    state = pictures.tiny_state(SCENE, POSE, POSE)
+    good = state.estimate
+    asked = (None, state, scenes.tiny_model(SCENE), (), Past(), Turn(index=0, cap=1))
     assert estimate_of(Saying(answer=good), *asked) is good
     with pytest.raises(WrongAnswer, match=f"'saying' returned .*{said}"):
         estimate_of(Saying(answer=replace(good, **change)), *asked)

@@ -1,4 +1,5 @@
 import errno
+import io
 import json
 import os
 import sys
@@ -329,16 +330,30 @@ def test_progress_is_plain_lines_unless_on_a_terminal(capsys):
         def flush(self):
             pass
 
-    show = reporter()
-    show("track: 3 of 6 frames, at rest after 2 turns")
+    with reporter() as show:
+        show("track: 3 of 6 frames, at rest after 2 turns")
     assert capsys.readouterr().err == "track: 3 of 6 frames, at rest after 2 turns\n"
     terminal = Terminal()
-    show = reporter(terminal)
-    show("track: 3 of 6 frames, at rest after 2 turns")
-    show("smooth: running")
+    with reporter(terminal) as show:
+        show("track: 3 of 6 frames, at rest after 2 turns")
+        show("smooth: running")
     assert terminal.written == (
         f"\r\x1b[Ktrack: {'█' * 15}{'·' * 15} 3 of 6 frames, at rest after 2 turns\nsmooth: running\n"
     )
+
+
+def test_a_bar_fits_the_terminal_and_what_comes_after_it_begins_a_line(monkeypatch):
+    class Terminal(io.StringIO):
+        def isatty(self):
+            return True
+
+    monkeypatch.setenv("COLUMNS", "60")
+    terminal = Terminal()
+    with pytest.raises(KeyError), reporter(terminal) as show:
+        show("track: 3 of 6 frames, 12:30 left, at rest after 2 turns")
+        raise KeyError
+    line, rest = terminal.getvalue().removeprefix("\r\x1b[K").split("\n")
+    assert len(line) < 60 and line.startswith("track: █") and rest == ""
 
 
 @pytest.mark.parametrize("garment", ["skirt", "shorts", "cylinder"])

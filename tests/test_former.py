@@ -34,6 +34,13 @@ def run(call, *changes):
     return done
 
 
+def test_a_damaged_memory_of_the_run_is_told(call):
+    run(call)
+    (OUT / FILE).write_text("[]")
+    told = call("status", "out")
+    assert told.exit_code == 2 and "command.json  this file is damaged" in told.stderr
+
+
 def test_results_of_another_run_are_set_aside(call):
     run(call)
     (OUT / layout.ERRORS).write_text("of the first run")

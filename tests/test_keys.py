@@ -122,6 +122,8 @@ def test_cameras_made_by_a_stage_change_what_comes_after_it(tmp_path, clip):
         ("truth/angles.csv", set()),
         ("reference/angles.csv", set()),
         ("README.md", set()),
+        ("videos/cam01/.DS_Store", set()),
+        ("videos/.hidden/cam01.mp4", set()),
         ("static/videos/cam01.mp4", {"background", "start", "track"}),
     ],
 )

@@ -507,3 +507,7 @@ def test_other_versions_are_told(tmp_path, path, monkeypatch):
     assert f"warning: frames 0–4 of track were made with numpy {real['numpy']}, now 9.9" in lines
     _, again = run_tiny(path, tmp_path)  # all done: the mixture is still told
     assert f"warning: frames 0–4 of track were made with numpy {real['numpy']}, now 9.9" in again
+    for module in (store, execution):
+        monkeypatch.setattr(module, "versions", lambda: real | {"numpy": "10"})
+    _, lines = run_tiny(path, tmp_path)
+    assert "warning: frames 5–11 of track were made with numpy 9.9, now 10" in lines

@@ -17,6 +17,7 @@ import pytest
 
 from mocapflow.errors import ComponentFailed, PipelineError
 from mocapflow.loop import settle
+from mocapflow.recording import Recording
 from mocapflow.runner import run
 from mocapflow.store import Store
 from tests.fixtures.stores import STAGES, load, run_tiny, same, the_track, write_pipeline, write_recording
@@ -142,6 +143,21 @@ def test_a_component_that_raises_is_named_and_the_run_goes_on_there(tmp_path, pa
     assert "track: going on after 7 frames" in lines
     run_tiny(path, tmp_path / "whole")
     assert same(the_track(tmp_path / "whole"), the_track(tmp_path))
+
+
+def test_a_frame_that_cannot_be_read_is_not_told_as_the_one_before(tmp_path, path, monkeypatch):
+    write_pipeline(tmp_path, tmp_path / "clip", stages=SHORT)
+    real = Recording.frames
+
+    def breaking(self, since=None):
+        for frame in real(self, since):
+            if frame.index == 4:
+                raise FloatingPointError("torn")
+            yield frame
+
+    monkeypatch.setattr(Recording, "frames", breaking)
+    with pytest.raises(ComponentFailed, match=r"failed: FloatingPointError: torn\n *frames 0–3 are saved"):
+        run_tiny(path, tmp_path)
 
 
 def test_after_a_fresh_run_going_on_needs_a_run_that_is_not(tmp_path, path, monkeypatch):

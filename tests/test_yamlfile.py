@@ -74,6 +74,7 @@ def test_changes_of_the_command_line_come_last(folder):
     steady = read(Path("base.yaml"), ["stages.track.steady.turns=3"]).values["stages"]["track"]["steady"]
     assert steady == {"turns": 3}  # settings that the file leaves out
     assert document.place(("frames", "start")).text == "--set frames={start: 3}"
+    assert read(Path("base.yaml"), ["stages.track.draper="]).values["stages"]["track"]["draper"] is None
 
 
 def test_what_looks_like_a_date_or_a_time_is_text(folder):

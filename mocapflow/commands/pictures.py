@@ -72,9 +72,7 @@ def poster(scene: Scene, garment: Garment, draper: Draper) -> U8:
 
 
 def _draped(draper: Draper, scene: Scene, pose: Pose) -> F64:
-    assert scene.garment is not None
-    calm = np.zeros(len(scene.garment.parameter_names))
-    return ClothedModel(scene=scene, draper=draper).drape(pose, calm, Past()).vertices
+    return ClothedModel(scene=scene, draper=draper).drape(pose, scene.calm, Past()).vertices
 
 
 def _pose(scene: Scene, degrees: dict[str, float]) -> Pose:

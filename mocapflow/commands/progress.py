@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -16,10 +17,18 @@ COUNT = re.compile(r"^(\S+): (\d+) of (\d+) (frames.*)$")
 WIDTH = 30
 
 
-def reporter(stream: TextIO | None = None) -> Callable[[str], None]:
-    """Return a function that shows lines of progress."""
+@contextmanager
+def reporter(stream: TextIO | None = None) -> Iterator[Callable[[str], None]]:
+    """Give a function that shows lines of progress; what is written afterwards begins on a line of its own."""
     out = stream or sys.stderr
-    return _Bar(out).show if out.isatty() else lambda line: print(line, file=out, flush=True)
+    if not out.isatty():
+        yield lambda line: print(line, file=out, flush=True)
+        return
+    bar = _Bar(out)
+    try:
+        yield bar.show
+    finally:
+        bar.close()
 
 
 @contextmanager
@@ -67,12 +76,19 @@ class _Bar:
     def show(self, line: str) -> None:
         counted = COUNT.match(line)
         if counted is None:
-            self._out.write(("\n" if self._open else "") + line + "\n")
-            self._open = False
+            self.close()
+            self._out.write(line + "\n")
         else:
             label, done, total, rest = counted[1], int(counted[2]), int(counted[3]), counted[4]
             full = WIDTH * done // max(total, 1)
-            self._out.write(f"\r\x1b[K{label}: {'█' * full}{'·' * (WIDTH - full)} {done} of {total} {rest}")
+            text = f"{label}: {'█' * full}{'·' * (WIDTH - full)} {done} of {total} {rest}"
+            # one that wraps would not be overwritten
+            self._out.write("\r\x1b[K" + text[: shutil.get_terminal_size().columns - 1])
             self._open = done < total
             self._out.write("" if self._open else "\n")
         self._out.flush()
+
+    def close(self) -> None:
+        """End the line of a count that has not come to its end."""
+        self._out.write("\n" if self._open else "")
+        self._open = False

@@ -61,14 +61,12 @@ def run(
     if fresh:
         raise PipelineError("--fresh does not go with several workers", hint="name a new store with --store")
 
-    def begin_with_parts(steps: Sequence[Step]) -> None:
+    def begin_with_parts(invocation: Invocation, out: Path, steps: Sequence[Step]) -> None:
         labels = parts_of(steps)
-        begin(invocation, folder, steps)
-        make_parts(labels, invocation, folder, workers, scheduler)
+        begin(invocation, out, steps)
+        make_parts(labels, invocation, out, workers, scheduler)
 
-    loaded = _loaded(invocation, folder)
-    with alone(folder):
-        typer.echo(carry_out(loaded, invocation, folder, begin=begin_with_parts))
+    typer.echo(execute(invocation, folder, begin=begin_with_parts))
 
 
 def plan(
@@ -94,7 +92,7 @@ def demo(out: Annotated[Path, typer.Option(help="The run folder.")] = Path("runs
     """Track the example recording that comes with mocapflow."""
     from mocapflow.shipped import shipped
 
-    execute(_invocation(shipped("pipelines", "demo.yaml"), None, out, None, None, None), out, fresh=False)
+    execute(_invocation(shipped("pipelines", "demo.yaml"), None, out, None, None, None), out)
     typer.echo(f"overlay videos  {out / 'overlay'}")
     typer.echo(f"joint angles    {out / 'results' / 'angles.csv'}")
 
@@ -124,14 +122,8 @@ def track(invocation: Invocation, out: Path, label: str) -> None:
     from mocapflow import runner
 
     pipeline, store = invocation.load(), Path(invocation.store)
-    runner.run(pipeline, store=store, url=invocation.url, out=out, only=label, report=reporter())
-
-
-def execute(invocation: Invocation, out: Path, fresh: bool) -> RunSummary:
-    """Run what an invocation says, have the run folder remember it, and return the summary."""
-    pipeline = _loaded(invocation, out)
-    with alone(out):
-        return carry_out(pipeline, invocation, out, fresh, partial(begin, invocation, out))
+    with reporter() as report:
+        runner.run(pipeline, store=store, url=invocation.url, out=out, only=label, report=report)
 
 
 def begin(invocation: Invocation, out: Path, steps: Sequence[Step]) -> None:
@@ -140,6 +132,18 @@ def begin(invocation: Invocation, out: Path, steps: Sequence[Step]) -> None:
     if before is not None and differing(before, now) and (former := set_aside(out)):
         typer.echo(f"the results of the run before are now in {former}", err=True)
     remember(invocation, out, now)
+
+
+def execute(
+    invocation: Invocation,
+    out: Path,
+    fresh: bool = False,
+    begin: Callable[[Invocation, Path, Sequence[Step]], None] = begin,
+) -> RunSummary:
+    """Run what an invocation says, have the run folder remember it, and return the summary."""
+    pipeline = _loaded(invocation, out)
+    with alone(out):
+        return carry_out(pipeline, invocation, out, fresh, partial(begin, invocation, out))
 
 
 def carry_out(
@@ -152,7 +156,7 @@ def carry_out(
     """Run the pipeline of an invocation and return the summary; see `runner.run`."""
     from mocapflow import runner
 
-    with noted(reporter(), out) as report:
+    with reporter() as shown, noted(shown, out) as report:
         store = Path(invocation.store)
         return runner.run(pipeline, store=store, url=invocation.url, out=out, fresh=fresh, report=report, begin=begin)
 

@@ -46,6 +46,13 @@ def centre(camera: Camera) -> F64:
     return position
 
 
+def directions(pixels: F64, camera: Camera) -> F64:
+    """Return the rays (..., 3) of pixels (..., 2) of a pinhole camera, in the world and one metre deep."""
+    homogeneous = np.concatenate([pixels, np.ones_like(pixels[..., :1])], axis=-1)
+    rays: F64 = homogeneous @ np.linalg.inv(camera.intrinsics).T @ camera.camera_from_world[:3, :3]
+    return rays
+
+
 def magnification(camera: Camera, point: F64) -> float:
     """Return how large a view shows what stands at a point (3,) in m: px per metre across the line of sight."""
     depth = camera.camera_from_world[2, :3] @ point + camera.camera_from_world[2, 3]

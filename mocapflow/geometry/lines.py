@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mocapflow.assets import Camera
+from mocapflow.geometry.cameras import centre, directions
 from mocapflow.records import F64
 
 
@@ -20,12 +21,9 @@ def through(pixels: F64, camera: Camera) -> F64:
 
     Source: Rosenhahn 2008, Eq. (12.2)
     """
-    homogeneous = np.column_stack([pixels, np.ones(len(pixels))])
-    rotation, translation = camera.camera_from_world[:3, :3], camera.camera_from_world[:3, 3]
-    directions = homogeneous @ np.linalg.inv(camera.intrinsics).T @ rotation
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    moments = np.cross(-rotation.T @ translation, directions)
-    return np.hstack([directions, moments])
+    ray = directions(pixels, camera)
+    ray /= np.linalg.norm(ray, axis=1, keepdims=True)
+    return np.hstack([ray, np.cross(centre(camera), ray)])
 
 
 def error(points: F64, lines: F64) -> F64:

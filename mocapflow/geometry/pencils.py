@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from mocapflow.assets import Camera
-from mocapflow.geometry.cameras import centre
+from mocapflow.geometry.cameras import centre, directions
 from mocapflow.records import F64
 
 
@@ -22,9 +22,8 @@ def plane_angles(pixels: F64, camera: Camera, axes: F64) -> F64:
         camera: one of the two cameras of `axes`.
         axes: (2, 3) from `pencil_axes`.
     """
-    at_depth_one = np.concatenate([pixels, np.ones_like(pixels[..., :1])], axis=-1) @ np.linalg.inv(camera.intrinsics).T
-    directions = at_depth_one @ camera.camera_from_world[:3, :3]
-    angles: F64 = np.arctan2(directions @ axes[1], directions @ axes[0])
+    rays = directions(pixels, camera)
+    angles: F64 = np.arctan2(rays @ axes[1], rays @ axes[0])
     return angles
 
 

@@ -25,15 +25,18 @@ def read_columns(path: Path) -> dict[str, F64]:
         raise RecordingError("no such table", where=str(path))
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = [row for row in csv.reader(file) if row]
+            reader = csv.reader(file)
+            lines = [(reader.line_num, row) for row in reader if row]
     except UnicodeDecodeError:
         raise RecordingError("is not UTF-8 text", where=str(path), hint=FORM) from None
-    if len(rows) < 2:
+    except csv.Error as error:
+        raise RecordingError(f"is no table: {error}", where=f"{path}:{reader.line_num}", hint=FORM) from None
+    if len(lines) < 2:
         raise RecordingError("the table has no rows", where=str(path))
-    header = [name.strip() for name in rows[0]]
+    header = [name.strip() for name in lines[0][1]]
     if len(header) == 1 and ";" in header[0]:
         raise RecordingError("the columns are divided by semicolons", where=f"{path}:1", hint=FORM)
     if twice := next((name for name in header if header.count(name) > 1), None):
         raise RecordingError(f"two columns are called '{twice}'", where=f"{path}:1", hint="which one is meant?")
-    values = np.array([numbers(row, len(header), f"{path}:{number}") for number, row in enumerate(rows[1:], 2)])
+    values = np.array([numbers(row, len(header), f"{path}:{number}") for number, row in lines[1:]])
     return {name: values[:, column].copy() for column, name in enumerate(header)}

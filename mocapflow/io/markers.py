@@ -88,18 +88,17 @@ def read_trc(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
     return names, positions, table[:, 1].copy(), rate
 
 
-def write_mot(path: Path, columns: Mapping[str, F64], time: F64, in_degrees: bool = True) -> None:
+def write_mot(path: Path, columns: Mapping[str, F64], time: F64) -> None:
     """Write coordinates over time, with OpenSim's names and signs.
 
     Args:
         path: the file.
-        columns: each (T,); angles in degrees (radians if not `in_degrees`), pelvis_tx, _ty, _tz in m.
+        columns: each (T,); angles in degrees, pelvis_tx, _ty, _tz in m.
         time: (T,) s.
-        in_degrees: what the header says of the angles.
     """
     lines = [
         path.stem, "version=1", f"nRows={len(time)}", f"nColumns={len(columns) + 1}",
-        f"inDegrees={'yes' if in_degrees else 'no'}", "endheader", "\t".join(["time", *columns]),
+        "inDegrees=yes", "endheader", "\t".join(["time", *columns]),
     ]  # fmt: skip
     table = np.column_stack([time, *columns.values()])
     lines += ["\t".join(f"{x:.8f}" for x in row) for row in table]
@@ -164,7 +163,7 @@ def read_c3d(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
 def _text(path: Path) -> str:
     if not path.is_file():
         raise RecordingError("no such file", where=str(path))
-    return path.read_text(encoding="utf-8", errors="replace")
+    return path.read_text(encoding="utf-8-sig", errors="replace")
 
 
 def _fitted(cells: Sequence[str], width: int) -> Sequence[str]:

@@ -78,9 +78,11 @@ def _checked(
     points: Sequence[Sequence[str]] | F64, triangles: Sequence[tuple[int, int, int]] | I32, path: Path
 ) -> tuple[F64, I32]:
     try:
-        vertices = np.array(points, np.float64).reshape(-1, 3)
+        vertices = np.array(points, np.float64)
     except ValueError as error:
         raise RecordingError(f"a vertex that is not three numbers: {error}", where=str(path)) from None
+    if len(vertices) and vertices.shape[1:] != (3,):
+        raise RecordingError(f"vertices of {vertices.shape[1]} numbers, not three", where=str(path))
     faces = np.array(triangles, np.int64).reshape(-1, 3)
     if not len(vertices) or not len(faces):
         raise RecordingError(f"{len(vertices)} vertices and {len(faces)} faces: no mesh", where=str(path))

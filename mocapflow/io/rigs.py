@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from mocapflow.assets import Camera
-from mocapflow.geometry.cameras import centre, pinhole, project, undistort
+from mocapflow.geometry.cameras import centre, directions, pinhole, project, undistort
 from mocapflow.io.findings import Finding, note, warning
 from mocapflow.io.findings import error as problem
 from mocapflow.records import F64, Bool
@@ -77,9 +77,8 @@ def _common_view(cameras: Sequence[Camera]) -> Iterator[Finding]:
 def _seen_space(camera: Camera) -> F64:
     """Return points (P, 3) m all over what a camera sees."""
     grid = np.stack(np.meshgrid(*(np.linspace(0, n - 1, RAYS) for n in camera.size)), -1).reshape(-1, 2)
-    rays = np.column_stack([undistort(grid, camera), np.ones(len(grid))]) @ np.linalg.inv(camera.intrinsics).T
-    rotation = camera.camera_from_world[:3, :3]
-    points: F64 = (DEPTHS[:, None, None] * (rays @ rotation)).reshape(-1, 3) + centre(camera)
+    rays = directions(undistort(grid, camera), camera)
+    points: F64 = (DEPTHS[:, None, None] * rays).reshape(-1, 3) + centre(camera)
     return points
 
 

@@ -19,7 +19,7 @@ from mocapflow.testing.same import assert_pure
 
 
 class GarmentConformance(Conformance):
-    """A garment; `body` is what it is sewn on."""
+    """A garment, sewn on the body of `make_body`."""
 
     role = "garment"
     garment: Garment
@@ -29,7 +29,7 @@ class GarmentConformance(Conformance):
         return tiny_body()
 
     def sewn(self) -> GarmentMesh:
-        """Return the garment sewn twice on the body, once checked for purity."""
+        """Return the garment sewn on the body; it is sewn twice, to see that it is pure."""
         return assert_pure(self.garment.sew, self.make_body())  # type: ignore[no-any-return]
 
     def test_indices_are_in_range(self) -> None:
@@ -69,7 +69,7 @@ class GarmentConformance(Conformance):
         assert away.max() < 0.10, f"a pin is {away.max():.3f} m from the skin"
 
     def test_rings_and_parameters(self) -> None:
-        """Lengths of links are positive; each parameter has a name and a range that holds its rest value, zero."""
+        """Lengths of links are positive; each parameter has a name and a range."""
         mesh = self.sewn()
         assert (mesh.ring_length > 0).all()
         assert len(set(mesh.parameter_names)) == len(mesh.parameter_names) == len(mesh.parameter_bounds)

@@ -62,8 +62,7 @@ def tiny_model(scene: Scene) -> ClothedModel:
 
 def tiny_cloth(scene: Scene, pose: Pose) -> Cloth:
     """Return the cloth of the tiny scene at a pose, at rest."""
-    parameters = np.zeros(0 if scene.garment is None else len(scene.garment.parameter_names))
-    return tiny_model(scene).drape(pose, parameters, Past())
+    return tiny_model(scene).drape(pose, scene.calm, Past())
 
 
 def tiny_past(scene: Scene, *poses: Pose) -> Past:

@@ -89,7 +89,7 @@ def floor_points(camera: Camera, height: float) -> F64:
     """Return where the ray of each pixel meets the floor: (H, W, 2) m, NaN above the horizon."""
     width, rows = int(camera.size[0]), int(camera.size[1])
     u, v = np.meshgrid(np.arange(width), np.arange(rows))
-    rays = np.stack([u, v, np.ones_like(u)], -1) @ np.linalg.inv(camera.intrinsics).T @ camera.camera_from_world[:3, :3]
+    rays = cameras.directions(np.stack([u, v], -1).astype(float), camera)
     place = cameras.centre(camera)
     down = np.where(rays[..., 2] < -1e-3, rays[..., 2], np.nan)
     points: F64 = place[:2] + ((height - place[2]) / down)[..., None] * rays[..., :2]

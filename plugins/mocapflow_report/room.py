@@ -124,7 +124,6 @@ class Room:
 def _frustum(camera: Camera, floor: float) -> F64:
     """Return the centre of a camera, the corners of what it sees at a depth, and the floor below it: (6, 3) m."""
     width, height = camera.size
-    corners = np.array([[0, 0, 1], [width, 0, 1], [width, height, 1], [0, height, 1.0]])
-    rays = corners @ np.linalg.inv(camera.intrinsics).T @ camera.camera_from_world[:3, :3]
+    rays = cameras.directions(np.array([[0, 0], [width, 0], [width, height], [0, height]], float), camera)
     centre = cameras.centre(camera)
     return np.vstack([centre, centre + DEPTH * rays, [*centre[:2], floor]])
