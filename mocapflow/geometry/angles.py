@@ -6,6 +6,7 @@ Hip flexion is the angle of the thigh from straight down in the pelvis' own sagi
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -70,6 +71,15 @@ def three_point(positions: F64) -> F64:
     a, b = positions[..., 1, :] - positions[..., 0, :], positions[..., 2, :] - positions[..., 1, :]
     angle: F64 = np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), np.sum(a * b, axis=-1)))
     return angle
+
+
+def between_centres(places: Mapping[str, F64]) -> dict[str, F64]:
+    """Return the three-point angles (T,) in degrees that joint centres (T, 3) by name allow."""
+    return {
+        wish.name: three_point(np.stack([places[point] for point in wish.points], axis=1)) + wish.offset
+        for wish in definitions(tuple(places))
+        if len(wish.points) == 3
+    }
 
 
 def anatomical_axes(body: Body) -> F64:

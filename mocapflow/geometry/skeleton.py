@@ -30,6 +30,11 @@ class Skeleton(NamedTuple):
         return np.asarray(self.positions[joint] - self.positions[parent]) if parent >= 0 else np.zeros(3)
 
 
+def unsided(name: str) -> str:
+    """Return the name of a joint without its side."""
+    return name.removesuffix("_l").removesuffix("_r")
+
+
 def skeleton_of(body: Body) -> Skeleton:
     """Return the skeleton of a body."""
     return Skeleton(body.joint_names, body.parents, body.positions)

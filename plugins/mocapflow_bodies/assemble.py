@@ -9,9 +9,9 @@ import numpy as np
 from mocapflow.assets import Body
 from mocapflow.errors import RecordingError
 from mocapflow.geometry.meshes import edges
-from mocapflow.geometry.skeleton import Skeleton
+from mocapflow.geometry.skeleton import Skeleton, unsided
 from mocapflow.records import F64, I32, Bool
-from mocapflow_bodies.joints import base, screws
+from mocapflow_bodies.joints import screws
 from mocapflow_bodies.weights import strongest
 
 Part = Literal["full", "legs", "arms"]
@@ -61,7 +61,7 @@ def cut_out(faces: I32, skeleton: Skeleton, weights: F64, kept: tuple[str, ...])
     Raises:
         RecordingError: a kept joint hangs below one that goes, or nothing is left.
     """
-    stays = np.array([base(name) in kept for name in skeleton.names])
+    stays = np.array([unsided(name) in kept for name in skeleton.names])
     inside = weights[:, stays].sum(axis=1) > 0.5 * weights.sum(axis=1)
     whole = inside[faces].all(axis=1)
     lost = [j for j in np.flatnonzero(stays & (skeleton.parents >= 0)) if not stays[skeleton.parents[j]]]

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mocapflow.geometry import twists
-from mocapflow.geometry.skeleton import Skeleton
+from mocapflow.geometry.skeleton import Skeleton, unsided
 from mocapflow.records import F64, I32
 from mocapflow_bodies.axes import joint_axes, rest_bend
 
@@ -87,7 +87,7 @@ def screws(skeleton: Skeleton) -> Screws:
         name, available = skeleton.names[joint], joint_axes(skeleton, int(joint))
         for dof in table_row(name):
             axis = -available[dof.axis[1:]] if dof.axis.startswith("-") else available[dof.axis]
-            from_rest = dof.name == "flexion" and base(name) in FROM_STRAIGHT
+            from_rest = dof.name == "flexion" and unsided(name) in FROM_STRAIGHT
             bend = rest_bend(skeleton, int(joint), axis) if from_rest else 0.0
             names.append(f"{name}.{dof.name}")
             axes.append(axis)
@@ -103,11 +103,6 @@ def screws(skeleton: Skeleton) -> Screws:
     )
 
 
-def base(name: str) -> str:
-    """Return the name of a joint without its side."""
-    return name.removesuffix("_l").removesuffix("_r")
-
-
 def table_row(name: str) -> tuple[Dof, ...]:
     """Return the degrees of freedom of a joint by its name."""
-    return TABLE.get(base(name), BALL)
+    return TABLE.get(unsided(name), BALL)

@@ -14,6 +14,7 @@ from mocapflow.assets import Body, GarmentMesh
 from mocapflow.geometry.kinematics import descendants
 from mocapflow.records import F32, F64, I32, Bool, array, record
 
+SLACK = 0.01  # m that a part's interpolated field may say "inside" beyond the ball around its skin
 MARGIN = 0.06  # m around a part in which its field is stored; farther out the distance to its box is used
 OVERLAP = 1.5  # voxels by which neighbouring parts overlap
 BLOCK = 512  # points measured against all planes of a hull at once: what stays in cache
@@ -61,7 +62,7 @@ def build_fields(body: Body, joints: I32, voxel: float) -> BodyFields:
         shape=np.array([values.shape for _, values in parts], np.int32),
         offset=np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int32),
         centre=np.array([centre for centre, _ in balls]),
-        radius=np.array([radius + MARGIN / 6 for _, radius in balls]),
+        radius=np.array([radius + SLACK for _, radius in balls]),
         values=np.concatenate([values.ravel() for _, values in parts]).astype(np.float32),
         voxel=voxel,
     )

@@ -64,7 +64,9 @@ def draw_cycles(path: Path, strides: Mapping[str, Mapping[str, F64]]) -> Path:
 
 def draw_sticks(path: Path, ours: Stick, theirs: Stick, frame: F64) -> Path:
     """Draw both stick models in a few of the frames (T,), seen from the front and from the side."""
-    known = np.flatnonzero(np.isfinite(theirs.places).all(axis=(1, 2)))
+    drawn = sorted({joint for bone in theirs.bones() for joint in bone})
+    seen = np.isfinite(theirs.places[:, drawn]).all(axis=2).sum(axis=1)
+    known = np.flatnonzero(seen == seen.max(initial=1))  # some points may never be seen
     rows = known[np.linspace(0, len(known) - 1, MOMENTS).round().astype(int)] if len(known) else np.array([], int)
     figure, every = panels(2 * MOMENTS, MOMENTS, 3.0, subplot_kw={"aspect": "equal"})
     for panel in every:
@@ -90,12 +92,10 @@ def _draw_bones(panel: Any, stick: Stick, flat: F64, colour: str, label: str) ->
 
 
 def _across(stick: Stick, row: int) -> F64:
-    """Return the level direction from the right to the left hip; the world's x where there are none."""
-    if not {"hip_l", "hip_r"} <= set(stick.names):
-        return np.array([1.0, 0.0, 0.0])
-    left = stick.places[row, stick.names.index("hip_l")] - stick.places[row, stick.names.index("hip_r")]
-    level: F64 = left * [1.0, 1.0, 0.0] / np.linalg.norm(left[:2])
-    return level
+    """Return the level direction from the right to the left hip; the world's x where they are not known."""
+    at = dict(zip(stick.names, stick.places[row], strict=True))
+    left: F64 = at.get("hip_l", np.full(3, np.nan)) - at.get("hip_r", np.full(3, np.nan))
+    return left * [1.0, 1.0, 0.0] / np.linalg.norm(left[:2]) if np.isfinite(left).all() else np.array([1.0, 0.0, 0.0])
 
 
 def _common_strides(strides: Sequence[Cycle], ours: F64, reference: F64, name: str) -> dict[str, F64]:

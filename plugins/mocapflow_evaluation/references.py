@@ -123,7 +123,7 @@ def _positions(path: Path, labels: tuple[str, ...], positions: F64, time: F64) -
     """Return the angles between joint centres that a file has, or that its markers tell."""
     known = {f"{s.upper()}{name}": f"{ours}_{s}" for name, ours in POSE2SIM.items() for s in ("l", "r")}
     names = tuple(known.get(label, label) for label in labels)
-    curves = _between(names, positions)
+    curves = angles.between_centres(dict(zip(names, np.moveaxis(positions, 1, 0), strict=True)))
     notes: tuple[str, ...] = ()
     if not curves:
         marks = {name: positions[:, index] for name, index in landmarks(labels, path.parent).items()}
@@ -137,17 +137,9 @@ def _positions(path: Path, labels: tuple[str, ...], positions: F64, time: F64) -
                 "these are neither joint centres nor markers that are known", where=str(path), hint=hint
             )
         positions = np.stack(list(centres.values()), axis=1)
-        curves = _between(names, positions) | _about_axes(marks, centres)
+        curves = angles.between_centres(centres) | _about_axes(marks, centres)
         notes = (f"joint centres and knee axes from {len(marks)} markers on bony landmarks",)
     return Reference(curves=curves, at=time, by_frame=False, joint_names=names, joints=positions, notes=notes)
-
-
-def _between(names: tuple[str, ...], positions: F64) -> dict[str, F64]:
-    return {
-        wish.name: angles.three_point(positions[:, [names.index(p) for p in wish.points]]) + wish.offset
-        for wish in angles.definitions(names)
-        if len(wish.points) == 3
-    }
 
 
 def _about_axes(marks: Mapping[str, F64], centres: Mapping[str, F64]) -> dict[str, F64]:

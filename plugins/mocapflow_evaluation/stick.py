@@ -40,7 +40,8 @@ def constant(stick: Stick) -> Stick:
         if {start, end} <= set(measured):
             along = measured[end] - measured[start]
             length = np.linalg.norm(along, axis=1, keepdims=True)
-            laid[end] = laid[start] + along / length * np.nanmedian(length)
+            usual = np.nanmedian(length) if np.isfinite(length).any() else np.nan
+            laid[end] = laid[start] + along / length * usual
     return Stick(names=stick.names, places=np.stack([laid[name] for name in stick.names], axis=1))
 
 

@@ -23,7 +23,7 @@ def misgivings(track: Track, cameras: Sequence[str]) -> list[str]:
     median = overlap_medians(track)
     for index, (camera, own) in enumerate(zip(cameras, median, strict=True)):
         others = middle(np.delete(median, index))
-        if own < min(APART, others - BEHIND):
+        if own < APART and own < others - BEHIND:  # not where there are no others
             said.append(
                 f"{camera} shows something else than the other views: overlap {own:.2f} there, {others:.2f} in them; "
                 "is its calibration right, and its video its own?"

@@ -46,6 +46,9 @@ class AlignCameras(Stage):
         pixels = np.concatenate([person.pixels for person in people], axis=1)
         confidence = np.concatenate([person.confidence for person in people], axis=1)
         shared = (confidence > 0.3).sum(axis=0) >= min(3, len(cameras))  # two views nearly always agree
+        if not shared.any():
+            LOG.warning("no keypoint is seen by three cameras: nothing tells whether they have turned")
+            return Rig(cameras=cameras)
         turned = self._turned(cameras, pixels[:, shared], np.where(confidence > 0.3, confidence, 0.0)[:, shared])
         shifts = [shift_px(old, new) for old, new in zip(cameras, turned, strict=True)]
         said = ", ".join(f"{camera.name} {shift:.1f} px" for camera, shift in zip(cameras, shifts, strict=True))

@@ -10,7 +10,7 @@ from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.recording import Recording
 from mocapflow_fitting.keypoint_fit import Seen
-from mocapflow_fitting.keypoint_layouts import LAYOUTS, Layout, layout_of
+from mocapflow_fitting.keypoint_layouts import LAYOUTS, Layout, layout_of, rows_of
 from mocapflow_fitting.person import Person, find_person
 
 LEAST_POINTS = 8  # triangulated keypoints that make a usable frame
@@ -61,14 +61,22 @@ def persons(recording: Recording, indices: Sequence[int], cameras: Sequence[Came
 
 
 def layout(recording: Recording, indices: Sequence[int], wanted: Layout | None) -> tuple[str, ...]:
-    """Return the names of the keypoints, in the order of the files."""
+    """Return the names of the keypoints, in the order of the files.
+
+    Raises:
+        RecordingError: their number is that of no layout, or of two that these frames do not tell apart.
+    """
     detections = [points for index in indices for view in recording.people(index) for points in view]
-    return LAYOUTS[wanted or layout_of(detections)]
+    told = wanted or layout_of(detections)
+    if told is None:
+        message = "25 keypoints may be BODY_25 or BODY_25B: neither hips nor shoulders are seen that would tell"
+        raise RecordingError(message, where=str(recording.folder / "keypoints"), hint="set `layout` of the stage")
+    return LAYOUTS[told]
 
 
 def seen(person: Person, names: Sequence[str], wanted: Sequence[str]) -> Seen:
     """Return a person's keypoints (named `names`) in the order of the landmarks `wanted`."""
-    row = np.array([names.index(name) if name in names else -1 for name in wanted])
+    row = rows_of(names, wanted)
     known = row >= 0
     return Seen(
         position=np.where(known[:, None], person.points.position[row], np.nan),

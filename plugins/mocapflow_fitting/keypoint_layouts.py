@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 import numpy as np
 
 from mocapflow.errors import RecordingError
-from mocapflow.records import F64
+from mocapflow.records import F64, I32
 
 Layout = Literal["body_25", "body_25b", "halpe_26", "coco_17"]
 FACE = ("nose", "eye_l", "eye_r", "ear_l", "ear_r")
@@ -30,18 +30,21 @@ LAYOUTS: Mapping[Layout, tuple[str, ...]] = {
     "coco_17": (*FACE, *PAIRS),
 }  # fmt: skip
 
+MIDWAY = ((8, 9, 12, 0.03), (1, 2, 5, 0.05))  # of BODY_25: hips, shoulders; off by a share of the person's size
 
-def layout_of(detections: list[F64]) -> Layout:
-    """Return the layout of detections, each (K, 3) px, px, confidence.
 
-    BODY_25 and BODY_25B both have 25 points: in the first, point 8 lies midway between points 9 and 12, the hips.
+def layout_of(detections: list[F64]) -> Layout | None:
+    """Return the layout of detections, each (K, 3) px, px, confidence; None: too little is seen to tell two apart.
+
+    BODY_25 and BODY_25B both have 25 points: in the first, point 8 lies midway between points 9 and 12, the hips, and
+    point 1 between points 2 and 5, the shoulders.
 
     Raises:
         RecordingError: no layout has that many points.
     """
     counts = {len(points) for points in detections}
     if counts == {25}:
-        return "body_25" if _has_mid_hip(np.stack(detections)) else "body_25b"
+        return _of_25(np.stack(detections))
     for name, points in LAYOUTS.items():
         if counts == {len(points)}:
             return name
@@ -50,9 +53,17 @@ def layout_of(detections: list[F64]) -> Layout:
     raise RecordingError(f"{what}: the layout of the keypoints is not known", hint=f"known layouts: {known}")
 
 
-def _has_mid_hip(points: F64) -> bool:
-    seen = points[(points[:, [1, 8, 9, 12], 2] > 0).all(axis=1)][..., :2]
-    if not len(seen):
-        return False
-    off = np.linalg.norm(seen[:, 8] - (seen[:, 9] + seen[:, 12]) / 2, axis=1)
-    return bool(np.median(off / np.linalg.norm(seen[:, 8] - seen[:, 1], axis=1)) < 0.1)
+def rows_of(listed: Sequence[str], wanted: Sequence[str]) -> I32:
+    """Return where each wanted name stands in a list, -1 where it does not."""
+    return np.array([listed.index(name) if name in listed else -1 for name in wanted], np.int32)
+
+
+def _of_25(points: F64) -> Layout | None:
+    """Return the layout of detections (N, 25, 3), by a point that in BODY_25 lies midway between two others."""
+    for middle, one, other, share in MIDWAY:
+        known = points[(points[:, [middle, one, other], 2] > 0).all(axis=1)]
+        if len(known):
+            size = [np.ptp(person[person[:, 2] > 0, :2], axis=0).max() for person in known]
+            off = known[:, middle, :2] - (known[:, one, :2] + known[:, other, :2]) / 2
+            return "body_25" if np.median(np.linalg.norm(off, axis=1) / size) < share else "body_25b"
+    return None

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mocapflow.assets import Body
-from mocapflow.geometry.skeleton import body_directions, skeleton_of
+from mocapflow.geometry.skeleton import body_directions, skeleton_of, unsided
 from mocapflow.records import F64, I32
 
 # Estimators mark what they see, not joint centres. Fixed offsets, from silhouettes and skin markers of real footage:
@@ -36,7 +36,7 @@ def landmarks(body: Body) -> Landmarks:
     directions = body_directions(skeleton)
     points: dict[str, tuple[int, F64]] = {}
     for joint, name in enumerate(body.joint_names):
-        base = name.removesuffix("_l").removesuffix("_r")
+        base = unsided(name)
         if base in {"shoulder", "elbow", "wrist", "hip", "knee", "ankle", "neck"}:
             beside = _beside(body, name)
             carrier = max(int(body.parents[joint]), 0) if beside.any() else joint
@@ -45,7 +45,7 @@ def landmarks(body: Body) -> Landmarks:
         points |= _foot(body, directions, side)
     points |= _head(body, directions)
     names = tuple(points)
-    spread = [SPREAD_M.get(name.removesuffix("_l").removesuffix("_r"), SPREAD_ELSEWHERE_M) for name in names]
+    spread = [SPREAD_M.get(unsided(name), SPREAD_ELSEWHERE_M) for name in names]
     carriers = np.array([points[name][0] for name in names], np.int32).reshape(-1)
     vertices = np.array([points[name][1] for name in names]).reshape(-1, 3)
     return Landmarks(names, _carrying(body, vertices, carriers), np.array(spread))

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from mocapflow.assets import Camera
+from mocapflow.errors import RecordingError
+from mocapflow.geometry.cameras import project
 from mocapflow.records import F64, array, record
 from mocapflow_fitting.triangulate import Points, triangulate
 
@@ -33,7 +35,14 @@ def find_person(detections: Sequence[F64], cameras: Sequence[Camera]) -> Person 
 
     Every pair of detections of two cameras proposes a person; each further camera joins with the detection that lies
     closest to the projected points, if any does. A bystander seen by fewer cameras, smaller or less clearly loses.
+
+    Raises:
+        RecordingError: cameras list different keypoints.
     """
+    counts = sorted({people.shape[1] for people in detections if len(people)})
+    if len(counts) > 1:
+        message = f"cameras list {' and '.join(map(str, counts))} keypoints of a person"
+        raise RecordingError(message, hint="use one estimator with one layout for all cameras")
     best: Person | None = None
     seen: set[tuple[int, ...]] = set()
     for a in range(len(cameras)):
@@ -62,8 +71,6 @@ def _joined(detections: Sequence[F64], cameras: Sequence[Camera], pair: dict[int
 
 def _agreement(position: F64, points: F64, camera: Camera) -> float:
     """Return the share of a detection's confidence that lies near the projected points."""
-    from mocapflow.geometry.cameras import project
-
     error = np.linalg.norm(project(position, camera) - points[:, :2], axis=1)
     near = 1 / (1 + (error / scale_of(points)) ** 2)
     return float(np.nansum(points[:, 2] * near) / max(points[:, 2].sum(), 1e-9))

@@ -10,7 +10,7 @@ import numpy as np
 
 from mocapflow.assets import Body
 from mocapflow.geometry import twists
-from mocapflow.geometry.skeleton import body_directions, skeleton_of
+from mocapflow.geometry.skeleton import body_directions, skeleton_of, unsided
 from mocapflow.records import F64
 
 # What can be stretched; `stature` multiplies all, `girth` what lies across the limbs and the depth of the trunk.
@@ -63,7 +63,7 @@ def _stretches(body: Body, factors: Mapping[str, float]) -> F64:
     directions = body_directions(skeleton)
     stretch = np.empty((len(body.parents), 3, 3))
     for joint, name in enumerate(body.joint_names):
-        base = name.removesuffix("_l").removesuffix("_r")
+        base = unsided(name)
         if base in LIMBS:
             bone = skeleton.bone(joint)
             along = np.outer(bone, bone) / (bone @ bone)

@@ -63,7 +63,7 @@ class Cylinder(Garment):
             )
         limb = body.positions[below[0]] - body.positions[joint]
         plane = _across(body.positions[joint] + self.start * limb, limb)
-        outlines = [sections.outline(points) for points in sections.sections(body, plane)]
+        outlines = sections.outlines(body, plane)
         if not outlines:
             raise GarmentError(f"cylinder: there is no body around '{self.joint}'", hint="change `start`")
         limb_outline = min(outlines, key=lambda closed: float(np.linalg.norm(closed.mean(axis=0))))

@@ -49,7 +49,7 @@ def waistband(garment: str, body: Body, height: float, around: float) -> tuple[F
     Raises:
         GarmentError: there is no body at that height or only legs, or the band is far too wide to stay up.
     """
-    outlines = _outlines(body, height)
+    outlines = sections.outlines(body, sections.level(height))
     if not outlines:
         raise GarmentError(
             f"{garment}: there is no body at waist_height_m = {height:.2f}",
@@ -83,17 +83,12 @@ def hip_rings(body: Body, height: float, rows: F64, around: F64, away: float) ->
     """
     around = around.copy()
     for row, below in enumerate(rows):
-        outlines = _outlines(body, height - below)
+        outlines = sections.outlines(body, sections.level(height - below))
         middle = [closed for closed in outlines if _holds_middle(closed, outlines)]
         if not middle:  # the legs have parted
             break
         around[row] = max(around[row], sections.perimeter(middle[0]) + 2 * math.pi * away)
     return np.maximum.accumulate(around)
-
-
-def _outlines(body: Body, height: float) -> list[F64]:
-    """Return the outlines (N, 2) m of all that a level plane cuts."""
-    return [sections.outline(points) for points in sections.sections(body, sections.level(height))]
 
 
 def _holds_middle(closed: F64, outlines: list[F64]) -> bool:

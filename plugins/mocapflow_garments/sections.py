@@ -62,6 +62,11 @@ def outline(points: F64) -> F64:
     return outline
 
 
+def outlines(body: Body, plane: Plane) -> list[F64]:
+    """Return the outlines (N, 2) m of all that a plane cuts of the rest body."""
+    return [outline(points) for points in sections(body, plane)]
+
+
 def perimeter(closed: F64) -> float:
     """Return the length of a closed polygon (N, 2)."""
     return float(np.linalg.norm(closed - np.roll(closed, 1, axis=0), axis=1).sum())

@@ -111,8 +111,7 @@ class Shorts(Garment):
         rows: F64 = waist[:, None] * (1 - share) + seam[:, None] * share
         for row in range(1, crotch):
             height = float(rows[:, row, 2].mean())
-            points = sections.sections(body, sections.level(height))
-            torso = max((sections.outline(p) for p in points), key=sections.perimeter)
+            torso = max(sections.outlines(body, sections.level(height)), key=sections.perimeter)
             reach = (facing[:, :2] @ torso.T).max(axis=1) + away
             rows[:, row] += np.maximum(reach - (rows[:, row] * facing).sum(axis=1), 0.0)[:, None] * facing
         return rows
@@ -128,7 +127,8 @@ class Shorts(Garment):
             plane = sections.level(height, start)
             closed = _leg(body, side, height, start)
             tape = sections.perimeter(closed)
-            away = pattern.room(self.name, "leg_opening_circumference_m", length, tape)
+            measure = f"the leg above a leg_opening_circumference_m of {self.leg_opening_circumference_m:.2f} m"
+            away = pattern.room(self.name, measure, length, tape)
             rows.append(plane.lift(sections.band(closed, away, self.strands, 0.5)[0]))
             least.append(tape + 2 * math.pi * pattern.EASE)
         return np.stack(rows, axis=1), np.array(least)
@@ -149,7 +149,7 @@ def _leg(body: Body, side: float, height: float, start: float) -> F64:
     """Return the outline (N, 2) of the leg on one side; where thighs still touch, that of where they part below."""
     for lower in np.linspace(0.0, TOUCHING, 11):
         plane = sections.level(height - lower, start)
-        outlines = [sections.outline(points) for points in sections.sections(body, plane)]
+        outlines = sections.outlines(body, plane)
         legs = [o for o in outlines if side * plane.lift(o)[:, 0].mean() > 0.02 and sections.perimeter(o) > 0.2]
         if legs:
             return min(legs, key=lambda o: abs(plane.lift(o)[:, 0].mean()))

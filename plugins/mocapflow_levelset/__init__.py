@@ -1,4 +1,4 @@
-"""Segmenters: the chapter's level set, the difference to the empty scene, and grabCut for comparison."""
+"""Segmenters: the chapter's level set, with contours inside it or without, difference to the empty scene, grabCut."""
 
 from __future__ import annotations
 

@@ -20,11 +20,12 @@ from mocapflow_levelset.evolve import Rhythm, Weights
 from mocapflow_levelset.levelset import INNER_BAND_PX, PERSON
 from mocapflow_levelset.masks import counted
 from mocapflow_levelset.plates import Plate, Shadow, density_of, plate_of
-from mocapflow_levelset.shadows import floor_around
+from mocapflow_levelset.shadows import REACH_M, floor_around
 from mocapflow_levelset.statistics import Window
 from mocapflow_levelset.view import Empty, Level, Method, View, find
 
 CHANNELS: tuple[ChannelName, ...] = ("lab",)
+USUAL = Shadow()
 STRIDE = 2  # of the pixels that the statistics are taken from
 REFINE_STEPS = 4  # against the plate, then as many with local statistics on both sides
 
@@ -37,13 +38,17 @@ class BackgroundDifference(Segmenter):
 
     name: ClassVar[str] = "background"
 
-    spread_floor: PositiveFloat = 0.012  # smallest standard deviation of the empty scene, share of the range
-    shadow_share: Annotated[float, Field(ge=0, lt=1)] = 0.2  # of the background; 0: shadows count as the person
-    shadow_reach_m: PositiveFloat = 2.0  # shadows fall on the floor within this distance of the person
-    darkest_shadow: Annotated[float, Field(gt=0, lt=1)] = 0.5  # factor of L + 16, a and b in the deepest shadow
-    shadow_chroma: PositiveFloat = 0.005  # how far a shadow may be off the plate's chromaticity, share of the range
+    spread_floor: PositiveFloat = USUAL.floor  # smallest standard deviation of the empty scene, share of the range
+    shadow_share: Annotated[float, Field(ge=0, lt=1)] = USUAL.share  # of the background; 0: shadows count as the person
+    shadow_reach_m: PositiveFloat = REACH_M  # shadows fall on the floor within this distance of the person
+    darkest_shadow: Annotated[float, Field(gt=0, lt=1)] = (
+        USUAL.darkest
+    )  # factor of L + 16, a and b in the deepest shadow
+    shadow_chroma: PositiveFloat = (
+        USUAL.chroma
+    )  # how far a shadow may be off the plate's chromaticity, share of the range
     smooth_px: PositiveFloat = 1.0  # of the evidence before it is cut
-    hole_px: NonNegativeInt = 120  # holes up to this area are filled, in square px
+    hole_px2: NonNegativeInt = 120  # holes up to this area are filled
     reach_px: NonNegativeFloat = 60.0  # parts further from the projected model than this are someone else; 0: keep all
     smallest_part: Annotated[float, Field(ge=0, le=1)] = 0.01  # of the largest part's area; smaller parts are noise
     length_weight: NonNegativeFloat = 0.5  # of the boundary's length in the refinement
@@ -120,7 +125,7 @@ class BackgroundDifference(Segmenter):
         count, label, stats, _ = cv2.connectedComponentsWithStats((~person).astype(np.uint8), connectivity=8)
         whole = stats[:, cv2.CC_STAT_AREA]
         within = np.bincount(label.ravel(), weights=(model > 0).ravel(), minlength=count)
-        small = (whole <= self.hole_px) | (within > 0.8 * whole)  # the model says where the body has no hole
+        small = (whole <= self.hole_px2) | (within > 0.8 * whole)  # the model says where the body has no hole
         small[0] = False
         kept: Bool = person | small[label]
         return kept

@@ -65,9 +65,9 @@ class Layered(LevelSet):
         if COLOURS not in past.appearance:
             return None
         layers, known, search = layer_of(scene), shown(past), self._search(turn)
-        told = told_apart(scene, layers, known)
+        findable = told_apart(scene, layers, known)
         parts = [
-            inner_contours(frame.images[s.camera], s, surface, scene.cameras[s.camera], layers, told, known, search)
+            inner_contours(frame.images[s.camera], s, surface, scene.cameras[s.camera], layers, findable, known, search)
             for s in found.of(PERSON)
         ]
         return pool([(1.0, part) for part in parts]) if parts else None

@@ -13,6 +13,7 @@ import numpy as np
 
 from mocapflow.assets import Camera
 from mocapflow.data import Frame, Past, Silhouette, Surface
+from mocapflow.geometry.skeleton import unsided
 from mocapflow.geometry.visibility import front_vertices
 from mocapflow.once import once
 from mocapflow.records import F32, F64, I32, Bool
@@ -40,7 +41,7 @@ class Shown(NamedTuple):
 def layer_of(scene: Scene) -> I32:
     """Return the layer (N,) of each surface vertex: that of the joint that moves it, sides together; cloth is last."""
     body = scene.body
-    names = [name.removesuffix("_l").removesuffix("_r") for name in body.joint_names]
+    names = [unsided(name) for name in body.joint_names]
     _, of_joint = np.unique(names, return_inverse=True)
     cloth = 0 if scene.garment is None else len(scene.garment.vertices)
     layers = np.concatenate([of_joint[body.main_joint], np.full(cloth, of_joint.max() + 1)])

@@ -22,10 +22,11 @@ from mocapflow_levelset.evolve import Rhythm, Weights
 from mocapflow_levelset.masks import counted, without_cut
 from mocapflow_levelset.moved import moved_outline
 from mocapflow_levelset.plates import Plate, Shadow, plate_of
-from mocapflow_levelset.shadows import floor_around
+from mocapflow_levelset.shadows import REACH_M, floor_around
 from mocapflow_levelset.statistics import Window
 from mocapflow_levelset.view import Contact, Empty, Level, Matte, Method, View, find
 
+USUAL = Shadow()
 Share = Annotated[float, Field(ge=0, lt=1)]
 
 PERSON = "person"
@@ -58,7 +59,6 @@ class LevelSet(Segmenter):
     length_weight: NonNegativeFloat = 0.9  # nu; explicit steps are stable below 0.94
     shape_weight: NonNegativeFloat = 0.05  # lambda: 0.05 clean, 0.1 with occlusion, 0.1-0.3 in heavy noise, 0 uncoupled
     ratio_clip: PositiveFloat = 6.0  # bound on log p1/p2
-    time_step: PositiveFloat = 1.0  # of the explicit scheme
     coarse_steps: NonNegativeInt = 8  # at a quarter of the size, on the first turn
     half_steps: NonNegativeInt = 4  # at half the size
     steps: PositiveInt = 3  # at full size
@@ -73,12 +73,16 @@ class LevelSet(Segmenter):
     border_px: NonNegativeInt = 3  # left out at the image's border
     margin_px: PositiveInt = 40  # of the crop around the start contour
     use_background: bool = True  # take the outside's density from the empty scene, where it is known
-    spread_floor: PositiveFloat = 0.012  # smallest standard deviation of the empty scene, share of the range
+    spread_floor: PositiveFloat = USUAL.floor  # smallest standard deviation of the empty scene, share of the range
     calm_px: NonNegativeFloat = 1.0  # smoothing of the image before it is compared with the empty scene
     shadow_share: Share = 0.5  # of the background; 0: shadows count as changes
-    shadow_reach_m: PositiveFloat = 2.0  # shadows fall on the floor within this distance of the person
-    darkest_shadow: Annotated[float, Field(gt=0, lt=1)] = 0.5  # factor of L + 16, a and b in the deepest shadow
-    shadow_chroma: PositiveFloat = 0.005  # how far a shadow may be off the plate's chromaticity, share of the range
+    shadow_reach_m: PositiveFloat = REACH_M  # shadows fall on the floor within this distance of the person
+    darkest_shadow: Annotated[float, Field(gt=0, lt=1)] = (
+        USUAL.darkest
+    )  # factor of L + 16, a and b in the deepest shadow
+    shadow_chroma: PositiveFloat = (
+        USUAL.chroma
+    )  # how far a shadow may be off the plate's chromaticity, share of the range
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
         """Return the person's silhouette in each usable view.
@@ -178,7 +182,7 @@ class LevelSet(Segmenter):
                 length=self.length_weight,
                 shape=self.shape_weight,
                 clip=self.ratio_clip,
-                step=self.time_step,
+                step=1.0,  # `length_weight` is stable with it
                 band_px=INNER_BAND_PX,
             ),
             shadow=Shadow(self.spread_floor, self.shadow_share, self.darkest_shadow, self.shadow_chroma),

@@ -38,7 +38,10 @@ def without_cut(counts: Bool, model: F32, body: Body, surface: Surface, camera: 
     if not body.cut.any():
         return counts
     pixels = project(surface.vertices[: len(body.vertices)][body.cut], camera)
-    hull = cv2.convexHull(pixels[np.isfinite(pixels).all(axis=1)].astype(np.float32))
+    pixels = pixels[np.isfinite(pixels).all(axis=1)].astype(np.float32)
+    if not len(pixels):  # behind the camera
+        return counts
+    hull = cv2.convexHull(pixels)
     off_rim = np.ones(counts.shape, np.uint8)
     cv2.fillConvexPoly(off_rim, np.rint(hull).astype(np.int32), 0)
     to_rim = cv2.distanceTransform(off_rim, cv2.DIST_L2, 5)

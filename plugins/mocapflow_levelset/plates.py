@@ -26,10 +26,10 @@ LOG_ROOT = np.float32(-0.5 * np.log(2 * np.pi))
 class Shadow(NamedTuple):
     """What counts as background, lit or in a shadow."""
 
-    floor: float  # smallest standard deviation of the empty scene, share of a channel's range
-    share: float  # prior share of shadow on the background; 0 switches the suppression off
-    darkest: float  # smallest factor k of (L + 16, a, b)
-    chroma: float  # standard deviation of the distance to the ray, share of a channel's range
+    floor: float = 0.012  # smallest standard deviation of the empty scene, share of a channel's range
+    share: float = 0.2  # prior share of shadow on the background; 0 switches the suppression off
+    darkest: float = 0.5  # smallest factor k of (L + 16, a, b)
+    chroma: float = 0.005  # standard deviation of the distance to the ray, share of a channel's range
 
 
 class Plate(NamedTuple):
@@ -46,7 +46,7 @@ class Plate(NamedTuple):
 
 def plate_of(mean: F32, spread: F32, channels: Sequence[ChannelName], factor: int = 1) -> Plate:
     """Return a plate, at 1 / factor of its size, from mean and spread (H, W, 3) in grey levels."""
-    mean, spread = crops.shrink_values(mean, factor), crops.shrink_values(spread, factor) / np.float32(255)
+    mean, spread = crops.shrink(mean, factor), crops.shrink(spread, factor) / np.float32(255)
     levels = np.clip(np.rint(mean), 0, 255).astype(np.uint8)
     return Plate(features(levels, channels), np.sqrt(np.mean(spread * spread, axis=2)))
 

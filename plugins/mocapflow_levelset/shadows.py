@@ -11,6 +11,7 @@ from mocapflow.once import once
 from mocapflow.records import F64, Bool
 
 CORNERS = 72
+REACH_M = 2.0  # from the person, where their shadow may fall
 
 
 @once
@@ -23,7 +24,7 @@ def _circle(surface: Surface, radius_m: float) -> F64:
     return np.column_stack([circle, np.full(CORNERS, feet)])
 
 
-def floor_around(surface: Surface, camera: Camera, reach_m: float) -> Bool:
+def floor_around(surface: Surface, camera: Camera, reach_m: float = REACH_M) -> Bool:
     """Return True for pixels (H, W) that show the floor within reach of the person.
 
     The floor is the horizontal plane through the lowest point of the posed surface. Elsewhere, a darker pixel of

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from mocapflow_fitting.keypoint_layouts import LAYOUTS, Layout, layout_of
+from mocapflow_fitting.keypoint_layouts import LAYOUTS, Layout, layout_of, rows_of
 from mocapflow_fitting.landmarks import landmarks
 from mocapflow_fitting.person import scale_of
 from mocapflow_fitting.triangulate import triangulate
@@ -61,10 +61,10 @@ class Keypoints(Matcher):
         assert frame.keypoints is not None
         people = [points for view in frame.keypoints for points in view]
         seen = np.zeros((len(image), len(names), 3))
-        if not people:
+        layout = self.layout or (layout_of(people) if people else None)
+        if layout is None:
             return seen
-        listed = LAYOUTS[self.layout or layout_of(people)]
-        row = np.array([listed.index(name) if name in listed else -1 for name in names])
+        row = rows_of(LAYOUTS[layout], names)
         for index, (view, projected) in enumerate(zip(frame.keypoints, image, strict=True)):
             ordered = [np.where(row[:, None] >= 0, points[row], 0.0) for points in view]
             if frame.usable[index] and ordered:

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import NonNegativeFloat, NonNegativeInt, PositiveFloat
 
 from mocapflow.components import Matcher, pool
-from mocapflow.data import CLOTH, Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn
+from mocapflow.data import CLOTH, Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn, empty_matches
 from mocapflow.geometry import silhouettes
 from mocapflow.records import F32, F64, Bool
 from mocapflow.scene import Scene
@@ -74,6 +74,8 @@ class OpticalFlow(Matcher):
         camera = scene.cameras[silhouette.camera]
         boundary = silhouettes.outline(surface, camera)
         model = silhouettes.samples(boundary, surface, camera, self.spacing_px)
+        if not len(model.pixel):  # it has left the view
+            return empty_matches()
         shrink = int(np.ceil(camera.size.max() / WORKING_SIDE))
         covered, shown = silhouettes.mask(boundary, camera), silhouette.distance > 0
         here, there = (silhouettes.mask_distance(_shrunk(mask, shrink)) for mask in (covered, shown))

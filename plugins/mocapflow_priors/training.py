@@ -12,6 +12,7 @@ from mocapflow.assets import Body
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import angles
 from mocapflow.geometry.joints import angles_from_rotations
+from mocapflow.geometry.skeleton import unsided
 from mocapflow.io import markers
 from mocapflow.io.columns import read_columns
 from mocapflow.records import F64
@@ -67,7 +68,7 @@ def chosen(take: Angles, wanted: Sequence[str]) -> Angles:
 
     def sought(name: str) -> bool:
         joint, _, angle = name.partition(".")
-        joint = joint.removesuffix("_l").removesuffix("_r")
+        joint = unsided(joint)
         return joint in wanted or f"{joint}.{angle}" in wanted
 
     return {name: values for name, values in take.items() if sought(name)}

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mocapflow.errors import RecordingError
-from mocapflow.geometry.angles import three_point
+from mocapflow.geometry.angles import between_centres
 from mocapflow.records import F64
 
 ALIASES: Mapping[str, tuple[str, ...]] = {  # ours: also those of CMU and HDM05 conversions, Mixamo, MotionBuilder
@@ -22,11 +22,6 @@ ALIASES: Mapping[str, tuple[str, ...]] = {  # ours: also those of CMU and HDM05 
     "wrist_l": ("lefthand", "leftwrist", "lwrist"),
     "spine": ("spine", "lowerback", "torso", "chest"),
 }
-CHAINS = {
-    "knee_flexion": ("hip", "knee", "ankle"),
-    "ankle": ("knee", "ankle", "toe"),
-    "elbow": ("shoulder", "elbow", "wrist"),
-}
 
 
 def columns(path: Path) -> dict[str, F64]:
@@ -36,13 +31,8 @@ def columns(path: Path) -> dict[str, F64]:
         RecordingError: the reader of BVH files is not installed, or the file is not whole.
     """
     places = joint_places(path)
-    found: dict[str, F64] = {}
+    found = between_centres(places)
     for side in ("l", "r"):
-        for column, chain in CHAINS.items():
-            names = [f"{joint}_{side}" for joint in chain]
-            if set(names) <= set(places):
-                bend = three_point(np.stack([places[name] for name in names], axis=1))
-                found[f"{column}_{side}"] = bend - 90 if column == "ankle" else bend
         if {"hip_l", "hip_r", "spine", f"knee_{side}"} <= set(places):
             found[f"hip_flexion_{side}"] = hip_flexion(places, side)
     return found

@@ -20,9 +20,8 @@ from mocapflow.once import once
 from mocapflow.records import F32, F64, U8, Bool
 
 CHANNELS: tuple[ChannelName, ...] = ("lab",)
-SHADOW = Shadow(floor=0.012, share=0.2, darkest=0.5, chroma=0.005)
+SHADOW = Shadow()
 EMPTY = 3.0  # standard deviations within which a pixel is that of the empty room
-FLOOR_REACH = 2.0  # m, from the person, where their shadow may fall
 SPECK = 0.01  # of the largest part's area: smaller parts are noise
 MOST = 3.0  # of the model's area: more can't be the person
 SURELY = 1.0  # log density of a colour on the garment over that elsewhere from which on it is the garment's
@@ -79,8 +78,8 @@ def views(frame: Frame, surface: Surface, room: Room, near_m: float, garment: F6
         image, hidden = frame.images[number], frame.hidden_in(int(number))
         factor = image.shape[1] // int(camera.size[0])
         small = crops.shrink(image, factor)
-        changed, same = _compared(small, plate, floor_around(surface, camera, FLOOR_REACH))
-        told = True if hidden is None else crops.shrink_values(hidden.astype(np.float32), factor) == 0
+        changed, same = _compared(small, plate, floor_around(surface, camera))
+        told = True if hidden is None else crops.shrink(hidden.astype(np.float32), factor) == 0
         person = _near(changed & told, model, near_m / size)
         if np.count_nonzero(person) < MOST * np.count_nonzero(model):
             cloth = np.zeros(person.shape, bool) if garment is None else person & (garment[bins_of(small)] > SURELY)

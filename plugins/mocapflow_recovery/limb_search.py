@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Annotated, ClassVar
 
@@ -93,9 +93,10 @@ class LimbSearch(Recovery):
         judge = self._judge(state, result, seen, past, model)
         fit = judge.of(result)
         best = fit
-        looks = ([self._near] if judge.given else []) + ([self._far] if doubtful or not judge.given else [])
+        far = partial(self._far, astray=doubtful)
+        looks = ([self._near] if judge.given else []) + ([far] if doubtful or not judge.given else [])
         for look in looks:
-            found = look(frame.index, state.estimate.pose, fitted, judge, doubtful)
+            found = look(frame.index, state.estimate.pose, fitted, judge)
             best = self._better(judge.of(settle(found, judge.parameters)), best)
         if best is fit:
             return noted(result, f"{why}: search found nothing better", doubted=True) if doubtful else result
@@ -123,7 +124,7 @@ class LimbSearch(Recovery):
     def _doubtful(self, stray: Stray) -> bool:
         return stray.uncovered > self.uncovered_cm2 or stray.floating > self.floating_cm2
 
-    def _near(self, frame: int, believed: Pose, fitted: Pose, judge: Judge, astray: bool) -> Pose:
+    def _near(self, frame: int, believed: Pose, fitted: Pose, judge: Judge) -> Pose:
         """Return the pose that agrees best with the views near the one that was given."""
         body, rng = judge.model.scene.body, np.random.default_rng(frame)
         spread = Spread(2 * np.radians(self.start_deg), np.radians(self.root_spread_deg), self.root_spread_m)

@@ -49,10 +49,9 @@ class Room:
         """Return the image (H, W, 3) BGR of a posed body and cloth vertices (W, 3)."""
         import cv2
 
-        dressed = self._faces is not None and len(cloth) > 0
         canvas = raster.Canvas(self._shadowed(body), self._camera)
         canvas.draw(body.vertices, body.faces, raster.shade(body.vertices, body.faces, SKIN))
-        if self._faces is not None and dressed:
+        if self._faces is not None and len(cloth):
             canvas.veil(cloth, self._faces, raster.shade(cloth, self._faces, GARMENT, two_sided=True), 0.55)
         image = np.clip(255 * canvas.picture, 0, 255).astype(np.uint8)
         self._stick(image, body)

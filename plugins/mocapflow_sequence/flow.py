@@ -17,6 +17,7 @@ from mocapflow.results import ImageFlow, ViewChecks
 
 LEAST_CORNER = 0.005  # share of the best corner's strength
 BLOCK = 5  # px, over which a corner is judged
+SPECK = 5  # px; what differs from the empty scene in less than half of such a square is noise
 
 
 class FollowPoints(Stage):
@@ -88,7 +89,7 @@ class FollowPoints(Stage):
 
         away = cv2.absdiff(picture, np.clip(np.rint(empty), 0, 255).astype(np.uint8))
         different = cv2.max(cv2.max(away[..., 0], away[..., 1]), away[..., 2]) > self.difference
-        return np.asarray(cv2.medianBlur(different.astype(np.uint8), BLOCK), bool)
+        return np.asarray(cv2.medianBlur(different.astype(np.uint8), SPECK), bool)
 
 
 NOTHING = Flow(pixel=np.empty((0, 2), np.float32), displacement=np.empty((0, 2), np.float32))

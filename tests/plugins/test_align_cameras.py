@@ -1,6 +1,7 @@
 """Cameras knocked since their calibration: found and turned back; good cameras are left alone."""
 
 import logging
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -51,6 +52,18 @@ def test_a_knocked_camera_is_turned_back(body, tmp_path, caplog):
     before, after = shift_px(cameras[1], truth[1]), shift_px(found[1], truth[1])
     assert before > 4 and after < 0.35 * before
     assert "cameras have turned since their calibration" in caplog.text
+
+
+def test_what_only_two_cameras_see_tells_nothing(body, tmp_path, caplog):
+    folder = copy_demo(tmp_path / "recording")
+    cameras = open_recording(folder).cameras
+    write(folder, body, walking(body, 8), cameras, noise_px=0.7, bystander=())
+    for view in sorted((folder / "keypoints").iterdir())[2:]:
+        shutil.rmtree(view)
+    with caplog.at_level(logging.WARNING, "mocapflow"):
+        found = AlignCameras(frames=8).run(open_recording(folder, stop=8)).cameras
+    assert all(np.array_equal(a.camera_from_world, b.camera_from_world) for a, b in zip(found, cameras, strict=True))
+    assert "no keypoint is seen by three cameras" in caplog.text
 
 
 def test_the_first_frame_alone_can_do(body, tmp_path):

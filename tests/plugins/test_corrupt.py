@@ -1,5 +1,7 @@
 """Recordings that are disturbed on purpose: what becomes of pictures, and how later stages see it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mocapflow_robustness import pixels
@@ -83,6 +85,13 @@ def test_a_picture_from_elsewhere(clip, event, source):
     camera, index = source
     assert (found.frame(6).images[0] == plain[index][camera]).all()
     assert (found.frame(6).images[1] == plain[6][1]).all()
+
+
+def test_one_camera_has_no_other(clip):
+    whole = open_recording(clip)
+    alone = replace(whole, views=whole.views[:1])
+    with pytest.raises(RecordingError, match="there is no other camera"):
+        Corrupt(events=[dict(what="other_camera")]).run(alone)
 
 
 def test_a_picture_that_is_spoiled_or_missing(clip):

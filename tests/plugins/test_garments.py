@@ -111,6 +111,7 @@ def test_a_skirt_that_can_not_be_says_what_to_do(change, said):
         (dict(inseam_m=0.6), "the inseam"),
         (dict(length_m=1.2), "below the floor"),
         (dict(inseam_m=0.5), "legs have not parted"),
+        (dict(leg_opening_circumference_m=0.1), "leg_opening_circumference_m of 0.10 m is .* m, but the body measures"),
     ],
 )
 def test_shorts_that_can_not_be_say_what_to_do(change, said):

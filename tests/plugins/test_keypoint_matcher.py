@@ -128,5 +128,6 @@ def test_no_keypoints_no_pairs():
     frame = frame_of(POSE)
     assert len(match(replace(frame, keypoints=None)).vertex) == 0
     assert len(match(replace(frame, keypoints=tuple(np.empty((0, 0, 3)) for _ in frame.keypoints))).vertex) == 0
+    assert len(match(replace(frame, keypoints=tuple(np.zeros((1, 25, 3)) for _ in frame.keypoints))).vertex) == 0
     lost = replace(frame, usable=np.array([True, False, True, True]))
     assert set(match(lost).camera) == {0, 2, 3}

@@ -229,6 +229,8 @@ def test_beyond_a_cut_nothing_counts(scene, pose):
     below = np.flatnonzero((model > 0).any(axis=1))[-1]
     assert weight[(first_row + below) // 2].sum() > 0.9 * (weight.shape[1] - 6)
     assert (without_cut(counted(model.shape, 3), model, scene.body, surface, camera) > 0).sum() == 234 * 314
+    behind = replace(camera, camera_from_world=camera.camera_from_world - 20 * np.outer(np.eye(4)[2], np.eye(4)[3]))
+    assert (without_cut(counted(model.shape, 3), model, partial, surface, behind) > 0).sum() == 234 * 314
 
 
 def test_grabcut_repeats_exactly(scene, pose):

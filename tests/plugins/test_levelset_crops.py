@@ -1,7 +1,7 @@
 """Coarser copies of images and level sets."""
 
 import numpy as np
-from mocapflow_levelset.crops import coarser, finer, pyramid, shrink, shrink_values
+from mocapflow_levelset.crops import coarser, finer, pyramid, shrink
 
 
 def test_a_pixel_of_a_shrunken_array_is_the_mean_of_its_square():
@@ -9,7 +9,7 @@ def test_a_pixel_of_a_shrunken_array_is_the_mean_of_its_square():
     for factor in (2, 3, 4):
         height, width = 23 // factor, 14 // factor
         squares = values[: height * factor, : width * factor].reshape(height, factor, width, factor)
-        np.testing.assert_allclose(shrink_values(values, factor), squares.mean(axis=(1, 3)), atol=1e-6)
+        np.testing.assert_allclose(shrink(values, factor), squares.mean(axis=(1, 3)), atol=1e-6)
 
 
 def test_an_image_is_rounded_by_no_more_than_a_level():

@@ -6,7 +6,7 @@ from mocapflow_levelset.evidence import Room, from_image, in_room
 from mocapflow_levelset.islands import runs_of, without_islands
 from mocapflow_levelset.plates import Shadow, plate_of
 
-SHADOW = Shadow(floor=0.012, share=0.2, darkest=0.5, chroma=0.005)
+SHADOW = Shadow()
 
 
 def evidence(image, known=True):

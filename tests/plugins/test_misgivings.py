@@ -17,6 +17,7 @@ def seen(*overlaps, **changes):
 def test_a_good_track_gives_none():
     assert misgivings(seen(0.93, 0.9, 0.85, 0.61), NAMES) == []
     assert misgivings(seen(0.93, np.nan, 0.85, np.nan), NAMES) == []  # dropped cameras
+    assert not any("other views" in said for said in misgivings(seen(0.55, *[np.nan] * 3), NAMES))  # there are none
     assert np.isnan(overlap_medians(seen(0.93, np.nan, 0.85, 0.9))[1])
 
 

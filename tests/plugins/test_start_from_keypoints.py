@@ -58,6 +58,10 @@ def test_body_25_and_25b_are_told_apart(body, pose, cameras):
     by_name["hip_mid"] = (by_name["hip_l"] + by_name["hip_r"]) / 2
     other = np.array([by_name[name] for name in LAYOUTS["body_25"]])
     assert layout_of([b]) == "body_25b" and layout_of([other]) == "body_25"
+    for points, told in ((b, None), (other, "body_25")):  # of the former nobody knows the eyes
+        hipless = np.where(np.arange(25)[:, None] == 12, 0.0, points)  # one of the points that both tell by
+        assert layout_of([hipless]) == told
+    assert layout_of([np.zeros((25, 3))]) is None
     assert layout_of([b[:17]]) == "coco_17"
     with pytest.raises(RecordingError, match="18 keypoints: the layout of the keypoints is not known"):
         layout_of([b[:18]])
@@ -83,6 +87,8 @@ def test_the_person_is_who_reprojects_best(body, pose, cameras):
     detections[2][0][4] = (5.0, 5.0, 0.9)  # one gross error
     person = find_person([np.array(people) for people in detections], cameras)
     assert person.chosen == (1, 0, 0, 0)
+    with pytest.raises(RecordingError, match="cameras list 25 and 26 keypoints"):
+        find_person([np.ones((1, 25, 3)), np.ones((1, 26, 3)), *(np.empty((0, 0, 3)),) * 2], cameras)
     assert find_person([np.array(detections[0]), *(np.empty((0, 0, 3)),) * 3], cameras) is None
 
 

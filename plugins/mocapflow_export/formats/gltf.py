@@ -61,7 +61,7 @@ class Author:
             self._gltf.nodes.append(self._lib.Node(name=name, translation=offset.tolist(), children=[]))
             self._gltf.nodes[parent + 1].children.append(joint + 1)
             quaternion = Rotation.from_matrix(turns[:, joint]).as_quat()
-            flips = np.cumprod(np.sign(np.einsum("ta,ta->t", quaternion[1:], quaternion[:-1])))
+            flips = np.cumprod(np.where(np.einsum("ta,ta->t", quaternion[1:], quaternion[:-1]) < 0, -1.0, 1.0))
             quaternion[1:] *= flips[:, None]  # the shorter way between frames
             self._animate(joint + 1, "rotation", quaternion)
             if parent < 0:

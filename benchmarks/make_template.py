@@ -1,4 +1,4 @@
-"""Packs two subjects with one mesh into the template: `python -m mocapflow_bodies.make_template A B`."""
+"""Packs two subjects with one mesh into the template body: `python benchmarks/make_template.py A B`."""
 
 from __future__ import annotations
 
