@@ -26,12 +26,12 @@ from mocapflow.scene import Scene
 from mocapflow.testing.bodies import tiny_body
 
 
-def literal(body, grid, fixed, step=2.0, iterations=50, limited=True):
+def literal(body, grid, fixed, step=2.0, iterations=50, limited=True, in_space=False):
     """Return a grid (N, L, 3) laid step by step, and what is fixed."""
     values, parts = prepared(body)
     grid, fixed = grid[None].copy(), fixed[None].copy()
     first, last = np.zeros(grid.shape[1], np.int32), np.full(grid.shape[1], grid.shape[2] - 1, np.int32)
-    settle_batch(grid, fixed, first, last, np.array([SKIN]), np.radians(step), iterations, limited, False, 0.002,
+    settle_batch(grid, fixed, first, last, np.array([SKIN]), np.radians(step), iterations, limited, in_space, 0.002,
                  parts, values)  # fmt: skip
     return grid[0], fixed[0]
 
@@ -107,6 +107,18 @@ def test_without_the_limit_it_swings_by_no_more_than_a_step():
     laid, _ = literal(nothing, strand(11, 0.01, 0.0), fixed, limited=False)
     bar = laid[0, -1] - laid[0, 0]
     assert np.degrees(np.arctan2(np.hypot(*bar[:2]), -bar[2])) <= 2.0 + 1e-9
+
+
+def test_pivots_are_the_nearest_along_the_strand_or_in_space():
+    """The end of one strand lies beside a fixed point of the other: in space it swings about that, and tears off."""
+    nothing = box([5, 5, 5], [5.1, 5.1, 5.1])
+    two = np.concatenate([strand(11, 0.01, 0.0), strand(11, 0.01, 0.0) + [0.11, 0, 0]])
+    fixed = np.zeros((2, 11), bool)
+    fixed[:, 0] = True
+    along, _ = literal(nothing, two, fixed)
+    across, _ = literal(nothing, two, fixed, in_space=True)
+    np.testing.assert_allclose(along[:, -1], [[0, 0, -0.1], [0.11, 0, -0.1]], atol=1e-9)
+    np.testing.assert_allclose(across[0, -1], [0.11, 0, -0.01], atol=1e-9)
 
 
 def test_a_level_strand_hangs_after_45_steps():
