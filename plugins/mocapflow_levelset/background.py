@@ -8,7 +8,6 @@ import numpy as np
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat
 
 from mocapflow.assets import Background
-from mocapflow.components import Segmenter
 from mocapflow.data import Frame, FrameState, Past, Segmentation, Silhouette, Turn
 from mocapflow.errors import RecordingError
 from mocapflow.geometry.silhouettes import model_distance
@@ -19,18 +18,17 @@ from mocapflow_levelset.evidence import calmed
 from mocapflow_levelset.evolve import Rhythm, Weights
 from mocapflow_levelset.levelset import INNER_BAND_PX, PERSON
 from mocapflow_levelset.masks import counted
-from mocapflow_levelset.plates import Plate, Shadow, density_of, plate_of
-from mocapflow_levelset.shadows import REACH_M, floor_around
+from mocapflow_levelset.plates import Plate, density_of, plate_of
+from mocapflow_levelset.shadows import ShadowAware, floor_around
 from mocapflow_levelset.statistics import Window
 from mocapflow_levelset.view import Empty, Level, Method, View, find
 
 CHANNELS: tuple[ChannelName, ...] = ("lab",)
-USUAL = Shadow()
 STRIDE = 2  # of the pixels that the statistics are taken from
 REFINE_STEPS = 4  # against the plate, then as many with local statistics on both sides
 
 
-class BackgroundDifference(Segmenter):
+class BackgroundDifference(ShadowAware):
     """Difference to the empty scene: a neutral, limited darkening is a shadow, any other change the person.
 
     The boundary is then refined to sub-pixels by a few level-set steps, the person's colours against the plate.
@@ -38,15 +36,6 @@ class BackgroundDifference(Segmenter):
 
     name: ClassVar[str] = "background"
 
-    spread_floor: PositiveFloat = USUAL.floor  # smallest standard deviation of the empty scene, share of the range
-    shadow_share: Annotated[float, Field(ge=0, lt=1)] = USUAL.share  # of the background; 0: shadows count as the person
-    shadow_reach_m: PositiveFloat = REACH_M  # shadows fall on the floor within this distance of the person
-    darkest_shadow: Annotated[float, Field(gt=0, lt=1)] = (
-        USUAL.darkest
-    )  # factor of L + 16, a and b in the deepest shadow
-    shadow_chroma: PositiveFloat = (
-        USUAL.chroma
-    )  # how far a shadow may be off the plate's chromaticity, share of the range
     smooth_px: PositiveFloat = 1.0  # of the evidence before it is cut
     hole_px2: NonNegativeInt = 120  # holes up to this area are filled
     reach_px: NonNegativeFloat = 60.0  # parts further from the projected model than this are someone else; 0: keep all
@@ -102,7 +91,7 @@ class BackgroundDifference(Segmenter):
 
         calm = features(calmed(image, self.smooth_px), CHANNELS)
         values, expected = calm.reshape(len(calm), -1), plate.planes.reshape(len(calm), -1)
-        density = density_of(values, expected, plate.spread.ravel(), floor.ravel(), CHANNELS, self._shadow())
+        density = density_of(values, expected, plate.spread.ravel(), floor.ravel(), CHANNELS, self.shadow())
         change = cv2.GaussianBlur(np.clip(-density.reshape(model.shape), -6, 6), (0, 0), self.smooth_px)
         if hidden is not None:
             change[hidden] = np.clip(model[hidden], -1, 1)  # nothing else tells
@@ -130,16 +119,13 @@ class BackgroundDifference(Segmenter):
         kept: Bool = person | small[label]
         return kept
 
-    def _shadow(self) -> Shadow:
-        return Shadow(self.spread_floor, self.shadow_share, self.darkest_shadow, self.shadow_chroma)
-
     def _method(self) -> Method:
         return Method(
             channels=CHANNELS,
             weights=Weights(
                 sigma_px=1.5, length=self.length_weight, shape=0.0, clip=6.0, step=1.0, band_px=INNER_BAND_PX
             ),
-            shadow=self._shadow(),
+            shadow=self.shadow(),
             calm_px=self.smooth_px,
             decorrelate=False,
             stride=STRIDE,

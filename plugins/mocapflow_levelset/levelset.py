@@ -9,7 +9,6 @@ import numpy as np
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
 from mocapflow.assets import Background, Camera
-from mocapflow.components import Segmenter
 from mocapflow.data import Frame, FrameState, Past, Segmentation, Silhouette, Surface, Turn
 from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.once import once
@@ -21,12 +20,11 @@ from mocapflow_levelset.contact import contact_zone
 from mocapflow_levelset.evolve import Rhythm, Weights
 from mocapflow_levelset.masks import counted, without_cut
 from mocapflow_levelset.moved import moved_outline
-from mocapflow_levelset.plates import Plate, Shadow, plate_of
-from mocapflow_levelset.shadows import REACH_M, floor_around
+from mocapflow_levelset.plates import Plate, plate_of
+from mocapflow_levelset.shadows import ShadowAware, floor_around
 from mocapflow_levelset.statistics import Window
 from mocapflow_levelset.view import Contact, Empty, Level, Matte, Method, View, find
 
-USUAL = Shadow()
 Share = Annotated[float, Field(ge=0, lt=1)]
 
 PERSON = "person"
@@ -35,7 +33,7 @@ REDUCED_RHO_PX = 8.0  # Gaussian window of the local statistics at reduced sizes
 COARSE, HALF, FULL = 4, 2, 1  # what the image is shrunk by
 
 
-class LevelSet(Segmenter):
+class LevelSet(ShadowAware):
     """Region-based level set (12.1) with the projected model as shape prior (12.9), descended by (12.10).
 
     It goes from coarse to fine. The empty scene, where it is known, gives the density of the outside at reduced size;
@@ -73,16 +71,8 @@ class LevelSet(Segmenter):
     border_px: NonNegativeInt = 3  # left out at the image's border
     margin_px: PositiveInt = 40  # of the crop around the start contour
     use_background: bool = True  # take the outside's density from the empty scene, where it is known
-    spread_floor: PositiveFloat = USUAL.floor  # smallest standard deviation of the empty scene, share of the range
     calm_px: NonNegativeFloat = 1.0  # smoothing of the image before it is compared with the empty scene
     shadow_share: Share = 0.5  # of the background; 0: shadows count as changes
-    shadow_reach_m: PositiveFloat = REACH_M  # shadows fall on the floor within this distance of the person
-    darkest_shadow: Annotated[float, Field(gt=0, lt=1)] = (
-        USUAL.darkest
-    )  # factor of L + 16, a and b in the deepest shadow
-    shadow_chroma: PositiveFloat = (
-        USUAL.chroma
-    )  # how far a shadow may be off the plate's chromaticity, share of the range
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
         """Return the person's silhouette in each usable view.
@@ -185,7 +175,7 @@ class LevelSet(Segmenter):
                 step=1.0,  # `length_weight` is stable with it
                 band_px=INNER_BAND_PX,
             ),
-            shadow=Shadow(self.spread_floor, self.shadow_share, self.darkest_shadow, self.shadow_chroma),
+            shadow=self.shadow(),
             calm_px=self.calm_px,
             decorrelate=self.decorrelate,
             stride=self.stride_px,

@@ -1,17 +1,37 @@
-"""Where the person can throw a shadow: on the floor around their feet."""
+"""Shadows that the person throws: on the floor around their feet, and how a segmenter tells them from the person."""
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import numpy as np
+from pydantic import Field, PositiveFloat
 
 from mocapflow.assets import Camera
+from mocapflow.components import Segmenter
 from mocapflow.data import Surface
 from mocapflow.geometry.cameras import project
 from mocapflow.once import once
 from mocapflow.records import F64, Bool
+from mocapflow_levelset.plates import Shadow
 
 CORNERS = 72
 REACH_M = 2.0  # from the person, where their shadow may fall
+USUAL = Shadow()
+
+
+class ShadowAware(Segmenter):
+    """A segmenter that compares pixels with the empty scene, lit and in the person's shadow."""
+
+    spread_floor: PositiveFloat = USUAL.floor  # smallest standard deviation of the empty scene, share of the range
+    shadow_share: Annotated[float, Field(ge=0, lt=1)] = USUAL.share  # of the background; 0: shadows count as changes
+    shadow_reach_m: PositiveFloat = REACH_M  # shadows fall on the floor within this distance of the person
+    darkest_shadow: Annotated[float, Field(gt=0, lt=1)] = USUAL.darkest  # factor of L + 16, a and b
+    shadow_chroma: PositiveFloat = USUAL.chroma  # off the plate's chromaticity, share of the range
+
+    def shadow(self) -> Shadow:
+        """Return what counts as background, as it is set."""
+        return Shadow(self.spread_floor, self.shadow_share, self.darkest_shadow, self.shadow_chroma)
 
 
 @once
