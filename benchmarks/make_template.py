@@ -6,14 +6,14 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from mocapflow_bodies.template import FILE, UNIT
+from mocapflow_bodies.weights import strongest
 
 from mocapflow.geometry.skeleton import Skeleton, body_directions
 from mocapflow.io.meshes import read_mesh
 from mocapflow.io.scans import read_skeleton
 from mocapflow.io.weights import read_weights
 from mocapflow.records import F64
-from mocapflow_bodies.template import FILE, UNIT
-from mocapflow_bodies.weights import strongest
 
 # MakeHuman's hips lie behind and outside the femoral heads (Bell 1989: from the front spines of the pelvis inward by
 # 14 % of their distance, back by 22 %, down by 30 %), its knees above the epicondyles (thighs are as long as shanks).

@@ -64,9 +64,6 @@ def main(count: int = 40) -> None:
             content = arrays(result)
             timed(spent["npz compressed"], lambda n=name, c=content: np.savez_compressed(n + "z", **c))
             timed(spent["npz"], lambda n=name, c=content: np.savez(n, **c))
-        read = []
-        for row in range(1, count):
-            timed(read, lambda r=row: checkpoint.seen(r))
         sealing: list[float] = []
         track = timed(sealing, checkpoint.track)
         assert len(track.frame) == count
@@ -81,7 +78,6 @@ def main(count: int = 40) -> None:
         middle = np.median(values[1:])
         print(f"{name:<18}{middle:8.2f}{min(values[1:]):8.2f}{middle / best:8.2f}{size[name] / 1e6:8.3f}")
     print(f"first commit (makes the arrays) {spent['commit'][0]:.1f} ms; sealing {sealing[0] / count:.2f} ms a frame;")
-    print(f"reading silhouettes and matches back {np.median(read):.2f} ms a frame")
     print(f"waiting until the drive has it {np.median(parts.waited[1:]):.1f} ms a frame")
     print("of the commit:", ", ".join(f"{name} {np.median(ms[1:]):.2f} ms" for name, ms in parts.spent.items()))
 

@@ -81,11 +81,6 @@ def _quantise(distance, steps):  # type: ignore[no-untyped-def]
             steps[row, column] = nearest + np.int32((value > 0) & (nearest < 1))  # without branches it vectorises
 
 
-def distance_of(steps: npt.NDArray[np.int8]) -> F32:
-    """Return the signed distance (H, W) px of a stored silhouette."""
-    return steps.astype(np.float32) / np.float32(FINE)
-
-
 def match_capacity(count: int) -> int:
     """Return the width of the array that holds `count` matches: a power of two."""
     return max(64, 1 << (count - 1).bit_length())
@@ -98,15 +93,3 @@ def match_row(matches: Matches) -> F32:
     used[:, 0], used[:, 5], used[:, 6] = matches.camera, matches.vertex, matches.weight
     used[:, 1:3], used[:, 3:5] = matches.pixel, matches.direction
     return packed
-
-
-def matches_of(packed: F32, count: int) -> Matches:
-    """Return the first `count` of stored matches (capacity, 7)."""
-    used = packed[:count].astype(np.float64)
-    return Matches(
-        camera=used[:, 0].astype(np.int16),
-        pixel=used[:, 1:3].copy(),
-        direction=used[:, 3:5].copy(),
-        vertex=used[:, 5].astype(np.int32),
-        weight=used[:, 6].copy(),
-    )

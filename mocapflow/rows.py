@@ -91,10 +91,6 @@ class Rows:
         file.write_bytes(self._zstd.encode(whole))
         flush(file)
 
-    def has(self, row: int) -> bool:
-        """Return whether a row was written."""
-        return self._file(row).exists()
-
     def read(self, row: int) -> npt.NDArray[Any]:
         """Return one row, freshly allocated.
 

@@ -52,6 +52,7 @@ LAYERS = (  # a module imports only from its own layer or an earlier one; `io` a
     "store",
     "copies",
     "shared",
+    "growing",
     "sealing",
     "checkpoint",
     "track",

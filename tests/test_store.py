@@ -16,11 +16,10 @@ import zarr
 
 from mocapflow import locks, rows
 from mocapflow.assets import Background
-from mocapflow.checkpoint import Checkpoint
 from mocapflow.data import Frame, Past, Pose, Silhouette, Start
 from mocapflow.errors import ComponentFailed, StoreError
 from mocapflow.execution import Execution
-from mocapflow.packing import FINE, distance_of, match_row, matches_of, quantised
+from mocapflow.packing import FINE, match_row, quantised
 from mocapflow.rows import Corrupted, Rows
 from mocapflow.series import Series
 from mocapflow.store import Store, remove
@@ -151,7 +150,7 @@ def test_a_damaged_row_is_noticed(tmp_path, damage):
 def test_silhouettes_keep_their_mask_and_an_eighth_of_a_pixel():
     distance = np.random.default_rng(1).uniform(-20, 20, (64, 80)).astype(np.float32)
     distance[0, :4] = [0.01, -0.01, 0.0, 0.06]
-    back = distance_of(quantised(Silhouette(camera=0, layer="person", distance=distance)))
+    back = quantised(Silhouette(camera=0, layer="person", distance=distance)) / np.float32(FINE)
     assert np.array_equal(back > 0, distance > 0)
     near = np.abs(distance) < 15
     assert np.abs(back - distance)[near].max() <= 1 / FINE
@@ -161,21 +160,23 @@ def test_matches_come_back(tmp_path):
     frame = Frame(index=3, time=0.0, images=(), usable=np.zeros(0, bool))
     surface = type("S", (), {"vertices": np.zeros((5, 3))})
     matches = TinyMatcher().match(frame, None, surface, None, None, None)
-    back = matches_of(match_row(matches), len(matches.weight))
-    for name in ("camera", "pixel", "direction", "vertex", "weight"):
-        assert np.array_equal(getattr(back, name), getattr(matches, name))
+    packed = match_row(matches)
+    parts = np.split(packed[: len(matches.weight)], [1, 3, 5, 6], axis=1)
+    for name, part in zip(("camera", "pixel", "direction", "vertex", "weight"), parts, strict=True):
+        assert np.array_equal(part.squeeze(1) if part.shape[1] == 1 else part, getattr(matches, name))
+    assert not packed[len(matches.weight) :].any()
 
 
 def test_what_was_seen_can_be_read_back(tmp_path, path):
     run_tiny(path, tmp_path)
     store = Store(tmp_path / "store.zarr")
     (found,) = [a for a in store.artifacts() if a.path.name.startswith("track-")]
-    silhouettes, matches = Checkpoint(store, found, range(12), ["cam01", "cam02"]).seen(6)
-    assert [(s.camera, s.layer, s.distance.shape) for s in silhouettes] == [
-        (0, "person", (16, 24)),
-        (1, "person", (16, 24)),
-    ]
-    assert len(matches.weight) == 100
+    group = zarr.open_group(str(found.path), mode="r")
+    for camera in ("cam01", "cam02"):
+        steps = group[f"silhouettes/person/{camera}"][6]
+        assert steps.shape == (16, 24) and steps.max() > 0 > steps.min()
+    assert group["match_count"][6] == 100
+    assert (group["matches/128"][6, :, 6] > 0).sum() == 100
 
 
 def test_an_unfinished_result_is_none(store):
