@@ -55,55 +55,76 @@ def _read_file(path: Path) -> Document:
 
 def _parse(text: str, file: str, path: Path | None) -> Document:
     """Return the value of a YAML text; `path` None: a value from the command line, without line numbers."""
-    places: dict[Steps, Place] = {}
-    folder = path.parent if path else Path()
-
-    def mark(node_mark: yaml.Mark) -> str:
-        return f"{file}:{node_mark.line + 1}:{node_mark.column + 1}" if path else file
-
-    def build(node: yaml.Node, steps: Steps) -> Any:
-        places.setdefault(steps, Place(mark(node.start_mark), folder))
-        if isinstance(node, yaml.MappingNode):
-            return {key: build(value, (*steps, key)) for key, value in keys(node, steps)}
-        if isinstance(node, yaml.SequenceNode):
-            return [build(item, (*steps, index)) for index, item in enumerate(node.value)]
-        return plain(node)
-
-    def plain(node: yaml.Node) -> Any:
-        base_60 = node.tag.endswith((":int", ":float")) and ":" in node.value  # of YAML 1.1: it makes 10:20 620
-        octal = node.tag.endswith(":int") and LEADING_ZERO.match(node.value)  # likewise: it makes 010 8
-        if base_60 or octal or node.tag.endswith(":timestamp"):
-            return node.value
-        try:
-            return loader.construct_object(node)
-        except (ValueError, LookupError):  # the latter of 'x: !!bool abc'
-            kind = node.tag.rpartition(":")[2]
-            raise PipelineError(f"not YAML: '{node.value}' is no {kind}", where=mark(node.start_mark)) from None
-
-    def keys(node: yaml.MappingNode, steps: Steps) -> Iterable[tuple[str, yaml.Node]]:
-        for key_node, value in node.value:
-            key: Hashable = plain(key_node)
-            where = mark(key_node.start_mark)
-            if not isinstance(key, str):
-                raise PipelineError(f"a name should be text, not {key!r}: put it in quotes", where=where)
-            if (*steps, key) in places:
-                raise PipelineError(f"'{dotted((*steps, key))}' is written twice", where=where)
-            places[*steps, key] = Place(where, folder)
-            yield key, value
-
+    built = _Built(file, path)
     try:
         loader = yaml.SafeLoader(text)
         node = loader.get_single_node()
-        value: Any = build(node, ()) if node else ({} if path else None)
-        return Document(value, places or {(): Place(f"{file}:1:1" if path else file, folder)})
+        value: Any = built.value(node, (), loader) if node else ({} if path else None)
     except yaml.MarkedYAMLError as error:
-        where = mark(error.problem_mark) if error.problem_mark else file
+        where = built.where(error.problem_mark) if error.problem_mark else file
         context = f" ({error.context})" if error.context else ""
         raise PipelineError(f"not YAML: {error.problem}{context}", where=where) from None
     except RecursionError:
         raise PipelineError("not YAML: values inside of values without an end", where=file) from None
     except yaml.YAMLError as error:
         raise PipelineError(f"not YAML: {str(error).splitlines()[0]}", where=file) from None
+    return Document(value, built.places or {(): Place(f"{file}:1:1" if path else file, built.folder)})
+
+
+class _Built:
+    """Values of YAML nodes, and where each was written."""
+
+    def __init__(self, file: str, path: Path | None) -> None:
+        self.places: dict[Steps, Place] = {}
+        self.folder = path.parent if path else Path()
+        self._file, self._lines = file, path is not None
+
+    def where(self, mark: yaml.Mark) -> str:
+        """Return a place for people."""
+        return f"{self._file}:{mark.line + 1}:{mark.column + 1}" if self._lines else self._file
+
+    def value(self, node: yaml.Node, steps: Steps, loader: yaml.SafeLoader) -> Any:
+        """Return the value of a node, which is found in the document by these steps.
+
+        Raises:
+            PipelineError: a name is no text or is written twice, or a value is not what it is tagged as.
+        """
+        self.places.setdefault(steps, Place(self.where(node.start_mark), self.folder))
+        if isinstance(node, yaml.MappingNode):
+            found: dict[str, Any] = {}
+            for named, inner in node.value:
+                key = self._key(named, steps, loader)
+                found[key] = self.value(inner, (*steps, key), loader)
+            return found
+        if isinstance(node, yaml.SequenceNode):
+            return [self.value(item, (*steps, index), loader) for index, item in enumerate(node.value)]
+        return self._plain(node, loader)
+
+    def _key(self, node: yaml.Node, steps: Steps, loader: yaml.SafeLoader) -> str:
+        key: Hashable = self._plain(node, loader)
+        where = self.where(node.start_mark)
+        if not isinstance(key, str):
+            raise PipelineError(f"a name should be text, not {key!r}: put it in quotes", where=where)
+        if (*steps, key) in self.places:
+            raise PipelineError(f"'{dotted((*steps, key))}' is written twice", where=where)
+        self.places[*steps, key] = Place(where, self.folder)
+        return key
+
+    def _plain(self, node: yaml.Node, loader: yaml.SafeLoader) -> Any:
+        if _meant_as_text(node):
+            return node.value
+        try:
+            return loader.construct_object(node)
+        except (ValueError, LookupError):  # the latter of 'x: !!bool abc'
+            kind = node.tag.rpartition(":")[2]
+            raise PipelineError(f"not YAML: '{node.value}' is no {kind}", where=self.where(node.start_mark)) from None
+
+
+def _meant_as_text(node: yaml.Node) -> bool:
+    """Return whether YAML 1.1 would read something else than people write: 10:20 as 620, 010 as 8, a date."""
+    base_60 = node.tag.endswith((":int", ":float")) and ":" in node.value
+    octal = node.tag.endswith(":int") and LEADING_ZERO.match(node.value) is not None
+    return base_60 or octal or node.tag.endswith(":timestamp")
 
 
 def _extended(child: Document, path: Path) -> Document:
