@@ -80,6 +80,7 @@ LAYERS = (  # a module imports only from its own layer or an earlier one; `io` a
     "scaffold",
     "commands",
     "cli",
+    "__main__",
 )
 LATE = {("data", "geometry")}  # inside a method, for a default everyone shares
 HEAVY = {"open3d", "numba", "cv2", "zarr", "matplotlib"}

@@ -2,6 +2,7 @@ import errno
 import io
 import json
 import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -387,3 +388,8 @@ def test_a_draper_that_can_not_be_made_is_told(call, monkeypatch, draper, messag
 
 def test_only_a_garment_has_a_picture(call):
     assert "only a garment has a picture" in call("show", "matcher", "contour_icp", "--out", "it.png").output
+
+
+def test_the_module_runs_as_the_command_does():
+    done = subprocess.run([sys.executable, "-m", "mocapflow", "plugins"], capture_output=True, text=True, check=True)
+    assert "levelset" in done.stdout
