@@ -30,19 +30,19 @@ def distance(surface: Surface, views: Sequence[View], cap_m: float) -> float:
     return total / max(len(views), 1)
 
 
-def uncovered_area(surface: Surface, views: Sequence[View], reach_m: float, cloth_m: float) -> tuple[float, float]:
-    """Return the area (m²), all views together, of the person further than `reach_m` from the model: skin, and cloth.
+def uncovered_areas(surface: Surface, views: Sequence[View], reaches_m: Sequence[float], cloth_m: float) -> F64:
+    """Return the areas (R, 2) m², all views together, of the person farther than each reach off the model: skin, cloth.
 
     What is within `cloth_m` of the garment counts as neither: cloth swings. Cloth is what shows the garment's colours.
     """
-    skin = cloth = 0.0
+    areas = np.zeros((len(reaches_m), 2))
     for view in views:
-        stray = view.person & (_of(surface, view)[1] > reach_m / view.pixel_m)
-        stray &= _from_cloth(surface, view) > cloth_m / view.pixel_m
-        worn = np.count_nonzero(stray & view.cloth)
-        skin += (np.count_nonzero(stray) - worn) * view.pixel_m**2
-        cloth += worn * view.pixel_m**2
-    return skin, cloth
+        off, loose = _of(surface, view)[1], view.person & (_from_cloth(surface, view) > cloth_m / view.pixel_m)
+        for row, reach_m in enumerate(reaches_m):
+            stray = loose & (off > reach_m / view.pixel_m)
+            worn = np.count_nonzero(stray & view.cloth)
+            areas[row] += np.array([np.count_nonzero(stray) - worn, worn]) * view.pixel_m**2
+    return areas
 
 
 def floating_area(bare: Surface, views: Sequence[View], reach_m: float) -> float:

@@ -12,13 +12,14 @@ from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow.scene import Scene
 from mocapflow_recovery.certain import View
-from mocapflow_recovery.disagreement import distance, floating_area, uncovered_area
+from mocapflow_recovery.disagreement import distance, floating_area, uncovered_areas
 
 
 class Reach(NamedTuple):
     """What counts as apart, m."""
 
     reach_m: float  # what lies nearer to the other is no stray
+    hint_m: float  # the same, of what is but a hint
     cloth_m: float  # nor is what lies so near to the garment
     cap_m: float  # beyond, it does not matter how far
 
@@ -29,6 +30,7 @@ class Stray(NamedTuple):
     uncovered: float
     floating: float
     cloth: float  # uncovered as well; a limb may hold it there, or it flies
+    near: float  # of the person, without cloth, off the model by little
 
     def __str__(self) -> str:
         worn = f" ({self.cloth:.0f} of it cloth)" if self.cloth >= 0.5 else ""
@@ -38,9 +40,9 @@ class Stray(NamedTuple):
 
 def stray_of(surface: Surface, scene: Scene, seen: Sequence[View], reach: Reach) -> Stray:
     """Return how much of the person lies off a surface of the scene, and of its skin off the person."""
-    skin, cloth = uncovered_area(surface, seen, reach.reach_m, reach.cloth_m)
-    floating = floating_area(scene.bare(surface), seen, reach.reach_m)
-    return Stray(uncovered=1e4 * skin, floating=1e4 * floating, cloth=1e4 * cloth)
+    (skin, cloth), (near, _) = 1e4 * uncovered_areas(surface, seen, (reach.reach_m, reach.hint_m), reach.cloth_m)
+    floating = 1e4 * floating_area(scene.bare(surface), seen, reach.reach_m)
+    return Stray(uncovered=skin, floating=floating, cloth=cloth, near=near)
 
 
 class Fit(NamedTuple):

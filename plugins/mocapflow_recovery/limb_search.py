@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
+from math import inf
 from pathlib import Path
 from typing import Annotated, ClassVar
 
@@ -26,6 +27,7 @@ from mocapflow_recovery.leaps import leapt, overbent
 from mocapflow_recovery.sampling import Cost, Plan, Spread, put_back, search, seen_samples, without_idle_parts
 
 CURED = 2.0  # times as far apart may be what is doubted no more: a leg lay where a skirt flew
+CLEARED = 1.1  # the same, what leaves no hint: of a foot that was lost all other limbs and the cloth tell nothing
 
 
 class LimbSearch(Recovery):
@@ -39,8 +41,9 @@ class LimbSearch(Recovery):
     a new place under the skirt because an arm was lost. The loop settles again from there.
     It also looks where images need not contradict a limb that is elsewhere: in the first frame and after frames that
     did not show the person, where a leg may rest on the contour of the other one and a foot lie turned in its own;
-    where a joint is bent beyond its limits; and where a limb has leapt into a pose that nobody was seen in. There a
-    part moves only if that brings person and model together.
+    where a joint is bent beyond its limits; where a little of the person is off the model, if `hint_cm2` says so; and
+    where a limb has leapt into a pose that nobody was seen in. There a part moves only if that brings person and model
+    together.
     The first frame starts from a pose that was given and is about right (`start_deg`). So it is searched near that one
     first, and of two poses that fit alike the nearer one is taken: crossed legs look the same exchanged.
     What shows the garment's colours calls for a search where it strays, but moves no part and is no doubt: it may fly.
@@ -50,10 +53,12 @@ class LimbSearch(Recovery):
     name: ClassVar[str] = "limb_search"
     uncovered_cm2: PositiveFloat = 30.0  # of the person off the model, in all views: more, and the fit is doubted
     floating_cm2: PositiveFloat = 30.0  # likewise, of skin in empty space
+    hint_cm2: PositiveOrInf = inf  # of the person off it by `hint_m`: more, and limbs are looked for; noise has it, too
     beginnings: bool = True  # limbs are looked for in the first frame, and in the first one after a gap
     leap_deg: PositiveOrInf = 20.0  # from what was believed and from all `poses`: a limb so far from both is looked for
     overbent_deg: PositiveOrInf = 5.0  # of a joint, beyond its limits: they are soft, and what is lost goes there
     reach_m: PositiveFloat = 0.06  # what lies nearer to the other does not count
+    hint_m: PositiveFloat = 0.03  # nor, as a hint, what lies nearer than this
     cloth_m: PositiveFloat = 0.2  # what lies so near to the garment may be the garment, wherever it swings
     gain: Annotated[float, Field(ge=0, lt=1)] = 0.1  # share that each part mends, and a fit that cures no doubt
     tolerance: NonNegativeFloat = 0.03  # by which share a part may be farther that stays as it was fitted
@@ -104,8 +109,12 @@ class LimbSearch(Recovery):
 
     def _better(self, other: Fit, fit: Fit) -> Fit:
         """Return another fit if it is clearly nearer to the person, or doubted no more and not much farther."""
-        cured = self._doubtful(fit.stray) and not self._doubtful(other.stray)
-        return other if other.apart < (CURED if cured else 1 - self.gain) * fit.apart else fit
+        most = 1 - self.gain
+        if self._doubtful(fit.stray) and not self._doubtful(other.stray):
+            most = CURED
+        elif fit.stray.near > self.hint_cm2 >= other.stray.near:
+            most = CLEARED
+        return other if other.apart < most * fit.apart else fit
 
     def _suspicion(self, stray: Stray, fitted: Pose, believed: FrameState, past: Past, body: Body) -> str:
         """Return why limbs are looked for that images do not contradict, or nothing.
@@ -114,6 +123,8 @@ class LimbSearch(Recovery):
         """
         if stray.uncovered + stray.cloth > self.uncovered_cm2:
             return f"cloth off the model, {stray}"
+        if stray.near > self.hint_cm2:
+            return f"{stray.near:.0f} cm² of the person a little off the model"
         if self.beginnings and not past.moments:
             return f"looked for the limbs {'after a gap' if past.after_gap else 'of a first frame'}"
         if overbent(fitted, body, np.radians(self.overbent_deg)):
@@ -166,7 +177,7 @@ class LimbSearch(Recovery):
         return read(self.poses)
 
     def _reach(self) -> Reach:
-        return Reach(self.reach_m, self.cloth_m, self.cap_m)
+        return Reach(self.reach_m, self.hint_m, self.cloth_m, self.cap_m)
 
 
 def nearest(cost: Cost, poses: Sequence[Pose]) -> Pose:

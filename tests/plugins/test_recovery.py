@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 import pytest
 from mocapflow_levelset.colours import BINS
 from mocapflow_priors.density import Density, write
 from mocapflow_recovery.certain import shrunk, small_room, views
-from mocapflow_recovery.disagreement import distance, floating_area, uncovered_area
+from mocapflow_recovery.disagreement import distance, floating_area, uncovered_areas
 from mocapflow_recovery.judge import Fit, Given, Stray
 from mocapflow_recovery.leaps import leapt
 from mocapflow_recovery.limb_search import LimbSearch
@@ -91,8 +92,8 @@ def test_somebody_far_away_is_not_the_person() -> None:
 @pytest.mark.parametrize("angle", [0.4, 0.8])
 def test_a_leg_astray_counts_by_its_area_and_by_its_way(angle) -> None:
     wrong = surface(astray(angle))
-    assert uncovered_area(surface(POSE), seen(), 0.06, 0.2)[0] < 20e-4
-    assert uncovered_area(wrong, seen(), 0.06, 0.2)[0] > 150e-4
+    assert uncovered_areas(surface(POSE), seen(), [0.06], 0.2)[0, 0] < 20e-4
+    assert uncovered_areas(wrong, seen(), [0.06], 0.2)[0, 0] > 150e-4
     assert floating_area(surface(POSE), seen(), 0.06) < 20e-4
     assert 150e-4 < floating_area(wrong, seen(), 0.06) < 0.25  # m², the skin of a leg
     ways = [distance(surface(astray(part * angle)), seen(), 0.2) for part in (0, 0.5, 1)]
@@ -103,7 +104,8 @@ def test_a_leg_astray_counts_by_its_area_and_by_its_way(angle) -> None:
 @pytest.mark.parametrize(("told", "lost"), [(4.0, False), (-4.0, True)], ids=["the garment's", "a limb's"])
 def test_what_shows_the_colours_of_the_garment_is_told_from_a_limb(told, lost) -> None:
     looked = views(FRAME, surface(POSE), ROOM, 0.35, np.full(BINS, told))
-    skin, cloth = uncovered_area(surface(astray(0.8)), looked, 0.06, 0.2)
+    (skin, cloth), (near, _) = uncovered_areas(surface(astray(0.8)), looked, [0.06, 0.03], 0.2)
+    assert near > skin if lost else near == 0
     assert (skin > 150e-4 and cloth == 0) if lost else (skin == 0 and cloth > 150e-4)
     assert all((view.cloth == (view.person & (told > 0))).all() for view in looked)
 
@@ -221,7 +223,9 @@ def test_a_doubt_that_is_cured_is_gain_enough(monkeypatch) -> None:
         return settled(pictures.tiny_state(SCENE, astray(0.25), POSE))
 
     lost, past = pictures.tiny_state(SCENE, astray(0.26), POSE), scenes.tiny_past(SCENE, POSE)
-    uncovered = 1e4 * np.array([uncovered_area(surface(astray(end)), seen(), 0.06, 0.2)[0] for end in (0.25, 0.26)])
+    uncovered = 1e4 * np.array(
+        [uncovered_areas(surface(astray(end)), seen(), [0.06], 0.2)[0, 0] for end in (0.25, 0.26)]
+    )
     assert uncovered[0] < uncovered[1]
     for line, cured in ((uncovered.mean(), True), (uncovered[0] / 2, False)):
         search = LimbSearch(gain=0.9, uncovered_cm2=line, floating_cm2=1e6)
@@ -246,6 +250,18 @@ def test_where_frames_begin_a_limb_is_looked_for_that_nothing_doubts(past, looke
     assert kept.state.estimate.pose is near.estimate.pose and not kept.notes
 
 
+@pytest.mark.parametrize(("hint", "looked"), [(inf, False), (1.0, True)])
+def test_a_little_of_the_person_off_the_model_is_a_hint_where_it_counts(hint, looked) -> None:
+    def settle(pose, parameters):
+        return settled(pictures.tiny_state(SCENE, POSE, POSE))
+
+    near, model = pictures.tiny_state(SCENE, astray(0.12), POSE), scenes.tiny_model(SCENE)
+    search = LimbSearch(hint_cm2=hint, uncovered_cm2=1e4, floating_cm2=1e4)
+    found = search.recover(FRAME, near, settled(near), scenes.tiny_past(SCENE, POSE), model, settle)
+    assert (found.state.estimate.pose.angles == POSE.angles).all() == looked and not found.doubted
+    assert looked == any("a little off the model: found again" in note for note in found.notes)
+
+
 @pytest.mark.parametrize(("past", "found"), [(Past(), True), (Past(after_gap=True), False)], ids=["first", "gap"])
 def test_a_first_frame_is_searched_near_the_pose_it_starts_from(past, found) -> None:
     """No sample reaches the leg where the fit has it; from the start it is near."""
@@ -267,8 +283,18 @@ def test_a_first_frame_is_searched_near_the_pose_it_starts_from(past, found) -> 
 )
 def test_a_doubt_that_is_cured_may_cost_distance(strays, apart, taken) -> None:
     result = settled(pictures.tiny_state(SCENE, POSE, POSE))
-    fit, other = (Fit(result, Stray(area, 0.0, 0.0), far) for area, far in ((100.0, 1.0), (strays, apart)))
+    fit, other = (Fit(result, Stray(area, 0.0, 0.0, 0.0), far) for area, far in ((100.0, 1.0), (strays, apart)))
     assert (LimbSearch()._better(other, fit) is other) == taken
+
+
+@pytest.mark.parametrize(
+    ("left", "apart", "taken"), [(0.0, 1.05, True), (0.0, 1.15, False), (20.0, 1.05, False)],
+    ids=["cleared", "cleared but farther", "still there"],
+)  # fmt: skip
+def test_a_hint_that_is_cleared_may_cost_a_little_distance(left, apart, taken) -> None:
+    result = settled(pictures.tiny_state(SCENE, POSE, POSE))
+    fit, other = (Fit(result, Stray(0.0, 0.0, 0.0, near), far) for near, far in ((25.0, 1.0), (left, apart)))
+    assert (LimbSearch(hint_cm2=15)._better(other, fit) is other) == taken
 
 
 def test_of_two_fits_alike_the_one_nearer_to_the_start_is_taken() -> None:
