@@ -7,7 +7,7 @@ from mocapflow_priors.density import Density
 
 from mocapflow.assets import Body
 from mocapflow.data import Pose
-from mocapflow.records import F64
+from mocapflow.records import F64, Bool
 from mocapflow_recovery.sampling import parts
 
 
@@ -33,8 +33,18 @@ def leapt(fitted: Pose, believed: Pose, body: Body, density: Density, least: flo
 
 def overbent(pose: Pose, body: Body, least: float) -> bool:
     """Return whether a joint is bent beyond its limits by more than `least` (rad)."""
+    return bool(_beyond(pose, body, least).any())
+
+
+def eased(pose: Pose, other: Pose, body: Body) -> Pose:
+    """Return a pose whose joints that are bent beyond their limits have the angles of another pose."""
+    return Pose(root=pose.root, angles=np.where(_beyond(pose, body, 0.0), other.angles, pose.angles))
+
+
+def _beyond(pose: Pose, body: Body, least: float) -> Bool:
     low, high = body.limits.T
-    return bool(np.any((pose.angles > high + least) | (pose.angles < low - least)))
+    beyond: Bool = (pose.angles > high + least) | (pose.angles < low - least)
+    return beyond
 
 
 def _apart(angles: F64, seen: F64) -> float:

@@ -23,7 +23,7 @@ from mocapflow.records import F64
 from mocapflow.settings import PositiveOrInf
 from mocapflow_recovery.certain import View, small_room, views
 from mocapflow_recovery.judge import Fit, Given, Judge, Reach, Stray, stray_of, surface_of
-from mocapflow_recovery.leaps import leapt, overbent
+from mocapflow_recovery.leaps import eased, leapt, overbent
 from mocapflow_recovery.sampling import Cost, Plan, Spread, put_back, search, seen_samples, without_idle_parts
 
 CURED = 2.0  # times as far apart may be what is doubted no more: a leg lay where a skirt flew
@@ -150,7 +150,8 @@ class LimbSearch(Recovery):
         plan, before = self._plan(body), [moment.pose for moment in judge.past.moments[-1:]]
         at_rest, every = np.zeros(len(body.twists)), np.arange(len(body.twists), dtype=np.int32)
         seen_poses = seen_samples(Pose(root=believed.root, angles=at_rest), every, body, plan, rng)
-        begins = [nearest(judge.apart, [fitted, believed, *before, *seen_poses]), *before]
+        possible = eased(fitted, believed, body)
+        begins = [nearest(judge.apart, [possible, believed, *before, *seen_poses]), *before]
         found = nearest(judge.apart, [search(judge.apart, begin, body, plan, rng) for begin in dict.fromkeys(begins)])
         # by what strays a fit that is not astray has only idle parts
         return self._tidied(found, fitted, believed, judge, judge.stray if astray else judge.apart)

@@ -12,7 +12,7 @@ from mocapflow_priors.density import Density, write
 from mocapflow_recovery.certain import shrunk, small_room, views
 from mocapflow_recovery.disagreement import distance, floating_area, uncovered_areas
 from mocapflow_recovery.judge import Fit, Given, Stray
-from mocapflow_recovery.leaps import leapt
+from mocapflow_recovery.leaps import eased, leapt
 from mocapflow_recovery.limb_search import LimbSearch
 from mocapflow_recovery.sampling import Plan, Spread, parts, put_back, samples, search, seen_samples, without_idle_parts
 
@@ -349,6 +349,16 @@ def test_a_joint_beyond_its_limits_is_looked_for_though_nothing_strays(beyond, l
     found = LimbSearch().recover(FRAME, near, settled(near), past, model, settle)
     assert (found.state.estimate.pose.angles == POSE.angles).all() == looked
     assert bool(found.notes) == looked
+
+
+def test_a_search_begins_within_the_limits() -> None:
+    """No sample around an impossible foot reaches the right one."""
+    body = replace(SCENE.body, limits=np.tile([-1.0, 1.0], (len(POSE.angles), 1)))
+    other = Pose(root=POSE.root, angles=np.full(len(POSE.angles), 0.1))
+    bent = Pose(root=2 * POSE.root, angles=np.where(np.arange(len(POSE.angles)) == 1, 1.2, 0.3))
+    found = eased(bent, other, body)
+    assert found.root is bent.root
+    assert found.angles[1] == 0.1 and (np.delete(found.angles, 1) == 0.3).all()
 
 
 @pytest.mark.parametrize(("leap_deg", "looked"), [(2.0, True), (10.0, False), (np.inf, False)])
