@@ -71,7 +71,7 @@ def test_bent_joints_show_in_the_signs_of_the_angles():
 
 def test_scripted_motions_stand_on_the_floor():
     body = made.read_body(SKIRT / "subject")
-    for script in ("squat", "dance"):
+    for script in made.SCRIPTS:
         take = made.Take("A", "skirt", script, 0, made.GREY, frames=20)
         motion = made.ground(body, made.rotations_of(take, body, Path())[0])
         lowest = made.skin(body, motion, body.main("ankle", "toe"))[..., 2].min(1)
