@@ -67,9 +67,9 @@ def estimate_of(
     _possible(solver, found.pose, model.scene)
     array_of(solver, found.parameters, state.estimate.parameters.shape, "parameters")
     array_of(solver, found.observed, found.pose.angles.shape, "observed shares")
-    size, least = len(found.covariance), 6 + len(found.pose.angles)
-    array_of(solver, found.covariance, (max(size, least),) * 2, "a covariance")  # unknowns of the cloth may follow
-    if size and np.diag(found.covariance).min() <= 0:
+    size = max(len(found.covariance), 6 + len(found.pose.angles))  # unknowns of the cloth may follow
+    array_of(solver, found.covariance, (size, size), "a covariance")
+    if np.diag(found.covariance).min() <= 0:
         raise WrongAnswer(solver, "a variance that is not above zero")
     return found
 

@@ -69,7 +69,7 @@ class Checkpoint:
         frame_done: Callable[[int, FrameResult], None] = silent,
     ) -> None:
         self._store, self._path, self._lock = store, artifact.path, lock
-        self._indices, self._count = indices, len(cameras)
+        self._indices, self._camera_count = indices, len(cameras)
         self._attributes: dict[str, Any] = dict(artifact.attributes)
         self._wanted, self._fresh, self._cap = wanted, fresh, 0
         self._turns: list[Pose] | None = None  # of the frame at hand
@@ -173,7 +173,7 @@ class Checkpoint:
         return {name: tuple(shape) for name, shape in self._attributes["columns"]}
 
     def _lay_out(self, result: FrameResult) -> None:
-        columns = packing.columns_of(result, self._count)
+        columns = packing.columns_of(result, self._camera_count)
         self._attributes["columns"] = [[name, list(shape)] for name, shape in columns.items()]
         self._attributes["step_names"] = list(result.seconds)
         self._attributes["energy_terms"] = list(result.energy_terms)

@@ -14,7 +14,7 @@ from mocapflow.components import Prior
 from mocapflow.data import Cloth, Estimate, FrameState, Matches, Past, Pose, Segmentation, Silhouette, Surface
 from mocapflow.geometry import silhouettes
 from mocapflow.geometry.cameras import project_each
-from mocapflow.model import ClothedModel, increment, moved
+from mocapflow.model import ClothedModel, increment_between, moved
 from mocapflow.records import F32, F64
 
 SHAPE_WEIGHT = 0.05  # lambda, px^-2; a segmenter may descend with another one
@@ -99,7 +99,7 @@ def contours(surface: Surface, matches: Matches, cameras: Sequence[Camera]) -> F
 
 def halfway(one: Pose, other: Pose) -> Pose:
     """Return the pose in the middle of two."""
-    return moved(one, 0.5 * increment(one, other))
+    return moved(one, 0.5 * increment_between(one, other))
 
 
 def told_apart(names: Sequence[str]) -> tuple[str, ...]:

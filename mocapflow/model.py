@@ -62,7 +62,7 @@ def _laid(pose: Pose, parameters: tuple[float, ...], past: ref[Past], model: Clo
     return Cloth(vertices=model.drapes(pose, values[None], known)[0], parameters=values)
 
 
-def increment(one: Pose, other: Pose) -> F64:
+def increment_between(one: Pose, other: Pose) -> F64:
     """Return the increment (6 + D,) that leads from one pose to another; see `moved`."""
     return np.concatenate([twists.log(other.root @ np.linalg.inv(one.root)), other.angles - one.angles])
 

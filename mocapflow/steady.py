@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
 from mocapflow.data import Change, Pose, Surface
-from mocapflow.model import increment
+from mocapflow.model import increment_between
 from mocapflow.records import F64
 from mocapflow.settings import Settings
 
@@ -75,7 +75,7 @@ def measure_change(old: Shown, new: Shown, covariance: F64) -> Change:
 
 def _sigmas(old: Pose, new: Pose, covariance: F64) -> float:
     """Return the way between two poses in standard deviations, the root mean square over independent directions."""
-    way = increment(old, new)
+    way = increment_between(old, new)
     unit = np.sqrt(np.diag(covariance))[: len(way)]  # scaled first: units differ widely
     scaled = covariance[: len(way), : len(way)] / unit[:, None] / unit
     return float(np.sqrt(way / unit @ np.linalg.solve(scaled, way / unit) / len(way)))

@@ -9,7 +9,7 @@ from mocapflow.data import FrameState, Matches, Past, Pose
 from mocapflow.functional import SHAPE_WEIGHT, Functional, area, contours, halfway, told_apart
 from mocapflow.geometry.cameras import project
 from mocapflow.geometry.silhouettes import model_distance
-from mocapflow.model import moved
+from mocapflow.model import increment_between, moved
 from mocapflow.testing import pictures, scenes
 
 SCENE = scenes.tiny_scene(clothed=True)
@@ -69,6 +69,11 @@ def test_a_step_that_raises_the_functional_is_halved(shift, halvings, share):
     went = reached.pose.root[:3, 3] - begin.root[:3, 3]
     np.testing.assert_allclose(went, share * (target.root[:3, 3] - begin.root[:3, 3]), atol=1e-12)
     np.testing.assert_allclose(cloth.vertices, scenes.tiny_cloth(SCENE, reached.pose).vertices, atol=1e-9)
+
+
+def test_an_increment_leads_from_one_pose_to_another():
+    step = np.random.default_rng(2).uniform(-1, 1, 6 + len(POSE.angles))
+    np.testing.assert_allclose(increment_between(POSE, moved(POSE, step)), step, atol=1e-10)
 
 
 def test_halfway_lies_in_the_middle():

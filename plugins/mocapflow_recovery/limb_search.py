@@ -108,12 +108,13 @@ class LimbSearch(Recovery):
         return noted(best.result, f"{why}: found again by search; then {best.stray}", self._doubtful(best.stray))
 
     def _better(self, other: Fit, fit: Fit) -> Fit:
-        """Return another fit if it is clearly nearer to the person, or doubted no more and not much farther."""
+        """Return another fit if it is clearly nearer to the person, or free of a doubt or hint and not much farther."""
         most = 1 - self.gain
-        if self._doubtful(fit.stray) and not self._doubtful(other.stray):
-            most = CURED
-        elif fit.stray.near > self.hint_cm2 >= other.stray.near:
-            most = CLEARED
+        if not self._doubtful(other.stray):
+            if self._doubtful(fit.stray):
+                most = CURED
+            elif fit.stray.near > self.hint_cm2 >= other.stray.near:
+                most = CLEARED
         return other if other.apart < most * fit.apart else fit
 
     def _suspicion(self, stray: Stray, fitted: Pose, believed: FrameState, past: Past, body: Body) -> str:

@@ -3,11 +3,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from mocapflow_evaluation import compare
+from mocapflow_evaluation import compare, comparison_plots
 from mocapflow_evaluation.evaluate import Evaluate, evaluate, evaluate_run
 from mocapflow_evaluation.ours import Ours
 from mocapflow_evaluation.references import read_reference
-from mocapflow_evaluation.stick import Stick
+from mocapflow_evaluation.stick import Stick, constant
 from mocapflow_export import layout, tables
 from results_scene import DEMO, demo_scene, stepping
 from scipy.signal import lfilter
@@ -23,6 +23,22 @@ FRAMES = np.arange(120.0)
 
 def row(ours: np.ndarray, truth: np.ndarray) -> dict[str, float]:
     return compare.figures(ours, truth, np.ones(len(ours)), FRAMES[: len(ours)], 30.0)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_point_that_is_never_seen_hides_no_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    names = ("hip_l", "hip_r", "knee_l", "knee_r", "ear_l")
+    places = np.random.default_rng(0).uniform(0, 1, (30, 5, 3))
+    places[:, 4] = np.nan
+    drawn = []
+    monkeypatch.setattr(comparison_plots, "_draw_bones", lambda panel, stick, *_: drawn.append(stick))
+    comparison_plots.draw_sticks(
+        tmp_path / "a.png", Stick(names=names, places=places), Stick(names=names, places=places), np.arange(30.0)
+    )
+    assert len(drawn) == 2 * 2 * comparison_plots.MOMENTS
+    unseen = np.where(np.arange(5)[:, None] == 3, np.nan, places)
+    kept = constant(Stick(names=names, places=unseen)).places
+    assert np.isnan(kept[:, 3:]).all() and np.isfinite(kept[:, :3]).all()
 
 
 def test_identical_curves_deviate_by_nothing() -> None:

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 import readers
 from mocapflow_export.formats import FILES, Result, write
+from mocapflow_export.formats.gltf import the_shorter_way
 from results_scene import DEMO, demo_scene, stepping
+from scipy.spatial.transform import Rotation
 
 from mocapflow.errors import PipelineError
 from mocapflow.geometry import angles
@@ -131,6 +133,18 @@ def test_gltf_opens_and_moves_body_and_garment(result: Result, tmp_path: Path) -
         np.testing.assert_allclose(played.garment(row), result.track.cloth[row], atol=NEAR)
         off = np.linalg.norm(played.skinned(row) - result.bare(row).vertices, axis=1)
         assert off.max() < 2e-3  # the format has four joints a vertex, ours five
+
+
+def test_turns_go_the_shorter_way_and_past_a_half_turn() -> None:
+    """Half a turn at once has no shorter way: the sign stays, and nothing becomes zero."""
+    degrees = np.array([0.0, 100.0, 200.0, 300.0, 480.0, 490.0])
+    turns = Rotation.from_rotvec(np.outer(np.radians(degrees), [0, 0, 1])).as_quat()
+    way = the_shorter_way(np.where(np.arange(6)[:, None] % 2, -1, 1) * turns)
+    np.testing.assert_allclose(np.abs(np.einsum("ta,ta->t", way, turns)), 1)
+    steps = np.einsum("ta,ta->t", way[1:], way[:-1])
+    assert (steps > -1e-12).all() and (np.delete(steps, 3) > 0.6).all()
+    exact = the_shorter_way(np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, -1.0, 0, 0]]))
+    np.testing.assert_array_equal(exact, [[1, 0, 0, 0], [0, 1, 0, 0], [0, 1, 0, 0]])
 
 
 def test_usd_opens_and_moves_body_and_garment(result: Result, tmp_path: Path) -> None:

@@ -288,12 +288,14 @@ def test_a_doubt_that_is_cured_may_cost_distance(strays, apart, taken) -> None:
 
 
 @pytest.mark.parametrize(
-    ("left", "apart", "taken"), [(0.0, 1.05, True), (0.0, 1.15, False), (20.0, 1.05, False)],
-    ids=["cleared", "cleared but farther", "still there"],
-)  # fmt: skip
-def test_a_hint_that_is_cleared_may_cost_a_little_distance(left, apart, taken) -> None:
+    ("left", "floating", "apart", "taken"),
+    [(0.0, 0.0, 1.05, True), (0.0, 0.0, 1.15, False), (20.0, 0.0, 1.05, False), (0.0, 90.0, 1.05, False)],
+    ids=["cleared", "cleared but farther", "still there", "cleared but doubted"],
+)
+def test_a_hint_that_is_cleared_may_cost_a_little_distance(left, floating, apart, taken) -> None:
     result = settled(pictures.tiny_state(SCENE, POSE, POSE))
-    fit, other = (Fit(result, Stray(0.0, 0.0, 0.0, near), far) for near, far in ((25.0, 1.0), (left, apart)))
+    fit = Fit(result, Stray(0.0, 0.0, 0.0, 25.0), 1.0)
+    other = Fit(result, Stray(0.0, floating, 0.0, left), apart)
     assert (LimbSearch(hint_cm2=15)._better(other, fit) is other) == taken
 
 

@@ -61,9 +61,7 @@ class Author:
             self._gltf.nodes.append(self._lib.Node(name=name, translation=offset.tolist(), children=[]))
             self._gltf.nodes[parent + 1].children.append(joint + 1)
             quaternion = Rotation.from_matrix(turns[:, joint]).as_quat()
-            flips = np.cumprod(np.where(np.einsum("ta,ta->t", quaternion[1:], quaternion[:-1]) < 0, -1.0, 1.0))
-            quaternion[1:] *= flips[:, None]  # the shorter way between frames
-            self._animate(joint + 1, "rotation", quaternion)
+            self._animate(joint + 1, "rotation", the_shorter_way(quaternion))
             if parent < 0:
                 self._animate(joint + 1, "translation", self._result.places[:, joint])
 
@@ -139,3 +137,11 @@ class Author:
         )  # fmt: skip
         self._data += array.tobytes()  # every kind here is a multiple of four bytes long
         return len(self._gltf.accessors) - 1
+
+
+def the_shorter_way(quaternions: F64) -> F64:
+    """Return the same turns by quaternions (T, 4) of the sign that leads the shorter way from each to the next."""
+    back = np.einsum("ta,ta->t", quaternions[1:], quaternions[:-1]) < 0
+    signs = np.concatenate([[1.0], np.cumprod(np.where(back, -1.0, 1.0))])
+    way: F64 = quaternions * signs[:, None]
+    return way
