@@ -134,15 +134,17 @@ def _content(part: Recording, digests: Digests) -> dict[str, Any]:
 def _scene(
     pipeline: Pipeline, recording: Recording, body: Step | None, rig: Step | None, digests: Digests
 ) -> dict[str, Any]:
-    garment, registry = pipeline.garment, pipeline.registry
-    loaded = component_recipe(pipeline.body, registry, digests) | {
-        "files": _files(pipeline.body.inputs(pipeline.recording), digests)
-    }
+    garment = pipeline.garment
     return {
         "cameras": _input(rig) if rig else {camera.name: _camera(camera) for camera in recording.cameras},
-        "body": _input(body) if body else loaded,
-        "garment": None if garment is None else component_recipe(garment, registry, digests),
+        "body": _input(body) if body else _asset(pipeline, digests),
+        "garment": None if garment is None else component_recipe(garment, pipeline.registry, digests),
     }
+
+
+def _asset(pipeline: Pipeline, digests: Digests) -> dict[str, Any]:
+    files = _files(pipeline.body.inputs(pipeline.recording), digests)
+    return component_recipe(pipeline.body, pipeline.registry, digests) | {"files": files}
 
 
 def _files(paths: Iterable[Path], digests: Digests) -> list[str]:

@@ -70,7 +70,10 @@ def layout(recording: Recording, indices: Sequence[int], wanted: Layout | None) 
     told = wanted or layout_of(detections)
     if told is None:
         message = "25 keypoints may be BODY_25 or BODY_25B: neither hips nor shoulders are seen that would tell"
-        raise RecordingError(message, where=str(recording.folder / "keypoints"), hint="set `layout` of the stage")
+        hint = (
+            "begin where one of them is seen; fit_subject, start_from_keypoints and keypoints have a setting `layout`"
+        )
+        raise RecordingError(message, where=str(recording.folder / "keypoints"), hint=hint)
     return LAYOUTS[told]
 
 

@@ -30,7 +30,7 @@ class Stray(NamedTuple):
     uncovered: float
     floating: float
     cloth: float  # uncovered as well; a limb may hold it there, or it flies
-    near: float  # of the person, without cloth, off the model by little
+    near: float  # of the person, without cloth, off the model by little or more
 
     def __str__(self) -> str:
         worn = f" ({self.cloth:.0f} of it cloth)" if self.cloth >= 0.5 else ""
