@@ -1,13 +1,13 @@
 """Recordings of known motion with physics cloth, against which a track can be measured.
 
 `apt install blender python3-numpy ffmpeg`, then `python benchmarks/known_motion.py TAKE DATA OUT`. TAKE is one of
-`TAKES`; DATA holds the recordings walk_skirt (subject A, her skirt) and kneeup_shorts (subject B, his shorts) and the
-folder motions; OUT/TAKE becomes a recording folder: cameras, videos, clean plates, subject, init.json, truth. The body
-is posed in `known_poses.py`, the garment sewn in `known_garments.py`; `known_motion_blender.py` drapes it with
-Blender's cloth and draws what each camera sees; softness of the lens and noise of the sensor are added here. Nothing of
-the tracker takes part, its kinematics neither: what shared code with it could not tell that it is wrong. On one core
-about 2 s a view: 8 minutes a take of 50 frames. OUT/room_A and room_B keep the empty rooms for the next take; delete
-them when the room, the light or the cameras here have changed.
+`known_takes.TAKES`; DATA holds the recordings walk_skirt (subject A, her skirt) and kneeup_shorts (subject B, his
+shorts) and the folder motions; OUT/TAKE becomes a recording folder: cameras, videos, clean plates, subject, init.json,
+truth. The body is posed in `known_poses.py`, the garment sewn in `known_garments.py`; `known_motion_blender.py` drapes
+it with Blender's cloth and draws what each camera sees; softness of the lens and noise of the sensor are added here.
+Nothing of the tracker takes part, its kinematics neither: what shared code with it could not tell that it is wrong. On
+one core about 2 s a view: 8 minutes a take of 50 frames. OUT/room_A and room_B keep the empty rooms for the next take;
+delete them when the room, the light or the cameras here have changed.
 """
 
 from __future__ import annotations
@@ -17,13 +17,14 @@ import shutil
 import subprocess
 import sys
 import tomllib
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 from known_garments import measures_for, sew
 from known_poses import RATE, SCRIPTS, Body, Motion, angles, chain, ground, read_body, skin
+from known_takes import TAKES, Take
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation, Slerp
 
@@ -32,62 +33,9 @@ RUN_UP = 10  # frames of the motion before frame 0
 PLATES = 8  # empty rooms drawn per camera
 TONE = 0.965  # of a frame to its clean plate, as in the shared recordings
 SOFTNESS_PX, NOISE = 0.7, 3.0
-PURPLE = ((0.60, 0.40, 0.70), (0.32, 0.16, 0.42))  # of the stripes
-GREY = ((0.45, 0.46, 0.50), (0.12, 0.13, 0.16))
-GREEN = ((0.35, 0.62, 0.40), (0.10, 0.28, 0.16))
-DARK = ((0.06, 0.06, 0.08), (0.06, 0.06, 0.08))  # plain
 SKIN, HAIR, UNDERWEAR = (0.56, 0.33, 0.21), (0.05, 0.035, 0.03), (0.10, 0.10, 0.12)
 SHIRT, SOCKS = {"A": (0.16, 0.33, 0.60), "B": (0.55, 0.10, 0.10)}, {"A": (0.80, 0.80, 0.80), "B": (0.03, 0.03, 0.035)}
 RECORDINGS, OWNER = {"A": "walk_skirt", "B": "kneeup_shorts"}, {"skirt": "A", "shorts": "B"}
-
-
-@dataclass(frozen=True)
-class Take:
-    """Who wears what and moves how: a file of DATA/motions from a frame on, or one of `SCRIPTS`."""
-
-    subject: str
-    garment: str
-    motion: str
-    seed: int  # of the errors of init.json and of the noise
-    stripes: tuple[tuple[float, ...], tuple[float, ...]]
-    start: int = 0
-    frames: int = 50
-    flight: tuple[int, int] | None = None  # frames of take-off and landing
-
-
-TAKES = {
-    "legcross_A_skirt": Take("A", "skirt", "legcross_A", 1, PURPLE, start=150),
-    "squat_A_skirt": Take("A", "skirt", "kneebend_A", 2, GREEN, start=190),
-    "walk_B_skirt": Take("B", "skirt", "walk_B", 3, GREEN, start=100),
-    "dance_A_shorts": Take("A", "shorts", "dance", 4, GREY),
-    "kick_B_shorts": Take("B", "shorts", "kick_B", 5, GREY, frames=40),
-    "legcross_B_shorts": Take("B", "shorts", "legcross_B", 6, GREEN, start=150),
-    "jump_A_skirt": Take("A", "skirt", "jump_A", 7, PURPLE, start=14, frames=30, flight=(13, 24)),
-    "squat_A_shorts": Take("A", "shorts", "squat", 8, GREEN),
-    "dance_B_skirt": Take("B", "skirt", "dance", 9, PURPLE),
-    "kneeup_A_skirt": Take("A", "skirt", "kneeup_A", 11, GREEN, start=5),
-    # a foot leaves the pictures
-    "kick_B_skirt": Take("B", "skirt", "kick_B", 12, PURPLE, start=120, frames=40),
-    "walk_B_shorts": Take("B", "shorts", "walk_B", 13, PURPLE, start=200, frames=40),
-    "legcross_B_skirt": Take("B", "skirt", "legcross_B", 14, GREEN, start=60, frames=40),
-    "kneeup_B_dark": Take("B", "skirt", "kneeup_B", 21, DARK, start=200, frames=40),
-    "squat_B_skirt": Take("B", "skirt", "kneebend_A", 32, GREEN, start=60, frames=80),
-    "dance_A_skirt": Take("A", "skirt", "dance", 31, GREY, frames=100),
-    "jump_A_shorts": Take("A", "shorts", "jump_A", 41, GREEN, start=14, frames=30, flight=(13, 24)),
-    "kneeup_A_shorts": Take("A", "shorts", "kneeup_A", 42, PURPLE, start=40, frames=60),
-    "walk_A_shorts": Take("A", "shorts", "walk_A", 43, GREY, start=60, frames=60),
-    "legcross_A_skirt2": Take("A", "skirt", "legcross_A", 44, GREEN, start=20, frames=90),
-    "kick_B_shorts2": Take("B", "shorts", "kick_B", 45, GREEN, start=60, frames=60),
-    "kneeup_B_skirt": Take("B", "skirt", "kneeup_B", 46, GREY, start=60, frames=80),
-    "legcross_B_skirt2": Take("B", "skirt", "legcross_B", 51, GREY, start=200, frames=60),
-    "dance_B_shorts": Take("B", "shorts", "dance", 52, PURPLE, frames=60),
-    "walk_A_skirt2": Take("A", "skirt", "walk_A", 53, DARK, start=220, frames=60),
-    "lunge_A_skirt": Take("A", "skirt", "lunge", 54, GREEN, frames=60),
-    "spin_B_skirt": Take("B", "skirt", "spin", 55, GREY, frames=60),
-    "spin_A_skirt": Take("A", "skirt", "spin", 56, PURPLE, frames=60),
-    "lunge_B_shorts": Take("B", "shorts", "lunge", 57, GREY, frames=60),
-    "squat_B_shorts": Take("B", "shorts", "kneebend_A", 47, PURPLE, start=120, frames=60),
-}
 
 
 ABOUT = """# {name}
@@ -167,6 +115,7 @@ def prepare(take: Take, data: Path, out: Path) -> None:
     measures = json.loads((owners / "subject/garment.json").read_text())
     if own != owners:
         measures = measures_for(body, measures, read_body(owners / "subject"))
+    measures |= take.cut
     (out / "subject/garment.json").write_text(json.dumps(measures, indent=1))
     centre = np.load(own / "truth/joints.npz")["positions"][:, 0, :2].mean(0)
     whole, first = build_motion(take, body, data, centre, cameras)

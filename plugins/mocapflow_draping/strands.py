@@ -79,7 +79,7 @@ def strands_of(garment: GarmentMesh, body: Body) -> Strands:
     beside, ring_length = _beside(garment, vertex, own)
     carrier = garment.carried_by[vertex[:, -1]]
     under = np.asarray(cKDTree(body.vertices).query(rows)[1], np.int32)
-    rides = bool(np.mean(body.main_joint[under[:, -1]] == carrier) > 0.5)
+    rides = bool(np.mean(_limbs(body.parents)[carrier, body.main_joint[under[:, -1]]]) > 0.5)
     facing = _from_middle(rows, beside) if rides else _along(rows)
     return Strands(
         vertex=vertex,
@@ -167,6 +167,15 @@ def roots(strands: Strands, chain: F64) -> F64:
     held = np.einsum("nk,bnkij->bnij", strands.root_weight, chain[:, strands.root_joint, :3])
     pinned: F64 = np.einsum("bnij,nj->bni", held[..., :3], strands.rest[:, 0]) + held[..., 3]
     return pinned
+
+
+def _limbs(parents: I32) -> Bool:
+    """Return (J, J), True where the second joint is the first or follows it and no branch lies between."""
+    limb = np.eye(len(parents), dtype=bool)
+    for joint in range(1, len(parents)):  # parents come first
+        if np.count_nonzero(parents == parents[joint]) == 1:
+            limb[:, joint] |= limb[:, parents[joint]]
+    return limb
 
 
 def _along(rows: F64) -> F64:

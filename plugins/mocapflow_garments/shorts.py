@@ -141,7 +141,8 @@ class Shorts(Garment):
     def _carried_by(self, body: Body, vertices: F64, legs: list[I32], waist_skin: I32) -> I32:
         carried = np.full(len(vertices), sewing.main_joint(body, waist_skin), np.int32)
         for leg in legs:
-            carried[leg] = sewing.main_joint(body, sewing.nearest_skin(body, vertices[leg[:, leg.shape[1] // 2]]))
+            thigh = vertices[leg[:, : leg.shape[1] // 2 + 1]].reshape(-1, 3)  # a long leg ends at the shank
+            carried[leg] = sewing.main_joint(body, sewing.nearest_skin(body, thigh))
         return carried
 
 

@@ -18,10 +18,12 @@ from mocapflow_draping.distance import outwards
 from mocapflow_draping.kinematic import Kinematic
 from mocapflow_draping.literal import settle_batch
 from mocapflow_draping.voxels import signed_distance
+from mocapflow_garments.shorts import Shorts
 from mocapflow_garments.skirt import Skirt
 
 from mocapflow.data import Past, PoseBatch
 from mocapflow.errors import PluginError
+from mocapflow.geometry import kinematics
 from mocapflow.scene import Scene
 from mocapflow.testing.bodies import tiny_body
 
@@ -192,3 +194,22 @@ def test_joints_that_it_can_not_touch_do_not_move_the_cloth():
     poses = PoseBatch(root=np.tile(np.eye(4), (2, 1, 1)), angles=angles)
     still, moved = kinematic.drape(poses, calm(scene, 2), Past(), scene)
     np.testing.assert_array_equal(still, moved)
+
+
+@pytest.mark.parametrize(("length", "inseam"), [(0.80, 0.46), (0.98, 0.64)], ids=["below the knee", "to the ankle"])
+def test_legs_of_shorts_stay_around_the_shank(length, inseam):
+    body, poses = drape_bodies.legs(), leg_poses()
+    garment = Shorts(
+        waist_height_m=1.08, waist_circumference_m=0.92, hip_circumference_m=1.1, leg_opening_circumference_m=0.5,
+        inseam_m=inseam, length_m=length,
+    ).sew(body)  # fmt: skip
+    scene = Scene(cameras=(), body=body, garment=garment)
+    drape = draper().drape(poses, np.zeros((4, len(garment.parameter_names))), Past(), scene)
+    hem = garment.strands[:, -1][: len(garment.strands) * 3 // 4]
+    chain = kinematics.chain_batch(body, poses)
+    for side, (knee, x) in enumerate([(2, 0.1), (4, -0.1)]):
+        ring = drape[:, np.split(hem, 2)[side]]
+        shank = chain[:, knee, :3, :3] @ [0, 0, -1.0]
+        top = (chain[:, knee] @ [x, 0, 0.48, 1])[:, :3]
+        beside = np.cross(ring.mean(axis=1) - top, shank)
+        assert np.linalg.norm(beside, axis=1).max() < 0.08

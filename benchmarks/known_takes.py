@@ -1,0 +1,75 @@
+"""The takes that `known_motion.py` can make: who wears what and moves how."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+PURPLE = ((0.60, 0.40, 0.70), (0.32, 0.16, 0.42))  # of the stripes
+GREY = ((0.45, 0.46, 0.50), (0.12, 0.13, 0.16))
+GREEN = ((0.35, 0.62, 0.40), (0.10, 0.28, 0.16))
+DARK = ((0.06, 0.06, 0.08), (0.06, 0.06, 0.08))  # plain
+# m, measures of other cuts; what is not named is the owner's, scaled to the wearer
+MAXI = {"length": 0.90, "hem_circumference": 2.1}
+MINI = {"length": 0.42, "hem_circumference": 1.25}
+WIDE = {"length": 0.60, "hem_circumference": 2.4}
+CULOTTES = {"length": 0.68, "inseam": 0.44, "leg_opening_circumference": 0.66}
+TROUSERS = {"length": 0.90, "inseam": 0.66, "leg_opening_circumference": 0.48}
+
+
+@dataclass(frozen=True)
+class Take:
+    """Who wears what and moves how: a file of DATA/motions from a frame on, or one of `SCRIPTS`."""
+
+    subject: str
+    garment: str
+    motion: str
+    seed: int  # of the errors of init.json and of the noise
+    stripes: tuple[tuple[float, ...], tuple[float, ...]]
+    start: int = 0
+    frames: int = 50
+    flight: tuple[int, int] | None = None  # frames of take-off and landing
+    cut: dict[str, float] = field(default_factory=dict)  # m, measures in which the garment differs from its owner's
+
+
+TAKES = {
+    "legcross_A_skirt": Take("A", "skirt", "legcross_A", 1, PURPLE, start=150),
+    "squat_A_skirt": Take("A", "skirt", "kneebend_A", 2, GREEN, start=190),
+    "walk_B_skirt": Take("B", "skirt", "walk_B", 3, GREEN, start=100),
+    "dance_A_shorts": Take("A", "shorts", "dance", 4, GREY),
+    "kick_B_shorts": Take("B", "shorts", "kick_B", 5, GREY, frames=40),
+    "legcross_B_shorts": Take("B", "shorts", "legcross_B", 6, GREEN, start=150),
+    "jump_A_skirt": Take("A", "skirt", "jump_A", 7, PURPLE, start=14, frames=30, flight=(13, 24)),
+    "squat_A_shorts": Take("A", "shorts", "squat", 8, GREEN),
+    "dance_B_skirt": Take("B", "skirt", "dance", 9, PURPLE),
+    "kneeup_A_skirt": Take("A", "skirt", "kneeup_A", 11, GREEN, start=5),
+    # a foot leaves the pictures
+    "kick_B_skirt": Take("B", "skirt", "kick_B", 12, PURPLE, start=120, frames=40),
+    "walk_B_shorts": Take("B", "shorts", "walk_B", 13, PURPLE, start=200, frames=40),
+    "legcross_B_skirt": Take("B", "skirt", "legcross_B", 14, GREEN, start=60, frames=40),
+    "kneeup_B_dark": Take("B", "skirt", "kneeup_B", 21, DARK, start=200, frames=40),
+    "squat_B_skirt": Take("B", "skirt", "kneebend_A", 32, GREEN, start=60, frames=80),
+    "dance_A_skirt": Take("A", "skirt", "dance", 31, GREY, frames=100),
+    "jump_A_shorts": Take("A", "shorts", "jump_A", 41, GREEN, start=14, frames=30, flight=(13, 24)),
+    "kneeup_A_shorts": Take("A", "shorts", "kneeup_A", 42, PURPLE, start=40, frames=60),
+    "walk_A_shorts": Take("A", "shorts", "walk_A", 43, GREY, start=60, frames=60),
+    "legcross_A_skirt2": Take("A", "skirt", "legcross_A", 44, GREEN, start=20, frames=90),
+    "kick_B_shorts2": Take("B", "shorts", "kick_B", 45, GREEN, start=60, frames=60),
+    "kneeup_B_skirt": Take("B", "skirt", "kneeup_B", 46, GREY, start=60, frames=80),
+    "legcross_B_skirt2": Take("B", "skirt", "legcross_B", 51, GREY, start=200, frames=60),
+    "dance_B_shorts": Take("B", "shorts", "dance", 52, PURPLE, frames=60),
+    "walk_A_skirt2": Take("A", "skirt", "walk_A", 53, DARK, start=220, frames=60),
+    "lunge_A_skirt": Take("A", "skirt", "lunge", 54, GREEN, frames=60),
+    "spin_B_skirt": Take("B", "skirt", "spin", 55, GREY, frames=60),
+    "spin_A_skirt": Take("A", "skirt", "spin", 56, PURPLE, frames=60),
+    "lunge_B_shorts": Take("B", "shorts", "lunge", 57, GREY, frames=60),
+    "squat_B_shorts": Take("B", "shorts", "kneebend_A", 47, PURPLE, start=120, frames=60),
+    # other cuts than those of the shared recordings
+    "walk_B_maxi": Take("B", "skirt", "walk_B", 61, PURPLE, start=40, cut=MAXI),
+    "dance_A_mini": Take("A", "skirt", "dance", 62, GREY, cut=MINI),
+    "kneeup_A_wide": Take("A", "skirt", "kneeup_A", 63, GREEN, start=60, cut=WIDE),
+    "squat_A_maxi": Take("A", "skirt", "squat", 64, GREY, cut={"length": 0.86, "hem_circumference": 2.0}),
+    "walk_A_culottes": Take("A", "shorts", "walk_A", 65, GREEN, start=120, cut=CULOTTES),
+    "kneeup_B_culottes": Take("B", "shorts", "kneeup_B", 66, GREY, start=60, cut=CULOTTES),
+    "walk_B_trousers": Take("B", "shorts", "walk_B", 67, PURPLE, start=60, cut=TROUSERS),
+    "squat_A_trousers": Take("A", "shorts", "kneebend_A", 68, DARK, start=60, cut=TROUSERS),
+}
