@@ -13,7 +13,7 @@ import typer
 import typer.core
 
 from mocapflow.commands import cache, comparing, looking, new, prior, results, running
-from mocapflow.errors import MocapflowError, unwritable
+from mocapflow.errors import MocapflowError, interrupted, unwritable
 
 
 class Commands(typer.core.TyperGroup):
@@ -23,22 +23,17 @@ class Commands(typer.core.TyperGroup):
         """Run the command and turn errors into exit status 1 or 2, an interrupt into 130."""
         try:
             return super().invoke(ctx)
-        except MocapflowError as error:
-            raise self._told(error) from None
-        except OSError as error:
-            if (said := unwritable(error)) is None:
+        except (Exception, KeyboardInterrupt) as error:
+            if interrupted(error):
+                words = [word for word in sys.argv[1:] if word != "--fresh"]  # it would remove what is saved
+                again = shlex.join(["mocapflow", *words])
+                typer.echo(f"\ninterrupted; finished frames are saved. To go on: {again}", err=True)
+                raise typer.Exit(130) from None
+            said = unwritable(error) if isinstance(error, OSError) else error
+            if not isinstance(said, MocapflowError):
                 raise
-            raise self._told(said) from None
-        except KeyboardInterrupt:
-            words = [word for word in sys.argv[1:] if word != "--fresh"]  # it would remove what is saved
-            again = shlex.join(["mocapflow", *words])
-            typer.echo(f"\ninterrupted; finished frames are saved. To go on: {again}", err=True)
-            raise typer.Exit(130) from None
-
-    @staticmethod
-    def _told(error: MocapflowError) -> typer.Exit:
-        typer.echo(f"error: {error}", err=True)
-        return typer.Exit(error.exit_status)
+            typer.echo(f"error: {said}", err=True)
+            raise typer.Exit(said.exit_status) from None
 
 
 app = typer.Typer(

@@ -17,7 +17,16 @@ from mocapflow.checkpoint import Checkpoint
 from mocapflow.cloth_answers import mesh_of
 from mocapflow.components import Component, Garment
 from mocapflow.data import FrameResult
-from mocapflow.errors import FULL, ComponentFailed, GarmentError, MocapflowError, PluginError, ShapeError, unwritable
+from mocapflow.errors import (
+    FULL,
+    ComponentFailed,
+    GarmentError,
+    MocapflowError,
+    PluginError,
+    ShapeError,
+    interrupted,
+    unwritable,
+)
 from mocapflow.locks import Lock
 from mocapflow.pipeline import Pipeline
 from mocapflow.progress import Progress
@@ -199,6 +208,8 @@ class Execution:
         except ComponentFailed:
             raise
         except (Exception, SystemExit) as error:
+            if interrupted(error):
+                raise KeyboardInterrupt from None
             if isinstance(error, MocapflowError) and not isinstance(error, ShapeError | PluginError):
                 raise
             if isinstance(error, OSError) and error.errno in {*FULL, errno.EROFS} and (said := unwritable(error)):

@@ -8,6 +8,7 @@ from typing import Any
 import pluggy
 
 from mocapflow.data import FrameResult, FrameState
+from mocapflow.errors import interrupted
 
 
 class Observers:
@@ -36,6 +37,8 @@ class Observers:
             try:
                 observer.function(*(news[name] for name in observer.argnames))
             except Exception as error:  # an onlooker must never stop a run
+                if interrupted(error):
+                    raise KeyboardInterrupt from None
                 self._off.add(observer.function)
                 text = "observer %s of plugin '%s' raised %s: %s; it is switched off for the rest of this run"
                 logging.getLogger("mocapflow").warning(text, hook, observer.plugin_name, type(error).__name__, error)

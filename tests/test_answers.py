@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from mocapflow.answers import (
     WrongAnswer,
@@ -15,6 +16,7 @@ from mocapflow.answers import (
     result_of,
     segmentation_of,
 )
+from mocapflow.cli import app
 from mocapflow.cloth_answers import cloth_of, mesh_of
 from mocapflow.components import (
     ClothFitter,
@@ -159,9 +161,21 @@ class Leaves(Prior):
         raise SystemExit(0)
 
 
+class Interrupted(Prior):
+    \"\"\"Ctrl-C arrives in compiled code.\"\"\"
+
+    name = "interrupted"
+
+    def residual(self, pose, past, scene):
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt as error:
+            raise SystemError("CPUDispatcher returned a result with an exception set") from error
+
+
 @hookimpl
 def mocapflow_priors():
-    return [Nan, Leaves]
+    return [Nan, Leaves, Interrupted]
 """
 
 
@@ -173,14 +187,27 @@ def mocapflow_priors():
     ],
 )
 def test_a_run_names_who_answers_wrongly(tmp_path, prior, said):
-    (tmp_path / "bad.py").write_text(PLUGIN)
-    stages = STAGES | {"track": STAGES["track"] | {"priors": [prior]}}
-    path = write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=stages)
-    content = path.read_text().replace("plugins:\n", f"plugins:\n- {tmp_path / 'bad.py'}\n")
-    path.write_text(content)
+    path = with_prior(tmp_path, prior)
     assert load(path)
     with pytest.raises(ComponentFailed, match=said):
         run_tiny(path, tmp_path, frames=2)
+
+
+def test_nobody_is_blamed_for_an_interrupt(tmp_path):
+    path = with_prior(tmp_path, "interrupted")
+    done = CliRunner().invoke(app, ["run", str(path), "--out", str(tmp_path / "out"), "--frames", "0:2"])
+    assert done.exit_code == 130
+    assert "interrupted; finished frames are saved" in done.output
+    assert "failed" not in done.output
+    assert not (tmp_path / "out" / "failed.log").exists()
+
+
+def with_prior(tmp_path, prior):
+    (tmp_path / "bad.py").write_text(PLUGIN)
+    stages = STAGES | {"track": STAGES["track"] | {"priors": [prior]}}
+    path = write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=stages)
+    path.write_text(path.read_text().replace("plugins:\n", f"plugins:\n- {tmp_path / 'bad.py'}\n"))
+    return path
 
 
 @pytest.mark.parametrize(

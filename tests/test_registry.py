@@ -211,3 +211,13 @@ def test_observers_are_told_and_a_raising_one_is_switched_off(caplog):
         "observer mocapflow_frame_done of plugin 'mocapflow-wardrobe:wardrobe' raised ValueError: no window; "
         "it is switched off for the rest of this run"
     ]
+
+
+def test_an_observer_that_is_interrupted_does_not_keep_it_to_itself():
+    @hookimpl
+    def mocapflow_frame_done(frame):
+        raise SystemError("CPUDispatcher returned a result with an exception set") from KeyboardInterrupt()
+
+    registry = registry_of((OURS, lambda: SimpleNamespace(mocapflow_frame_done=mocapflow_frame_done)))
+    with pytest.raises(KeyboardInterrupt):
+        registry.observers.frame_done(3, "result")
