@@ -64,10 +64,12 @@ def bandwidth(poses: F64, percentile: float = 100.0) -> float:
     """Return the largest distance (rad) from one of N poses (N, K) to its nearest neighbour.
 
     Neighbours in a smooth motion then overlap within one bandwidth. A lower percentile is proof against odd poses.
+    Angles count modulo a turn.
 
     Source: Rosenhahn 2008, section 12.5.1
     """
-    distance = np.asarray(KDTree(poses).query(poses, 2)[0])  # to itself and to the nearest other
+    around = np.mod(poses, TURN) % TURN  # once more, for of what is just below zero the first leaves a whole turn
+    distance = np.asarray(KDTree(around, boxsize=TURN).query(around, 2)[0])  # to itself and to the nearest other
     return float(np.percentile(distance[:, 1], percentile))
 
 

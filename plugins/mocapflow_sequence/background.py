@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
@@ -14,6 +15,7 @@ from mocapflow.errors import RecordingError
 from mocapflow.recording import Recording
 from mocapflow.records import F32, U8
 
+LOG = logging.getLogger("mocapflow")
 ROWS = 64  # of the images at a time: the median's working memory
 LEAST_SPREAD = 1.0  # grey levels; the rounding of 8-bit pictures alone makes 0.3
 NORMAL = 1.4826  # standard deviation of a normal variable over its median absolute deviation
@@ -45,6 +47,12 @@ class EmptyScene(Stage):
                 "there are no clean plates",
                 where=str(recording.folder / "background"),
                 hint="put one picture per camera there (cam01.png …), or set source: median",
+            )
+        if self.source == "auto":
+            LOG.warning(
+                "no clean plates in %s: the median over the recording shows whoever hardly moves, and loses them; then"
+                " do without it (--set stages.background=null --set stages.track.first_segmenter=null)",
+                recording.folder / "background",
             )
         pairs = [temporal_median(self._pictures(recording, c)) for c in range(len(recording.views))]
         return Background(mean=tuple(mean for mean, _ in pairs), spread=tuple(spread for _, spread in pairs))

@@ -110,6 +110,15 @@ def test_the_median_sees_through_someone_who_walks_by():
     assert 2 < np.median(spread) < 5
 
 
+def test_a_median_in_place_of_plates_is_no_secret(tmp_path, caplog):
+    write_recording(tmp_path, frames=5, cameras=ring(names=("cam01",)))
+    recording = open_recording(tmp_path)
+    EmptyScene(source="median").run(recording)
+    assert not caplog.messages
+    EmptyScene().run(recording)
+    assert [line.split(":")[0] for line in caplog.messages] == [f"no clean plates in {tmp_path / 'background'}"]
+
+
 def test_the_stage_prefers_plates_and_can_do_without():
     recording = open_recording(shipped("examples", "data", "skirt_steps"))
     plates = EmptyScene().run(recording)

@@ -196,3 +196,17 @@ def test_a_parameter_without_a_meaning_is_refused(skirted):
     odd = type(skirted.garment)(**{**vars(skirted.garment), "parameter_names": names})
     with pytest.raises(PluginError, match=r"'flair_rad'(.|\n)*did you mean 'flare_rad'"):
         tilts(odd, np.zeros((1, len(names))), np.zeros(3))
+
+
+@pytest.mark.parametrize("yaw", [0.0, 1.1])
+def test_a_wind_of_the_literal_rule_blows_where_it_says(skirted, yaw):
+    garment, turn, way = skirted.garment, np.eye(4), np.array([0.6, 0.8])
+    turn[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
+    poses = PoseBatch(root=np.stack([turn, turn]), angles=np.zeros((2, 4)))
+    wind = parameters(garment, wind_cos_rad=0.2 * way[0], wind_sin_rad=0.2 * way[1])
+    literal = drape_bodies.draper(rule="literal", limited=True, sweeps=0)
+    calm, blown = literal.drape(poses, np.concatenate([0 * wind, wind]), Past(), skirted)
+    moved = (blown - calm)[garment.strands[:, -1], :2] @ turn[:2, :2]
+    assert (moved @ way).min() > -0.005  # to windward legs hold the cloth
+    assert 0.08 < (moved @ way).max() < 0.6 * np.sin(0.2) + 0.005  # of a strand of 0.6 m
+    assert np.abs(moved @ [-way[1], way[0]]).max() < 0.03

@@ -64,6 +64,12 @@ def test_bandwidth_is_the_largest_distance_to_a_neighbour() -> None:
     assert bandwidth(poses, 50) == pytest.approx(np.median(apart.min(axis=1)))
 
 
+def test_poses_on_both_sides_of_half_a_turn_are_neighbours() -> None:
+    poses = np.array([[3.13], [3.135], [-3.138]])
+    assert bandwidth(poses) == pytest.approx(2 * np.pi - 3.138 - 3.135)
+    assert bandwidth(np.array([[-1e-20], [0.1]])) == pytest.approx(0.1)
+
+
 def test_angles_wrap_and_far_poses_do_not_underflow() -> None:
     density = gait(("a", "b"))
     place = np.array([0.2, 0.1])
