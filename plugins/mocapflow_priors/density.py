@@ -69,9 +69,8 @@ def bandwidth(poses: F64, percentile: float = 100.0) -> float:
     Source: Rosenhahn 2008, section 12.5.1
     """
     around = np.mod(poses, TURN) % TURN  # once more, for of what is just below zero the first leaves a whole turn
-    distance = np.asarray(
-        KDTree(around, boxsize=np.full(poses.shape[1], TURN)).query(around, 2)[0]
-    )  # to itself and to the nearest other
+    known = KDTree(around, boxsize=np.full(poses.shape[1], TURN))
+    distance = np.asarray(known.query(around, 2)[0])  # to itself and to the nearest other
     return float(np.percentile(distance[:, 1], percentile))
 
 
