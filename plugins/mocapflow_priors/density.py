@@ -68,7 +68,7 @@ def bandwidth(poses: F64, percentile: float = 100.0) -> float:
 
     Source: Rosenhahn 2008, section 12.5.1
     """
-    around = np.mod(poses, TURN) % TURN  # once more, for of what is just below zero the first leaves a whole turn
+    around = np.mod(poses, TURN) % TURN  # of -1e-20 the first leaves a whole turn, which is out of the box
     known = KDTree(around, boxsize=np.full(poses.shape[1], TURN))
     distance = np.asarray(known.query(around, 2)[0])  # to itself and to the nearest other
     return float(np.percentile(distance[:, 1], percentile))

@@ -50,8 +50,8 @@ class EmptyScene(Stage):
             )
         if self.source == "auto":
             LOG.warning(
-                "no clean plates in %s: the median over the recording shows whoever hardly moves, and loses them; then"
-                " do without it (--set stages.background=null --set stages.track.first_segmenter=null)",
+                "no clean plates in %s: a median over the recording stands in for them; a person who stays in place"
+                " is part of it, and lost: then --set stages.background=null --set stages.track.first_segmenter=null",
                 recording.folder / "background",
             )
         pairs = [temporal_median(self._pictures(recording, c)) for c in range(len(recording.views))]

@@ -206,6 +206,7 @@ def test_legs_of_shorts_stay_around_the_shank(length, inseam):
     scene = Scene(cameras=(), body=body, garment=garment)
     drape = draper().drape(poses, np.zeros((4, len(garment.parameter_names))), Past(), scene)
     hem = garment.strands[:, -1][: len(garment.strands) * 3 // 4]
+    assert {body.joint_names[joint] for joint in garment.carried_by[hem]} == {"hip_l", "hip_r"}
     chain = kinematics.chain_batch(body, poses)
     for side, (knee, x) in enumerate([(2, 0.1), (4, -0.1)]):
         ring = drape[:, np.split(hem, 2)[side]]
