@@ -62,6 +62,7 @@ class Segmenter(Component):
     """Finds the silhouette in each image."""
 
     role: ClassVar[str] = "segmenter"
+    needs_background: ClassVar[bool] = False  # True: it can't do without the empty scene
 
     @abstractmethod
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:

@@ -11,7 +11,18 @@ import numpy as np
 from mocapflow.answers import residual_of
 from mocapflow.assets import Camera
 from mocapflow.components import Prior
-from mocapflow.data import Cloth, Estimate, FrameState, Matches, Past, Pose, Segmentation, Silhouette, Surface
+from mocapflow.data import (
+    Cloth,
+    Estimate,
+    FrameResult,
+    FrameState,
+    Matches,
+    Past,
+    Pose,
+    Segmentation,
+    Silhouette,
+    Surface,
+)
 from mocapflow.geometry import silhouettes
 from mocapflow.geometry.cameras import project_each
 from mocapflow.model import ClothedModel, increment_between, moved
@@ -74,6 +85,12 @@ class Functional:
 
     def _priors(self, pose: Pose) -> list[float]:
         return [prior.weight * residual_of(prior, pose, self.past, self.model.scene).energy for prior in self.priors]
+
+
+def total(result: FrameResult) -> float:
+    """Return the functional after the last turn of a frame: what was not seen does not count."""
+    summed = [not name.endswith(".contour") for name in result.energy_terms]
+    return float(np.nansum(result.energy[result.iterations - 1, summed]))
 
 
 def area(surface: Surface, silhouette: Silhouette, camera: Camera) -> float:

@@ -35,11 +35,12 @@ from mocapflow.data import (
     Pose,
     Segmentation,
     Start,
+    Turn,
     blind,
     empty_matches,
 )
 from mocapflow.errors import ComponentFailed, PipelineError
-from mocapflow.functional import Functional
+from mocapflow.functional import Functional, total
 from mocapflow.keys import FREE
 from mocapflow.loop import Steps, settle
 from mocapflow.model import ClothedModel
@@ -160,13 +161,17 @@ class CoupledLoop(Stage):
     def approach(self, frame: Frame, state: FrameState, past: Past, model: ClothedModel) -> FrameState:
         """Return a first or second frame's state moved near the person by the first segmenter, if there is one.
 
-        Of the second it is not known yet how the person moves: somebody may run.
+        Of the second it is not known yet how the person moves: somebody may run. A limb that looks like the room
+        behind leads a segmenter astray that knows no more than the room: unless it helps, the state stays.
         """
-        if self.first_segmenter is None or not seen(frame):
+        first = self.first_segmenter
+        if first is None or not seen(frame) or (first.needs_background and model.scene.background is None):
             return state
-        steps = replace(self.steps, segmenter=self.first_segmenter)
-        near = settle(frame, state, past, steps, model, lambda *_: None).state
-        return believed(near.estimate.pose, near.cloth.parameters, near.cloth)
+        steps = replace(self.steps, segmenter=first)
+        near = settle(frame, state, past, steps, model, unobserved).state
+        begins = (believed(near.estimate.pose, near.cloth.parameters, near.cloth), state)
+        once = replace(self.steps, steady=Steady(max_turns=1))
+        return min(begins, key=lambda begin: total(settle(frame, begin, past, once, model, unobserved)))
 
     def recovered(
         self, frame: Frame, state: FrameState, result: FrameResult, past: Past, model: ClothedModel
@@ -177,7 +182,7 @@ class CoupledLoop(Stage):
 
         def settle_from(pose: Pose, parameters: F64) -> FrameResult:
             begun = believed(pose, parameters, model.drape(pose, parameters, past))
-            return settle(frame, begun, past, self.steps, model, lambda *_: None)
+            return settle(frame, begun, past, self.steps, model, unobserved)
 
         found = self.recovery.recover(frame, state, result, past, model, settle_from)
         return result_of(self.recovery, found, model.scene)
@@ -191,6 +196,10 @@ class CoupledLoop(Stage):
                 "the frame is saved; on_unsteady: go_on continues after it, steady: {max_turns: …} gives it more turns"
             )
             raise ComponentFailed(f"frame {frame.index} {kind} in {result.iterations} turns: {moved}", hint=hint)
+
+
+def unobserved(frame: int, turn: Turn, state: FrameState) -> None:
+    """Look on at no turn."""
 
 
 def seen(frame: Frame) -> bool:

@@ -35,6 +35,7 @@ class BackgroundDifference(ShadowAware):
     """
 
     name: ClassVar[str] = "background"
+    needs_background: ClassVar[bool] = True
 
     smooth_px: PositiveFloat = 1.0  # of the evidence before it is cut
     hole_px2: NonNegativeInt = 120  # holes up to this area are filled
