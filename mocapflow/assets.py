@@ -128,6 +128,7 @@ class Background:
 
     mean: tuple[F32, ...]  # C x (H, W, 3) grey levels
     spread: tuple[F32, ...]  # C x (H, W, 3) grey levels, standard deviation
+    assumed: bool = False  # from pictures with people in them: whoever stayed in place is part of it
 
 
 def _stray(index: I32, count: int, least: int) -> int | None:

@@ -39,6 +39,7 @@ from mocapflow.data import (
     blind,
     empty_matches,
 )
+from mocapflow.emptiness import believable
 from mocapflow.errors import ComponentFailed, PipelineError
 from mocapflow.functional import Functional, total
 from mocapflow.keys import FREE
@@ -102,6 +103,8 @@ class CoupledLoop(Stage):
         if scene.garment is not None and self.draper is None:
             hint = "name a draper and a cloth_fitter, or track the bare body: garment: null"
             raise PipelineError(f"the person wears a {scene.garment.name}, which the track does not drape", hint=hint)
+        if background is not None and not believable(background, recording, start, scene):
+            background = None
         scene = scene.with_background(background).simplified(self.body_faces)
         model = ClothedModel(scene=scene, draper=self.draper)
         if self.keep == "trace":

@@ -51,11 +51,12 @@ class EmptyScene(Stage):
         if self.source == "auto":
             LOG.warning(
                 "no clean plates in %s: a median over the recording stands in for them; a person who stays in place"
-                " is part of it, and lost: then --set stages.background=null --set stages.track.first_segmenter=null",
+                " is part of it",
                 recording.folder / "background",
             )
         pairs = [temporal_median(self._pictures(recording, c)) for c in range(len(recording.views))]
-        return Background(mean=tuple(mean for mean, _ in pairs), spread=tuple(spread for _, spread in pairs))
+        mean, spread = zip(*pairs, strict=True)
+        return Background(mean=mean, spread=spread, assumed=True)
 
     def _pictures(self, recording: Recording, camera: int) -> U8:
         """Return pictures (N, H, W, 3) of one camera, spread over the recording."""
