@@ -28,6 +28,7 @@ from mocapflow.errors import (
     unwritable,
 )
 from mocapflow.locks import Lock
+from mocapflow.named_parts import whereabouts
 from mocapflow.pipeline import Pipeline
 from mocapflow.progress import Progress
 from mocapflow.recipes import Step
@@ -236,7 +237,7 @@ class Execution:
         pipeline = self._pipeline
         return {
             "pipeline": pipeline.name,
-            "recording": str(pipeline.recording),
+            "recording": whereabouts(pipeline.recording),
             "frames": {"start": pipeline.start, "stop": pipeline.stop, "step": pipeline.step},
             "scale": pipeline.scale,
             "versions": versions(),

@@ -80,8 +80,9 @@ def check_apart(out: Path, store: Path, recording: Path) -> None:
         PipelineError: the run folder or the store is the recording folder, or lies in one of its folders.
     """
     folder = recording.resolve()
+    inside = [(folder / name).resolve() for name in INPUTS]  # links, where a pipeline names each part
     for what, path, option in (("results", out, "--out"), ("stored results", store, "--store")):
-        if path.resolve() == folder or any(path.resolve().is_relative_to(folder / name) for name in INPUTS):
+        if path.resolve() == folder or any(path.resolve().is_relative_to(place) for place in inside):
             hint = f"give {what} a folder of their own: {option} {Path('runs') / folder.name}"
             raise PipelineError(f"the {what} would lie among the files of the recording", where=str(path), hint=hint)
 

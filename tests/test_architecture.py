@@ -60,6 +60,7 @@ LAYERS = (  # a module imports only from its own layer or an earlier one; `io` a
     "yamlfile",
     "resolve",
     "measures",
+    "named_parts",
     "doctor",
     "pipeline",
     "levels",
