@@ -76,6 +76,8 @@ class Checkpoint:
         self._earlier, self._said = artifact.warnings, list[str]()
         self._iteration_done, self._frame_done = iteration_done, frame_done
         self._growing = Growing(artifact.path, indices, cameras)
+        for part in artifact.path.glob("*.part"):  # of a commit that was cut off; zarr would complain of it
+            part.unlink()
 
     @property
     def done(self) -> int:

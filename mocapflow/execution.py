@@ -257,4 +257,6 @@ class Execution:
 
     def _set_aside(self, path: Path, error: Corrupted) -> None:
         aside = self._store.set_aside(path)
-        self._report(f"warning: {path.name} is damaged and made anew: {error.message} (kept as {aside.name})")
+        self._report(
+            f"warning: {path.name} is damaged and made anew: {error.message} (kept as {aside.relative_to(path.parent)})"
+        )

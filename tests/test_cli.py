@@ -73,7 +73,11 @@ def test_the_store(call):
     assert call("cache", "explain", name, name, *store).stdout == "made from the same\n"
     assert f"would remove {name}" in call("cache", "prune", "--all", "--dry-run", *store).stdout
     assert "0 results" in call("cache", "prune", "--days", "1", *store).stdout
-    assert f"removed {name}" in call("cache", "prune", "--all", *store).stdout
+    damaged = Path("first/store.zarr/.state/damaged-start-0")
+    damaged.mkdir()
+    pruned = call("cache", "prune", "--all", *store).stdout
+    assert f"removed {name}" in pruned and f"removed {damaged.name}" in pruned
+    assert not damaged.exists()
     assert call("cache", "list", *store).stdout == ""
 
 
