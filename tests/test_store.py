@@ -90,6 +90,19 @@ def test_arrays_say_their_axes_and_units(store):
     assert group["vertices"].attrs["unit"] == "m, at rest"
 
 
+def test_every_array_of_a_store_says_its_axes_and_unit(tmp_path, path):
+    run_tiny(path, tmp_path, "stages.track.keep=trace", frames=3)
+    nodes = dict(zarr.open_group(str(tmp_path / "store.zarr"), mode="r").members(max_depth=None))
+    arrays = {name.partition("/")[2]: node for name, node in nodes.items() if isinstance(node, zarr.Array)}
+    assert {"trace", "live/rows", "match_count", "mean/0/values", "pose/root", "raw_angles"} <= set(arrays)
+    for name, array in arrays.items():
+        axes = array.metadata.dimension_names
+        assert axes is not None and all(axes), name
+        assert len(set(axes)) == len(axes), name
+        assert not any(axis.startswith("axis_") for axis in axes), name
+        assert array.attrs.get("unit"), name
+
+
 def test_a_track_is_read_by_xarray(tmp_path, path):
     xarray = pytest.importorskip("xarray")
     run_tiny(path, tmp_path)
