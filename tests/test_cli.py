@@ -372,6 +372,18 @@ def test_a_garment_is_drawn(call, garment):
     assert (panels > 0.004).all(), panels
 
 
+def test_a_garment_is_drawn_without_being_asked_to(call, monkeypatch):
+    monkeypatch.setattr(pictures, "poster", lambda *_: np.zeros((8, 8, 3), np.uint8))  # which takes two seconds to draw
+    shown = call("show", "garment", "skirt")
+    assert shown.stdout.splitlines()[-1].endswith("picture: runs/skirt.png") and "length_m" in shown.stdout
+    assert cv2.imread("runs/skirt.png").shape == (8, 8, 3)
+    assert (
+        call("show", "garment", "skirt", "--draper", "kinematik")
+        .stdout.splitlines()[-2]
+        .startswith("no picture: show garment skirt  no draper named 'kinematik'")
+    )
+
+
 @pytest.mark.parametrize("out", ["nowhere/skirt.png", "skirt.doc"])
 def test_a_picture_that_can_not_be_written(call, monkeypatch, out):
     monkeypatch.setattr(pictures, "poster", lambda *_: np.zeros((8, 8, 3), np.uint8))  # which takes two seconds to draw
