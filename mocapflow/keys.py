@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -65,7 +66,7 @@ def _plain(value: Any, where: str, registry: Registry, digests: Digests) -> Any:
     if value is None or isinstance(value, bool | int | str) and not isinstance(value, Enum):
         return value
     if isinstance(value, float):
-        return repr(float(value))  # json has no infinity
+        return float(value) if math.isfinite(value) else repr(float(value))  # json has no infinity
     if isinstance(value, Enum):
         return value.name
     if isinstance(value, Path):
@@ -86,7 +87,12 @@ def _plain(value: Any, where: str, registry: Registry, digests: Digests) -> Any:
 
 
 def _unnamed(value: Any) -> Any:
-    """Return a recipe with the names dropped from its digests: content counts, not where it lies."""
+    """Return what counts of a recipe: digests without their names, for it is no matter where content lies.
+
+    Fractions are text, as they were in all keys before recipes had them as numbers.
+    """
+    if isinstance(value, float):
+        return repr(value)
     if isinstance(value, str) and value.startswith(MARK):
         return value.partition(" ")[0]
     if isinstance(value, Mapping):
