@@ -223,6 +223,14 @@ class Stage(Component):
         """Return files that `run` reads besides the frames: their content is part of the cache key."""
         return ()
 
+    @property
+    def looks_back(self) -> bool:
+        """True where `look_back` has to see a result that comes from the store."""
+        return False
+
+    def look_back(self, made: Any) -> None:
+        """Raise what `run` would have raised of a result; settings outside its key may be others since it was made."""
+
 
 def pool(parts: Sequence[tuple[float, Matches]]) -> Matches:
     """Return the matches of several matchers as one set, each weighted by its share; none of no matcher."""

@@ -61,10 +61,11 @@ class Execution:
         self.entries: dict[str, Mapping[str, Any]] = {}  # per finished stage
 
     def finish(self, step: Step) -> None:
-        """See to it that the result of a stage exists; a cached one is not even read."""
+        """See to it that the result of a stage exists; a cached one is mostly not even read."""
         if step.label in self.entries:
             return
-        if found := self._find(step):
+        found = self._find(step)
+        if found and not step.named.stage.looks_back:
             self._entered(step, found)
         else:
             self._result(step.label)
@@ -90,6 +91,8 @@ class Execution:
     def _read(self, step: Step, found: Artifact) -> Any:
         result = self._store.load(found, step.frames if step.chain else None)
         self._entered(step, found)
+        if step.named.stage.looks_back:
+            step.named.stage.look_back(result)
         return result
 
     def _made(self, step: Step) -> Any:
