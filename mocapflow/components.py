@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from mocapflow.model import ClothedModel
+    from mocapflow.recording import Recording
     from mocapflow.scene import Scene
 
 
@@ -200,6 +201,9 @@ class BodyModel(Component):
         """Return the files `load` reads: their content is part of the cache key."""
         return ()
 
+    def need(self, recording: Path) -> None:
+        """Raise what `load` would for want of a file: asked by `plan`, and before a run computes anything."""
+
 
 class Stage(Component):
     """A whole-sequence step; the annotations of `run` are its wiring.
@@ -222,6 +226,9 @@ class Stage(Component):
     def inputs(self, recording: Path) -> Sequence[Path]:
         """Return files that `run` reads besides the frames: their content is part of the cache key."""
         return ()
+
+    def need(self, recording: Recording) -> None:
+        """Raise what `run` would for want of an input: asked by `plan`, and before a run computes anything."""
 
     @property
     def looks_back(self) -> bool:

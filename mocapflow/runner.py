@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from mocapflow.errors import PipelineError, no_run_folder
+from mocapflow.errors import MocapflowError, PipelineError, no_run_folder
 from mocapflow.execution import Execution, is_hit
 from mocapflow.keys import explain
 from mocapflow.pipeline import Pipeline
@@ -60,7 +61,9 @@ class RunSummary:
 def plan(pipeline: Pipeline, *, store: Path, url: str | None = None) -> list[PlanLine]:
     """Return for each stage whether its result is there, can be continued, or has to be made, and why."""
     kept = open_store(store, url)
-    lines = [_plan_line(step, kept) for step in steps_of(pipeline, kept.digests)]
+    steps = steps_of(pipeline, kept.digests)
+    check_inputs(pipeline, steps, kept)
+    lines = [_plan_line(step, kept) for step in steps]
     kept.digests.save()
     return lines
 
@@ -85,6 +88,31 @@ def check_apart(out: Path, store: Path, recording: Path) -> None:
         if path.resolve() == folder or any(path.resolve().is_relative_to(place) for place in inside):
             hint = f"give {what} a folder of their own: {option} {Path('runs') / folder.name}"
             raise PipelineError(f"the {what} would lie among the files of the recording", where=str(path), hint=hint)
+
+
+def check_inputs(pipeline: Pipeline, steps: Sequence[Step], store: Store, fresh: bool = False) -> None:
+    """Check that everything is there that has to be read; what comes from the store needs nothing.
+
+    Raises:
+        MocapflowError: what is missing, as the stage or body would tell it in the midst of a run.
+    """
+
+    def asked(need: Callable[[], None], readers: Sequence[Step]) -> None:
+        try:
+            need()
+        except MocapflowError:
+            if any(fresh or not _made(step, store) for step in readers):
+                raise
+
+    for step in steps:
+        asked(partial(step.named.stage.need, step.recording), [step])
+    dressed = [step for step in steps if "scene" in step.sources.values() and step.body is None]
+    asked(partial(pipeline.body.need, pipeline.recording), dressed)
+
+
+def _made(step: Step, store: Store) -> bool:
+    found = store.find(step.key) if step.stored else None
+    return found is not None and is_hit(step, found)
 
 
 def run(
@@ -118,6 +146,7 @@ def run(
     check_apart(out, store, pipeline.recording)
     kept = open_store(store, url)
     steps = steps_of(pipeline, kept.digests)
+    check_inputs(pipeline, steps, kept, fresh)
     kept.create()
     kept.digests.save()
     begin(steps)

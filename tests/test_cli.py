@@ -2,6 +2,7 @@ import errno
 import io
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -58,6 +59,49 @@ def test_a_run_folder_within_the_recording_is_refused_before_it_is_made(call, tm
     assert not Path("clip/videos/run").exists()
     stored = call("run", str(tmp_path / "tiny.yaml"), "--out", "run", "--store", "clip/videos", *more)
     assert stored.exit_code == 2 and "the stored results would lie among the files" in stored.stderr
+
+
+@pytest.mark.parametrize(
+    ("stages", "lost", "message"),
+    [
+        ("{start: start_from_file}", "init.json", "there is no file with the first pose"),
+        ("{start: start_from_file}", "subject/body.obj", "no such mesh"),
+        ("{start: start_from_file}", "subject/skeleton.json", "there is no skeleton for the mesh"),
+        ("{start: start_from_file}", "videos/cam02.mp4", "missing camera: no video of cam02"),
+        ("{start: start_from_file}", "cameras.toml", "no calibration file"),
+        ("{start: start_from_keypoints}", "none", "there are no 2D keypoints of two cameras or more"),
+        ("{turned: align_cameras}", "none", "there are no 2D keypoints of two cameras or more"),
+        ("{body: {use: fit_subject, trial: static}}", "none", "there is no standing trial"),
+        ("{room: {use: background, source: plates}}", "background", "there are no clean plates"),
+        ("{room: background}", "background/cam03.png", "no clean plate of cam03"),
+    ],
+)
+def test_a_plan_tells_what_is_missing_as_a_run_does_before_it_begins(call, tmp_path, stages, lost, message):
+    shutil.copytree(CLIP, tmp_path / "clip")
+    shutil.rmtree(tmp_path / "clip/keypoints", ignore_errors=True)
+    place = tmp_path / "clip" / lost
+    if place.exists():
+        shutil.rmtree(place) if place.is_dir() else place.unlink()
+    Path("start.yaml").write_text(f"recording: clip\nstages: {stages}\n")
+    planned, done = call("plan", "start.yaml"), call("run", "start.yaml")
+    assert planned.exit_code == done.exit_code == 2, planned.output + done.output
+    assert message in planned.stderr and planned.stdout == ""
+    assert done.stderr == planned.stderr
+    assert not Path("runs/store.zarr").exists()
+
+
+def test_a_reference_that_is_missing_is_told_before_anything_is_tracked(call):
+    bare, change = str(shipped("pipelines", "bare.yaml")), "stages.evaluate.reference=truth/no.csv"
+    planned = call("plan", bare, "--recording", str(CLIP), "--set", change)
+    assert planned.exit_code == 2 and "truth/no.csv  no such reference" in planned.stderr
+
+
+def test_what_comes_from_the_store_needs_no_files(call, tmp_path):
+    shutil.copytree(CLIP, tmp_path / "clip")
+    Path("start.yaml").write_text("recording: clip\nstages: {turned: {use: background, source: plates}}\n")
+    assert call("run", "start.yaml", "--frames", "0:2").exit_code == 0
+    shutil.rmtree(tmp_path / "clip/subject")  # which nobody reads
+    assert call("plan", "start.yaml", "--frames", "0:2").exit_code == 0
 
 
 def test_the_store(call):
