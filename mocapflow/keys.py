@@ -24,6 +24,7 @@ from mocapflow.errors import PluginError
 from mocapflow.registry import Registry
 
 FORMAT = 2  # of recipes and groups: another number makes everything anew
+CODE = frozenset({"format", "core", "code", "reader", "key"})  # what is of code in a recipe
 Recipe = Mapping[str, Any]
 
 
@@ -39,6 +40,13 @@ def key_of(recipe: Recipe) -> str:
     """Return the key of a recipe: 32 hexadecimal digits."""
     text = json.dumps(_unnamed(recipe), sort_keys=True, separators=(",", ":"))
     return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
+
+
+def without_code(value: Any) -> Any:
+    """Return a recipe without digests of code, and without the keys of its inputs, which have them in them."""
+    if isinstance(value, Mapping):
+        return {name: without_code(inner) for name, inner in value.items() if name not in CODE}
+    return [without_code(inner) for inner in value] if isinstance(value, list | tuple) else value
 
 
 def component_recipe(component: Component, registry: Registry, digests: Digests) -> dict[str, Any]:

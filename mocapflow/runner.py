@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from mocapflow.errors import MocapflowError, PipelineError, no_run_folder
 from mocapflow.execution import Execution, is_hit
+from mocapflow.former_code import as_made
 from mocapflow.keys import explain
 from mocapflow.pipeline import Pipeline
 from mocapflow.recipes import Step, steps_of
@@ -70,8 +71,13 @@ def plan(pipeline: Pipeline, *, store: Path, url: str | None = None) -> list[Pla
 
 def keys(pipeline: Pipeline, *, store: Path, url: str | None = None) -> dict[str, str]:
     """Return the key of what each stage would make, by label."""
+    return {step.label: step.key for step in steps(pipeline, store=store, url=url)}
+
+
+def steps(pipeline: Pipeline, *, store: Path, url: str | None = None) -> list[Step]:
+    """Return the stages of a pipeline with their recipes and keys."""
     kept = open_store(store, url)
-    found = {step.label: step.key for step in steps_of(pipeline, kept.digests)}
+    found = steps_of(pipeline, kept.digests)
     kept.digests.save()
     return found
 
@@ -125,6 +131,7 @@ def run(
     only: str | None = None,
     report: Report = lambda line: None,
     begin: Callable[[Sequence[Step]], None] = lambda steps: None,
+    made: Mapping[str, str] | None = None,
 ) -> RunSummary:
     """Run a pipeline and return what was done.
 
@@ -137,6 +144,7 @@ def run(
         only: the label of one stage: make that and what it needs.
         report: told lines of progress.
         begin: told the steps, one for each stage, before any is made.
+        made: keys by label of what older code has made of the same: that is taken from the store.
 
     Raises:
         ComponentFailed: a component raised; committed frames are kept.
@@ -146,6 +154,8 @@ def run(
     check_apart(out, store, pipeline.recording)
     kept = open_store(store, url)
     steps = steps_of(pipeline, kept.digests)
+    if made is not None:
+        steps = as_made(steps, made, kept, report)
     check_inputs(pipeline, steps, kept, fresh)
     kept.create()
     kept.digests.save()

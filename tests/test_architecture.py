@@ -72,6 +72,7 @@ LAYERS = (  # a module imports only from its own layer or an earlier one; `io` a
     "progress",
     "warned",
     "execution",
+    "former_code",
     "runner",
     "testing",
     "shipped",
