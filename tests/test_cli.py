@@ -342,6 +342,11 @@ def test_settings(call):
     assert "available: mocapflow — did you mean 'mocapflow'?" in other.stderr
 
 
+@pytest.mark.parametrize(("command", "default"), [("run", "runs/NAME_OF_PIPELINE"), ("show", "runs/NAME.png")])
+def test_help_says_where_files_go_by_default(call, command, default):
+    assert f"[default: ({default})]" in call(command, "--help").stdout
+
+
 def test_show(call):
     shown = call("show", "prior", "joint_limits").stdout
     assert shown.startswith("prior joint_limits, from plugin 'priors' (mocapflow 0.1.0)\nA soft wall at the limits")

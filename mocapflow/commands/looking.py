@@ -34,7 +34,7 @@ def show(
     role: Annotated[str, typer.Argument(help="draper, garment, matcher, stage, …")],
     name: Annotated[str, typer.Argument(help="Its name, as in a pipeline file.")],
     out: Annotated[
-        Path | None, typer.Option(metavar="PNG", help="The picture of a garment.  [default: runs/NAME.png]")
+        Path | None, typer.Option(metavar="PNG", help="The picture of a garment.", show_default="runs/NAME.png")
     ] = None,
     recording: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Whose person and tape measures; a shipped clip if not given.")

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Run = Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")]
 Truth = Annotated[
-    Path | None, typer.Option(help="A .csv, .mot, .trc or .c3d to compare with.  [default: the recording's]")
+    Path | None, typer.Option(help="A .csv, .mot, .trc or .c3d to compare with.", show_default="the recording's")
 ]
 Format = Annotated[
     list[str],

@@ -22,12 +22,13 @@ if TYPE_CHECKING:
 
 File = Annotated[Path, typer.Argument(metavar="PIPELINE", help="A pipeline file (.yaml).")]
 Recording = Annotated[Path | None, typer.Option(help="Use this recording folder instead of the file's.")]
-Out = Annotated[Path | None, typer.Option(help="The run folder.  [default: runs/NAME_OF_PIPELINE]")]
+Out = Annotated[Path | None, typer.Option(help="The run folder.", show_default="runs/NAME_OF_PIPELINE")]
 Store = Annotated[
     str | None,
     typer.Option(
         metavar="PATH|URL",
-        help="Cached results, or a URL (s3://…) to share them.  [default: store.zarr beside the run folder]",
+        help="Cached results, or a URL (s3://…) to share them.",
+        show_default="store.zarr beside the run folder",
     ),
 ]
 Set = Annotated[list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Change a value; repeatable.")]
