@@ -38,7 +38,7 @@ def save_record(group: zarr.Group, value: Any) -> None:
             unit = declared[field.name].unit if field.name in declared else ""
             save_array(group, field.name, inner, axis_names(field.name, axes, len(inner.shape)), unit)
         elif _is_nested(inner):
-            _save_nested(group.create_group(field.name), inner)
+            _save_nested(group.create_group(field.name), inner, *field.metadata.get("each", ((), "")))
         else:
             plain[field.name] = str(inner) if isinstance(inner, Path) else inner
     group.update_attributes({"record": f"{cls.__module__}:{cls.__qualname__}", PLAIN: plain})
@@ -107,7 +107,7 @@ def _is_nested(value: Any) -> bool:
     return is_dataclass(value)
 
 
-def _save_nested(group: zarr.Group, value: Any) -> None:
+def _save_nested(group: zarr.Group, value: Any, axes: tuple[str, ...] = (), unit: str = "") -> None:
     if is_dataclass(value):
         save_record(group, value)
         return
@@ -116,9 +116,9 @@ def _save_nested(group: zarr.Group, value: Any) -> None:
     for name, inner in items:
         order.append(name)
         if isinstance(inner, np.ndarray):  # its axes are its own: equal names would have to have equal lengths
-            save_array(group.create_group(name), "values", inner, axis_names("axis", (), inner.ndim), "")
+            save_array(group.create_group(name), "values", inner, axis_names("axis", axes, inner.ndim), unit)
         elif inner is not None:
-            _save_nested(group.create_group(name), inner)
+            _save_nested(group.create_group(name), inner, axes, unit)
     group.update_attributes({"kind": "mapping" if isinstance(value, Mapping) else "tuple", "order": order})
 
 

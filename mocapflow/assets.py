@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mocapflow.errors import GarmentError, MocapflowError, ShapeError, alternatives
-from mocapflow.records import F32, F64, I32, Bool, array, record
+from mocapflow.records import F32, F64, I32, Bool, array, arrays, record
 
 
 @record
@@ -126,8 +126,8 @@ class GarmentMesh:
 class Background:
     """The empty scene, per camera: mean and spread of every pixel."""
 
-    mean: tuple[F32, ...]  # C x (H, W, 3) grey levels
-    spread: tuple[F32, ...]  # C x (H, W, 3) grey levels, standard deviation
+    mean: tuple[F32, ...] = arrays("H", "W", "BGR", unit="grey levels")
+    spread: tuple[F32, ...] = arrays("H", "W", "BGR", unit="grey levels, standard deviation")
     assumed: bool = False  # from pictures with people in them: whoever stayed in place is part of it
 
 

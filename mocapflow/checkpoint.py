@@ -6,7 +6,7 @@ counts once `frames_done` says so, which is written last and in one step, when t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -76,6 +76,8 @@ class Checkpoint:
         self._earlier, self._said = artifact.warnings, list[str]()
         self._iteration_done, self._frame_done = iteration_done, frame_done
         self._growing = Growing(artifact.path, indices, cameras)
+        for part in artifact.path.glob("*.part"):  # of a commit that was cut off; zarr would complain of it
+            part.unlink()
 
     @property
     def done(self) -> int:
@@ -110,6 +112,13 @@ class Checkpoint:
         rows = range(max(0, self.done - REMEMBERED), self.done)
         moments = tuple(self._moment(self._growing.numbers(row, self._columns), self._cloth(row)) for row in rows)
         return Past(moments=moments, appearance=self._appearance(self.done - 1) if rows else {})
+
+    def rests(self) -> Iterator[tuple[int, int, bool]]:
+        """Yield of each frame that is saved its index, its turns, and whether it came to rest."""
+        for row in range(self.done):
+            numbers = self._growing.numbers(row, self._columns)
+            turns, steady = (float(column(self._columns, numbers, name)) for name in ("iterations", "steady"))
+            yield self._indices[row], int(turns), bool(steady)
 
     def keep_turns(self, cap: int) -> None:
         """Keep the pose of every turn as `trace`, at most `cap` a frame; frames that are done have none."""

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from mocapflow.model import ClothedModel
+    from mocapflow.recording import Recording
     from mocapflow.scene import Scene
 
 
@@ -201,6 +202,9 @@ class BodyModel(Component):
         """Return the files `load` reads: their content is part of the cache key."""
         return ()
 
+    def need(self, recording: Path) -> None:
+        """Raise what `load` would for want of a file: asked by `plan`, and before a run computes anything."""
+
 
 class Stage(Component):
     """A whole-sequence step; the annotations of `run` are its wiring.
@@ -223,6 +227,17 @@ class Stage(Component):
     def inputs(self, recording: Path) -> Sequence[Path]:
         """Return files that `run` reads besides the frames: their content is part of the cache key."""
         return ()
+
+    def need(self, recording: Recording) -> None:
+        """Raise what `run` would for want of an input: asked by `plan`, and before a run computes anything."""
+
+    @property
+    def looks_back(self) -> bool:
+        """True where `look_back` has to see a result that comes from the store."""
+        return False
+
+    def look_back(self, made: Any) -> None:
+        """Raise what `run` would have raised of a result; settings outside its key may be others since it was made."""
 
 
 def pool(parts: Sequence[tuple[float, Matches]]) -> Matches:

@@ -28,6 +28,7 @@ from mocapflow.errors import (
     unwritable,
 )
 from mocapflow.locks import Lock
+from mocapflow.named_parts import whereabouts
 from mocapflow.pipeline import Pipeline
 from mocapflow.progress import Progress
 from mocapflow.recipes import Step
@@ -60,10 +61,11 @@ class Execution:
         self.entries: dict[str, Mapping[str, Any]] = {}  # per finished stage
 
     def finish(self, step: Step) -> None:
-        """See to it that the result of a stage exists; a cached one is not even read."""
+        """See to it that the result of a stage exists; a cached one is mostly not even read."""
         if step.label in self.entries:
             return
-        if found := self._find(step):
+        found = self._find(step)
+        if found and not step.named.stage.looks_back:
             self._entered(step, found)
         else:
             self._result(step.label)
@@ -89,6 +91,8 @@ class Execution:
     def _read(self, step: Step, found: Artifact) -> Any:
         result = self._store.load(found, step.frames if step.chain else None)
         self._entered(step, found)
+        if step.named.stage.looks_back:
+            step.named.stage.look_back(result)
         return result
 
     def _made(self, step: Step) -> Any:
@@ -236,7 +240,7 @@ class Execution:
         pipeline = self._pipeline
         return {
             "pipeline": pipeline.name,
-            "recording": str(pipeline.recording),
+            "recording": whereabouts(pipeline.recording),
             "frames": {"start": pipeline.start, "stop": pipeline.stop, "step": pipeline.step},
             "scale": pipeline.scale,
             "versions": versions(),
@@ -256,4 +260,6 @@ class Execution:
 
     def _set_aside(self, path: Path, error: Corrupted) -> None:
         aside = self._store.set_aside(path)
-        self._report(f"warning: {path.name} is damaged and made anew: {error.message} (kept as {aside.name})")
+        self._report(
+            f"warning: {path.name} is damaged and made anew: {error.message} (kept as {aside.relative_to(path.parent)})"
+        )

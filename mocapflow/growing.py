@@ -52,7 +52,7 @@ class Growing:
 
     def write_numbers(self, row: int, numbers: F64) -> None:
         """Write all numbers of a frame."""
-        self._like(NUMBERS, numbers, np.nan, "number").write(row, numbers)
+        self._like(NUMBERS, numbers, np.nan, "number", unit="by column: `columns` of the track").write(row, numbers)
 
     def cloth(self, row: int) -> F64:
         """Return the cloth vertices (W, 3) m of a frame."""
@@ -70,7 +70,8 @@ class Growing:
             self._like(name, steps, packing.UNSEEN, "y", "x", unit=f"1/{packing.FINE} px").write(row, steps)
         packed = packing.match_row(matches)
         name = f"matches/{len(packed)}"
-        self._like(name, packed, 0, f"M{len(packed)}", "match", columns=packing.MATCH).write(row, packed)
+        about = {"unit": "by column", "columns": packing.MATCH}
+        self._like(name, packed, 0, f"M{len(packed)}", "match", **about).write(row, packed)
 
     def appearance(self, row: int, shapes: Shapes) -> dict[str, F64]:
         """Return what frames have shown up to this one, one of the last two.
@@ -90,14 +91,16 @@ class Growing:
         """Write what frames have shown up to this one, over that of the last but one."""
         if appearance:
             flat = np.concatenate([[self._indices[row]], *(values.ravel() for values in appearance.values())])
-            self._like(f"live/appearance-{len(flat)}", flat, np.nan, f"A{len(flat)}").write(row % 2, flat)
+            name, unit = f"live/appearance-{len(flat)}", "frame index, then as the segmenter has it"
+            self._like(name, flat, np.nan, f"A{len(flat)}", unit=unit).write(row % 2, flat)
 
     def write_trace(self, row: int, turns: Sequence[Pose], cap: int, angles: int) -> None:
         """Write the poses of a frame's turns, at most `cap`, with so many angles each."""
         poses = np.full((cap, 16 + angles), np.nan)
         for turn, pose in enumerate(turns):
             poses[turn] = np.concatenate([pose.root.ravel(), pose.angles])
-        self._like("trace", poses, np.nan, "turn", "root_and_angles").write(row, poses)
+        unit = "root (4, 4) in m, world_from_body, then angles in rad; NaN after the last turn"
+        self._like("trace", poses, np.nan, "turn", "root_and_angles", unit=unit).write(row, poses)
 
     def array(self, name: str) -> Rows:
         """Return an array that is there."""

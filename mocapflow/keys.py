@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -23,6 +24,7 @@ from mocapflow.errors import PluginError
 from mocapflow.registry import Registry
 
 FORMAT = 2  # of recipes and groups: another number makes everything anew
+CODE = frozenset({"format", "core", "code", "reader", "key"})  # what is of code in a recipe
 Recipe = Mapping[str, Any]
 
 
@@ -38,6 +40,13 @@ def key_of(recipe: Recipe) -> str:
     """Return the key of a recipe: 32 hexadecimal digits."""
     text = json.dumps(_unnamed(recipe), sort_keys=True, separators=(",", ":"))
     return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
+
+
+def without_code(value: Any) -> Any:
+    """Return a recipe without digests of code, and without the keys of its inputs, which have them in them."""
+    if isinstance(value, Mapping):
+        return {name: without_code(inner) for name, inner in value.items() if name not in CODE}
+    return [without_code(inner) for inner in value] if isinstance(value, list | tuple) else value
 
 
 def component_recipe(component: Component, registry: Registry, digests: Digests) -> dict[str, Any]:
@@ -65,7 +74,7 @@ def _plain(value: Any, where: str, registry: Registry, digests: Digests) -> Any:
     if value is None or isinstance(value, bool | int | str) and not isinstance(value, Enum):
         return value
     if isinstance(value, float):
-        return repr(float(value))  # json has no infinity
+        return float(value) if math.isfinite(value) else repr(float(value))  # json has no infinity
     if isinstance(value, Enum):
         return value.name
     if isinstance(value, Path):
@@ -86,7 +95,12 @@ def _plain(value: Any, where: str, registry: Registry, digests: Digests) -> Any:
 
 
 def _unnamed(value: Any) -> Any:
-    """Return a recipe with the names dropped from its digests: content counts, not where it lies."""
+    """Return what counts of a recipe: digests without their names, for it is no matter where content lies.
+
+    Fractions are text, as they were in all keys before recipes had them as numbers.
+    """
+    if isinstance(value, float):
+        return repr(value)
     if isinstance(value, str) and value.startswith(MARK):
         return value.partition(" ")[0]
     if isinstance(value, Mapping):

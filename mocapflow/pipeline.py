@@ -14,6 +14,7 @@ from mocapflow.components import BodyModel, Garment, Stage
 from mocapflow.documents import Document, Place, Steps, changed
 from mocapflow.errors import PipelineError, RecordingError
 from mocapflow.measures import garment_of, place_of
+from mocapflow.named_parts import folder_of
 from mocapflow.registry import Registry, load_registry
 from mocapflow.resolve import Resolver
 from mocapflow.settings import Settings
@@ -56,7 +57,7 @@ class PipelineFile(Settings):
 
     name: ClassVar[str] = "a pipeline"
     mocapflow: Literal[1] = 1  # version of the format
-    recording: str | None = None  # a folder, from the folder of this file; instead of --recording
+    recording: str | dict[str, Any] | None = None  # a folder, or {cameras: FILE, videos: DIR, …}
     plugins: tuple[str, ...] = ()  # plugin files, from the folder of this file
     body: Any = "scanned"  # a component `body`
     garment: Any = None  # a component `garment`
@@ -136,7 +137,7 @@ def load_pipeline(
     said = plain.build(PipelineFile, document.values, ())
     assert isinstance(said, PipelineFile)
     resolver = Resolver(document, registry or _registry_with(said.plugins, plain))
-    recording = recording or _recording(said, resolver)
+    recording = recording or _recording(said, Path(path).stem, resolver)
     if not recording.is_dir():
         raise RecordingError("there is no such folder", where=str(recording), hint="--recording DIR names another")
     part = said.frames
@@ -172,9 +173,11 @@ def _registry_with(plugins: tuple[str, ...], resolver: Resolver) -> Registry:
     return registry
 
 
-def _recording(said: PipelineFile, resolver: Resolver) -> Path:
+def _recording(said: PipelineFile, name: str, resolver: Resolver) -> Path:
     if said.recording is None:
         raise resolver.located(PipelineError("no recording: write `recording: DIR`, or give --recording DIR"), ())
+    if isinstance(said.recording, dict):
+        return folder_of(said.recording, name, resolver)
     return resolver.file(said.recording, ("recording",))
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from mocapflow.assets import Background, Body, Camera, Rig
 from mocapflow.data import Start
 from mocapflow.digests import Digests, digest_array
-from mocapflow.keys import FORMAT, Recipe, component_recipe, key_of
+from mocapflow.keys import FORMAT, Recipe, component_recipe, key_of, without_code
 from mocapflow.parts import in_parts
 from mocapflow.pipeline import NamedStage, Pipeline
 from mocapflow.recording import Recording, open_recording
@@ -37,6 +37,12 @@ class Step:
     def label(self) -> str:
         """What the pipeline calls it."""
         return self.named.label
+
+    @property
+    def content(self) -> str:
+        """A key of what pipeline and recording say of this stage and what it reads, whatever code makes of it."""
+        read = {"from": self.sources, "body": self.body, "rig": self.rig}
+        return key_of({**without_code(self.recipe), "read": read})
 
     @property
     def chain(self) -> bool:

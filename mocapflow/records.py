@@ -49,6 +49,11 @@ def array(*axes: str | int, unit: str, default: Any = dataclasses.MISSING) -> An
     return dataclasses.field(default=default, metadata={"axes": axes, "unit": unit})
 
 
+def arrays(*axes: str, unit: str) -> Any:
+    """Declare a field of several arrays of their own lengths: for the store, which names axes and unit of each."""
+    return dataclasses.field(metadata={"each": (axes, unit)})
+
+
 @cache
 def array_fields(record_class: type) -> dict[str, Axes]:
     """Return the declaration of each array field of a record class."""
@@ -98,7 +103,7 @@ def _complain(where: str, shape: tuple[int, ...], axes: tuple[str | int, ...], l
     raise ShapeError(f"{where} has shape {shape}; expected ({wanted})")
 
 
-@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(array, dataclasses.field))
+@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(array, arrays, dataclasses.field))
 def record(cls: Class) -> Class:
     """Make a frozen, keyword-only dataclass that checks its arrays when built."""
     own_check: Callable[[Any], None] | None = cls.__dict__.get("__post_init__")

@@ -60,7 +60,7 @@ class Track:
     time: F64 = array("T", unit="s")
     root: F64 = array("T", 4, 4, unit="m, world_from_body")
     angles: F64 = array("T", "D", unit="rad")
-    covariance: Wide = array("T", "R", "R", unit="of (omega, v, angles)")
+    covariance: Wide = array("T", "R", "R", unit="rad², rad m and m² of (omega in rad, v in m, angles in rad)")
     observed: F64 = array("T", "D", unit="1, share of the priors' variance of each angle that the images took away")
     cloth: Wide = array("T", "W", 3, unit="m")
     cloth_parameters: F64 = array("T", "Q", unit="by name")

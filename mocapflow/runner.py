@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from mocapflow.errors import PipelineError, no_run_folder
+from mocapflow.errors import MocapflowError, PipelineError, no_run_folder
 from mocapflow.execution import Execution, is_hit
+from mocapflow.former_code import as_made
 from mocapflow.keys import explain
 from mocapflow.pipeline import Pipeline
 from mocapflow.recipes import Step, steps_of
@@ -60,15 +62,22 @@ class RunSummary:
 def plan(pipeline: Pipeline, *, store: Path, url: str | None = None) -> list[PlanLine]:
     """Return for each stage whether its result is there, can be continued, or has to be made, and why."""
     kept = open_store(store, url)
-    lines = [_plan_line(step, kept) for step in steps_of(pipeline, kept.digests)]
+    steps = steps_of(pipeline, kept.digests)
+    check_inputs(pipeline, steps, kept)
+    lines = [_plan_line(step, kept) for step in steps]
     kept.digests.save()
     return lines
 
 
 def keys(pipeline: Pipeline, *, store: Path, url: str | None = None) -> dict[str, str]:
     """Return the key of what each stage would make, by label."""
+    return {step.label: step.key for step in steps(pipeline, store=store, url=url)}
+
+
+def steps(pipeline: Pipeline, *, store: Path, url: str | None = None) -> list[Step]:
+    """Return the stages of a pipeline with their recipes and keys."""
     kept = open_store(store, url)
-    found = {step.label: step.key for step in steps_of(pipeline, kept.digests)}
+    found = steps_of(pipeline, kept.digests)
     kept.digests.save()
     return found
 
@@ -80,10 +89,36 @@ def check_apart(out: Path, store: Path, recording: Path) -> None:
         PipelineError: the run folder or the store is the recording folder, or lies in one of its folders.
     """
     folder = recording.resolve()
+    inside = [(folder / name).resolve() for name in INPUTS]  # links, where a pipeline names each part
     for what, path, option in (("results", out, "--out"), ("stored results", store, "--store")):
-        if path.resolve() == folder or any(path.resolve().is_relative_to(folder / name) for name in INPUTS):
+        if path.resolve() == folder or any(path.resolve().is_relative_to(place) for place in inside):
             hint = f"give {what} a folder of their own: {option} {Path('runs') / folder.name}"
             raise PipelineError(f"the {what} would lie among the files of the recording", where=str(path), hint=hint)
+
+
+def check_inputs(pipeline: Pipeline, steps: Sequence[Step], store: Store, fresh: bool = False) -> None:
+    """Check that everything is there that has to be read; what comes from the store needs nothing.
+
+    Raises:
+        MocapflowError: what is missing, as the stage or body would tell it in the midst of a run.
+    """
+
+    def asked(need: Callable[[], None], readers: Sequence[Step]) -> None:
+        try:
+            need()
+        except MocapflowError:
+            if any(fresh or not _made(step, store) for step in readers):
+                raise
+
+    for step in steps:
+        asked(partial(step.named.stage.need, step.recording), [step])
+    dressed = [step for step in steps if "scene" in step.sources.values() and step.body is None]
+    asked(partial(pipeline.body.need, pipeline.recording), dressed)
+
+
+def _made(step: Step, store: Store) -> bool:
+    found = store.find(step.key) if step.stored else None
+    return found is not None and is_hit(step, found)
 
 
 def run(
@@ -96,6 +131,7 @@ def run(
     only: str | None = None,
     report: Report = lambda line: None,
     begin: Callable[[Sequence[Step]], None] = lambda steps: None,
+    made: Mapping[str, str] | None = None,
 ) -> RunSummary:
     """Run a pipeline and return what was done.
 
@@ -108,6 +144,7 @@ def run(
         only: the label of one stage: make that and what it needs.
         report: told lines of progress.
         begin: told the steps, one for each stage, before any is made.
+        made: keys by label of what older code has made of the same: that is taken from the store.
 
     Raises:
         ComponentFailed: a component raised; committed frames are kept.
@@ -117,6 +154,9 @@ def run(
     check_apart(out, store, pipeline.recording)
     kept = open_store(store, url)
     steps = steps_of(pipeline, kept.digests)
+    if made is not None:
+        steps = as_made(steps, made, kept, report)
+    check_inputs(pipeline, steps, kept, fresh)
     kept.create()
     kept.digests.save()
     begin(steps)

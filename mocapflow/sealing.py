@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mocapflow.archive import PLAIN, axis_names
-from mocapflow.packing import Columns, column
+from mocapflow.packing import UNITS, Columns, column
 from mocapflow.records import array_fields
 from mocapflow.results import Track
 from mocapflow.rows import Corrupted, Rows, write_json
@@ -55,5 +55,5 @@ def _array(path: Path, name: str, shape: tuple[int, ...], rows: int, sealed: int
     declared = array_fields(Track).get(name)
     axes = axis_names(name, declared.axes if declared else ("T",), 1 + len(shape))
     dtype = declared.dtype if declared else np.dtype(float)
-    unit = {"unit": declared.unit} if declared else {}
-    return Rows.create(path / name, (rows, *shape), dtype.name, 0, axes, unit, BLOCK)
+    unit = declared.unit if declared else UNITS[name]
+    return Rows.create(path / name, (rows, *shape), dtype.name, 0, axes, {"unit": unit}, BLOCK)

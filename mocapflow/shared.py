@@ -95,7 +95,7 @@ class SharedStore(Store):
         there = self._ahead(key, super().find(key))
         if there is None:
             return
-        part = self.path / f".{uuid4().hex}"
+        part = self.state / uuid4().hex
         try:
             self._copies.fetch(there, part)
             if not (part / META).is_file():  # dropped meanwhile for one that is further: what is here stays

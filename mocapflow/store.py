@@ -2,6 +2,10 @@
 
 A group counts as finished only by its attribute `complete`, never by which chunks exist: a missing chunk reads as
 the fill value.
+
+What is no result lies in `.state`: locks, digests, groups that were damaged. To zarr it is an empty array, for zarr and
+xarray look into every group and complain of what they don't know, but never into an array. It is not beside the store:
+whoever shares the folder has to share the locks.
 """
 
 from __future__ import annotations
@@ -17,11 +21,13 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from mocapflow.digests import Digests
 from mocapflow.errors import FULL, StoreError
 from mocapflow.keys import Recipe
 from mocapflow.locks import Lock, acquire, held
-from mocapflow.rows import Corrupted, flush_all, read_json, write_json
+from mocapflow.rows import Corrupted, array_meta, flush_all, read_json, write_json
 
 SHORT = 12  # digits of the key in a group's name
 LIBRARIES = ("mocapflow", "numpy", "scipy", "opencv-python-headless", "numba")
@@ -76,8 +82,8 @@ class Store:
                 f"the store has to be a folder, not {path}", hint="a URL is for --store of run, plan and compare"
             )
         self.path = path
-        self._state = path / ".state"
-        self.digests = Digests(self._state / "digests.json")
+        self.state = path / ".state"  # what is no result
+        self.digests = Digests(self.state / "digests.json")
 
     def create(self) -> None:
         """Make the folder, if there is none.
@@ -85,11 +91,15 @@ class Store:
         Raises:
             StoreError: it can't be written.
         """
+        about = {"unit": "1", "about": "locks, digests and damaged results of mocapflow; no data"}
+        state = array_meta((0,), (1,), np.dtype(np.uint8), 0, ("nothing",), about)
         with writing(self.path):
-            for folder in (self.path, self._state):
+            for folder, meta in ((self.path, group_meta({})), (self.state, state)):
                 folder.mkdir(parents=True, exist_ok=True)
-                if not (folder / "zarr.json").exists():  # also the state is a group, so that zarr lists it calmly
-                    write_json(folder / "zarr.json", group_meta({}))
+                if _kind(folder) != meta["node_type"]:  # not there yet, or of an earlier version
+                    write_json(folder / "zarr.json", meta)
+            for damaged in self.path.glob(f"damaged-*-{'[0-9]' * 19}"):  # where earlier versions set them aside
+                damaged.rename(self.state / damaged.name)
 
     def artifacts(self) -> list[Artifact]:
         """Return what is in the store, oldest first; what can't be read is left out."""
@@ -175,10 +185,14 @@ class Store:
 
     def set_aside(self, path: Path) -> Path:
         """Move a damaged group out of the way and return its new name."""
-        aside = path.with_name(f"damaged-{path.name}-{time.time_ns()}")
+        aside = self.state / f"damaged-{path.name}-{time.time_ns()}"
         with writing(self.path):
             path.rename(aside)
         return aside
+
+    def aside(self) -> list[Path]:
+        """Return the groups that were damaged and set aside."""
+        return sorted(self.state.glob("damaged-*"))
 
     def discard(self, artifact: Artifact) -> None:
         """Remove an artifact that is to be made anew."""
@@ -189,10 +203,10 @@ class Store:
         return next((p for p in self._groups(f"*-{key[:SHORT]}") if _open(p) is None), None)
 
     def _lock(self, key: str) -> Path:
-        return self._state / f"{key[:SHORT]}.lock"
+        return self.state / f"{key[:SHORT]}.lock"
 
     def _groups(self, pattern: str) -> list[Path]:
-        return sorted(p for p in self.path.glob(pattern) if p.is_dir() and not p.name.startswith((".", "damaged-")))
+        return sorted(p for p in self.path.glob(pattern) if p.is_dir() and not p.name.startswith("."))
 
 
 def group_meta(attributes: Mapping[str, Any]) -> dict[str, Any]:
@@ -246,6 +260,14 @@ def writing(where: Path, saved: str = "") -> Iterator[None]:
         todo = "free some space" if full else "make it writable"
         hint = "\n".join(filter(None, [f"{todo}, or name another store", saved]))
         raise StoreError(message, hint=hint) from error
+
+
+def _kind(folder: Path) -> str | None:
+    """Return what a zarr node is, None where it can't be read."""
+    try:
+        return str(read_json(folder / "zarr.json").get("node_type"))
+    except StoreError:
+        return None
 
 
 def _open(path: Path) -> Artifact | None:

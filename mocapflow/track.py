@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
@@ -56,6 +56,7 @@ STEPS = ("decode", "predict", "drape", "segment", "solve", "cloth", "match", "re
 VIEWS = 2  # fewer than these do not fix a pose in space
 MOVING = 2  # frames before that tell how the person moves
 UNKNOWN = np.pi**2  # rad^2 and m^2, the variance where nothing was seen
+GO_ON = "the frame is saved; on_unsteady: go_on continues after it, steady: {max_turns: …} gives it more turns"
 
 
 class CoupledLoop(Stage):
@@ -109,6 +110,8 @@ class CoupledLoop(Stage):
         model = ClothedModel(scene=scene, draper=self.draper)
         if self.keep == "trace":
             checkpoint.keep_turns(self.steady.cap)
+        if self.looks_back:
+            self._refuse(rest for rest in checkpoint.rests() if rest[0] in recording.indices)
         past, watch = checkpoint.past(), Stopwatch()
         for raw in recording.frames(since=checkpoint.next_index):
             # `frame` is what failures are told of: here it would still be the one before
@@ -121,6 +124,19 @@ class CoupledLoop(Stage):
             self.complain(picture, result)
             watch = Stopwatch()
         return checkpoint.track()
+
+    @property
+    def looks_back(self) -> bool:
+        """True where frames of earlier runs count, too: they may have gone on after one that did not come to rest."""
+        return self.on_unsteady == "stop"
+
+    def look_back(self, made: Track) -> None:
+        """Stop at a track of the store with a frame that did not settle, if that is wanted.
+
+        Raises:
+            ComponentFailed: it has one.
+        """
+        self._refuse(zip(made.frame.tolist(), made.iterations.tolist(), made.steady.tolist(), strict=True))
 
     @property
     def steps(self) -> Steps:
@@ -195,10 +211,14 @@ class CoupledLoop(Stage):
         if self.on_unsteady == "stop" and not result.steady and result.iterations:
             kind = "swings between two states" if result.oscillating else "did not come to rest"
             moved = f"{1000 * result.change.body:.2f} mm and {np.degrees(result.change.angles):.2f}° in the last turn"
-            hint = (
-                "the frame is saved; on_unsteady: go_on continues after it, steady: {max_turns: …} gives it more turns"
-            )
-            raise ComponentFailed(f"frame {frame.index} {kind} in {result.iterations} turns: {moved}", hint=hint)
+            raise ComponentFailed(f"frame {frame.index} {kind} in {result.iterations} turns: {moved}", hint=GO_ON)
+
+    @staticmethod
+    def _refuse(rests: Iterable[tuple[int, int, bool]]) -> None:
+        """Raise for the first of some saved frames, with their turns, that did not come to rest; see `complain`."""
+        for frame, turns, steady in rests:
+            if turns and not steady:
+                raise ComponentFailed(f"frame {frame} did not come to rest in {turns} turns", hint=GO_ON)
 
 
 def unobserved(frame: int, turn: Turn, state: FrameState) -> None:

@@ -2,6 +2,7 @@ import errno
 import io
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -60,6 +61,49 @@ def test_a_run_folder_within_the_recording_is_refused_before_it_is_made(call, tm
     assert stored.exit_code == 2 and "the stored results would lie among the files" in stored.stderr
 
 
+@pytest.mark.parametrize(
+    ("stages", "lost", "message"),
+    [
+        ("{start: start_from_file}", "init.json", "there is no file with the first pose"),
+        ("{start: start_from_file}", "subject/body.obj", "no such mesh"),
+        ("{start: start_from_file}", "subject/skeleton.json", "there is no skeleton for the mesh"),
+        ("{start: start_from_file}", "videos/cam02.mp4", "missing camera: no video of cam02"),
+        ("{start: start_from_file}", "cameras.toml", "no calibration file"),
+        ("{start: start_from_keypoints}", "none", "there are no 2D keypoints of two cameras or more"),
+        ("{turned: align_cameras}", "none", "there are no 2D keypoints of two cameras or more"),
+        ("{body: {use: fit_subject, trial: static}}", "none", "there is no standing trial"),
+        ("{room: {use: background, source: plates}}", "background", "there are no clean plates"),
+        ("{room: background}", "background/cam03.png", "no clean plate of cam03"),
+    ],
+)
+def test_a_plan_tells_what_is_missing_as_a_run_does_before_it_begins(call, tmp_path, stages, lost, message):
+    shutil.copytree(CLIP, tmp_path / "clip")
+    shutil.rmtree(tmp_path / "clip/keypoints", ignore_errors=True)
+    place = tmp_path / "clip" / lost
+    if place.exists():
+        shutil.rmtree(place) if place.is_dir() else place.unlink()
+    Path("start.yaml").write_text(f"recording: clip\nstages: {stages}\n")
+    planned, done = call("plan", "start.yaml"), call("run", "start.yaml")
+    assert planned.exit_code == done.exit_code == 2, planned.output + done.output
+    assert message in planned.stderr and planned.stdout == ""
+    assert done.stderr == planned.stderr
+    assert not Path("runs/store.zarr").exists()
+
+
+def test_a_reference_that_is_missing_is_told_before_anything_is_tracked(call):
+    bare, change = str(shipped("pipelines", "bare.yaml")), "stages.evaluate.reference=truth/no.csv"
+    planned = call("plan", bare, "--recording", str(CLIP), "--set", change)
+    assert planned.exit_code == 2 and "truth/no.csv  no such reference" in planned.stderr
+
+
+def test_what_comes_from_the_store_needs_no_files(call, tmp_path):
+    shutil.copytree(CLIP, tmp_path / "clip")
+    Path("start.yaml").write_text("recording: clip\nstages: {turned: {use: background, source: plates}}\n")
+    assert call("run", "start.yaml", "--frames", "0:2").exit_code == 0
+    shutil.rmtree(tmp_path / "clip/subject")  # which nobody reads
+    assert call("plan", "start.yaml", "--frames", "0:2").exit_code == 0
+
+
 def test_the_store(call):
     call("run", "start.yaml", "--out", "first/run")
     assert Path("first/store.zarr").is_dir()
@@ -73,7 +117,11 @@ def test_the_store(call):
     assert call("cache", "explain", name, name, *store).stdout == "made from the same\n"
     assert f"would remove {name}" in call("cache", "prune", "--all", "--dry-run", *store).stdout
     assert "0 results" in call("cache", "prune", "--days", "1", *store).stdout
-    assert f"removed {name}" in call("cache", "prune", "--all", *store).stdout
+    damaged = Path("first/store.zarr/.state/damaged-start-0")
+    damaged.mkdir()
+    pruned = call("cache", "prune", "--all", *store).stdout
+    assert f"removed {name}" in pruned and f"removed {damaged.name}" in pruned
+    assert not damaged.exists()
     assert call("cache", "list", *store).stdout == ""
 
 
@@ -294,6 +342,11 @@ def test_settings(call):
     assert "available: mocapflow — did you mean 'mocapflow'?" in other.stderr
 
 
+@pytest.mark.parametrize(("command", "default"), [("run", "runs/NAME_OF_PIPELINE"), ("show", "runs/NAME.png")])
+def test_help_says_where_files_go_by_default(call, command, default):
+    assert f"[default: ({default})]" in call(command, "--help").stdout
+
+
 def test_show(call):
     shown = call("show", "prior", "joint_limits").stdout
     assert shown.startswith("prior joint_limits, from plugin 'priors' (mocapflow 0.1.0)\nA soft wall at the limits")
@@ -366,6 +419,18 @@ def test_a_garment_is_drawn(call, garment):
     cloth = (image[..., 0] > 1.5 * image[..., 2]) & (image[..., 0] > 60)  # blue
     panels = np.array([panel.mean() for panel in np.hsplit(cloth, 5)])
     assert (panels > 0.004).all(), panels
+
+
+def test_a_garment_is_drawn_without_being_asked_to(call, monkeypatch):
+    monkeypatch.setattr(pictures, "poster", lambda *_: np.zeros((8, 8, 3), np.uint8))  # which takes two seconds to draw
+    shown = call("show", "garment", "skirt")
+    assert shown.stdout.splitlines()[-1].endswith("picture: runs/skirt.png") and "length_m" in shown.stdout
+    assert cv2.imread("runs/skirt.png").shape == (8, 8, 3)
+    assert (
+        call("show", "garment", "skirt", "--draper", "kinematik")
+        .stdout.splitlines()[-2]
+        .startswith("no picture: show garment skirt  no draper named 'kinematik'")
+    )
 
 
 @pytest.mark.parametrize("out", ["nowhere/skirt.png", "skirt.doc"])

@@ -173,7 +173,7 @@ def test_files_for_opensim_and_the_record_of_the_run(whole, clip):
     assert len(rows_after(results / "angles.mot", "endheader")) == 60
     assert [row[0] for row in rows_after(results / "joints.trc", "Frame#")] == [str(k) for k in range(1, 61)]
     record = json.loads((whole[clip] / "run.json").read_text())
-    assert record["recipe"]["settings"]["track"]["name"] == "coupled_loop"
+    assert record["settings"]["track"]["name"] == "coupled_loop"
     assert "\nknee_flexion_l,60," in (results / "evaluation.csv").read_text()
 
 

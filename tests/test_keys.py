@@ -1,6 +1,7 @@
 """A table of edits, each of which must or must not change a key; and what a miss says about its reason."""
 
 import ast
+import json
 import os
 import shutil
 import sys
@@ -12,7 +13,7 @@ import pytest
 from mocapflow import digests, recipes, sources
 from mocapflow.data import Start
 from mocapflow.digests import Digests
-from mocapflow.keys import explain, key_of
+from mocapflow.keys import _plain, explain, key_of
 from mocapflow.recipes import steps_of
 from tests.fixtures.stores import PLUGIN, STAGES, load, write_pipeline, write_recording
 
@@ -32,6 +33,14 @@ def keys(folder, recording, *changes, stages=None, garment="tiny_garment", frame
 
 def changed(before, after):
     return {label for label in before if before[label] != after[label]}
+
+
+def test_fractions_are_numbers_in_a_recipe_and_keys_are_as_before(tmp_path, clip):
+    (track,) = [step for step in steps_of(load(write_pipeline(tmp_path, clip)), SHARED) if step.label == "track"]
+    assert track.recipe["component"]["settings"]["segmenter"]["settings"]["sigma_px"] == 2.0
+    as_text = json.loads(json.dumps(track.recipe), parse_float=str)
+    assert key_of(as_text) == track.key and explain(as_text, track.recipe) == ""
+    assert [_plain(value, "", None, SHARED) for value in (np.inf, np.nan, np.float64(0.5))] == ["inf", "nan", 0.5]
 
 
 @pytest.mark.parametrize(

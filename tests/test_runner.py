@@ -111,7 +111,7 @@ def test_later_stages_know_how_the_earlier_ones_were_made(tmp_path, path):
     assert recipe["stages"]["track"]["cached"] is True
     assert set(recipe["stages"]["track"]) == {"label", "key", "cached", "seconds", "wall_seconds", "warnings"}
     assert recipe["versions"]["numpy"] == np.__version__
-    assert recipe["settings"]["track"]["settings"]["segmenter"]["settings"]["sigma_px"] == "2.0"
+    assert recipe["settings"]["track"]["settings"]["segmenter"]["settings"]["sigma_px"] == 2.0
 
 
 def test_what_a_stage_warned_of_is_told_again_when_it_comes_from_the_store(tmp_path, path, caplog):

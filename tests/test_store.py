@@ -22,7 +22,7 @@ from mocapflow.execution import Execution
 from mocapflow.packing import FINE, match_row, quantised
 from mocapflow.rows import Corrupted, Rows
 from mocapflow.series import Series
-from mocapflow.store import Store, remove
+from mocapflow.store import Store, group_meta, remove
 from tests.fixtures.stores import actions, run_tiny, same, the_track, write_pipeline, write_recording
 from tests.fixtures.tiny_plugin import TinyMatcher, tiny_body
 
@@ -90,6 +90,19 @@ def test_arrays_say_their_axes_and_units(store):
     assert group["vertices"].attrs["unit"] == "m, at rest"
 
 
+def test_every_array_of_a_store_says_its_axes_and_unit(tmp_path, path):
+    run_tiny(path, tmp_path, "stages.track.keep=trace", frames=3)
+    nodes = dict(zarr.open_group(str(tmp_path / "store.zarr"), mode="r").members(max_depth=None))
+    arrays = {name.partition("/")[2]: node for name, node in nodes.items() if isinstance(node, zarr.Array)}
+    assert {"trace", "live/rows", "match_count", "mean/0/values", "pose/root", "raw_angles"} <= set(arrays)
+    for name, array in arrays.items():
+        axes = array.metadata.dimension_names
+        assert axes is not None and all(axes), name
+        assert len(set(axes)) == len(axes), name
+        assert not any(axis.startswith("axis_") for axis in axes), name
+        assert array.attrs.get("unit"), name
+
+
 def test_a_track_is_read_by_xarray(tmp_path, path):
     xarray = pytest.importorskip("xarray")
     run_tiny(path, tmp_path)
@@ -116,10 +129,44 @@ def test_a_track_has_named_arrays_whose_equal_axes_are_equally_long(tmp_path, pa
     assert group["silhouettes/person/cam01"].attrs["unit"] == "1/8 px"
 
 
-def test_zarr_lists_the_store_without_complaint(tmp_path, path):
-    run_tiny(path, tmp_path)
-    names = {name.partition("-")[0] for name, _ in zarr.open_group(str(tmp_path / "store.zarr"), mode="r").members()}
+@pytest.mark.parametrize("damaged", [False, True])
+def test_others_read_the_store_without_complaint(tmp_path, path, damaged):
+    xarray = pytest.importorskip("xarray")
+    run_tiny(path, tmp_path, frames=5)
+    store = tmp_path / "store.zarr"
+    if damaged:
+        for group in store.glob("*-*"):
+            damage_zarr_json(group)
+            (group / "zarr.0.part").touch()  # as a machine leaves it that stops at a commit
+        run_tiny(path, tmp_path, frames=5)
+    whole = zarr.open_group(str(store), mode="r")
+    names = {name.partition("-")[0] for name, _ in whole.members(max_depth=None) if "/" not in name}
     assert names == {"background", "start", "track", "smooth", ".state"}
+    assert "track-" in str(whole.tree())
+    xarray.open_zarr(str(store), consolidated=False).load()
+    tree = xarray.open_datatree(str(store), engine="zarr", consolidated=False).load()
+    (track,) = (name for name in tree.children if name.startswith("track-"))
+    assert tree[track]["angles"].shape == (5, 2)
+
+
+def test_a_store_of_before_becomes_one_that_others_read(tmp_path, path):
+    state = tmp_path / "store.zarr" / ".state"
+    damaged = state.parent / "damaged-track-3d6ffcac11d8-1795600194923539224"
+    for folder in (state, damaged):
+        folder.mkdir(parents=True)
+    rows.write_json(state / "zarr.json", group_meta({}))
+    (damaged / "zarr.json").touch()
+    run_tiny(path, tmp_path, frames=2)
+    assert len(list(zarr.open_group(str(state.parent), mode="r").members(max_depth=None))) > 20
+    assert [group.name for group in Store(state.parent).aside()] == [damaged.name]
+
+
+def test_what_a_stopped_commit_leaves_is_gone_when_the_track_goes_on(tmp_path, path):
+    run_tiny(path, tmp_path, frames=5)
+    (group,) = (tmp_path / "store.zarr").glob("track-*")
+    (group / "zarr.0.part").touch()
+    run_tiny(path, tmp_path)
+    assert not list(group.glob("*.part"))
 
 
 def test_rows_are_plain_zarr(tmp_path):
@@ -222,7 +269,9 @@ def test_a_damaged_group_is_set_aside_and_made_anew(tmp_path, path, damage):
     _, lines = run_tiny(path, tmp_path)
     (warning,) = [line for line in lines if "damaged" in line]
     assert warning.startswith(f"warning: {group.name} is damaged and made anew: ")
-    assert len(list((tmp_path / "store.zarr").glob(f"damaged-{group.name}-*"))) == 1
+    (aside,) = Store(tmp_path / "store.zarr").aside()
+    assert aside.name.startswith(f"damaged-{group.name}-")
+    assert warning.endswith(f"(kept as .state/{aside.name})")
     assert same(whole, the_track(tmp_path))
 
 
@@ -241,7 +290,7 @@ def test_a_damaged_result_that_another_run_makes_anew_is_left_alone(tmp_path, pa
     summary, lines = run_tiny(path, tmp_path)  # `export` reads it
     assert actions(summary)["smooth"] == "hit"
     assert not [line for line in lines if "damaged" in line]
-    assert not list(kept.path.glob("damaged-*"))
+    assert not kept.aside()
 
 
 def test_a_result_that_another_run_left_damaged_is_made_anew(tmp_path, path, monkeypatch):

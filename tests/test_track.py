@@ -20,7 +20,7 @@ from mocapflow.loop import settle
 from mocapflow.recording import Recording
 from mocapflow.runner import run
 from mocapflow.store import Store
-from tests.fixtures.stores import STAGES, load, run_tiny, same, the_track, write_pipeline, write_recording
+from tests.fixtures.stores import STAGES, actions, load, run_tiny, same, the_track, write_pipeline, write_recording
 
 SHORT = {name: STAGES[name] for name in ("start", "track")}
 KILLS = Path(__file__).parent / "fixtures" / "kills.py"
@@ -293,6 +293,19 @@ def test_on_unsteady_stop(tmp_path, path):
         ComponentFailed, match=r"frame \d+ did not come to rest in 2 turns: .* mm and .*° in the last turn"
     ):
         run_tiny(path, tmp_path, "stages.track.on_unsteady=stop", "stages.track.steady.max_turns=2")
+
+
+@pytest.mark.parametrize("frames", [5, None])
+def test_on_unsteady_stop_also_holds_for_frames_of_the_store(tmp_path, path, frames):
+    run_tiny(path, tmp_path, "stages.track.steady.max_turns=2", frames=5)
+    stop = ("stages.track.steady.max_turns=2", "stages.track.on_unsteady=stop")
+    for _ in range(2):
+        with pytest.raises(ComponentFailed, match="frame 0 did not come to rest in 2 turns") as caught:
+            run_tiny(path, tmp_path, *stop, frames=frames)
+        assert caught.value.hint.startswith("the frame is saved; on_unsteady: go_on continues after it")
+    assert len(the_track(tmp_path).frame) == 5
+    summary, _ = run_tiny(path, tmp_path, stop[0], frames=5)
+    assert actions(summary)["track"] == "hit"
 
 
 def test_keep_trace_keeps_every_turn(tmp_path, path):

@@ -56,7 +56,7 @@ def prune(
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would be removed.")] = False,
 ) -> None:
     """Remove results; damaged ones that were set aside always go."""
-    from mocapflow.store import remove
+    from mocapflow.store import Store, remove
 
     if days is not None and not days >= 0:  # so says nan, too
         raise typer.BadParameter("a number of days, 0 or more", param_hint="--days")
@@ -64,7 +64,7 @@ def prune(
     for artifact in filter(_in_use, going):
         typer.echo(f"kept {artifact.path.name}: a run is writing it", err=True)
     going = [artifact for artifact in going if not _in_use(artifact)]
-    paths = [artifact.path for artifact in going] + sorted(store.glob("damaged-*"))
+    paths = [artifact.path for artifact in going] + Store(store).aside()
     freed = sum(map(_size, paths))
     for path in paths:
         typer.echo(f"{'would remove' if dry_run else 'removed'} {path.name}")

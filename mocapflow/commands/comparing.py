@@ -27,9 +27,9 @@ def compare(
         list[Path] | None, typer.Option("--recording", help="Instead of those of the file; repeatable.")
     ] = None,
     frames: Frames = None,
-    out: Annotated[Path | None, typer.Option(help="Where to write.  [default: runs/NAME_OF_EXPERIMENT]")] = None,
+    out: Annotated[Path | None, typer.Option(help="Where to write.", show_default="runs/NAME_OF_EXPERIMENT")] = None,
     store: Annotated[
-        str | None, typer.Option(help="Cached results, or a URL to share them.  [default: store.zarr beside it]")
+        str | None, typer.Option(help="Cached results, or a URL to share them.", show_default="store.zarr beside it")
     ] = None,
     workers: Workers = 1,
     scheduler: Scheduler = None,

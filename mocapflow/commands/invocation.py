@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from mocapflow.pipeline import Pipeline
 
 FILE = "command.json"
+KEYS = ("keys", "contents")  # of what the stages make; without and with what code makes of it left out
 
 
 @dataclass(frozen=True)
@@ -83,9 +84,11 @@ def alone(out: Path) -> Iterator[None]:
         os.close(folder)
 
 
-def remember(invocation: Invocation, out: Path, keys: Mapping[str, str]) -> None:
-    """Write an invocation into its run folder, with the keys of what its stages make."""
-    said = {**asdict(invocation.absolute()), "keys": keys}
+def remember(
+    invocation: Invocation, out: Path, keys: Mapping[str, str], contents: Mapping[str, str] | None = None
+) -> None:
+    """Write an invocation into its run folder, with the keys of what its stages make, and those whatever the code."""
+    said = {**asdict(invocation.absolute()), **dict(zip(KEYS, (keys, contents or {}), strict=True))}
     try:
         (out / FILE).write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
     except OSError as error:
@@ -96,7 +99,7 @@ def recall(out: Path) -> Invocation:
     """Return the invocation a run folder was made by."""
     try:
         said = json.loads((out / FILE).read_text(encoding="utf-8"))
-        known = {name: value for name, value in said.items() if name != "keys"}
+        known = {name: value for name, value in said.items() if name not in KEYS}
         return Invocation(**{**known, "changes": tuple(said["changes"])})
     except (FileNotFoundError, NotADirectoryError):
         hint = f"a run folder is what `mocapflow run` writes; it holds {FILE}"
@@ -105,10 +108,15 @@ def recall(out: Path) -> Invocation:
         raise PipelineError("this file is damaged", where=str(out / FILE), hint="run the pipeline again") from None
 
 
-def recalled_keys(out: Path) -> dict[str, str] | None:
-    """Return the keys of what the stages of a run folder's command make, none if unknown; None: it is no run folder."""
+def recalled_keys(out: Path, kind: str = "keys") -> dict[str, str] | None:
+    """Return the keys of what the stages of a run folder's command make, none if unknown; None: it is no run folder.
+
+    Args:
+        out: the run folder.
+        kind: `contents` are those of pipeline and recording alone, whatever the code.
+    """
     try:
-        keys = json.loads((out / FILE).read_text(encoding="utf-8"))["keys"]
+        keys = json.loads((out / FILE).read_text(encoding="utf-8"))[kind]
         return dict(keys)
     except FileNotFoundError:
         return None

@@ -12,6 +12,8 @@ from mocapflow.errors import MocapflowError, RecordingError
 if TYPE_CHECKING:
     from mocapflow.registry import Registry
 
+PICTURES = Path("runs")
+
 
 def plugins() -> None:
     """List the installed plugins and what they provide."""
@@ -31,7 +33,9 @@ def plugins() -> None:
 def show(
     role: Annotated[str, typer.Argument(help="draper, garment, matcher, stage, …")],
     name: Annotated[str, typer.Argument(help="Its name, as in a pipeline file.")],
-    out: Annotated[Path | None, typer.Option(metavar="PNG", help="Of a garment: draw it there.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="PNG", help="The picture of a garment.", show_default="runs/NAME.png")
+    ] = None,
     recording: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Whose person and tape measures; a shipped clip if not given.")
     ] = None,
@@ -46,13 +50,24 @@ def show(
     typer.echo(f"{role} {name}, from {registry.origin(cls)}")
     for line in describe(cls):
         typer.echo(line)
-    if out is not None:
-        if role != "garment":
-            raise typer.BadParameter("only a garment has a picture", param_hint="--out")
-        from mocapflow.commands.pictures import draw_garment
-
-        for line in draw_garment(registry, name, recording, draper, out):
+    if role == "garment":
+        for line in _drawn(registry, name, recording, draper, out):
             typer.echo(line)
+    elif out is not None:
+        raise typer.BadParameter("only a garment has a picture", param_hint="--out")
+
+
+def _drawn(registry: Registry, name: str, recording: Path | None, draper: str, out: Path | None) -> list[str]:
+    """Draw a garment and return what to say of it; where nobody has asked for a picture, none is no error."""
+    from mocapflow.commands.pictures import draw_garment
+
+    if out is not None:
+        return draw_garment(registry, name, recording, draper, out)
+    try:
+        PICTURES.mkdir(exist_ok=True)
+        return draw_garment(registry, name, recording, draper, PICTURES / f"{name}.png")
+    except (MocapflowError, OSError) as error:
+        return [f"no picture: {error}"]
 
 
 def settings(

@@ -21,7 +21,7 @@ def _new() -> None:
 def plugin(
     name: Annotated[str, typer.Argument(help="Of the package, without mocapflow-: my-dress.")],
     role: Annotated[str, typer.Option(help=f"What it adds: {', '.join(scaffold.KINDS)}.")] = "garment",
-    out: Annotated[Path | None, typer.Option(help="The folder to make.  [default: mocapflow-NAME]")] = None,
+    out: Annotated[Path | None, typer.Option(help="The folder to make.", show_default="mocapflow-NAME")] = None,
 ) -> None:
     """Write a plugin package that works: a module, its test, ready to install and to be changed."""
     folder = out or Path(f"mocapflow-{name}")

@@ -25,7 +25,7 @@ def fit(
     out: Annotated[Path, typer.Option("--out", help="The file to write; `parzen: {poses: FILE}` reads it.")],
     angles: Annotated[
         list[str] | None,
-        typer.Option("--angle", help="A joint, or joint.angle; repeatable.  [default: hips, knees, ankles, arms]"),
+        typer.Option("--angle", help="A joint, or joint.angle; repeatable.", show_default="hips, knees, ankles, arms"),
     ] = None,
     percentile: Annotated[
         float, typer.Option(min=1, max=100, help="Of the distances to the nearest pose; 100: the largest.")

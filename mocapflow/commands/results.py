@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Run = Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")]
 Truth = Annotated[
-    Path | None, typer.Option(help="A .csv, .mot, .trc or .c3d to compare with.  [default: the recording's]")
+    Path | None, typer.Option(help="A .csv, .mot, .trc or .c3d to compare with.", show_default="the recording's")
 ]
 Format = Annotated[
     list[str],
@@ -68,20 +68,27 @@ def _comparison(run: Path, truth: Path | None) -> tuple[Path | None, str, float]
 
 
 def export(run: Run, format_: Format) -> None:
-    """Write the track of a run in other formats, into the run folder."""
+    """Write the track of a run in other formats, into the run folder.
+
+    Code may have changed since; pipeline and recording may not.
+    """
     from mocapflow import runner
     from mocapflow.commands.running import carry_out
 
     invocation = recall(run)
     pipeline = invocation.load()
     with alone(run):
-        now = runner.keys(pipeline, store=Path(invocation.store), url=invocation.url)
-        if changed := differing(recalled_keys(run) or {}, now):
-            what = f"pipeline, recording or mocapflow have changed since this run: {', '.join(changed)}"
+        steps = runner.steps(pipeline, store=Path(invocation.store), url=invocation.url)
+        keys = recalled_keys(run) or {}
+        changed = differing(keys, {step.label: step.key for step in steps})
+        contents = recalled_keys(run, "contents")
+        other = differing(contents, {step.label: step.content for step in steps}) if contents else changed
+        if changed and other:
+            what = f"pipeline, recording or mocapflow have changed since this run: {', '.join(other)}"
             hint = "run it again, then export: else its files would show two tracks"
             raise PipelineError(what, where=str(run), hint=hint)
         exporting = invocation.changed(*_only_formats(pipeline, format_))
-        typer.echo(carry_out(exporting.load(), exporting, run))
+        typer.echo(carry_out(exporting.load(), exporting, run, made=keys if changed else None))
 
 
 def _only_formats(pipeline: Pipeline, formats: Sequence[str]) -> list[str]:

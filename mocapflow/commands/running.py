@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -22,12 +22,13 @@ if TYPE_CHECKING:
 
 File = Annotated[Path, typer.Argument(metavar="PIPELINE", help="A pipeline file (.yaml).")]
 Recording = Annotated[Path | None, typer.Option(help="Use this recording folder instead of the file's.")]
-Out = Annotated[Path | None, typer.Option(help="The run folder.  [default: runs/NAME_OF_PIPELINE]")]
+Out = Annotated[Path | None, typer.Option(help="The run folder.", show_default="runs/NAME_OF_PIPELINE")]
 Store = Annotated[
     str | None,
     typer.Option(
         metavar="PATH|URL",
-        help="Cached results, or a URL (s3://…) to share them.  [default: store.zarr beside the run folder]",
+        help="Cached results, or a URL (s3://…) to share them.",
+        show_default="store.zarr beside the run folder",
     ),
 ]
 Set = Annotated[list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Change a value; repeatable.")]
@@ -131,7 +132,7 @@ def begin(invocation: Invocation, out: Path, steps: Sequence[Step]) -> None:
     before, now = recalled_keys(out), {step.label: step.key for step in steps}
     if before is not None and differing(before, now) and (former := set_aside(out)):
         typer.echo(f"the results of the run before are now in {former}", err=True)
-    remember(invocation, out, now)
+    remember(invocation, out, now, {step.label: step.content for step in steps})
 
 
 def execute(
@@ -152,13 +153,14 @@ def carry_out(
     out: Path,
     fresh: bool = False,
     begin: Callable[[Sequence[Step]], None] = lambda steps: None,
+    made: Mapping[str, str] | None = None,
 ) -> RunSummary:
     """Run the pipeline of an invocation and return the summary; see `runner.run`."""
     from mocapflow import runner
 
+    store, url = Path(invocation.store), invocation.url
     with reporter() as shown, noted(shown, out) as report:
-        store = Path(invocation.store)
-        return runner.run(pipeline, store=store, url=invocation.url, out=out, fresh=fresh, report=report, begin=begin)
+        return runner.run(pipeline, store=store, url=url, out=out, fresh=fresh, report=report, begin=begin, made=made)
 
 
 def _loaded(invocation: Invocation, out: Path) -> Pipeline:

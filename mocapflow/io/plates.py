@@ -39,18 +39,28 @@ def background(folder: Path, views: Sequence[View], videos: Sequence[Video]) -> 
         RecordingError: a camera has no plate though others do, or a plate has another size than the video,
             is far too dark, or in colour beside a grey video.
     """
-    found = [plates(folder, view.lens.name) for view in views]
-    if not any(found):
+    found = plate_files(folder, views)
+    if not found:
         return None
+    rows = [_one(files, view, video) for files, view, video in zip(found, views, videos, strict=True)]
+    return Background(mean=tuple(mean for mean, _ in rows), spread=tuple(spread for _, spread in rows))
+
+
+def plate_files(folder: Path, views: Sequence[View]) -> list[tuple[Path, ...]]:
+    """Return the clean plates of each camera, [] where none has any.
+
+    Raises:
+        RecordingError: a camera has none though others do, or two where one is expected.
+    """
+    found = [plates(folder, view.lens.name) for view in views]
     missing = [view.lens.name for view, files in zip(views, found, strict=True) if not files]
-    if missing:
+    if any(found) and missing:
         raise RecordingError(
             f"no clean plate of {', '.join(missing)}",
             where=str(folder / "background"),
             hint="give every camera its plate, or remove the folder",
         )
-    rows = [_one(files, view, video) for files, view, video in zip(found, views, videos, strict=True)]
-    return Background(mean=tuple(mean for mean, _ in rows), spread=tuple(spread for _, spread in rows))
+    return found if any(found) else []
 
 
 def _one(files: Sequence[Path], view: View, video: Video) -> tuple[F32, F32]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
@@ -51,6 +51,15 @@ class Scanned(BodyModel):
         if (subject / "weights.npz").exists():
             files.append(subject / "weights.npz")
         return [*files, recording / self.morph.mesh] if self.morph else files
+
+    def need(self, recording: Path) -> None:
+        """Raise if mesh or skeleton is missing."""
+        subject = recording / "subject"
+        meshes = [subject / "body.obj", *([recording / self.morph.mesh] if self.morph else [])]
+        readers: dict[Path, Callable[[Path], object]] = dict.fromkeys(meshes, read_mesh)
+        for path, read in {**readers, subject / "skeleton.json": read_skeleton}.items():
+            if not path.is_file():
+                read(path)  # says what to do
 
     def load(self, recording: Path) -> Body:
         """Return the body at rest.

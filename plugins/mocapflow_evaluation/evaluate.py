@@ -44,6 +44,12 @@ class Evaluate(Stage):
     reference: str = ""  # from the folder of the recording; empty: truth/angles.csv, or the one in reference/
     longest_lag_s: PositiveFloat = LONGEST_LAG_S  # of one system behind the other, that is looked for
 
+    def need(self, recording: Recording) -> None:
+        """Raise if the reference that is named is not there."""
+        path, _ = chosen(recording.folder, self.reference)
+        if self.reference and path is not None and not path.exists():
+            read_reference(path)  # says what is wrong
+
     def run(self, track: Track, scene: Scene, recording: Recording, run_folder: RunFolder) -> Evaluation:
         """Return the evaluation of the track."""
         layout.forget_comparison(run_folder.path)

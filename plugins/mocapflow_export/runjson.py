@@ -21,11 +21,13 @@ FRAME = re.compile(r"^frame (\d+): ?(.*)$")
 
 
 def summary(track: Track, series: AngleSeries, run_folder: RunFolder, warnings: tuple[str, ...]) -> dict[str, Any]:
-    """Return what run.json says: recipe, seconds per step, and per frame iterations, rest, overlap and mishaps."""
+    """Return what run.json says: versions, settings, recipe, seconds per step, and what happened frame by frame."""
     seconds = track.seconds
     lost, said = lost_rows(track), by_frame(track.notes)
+    made = {name: run_folder.recipe.get(name, {}) for name in ("versions", "settings")}
     return {
-        "recipe": run_folder.recipe,
+        **made,
+        "recipe": {name: value for name, value in run_folder.recipe.items() if name not in made},
         "warnings": [*warnings, *said_by_stages(run_folder.recipe)],
         "frames": {
             "count": len(track.frame),

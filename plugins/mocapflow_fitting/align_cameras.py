@@ -16,7 +16,7 @@ from mocapflow.geometry import twists
 from mocapflow.geometry.cameras import project
 from mocapflow.recording import Recording
 from mocapflow.records import F64
-from mocapflow_fitting.detections import persons, spread
+from mocapflow_fitting.detections import need_keypoints, persons, spread
 from mocapflow_fitting.triangulate import triangulate
 
 LOG = logging.getLogger("mocapflow")
@@ -34,6 +34,10 @@ class AlignCameras(Stage):
     spread_deg: PositiveFloat = 0.5  # standard deviation of what a camera may have turned
     sigma_px: PositiveFloat = 6.0  # of a keypoint
     least_px: PositiveFloat = 6.0  # a rig whose views move by less is left as it is
+
+    def need(self, recording: Recording) -> None:
+        """Raise if there are no keypoints."""
+        need_keypoints(recording)
 
     def run(self, recording: Recording) -> Rig:
         """Return the cameras, corrected where they need it.

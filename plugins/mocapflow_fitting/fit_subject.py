@@ -15,7 +15,7 @@ from mocapflow.errors import RecordingError
 from mocapflow.recording import Recording
 from mocapflow.records import F64
 from mocapflow.scene import Scene
-from mocapflow_fitting.detections import layout, persons, seen, spread
+from mocapflow_fitting.detections import layout, need_keypoints, persons, seen, spread
 from mocapflow_fitting.keypoint_fit import Seen, fit
 from mocapflow_fitting.keypoint_layouts import Layout
 from mocapflow_fitting.landmarks import landmarks
@@ -45,6 +45,16 @@ class FitSubject(Stage):
     trial: Literal["auto", "static", "recording"] = "auto"  # auto: both, if the standing trial shows the same person
     layout: Layout | None = None  # order of the keypoints; null: told by their number
 
+    def need(self, recording: Recording) -> None:
+        """Raise if there are no keypoints, or no standing trial where that is wanted."""
+        if self.trial != "static":
+            need_keypoints(recording)
+        elif (static := recording.static()) is None:
+            hint = "use trial: auto"
+            raise RecordingError("there is no standing trial", where=str(recording.folder / "static"), hint=hint)
+        else:
+            need_keypoints(static)
+
     def run(self, recording: Recording, scene: Scene) -> Body:
         """Return the scaled body.
 
@@ -52,11 +62,8 @@ class FitSubject(Stage):
             RecordingError: there are no keypoints, or no frame in which two cameras see the same person.
         """
         names = landmarks(scene.body).names
+        self.need(recording)
         static = None if self.trial == "recording" else recording.static()
-        if self.trial == "static" and static is None:
-            raise RecordingError(
-                "there is no standing trial", where=str(recording.folder / "static"), hint="use trial: auto"
-            )
         moving = [] if self.trial == "static" else self._seen(recording, names, self.frames, scene.cameras)
         standing = self._seen(static, names, 4, scene.cameras) if static is not None and _has_keypoints(static) else []
         if moving and standing and (difference := unlike(moving, standing, names)) > DIFFERENT:

@@ -38,26 +38,39 @@ class StartFromFile(Stage):
         path = recording / self.file
         return [path, *sorted(path.parent.glob(f"{path.stem}_*{path.suffix}"))]
 
+    def need(self, recording: Recording) -> None:
+        """Raise if there is no file with the first pose."""
+        self._found(recording)
+
     def run(self, recording: Recording, scene: Scene) -> Start:
         """Return the pose in the file; the cloth starts without forces.
 
         Raises:
             RecordingError: the file is missing or malformed, or names a joint the body lacks.
         """
-        first, path = recording.indices[0], recording.folder / self.file
-        own = path.with_name(f"{path.stem}_{first:06}{path.suffix}")
-        if own.is_file():
-            path = own
-        elif first:
-            LOG.warning("%s is taken for the pose of frame %d; %s would come before it", path.name, first, own.name)
-        if not path.is_file():
-            there = ", ".join(sorted(p.name for p in recording.folder.iterdir()))
-            hint = f"the recording has: {there}\nwithout a start pose, use the stage start_from_keypoints"
-            raise RecordingError("there is no file with the first pose", where=str(path), hint=hint)
+        first, path = recording.indices[0], self._found(recording)
+        if first and path == recording.folder / self.file:
+            own = _own(path, first).name
+            LOG.warning("%s is taken for the pose of frame %d; %s would come before it", path.name, first, own)
         pose = read_pose(path, scene.body)
         if odd := beyond_limits(pose, scene.body):
             LOG.warning("%s bends joints as nobody can: %s; are its turns in radians, of the right sign?", path, odd)
         return Start(pose=pose, parameters=scene.calm)
+
+    def _found(self, recording: Recording) -> Path:
+        """Return the file with the pose of the first frame."""
+        path = recording.folder / self.file
+        own = _own(path, recording.indices[0])
+        if own.is_file() or path.is_file():
+            return own if own.is_file() else path
+        there = ", ".join(sorted(p.name for p in recording.folder.iterdir()))
+        hint = f"the recording has: {there}\nwithout a start pose, use the stage start_from_keypoints"
+        raise RecordingError("there is no file with the first pose", where=str(path), hint=hint)
+
+
+def _own(path: Path, frame: int) -> Path:
+    """Return the file with the pose of one frame."""
+    return path.with_name(f"{path.stem}_{frame:06}{path.suffix}")
 
 
 def read_pose(path: Path, body: Body) -> Pose:

@@ -25,6 +25,10 @@ class StartFromKeypoints(Stage):
     extent: ClassVar[Literal["beginning"]] = "beginning"
     layout: Layout | None = None  # order of the keypoints; null: told by their number
 
+    def need(self, recording: Recording) -> None:
+        """Raise if there are no keypoints."""
+        need_keypoints(recording)
+
     def run(self, recording: Recording, scene: Scene) -> Start:
         """Return the pose of the first usable frame; the cloth starts without forces.
 

@@ -12,6 +12,7 @@ from pydantic import Field
 from mocapflow.assets import Background
 from mocapflow.components import Stage
 from mocapflow.errors import RecordingError
+from mocapflow.io.plates import plate_files
 from mocapflow.recording import Recording
 from mocapflow.records import F32, U8
 
@@ -33,21 +34,26 @@ class EmptyScene(Stage):
     source: Literal["auto", "plates", "median"] = "auto"  # auto: the plates where there are any
     samples: Annotated[int, Field(ge=3)] = 25  # frames the median is taken over
 
+    def need(self, recording: Recording) -> None:
+        """Raise if plates are wanted and missing."""
+        found = self.source == "median" or plate_files(recording.folder, recording.views)
+        if self.source == "plates" and not found:
+            raise RecordingError(
+                "there are no clean plates",
+                where=str(recording.folder / "background"),
+                hint="put one picture per camera there (cam01.png …), or set source: median",
+            )
+
     def run(self, recording: Recording) -> Background:
         """Return mean and spread of every pixel of the empty scene.
 
         Raises:
             RecordingError: plates are wanted and missing, or a camera has too few readable frames for a median.
         """
+        self.need(recording)
         plates = None if self.source == "median" else recording.background()
         if plates is not None:
             return plates
-        if self.source == "plates":
-            raise RecordingError(
-                "there are no clean plates",
-                where=str(recording.folder / "background"),
-                hint="put one picture per camera there (cam01.png …), or set source: median",
-            )
         if self.source == "auto":
             LOG.warning(
                 "no clean plates in %s: a median over the recording stands in for them; a person who stays in place"

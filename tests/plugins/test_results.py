@@ -35,6 +35,7 @@ def exported(track: Track, scene: Scene, recording: Recording, folder: Path, **s
     recipe = {
         "pipeline": Path("skirt.yaml"),
         "versions": {"numpy": np.__version__},
+        "settings": {"track": {"name": "coupled_loop", "settings": {"damping": 0.5}}},
         "stages": {"start": {"seconds": np.float64(1.5), "warnings": ["a knee bends backwards"]}},
     }
     run_folder = RunFolder(path=folder, recipe=recipe)
@@ -143,7 +144,9 @@ def test_run_json_says_how_it_was_made_and_how_it_went(scene: Scene, recording: 
     observed[4:, scene.body.screw_names.index("knee_l.x")] = 0.2
     exported(Smooth().run(track=replace(broken, observed=observed), scene=scene), scene, recording, tmp_path)
     got = json.loads((tmp_path / layout.RUN).read_text())
-    assert got["recipe"]["versions"] == {"numpy": np.__version__}
+    assert got["versions"] == {"numpy": np.__version__}
+    assert got["settings"]["track"]["settings"] == {"damping": 0.5}
+    assert set(got["recipe"]) == {"pipeline", "stages"}
     assert got["frames"]["lost"] == [3]
     assert "neighbouring" in got["frames"]["bridged_by"]
     assert got["frames"]["not_at_rest"] == [2, 3]
