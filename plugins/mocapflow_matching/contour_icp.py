@@ -92,6 +92,9 @@ class ContourIcp(Matcher):
         if reach > self.cloth_reach_px:
             kept = self.reached(image.pixel.take(seen, axis=0), model, shown, surface)
             seen, shown = seen[kept], shown[kept]
+        if scene.body.cut.any():  # there the person goes on although the model ends
+            goes_on = np.isin(model.vertex, np.flatnonzero(scene.body.cut)).take(shown)
+            seen, shown = seen[~goes_on], shown[~goes_on]
         guard = self.hem_guard_px
         sigma = contour_sigma(model, surface, scene, self.sigma_px, self.cloth_sigma_px_per_m, guard)
         return self.weigh(silhouette.camera, image, model, seen, shown, sigma, turn)

@@ -214,3 +214,14 @@ def test_what_a_garment_covers_ends_at_its_borders():
     covered = DRESSED.covered[: len(body)]
     assert covered.any() and (DRESSED.near_garment & ~covered).any() and not DRESSED.covered[len(body) :].any()
     assert (body[covered, 2] < high).all() and (body[covered, 2] > low).all()
+
+
+def test_where_a_partial_body_was_cut_off_nothing_is_matched(truth):
+    """The image shows the whole person, and their contour passes the cut: what is paired there would hold the body."""
+    whole = surface_at(truth)
+    at_rest = SCENE.body.vertices[:, 2]
+    rim = at_rest > np.quantile(at_rest, 0.9)
+    partial = replace(SCENE, body=replace(SCENE.body, cut=rim))
+    usual, cut = (match(ContourIcp(), whole, seen(whole, SCENE), scene=scene) for scene in (SCENE, partial))
+    assert rim[usual.vertex].sum() > 20
+    assert sorted(cut.vertex) == sorted(usual.vertex[~rim[usual.vertex]])
