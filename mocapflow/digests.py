@@ -28,6 +28,7 @@ CORE = (
     "cloth_answers",
     "components",
     "data",
+    "emptiness",
     "functional",
     "geometry",
     "loop",

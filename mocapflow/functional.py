@@ -87,9 +87,12 @@ class Functional:
         return [prior.weight * residual_of(prior, pose, self.past, self.model.scene).energy for prior in self.priors]
 
 
-def total(result: FrameResult) -> float:
-    """Return the functional after the last turn of a frame: what was not seen does not count."""
-    summed = [not name.endswith(".contour") for name in result.energy_terms]
+def image_cost(result: FrameResult) -> float:
+    """Return what the silhouettes of a frame's last turn cost by the images, data and length: less is better.
+
+    Not by the area between model and silhouette, most of which is that of cloth laid wrong, whatever the pose.
+    """
+    summed = [name.endswith((".data", ".length")) for name in result.energy_terms]
     return float(np.nansum(result.energy[result.iterations - 1, summed]))
 
 

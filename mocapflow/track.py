@@ -41,7 +41,7 @@ from mocapflow.data import (
 )
 from mocapflow.emptiness import believable
 from mocapflow.errors import ComponentFailed, PipelineError
-from mocapflow.functional import Functional, total
+from mocapflow.functional import Functional, image_cost
 from mocapflow.keys import FREE
 from mocapflow.loop import Steps, settle
 from mocapflow.model import ClothedModel
@@ -181,7 +181,8 @@ class CoupledLoop(Stage):
         """Return a first or second frame's state moved near the person by the first segmenter, if there is one.
 
         Of the second it is not known yet how the person moves: somebody may run. A limb that looks like the room
-        behind leads a segmenter astray that knows no more than the room: unless it helps, the state stays.
+        behind leads a segmenter astray that knows no more than the room: unless the images then fit better, the state
+        stays.
         """
         first = self.first_segmenter
         if first is None or not seen(frame) or (first.needs_background and model.scene.background is None):
@@ -190,7 +191,7 @@ class CoupledLoop(Stage):
         near = settle(frame, state, past, steps, model, unobserved).state
         begins = (believed(near.estimate.pose, near.cloth.parameters, near.cloth), state)
         once = replace(self.steps, steady=Steady(max_turns=1))
-        return min(begins, key=lambda begin: total(settle(frame, begin, past, once, model, unobserved)))
+        return min(begins, key=lambda begin: image_cost(settle(frame, begin, past, once, model, unobserved)))
 
     def recovered(
         self, frame: Frame, state: FrameState, result: FrameResult, past: Past, model: ClothedModel

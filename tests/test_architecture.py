@@ -35,6 +35,7 @@ LAYERS = (  # a module imports only from its own layer or an earlier one; `io` a
     "cloth_answers",
     "model",
     "timing",
+    "emptiness",
     "functional",
     "steady",
     "loop",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mocapflow.data import Change, FrameResult, FrameState, Matches, Past, Pose
-from mocapflow.functional import SHAPE_WEIGHT, Functional, area, contours, halfway, told_apart, total
+from mocapflow.functional import SHAPE_WEIGHT, Functional, area, contours, halfway, image_cost, told_apart
 from mocapflow.geometry.cameras import project
 from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.model import increment_between, moved
@@ -89,12 +89,12 @@ def test_two_priors_of_one_name_are_told_apart():
     assert told_apart(["parzen", "limits", "parzen", "parzen"]) == ("parzen", "limits", "parzen_2", "parzen_3")
 
 
-def test_the_total_of_a_frame_is_that_of_its_last_turn_without_contours_and_what_was_not_seen():
+def test_images_cost_what_the_last_turn_left_of_data_and_length():
     state = pictures.tiny_state(SCENE, POSE)
     result = FrameResult(
         state=state, iterations=2, steady=True, oscillating=False, overlap=np.ones(1),
         change=Change(body=0.0, cloth=0.0, angles=0.0, sigmas=0.0, shift=np.zeros((1, 3))),
-        energy=np.array([[1.0, 1, 1, 1], [2.0, np.nan, 4, 8], [np.nan] * 4]),
-        energy_terms=("cam01.data", "cam02.data", "cam01.contour", "parzen"),
+        energy=np.array([[1.0] * 6, [2.0, 1.0, np.nan, 4, 8, 16], [np.nan] * 6]),
+        energy_terms=("cam01.data", "cam01.length", "cam02.data", "cam01.shape", "cam01.contour", "parzen"),
     )  # fmt: skip
-    assert total(result) == 10
+    assert image_cost(result) == 3

@@ -218,7 +218,7 @@ def test_the_first_segmenter_settles_frames_before_which_no_velocity_is_known(tm
 
 
 @pytest.mark.parametrize("helps", [True, False])
-def test_what_the_first_segmenter_finds_is_kept_where_it_lowers_the_functional(tmp_path, monkeypatch, helps):
+def test_what_the_first_segmenter_finds_is_kept_where_images_fit_better_from_there(tmp_path, monkeypatch, helps):
     begins, costs = [], iter([0.0, 1.0] if helps else [1.0, 0.0])
 
     def spy(frame, state, *rest):
@@ -226,7 +226,7 @@ def test_what_the_first_segmenter_finds_is_kept_where_it_lowers_the_functional(t
         return settle(frame, state, *rest)
 
     monkeypatch.setattr("mocapflow.track.settle", spy)
-    monkeypatch.setattr("mocapflow.track.total", lambda result: next(costs))
+    monkeypatch.setattr("mocapflow.track.image_cost", lambda result: next(costs))
     stages = SHORT | {"track": SHORT["track"] | {"first_segmenter": "tiny_segmenter"}}
     run_tiny(write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=stages), tmp_path, frames=1)
     given, approached, stayed, kept = begins
