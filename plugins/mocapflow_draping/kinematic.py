@@ -115,7 +115,7 @@ class Kinematic(Draper):
             motion = rate, np.zeros_like(rate), moved.carry, moved.swell, moved.grow
             self._close(fitting, grid, links[-1:], skin[-1:], parts, motion)
         row, unknowns = strands.place[vertices], 6 + len(pose.angles) + len(parameters)
-        return all_columns(grid.reshape(-1, 3)[row], rate.reshape(-1, 3, len(steps))[row], tried, unknowns)
+        return all_columns(grid.reshape(-1, 3)[row], rate.reshape(-1, 3, len(steps))[row], tried, pose, unknowns)
 
     def touchable(self, scene: Scene) -> Bool:
         """Return which joints (J,) move what the garment hangs from or can touch."""
