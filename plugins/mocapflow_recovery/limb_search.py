@@ -70,6 +70,7 @@ class LimbSearch(Recovery):
     poses: Path = SHIPPED  # that people were seen in, made by `mocapflow prior fit`: limbs are tried as they are there
     seen_samples: NonNegativeInt = 100  # of each limb in the first round, from `poses`
     shares: Annotated[tuple[PositiveFloat, ...], Field(min_length=1)] = (1.0, 0.6, 0.4, 0.25, 0.12)  # of the spread
+    first_looks: PositiveInt = 2  # of the first frame where its fit is doubted: each search is repeated so often
     start_deg: PositiveFloat = 6.0  # how far off, in each angle, the pose may be that the first frame starts from
     spread_deg: PositiveFloat = 25.0  # standard deviation of the first samples; less where a joint at rest hardly bends
     root_spread_deg: PositiveFloat = 8.0  # likewise, of the root's turn
@@ -100,8 +101,11 @@ class LimbSearch(Recovery):
         best = fit
         far = partial(self._far, astray=doubtful)
         looks = ([self._near] if judge.given else []) + ([far] if doubtful or not judge.given else [])
-        for look in looks:
-            found = look(frame.index, state.estimate.pose, fitted, judge)
+        if judge.given and doubtful:  # where all begins, chance shall not decide
+            looks *= self.first_looks
+        for number, look in enumerate(looks):
+            rng = np.random.default_rng([frame.index, number])
+            found = look(rng, state.estimate.pose, fitted, judge)
             best = self._better(judge.of(settle(found, judge.parameters)), best)
         if best is fit:
             return noted(result, f"{why}: search found nothing better", doubted=True) if doubtful else result
@@ -136,17 +140,17 @@ class LimbSearch(Recovery):
     def _doubtful(self, stray: Stray) -> bool:
         return stray.uncovered > self.uncovered_cm2 or stray.floating > self.floating_cm2
 
-    def _near(self, frame: int, believed: Pose, fitted: Pose, judge: Judge) -> Pose:
+    def _near(self, rng: np.random.Generator, believed: Pose, fitted: Pose, judge: Judge) -> Pose:
         """Return the pose that agrees best with the views near the one that was given."""
-        body, rng = judge.model.scene.body, np.random.default_rng(frame)
+        body = judge.model.scene.body
         spread = Spread(2 * np.radians(self.start_deg), np.radians(self.root_spread_deg), self.root_spread_m)
         plan = self._plan(body)._replace(spread=spread, seen_samples=0)
         found = search(judge.apart, Pose(root=fitted.root, angles=believed.angles), body, plan, rng)
         return self._tidied(found, fitted, believed, judge, judge.apart)
 
-    def _far(self, frame: int, believed: Pose, fitted: Pose, judge: Judge, astray: bool) -> Pose:
+    def _far(self, rng: np.random.Generator, believed: Pose, fitted: Pose, judge: Judge, astray: bool) -> Pose:
         """Return the pose that agrees best with the views, sampled around those at hand and as people were seen."""
-        body, rng = judge.model.scene.body, np.random.default_rng(frame)
+        body = judge.model.scene.body
         judge = judge._replace(given=None)  # it may have been far off
         plan, before = self._plan(body), [moment.pose for moment in judge.past.moments[-1:]]
         at_rest, every = np.zeros(len(body.twists)), np.arange(len(body.twists), dtype=np.int32)
