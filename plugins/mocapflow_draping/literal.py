@@ -1,4 +1,4 @@
-"""The drape as the chapter prints it: step by step, each particle about its nearest fixed point (numba).
+"""The drape as the chapter prints it: step by step, free ends about their nearest fixed point (numba).
 
 Kept for reproduction and comparison; `swing.py` reaches the taut strand without steps.
 """
@@ -78,14 +78,20 @@ def _turn(grid, fixed, first, last, step, limited, in_space):  # type: ignore[no
 
 @numba.njit(cache=True)
 def _nearest(grid, fixed, n, k, first, last, in_space):  # type: ignore[no-untyped-def]
-    """Return strand and row of the nearest fixed particle, (-1, -1) where there is none."""
-    if not in_space:
-        for away in range(1, grid.shape[1]):
-            if k - away >= first[n] and fixed[n, k - away]:
-                return n, k - away
-            if k + away <= last[n] and fixed[n, k + away]:
-                return n, k + away
+    """Return strand and row of the fixed particle to turn about, the nearest; (-1, -1) for none.
+
+    None, too, for a particle with fixed ones above and below it on its strand: cloth is taut between them.
+    """
+    above, below = k - 1, k + 1
+    while above >= first[n] and not fixed[n, above]:
+        above -= 1
+    while below <= last[n] and not fixed[n, below]:
+        below += 1
+    hangs, stands = above >= first[n], below <= last[n]
+    if hangs and stands:
         return -1, -1
+    if not in_space:
+        return (n, above) if hangs else (n, below) if stands else (-1, -1)
     least, m, j = np.inf, -1, -1
     for a in range(grid.shape[0]):
         for r in range(first[a], last[a] + 1):
@@ -101,15 +107,15 @@ def _nearest(grid, fixed, n, k, first, last, in_space):  # type: ignore[no-untyp
 def blow_batch(grid, fixed, first, last, skin, force, amount, parts, values):  # type: ignore[no-untyped-def]
     """Turn the free tails of B draped grids towards forces (B, 3) by `amount` (B,) rad, until they touch, in place.
 
+    Returns:
+        (B, N) the row of each strand that its tail hangs from.
+
     Source: Rosenhahn 2008, section 12.3
     """
-    trial = np.empty((grid.shape[2], 3))
+    trial, held = np.empty((grid.shape[2], 3)), np.empty(fixed.shape[:2], np.int32)
     for b in range(len(grid)):
         for n in range(grid.shape[1]):
-            pivot = first[n]
-            for k in range(first[n], last[n] + 1):
-                if fixed[b, n, k]:
-                    pivot = k
+            held[b, n] = pivot = last_fixed(fixed[b, n], first[n], last[n])
             if pivot == last[n]:
                 continue
             turned = 0.0
@@ -133,6 +139,17 @@ def blow_batch(grid, fixed, first, last, skin, force, amount, parts, values):  #
                     break
                 grid[b, n, pivot + 1 : last[n] + 1] = trial[pivot + 1 : last[n] + 1]
                 turned += angle
+    return held
+
+
+@numba.njit(cache=True)
+def last_fixed(fixed, first, last):  # type: ignore[no-untyped-def]
+    """Return the row of the last fixed particle of a strand, the first row where there is none."""
+    pivot = first
+    for k in range(first, last + 1):
+        if fixed[k]:
+            pivot = k
+    return pivot
 
 
 @numba.njit(cache=True)

@@ -17,6 +17,7 @@ from drape_bodies import (
 from mocapflow_draping.distance import outwards
 from mocapflow_draping.kinematic import Kinematic
 from mocapflow_draping.literal import settle_batch
+from mocapflow_draping.strands import strands_of
 from mocapflow_draping.voxels import signed_distance
 from mocapflow_garments.shorts import Shorts
 from mocapflow_garments.skirt import Skirt
@@ -161,6 +162,16 @@ def test_the_chapters_steps_end_near_the_taut_drape(skirted):
     taut = draper(sweeps=0).drape(poses, calm(scene, 4), Past(), scene)
     steps = draper(sweeps=0, rule="literal", limited=True).drape(poses, calm(scene, 4), Past(), scene)
     assert np.linalg.norm(taut - steps, axis=-1)[0].mean() < 0.01
+
+
+@pytest.mark.parametrize("settings", [dict(), dict(limited=True), dict(iterations=100)], ids=str)
+def test_the_chapters_steps_keep_the_strands_lengths(skirted, settings):
+    """T-CL3: what lies between two fixed particles is taut, and is not swung."""
+    scene, poses = skirted
+    draped = draper(sweeps=0, rule="literal", **settings).drape(poses, calm(scene, 4), Past(), scene)
+    strands = strands_of(scene.garment, scene.body)
+    lengths = np.linalg.norm(np.diff(draped[:, strands.vertex], axis=2), axis=-1)
+    assert np.abs(lengths / strands.links - 1).max() < 1e-9
 
 
 def test_a_batch_is_its_drapes_one_by_one(skirted):

@@ -83,6 +83,24 @@ def test_links_that_are_short_stay_as_they_are(skirted):
     np.testing.assert_allclose(closed, fallen, atol=1e-9)
 
 
+def test_by_the_literal_rule_what_touches_stays_and_strands_keep_their_length(skirted):
+    """T-CL4: pinned by the skin, and taut above: only the free ends of strands come back to each other."""
+    poses, rule = leg_poses(), dict(rule="literal", stiff=0.0, bending_m=0.0, longest=1.1)
+    fallen, closed = (drape(skirted, poses, sweeps=sweeps, **rule) for sweeps in (0, 40))
+    strands = strands_of(skirted.garment, skirted.body)
+    rows = np.arange(strands.vertex.shape[1])
+    touches = (distances(skirted.body, fallen, poses) < SKIN)[:, strands.vertex]
+    stays = rows <= np.where(touches, rows, 0).max(axis=2, keepdims=True)
+    moved = np.linalg.norm((closed - fallen)[:, strands.vertex], axis=-1)
+    assert moved[stays].max() < 1e-9
+    assert moved[~stays].max() > 0.05
+    lengths = np.linalg.norm(np.diff(closed[:, strands.vertex], axis=2), axis=-1)
+    assert np.abs(lengths / strands.links - 1).max() < 1e-9
+    assert distances(skirted.body, closed, poses)[:, strands.vertex][~stays].min() > SKIN - 1e-4
+    before, after = (np.maximum(ring_strain(skirted.garment, cloth)[1:], 0.1) for cloth in (fallen, closed))
+    assert (after.mean(axis=1) < before.mean(axis=1)).all()  # standing, no ring is too long
+
+
 @pytest.mark.parametrize("flexion", [0, 30, 60, 90])
 def test_a_tube_stays_around_its_thigh(tube, flexion):
     poses = PoseBatch(root=np.eye(4)[None], angles=np.radians([[flexion, 0, 0, 0]]))
