@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from drape_bodies import (
     SKIN,
+    ball,
     box,
     check_whole_and_outside,
     distances,
@@ -13,6 +14,7 @@ from drape_bodies import (
     lying_cylinder,
     prepared,
     swing,
+    together,
 )
 from mocapflow_draping.distance import outwards
 from mocapflow_draping.kinematic import Kinematic
@@ -143,8 +145,43 @@ def test_a_strand_over_a_cylinder_is_taut(link):
     chords = np.linalg.norm(np.diff(laid[0, 0], axis=0), axis=1)
     assert np.abs(chords - link).max() < 1e-12
     tip = np.array([away, 0.0, -(length - np.pi / 2 * away)])
-    sag = link**2 / (8 * away)  # a chain of bars cuts corners
-    assert np.linalg.norm(laid[0, 0, -1] - tip) < 5e-4 + 2 * sag
+    assert np.linalg.norm(laid[0, 0, -1] - tip) < 5e-4
+
+
+def test_strands_over_a_sphere_lie_on_its_meridians():
+    radius, link, count = 0.1, 0.01, 33
+    away, azimuth = radius + SKIN, 2 * np.pi * np.arange(12) / 12
+    facing = np.stack([np.cos(azimuth), np.sin(azimuth), 0 * azimuth], axis=1)
+    laid, _ = swing(ball(radius), np.tile([0.0, 0.0, away], (12, 1)), facing, count, link)
+    bars = np.linalg.norm(np.diff(laid[0], axis=1), axis=-1)
+    assert np.abs(bars - link).max() < 1e-12
+    aside = np.abs(np.einsum("nla,na->nl", laid[0], np.cross(facing, [0, 0, 1.0])))
+    assert aside.max() < 1e-12
+    tips = away * facing - np.array([0, 0, link * (count - 1) - np.pi / 2 * away])
+    assert np.linalg.norm(laid[0, :, -1] - tips, axis=1).max() < 5e-4
+    assert np.linalg.norm(laid[0], axis=-1).min() > away - 1e-4
+
+
+def test_a_cloth_on_a_bumpy_plane_hangs_taut_from_bump_to_bump():
+    """Two ridges across a table: level between them, tents to both sides, all strands as long as they were."""
+    ridges = (-0.1, 0.1)
+    table = together(
+        box([-0.5, -0.3, -0.1], [0.5, 0.3, 0.0]),
+        *(box([x - 0.01, -0.3, -0.05], [x + 0.01, 0.3, 0.05]) for x in ridges),
+    )
+    x, y = np.meshgrid(np.linspace(-0.3, 0.3, 31), np.linspace(-0.1, 0.1, 5))
+    grid = np.stack([x, y, np.full(x.shape, 0.08)], axis=-1)
+    laid, fixed = literal(table, grid, np.zeros(x.shape, bool))
+    between, top = np.abs(x) <= 0.1, 0.05 + SKIN
+    assert fixed[np.abs(np.abs(x) - 0.1) < 0.005].all() and not fixed[np.abs(x) < 0.08].any()
+    assert np.ptp(laid[between][:, 2]) == 0 and top - 0.002 - 1e-6 <= laid[between][0, 2] < top
+    np.testing.assert_array_equal(laid[between][:, :2], grid[between][:, :2])
+    for end in (0, -1):
+        assert fixed[:, end].all()
+        assert (np.abs(laid[:, end, 2] - SKIN) < 0.2 * np.radians(2.0)).all()  # a step goes on into the table
+    lengths = np.linalg.norm(np.diff(laid, axis=1), axis=-1)
+    assert np.abs(lengths / 0.02 - 1).max() < 1e-9
+    np.testing.assert_allclose(laid[..., 1], y, atol=1e-12)
 
 
 def calm(scene, count):

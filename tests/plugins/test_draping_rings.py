@@ -47,6 +47,17 @@ def test_rings_come_back_to_their_length(skirted):
     assert (some < 0.24).all()
 
 
+@pytest.mark.parametrize("longest", [1.0, 1.1, 1.3])
+def test_what_was_too_long_becomes_as_long_as_allowed(skirted, longest):
+    """T-CL4: in the three poses that part the strands, links of more than half again their length."""
+    rule = dict(stiff=0.0, bending_m=0.0, longest=longest)
+    fallen, closed = (ring_strain(skirted.garment, drape(skirted, leg_poses(), sweeps=n, **rule)) for n in (0, 60))
+    far = fallen > 0.5
+    assert far[1:].any(axis=1).all()
+    assert np.quantile(closed[far], 0.25) > longest - 1 - 0.01
+    assert closed.max() < longest - 1 + 0.04 * longest  # within 3 % of their length rings are let be
+
+
 def test_strands_keep_their_length_and_particles_stay_outside(skirted):
     poses = leg_poses()
     draped = drape(skirted, poses, sweeps=40)
