@@ -63,6 +63,7 @@ def fitter(request):
 
 @pytest.mark.parametrize("azimuth_deg", [10.0, 155.0, 280.0])
 def test_a_known_wind_is_recovered_within_one_sampling_step(fitter, model, azimuth_deg):
+    """T-SYS2."""
     azimuth = np.radians(azimuth_deg)
     truth = parameters(model, wind_cos_rad=0.3 * np.cos(azimuth), wind_sin_rad=0.3 * np.sin(azimuth))
     found = fitted(fitter, model, truth, parameters(model)).parameters
@@ -83,6 +84,7 @@ def test_forces_are_held_about_none_as_firmly_as_asked(model):
 
 
 def test_thickness_is_measured_in_the_first_frame_and_kept(model):
+    """T-CL7."""
     truth, nothing = parameters(model, thickness_m=0.006), parameters(model)
     thickness = model.scene.garment.parameter_names.index("thickness_m")
     assert abs(fitted(SampledForces(), model, truth, nothing).parameters[thickness] - 0.006) <= 0.002

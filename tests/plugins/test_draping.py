@@ -1,4 +1,4 @@
-"""The drape on analytic bodies: T-CL1 to T-CL3, and the distance fields under it."""
+"""The drape on analytic bodies (T-CL1 to T-CL3), and the distance fields under it."""
 
 import drape_bodies
 import numpy as np
@@ -85,6 +85,7 @@ def test_a_raised_thigh_does_not_come_out_behind_the_body(skirted):
 
 
 def test_a_flat_cloth_lies_on_a_plane_undeformed():
+    """T-CL1."""
     table = box([-0.3, -0.3, -0.1], [0.3, 0.3, 0.0])
     grid = np.stack(np.meshgrid(np.linspace(-0.2, 0.2, 9), np.linspace(-0.2, 0.2, 9), indexing="ij"), -1)
     grid = np.concatenate([grid, np.full((9, 9, 1), 0.05)], -1)
@@ -96,6 +97,7 @@ def test_a_flat_cloth_lies_on_a_plane_undeformed():
 
 
 def test_an_overhang_hangs_straight_down_and_keeps_its_length():
+    """T-CL2."""
     table = box([-0.3, -0.3, -0.1], [0.105, 0.3, 0.0])
     ((laid,),), ((supported,),) = swing(table, [[0.0, 0.0, SKIN]], [1.0, 0.0, 0.0], 31, 0.01)
     assert 11 <= supported <= 22
@@ -106,6 +108,7 @@ def test_an_overhang_hangs_straight_down_and_keeps_its_length():
 
 
 def test_without_the_limit_it_swings_by_no_more_than_a_step():
+    """T-CL2."""
     nothing = box([5, 5, 5], [5.1, 5.1, 5.1])
     fixed = np.zeros((1, 11), bool)
     fixed[0, 0] = True
@@ -127,6 +130,7 @@ def test_pivots_are_the_nearest_along_the_strand_or_in_space():
 
 
 def test_a_level_strand_hangs_after_45_steps():
+    """T-CL2."""
     nothing = box([5, 5, 5], [5.1, 5.1, 5.1])
     fixed = np.zeros((1, 11), bool)
     fixed[0, 0] = True
@@ -138,6 +142,7 @@ def test_a_level_strand_hangs_after_45_steps():
 
 @pytest.mark.parametrize("link", [0.002, 0.01, 0.02])
 def test_a_strand_over_a_cylinder_is_taut(link):
+    """T-CL2."""
     radius, length = 0.1, 0.32
     count = round(length / link) + 1
     laid, _ = swing(lying_cylinder(radius), [[0.0, 0.0, radius + SKIN]], [1.0, 0.0, 0.0], count, link)
@@ -149,6 +154,7 @@ def test_a_strand_over_a_cylinder_is_taut(link):
 
 
 def test_strands_over_a_sphere_lie_on_its_meridians():
+    """T-CL1."""
     radius, link, count = 0.1, 0.01, 33
     away, azimuth = radius + SKIN, 2 * np.pi * np.arange(12) / 12
     facing = np.stack([np.cos(azimuth), np.sin(azimuth), 0 * azimuth], axis=1)
@@ -163,7 +169,7 @@ def test_strands_over_a_sphere_lie_on_its_meridians():
 
 
 def test_a_cloth_on_a_bumpy_plane_hangs_taut_from_bump_to_bump():
-    """Two ridges across a table: level between them, tents to both sides, all strands as long as they were."""
+    """T-CL1: two ridges across a table: level between them, tents to both sides, all strands as long as they were."""
     ridges = (-0.1, 0.1)
     table = together(
         box([-0.5, -0.3, -0.1], [0.5, 0.3, 0.0]),
@@ -189,6 +195,7 @@ def calm(scene, count):
 
 
 def test_a_skirt_keeps_its_strands_and_stays_outside(skirted):
+    """T-CL3."""
     scene, poses = skirted
     draped = draper(sweeps=0).drape(poses, calm(scene, 4), Past(), scene)
     check_whole_and_outside(scene, draped, poses)

@@ -162,6 +162,7 @@ def test_the_stick_model_has_the_times_of_the_track(own: Ours, tmp_path: Path) -
 
 @pytest.mark.usefixtures("unrendered")
 def test_the_stick_model_keeps_its_lengths(own: Ours, tmp_path: Path) -> None:
+    """T-OUT1."""
     loose = PLACES + np.random.default_rng(0).normal(scale=0.005, size=PLACES.shape)
     read(tmp_path, loose)
     evaluate(own, tmp_path / "markers.c3d", tmp_path)
