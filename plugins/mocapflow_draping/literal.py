@@ -17,6 +17,8 @@ from mocapflow_draping.distance import body_distance
 def settle_batch(grid, fixed, first, last, skin, step, iterations, limited, in_space, lower, parts, values):  # type: ignore[no-untyped-def]
     """Lay B grids of particles on posed bodies, in place.
 
+    What lies between two fixed particles of a strand is taut, and stays.
+
     Args:
         grid: (B, N, L, 3) m; overwritten.
         fixed: (B, N, L) booleans: pinned particles; those that touch are added.
@@ -48,8 +50,9 @@ FLOOR = -10.0  # m: what falls past everything stops here
 @numba.njit(cache=True)
 def _touch(grid, fixed, first, last, skin, parts, values):  # type: ignore[no-untyped-def]
     for n in range(grid.shape[0]):
+        top, bottom = fixed_span(fixed[n], first[n], last[n])
         for k in range(first[n], last[n] + 1):
-            if not fixed[n, k]:
+            if not top <= k <= bottom:
                 p = grid[n, k]
                 d = body_distance(p[0], p[1], p[2], 0, parts, values)[0]
                 fixed[n, k] = d < skin
@@ -59,11 +62,14 @@ def _touch(grid, fixed, first, last, skin, parts, values):  # type: ignore[no-un
 def _turn(grid, fixed, first, last, step, limited, in_space):  # type: ignore[no-untyped-def]
     before = grid.copy()
     for n in range(grid.shape[0]):
+        top, bottom = fixed_span(fixed[n], first[n], last[n])
         for k in range(first[n], last[n] + 1):
-            if fixed[n, k]:
-                continue
-            m, j = _nearest(before, fixed, n, k, first, last, in_space)
-            if m < 0:
+            if top <= k <= bottom:
+                continue  # fixed, or taut between two that are
+            m, j = n, min(max(k, top), bottom)
+            if in_space:
+                m, j = _nearest(before, fixed, before[n, k], first, last)
+            if j < 0:
                 continue
             x, p = before[m, j], grid[n, k]
             dx, dy, dz = p[0] - x[0], p[1] - x[1], p[2] - x[2]
@@ -77,26 +83,23 @@ def _turn(grid, fixed, first, last, step, limited, in_space):  # type: ignore[no
 
 
 @numba.njit(cache=True)
-def _nearest(grid, fixed, n, k, first, last, in_space):  # type: ignore[no-untyped-def]
-    """Return strand and row of the fixed particle to turn about, the nearest; (-1, -1) for none.
+def fixed_span(fixed, first, last):  # type: ignore[no-untyped-def]
+    """Return the rows of the first and the last fixed particle of a strand; (last + 1, -1) where there is none."""
+    top, bottom = last + 1, -1
+    for k in range(first, last + 1):
+        if fixed[k]:
+            top, bottom = min(top, k), k
+    return top, bottom
 
-    None, too, for a particle with fixed ones above and below it on its strand: cloth is taut between them.
-    """
-    above, below = k - 1, k + 1
-    while above >= first[n] and not fixed[n, above]:
-        above -= 1
-    while below <= last[n] and not fixed[n, below]:
-        below += 1
-    hangs, stands = above >= first[n], below <= last[n]
-    if hangs and stands:
-        return -1, -1
-    if not in_space:
-        return (n, above) if hangs else (n, below) if stands else (-1, -1)
+
+@numba.njit(cache=True)
+def _nearest(grid, fixed, p, first, last):  # type: ignore[no-untyped-def]
+    """Return strand and row of the fixed particle nearest to a point, (-1, -1) where there is none."""
     least, m, j = np.inf, -1, -1
     for a in range(grid.shape[0]):
         for r in range(first[a], last[a] + 1):
             if fixed[a, r]:
-                p, q = grid[n, k], grid[a, r]
+                q = grid[a, r]
                 d = (p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2
                 if d < least:
                     least, m, j = d, a, r
@@ -115,7 +118,7 @@ def blow_batch(grid, fixed, first, last, skin, force, amount, parts, values):  #
     trial, held = np.empty((grid.shape[2], 3)), np.empty(fixed.shape[:2], np.int32)
     for b in range(len(grid)):
         for n in range(grid.shape[1]):
-            held[b, n] = pivot = last_fixed(fixed[b, n], first[n], last[n])
+            held[b, n] = pivot = max(fixed_span(fixed[b, n], first[n], last[n])[1], first[n])
             if pivot == last[n]:
                 continue
             turned = 0.0
@@ -140,16 +143,6 @@ def blow_batch(grid, fixed, first, last, skin, force, amount, parts, values):  #
                 grid[b, n, pivot + 1 : last[n] + 1] = trial[pivot + 1 : last[n] + 1]
                 turned += angle
     return held
-
-
-@numba.njit(cache=True)
-def last_fixed(fixed, first, last):  # type: ignore[no-untyped-def]
-    """Return the row of the last fixed particle of a strand, the first row where there is none."""
-    pivot = first
-    for k in range(first, last + 1):
-        if fixed[k]:
-            pivot = k
-    return pivot
 
 
 @numba.njit(cache=True)
