@@ -62,6 +62,11 @@ class Functional:
             views[c, 2], views[c, 3] = area(surface, silhouette, cameras[c]), matched[c]
         return np.concatenate([views.ravel(), self._priors(state.estimate.pose)])
 
+    def total(self, values: F64) -> float:
+        """Return the sum of terms (E,), without those that a view or a segmenter lacks and the error of contours."""
+        counted = [not name.endswith(".contour") for name in self.terms]
+        return float(np.nansum(values[counted]))
+
     def pull(self, segmentation: Segmentation, pose: Pose, cloth: Cloth) -> float:
         """Return the terms that pose and cloth can change, summed: area and priors."""
         surface, cameras = self.model.surface(pose, cloth), self.model.scene.cameras

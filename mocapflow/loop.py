@@ -47,7 +47,7 @@ def settle(
     steady = steps.steady if past.moments else steps.steady.beginning
     calm, turn = 0, Turn(index=0, cap=steady.max_turns)
     last = before_last = Shown(state.estimate.pose, model.surface(state.estimate.pose, state.cloth))
-    energy = np.full((steps.steady.cap, len(functional.terms)), np.nan)
+    energy, cost = np.full((steps.steady.cap, len(functional.terms)), np.nan), np.nan
     for index in range(steady.max_turns):
         turn = Turn(index=index, cap=turn.cap, change=turn.change)
         segmentation = segmentation_of(steps.segmenter, frame, state, past, model.scene, turn)
@@ -63,13 +63,14 @@ def settle(
         matches = match(surface) if estimate.matches is None else estimate.matches
         state = FrameState(segmentation=segmentation, matches=matches, estimate=estimate, cloth=cloth)
         energy[index] = functional.values(state, surface)
+        last_cost, cost = cost, functional.total(energy[index])
         now = Shown(estimate.pose, surface)
         change, swing = (measure_change(old, now, estimate.covariance) for old in (last, before_last))
         watch.lap("match")
         observe(frame.index, turn, state)
         before_last, last = last, now
         turn = Turn(index=index, cap=turn.cap, change=change)
-        calm = calm + 1 if steady.holds(change, index + 1) else 0
+        calm = calm + 1 if steady.holds(change, index + 1) and steady.even(last_cost, cost) else 0
         if calm >= steady.turns:
             break
     assert turn.change is not None

@@ -10,7 +10,7 @@ from pydantic import NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveIn
 from mocapflow.data import Change, Pose, Surface
 from mocapflow.model import increment_between
 from mocapflow.records import F64
-from mocapflow.settings import Settings
+from mocapflow.settings import PositiveOrInf, Settings
 
 
 class Steady(Settings):
@@ -23,7 +23,8 @@ class Steady(Settings):
     surface_mm: PositiveFloat = 0.5  # largest move of a body vertex from turn to turn, RMS move of the cloth
     angle_deg: PositiveFloat = 0.1  # largest change of a joint angle
     sigmas: tuple[NonNegativeFloat, ...] = ()  # of the pose, turn by turn: moves below are rest too
-    turns: PositiveInt = 2  # in a row within both tolerances, then the frame is at rest
+    energy_share: PositiveOrInf = float("inf")  # largest change of the functional from turn to turn
+    turns: PositiveInt = 2  # in a row within the tolerances, then the frame is at rest
     max_turns: PositiveInt = 8  # then the frame is left as it is
     first_turns: NonNegativeInt = 0  # the same, if more, of a first frame, and of one after frames that were lost
     halvings: NonNegativeInt = 0  # at most, of a step that raises the functional; 0: it is taken whole
@@ -44,6 +45,10 @@ class Steady(Settings):
         exact = near and change.angles <= float(np.radians(self.angle_deg))
         allowed = self.sigmas[min(turns, len(self.sigmas)) - 1] if self.sigmas else 0.0
         return exact or change.sigmas < allowed
+
+    def even(self, before: float, now: float) -> bool:
+        """True where the functional has changed by no more than its tolerance; NaN before the first turn."""
+        return self.energy_share == float("inf") or abs(now - before) <= self.energy_share * abs(before)
 
 
 class Shown(NamedTuple):

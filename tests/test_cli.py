@@ -336,7 +336,7 @@ def test_a_plugin_that_does_not_load_is_told(call, tmp_path, monkeypatch, comman
 
 def test_settings(call):
     said = call("settings", "mocapflow").stdout
-    assert "| `steady.turns` | `int (> 0)` | `2` | | in a row within both tolerances" in said
+    assert "| `steady.turns` | `int (> 0)` | `2` | | in a row within the tolerances" in said
     other = call("settings", "mocapflo")
     assert (other.exit_code, other.stdout) == (2, "")
     assert "available: mocapflow — did you mean 'mocapflow'?" in other.stderr

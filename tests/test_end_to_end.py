@@ -89,6 +89,7 @@ def test_two_frames_without_cloth(tmp_path):
 @pytest.mark.parametrize("clip", CLIPS)
 @pytest.mark.parametrize("side", ["l", "r"])
 def test_knees_under_cloth_within_three_degrees(whole, clip, side):
+    """T-EXP1, on the two short clips that are shipped."""
     ours, truth = table(whole[clip] / "results/angles.csv"), table(CLIPS[clip] / "truth/angles.csv")
     error = ours[f"knee_flexion_{side}"] - truth[f"knee_flexion_{side}"]
     assert len(error) == 60

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mocapflow_priors.rest_pose import RestPose
 
 from mocapflow.data import Change, FrameResult, FrameState, Matches, Past, Pose
 from mocapflow.functional import SHAPE_WEIGHT, Functional, area, contours, halfway, image_cost, told_apart
@@ -58,6 +59,14 @@ def test_every_view_has_its_terms_and_a_lost_one_none():
     assert np.isnan(values["cam02.shape"]) and np.isfinite(values["cam01.shape"])
 
 
+def test_the_sum_is_of_all_terms_that_are_there_but_contours():
+    functional = Functional(MODEL, (RestPose(weight=2.0),), Past())
+    values = np.arange(17.0)
+    values[4] = np.nan  # cam02 has no data
+    assert functional.terms[-2:] == ("cam04.contour", "rest_pose")
+    assert functional.total(values) == sum(range(17)) - 4 - (3 + 7 + 11 + 15)
+
+
 @pytest.mark.parametrize(("shift", "halvings", "share"), [(0.01, 3, 1), (0.05, 3, 0.125), (0.05, 1, 0.5), (0.05, 0, 1)])
 def test_a_step_that_raises_the_functional_is_halved(shift, halvings, share):
     """From the true pose 5 cm aside costs more however often it is halved; 1 cm towards it costs less."""
@@ -69,6 +78,18 @@ def test_a_step_that_raises_the_functional_is_halved(shift, halvings, share):
     went = reached.pose.root[:3, 3] - begin.root[:3, 3]
     np.testing.assert_allclose(went, share * (target.root[:3, 3] - begin.root[:3, 3]), atol=1e-12)
     np.testing.assert_allclose(cloth.vertices, scenes.tiny_cloth(SCENE, reached.pose).vertices, atol=1e-9)
+
+
+@pytest.mark.parametrize(("risen", "halved"), [(1.0, 0), (1.009, 0), (1.011, 1)])
+def test_a_step_may_raise_the_functional_by_one_percent(monkeypatch, risen, halved):
+    """What a step lowers is the error of contours, not this; half of the step is let pass here."""
+    costs = iter([100.0, 100.0 * risen, 100.0])
+    monkeypatch.setattr(Functional, "pull", lambda *given: next(costs))
+    state, target = pictures.tiny_state(SCENE, POSE), off(POSE, 0.02)
+    estimate = replace(state.estimate, pose=target, parameters=CLOTH.parameters)
+    step = Functional(MODEL, (), Past()).step
+    reached, _ = step(state, state.segmentation, estimate, scenes.tiny_cloth(SCENE, target), 3)
+    assert reached.pose.root[0, 3] - POSE.root[0, 3] == pytest.approx(0.02 / 2**halved)
 
 
 def test_an_increment_leads_from_one_pose_to_another():

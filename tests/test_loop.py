@@ -8,6 +8,7 @@ import pytest
 from mocapflow.assets import Camera
 from mocapflow.components import PoseSolver
 from mocapflow.data import NO_CLOTH, Change, Estimate, Frame, Moment, Past, Pose, empty_matches
+from mocapflow.functional import Functional
 from mocapflow.geometry.kinematics import chain, skin
 from mocapflow.loop import Steps, settle
 from mocapflow.model import ClothedModel
@@ -36,7 +37,7 @@ def frame():
     return Frame(index=5, time=0.1, images=(image, image), usable=np.ones(2, bool))
 
 
-def go(frame, share, observe=lambda *_: None, max_turns=8, sigmas=(), past=None, first_turns=0):
+def go(frame, share, observe=lambda *_: None, max_turns=8, sigmas=(), past=None, first_turns=0, steady=None):
     camera = Camera(
         name="cam01", size=np.array([24, 16], np.int32), intrinsics=np.eye(3), distortion=np.zeros(5),
         camera_from_world=np.eye(4),
@@ -45,7 +46,7 @@ def go(frame, share, observe=lambda *_: None, max_turns=8, sigmas=(), past=None,
     steps = Steps(
         segmenter=TinySegmenter(), matchers=(TinyMatcher(),), pose_solver=Towards(share=share),
         cloth_fitter=None, priors=(),
-        steady=Steady(sigmas=sigmas, max_turns=max_turns, first_turns=first_turns),
+        steady=Steady(sigmas=sigmas, max_turns=max_turns, first_turns=first_turns, **(steady or {})),
     )  # fmt: skip
     pose = Pose(root=np.eye(4), angles=np.array([0.3, -0.4]))
     start = believed(pose, np.empty(0), model.drape(pose, np.empty(0), Past()))
@@ -79,6 +80,17 @@ def test_each_turn_has_its_own_measure_of_rest_and_later_ones_the_last():
     held = [Steady(sigmas=(0, 0.4, 0.6)).holds(moved, turns) for turns in (1, 2, 3, 4)]
     assert held == [False, False, True, True]
     assert not Steady().holds(moved, 8)
+
+
+def test_a_functional_that_goes_on_changing_is_no_rest(frame, monkeypatch):
+    """By 10 % of itself in each turn: the pose rests after the second, the frame only where that is within bounds."""
+    costs = iter(1.1 ** np.arange(24))
+    monkeypatch.setattr(Functional, "total", lambda self, values: next(costs))
+    found = [go(frame, 1.0, steady=dict(energy_share=share)) for share in (0.05, 0.11, np.inf)]
+    assert [(result.steady, result.iterations) for result in found] == [(False, 8), (True, 3), (True, 3)]
+    assert (
+        go(frame, 0.01, steady=dict(energy_share=0.11, angle_deg=1, surface_mm=100, turns=1)).iterations == 2
+    )  # none before
 
 
 def test_the_matches_kept_are_those_that_the_solver_explains(frame, monkeypatch):

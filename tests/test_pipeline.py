@@ -309,3 +309,35 @@ def test_every_shipped_pipeline_loads_and_is_wired(file):
         pytest.importorskip(EXTRAS[file.stem])
     pipeline = load_pipeline(file, load_registry(), recording=shipped("examples", "data", "skirt_steps"))
     assert wire(pipeline)
+
+
+CHAPTER = {  # what the chapter, or the specification of it where it is silent, says of each step
+    "segmenter": dict(
+        name="levelset", use_background=False, decorrelate=False, rho_px=12.0, sigma_px=1.5, length_weight=0.5,
+        shape_weight=0.05, variance_floor=0.02, steps=50, later_steps=20, cell_px=1, stride_px=1, statistics_every=1,
+        coarse_steps=0, half_steps=0, contact_steps=0, keep_px=0.0,
+    ),
+    "matchers": dict(
+        name="contour_icp", direction="both", residual="point", first_loss="zhang", later_loss="zhang", scale=6.0,
+        spacing_px=4.0, first_reach_px=40.0, later_reach_px=10.0, cloth_sigma_px_per_m=0.0, hem_guard_px=0.0,
+    ),
+    "pose_solver": dict(
+        residual="line", steps_per_match=4, iterations=10, damping=1e-4, correlation_px=0.0, cloth_unknowns=False,
+        balance_views=False, cap_deg=10.0, cap_mm=100.0,
+    ),
+    "draper": dict(
+        rule="literal", skin_m=0.004, step_deg=2.0, iterations=50, limited=False, pivot="strand", sweeps=40,
+        longest=1.1, stiff=0.0, bending_m=0.0,
+    ),
+    "cloth_fitter": dict(name="sampled_forces", directions=8, amounts_deg=(5.0, 10.0, 20.0), least_gain=0.01),
+    "steady": dict(surface_mm=0.5, angle_deg=0.1, energy_share=0.001, turns=2, max_turns=8, sigmas=(), first_turns=0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("step", CHAPTER)
+def test_the_chapters_pipeline_is_the_chapters(step):
+    pipeline = load_pipeline(shipped("pipelines", "paper.yaml"), load_registry())
+    track = next(named.stage for named in pipeline.stages if named.label == "track")
+    component = track.matchers[0] if step == "matchers" else getattr(track, step)
+    assert {name: getattr(component, name) for name in CHAPTER[step]} == CHAPTER[step]
+    assert len(track.matchers) == 1 and not track.priors and track.recovery is None

@@ -1,4 +1,4 @@
-"""Spoiled images, end to end: wrong frames are named and overcome (T-EXP4), unseen legs stay calm (T-EXP6)."""
+"""Spoiled images, end to end: wrong frames (T-EXP4), the scissors' disturbance (T-EXP5), unseen legs (T-EXP6)."""
 
 import csv
 import json
@@ -77,6 +77,7 @@ def test_legs_that_nobody_sees_do_not_jump_and_are_found_where_they_are(tmp_path
 
 @pytest.mark.long
 def test_a_forearm_behind_a_stripe_is_not_drawn_to_the_arm_before_it(tmp_path):
+    """T-EXP5."""
     errors, _, _ = tracked(tmp_path / "run", "disturbed.yaml", "--frames", "0:12", names=ELBOWS)
     assert errors.max() < 15  # it left by 100
 

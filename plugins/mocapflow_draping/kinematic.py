@@ -42,6 +42,8 @@ class Fitting:
 class Kinematic(Draper):
     """Lays a garment by geometry alone: no mass, no time, no history.
 
+    What touches the skin slides along it while rings close; by the literal rule it and what is taut above stay.
+
     Source: Rosenhahn 2008, section 12.3
     """
 
@@ -74,15 +76,16 @@ class Kinematic(Draper):
         links = length[kept, None, None] * strands.links
         parts = posed_parts(fitting.fields, chain)
         winds = tilts(garment, parameters, strands.azimuth)
+        first = np.broadcast_to(strands.first, (len(source), len(strands.first)))
         if self.rule == "literal":
-            grid = self._step(fitting, chain, source, parameters, garment, skin, links, parts)
+            grid, first = self._step(fitting, chain, source, parameters, garment, skin, links, parts)
         elif strands.rides:
             grid = riding(strands, chain[source], links[source], *winds)
         else:
             where = roots(strands, chain), standing_out(strands, chain), links
             grid = lay(strands, fitting.fields, where, winds, source, skin, parts, math.radians(self.start_deg)).grid
         if self.sweeps:
-            self._close(fitting, grid, links[source], skin[source], parts[source])
+            self._close(fitting, grid, first, links[source], skin[source], parts[source])
         vertices: F64 = grid.reshape(len(grid), -1, 3)[:, strands.place]
         return vertices
 
@@ -113,7 +116,7 @@ class Kinematic(Draper):
             grid, rate = laid.grid, follow(strands, fitting.fields, near, winds, laid, parts, moved)
         if self.sweeps:
             motion = rate, np.zeros_like(rate), moved.carry, moved.swell, moved.grow
-            self._close(fitting, grid, links[-1:], skin[-1:], parts, motion)
+            self._close(fitting, grid, strands.first[None], links[-1:], skin[-1:], parts, motion)
         row, unknowns = strands.place[vertices], 6 + len(pose.angles) + len(parameters)
         return all_columns(grid.reshape(-1, 3)[row], rate.reshape(-1, 3, len(steps))[row], tried, pose, unknowns)
 
@@ -150,7 +153,8 @@ class Kinematic(Draper):
         skin: F64,
         links: F64,
         parts: F64,
-    ) -> F64:
+    ) -> tuple[F64, I32]:
+        """Return the particles (B, N, L, 3) m, and the rows (B, N) that the free ends of the strands hang from."""
         from mocapflow_draping.literal import blow_batch, settle_batch
 
         strands, values = fitting.strands, fitting.fields.values
@@ -164,12 +168,13 @@ class Kinematic(Draper):
         )  # fmt: skip
         grid, fixed = grid[source], fixed[source]
         force, amount = wind(garment, parameters, chain[source, strands.carrier[0], :3, :3])
-        blow_batch(grid, fixed, strands.first, strands.last, skin[source], force, amount, parts[source], values)
-        return grid
+        blown = strands.first, strands.last, skin[source], force, amount, parts[source], values
+        return grid, blow_batch(grid, fixed, *blown)
 
     def _close(
-        self, fitting: Fitting, grid: F64, links: F64, skin: F64, parts: F64, motion: Motion | None = None
+        self, fitting: Fitting, grid: F64, first: I32, links: F64, skin: F64, parts: F64, motion: Motion | None = None
     ) -> None:
+        """Close the rings, in place, of all that hangs below the rows `first` (B, N); those stay."""
         from mocapflow_draping.rings import close_batch
 
         strands = fitting.strands
@@ -178,6 +183,6 @@ class Kinematic(Draper):
         if self.bending_m > 0 and not strands.rides:
             bend = np.exp(-strands.links / self.bending_m)
         close_batch(
-            grid, links, strands.first, strands.last, across, length, skin, self.longest, self.stiff, bend,
-            self.sweeps, parts, fitting.fields.values, motion,
+            grid, links, np.ascontiguousarray(first), strands.last, across, length, skin, self.longest, self.stiff,
+            bend, self.sweeps, parts, fitting.fields.values, motion,
         )  # fmt: skip

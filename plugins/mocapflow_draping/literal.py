@@ -1,4 +1,4 @@
-"""The drape as the chapter prints it: step by step, each particle about its nearest fixed point (numba).
+"""The drape as the chapter prints it: step by step, free ends about their nearest fixed point (numba).
 
 Kept for reproduction and comparison; `swing.py` reaches the taut strand without steps.
 """
@@ -16,6 +16,8 @@ from mocapflow_draping.distance import body_distance
 @numba.njit(cache=True)
 def settle_batch(grid, fixed, first, last, skin, step, iterations, limited, in_space, lower, parts, values):  # type: ignore[no-untyped-def]
     """Lay B grids of particles on posed bodies, in place.
+
+    What lies between two fixed particles of a strand is taut, and stays.
 
     Args:
         grid: (B, N, L, 3) m; overwritten.
@@ -48,8 +50,9 @@ FLOOR = -10.0  # m: what falls past everything stops here
 @numba.njit(cache=True)
 def _touch(grid, fixed, first, last, skin, parts, values):  # type: ignore[no-untyped-def]
     for n in range(grid.shape[0]):
+        top, bottom = fixed_span(fixed[n], first[n], last[n])
         for k in range(first[n], last[n] + 1):
-            if not fixed[n, k]:
+            if not top <= k <= bottom:
                 p = grid[n, k]
                 d = body_distance(p[0], p[1], p[2], 0, parts, values)[0]
                 fixed[n, k] = d < skin
@@ -59,11 +62,14 @@ def _touch(grid, fixed, first, last, skin, parts, values):  # type: ignore[no-un
 def _turn(grid, fixed, first, last, step, limited, in_space):  # type: ignore[no-untyped-def]
     before = grid.copy()
     for n in range(grid.shape[0]):
+        top, bottom = fixed_span(fixed[n], first[n], last[n])
         for k in range(first[n], last[n] + 1):
-            if fixed[n, k]:
-                continue
-            m, j = _nearest(before, fixed, n, k, first, last, in_space)
-            if m < 0:
+            if top <= k <= bottom:
+                continue  # fixed, or taut between two that are
+            m, j = n, min(max(k, top), bottom)
+            if in_space:
+                m, j = _nearest(before, fixed, before[n, k], first, last)
+            if j < 0:
                 continue
             x, p = before[m, j], grid[n, k]
             dx, dy, dz = p[0] - x[0], p[1] - x[1], p[2] - x[2]
@@ -77,20 +83,23 @@ def _turn(grid, fixed, first, last, step, limited, in_space):  # type: ignore[no
 
 
 @numba.njit(cache=True)
-def _nearest(grid, fixed, n, k, first, last, in_space):  # type: ignore[no-untyped-def]
-    """Return strand and row of the nearest fixed particle, (-1, -1) where there is none."""
-    if not in_space:
-        for away in range(1, grid.shape[1]):
-            if k - away >= first[n] and fixed[n, k - away]:
-                return n, k - away
-            if k + away <= last[n] and fixed[n, k + away]:
-                return n, k + away
-        return -1, -1
+def fixed_span(fixed, first, last):  # type: ignore[no-untyped-def]
+    """Return the rows of the first and the last fixed particle of a strand; (last + 1, -1) where there is none."""
+    top, bottom = last + 1, -1
+    for k in range(first, last + 1):
+        if fixed[k]:
+            top, bottom = min(top, k), k
+    return top, bottom
+
+
+@numba.njit(cache=True)
+def _nearest(grid, fixed, p, first, last):  # type: ignore[no-untyped-def]
+    """Return strand and row of the fixed particle nearest to a point, (-1, -1) where there is none."""
     least, m, j = np.inf, -1, -1
     for a in range(grid.shape[0]):
         for r in range(first[a], last[a] + 1):
             if fixed[a, r]:
-                p, q = grid[n, k], grid[a, r]
+                q = grid[a, r]
                 d = (p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2
                 if d < least:
                     least, m, j = d, a, r
@@ -101,15 +110,15 @@ def _nearest(grid, fixed, n, k, first, last, in_space):  # type: ignore[no-untyp
 def blow_batch(grid, fixed, first, last, skin, force, amount, parts, values):  # type: ignore[no-untyped-def]
     """Turn the free tails of B draped grids towards forces (B, 3) by `amount` (B,) rad, until they touch, in place.
 
+    Returns:
+        (B, N) the row of each strand that its tail hangs from.
+
     Source: Rosenhahn 2008, section 12.3
     """
-    trial = np.empty((grid.shape[2], 3))
+    trial, held = np.empty((grid.shape[2], 3)), np.empty(fixed.shape[:2], np.int32)
     for b in range(len(grid)):
         for n in range(grid.shape[1]):
-            pivot = first[n]
-            for k in range(first[n], last[n] + 1):
-                if fixed[b, n, k]:
-                    pivot = k
+            held[b, n] = pivot = max(fixed_span(fixed[b, n], first[n], last[n])[1], first[n])
             if pivot == last[n]:
                 continue
             turned = 0.0
@@ -133,6 +142,7 @@ def blow_batch(grid, fixed, first, last, skin, force, amount, parts, values):  #
                     break
                 grid[b, n, pivot + 1 : last[n] + 1] = trial[pivot + 1 : last[n] + 1]
                 turned += angle
+    return held
 
 
 @numba.njit(cache=True)

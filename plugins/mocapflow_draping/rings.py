@@ -30,8 +30,8 @@ def close_batch(grid, links, first, last, across, length, skin, longest, stiff, 
     Args:
         grid: (B, N, L, 3) m, draped strands; overwritten.
         links: (B, N, L - 1) m, lengths of the bars.
-        first: (N,) row of the first particle of each strand.
-        last: (N,) row of the last one.
+        first: (B, N) row of each strand down to which it stays as it is: of the pinned particle, or a lower one.
+        last: (N,) row of the last particle of each strand.
         across: (K, N, L) strand that lies 1, 2, 4, ... links to the left, or -1.
         length: (K, N, L) m, of the cloth between the two.
         skin: (B,) m, contact distance.
@@ -47,7 +47,7 @@ def close_batch(grid, links, first, last, across, length, skin, longest, stiff, 
     """
     for b in range(len(grid)):
         _close(
-            grid[b], links[b], first, last, across, length, skin[b], longest, stiff, bend, sweeps, parts[b], values,
+            grid[b], links[b], first[b], last, across, length, skin[b], longest, stiff, bend, sweeps, parts[b], values,
             motion,
         )  # fmt: skip
 

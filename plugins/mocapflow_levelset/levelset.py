@@ -40,9 +40,7 @@ class LevelSet(ShadowAware):
     at full size both sides have local statistics, because a pixel on the edge mixes two colours and the narrow density
     of an empty scene takes it for the person.
 
-    The chapter's own settings: `use_background: false`, `coarse_steps: 0`, `half_steps: 0`, `cell_px: 1`,
-    `stride_px: 1`, `steps: 50`, `contact_steps: 0`, `statistics_every: 1`, `keep_px: 0`;
-    `shape_weight: 0` uncouples it from the model.
+    The chapter's own settings are those of `pipelines/paper.yaml`; `shape_weight: 0` uncouples it from the model.
     """
 
     name: ClassVar[str] = "levelset"

@@ -67,7 +67,7 @@ class ContourIcp(Matcher):
     normal_px: NonNegativeFloat = 0.0  # px that count as far as normals at right angles, over sqrt 2
     scale: PositiveFloat = 2.0  # standard deviations at which the loss begins to give way
     sigma_px: PositiveFloat = 1.0  # standard deviation of a pair on skin
-    cloth_sigma_px_per_m: PositiveFloat = 80.0  # the longer cloth hangs, the less it is where a draper lays it
+    cloth_sigma_px_per_m: NonNegativeFloat = 80.0  # the longer cloth hangs, the less it is where a draper lays it
 
     @property
     def stride(self) -> int:

@@ -14,6 +14,7 @@ def rig(seed: int) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("count", [3, 20])
 def test_a_rigid_motion_is_recovered(seed: int, count: int) -> None:
+    """T-CAL."""
     rotation, shift = rig(seed)
     points = np.random.default_rng(seed).uniform(-1, 1, (count, 3))
     found = register(points, points @ rotation.T + shift)
@@ -25,7 +26,7 @@ def test_a_rigid_motion_is_recovered(seed: int, count: int) -> None:
 
 
 def test_error_with_noise_is_what_theory_predicts() -> None:
-    """Of 3 N coordinates, six are spent on the motion: mean square residual = (1 - 2/N) 3 sd² (Sibson 1979)."""
+    """T-CAL: of 3 N coordinates, six are spent on the motion: mean square residual = (1 - 2/N) 3 sd² (Sibson 1979)."""
     count, sd, squares, outside = 20, 0.001, [], []
     for seed in range(200):
         rotation, shift = rig(seed)

@@ -50,6 +50,13 @@ def box(low, high):
     return rigid(np.asarray(low) + corners * (np.asarray(high) - np.asarray(low)), triangles)
 
 
+def together(*bodies):
+    """Return several bodies of one joint as one."""
+    starts = np.cumsum([0, *(len(body.vertices) for body in bodies)])[:-1]
+    faces = [body.faces + start for body, start in zip(bodies, starts, strict=True)]
+    return rigid(np.concatenate([body.vertices for body in bodies]), np.concatenate(faces))
+
+
 def tube(points, radii, around=48):
     """Return vertices and faces of a closed tube along z with hemispheres as rings; `points` are heights."""
     turn = 2 * np.pi * np.arange(around) / around
@@ -72,6 +79,15 @@ def lying_cylinder(radius, half_length=0.15):
     """Return a cylinder along y through the origin."""
     vertices, faces = tube(np.linspace(-half_length, half_length, 13), np.full(13, radius), 180)
     return rigid(vertices @ np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]], float).T, faces)
+
+
+@cache
+def ball(radius, rings=90):
+    """Return a ball about the origin."""
+    angle = np.linspace(-np.pi / 2, np.pi / 2, rings + 1)[1:-1]
+    vertices, faces = tube(radius * np.sin(angle), radius * np.cos(angle), 2 * rings)
+    vertices[-2:] = [[0, 0, -radius], [0, 0, radius]]
+    return rigid(vertices, faces)
 
 
 def capsule(top, bottom, radius):
@@ -146,7 +162,7 @@ def swing(body, roots, facing, count, link, start=90.0, tilts=(0.0,), voxel=VOXE
     shape, many = (1, len(roots), count), len(tilts)
     fallen, lying = np.empty((*shape, 3)), np.empty(shape, np.int32)
     links, last = np.full((1, len(roots), count - 1), link), np.full(len(roots), count - 1, np.int32)
-    facing = np.tile(np.asarray(facing, float), (1, len(roots), 1))
+    facing = np.broadcast_to(np.asarray(facing, float), (1, len(roots), 3)).copy()
     fall_batch(np.asarray(roots, float)[None], facing, np.radians(start), np.array([SKIN]), links, 0 * last, last,
                parts, values, fallen, lying)  # fmt: skip
     grid, held = np.empty((many, *shape[1:], 3)), np.empty((many, *shape[1:]), np.int32)

@@ -63,6 +63,7 @@ def fitter(request):
 
 @pytest.mark.parametrize("azimuth_deg", [10.0, 155.0, 280.0])
 def test_a_known_wind_is_recovered_within_one_sampling_step(fitter, model, azimuth_deg):
+    """T-SYS2."""
     azimuth = np.radians(azimuth_deg)
     truth = parameters(model, wind_cos_rad=0.3 * np.cos(azimuth), wind_sin_rad=0.3 * np.sin(azimuth))
     found = fitted(fitter, model, truth, parameters(model)).parameters
@@ -72,7 +73,18 @@ def test_a_known_wind_is_recovered_within_one_sampling_step(fitter, model, azimu
     assert abs(np.hypot(cos, sin) - 0.3) < STEP
 
 
+def test_forces_are_held_about_none_as_firmly_as_asked(model):
+    """A wind of 17 degrees: held to 6 degrees it is found to two thirds, to 2 to less than half, to 0.3 not at all."""
+    truth, forces = parameters(model, wind_cos_rad=0.3), sum(samples.forces(model.scene.garment), [])
+    loose, firm, fast = (
+        np.degrees(np.linalg.norm(fitted(fitter, model, truth, parameters(model)).parameters[forces]))
+        for fitter in (SampledForces(force_sd_deg=deviation) for deviation in (6.0, 2.0, 0.3))
+    )
+    assert 10 < loose < 17 and 4 < firm < 0.7 * loose and fast < 1
+
+
 def test_thickness_is_measured_in_the_first_frame_and_kept(model):
+    """T-CL7."""
     truth, nothing = parameters(model, thickness_m=0.006), parameters(model)
     thickness = model.scene.garment.parameter_names.index("thickness_m")
     assert abs(fitted(SampledForces(), model, truth, nothing).parameters[thickness] - 0.006) <= 0.002

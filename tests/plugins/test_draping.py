@@ -1,10 +1,11 @@
-"""The drape on analytic bodies: T-CL1 to T-CL3, and the distance fields under it."""
+"""The drape on analytic bodies (T-CL1 to T-CL3), and the distance fields under it."""
 
 import drape_bodies
 import numpy as np
 import pytest
 from drape_bodies import (
     SKIN,
+    ball,
     box,
     check_whole_and_outside,
     distances,
@@ -13,10 +14,12 @@ from drape_bodies import (
     lying_cylinder,
     prepared,
     swing,
+    together,
 )
 from mocapflow_draping.distance import outwards
 from mocapflow_draping.kinematic import Kinematic
 from mocapflow_draping.literal import settle_batch
+from mocapflow_draping.strands import strands_of
 from mocapflow_draping.voxels import signed_distance
 from mocapflow_garments.shorts import Shorts
 from mocapflow_garments.skirt import Skirt
@@ -82,6 +85,7 @@ def test_a_raised_thigh_does_not_come_out_behind_the_body(skirted):
 
 
 def test_a_flat_cloth_lies_on_a_plane_undeformed():
+    """T-CL1."""
     table = box([-0.3, -0.3, -0.1], [0.3, 0.3, 0.0])
     grid = np.stack(np.meshgrid(np.linspace(-0.2, 0.2, 9), np.linspace(-0.2, 0.2, 9), indexing="ij"), -1)
     grid = np.concatenate([grid, np.full((9, 9, 1), 0.05)], -1)
@@ -93,6 +97,7 @@ def test_a_flat_cloth_lies_on_a_plane_undeformed():
 
 
 def test_an_overhang_hangs_straight_down_and_keeps_its_length():
+    """T-CL2."""
     table = box([-0.3, -0.3, -0.1], [0.105, 0.3, 0.0])
     ((laid,),), ((supported,),) = swing(table, [[0.0, 0.0, SKIN]], [1.0, 0.0, 0.0], 31, 0.01)
     assert 11 <= supported <= 22
@@ -103,6 +108,7 @@ def test_an_overhang_hangs_straight_down_and_keeps_its_length():
 
 
 def test_without_the_limit_it_swings_by_no_more_than_a_step():
+    """T-CL2."""
     nothing = box([5, 5, 5], [5.1, 5.1, 5.1])
     fixed = np.zeros((1, 11), bool)
     fixed[0, 0] = True
@@ -124,6 +130,7 @@ def test_pivots_are_the_nearest_along_the_strand_or_in_space():
 
 
 def test_a_level_strand_hangs_after_45_steps():
+    """T-CL2."""
     nothing = box([5, 5, 5], [5.1, 5.1, 5.1])
     fixed = np.zeros((1, 11), bool)
     fixed[0, 0] = True
@@ -135,6 +142,7 @@ def test_a_level_strand_hangs_after_45_steps():
 
 @pytest.mark.parametrize("link", [0.002, 0.01, 0.02])
 def test_a_strand_over_a_cylinder_is_taut(link):
+    """T-CL2."""
     radius, length = 0.1, 0.32
     count = round(length / link) + 1
     laid, _ = swing(lying_cylinder(radius), [[0.0, 0.0, radius + SKIN]], [1.0, 0.0, 0.0], count, link)
@@ -142,8 +150,44 @@ def test_a_strand_over_a_cylinder_is_taut(link):
     chords = np.linalg.norm(np.diff(laid[0, 0], axis=0), axis=1)
     assert np.abs(chords - link).max() < 1e-12
     tip = np.array([away, 0.0, -(length - np.pi / 2 * away)])
-    sag = link**2 / (8 * away)  # a chain of bars cuts corners
-    assert np.linalg.norm(laid[0, 0, -1] - tip) < 5e-4 + 2 * sag
+    assert np.linalg.norm(laid[0, 0, -1] - tip) < 5e-4
+
+
+def test_strands_over_a_sphere_lie_on_its_meridians():
+    """T-CL1."""
+    radius, link, count = 0.1, 0.01, 33
+    away, azimuth = radius + SKIN, 2 * np.pi * np.arange(12) / 12
+    facing = np.stack([np.cos(azimuth), np.sin(azimuth), 0 * azimuth], axis=1)
+    laid, _ = swing(ball(radius), np.tile([0.0, 0.0, away], (12, 1)), facing, count, link)
+    bars = np.linalg.norm(np.diff(laid[0], axis=1), axis=-1)
+    assert np.abs(bars - link).max() < 1e-12
+    aside = np.abs(np.einsum("nla,na->nl", laid[0], np.cross(facing, [0, 0, 1.0])))
+    assert aside.max() < 1e-12
+    tips = away * facing - np.array([0, 0, link * (count - 1) - np.pi / 2 * away])
+    assert np.linalg.norm(laid[0, :, -1] - tips, axis=1).max() < 5e-4
+    assert np.linalg.norm(laid[0], axis=-1).min() > away - 1e-4
+
+
+def test_a_cloth_on_a_bumpy_plane_hangs_taut_from_bump_to_bump():
+    """T-CL1: two ridges across a table: level between them, tents to both sides, all strands as long as they were."""
+    ridges = (-0.1, 0.1)
+    table = together(
+        box([-0.5, -0.3, -0.1], [0.5, 0.3, 0.0]),
+        *(box([x - 0.01, -0.3, -0.05], [x + 0.01, 0.3, 0.05]) for x in ridges),
+    )
+    x, y = np.meshgrid(np.linspace(-0.3, 0.3, 31), np.linspace(-0.1, 0.1, 5))
+    grid = np.stack([x, y, np.full(x.shape, 0.08)], axis=-1)
+    laid, fixed = literal(table, grid, np.zeros(x.shape, bool))
+    between, top = np.abs(x) <= 0.1, 0.05 + SKIN
+    assert fixed[np.abs(np.abs(x) - 0.1) < 0.005].all() and not fixed[np.abs(x) < 0.08].any()
+    assert np.ptp(laid[between][:, 2]) == 0 and top - 0.002 - 1e-6 <= laid[between][0, 2] < top
+    np.testing.assert_array_equal(laid[between][:, :2], grid[between][:, :2])
+    for end in (0, -1):
+        assert fixed[:, end].all()
+        assert (np.abs(laid[:, end, 2] - SKIN) < 0.2 * np.radians(2.0)).all()  # a step goes on into the table
+    lengths = np.linalg.norm(np.diff(laid, axis=1), axis=-1)
+    assert np.abs(lengths / 0.02 - 1).max() < 1e-9
+    np.testing.assert_allclose(laid[..., 1], y, atol=1e-12)
 
 
 def calm(scene, count):
@@ -151,6 +195,7 @@ def calm(scene, count):
 
 
 def test_a_skirt_keeps_its_strands_and_stays_outside(skirted):
+    """T-CL3."""
     scene, poses = skirted
     draped = draper(sweeps=0).drape(poses, calm(scene, 4), Past(), scene)
     check_whole_and_outside(scene, draped, poses)
@@ -161,6 +206,16 @@ def test_the_chapters_steps_end_near_the_taut_drape(skirted):
     taut = draper(sweeps=0).drape(poses, calm(scene, 4), Past(), scene)
     steps = draper(sweeps=0, rule="literal", limited=True).drape(poses, calm(scene, 4), Past(), scene)
     assert np.linalg.norm(taut - steps, axis=-1)[0].mean() < 0.01
+
+
+@pytest.mark.parametrize("settings", [dict(), dict(limited=True), dict(iterations=100)], ids=str)
+def test_the_chapters_steps_keep_the_strands_lengths(skirted, settings):
+    """T-CL3: what lies between two fixed particles is taut, and is not swung."""
+    scene, poses = skirted
+    draped = draper(sweeps=0, rule="literal", **settings).drape(poses, calm(scene, 4), Past(), scene)
+    strands = strands_of(scene.garment, scene.body)
+    lengths = np.linalg.norm(np.diff(draped[:, strands.vertex], axis=2), axis=-1)
+    assert np.abs(lengths / strands.links - 1).max() < 1e-9
 
 
 def test_a_batch_is_its_drapes_one_by_one(skirted):

@@ -144,6 +144,7 @@ def test_winds_of_one_drape_are_its_winds_one_by_one(skirted, draper):
 
 
 def test_thickness_is_found_again():
+    """T-CL7: the error has one minimum, at the true thickness."""
     cylinder = lying_cylinder(0.1)
     garment_thickness = np.linspace(0, 0.010, 6)
 

@@ -47,6 +47,17 @@ def test_rings_come_back_to_their_length(skirted):
     assert (some < 0.24).all()
 
 
+@pytest.mark.parametrize("longest", [1.0, 1.1, 1.3])
+def test_what_was_too_long_becomes_as_long_as_allowed(skirted, longest):
+    """T-CL4: in the three poses that part the strands, links of more than half again their length."""
+    rule = dict(stiff=0.0, bending_m=0.0, longest=longest)
+    fallen, closed = (ring_strain(skirted.garment, drape(skirted, leg_poses(), sweeps=n, **rule)) for n in (0, 60))
+    far = fallen > 0.5
+    assert far[1:].any(axis=1).all()
+    assert np.quantile(closed[far], 0.25) > longest - 1 - 0.01
+    assert closed.max() < longest - 1 + 0.04 * longest  # within 3 % of their length rings are let be
+
+
 def test_strands_keep_their_length_and_particles_stay_outside(skirted):
     poses = leg_poses()
     draped = drape(skirted, poses, sweeps=40)
@@ -81,6 +92,24 @@ def test_links_that_are_short_stay_as_they_are(skirted):
     fallen = drape(skirted, standing, sweeps=0)
     closed = drape(skirted, standing, sweeps=20, stiff=0.0, bending_m=0.0, longest=10.0)
     np.testing.assert_allclose(closed, fallen, atol=1e-9)
+
+
+def test_by_the_literal_rule_what_touches_stays_and_strands_keep_their_length(skirted):
+    """T-CL4: pinned by the skin, and taut above: only the free ends of strands come back to each other."""
+    poses, rule = leg_poses(), dict(rule="literal", stiff=0.0, bending_m=0.0, longest=1.1)
+    fallen, closed = (drape(skirted, poses, sweeps=sweeps, **rule) for sweeps in (0, 40))
+    strands = strands_of(skirted.garment, skirted.body)
+    rows = np.arange(strands.vertex.shape[1])
+    touches = (distances(skirted.body, fallen, poses) < SKIN)[:, strands.vertex]
+    stays = rows <= np.where(touches, rows, 0).max(axis=2, keepdims=True)
+    moved = np.linalg.norm((closed - fallen)[:, strands.vertex], axis=-1)
+    assert moved[stays].max() < 1e-9
+    assert moved[~stays].max() > 0.05
+    lengths = np.linalg.norm(np.diff(closed[:, strands.vertex], axis=2), axis=-1)
+    assert np.abs(lengths / strands.links - 1).max() < 1e-9
+    assert distances(skirted.body, closed, poses)[:, strands.vertex][~stays].min() > SKIN - 1e-4
+    before, after = (np.maximum(ring_strain(skirted.garment, cloth)[1:], 0.1) for cloth in (fallen, closed))
+    assert (after.mean(axis=1) < before.mean(axis=1)).all()  # standing, no ring is too long
 
 
 @pytest.mark.parametrize("flexion", [0, 30, 60, 90])

@@ -42,6 +42,7 @@ def test_a_point_that_is_never_seen_hides_no_other(tmp_path: Path, monkeypatch: 
 
 
 def test_identical_curves_deviate_by_nothing() -> None:
+    """T-EVAL."""
     curve = 20 * np.sin(FRAMES / 7)
     got = row(curve, curve)
     for name in ("rms_deg", "mae_deg", "offset_deg", "max_deg", "rms_low_deg", "rms_high_deg"):
@@ -51,6 +52,7 @@ def test_identical_curves_deviate_by_nothing() -> None:
 
 
 def test_rms_of_a_known_sinusoid_and_offset() -> None:
+    """T-EVAL."""
     truth = np.linspace(0, 50, 120)
     error = 3 * np.sin(2 * np.pi * FRAMES / 40) + 2  # whole periods
     got = row(truth + error, truth)
@@ -65,6 +67,8 @@ def test_rms_of_a_known_sinusoid_and_offset() -> None:
 @pytest.mark.parametrize("delay", [-3.4, -0.5, 0.0, 0.3, 2.75])
 @pytest.mark.parametrize("noise", [0.0, 0.5])
 def test_lag_is_recovered_to_a_tenth_of_a_frame(delay: float, noise: float) -> None:
+    """T-EVAL."""
+
     def curve(t: np.ndarray) -> np.ndarray:
         return 30 * np.sin(t / 6) + 10 * np.sin(t / 2.5 + 1)
 

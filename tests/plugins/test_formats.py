@@ -56,6 +56,7 @@ def test_a_missing_library_is_named(
 @pytest.mark.filterwarnings("ignore::PendingDeprecationWarning", "ignore:No analog data")  # of the readers
 @pytest.mark.parametrize("name", sorted(set(FILES) & set(readers.JOINTS)))
 def test_joint_centres_come_back(name: str, result: Result, tmp_path: Path) -> None:
+    """T-OUT4."""
     if name == "usd":
         pytest.importorskip("pxr")
     names, places = readers.JOINTS[name](write(name, result, tmp_path))

@@ -118,7 +118,7 @@ def test_low_passed_pairs_ask_for_the_shift():
 
 
 def test_normals_count_as_a_distance():
-    """Of two neighbours, the nearer one faces away: with normals in the distance the other one is found."""
+    """T-ICP5: of two neighbours, the nearer one faces away: with normals in the distance the other one is found."""
     point, normal = np.array([[0.0, 0.0]]), np.array([[1.0, 0.0]])
     others = np.array([[0.0, 2.0], [0.0, 4.0]])
     normals = np.array([[0.0, 1.0], [1.0, 0.0]])

@@ -87,6 +87,20 @@ def test_the_kernel_takes_the_step_of_the_equation():
     np.testing.assert_allclose(moved[touched], wanted[touched], atol=2e-4)
 
 
+def test_a_prior_beyond_the_band_pulls_no_harder_than_at_its_edge():
+    level, weights = np.clip(circle(14.0, 48, 24, 23), -7, 7).astype(np.float32), Weights(SIGMA, 0.5, 0.05, 6, 1, 7.0)
+    prior = np.where(np.arange(48) < 24, np.float32(30), np.float32(-30)) + np.zeros_like(level)
+    still, runs, moved = np.zeros_like(level), near(level, weights), []
+    for band in (np.inf, 7.0):
+        moved.append(level.copy())
+        advance(moved[-1], still, np.clip(prior, -band, band), runs, np.empty_like(level), weights)
+    np.testing.assert_array_equal(*moved)
+    assert np.abs(moved[0] - level).max() > 0.5
+    everywhere = np.array([[y, 0, 48] for y in range(48)], np.int32)
+    far, near_by = (costs(Settled(level, still, everywhere), np.clip(prior, -b, b), weights) for b in (np.inf, 7.0))
+    assert far.shape == near_by.shape > 0
+
+
 def test_the_logged_costs_are_those_of_the_equation():
     random = np.random.default_rng(3)
     level, prior = (np.clip(circle(r, 48, x, 23), -7, 7).astype(np.float32) for r, x in ((14, 24), (15, 26)))

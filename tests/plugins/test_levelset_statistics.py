@@ -2,14 +2,15 @@
 
 import numpy as np
 from levelset_scenes import ellipse, from_features, ramp_scene
+from mocapflow_levelset import front_kernels as kernels
 from mocapflow_levelset.channels import features
 from mocapflow_levelset.energy import heaviside
 from mocapflow_levelset.evolve import Weights, log_ratio, near
 from mocapflow_levelset.statistics import Window, local_gaussians, totals
-from mocapflow_levelset.statistics_kernels import FAINT
 
 SIGMA = 1.5
 ONES = np.ones((160, 160), np.float32)
+FAINT = 1e-3  # share of the window at which local and global statistics count the same
 
 
 def brute_force(planes, share, row, column, rho, floor):
@@ -84,6 +85,32 @@ def test_known_gaussians_give_the_known_ratio():
     log_ratio(runs, from_features(planes, ONES), gaussians, 1, 1, 100.0, ratio)
     at = np.abs(level) < 4
     np.testing.assert_allclose(ratio[at], known[at], rtol=1e-3, atol=5e-3)
+
+
+def test_a_region_that_a_window_hardly_holds_has_its_global_statistics():
+    """Far inside, the window has 0.2 % of the room in it: that is trusted to two thirds."""
+    planes, _ = ramp_scene()
+    level, window = ellipse(), Window(12.0, 1, 0.02)
+    found = local_gaussians(planes, ONES, level, totals(planes, ONES, 1), window, SIGMA)
+    outside = 1 - heaviside(level, SIGMA)
+    mean, variance = brute_force(planes, outside, 80, 76, 12.0, 0.02)
+    np.testing.assert_allclose(found[80, 76, 1, 1:4], mean, atol=2e-4)
+    np.testing.assert_allclose(0.5 / found[80, 76, 1, 4:], variance, rtol=0.02)
+
+
+def test_beside_a_known_room_the_persons_density_has_a_least_value():
+    """A colour that nobody has yet worn is no proof of the room: there its density is at least exp(-6)."""
+    gaussians = np.zeros((1, 1, 2, 3), np.float32)
+    gaussians[0, 0, 0] = 0.0, 0.5, 400.0  # of the person: mean 0.5, and 400 (F - 0.5)^2 below zero
+    values, runs = np.array([[0.5, 0.6, 0.8, 1.0]], np.float32), np.array([[0, 0, 4]], np.int32)
+    outside = np.array([-2.0, -2.0, -2.0, -9.0], np.float32)
+    weight, found = np.ones((1, 4), np.float32), np.zeros((1, 4), np.float32)
+    zero, clip = np.float32(0), np.float32(6)
+    kernels.log_ratio(runs, values, weight, outside, True, gaussians, 1, zero, clip, found)
+    np.testing.assert_allclose(found[0], [2.0, -2.0, -4.0, 3.0], atol=1e-4)
+    gaussians[0, 0, 1] = -2.0, 0.0, 0.0  # of a room that is not known: there is no least value
+    kernels.log_ratio(runs, values, weight, outside[:0], False, gaussians, 1, zero, clip, found)
+    np.testing.assert_allclose(found[0], [2.0, -2.0, -6.0, -6.0], atol=1e-4)
 
 
 def test_masked_pixels_do_not_count():

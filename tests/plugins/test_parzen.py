@@ -1,4 +1,4 @@
-"""The density of training poses: its slope, integral and bandwidth; and limbs nobody sees."""
+"""The density of training poses: its slope, integral and bandwidth (T-PRI1); limbs nobody sees (T-PRI2)."""
 
 from __future__ import annotations
 
@@ -41,6 +41,7 @@ class TestParzenConforms(PriorConformance):
 
 
 def test_slope_of_the_density() -> None:
+    """T-PRI1."""
     density, place, step = gait(("a", "b", "c")), np.array([0.3, -0.2, 0.9]), 1e-5
     _, mean = log_density(density, place)
     slope = [
@@ -51,6 +52,7 @@ def test_slope_of_the_density() -> None:
 
 
 def test_the_density_integrates_to_one() -> None:
+    """T-PRI1."""
     density = gait(("a", "b"))
     grid = np.linspace(-1.5, 1.5, 151)
     total = sum(np.exp(log_density(density, np.array([x, y]))[0]) for x in grid for y in grid)
@@ -58,6 +60,7 @@ def test_the_density_integrates_to_one() -> None:
 
 
 def test_bandwidth_is_the_largest_distance_to_a_neighbour() -> None:
+    """T-PRI1."""
     poses = RNG.normal(size=(40, 3))
     apart = np.linalg.norm(poses[:, None] - poses, axis=2) + 1e9 * np.eye(40)
     assert bandwidth(poses) == pytest.approx(apart.min(axis=1).max())
@@ -81,6 +84,7 @@ def test_angles_wrap_and_far_poses_do_not_underflow() -> None:
 
 
 def test_full_steps_to_the_mean_climb() -> None:
+    """T-PRI2."""
     density, place = gait(("a", "b", "c")), np.array([1.2, -1.0, 0.8])
     heights = []
     for _ in range(20):
@@ -90,6 +94,7 @@ def test_full_steps_to_the_mean_climb() -> None:
 
 
 def test_an_unseen_leg_comes_to_rest_in_a_training_pose(tmp_path: Path) -> None:
+    """T-PRI2."""
     scene, truth = make_scene(), make_pose(1)
     poses = np.tile([0.4, -0.3, 0.2, 0.5, 0.1], (6, 1)) + 0.01 * RNG.normal(size=(6, 5))
     write(tmp_path / "poses.npz", Density(names=LEG, poses=poses, bandwidth=0.1))

@@ -108,20 +108,30 @@ def moved(places: np.ndarray) -> tuple[np.ndarray, Rotation, np.ndarray]:
     return turn.apply(places.reshape(-1, 3)).reshape(places.shape) + shift, turn, shift
 
 
+def measure_wand(folder: Path, scale: float = 1.0) -> None:
+    """Write 20 points that both rigs have measured, one to a millimetre and on another scale."""
+    wand = np.random.default_rng(0).uniform(-1, 1, (20, 3))
+    noisy = scale * moved(wand)[0] + np.random.default_rng(1).normal(scale=0.001, size=wand.shape)
+    names = "x,y,z,marker_x,marker_y,marker_z"
+    np.savetxt(folder / "registration.csv", np.hstack([wand, noisy]), delimiter=",", header=names, comments="")
+
+
+@pytest.mark.usefixtures("unrendered")
+@pytest.mark.parametrize(("scale", "told"), [(0.997, True), (0.999, False), (1.001, False), (1.003, True)])
+def test_rigs_whose_metres_differ_by_more_than_a_fifth_of_a_percent_are_told(
+    own: Ours, tmp_path: Path, scale: float, told: bool
+) -> None:
+    read(tmp_path, moved(PLACES)[0])
+    measure_wand(tmp_path, scale)
+    notes = " ".join(evaluate(own, tmp_path / "markers.c3d", tmp_path / "run").notes)
+    assert f"scale {1 / scale:.3f}" in notes
+    assert ("the scale is not applied: check units and calibrations of both" in notes) == told
+
+
 @pytest.mark.usefixtures("unrendered")
 def test_two_rigs_are_brought_together_by_common_points(own: Ours, tmp_path: Path) -> None:
     read(tmp_path, moved(PLACES)[0])
-    wand = np.random.default_rng(0).uniform(-1, 1, (20, 3))
-    noisy = moved(wand)[0] + np.random.default_rng(1).normal(scale=0.001, size=wand.shape)
-    names = ["x", "y", "z", "marker_x", "marker_y", "marker_z"]
-    table = {name: np.hstack([wand, noisy])[:, k] for k, name in enumerate(names)}
-    np.savetxt(
-        tmp_path / "registration.csv",
-        np.column_stack(list(table.values())),
-        delimiter=",",
-        header=",".join(names),
-        comments="",
-    )
+    measure_wand(tmp_path)
     got = evaluate(own, tmp_path / "markers.c3d", tmp_path / "run")
     assert any("registered by 20 points of registration.csv: residual 1." in note for note in got.notes)
     far = tables_of_words(tmp_path / "run" / layout.DISTANCES)
@@ -152,6 +162,7 @@ def test_the_stick_model_has_the_times_of_the_track(own: Ours, tmp_path: Path) -
 
 @pytest.mark.usefixtures("unrendered")
 def test_the_stick_model_keeps_its_lengths(own: Ours, tmp_path: Path) -> None:
+    """T-OUT1."""
     loose = PLACES + np.random.default_rng(0).normal(scale=0.005, size=PLACES.shape)
     read(tmp_path, loose)
     evaluate(own, tmp_path / "markers.c3d", tmp_path)

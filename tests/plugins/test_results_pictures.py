@@ -55,6 +55,7 @@ def near(image: np.ndarray, colour: drawing.Colour) -> int:
 def test_overlay_shows_outline_garment_and_skeleton(
     scene: Scene, track: Track, recording: Recording, tmp_path: Path
 ) -> None:
+    """T-OUT2."""
     files = Overlay().run(track=track, scene=scene, recording=recording, run_folder=RunFolder(path=tmp_path, recipe={}))
     assert [p.relative_to(tmp_path) for p in files.paths] == [layout.overlay(f"cam0{k}") for k in (1, 2, 3, 4)]
     assert all(read_back(path).shape == (4, 800, 640, 3) for path in files.paths)  # small images are enlarged
@@ -99,6 +100,7 @@ def test_overlay_of_a_doubted_frame_says_so(scene: Scene, track: Track, recordin
 
 
 def test_virtual_room_moves_with_the_person(scene: Scene, track: Track, tmp_path: Path) -> None:
+    """T-OUT2."""
     run_folder = RunFolder(path=tmp_path, recipe={})
     (path,) = Virtual(width_px=320, height_px=240).run(track=track, scene=scene, run_folder=run_folder).paths
     video = read_back(path)

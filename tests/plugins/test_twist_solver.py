@@ -134,6 +134,7 @@ def test_a_hidden_limb_stays_and_is_unsure() -> None:
 
 
 def test_a_hidden_limb_goes_where_a_prior_puts_it() -> None:
+    """T-PRI2."""
     scene, truth = make_scene(), make_pose(2)
     matches = exact_matches(scene, truth, visible_vertices(scene), directed=True)
     estimate = solve(TwistGaussNewton(), scene, truth, matches, [RestPose()])

@@ -1,0 +1,107 @@
+"""One step of the solver: its caps, how it damps, and how priors on the root enter it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+from unittest.mock import Mock
+
+import numpy as np
+import pytest
+from mocapflow_priors.smooth_motion import SmoothMotion
+from mocapflow_twist import solve
+from mocapflow_twist.constraint import line_rows
+from mocapflow_twist.covariance import effective_share
+from mocapflow_twist.motion import ClothMotion
+from mocapflow_twist.problem import Anchor, Guess, Problem
+from mocapflow_twist.solver import TwistGaussNewton
+from test_twist_solver import FREE, start_from
+from twist_fixtures import exact_matches, make_pose, make_scene
+
+from mocapflow.data import NO_CLOTH, Moment, Past
+from mocapflow.model import ClothedModel, moved
+
+SCENE, TRUTH = make_scene(), make_pose(1)
+MODEL = ClothedModel(scene=SCENE)
+UNKNOWNS = 6 + len(TRUTH.angles)
+
+
+def problem_of(solver: TwistGaussNewton, start: Guess, priors: tuple[SmoothMotion, ...] = (), past: Past | None = None):
+    """The problem of exact matches of the true pose."""
+    data = solver._data(exact_matches(SCENE, TRUTH, np.arange(0, 300, 9), directed=False), MODEL)
+    anchor = Anchor(start, solver._precision(MODEL, start))
+    return Problem(MODEL, data, priors, past or Past(), anchor, {})
+
+
+@pytest.mark.parametrize(("column", "cap"), [(1, 0.1), (4, 0.05), (9, 0.1)], ids=["turn", "shift", "angle"])
+def test_each_kind_of_move_has_its_cap(column: int, cap: float) -> None:
+    """What is too large alone shortens the whole step, and to the cap; the rest of it is small."""
+    increment = np.full(UNKNOWNS, 1e-3)
+    increment[column] = -5.0
+    short = solve.capped(increment, UNKNOWNS - 6, 0.1, 0.05)
+    first = slice(3 * (column // 3), 3 * (column // 3) + 3) if column < 6 else [column]
+    assert np.linalg.norm(short[first]) == pytest.approx(cap)
+    np.testing.assert_allclose(short, increment * short[column] / increment[column])
+    within = np.full(UNKNOWNS, 1e-3)
+    np.testing.assert_array_equal(solve.capped(within, UNKNOWNS - 6, 0.1, 0.05), within)
+
+
+class Grudging(NamedTuple):
+    """A problem whose energy has risen at the first few poses that are tried."""
+
+    problem: Problem
+    tried: Mock
+    refusals: int
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self.problem, name)
+
+    def energies(self, guess: Guess) -> dict[str, float]:
+        self.tried(guess)
+        return {"data": np.inf if self.tried.call_count <= self.refusals else 0.0}
+
+
+@pytest.mark.parametrize(("refusals", "factor"), [(0, 0.1), (1, 1.0), (3, 100.0), (8, 1e8)])
+def test_a_worse_step_is_damped_ten_times_more_and_a_better_one_as_much_less(refusals: int, factor: float) -> None:
+    solver, start = TwistGaussNewton(), Guess(start_from(TRUTH, 1), NO_CLOTH)
+    problem = Grudging(problem_of(solver, start), Mock(), refusals)
+    motion = ClothMotion(MODEL, Past(), False, True, True)
+    total = problem.problem.quadratic(start, None).total
+    found, damping = solver._descend(problem, start, total, motion, 1e-3)
+    assert damping == pytest.approx(1e-3 * factor)
+    assert (found is start) == (refusals == 8)
+    assert found is start or found is problem.tried.call_args.args[0]
+
+
+def test_priors_on_the_root_pull_about_the_root_as_their_energy_says() -> None:
+    """Their rows are of increments about the world's origin, the equations of increments about the root."""
+    past = Past(moments=tuple(Moment(time=k / 30, pose=make_pose(5 + k, 0.1), cloth=NO_CLOTH) for k in (0, 1)))
+    prior = SmoothMotion(weight=3.0, root_sd_mm=40.0)
+    solver, guess = TwistGaussNewton(**FREE), Guess(TRUTH, NO_CLOTH)
+    problem = problem_of(solver, guess, (prior,), past)
+    columns = solve.about_origin(problem.centre(guess), UNKNOWNS).T
+
+    def energy(step: np.ndarray) -> float:
+        return problem.energies(Guess(moved(TRUTH, step), NO_CLOTH))["smooth_motion"]
+
+    slope = [(energy(1e-5 * c) - energy(-1e-5 * c)) / 2e-5 for c in columns]
+    assert problem.quadratic(guess, None).prior.gradient == pytest.approx(slope, rel=1e-5, abs=1e-3)
+    assert np.abs(slope[3:6]).max() > 1  # of which the lever would make turns
+
+
+def test_unweighted_equations_count_every_pair_once() -> None:
+    """The chapter's: a pair is there or not, whatever its weight; of its three components two are independent."""
+    matches = exact_matches(SCENE, TRUTH, np.arange(0, 300, 9), directed=False)
+    weight = np.where(np.arange(len(matches.weight)) % 4, np.linspace(0.1, 9, len(matches.weight)), 0.0)
+    matches = replace(matches, weight=weight)
+    rows = line_rows(matches, SCENE.cameras, 0.003)
+    np.testing.assert_allclose(rows.weight, np.repeat(weight > 0, 3) / 0.003**2)
+    np.testing.assert_array_equal(effective_share(matches, 0.0), np.ones(len(weight)))
+    literal = TwistGaussNewton(residual="line", correlation_px=0.0)._data(matches, MODEL)
+    assert literal.measurements == pytest.approx(2 * np.count_nonzero(weight))
+    assert literal.body.weight == pytest.approx(1 / 0.003**2)
+    correlated = TwistGaussNewton(residual="line", correlation_px=30.0)._data(matches, MODEL)
+    share = effective_share(matches, 30.0)[weight > 0]
+    assert share.max() < 1
+    assert correlated.measurements == pytest.approx(2 * share.sum())
+    assert correlated.body.weight == pytest.approx(np.repeat(share, 3) / 0.003**2)
