@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mocapflow.components import Segmenter
 from mocapflow.errors import ComponentFailed, PipelineError
 from mocapflow.loop import settle
 from mocapflow.recording import Recording
@@ -232,6 +233,28 @@ def test_what_the_first_segmenter_finds_is_kept_where_images_fit_better_from_the
     given, approached, stayed, kept = begins
     assert stayed is given
     assert kept is (approached if helps else given)
+
+
+@pytest.mark.parametrize("empty", [True, False])
+def test_an_empty_scene_that_is_not_empty_is_not_used(tmp_path, monkeypatch, empty):
+    known = []
+
+    def spy(frame, state, past, steps, model, observe):
+        known.append(model.scene.background is not None)
+        return settle(frame, state, past, steps, model, observe)
+
+    monkeypatch.setattr("mocapflow.track.settle", spy)
+    monkeypatch.setattr("mocapflow.track.believable", lambda *_: empty)
+    run_tiny(write_pipeline(tmp_path, write_recording(tmp_path / "clip")), tmp_path, frames=2)
+    assert set(known) == {empty}
+
+
+@pytest.mark.parametrize("without", [True, False])
+def test_a_first_segmenter_that_needs_the_empty_scene_is_left_out_without(tmp_path, monkeypatch, begun, without):
+    monkeypatch.setattr(Segmenter, "needs_background", without)
+    stages = SHORT | {"track": SHORT["track"] | {"first_segmenter": "tiny_segmenter"}}
+    run_tiny(write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=stages), tmp_path, frames=1)
+    assert (begun.count((0, 0)) == 1) is without
 
 
 def test_the_first_frame_that_shows_the_person_begins_like_a_first(tmp_path, begun):

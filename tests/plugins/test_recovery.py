@@ -216,6 +216,22 @@ def test_a_fit_that_still_strays_is_doubted(end, doubted) -> None:
     assert LimbSearch().recover(FRAME, lost, settled(lost), past, model, settle).doubted == doubted
 
 
+@pytest.mark.parametrize(
+    ("past", "end", "times"),
+    [(Past(), 0.9, 4), (Past(), 0.0, 1), (scenes.tiny_past(SCENE, POSE), 0.9, 1)],
+    ids=["doubted", "not doubted", "a later frame"],
+)
+def test_a_first_frame_that_is_doubted_is_searched_twice(past, end, times) -> None:
+    begun, lost = [], pictures.tiny_state(SCENE, astray(end), POSE)
+
+    def settle(pose, parameters):
+        begun.append(pose)
+        return settled(lost)  # nothing helps
+
+    LimbSearch().recover(FRAME, lost, settled(lost), past, scenes.tiny_model(SCENE), settle)
+    assert len(begun) == times
+
+
 def test_a_doubt_that_is_cured_is_gain_enough(monkeypatch) -> None:
     """A foot found again brings a whole person together by less than a tenth."""
 
