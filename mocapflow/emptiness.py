@@ -17,7 +17,7 @@ LOG = logging.getLogger("mocapflow")
 ALIKE = 3.0  # standard deviations within which a pixel looks like the empty scene
 NOISE = 3.0  # grey levels, the least standard deviation
 CORE = 0.25  # of the depth of the silhouette: nearer to its rim may be the room, where the pose is somewhat off
-MOST = 0.4  # of the person may look like the scene behind; clean plates have up to 0.15, those who stay in a median 0.62 to 0.96
+MOST = 0.4  # of the person may look like the scene behind: clean plates have up to 0.15, a median with them 0.62 up
 
 
 def believable(background: Background, recording: Recording, start: Start, scene: Scene) -> bool:
