@@ -5,6 +5,7 @@ import re
 import resource
 import subprocess
 import sys
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,7 @@ from mocapflow.equations import definitions, table
 
 ROOT = Path(mocapflow.__file__).parent
 PLUGINS = ROOT.parent / "plugins"
-LAYERS = (  # a module imports only from its own layer or an earlier one; `io` and `geometry` are folders
+LAYERS = (  # a module imports only from its own layer or an earlier one; in a folder there is no circle
     "errors",
     "once",
     "series",
@@ -107,8 +108,8 @@ def imported(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module:
-            inner = [f"mocapflow.{alias.name}" for alias in node.names]
-            yield from inner if node.module == "mocapflow" else [node.module]
+            yield from [] if node.module == "mocapflow" else [node.module]
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
 @pytest.mark.parametrize("path", sources(ROOT), ids=lambda path: str(path.relative_to(ROOT)))
@@ -122,6 +123,15 @@ def test_a_module_imports_only_from_earlier_layers(path):
         if first == "mocapflow" and (own, target) not in LATE:
             assert target in LAYERS[: LAYERS.index(own) + 1], f"{path.name} imports {name}"
         assert not first.startswith("mocapflow_") or own == "commands", f"{path.name} imports a plugin"
+
+
+@pytest.mark.parametrize(
+    "folder", sorted(path.parent for path in ROOT.glob("*/__init__.py")), ids=lambda path: path.name
+)
+def test_no_circle_of_imports_in_a_folder(folder):
+    modules = {f"mocapflow.{folder.name}.{path.stem}": path for path in folder.glob("[!_]*.py")}
+    uses = {name: modules.keys() & set(imported(ast.parse(path.read_text()))) for name, path in modules.items()}
+    TopologicalSorter(uses).prepare()  # raises the circle
 
 
 def test_public_names():
