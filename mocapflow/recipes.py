@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from mocapflow.assets import Background, Body, Camera, Rig
+from mocapflow.caching.digests import Digests, digest_array
+from mocapflow.caching.keys import FORMAT, Recipe, component_recipe, key_of, without_code
 from mocapflow.data import Start
-from mocapflow.digests import Digests, digest_array
-from mocapflow.keys import FORMAT, Recipe, component_recipe, key_of, without_code
 from mocapflow.parts import in_parts
 from mocapflow.pipeline import NamedStage, Pipeline
 from mocapflow.recording import Recording, open_recording

@@ -23,9 +23,9 @@ from typing import Any
 
 import numpy as np
 
-from mocapflow.digests import Digests
+from mocapflow.caching.digests import Digests
+from mocapflow.caching.keys import Recipe
 from mocapflow.errors import FULL, StoreError
-from mocapflow.keys import Recipe
 from mocapflow.locks import Lock, acquire, held
 from mocapflow.rows import Corrupted, array_meta, flush_all, read_json, write_json
 

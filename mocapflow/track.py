@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from mocapflow.answers import pose_of, result_of
 from mocapflow.assets import Background
+from mocapflow.caching.keys import FREE
 from mocapflow.checkpoint import Checkpoint
 from mocapflow.components import (
     ClothFitter,
@@ -42,7 +43,6 @@ from mocapflow.data import (
 from mocapflow.emptiness import believable
 from mocapflow.errors import ComponentFailed, PipelineError
 from mocapflow.functional import Functional, image_cost
-from mocapflow.keys import FREE
 from mocapflow.loop import Steps, settle
 from mocapflow.model import ClothedModel
 from mocapflow.recording import Recording

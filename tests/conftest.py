@@ -5,7 +5,7 @@ from pathlib import Path
 import mocapflow_levelset
 import pytest
 
-from mocapflow.digests import Digests
+from mocapflow.caching.digests import Digests
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -38,7 +38,7 @@ def explain(
     store: Where = DEFAULT,
 ) -> None:
     """Say what a result was made from, or how two differ."""
-    from mocapflow.keys import explain as differences
+    from mocapflow.caching.keys import explain as differences
 
     one = _find(name, store)
     if other is None:

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from mocapflow_sequence.flow import FollowPoints
 
-from mocapflow.digests import Digests
+from mocapflow.caching.digests import Digests
 from mocapflow.pipeline import load_pipeline
 from mocapflow.recipes import steps_of
 from mocapflow.recording import open_recording

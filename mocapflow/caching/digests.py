@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from mocapflow import sources
+from mocapflow.caching import sources
 from mocapflow.errors import RecordingError
 
 PARSER = threading.Lock()  # CPython 3.11 counts the parser's recursion across threads (python/cpython#106905)

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
+from mocapflow.caching.digests import MARK, Digests, digest_array
 from mocapflow.components import Component
-from mocapflow.digests import MARK, Digests, digest_array
 from mocapflow.errors import PluginError
 from mocapflow.registry import Registry
 

@@ -1,0 +1,1 @@
+"""What cache keys are made of: digests of code and of files, and the keys."""
