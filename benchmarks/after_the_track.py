@@ -34,7 +34,7 @@ import numpy as np
 from mocapflow import Recording, Stage, hookimpl
 from mocapflow.records import array_fields
 from mocapflow.results import Track
-from mocapflow.store import Store
+from mocapflow.storage.store import Store
 
 
 class Repeated(Stage):

@@ -24,7 +24,7 @@ import numpy as np
 
 from mocapflow.results import Track
 from mocapflow.shipped import shipped
-from mocapflow.store import Artifact, Store
+from mocapflow.storage.store import Artifact, Store
 
 MOCAPFLOW = Path(sys.executable).with_name("mocapflow")
 KILLED_AT = (60, 140)  # frames

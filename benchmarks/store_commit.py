@@ -18,8 +18,6 @@ from typing import TypeVar
 import cv2
 import numpy as np
 
-from mocapflow import packing, rows
-from mocapflow.checkpoint import Checkpoint
 from mocapflow.data import (
     Change,
     Cloth,
@@ -35,8 +33,10 @@ from mocapflow.data import (
 )
 from mocapflow.geometry.silhouettes import mask_distance
 from mocapflow.recording import open_recording
-from mocapflow.rows import Rows
-from mocapflow.store import Store
+from mocapflow.storage import packing, rows
+from mocapflow.storage.checkpoint import Checkpoint
+from mocapflow.storage.rows import Rows
+from mocapflow.storage.store import Store
 
 T = TypeVar("T")
 

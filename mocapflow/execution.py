@@ -13,7 +13,6 @@ from typing import Any
 from mocapflow.answers import of_kind
 from mocapflow.assets import Body, GarmentMesh
 from mocapflow.blame import failure
-from mocapflow.checkpoint import Checkpoint
 from mocapflow.cloth_answers import mesh_of
 from mocapflow.components import Component, Garment
 from mocapflow.data import FrameResult
@@ -27,7 +26,6 @@ from mocapflow.errors import (
     interrupted,
     unwritable,
 )
-from mocapflow.locks import Lock
 from mocapflow.named_parts import whereabouts
 from mocapflow.pipeline import Pipeline
 from mocapflow.progress import Progress
@@ -35,9 +33,11 @@ from mocapflow.recipes import Step
 from mocapflow.recording import Recording
 from mocapflow.records import unwatched
 from mocapflow.results import RunFolder
-from mocapflow.rows import Corrupted
 from mocapflow.scene import Scene
-from mocapflow.store import Artifact, Report, Store, versions, with_versions
+from mocapflow.storage.checkpoint import Checkpoint
+from mocapflow.storage.locks import Lock
+from mocapflow.storage.rows import Corrupted
+from mocapflow.storage.store import Artifact, Report, Store, versions, with_versions
 from mocapflow.warned import warnings_logged
 from mocapflow.wiring import Source, made_by
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 from mocapflow.errors import PipelineError
 from mocapflow.execution import is_hit
 from mocapflow.recipes import Step
-from mocapflow.rows import Corrupted
-from mocapflow.store import Artifact, Report, Store
+from mocapflow.storage.rows import Corrupted
+from mocapflow.storage.store import Artifact, Report, Store
 
 
 def as_made(steps: Sequence[Step], keys: Mapping[str, str], store: Store, report: Report) -> list[Step]:

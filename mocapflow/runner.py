@@ -16,8 +16,8 @@ from mocapflow.execution import Execution, is_hit
 from mocapflow.former_code import as_made
 from mocapflow.pipeline import Pipeline
 from mocapflow.recipes import Step, steps_of
-from mocapflow.shared import open_store
-from mocapflow.store import Report, Store
+from mocapflow.storage.shared import open_store
+from mocapflow.storage.store import Report, Store
 from mocapflow.wiring import SUPPLIED, Source
 
 # what a recording holds; files of a run in there would be taken for its own

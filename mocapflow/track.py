@@ -12,7 +12,6 @@ from pydantic import Field, model_validator
 from mocapflow.answers import pose_of, result_of
 from mocapflow.assets import Background
 from mocapflow.caching.keys import FREE
-from mocapflow.checkpoint import Checkpoint
 from mocapflow.components import (
     ClothFitter,
     Draper,
@@ -50,6 +49,7 @@ from mocapflow.records import F64
 from mocapflow.results import ImageFlow, Track, ViewChecks
 from mocapflow.scene import Scene
 from mocapflow.steady import Steady
+from mocapflow.storage.checkpoint import Checkpoint
 from mocapflow.timing import Stopwatch
 
 STEPS = ("decode", "predict", "drape", "segment", "solve", "cloth", "match", "recover")

@@ -18,8 +18,8 @@ from mocapflow.commands import pictures, results
 from mocapflow.commands.invocation import FILE, Invocation, remember
 from mocapflow.commands.progress import reporter
 from mocapflow.io.columns import read_columns
-from mocapflow.locks import myself
 from mocapflow.shipped import shipped
+from mocapflow.storage.locks import myself
 from tests.fixtures.stores import STAGES, write_pipeline, write_recording
 
 CLIP = shipped("examples", "data", "skirt_steps")

@@ -91,7 +91,7 @@ def test_parts_are_made_resumed_and_joined(tmp_path, path):
 def test_frames_of_a_part_are_those_of_its_own_track(tmp_path, path):
     pipeline = load(path, *IN_TWO)
     run(pipeline, store=tmp_path / "store.zarr", out=tmp_path / "out")
-    from mocapflow.store import Store
+    from mocapflow.storage.store import Store
 
     store = Store(tmp_path / "store.zarr")
     found = {

@@ -20,7 +20,7 @@ from mocapflow.errors import ComponentFailed, PipelineError
 from mocapflow.loop import settle
 from mocapflow.recording import Recording
 from mocapflow.runner import run
-from mocapflow.store import Store
+from mocapflow.storage.store import Store
 from tests.fixtures.stores import STAGES, actions, load, run_tiny, same, the_track, write_pipeline, write_recording
 
 SHORT = {name: STAGES[name] for name in ("start", "track")}

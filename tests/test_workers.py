@@ -17,7 +17,7 @@ from mocapflow.commands.comparing import finish
 from mocapflow.commands.invocation import Invocation
 from mocapflow.commands.workers import finished
 from mocapflow.errors import PipelineError
-from mocapflow.store import Store
+from mocapflow.storage.store import Store
 from tests.fixtures.stores import same, write_pipeline, write_recording
 
 dask = pytest.importorskip("dask")

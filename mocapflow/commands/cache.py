@@ -12,7 +12,7 @@ import typer
 from mocapflow.errors import StoreError, alternatives
 
 if TYPE_CHECKING:
-    from mocapflow.store import Artifact
+    from mocapflow.storage.store import Artifact
 
 app = typer.Typer(help="List, explain and prune cached results.", no_args_is_help=True)
 Where = Annotated[Path, typer.Option("--store", help="The store.")]
@@ -56,7 +56,7 @@ def prune(
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would be removed.")] = False,
 ) -> None:
     """Remove results; damaged ones that were set aside always go."""
-    from mocapflow.store import Store, remove
+    from mocapflow.storage.store import Store, remove
 
     if days is not None and not days >= 0:  # so says nan, too
         raise typer.BadParameter("a number of days, 0 or more", param_hint="--days")
@@ -83,13 +83,13 @@ def _goes(artifact: Artifact, days: float | None, unfinished: bool) -> bool:
 
 
 def _in_use(artifact: Artifact) -> bool:
-    from mocapflow.store import Store
+    from mocapflow.storage.store import Store
 
     return Store(artifact.path.parent).busy(artifact.key)
 
 
 def _artifacts(store: Path) -> list[Artifact]:
-    from mocapflow.store import Store
+    from mocapflow.storage.store import Store
 
     if not store.is_dir():
         raise StoreError("there is no store here", where=str(store), hint="--store names another")

@@ -34,7 +34,7 @@ def reporter(stream: TextIO | None = None) -> Iterator[Callable[[str], None]]:
 @contextmanager
 def noted(report: Callable[[str], None], folder: Path) -> Iterator[Callable[[str], None]]:
     """Give a reporter that also keeps its last line in the run folder as long as the run goes on."""
-    from mocapflow.locks import myself
+    from mocapflow.storage.locks import myself
 
     path, part = folder / FILE, folder / f"{FILE}.part"
 
@@ -54,8 +54,8 @@ def noted(report: Callable[[str], None], folder: Path) -> Iterator[Callable[[str
 
 def last_word(folder: Path) -> str:
     """Return what the run that is going on in a folder has told last, "" if there is none."""
-    from mocapflow.locks import gone, who
     from mocapflow.progress import clock
+    from mocapflow.storage.locks import gone, who
 
     try:
         note = json.loads((folder / FILE).read_text(encoding="utf-8"))

@@ -245,7 +245,7 @@ def test_every_part_of_the_core_exists():
 
 def test_all_of_mocapflow_that_a_plugin_or_the_core_imports_counts():
     """What finds plugins, refuses, is computed once, saves and takes the time changes no result."""
-    free = {"caching.keys", "checkpoint", "errors", "hookspecs", "levels", "once", "settings", "timing"}
+    free = {"caching.keys", "errors", "hookspecs", "levels", "once", "settings", "storage.checkpoint", "timing"}
     known = {*digests.CORE, *sources.SHARED, *free}
     plugins = (PLUGIN.parents[2] / "plugins").rglob("*.py")
     core = (path for part in digests.CORE for _, path in sources.python_files(f"mocapflow.{part}"))
@@ -255,7 +255,7 @@ def test_all_of_mocapflow_that_a_plugin_or_the_core_imports_counts():
         for name in sources.imports(ast.parse(path.read_text()))
         if name.startswith("mocapflow.")
     }
-    assert {"series", "geometry", "steady", "checkpoint"} <= imported <= known
+    assert {"series", "geometry", "steady", "storage.checkpoint"} <= imported <= known
 
 
 def test_an_edited_plugin_file_changes_the_keys_of_its_components(tmp_path, clip):

@@ -10,7 +10,7 @@ from mocapflow.pipeline import load_pipeline
 from mocapflow.recipes import steps_of
 from mocapflow.recording import open_recording
 from mocapflow.runner import run
-from mocapflow.store import Store
+from mocapflow.storage.store import Store
 from mocapflow.testing.same import same
 from tests.fixtures.stores import PLUGIN, STAGES, write_pipeline, write_recording
 

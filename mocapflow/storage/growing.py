@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from mocapflow import packing
 from mocapflow.data import Matches, Pose, Silhouette
-from mocapflow.packing import Columns, column
 from mocapflow.records import F64
-from mocapflow.rows import Corrupted, Rows, write_json
-from mocapflow.store import group_meta
+from mocapflow.storage import packing
+from mocapflow.storage.packing import Columns, column
+from mocapflow.storage.rows import Corrupted, Rows, write_json
+from mocapflow.storage.store import group_meta
 
 NUMBERS, CLOTH = "live/rows", "cloth"
 Shapes = Mapping[str, tuple[int, ...]]

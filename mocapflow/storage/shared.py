@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
-from mocapflow.copies import META, Copies, Copy, further
 from mocapflow.errors import StoreError
-from mocapflow.locks import Lock
-from mocapflow.rows import Corrupted, flush_all
-from mocapflow.store import Artifact, Report, Store, writing
+from mocapflow.storage.copies import META, Copies, Copy, further
+from mocapflow.storage.locks import Lock
+from mocapflow.storage.rows import Corrupted, flush_all
+from mocapflow.storage.store import Artifact, Report, Store, writing
 
 
 def open_store(path: Path, url: str | None) -> Store:

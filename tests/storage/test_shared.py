@@ -9,11 +9,11 @@ import pytest
 import zarr
 
 from mocapflow.commands.invocation import placed
-from mocapflow.copies import Copies
 from mocapflow.errors import ComponentFailed, StoreError
 from mocapflow.runner import plan, run
-from mocapflow.shared import open_store
-from mocapflow.store import Store
+from mocapflow.storage.copies import Copies
+from mocapflow.storage.shared import open_store
+from mocapflow.storage.store import Store
 from tests.fixtures.stores import actions, load, run_tiny, same, the_track, write_pipeline, write_recording
 
 MADE = {"background": "hit", "start": "hit", "track": "hit", "smooth": "hit", "export": "run"}

@@ -14,15 +14,15 @@ import numpy as np
 import pytest
 import zarr
 
-from mocapflow import locks, rows
 from mocapflow.assets import Background
 from mocapflow.data import Frame, Past, Pose, Silhouette, Start
 from mocapflow.errors import ComponentFailed, StoreError
 from mocapflow.execution import Execution
-from mocapflow.packing import FINE, match_row, quantised
-from mocapflow.rows import Corrupted, Rows
 from mocapflow.series import Series
-from mocapflow.store import Store, group_meta, remove
+from mocapflow.storage import locks, rows
+from mocapflow.storage.packing import FINE, match_row, quantised
+from mocapflow.storage.rows import Corrupted, Rows
+from mocapflow.storage.store import Store, group_meta, remove
 from tests.fixtures.stores import actions, run_tiny, same, the_track, write_pipeline, write_recording
 from tests.fixtures.tiny_plugin import TinyMatcher, tiny_body
 
@@ -547,7 +547,8 @@ def test_a_failed_run_gives_its_lock_back(tmp_path, path, monkeypatch):
 
 
 def test_other_versions_are_told(tmp_path, path, monkeypatch):
-    from mocapflow import execution, store
+    from mocapflow import execution
+    from mocapflow.storage import store
 
     real = store.versions()
     run_tiny(path, tmp_path, frames=5)

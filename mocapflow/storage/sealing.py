@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from mocapflow.archive import PLAIN, axis_names
-from mocapflow.packing import UNITS, Columns, column
 from mocapflow.records import array_fields
 from mocapflow.results import Track
-from mocapflow.rows import Corrupted, Rows, write_json
 from mocapflow.series import BLOCK
-from mocapflow.store import group_meta
+from mocapflow.storage.archive import PLAIN, axis_names
+from mocapflow.storage.packing import UNITS, Columns, column
+from mocapflow.storage.rows import Corrupted, Rows, write_json
+from mocapflow.storage.store import group_meta
 
 
 def seal(

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from mocapflow.errors import MocapflowError, StoreError
-from mocapflow.store import SHORT, group_meta
+from mocapflow.storage.store import SHORT, group_meta
 
 META = "zarr.json"
 

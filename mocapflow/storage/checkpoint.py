@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from mocapflow import packing
 from mocapflow.data import (
     NO_CLOTH,
     REMEMBERED,
@@ -26,14 +25,15 @@ from mocapflow.data import (
     Pose,
     Turn,
 )
-from mocapflow.growing import CLOTH, NUMBERS, Growing
-from mocapflow.locks import Lock
-from mocapflow.packing import column
 from mocapflow.records import F64
 from mocapflow.results import Track
-from mocapflow.rows import write_json
-from mocapflow.sealing import seal
-from mocapflow.store import Artifact, Store, group_meta, writing
+from mocapflow.storage import packing
+from mocapflow.storage.growing import CLOTH, NUMBERS, Growing
+from mocapflow.storage.locks import Lock
+from mocapflow.storage.packing import column
+from mocapflow.storage.rows import write_json
+from mocapflow.storage.sealing import seal
+from mocapflow.storage.store import Artifact, Store, group_meta, writing
 
 
 def silent(*_: Any) -> None:

@@ -17,8 +17,8 @@ import numpy as np
 from mocapflow.errors import StoreError
 from mocapflow.records import F64, array_fields
 from mocapflow.results import notes_of
-from mocapflow.rows import Corrupted
 from mocapflow.series import BLOCK, Numbers, Series, blocks
+from mocapflow.storage.rows import Corrupted
 
 if TYPE_CHECKING:
     import zarr

@@ -26,8 +26,8 @@ import numpy as np
 from mocapflow.caching.digests import Digests
 from mocapflow.caching.keys import Recipe
 from mocapflow.errors import FULL, StoreError
-from mocapflow.locks import Lock, acquire, held
-from mocapflow.rows import Corrupted, array_meta, flush_all, read_json, write_json
+from mocapflow.storage.locks import Lock, acquire, held
+from mocapflow.storage.rows import Corrupted, array_meta, flush_all, read_json, write_json
 
 SHORT = 12  # digits of the key in a group's name
 LIBRARIES = ("mocapflow", "numpy", "scipy", "opencv-python-headless", "numba")
@@ -159,7 +159,7 @@ class Store:
         """
         import zarr
 
-        from mocapflow.archive import save_record
+        from mocapflow.storage.archive import save_record
 
         with writing(self.path):
             group = zarr.open_group(str(artifact.path), mode="r+")
@@ -175,7 +175,7 @@ class Store:
         """
         import zarr
 
-        from mocapflow.archive import load_record
+        from mocapflow.storage.archive import load_record
 
         try:
             group = zarr.open_group(str(artifact.path), mode="r")
