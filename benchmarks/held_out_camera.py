@@ -21,11 +21,11 @@ from mocapflow_draping.take_up import TakeUp
 from mocapflow_twist.gauss_newton import GaussNewton
 
 from mocapflow.components import ClothFitter
+from mocapflow.config.pipeline import load_pipeline
 from mocapflow.data import Cloth, Frame, FrameState, Moment, Past, Segmentation, Turn
 from mocapflow.geometry import silhouettes
 from mocapflow.geometry.sewing import TAKE_UP, THICKNESS
 from mocapflow.model import ClothedModel
-from mocapflow.pipeline import load_pipeline
 from mocapflow.recording import open_recording
 from mocapflow.records import F64
 from mocapflow.runner import run

@@ -19,8 +19,8 @@ from mocapflow_fitting.calibrate_limbs import CalibrateLimbs
 from mocapflow_fitting.proportions import scaled
 
 from mocapflow.assets import Body
+from mocapflow.config.pipeline import load_pipeline
 from mocapflow.data import Pose
-from mocapflow.pipeline import load_pipeline
 from mocapflow.recording import open_recording
 from mocapflow.results import Track
 from mocapflow.scene import Scene

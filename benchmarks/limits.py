@@ -19,6 +19,7 @@ from mocapflow_fitting.start_from_file import read_pose
 
 from mocapflow.assets import Camera
 from mocapflow.components import Prior, Segmenter
+from mocapflow.config.pipeline import load_pipeline
 from mocapflow.data import (
     BODY,
     CLOTH,
@@ -39,7 +40,6 @@ from mocapflow.geometry.cameras import project
 from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.loop import settle
 from mocapflow.model import ClothedModel, moved
-from mocapflow.pipeline import load_pipeline
 from mocapflow.recording import open_recording
 from mocapflow.records import F64, Bool
 from mocapflow.scene import Scene

@@ -21,10 +21,10 @@ from mocapflow_robustness.check_views import CheckViews
 from mocapflow_robustness.corrupt import Corrupt
 from mocapflow_robustness.events import Event
 
+from mocapflow.config.pipeline import load_pipeline
 from mocapflow.data import Moment, Past, Pose
 from mocapflow.geometry.angles import measure
 from mocapflow.model import ClothedModel
-from mocapflow.pipeline import load_pipeline
 from mocapflow.recording import Recording, open_recording
 from mocapflow.records import F64
 from mocapflow.results import ViewChecks

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         Segmenter,
         Stage,
     )
+    from mocapflow.config.pipeline import Pipeline, load_pipeline
     from mocapflow.data import (
         Cloth,
         Estimate,
@@ -44,7 +45,6 @@ if TYPE_CHECKING:
     from mocapflow.errors import GarmentError, MocapflowError, PipelineError, PluginError
     from mocapflow.hookspecs import hookimpl
     from mocapflow.model import ClothedModel
-    from mocapflow.pipeline import Pipeline, load_pipeline
     from mocapflow.recording import Recording
     from mocapflow.registry import Registry, load_registry
     from mocapflow.results import Files, RunFolder, Track
@@ -55,12 +55,12 @@ _HOMES = {
     "assets": "Background Body Camera GarmentMesh",
     "components": "BodyModel ClothFitter Component Draper Garment Matcher PoseSolver Predictor Prior "
     "Recovery Segmenter Stage",
+    "config.pipeline": "Pipeline load_pipeline",
     "data": "Cloth Estimate Frame FrameResult FrameState Matches Past Pose PoseBatch Residual Segmentation Silhouette "
     "Start Surface Turn",
     "errors": "GarmentError MocapflowError PipelineError PluginError",
     "hookspecs": "hookimpl",
     "model": "ClothedModel",
-    "pipeline": "Pipeline load_pipeline",
     "recording": "Recording",
     "registry": "Registry load_registry",
     "results": "Files RunFolder Track",

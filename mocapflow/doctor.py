@@ -10,9 +10,9 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any
 
-from mocapflow import measures
 from mocapflow.assets import Camera
 from mocapflow.components import Garment
+from mocapflow.config import measures
 from mocapflow.errors import MocapflowError, UnknownComponent
 from mocapflow.io import agreement, folders
 from mocapflow.io.cameras import find_calibration, read_cameras

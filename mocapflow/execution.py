@@ -15,6 +15,8 @@ from mocapflow.assets import Body, GarmentMesh
 from mocapflow.blame import failure
 from mocapflow.cloth_answers import mesh_of
 from mocapflow.components import Component, Garment
+from mocapflow.config.named_parts import whereabouts
+from mocapflow.config.pipeline import Pipeline
 from mocapflow.data import FrameResult
 from mocapflow.errors import (
     FULL,
@@ -26,8 +28,6 @@ from mocapflow.errors import (
     interrupted,
     unwritable,
 )
-from mocapflow.named_parts import whereabouts
-from mocapflow.pipeline import Pipeline
 from mocapflow.progress import Progress
 from mocapflow.recipes import Step
 from mocapflow.recording import Recording

@@ -7,10 +7,10 @@ from collections.abc import Iterable, Iterator
 
 from pydantic import BaseModel
 
+from mocapflow.config.experiment import ExperimentFile
+from mocapflow.config.pipeline import PipelineFile
 from mocapflow.describe import Setting, settings
 from mocapflow.errors import UnknownComponent, alternatives
-from mocapflow.experiment import ExperimentFile
-from mocapflow.pipeline import PipelineFile
 from mocapflow.registry import PROVIDERS, Registry
 
 INTRODUCTION = """# Settings

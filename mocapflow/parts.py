@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
+from mocapflow.config.pipeline import NamedStage, Parts, Pipeline
 from mocapflow.data import Start
 from mocapflow.errors import PipelineError
-from mocapflow.pipeline import NamedStage, Parts, Pipeline
 from mocapflow.wiring import Source, makes, wire
 
 

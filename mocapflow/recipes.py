@@ -10,9 +10,9 @@ from typing import Any
 from mocapflow.assets import Background, Body, Camera, Rig
 from mocapflow.caching.digests import Digests, digest_array
 from mocapflow.caching.keys import FORMAT, Recipe, component_recipe, key_of, without_code
+from mocapflow.config.pipeline import NamedStage, Pipeline
 from mocapflow.data import Start
 from mocapflow.parts import in_parts
-from mocapflow.pipeline import NamedStage, Pipeline
 from mocapflow.recording import Recording, open_recording
 from mocapflow.results import Evaluation, Files
 from mocapflow.wiring import Source, latest, makes, wire

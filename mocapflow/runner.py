@@ -11,10 +11,10 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 
 from mocapflow.caching.keys import explain
+from mocapflow.config.pipeline import Pipeline
 from mocapflow.errors import MocapflowError, PipelineError, no_run_folder
 from mocapflow.execution import Execution, is_hit
 from mocapflow.former_code import as_made
-from mocapflow.pipeline import Pipeline
 from mocapflow.recipes import Step, steps_of
 from mocapflow.storage.shared import open_store
 from mocapflow.storage.store import Report, Store

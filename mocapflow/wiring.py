@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from types import NoneType, UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
+from mocapflow.config.pipeline import NamedStage, Pipeline
 from mocapflow.errors import PipelineError, PluginError, alternatives
-from mocapflow.pipeline import NamedStage, Pipeline
 from mocapflow.registry import Registry
 
 SUPPLIED = {"Scene": "scene", "Recording": "recording", "Checkpoint": "checkpoint", "RunFolder": "run folder"}

@@ -12,10 +12,10 @@ import turning_person
 from mocapflow_priors.density import log_density, read
 from mocapflow_priors.parzen import SHIPPED
 
+from mocapflow.config.pipeline import load_pipeline
 from mocapflow.data import NO_CLOTH, Moment, Past, Start
 from mocapflow.geometry import twists
 from mocapflow.model import ClothedModel
-from mocapflow.pipeline import load_pipeline
 from mocapflow.shipped import shipped
 from mocapflow.timing import Stopwatch
 from mocapflow.track import CoupledLoop

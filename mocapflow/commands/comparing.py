@@ -16,7 +16,7 @@ from mocapflow.commands.workers import Scheduler, Workers, finished
 from mocapflow.errors import MocapflowError, PipelineError
 
 if TYPE_CHECKING:
-    from mocapflow.experiment import Cell
+    from mocapflow.config.experiment import Cell
 
 SHOWN = ("recording", "variant", "angle", "rms_deg", "difference_deg", "difference_low_deg", "difference_high_deg")
 
@@ -38,7 +38,7 @@ def compare(
 
     A run that fails is told at the end, with an exit status of 1; the others go on.
     """
-    from mocapflow.experiment import load_experiment
+    from mocapflow.config.experiment import load_experiment
 
     folder = out or Path("runs") / experiment.stem
     cells = load_experiment(experiment, recordings or (), frames)
@@ -82,7 +82,7 @@ def show(folder: Path, cells: Sequence[Cell], failed: Mapping[Cell, str]) -> Non
     """Compare what has run, and print it with what has not."""
     from mocapflow_evaluation import variants
 
-    from mocapflow.levels import FILES
+    from mocapflow.config.levels import FILES
 
     runs = [(cell.variant, cell.name, failed.get(cell) or place(folder, cell)) for cell in cells]
     rows = [{name: row[name] for name in SHOWN} for row in variants.compare(runs, folder)]

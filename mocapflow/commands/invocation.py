@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from mocapflow.errors import PipelineError, no_run_folder
 
 if TYPE_CHECKING:
-    from mocapflow.pipeline import Pipeline
+    from mocapflow.config.pipeline import Pipeline
 
 FILE = "command.json"
 KEYS = ("keys", "contents")  # of what the stages make; without and with what code makes of it left out
@@ -35,7 +35,7 @@ class Invocation:
 
     def load(self) -> Pipeline:
         """Return the pipeline."""
-        from mocapflow.pipeline import frames_of, load_pipeline
+        from mocapflow.config.pipeline import frames_of, load_pipeline
 
         return load_pipeline(
             Path(self.pipeline),

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from mocapflow.components import Draper, Garment
+from mocapflow.config.documents import Document, Place
+from mocapflow.config.measures import garment_of
+from mocapflow.config.resolve import Resolver
 from mocapflow.data import Past, Pose
-from mocapflow.documents import Document, Place
 from mocapflow.errors import StoreError
-from mocapflow.measures import garment_of
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64, U8
 from mocapflow.registry import Registry
-from mocapflow.resolve import Resolver
 from mocapflow.scene import Scene
 from mocapflow.shipped import shipped
 

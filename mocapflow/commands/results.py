@@ -15,7 +15,7 @@ from mocapflow.commands.invocation import alone, recall, recalled_keys
 from mocapflow.errors import MocapflowError, PipelineError, RecordingError
 
 if TYPE_CHECKING:
-    from mocapflow.pipeline import Pipeline
+    from mocapflow.config.pipeline import Pipeline
 
 Run = Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")]
 Truth = Annotated[

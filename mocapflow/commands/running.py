@@ -16,7 +16,7 @@ from mocapflow.commands.workers import Scheduler, Workers, finished
 from mocapflow.errors import PipelineError
 
 if TYPE_CHECKING:
-    from mocapflow.pipeline import Pipeline
+    from mocapflow.config.pipeline import Pipeline
     from mocapflow.recipes import Step
     from mocapflow.runner import RunSummary
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from mocapflow_export import layout, tables
 
-from mocapflow.levels import FILES
+from mocapflow.config.levels import FILES
 from mocapflow.records import F64
 from mocapflow.results import frame_rate_of
 from mocapflow_evaluation import panels

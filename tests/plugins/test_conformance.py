@@ -5,9 +5,9 @@ from importlib.util import find_spec
 import pytest
 
 from mocapflow import testing
-from mocapflow.documents import Document, Place
+from mocapflow.config.documents import Document, Place
+from mocapflow.config.resolve import Resolver
 from mocapflow.registry import PROVIDERS, load_registry
-from mocapflow.resolve import Resolver
 from mocapflow.shipped import shipped
 
 REGISTRY = load_registry()

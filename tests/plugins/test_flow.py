@@ -6,7 +6,7 @@ import pytest
 from mocapflow_sequence.flow import FollowPoints
 
 from mocapflow.caching.digests import Digests
-from mocapflow.pipeline import load_pipeline
+from mocapflow.config.pipeline import load_pipeline
 from mocapflow.recipes import steps_of
 from mocapflow.recording import open_recording
 from mocapflow.runner import run

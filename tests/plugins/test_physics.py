@@ -11,9 +11,9 @@ from mocapflow_physics.cloth import links_of
 from mocapflow_physics.contacts import find_contacts
 from mocapflow_physics.motion import between
 
+from mocapflow.config.pipeline import load_pipeline
 from mocapflow.data import Cloth, Moment, Past, Pose, PoseBatch
 from mocapflow.errors import PipelineError
-from mocapflow.pipeline import load_pipeline
 from mocapflow.shipped import shipped
 from mocapflow.testing import tiny_scene
 

@@ -12,7 +12,7 @@ from mocapflow_evaluation import variants
 from mocapflow_evaluation.compare import rms
 from mocapflow_export import layout, tables
 
-from mocapflow import levels
+from mocapflow.config import levels
 
 FRAMES = np.arange(90.0)
 SHARED = 3 * np.sin(FRAMES / 5)

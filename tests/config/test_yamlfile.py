@@ -3,8 +3,8 @@ from pathlib import Path
 
 import pytest
 
+from mocapflow.config.yamlfile import read
 from mocapflow.errors import PipelineError
-from mocapflow.yamlfile import read
 
 BASE = """\
 recording: ../clip

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from mocapflow.documents import BEFORE, Document, Steps
+from mocapflow.config.documents import BEFORE, Document, Steps
 from mocapflow.errors import PipelineError
 
 ELSEWHERE = "recording"  # of a pipeline: an experiment says in `recordings` what it runs on

@@ -4,9 +4,9 @@ from pathlib import Path
 import pytest
 
 from mocapflow.assets import Body
+from mocapflow.config.experiment import load_experiment
+from mocapflow.config.pipeline import load_pipeline
 from mocapflow.errors import MocapflowError
-from mocapflow.experiment import load_experiment
-from mocapflow.pipeline import load_pipeline
 from mocapflow.registry import load_registry
 from mocapflow.shipped import shipped
 from mocapflow.wiring import latest, wire

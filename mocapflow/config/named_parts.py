@@ -16,11 +16,11 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from mocapflow.documents import Steps
+from mocapflow.config.documents import Steps
+from mocapflow.config.resolve import Resolver
 from mocapflow.errors import PipelineError, RecordingError, alternatives
 from mocapflow.io.cameras import YAML, calibration_files, find_calibration
 from mocapflow.io.lateness import TIMING
-from mocapflow.resolve import Resolver
 
 FILES = {"cameras": "cameras.toml", "init": "init.json", "late_frames": TIMING}
 SUBJECT = {"body": "body.obj", "skeleton": "skeleton.json", "weights": "weights.npz", "garment": "garment.json"}

@@ -12,13 +12,13 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
+from mocapflow.config.levels import changes_at, levels_at, variant_of
+from mocapflow.config.pipeline import frames_of
+from mocapflow.config.resolve import Resolver
+from mocapflow.config.yamlfile import read
 from mocapflow.errors import PipelineError
-from mocapflow.levels import changes_at, levels_at, variant_of
-from mocapflow.pipeline import frames_of
 from mocapflow.registry import Registry
-from mocapflow.resolve import Resolver
 from mocapflow.settings import Settings
-from mocapflow.yamlfile import read
 
 PIPELINE = "pipeline"  # in a level: another pipeline file instead of a change
 

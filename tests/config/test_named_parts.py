@@ -5,13 +5,13 @@ from pathlib import Path
 import pytest
 import yaml
 
+from mocapflow.config.named_parts import folder_of, home, whereabouts
+from mocapflow.config.pipeline import load_pipeline
+from mocapflow.config.resolve import Resolver
+from mocapflow.config.yamlfile import read
 from mocapflow.errors import MocapflowError, PipelineError
-from mocapflow.named_parts import folder_of, home, whereabouts
-from mocapflow.pipeline import load_pipeline
 from mocapflow.registry import Registry
-from mocapflow.resolve import Resolver
 from mocapflow.runner import keys, run
-from mocapflow.yamlfile import read
 from tests.fixtures.stores import actions, load, write_pipeline, write_recording
 
 PARTS = {"cameras": "lab/rig.toml", "videos": {"cam01": "a.mp4", "cam02": "b.mp4"}}

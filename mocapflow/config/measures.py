@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from mocapflow.components import Garment
-from mocapflow.documents import Document, Place
+from mocapflow.config.documents import Document, Place
+from mocapflow.config.resolve import Resolver
 from mocapflow.errors import MocapflowError, RecordingError, UnknownComponent
 from mocapflow.io.typed import place, read_json
 from mocapflow.registry import Registry
-from mocapflow.resolve import Resolver
 
 FILE = Path("subject") / "garment.json"
 FROM_RECORDING = "from_recording"

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from mocapflow.config.experiment import load_experiment
 from mocapflow.errors import PipelineError
-from mocapflow.experiment import load_experiment
 
 GRID = """mocapflow: 1
 pipeline: base.yaml

@@ -10,7 +10,7 @@ from typing import Any
 
 import yaml
 
-from mocapflow.documents import Document, Place, Steps, changed, dotted
+from mocapflow.config.documents import Document, Place, Steps, changed, dotted
 from mocapflow.errors import PipelineError, alternatives
 
 LEADING_ZERO = re.compile(r"[-+]?0[0-9_]")  # 0x10 and 0b10 say themselves what they are

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.errors import PydanticUserError
 
 from mocapflow.components import Component
-from mocapflow.documents import Document, Steps, dotted
+from mocapflow.config.documents import Document, Steps, dotted
 from mocapflow.errors import MocapflowError, PipelineError, guess
 from mocapflow.registry import Registry
 from mocapflow.settings import plain_parts

@@ -11,14 +11,14 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, NonNegativeInt, PositiveInt
 
 from mocapflow.components import BodyModel, Garment, Stage
-from mocapflow.documents import Document, Place, Steps, changed
+from mocapflow.config.documents import Document, Place, Steps, changed
+from mocapflow.config.measures import garment_of, place_of
+from mocapflow.config.named_parts import folder_of
+from mocapflow.config.resolve import Resolver
+from mocapflow.config.yamlfile import read
 from mocapflow.errors import PipelineError, RecordingError
-from mocapflow.measures import garment_of, place_of
-from mocapflow.named_parts import folder_of
 from mocapflow.registry import Registry, load_registry
-from mocapflow.resolve import Resolver
 from mocapflow.settings import Settings
-from mocapflow.yamlfile import read
 
 LABEL = re.compile(r"[\w-]+")  # of a stage
 

@@ -1,0 +1,1 @@
+"""What YAML files say: documents and their places, pipelines, experiments."""
