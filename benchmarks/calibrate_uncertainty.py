@@ -22,7 +22,7 @@ from mocapflow_export.uncertainty import OUTLINE_MM, excess, px_per_mm
 
 from mocapflow.commands.invocation import recall
 from mocapflow.io.columns import read_columns
-from mocapflow.recording import open_recording
+from mocapflow.recordings.recording import open_recording
 from mocapflow.records import F64
 
 LOST_DEG = 10.0  # RMS of a curve whose limb was lost: no error of measurement

@@ -20,7 +20,7 @@ import numpy as np
 
 from mocapflow.assets import Camera
 from mocapflow.io.cameras import write_cameras
-from mocapflow.recording import open_recording
+from mocapflow.recordings.recording import open_recording
 
 SIZES = {"640 x 800": (640, 800), "1088 x 1920": (1088, 1920)}
 LENS = np.array([-0.046, 0.14, 0.0006, 0.0007, 0.0])

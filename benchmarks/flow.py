@@ -27,7 +27,7 @@ from mocapflow_sequence.flow import FollowPoints
 from mocapflow.components import Matcher
 from mocapflow.data import NO_CLOTH, Change, Frame, Moment, Past, Pose, Turn
 from mocapflow.geometry.cameras import project
-from mocapflow.recording import open_recording
+from mocapflow.recordings.recording import open_recording
 from mocapflow.scene import Scene
 from mocapflow.shipped import shipped
 

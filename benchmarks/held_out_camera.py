@@ -26,7 +26,7 @@ from mocapflow.data import Cloth, Frame, FrameState, Moment, Past, Segmentation,
 from mocapflow.geometry import silhouettes
 from mocapflow.geometry.sewing import TAKE_UP, THICKNESS
 from mocapflow.model import ClothedModel
-from mocapflow.recording import open_recording
+from mocapflow.recordings.recording import open_recording
 from mocapflow.records import F64
 from mocapflow.runner import run
 from mocapflow.scene import Scene

@@ -21,7 +21,7 @@ from mocapflow_fitting.proportions import scaled
 from mocapflow.assets import Body
 from mocapflow.config.pipeline import load_pipeline
 from mocapflow.data import Pose
-from mocapflow.recording import open_recording
+from mocapflow.recordings.recording import open_recording
 from mocapflow.results import Track
 from mocapflow.scene import Scene
 from mocapflow.track import CoupledLoop

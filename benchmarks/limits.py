@@ -40,7 +40,7 @@ from mocapflow.geometry.cameras import project
 from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.loop import settle
 from mocapflow.model import ClothedModel, moved
-from mocapflow.recording import open_recording
+from mocapflow.recordings.recording import open_recording
 from mocapflow.records import F64, Bool
 from mocapflow.scene import Scene
 from mocapflow.track import CoupledLoop, believed

@@ -25,7 +25,7 @@ from mocapflow.config.pipeline import load_pipeline
 from mocapflow.data import Moment, Past, Pose
 from mocapflow.geometry.angles import measure
 from mocapflow.model import ClothedModel
-from mocapflow.recording import Recording, open_recording
+from mocapflow.recordings.recording import Recording, open_recording
 from mocapflow.records import F64
 from mocapflow.results import ViewChecks
 from mocapflow.scene import Scene

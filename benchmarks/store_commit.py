@@ -32,7 +32,7 @@ from mocapflow.data import (
     Silhouette,
 )
 from mocapflow.geometry.silhouettes import mask_distance
-from mocapflow.recording import open_recording
+from mocapflow.recordings.recording import open_recording
 from mocapflow.storage import packing, rows
 from mocapflow.storage.checkpoint import Checkpoint
 from mocapflow.storage.rows import Rows

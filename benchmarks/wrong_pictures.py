@@ -15,7 +15,7 @@ from mocapflow_robustness import doubts
 from mocapflow_robustness.check_views import CheckViews, rooms
 from mocapflow_robustness.thumbnails import Thumbnails, thumbnails
 
-from mocapflow.recording import open_recording
+from mocapflow.recordings.recording import open_recording
 from mocapflow.records import F32, F64
 
 TRIALS = 30

@@ -17,7 +17,7 @@ from mocapflow_levelset.masks import counted
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.statistics import Window
 
-from mocapflow.recording import open_recording
+from mocapflow.recordings.recording import open_recording
 from mocapflow.records import F32, U8
 from mocapflow.shipped import shipped
 

@@ -25,7 +25,7 @@ from mocapflow import (
     load_registry,
 )
 from mocapflow.loop import settle
-from mocapflow.recording import open_recording
+from mocapflow.recordings.recording import open_recording
 from mocapflow.records import F64, U8
 from mocapflow.shipped import shipped
 from mocapflow.timing import Stopwatch

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from mocapflow.errors import GarmentError, MocapflowError, PipelineError, PluginError
     from mocapflow.hookspecs import hookimpl
     from mocapflow.model import ClothedModel
-    from mocapflow.recording import Recording
+    from mocapflow.recordings.recording import Recording
     from mocapflow.registry import Registry, load_registry
     from mocapflow.results import Files, RunFolder, Track
     from mocapflow.runner import plan, run
@@ -61,7 +61,7 @@ _HOMES = {
     "errors": "GarmentError MocapflowError PipelineError PluginError",
     "hookspecs": "hookimpl",
     "model": "ClothedModel",
-    "recording": "Recording",
+    "recordings.recording": "Recording",
     "registry": "Registry load_registry",
     "results": "Files RunFolder Track",
     "runner": "plan run",

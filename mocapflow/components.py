@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from mocapflow.model import ClothedModel
-    from mocapflow.recording import Recording
+    from mocapflow.recordings.recording import Recording
     from mocapflow.scene import Scene
 
 

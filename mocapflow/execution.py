@@ -30,7 +30,7 @@ from mocapflow.errors import (
 )
 from mocapflow.progress import Progress
 from mocapflow.recipes import Step
-from mocapflow.recording import Recording
+from mocapflow.recordings.recording import Recording
 from mocapflow.records import unwatched
 from mocapflow.results import RunFolder
 from mocapflow.scene import Scene

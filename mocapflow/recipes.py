@@ -13,7 +13,7 @@ from mocapflow.caching.keys import FORMAT, Recipe, component_recipe, key_of, wit
 from mocapflow.config.pipeline import NamedStage, Pipeline
 from mocapflow.data import Start
 from mocapflow.parts import in_parts
-from mocapflow.recording import Recording, open_recording
+from mocapflow.recordings.recording import Recording, open_recording
 from mocapflow.results import Evaluation, Files
 from mocapflow.wiring import Source, latest, makes, wire
 
@@ -133,7 +133,7 @@ def _content(part: Recording, digests: Digests) -> dict[str, Any]:
         paths["static"] = part.folder / "static"
     return {
         "content": {name: digests.file(path, name) for name, path in sorted(paths.items())},
-        "reader": digests.package("mocapflow.recording"),
+        "reader": digests.package("mocapflow.recordings.recording"),
     }
 
 

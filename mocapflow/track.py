@@ -39,12 +39,12 @@ from mocapflow.data import (
     blind,
     empty_matches,
 )
-from mocapflow.emptiness import believable
 from mocapflow.errors import ComponentFailed, PipelineError
 from mocapflow.functional import Functional, image_cost
 from mocapflow.loop import Steps, settle
 from mocapflow.model import ClothedModel
-from mocapflow.recording import Recording
+from mocapflow.recordings.emptiness import believable
+from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow.results import ImageFlow, Track, ViewChecks
 from mocapflow.scene import Scene

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-SHARED = ("io", "recording")  # counted where a component imports them
+SHARED = ("io", "recordings.recording")  # counted where a component imports them
 
 
 def meaning(tree: ast.Module) -> str:
@@ -28,19 +28,25 @@ def imports(tree: ast.Module) -> Iterator[str]:
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
             yield node.module
-            yield from (f"{node.module}.{alias.name}" for alias in node.names if node.module == "mocapflow")
+            if node.module.partition(".")[0] == "mocapflow":  # a name may be a module of it
+                yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
 def counts(name: str) -> bool:
     """True for an import whose code a component depends on besides the core's."""
-    top, _, rest = name.partition(".")
-    return top.startswith("mocapflow_") or (top == "mocapflow" and rest.partition(".")[0] in SHARED)
+    return name.startswith("mocapflow_") or _shared(name) is not None
 
 
 def unit_of(module: str) -> str:
     """Return what is digested as one: the top package, or one part of mocapflow itself."""
     parts = module.split(".")
-    return ".".join(parts[:2] if parts[0] == "mocapflow" else parts[:1])
+    return _shared(module) or ".".join(parts[:2] if parts[0] == "mocapflow" else parts[:1])
+
+
+def _shared(name: str) -> str | None:
+    """Return the shared part of mocapflow that a name is in."""
+    units = (f"mocapflow.{part}" for part in SHARED)
+    return next((unit for unit in units if f"{name}.".startswith(f"{unit}.")), None)
 
 
 def visible(folder: Path) -> Iterator[Path]:

@@ -103,7 +103,7 @@ def doctor(
     write: Annotated[bool, typer.Option("--write", help="Put what --sync finds into recording.json.")] = False,
 ) -> None:
     """Check a recording folder and say what to mend."""
-    from mocapflow.doctor import examine, examine_timing
+    from mocapflow.recordings.doctor import examine, examine_timing
 
     findings = examine(recording)
     if (sync or write) and not any(finding.severity == "error" for finding in findings):

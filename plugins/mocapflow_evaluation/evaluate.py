@@ -11,7 +11,7 @@ from mocapflow_export import layout, runjson, tables
 from pydantic import PositiveFloat
 
 from mocapflow.components import Stage
-from mocapflow.recording import Recording
+from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow.results import Evaluation, RunFolder, Track
 from mocapflow.scene import Scene

@@ -14,7 +14,7 @@ from mocapflow_fitting.detections import persons
 
 from mocapflow.assets import Camera
 from mocapflow.io import folders, markers
-from mocapflow.recording import Recording
+from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 
 LOG = logging.getLogger("mocapflow")

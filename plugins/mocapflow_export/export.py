@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 
 from mocapflow.components import Stage
 from mocapflow.io import markers, opensim
-from mocapflow.recording import Recording
+from mocapflow.recordings.recording import Recording
 from mocapflow.results import Files, RunFolder, Track
 from mocapflow.scene import Scene
 from mocapflow_export import layout, runjson, tables

@@ -14,7 +14,7 @@ from mocapflow.assets import Camera, Rig
 from mocapflow.components import Stage
 from mocapflow.geometry import twists
 from mocapflow.geometry.cameras import project
-from mocapflow.recording import Recording
+from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow_fitting.detections import need_keypoints, persons, spread
 from mocapflow_fitting.triangulate import triangulate

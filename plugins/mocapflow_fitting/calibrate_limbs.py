@@ -16,7 +16,7 @@ from mocapflow.components import Draper, Matcher, Segmenter, Stage
 from mocapflow.data import Change, Frame, Matches, Past, Pose, Segmentation, Turn
 from mocapflow.loop import pool_matches
 from mocapflow.model import ClothedModel
-from mocapflow.recording import Recording
+from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow.results import Track
 from mocapflow.scene import Scene

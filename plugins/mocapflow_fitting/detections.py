@@ -8,7 +8,7 @@ import numpy as np
 
 from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
-from mocapflow.recording import Recording
+from mocapflow.recordings.recording import Recording
 from mocapflow_fitting.keypoint_fit import Seen
 from mocapflow_fitting.keypoint_layouts import LAYOUTS, Layout, layout_of, rows_of
 from mocapflow_fitting.person import Person, find_person

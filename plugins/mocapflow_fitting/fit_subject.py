@@ -12,7 +12,7 @@ from pydantic import PositiveInt
 from mocapflow.assets import Body, Camera
 from mocapflow.components import Stage
 from mocapflow.errors import RecordingError
-from mocapflow.recording import Recording
+from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow.scene import Scene
 from mocapflow_fitting.detections import layout, need_keypoints, persons, seen, spread

@@ -16,7 +16,7 @@ from mocapflow.errors import RecordingError
 from mocapflow.geometry import twists
 from mocapflow.geometry.joints import angles_from_rotations
 from mocapflow.io.first_pose import read_first_pose
-from mocapflow.recording import Recording
+from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow.scene import Scene
 

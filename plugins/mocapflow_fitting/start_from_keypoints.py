@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 from mocapflow.components import Stage
 from mocapflow.data import Start
 from mocapflow.errors import RecordingError
-from mocapflow.recording import Recording
+from mocapflow.recordings.recording import Recording
 from mocapflow.scene import Scene
 from mocapflow_fitting.detections import layout, need_keypoints, person_at, seen
 from mocapflow_fitting.keypoint_fit import fit

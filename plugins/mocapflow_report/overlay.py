@@ -12,7 +12,7 @@ from mocapflow.assets import Camera
 from mocapflow.components import Stage
 from mocapflow.data import CLOTH, NO_CLOTH, Frame, Pose, Surface
 from mocapflow.geometry import cameras, kinematics, meshes, silhouettes
-from mocapflow.recording import Recording
+from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64, I32, U8
 from mocapflow.results import Files, RunFolder, Track
 from mocapflow.scene import Scene

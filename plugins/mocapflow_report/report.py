@@ -16,7 +16,7 @@ from mocapflow_export.uncertainty import measured
 from mocapflow_sequence.lost import lost_rows
 
 from mocapflow.components import Stage
-from mocapflow.recording import Recording
+from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow.results import Evaluation, Files, RunFolder, Track
 from mocapflow.scene import Scene

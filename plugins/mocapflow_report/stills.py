@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mocapflow.recording import Recording
+from mocapflow.recordings.recording import Recording
 from mocapflow.records import U8
 from mocapflow.results import Track
 from mocapflow.scene import Scene

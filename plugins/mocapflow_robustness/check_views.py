@@ -11,7 +11,7 @@ from pydantic import Field, PositiveFloat
 
 from mocapflow.assets import Background
 from mocapflow.components import Stage
-from mocapflow.recording import Recording
+from mocapflow.recordings.recording import Recording
 from mocapflow.records import F32
 from mocapflow.results import ViewChecks
 from mocapflow_robustness import doubts

@@ -13,7 +13,7 @@ from pydantic import Field, NonNegativeInt, model_validator
 from mocapflow.components import Stage
 from mocapflow.data import Frame
 from mocapflow.errors import RecordingError, alternatives
-from mocapflow.recording import Recording
+from mocapflow.recordings.recording import Recording
 from mocapflow.records import U8
 from mocapflow_robustness import pixels
 from mocapflow_robustness.events import Event

@@ -12,7 +12,7 @@ from pydantic import PositiveFloat, PositiveInt
 
 from mocapflow.components import Stage
 from mocapflow.data import Frame
-from mocapflow.recording import Recording
+from mocapflow.recordings.recording import Recording
 from mocapflow.records import U8, Bool
 from mocapflow_robustness.hiding import together
 

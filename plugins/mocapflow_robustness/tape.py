@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from mocapflow.data import Frame
-from mocapflow.recording import Recording
+from mocapflow.recordings.recording import Recording
 
 
 class Tape:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mocapflow.recording import Recording
+from mocapflow.recordings.recording import Recording
 from mocapflow.records import F32, F64, U8, Bool, array, record
 
 SIDE = 20  # px of a thumbnail; blurred like this, pictures differ in proportion to how far things have moved

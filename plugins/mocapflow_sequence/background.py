@@ -13,7 +13,7 @@ from mocapflow.assets import Background
 from mocapflow.components import Stage
 from mocapflow.errors import RecordingError
 from mocapflow.io.plates import plate_files
-from mocapflow.recording import Recording
+from mocapflow.recordings.recording import Recording
 from mocapflow.records import F32, U8
 
 LOG = logging.getLogger("mocapflow")

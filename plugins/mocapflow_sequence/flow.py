@@ -11,7 +11,7 @@ from pydantic import Field, NonNegativeInt, PositiveFloat
 from mocapflow.assets import Background
 from mocapflow.components import Stage
 from mocapflow.data import Flow, Frame
-from mocapflow.recording import Recording
+from mocapflow.recordings.recording import Recording
 from mocapflow.records import F32, U8, Bool
 from mocapflow.results import ImageFlow, ViewChecks
 

@@ -218,6 +218,19 @@ def test_code_that_a_plugin_imports_counts(tmp_path, monkeypatch):
     assert made(1) != before
 
 
+@pytest.mark.parametrize(
+    "line",
+    [
+        "from mocapflow.recordings.recording import Recording",
+        "from mocapflow.recordings import recording",
+        "import mocapflow.recordings.recording",
+    ],
+)
+def test_the_reader_of_recordings_counts_however_it_is_imported(line):
+    counted = {name for name in sources.imports(ast.parse(line)) if sources.counts(name)}
+    assert {sources.unit_of(name) for name in counted} == {"mocapflow.recordings.recording"}
+
+
 def test_package_data_counts(tmp_path, monkeypatch):
     folder = tmp_path / "mocapflow_withdata"
     (folder / "__pycache__").mkdir(parents=True)

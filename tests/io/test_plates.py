@@ -6,7 +6,7 @@ import pytest
 
 from mocapflow.errors import RecordingError
 from mocapflow.io.plates import toned
-from mocapflow.recording import open_recording
+from mocapflow.recordings.recording import open_recording
 from tests.fixtures.recordings import NAMES, SIZE, write_recording
 
 

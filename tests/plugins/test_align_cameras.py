@@ -13,7 +13,7 @@ from mocapflow_fitting.start_from_file import read_pose
 
 from mocapflow.data import Pose
 from mocapflow.geometry import twists
-from mocapflow.recording import open_recording
+from mocapflow.recordings.recording import open_recording
 
 
 def walking(body, count):

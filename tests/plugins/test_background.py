@@ -10,7 +10,7 @@ from mocapflow.assets import Background
 from mocapflow.data import Past, Turn
 from mocapflow.errors import RecordingError
 from mocapflow.geometry.cameras import project
-from mocapflow.recording import open_recording
+from mocapflow.recordings.recording import open_recording
 from mocapflow.shipped import shipped
 from mocapflow.testing import pictures, scenes
 from tests.fixtures.recordings import number_of, ring, write_recording

@@ -23,7 +23,7 @@ from mocapflow.data import Pose, Segmentation, Silhouette
 from mocapflow.errors import RecordingError
 from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.model import ClothedModel, moved
-from mocapflow.recording import open_recording
+from mocapflow.recordings.recording import open_recording
 from mocapflow.scene import Scene
 
 WRONG = {"thigh": 1.03, "shank": 0.97}  # 12 mm each

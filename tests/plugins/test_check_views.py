@@ -12,7 +12,7 @@ from mocapflow_robustness.doubts import bridged, bursts, repeated
 from mocapflow_robustness.events import Event
 
 from mocapflow.data import Frame
-from mocapflow.recording import open_recording
+from mocapflow.recordings.recording import open_recording
 from mocapflow.results import ViewChecks
 from tests.fixtures.stores import STAGES, load, run_tiny, the_track, write_pipeline, write_recording
 

@@ -10,7 +10,7 @@ from mocapflow_robustness.events import Event
 from mocapflow_robustness.hiding import together
 
 from mocapflow.errors import RecordingError
-from mocapflow.recording import open_recording
+from mocapflow.recordings.recording import open_recording
 from mocapflow.runner import plan
 from tests.fixtures.stores import STAGES, actions, load, run_tiny, write_pipeline, write_recording
 

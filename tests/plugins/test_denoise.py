@@ -9,7 +9,7 @@ from mocapflow_robustness import pixels
 from mocapflow_robustness.corrupt import Corrupt
 from mocapflow_robustness.denoise import Denoise, filled, in_company, noise_share
 
-from mocapflow.recording import open_recording
+from mocapflow.recordings.recording import open_recording
 from mocapflow.shipped import shipped
 from tests.fixtures.stores import write_recording
 

@@ -12,7 +12,7 @@ from mocapflow_fitting.start_from_file import read_pose
 
 from mocapflow.data import Pose
 from mocapflow.geometry import angles
-from mocapflow.recording import open_recording
+from mocapflow.recordings.recording import open_recording
 from mocapflow.scene import Scene
 
 LIMBS = (("hip_l", "knee_l"), ("knee_r", "ankle_r"), ("shoulder_r", "elbow_r"), ("elbow_l", "wrist_l"))

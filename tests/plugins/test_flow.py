@@ -8,7 +8,7 @@ from mocapflow_sequence.flow import FollowPoints
 from mocapflow.caching.digests import Digests
 from mocapflow.config.pipeline import load_pipeline
 from mocapflow.recipes import steps_of
-from mocapflow.recording import open_recording
+from mocapflow.recordings.recording import open_recording
 from mocapflow.runner import run
 from mocapflow.storage.store import Store
 from mocapflow.testing.same import same

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from mocapflow.errors import PipelineError
 from mocapflow.geometry import angles
 from mocapflow.io import markers
-from mocapflow.recording import open_recording
+from mocapflow.recordings.recording import open_recording
 
 NEAR = 1e-4  # m
 

@@ -16,7 +16,7 @@ from results_scene import DEMO, make_track, stepping
 
 from mocapflow.geometry import kinematics
 from mocapflow.io import markers
-from mocapflow.recording import Recording, open_recording
+from mocapflow.recordings.recording import Recording, open_recording
 from mocapflow.results import Evaluation, RunFolder, Track
 from mocapflow.scene import Scene
 

@@ -22,7 +22,7 @@ from scipy.spatial.transform import Rotation
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import angles
 from mocapflow.io import markers
-from mocapflow.recording import open_recording
+from mocapflow.recordings.recording import open_recording
 
 SCENE = demo_scene()
 TRACK = stepping(SCENE.body, 60)

@@ -16,7 +16,7 @@ from mocapflow_export import layout
 from mocapflow_report.report import Report
 from results_scene import DEMO, demo_scene, stepping
 
-from mocapflow.recording import open_recording
+from mocapflow.recordings.recording import open_recording
 from mocapflow.results import RunFolder
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)

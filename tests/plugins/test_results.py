@@ -14,7 +14,7 @@ from mocapflow.errors import RecordingError
 from mocapflow.geometry import kinematics
 from mocapflow.io import markers
 from mocapflow.io.columns import read_columns
-from mocapflow.recording import Recording, open_recording
+from mocapflow.recordings.recording import Recording, open_recording
 from mocapflow.results import Files, RunFolder, Track
 from mocapflow.scene import Scene
 

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import kinematics
-from mocapflow.recording import open_recording
+from mocapflow.recordings.recording import open_recording
 from mocapflow.scene import Scene
 from tests.fixtures.turns import rotations_from_angles
 

@@ -19,7 +19,7 @@ from mocapflow.errors import RecordingError
 from mocapflow.geometry import kinematics, twists
 from mocapflow.geometry.cameras import project
 from mocapflow.model import moved
-from mocapflow.recording import open_recording
+from mocapflow.recordings.recording import open_recording
 from mocapflow.scene import Scene
 
 

@@ -19,7 +19,7 @@ from mocapflow.cli import app
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import angles
 from mocapflow.io import markers, opensim
-from mocapflow.recording import open_recording
+from mocapflow.recordings.recording import open_recording
 from tests.fixtures.turns import rotations_from_angles
 
 BENT = {"hip_l.flexion": 40.0, "knee_l.flexion": 70.0, "ankle_l.dorsiflexion": 12.0, "elbow_l.flexion": 50.0}

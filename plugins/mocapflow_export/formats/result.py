@@ -11,7 +11,7 @@ import numpy as np
 from mocapflow.data import NO_CLOTH, Cloth, PoseBatch, Surface
 from mocapflow.errors import PipelineError
 from mocapflow.geometry import kinematics
-from mocapflow.recording import Recording
+from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64, record
 from mocapflow.results import Track
 from mocapflow.scene import Scene

@@ -9,7 +9,7 @@ import numpy as np
 
 from mocapflow.assets import Camera
 from mocapflow.geometry.pencils import pencil_axes, plane_angles
-from mocapflow.recording import Recording
+from mocapflow.recordings.recording import Recording
 from mocapflow.records import F32, F64, U8
 
 Signals = Callable[[int, int], tuple[F64, F64]]

@@ -12,10 +12,10 @@ import pytest
 
 from mocapflow.errors import RecordingError
 from mocapflow.io.cameras import write_cameras
-from mocapflow.recording import open_recording
+from mocapflow.recordings.recording import open_recording
 from tests.fixtures.recordings import NAMES, avi_frames, number_of, picture, ring, write_recording, write_video
 
-DEMO = Path(__file__).parents[1] / "examples" / "data" / "skirt_steps"
+DEMO = Path(__file__).parents[2] / "examples" / "data" / "skirt_steps"
 
 
 def refused(folder, **settings):

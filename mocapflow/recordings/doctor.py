@@ -25,8 +25,8 @@ from mocapflow.io.plates import background
 from mocapflow.io.rigs import examine_rig, examine_view
 from mocapflow.io.subjects import examine_subject
 from mocapflow.io.video import Video, lost_frames, open_video
+from mocapflow.recordings.synchrony import measure
 from mocapflow.registry import Registry, load_registry
-from mocapflow.synchrony import measure
 
 __all__ = ["Finding", "examine", "examine_timing"]
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from mocapflow.errors import RecordingError
-from mocapflow.paired_views import Signals, keypoint_signals, outline_signals
-from mocapflow.recording import open_recording
+from mocapflow.recordings.paired_views import Signals, keypoint_signals, outline_signals
+from mocapflow.recordings.recording import open_recording
 from mocapflow.records import F64, record
 
 FRAMES = 600  # at most, that are looked at

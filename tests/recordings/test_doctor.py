@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from mocapflow_garments.shorts import Shorts
 
-from mocapflow.doctor import examine
 from mocapflow.geometry import twists
 from mocapflow.io.cameras import write_cameras
+from mocapflow.recordings.doctor import examine
 from tests.fixtures.recordings import avi_frames, look_at, ring, write_recording, write_video
 
-DEMO = Path(__file__).parents[1] / "examples" / "data"
+DEMO = Path(__file__).parents[2] / "examples" / "data"
 
 
 LIMBS = (("hip", "knee", "ankle", "toe"), ("shoulder", "elbow", "wrist"))

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from mocapflow.data import Start
-from mocapflow.emptiness import MOST, believable, share_alike
 from mocapflow.geometry import twists
+from mocapflow.recordings.emptiness import MOST, believable, share_alike
 from mocapflow.testing import pictures, scenes
 
 SCENE = scenes.tiny_scene()

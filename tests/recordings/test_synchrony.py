@@ -6,13 +6,13 @@ import cv2
 import numpy as np
 import pytest
 
-from mocapflow import paired_views, synchrony
-from mocapflow.doctor import examine_timing
 from mocapflow.errors import RecordingError
 from mocapflow.geometry.cameras import project
 from mocapflow.geometry.pencils import pencil_axes, plane_angles
 from mocapflow.io.cameras import write_cameras
-from mocapflow.recording import open_recording
+from mocapflow.recordings import paired_views, synchrony
+from mocapflow.recordings.doctor import examine_timing
+from mocapflow.recordings.recording import open_recording
 from tests.fixtures.recordings import look_at
 
 PLACES = [(3, 0.5, 1.4), (0.3, 3, 1.0), (-2, -2, 1.8)]

@@ -9,7 +9,7 @@ import numpy as np
 from mocapflow.assets import Background, Camera
 from mocapflow.data import NO_CLOTH, Frame, Start, Surface
 from mocapflow.geometry.silhouettes import mask, outline
-from mocapflow.recording import Recording
+from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow.scene import Scene
 

@@ -1,0 +1,1 @@
+"""Recordings: read, examined, and what cameras agree on."""
