@@ -8,10 +8,10 @@ from pathlib import Path
 from types import FrameType, TracebackType
 from typing import Any
 
-from mocapflow.answers import WrongAnswer
 from mocapflow.components import Component
 from mocapflow.data import Frame, Turn
 from mocapflow.errors import ComponentFailed
+from mocapflow.guards.answers import WrongAnswer
 from mocapflow.registry import Registry
 
 

@@ -10,10 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from mocapflow.answers import of_kind
 from mocapflow.assets import Body, GarmentMesh
 from mocapflow.blame import failure
-from mocapflow.cloth_answers import mesh_of
 from mocapflow.components import Component, Garment
 from mocapflow.config.named_parts import whereabouts
 from mocapflow.config.pipeline import Pipeline
@@ -28,6 +26,8 @@ from mocapflow.errors import (
     interrupted,
     unwritable,
 )
+from mocapflow.guards.answers import of_kind
+from mocapflow.guards.cloth_answers import mesh_of
 from mocapflow.progress import Progress
 from mocapflow.recipes import Step
 from mocapflow.recordings.recording import Recording

@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 
-from mocapflow.answers import residual_of
 from mocapflow.assets import Camera
 from mocapflow.components import Prior
 from mocapflow.data import (
@@ -25,6 +24,7 @@ from mocapflow.data import (
 )
 from mocapflow.geometry import silhouettes
 from mocapflow.geometry.cameras import project_each
+from mocapflow.guards.answers import residual_of
 from mocapflow.model import ClothedModel, increment_between, moved
 from mocapflow.records import F32, F64
 

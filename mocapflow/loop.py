@@ -8,15 +8,15 @@ from functools import partial
 
 import numpy as np
 
-from mocapflow.answers import estimate_of, matches_of, segmentation_of
 from mocapflow.assets import Camera
-from mocapflow.cloth_answers import cloth_of
 from mocapflow.components import ClothFitter, Matcher, Observe, PoseSolver, Prior, Segmenter, pool
 from mocapflow.data import NO_CLOTH, Frame, FrameResult, FrameState, Matches, Past, Segmentation, Surface, Turn
 from mocapflow.functional import Functional
 from mocapflow.geometry import silhouettes
 from mocapflow.geometry.cameras import project
 from mocapflow.geometry.contours import at_nearest
+from mocapflow.guards.answers import estimate_of, matches_of, segmentation_of
+from mocapflow.guards.cloth_answers import cloth_of
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64, record
 from mocapflow.scene import Scene

@@ -18,8 +18,8 @@ import pluggy
 from mocapflow import components, hookspecs
 from mocapflow.components import Component
 from mocapflow.errors import MocapflowError, PluginError, UnknownComponent, alternatives
+from mocapflow.guards.vetting import check_hooks, checked, import_file
 from mocapflow.observers import Observers
-from mocapflow.vetting import check_hooks, checked, import_file
 
 GROUP = "mocapflow"  # entry point group, and the distribution of the built-in plugins
 PROVIDERS: Mapping[str, tuple[str, type[Component]]] = {

@@ -9,7 +9,6 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from mocapflow.answers import pose_of, result_of
 from mocapflow.assets import Background
 from mocapflow.caching.keys import FREE
 from mocapflow.components import (
@@ -41,6 +40,7 @@ from mocapflow.data import (
 )
 from mocapflow.errors import ComponentFailed, PipelineError
 from mocapflow.functional import Functional, image_cost
+from mocapflow.guards.answers import pose_of, result_of
 from mocapflow.loop import Steps, settle
 from mocapflow.model import ClothedModel
 from mocapflow.recordings.emptiness import believable

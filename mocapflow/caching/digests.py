@@ -23,13 +23,13 @@ PARSER = threading.Lock()  # CPython 3.11 counts the parser's recursion across t
 MARK = "blake2b:"  # a digest reads "blake2b:<hex> <name>"; the name is for people and never counts
 
 CORE = (
-    "answers",
     "assets",
-    "cloth_answers",
     "components",
     "data",
     "functional",
     "geometry",
+    "guards.answers",
+    "guards.cloth_answers",
     "loop",
     "model",
     "recordings.emptiness",

@@ -6,18 +6,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from mocapflow.answers import (
-    WrongAnswer,
-    estimate_of,
-    matches_of,
-    of_kind,
-    pose_of,
-    residual_of,
-    result_of,
-    segmentation_of,
-)
 from mocapflow.cli import app
-from mocapflow.cloth_answers import cloth_of, mesh_of
 from mocapflow.components import (
     ClothFitter,
     Draper,
@@ -31,6 +20,17 @@ from mocapflow.components import (
 )
 from mocapflow.data import NO_CLOTH, Matches, Past, Pose, Residual, Turn
 from mocapflow.errors import ComponentFailed
+from mocapflow.guards.answers import (
+    WrongAnswer,
+    estimate_of,
+    matches_of,
+    of_kind,
+    pose_of,
+    residual_of,
+    result_of,
+    segmentation_of,
+)
+from mocapflow.guards.cloth_answers import cloth_of, mesh_of
 from mocapflow.testing import pictures, scenes
 from tests.fixtures.stores import STAGES, load, run_tiny, write_pipeline, write_recording
 

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mocapflow.answers import WrongAnswer, array_of, of_kind
 from mocapflow.assets import Body, GarmentMesh
 from mocapflow.components import ClothFitter, Draper, Garment
 from mocapflow.data import Cloth, Estimate, Frame, Past, Pose, PoseBatch, Segmentation, Turn
+from mocapflow.guards.answers import WrongAnswer, array_of, of_kind
 from mocapflow.records import F64, I32
 from mocapflow.scene import Scene
 

@@ -1,0 +1,1 @@
+"""What plugins provide and components answer, looked at where it comes in."""
