@@ -27,10 +27,11 @@ from mocapflow_matching.contour_icp import ContourIcp
 from mocapflow_twist.problem import Problem
 from mocapflow_twist.solver import TwistGaussNewton
 
-from mocapflow import hookimpl, load_pipeline, load_registry, runner
+from mocapflow import hookimpl, load_pipeline, load_registry
 from mocapflow.data import FrameResult, PoseBatch
 from mocapflow.model import ClothedModel
 from mocapflow.registry import Origin
+from mocapflow.running import runner
 from mocapflow.scene import Scene
 from mocapflow.shipped import shipped
 from mocapflow.track import CoupledLoop

@@ -28,7 +28,7 @@ from mocapflow.geometry.sewing import TAKE_UP, THICKNESS
 from mocapflow.model import ClothedModel
 from mocapflow.recordings.recording import open_recording
 from mocapflow.records import F64
-from mocapflow.runner import run
+from mocapflow.running.runner import run
 from mocapflow.scene import Scene
 
 RECORDING = Path("examples/data/skirt_steps")

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from mocapflow.recordings.recording import Recording
     from mocapflow.registry import Registry, load_registry
     from mocapflow.results import Files, RunFolder, Track
-    from mocapflow.runner import plan, run
+    from mocapflow.running.runner import plan, run
     from mocapflow.scene import Scene
 
 _HOMES = {
@@ -64,7 +64,7 @@ _HOMES = {
     "recordings.recording": "Recording",
     "registry": "Registry load_registry",
     "results": "Files RunFolder Track",
-    "runner": "plan run",
+    "running.runner": "plan run",
     "scene": "Scene",
 }
 

@@ -19,7 +19,7 @@ from mocapflow.components import Segmenter
 from mocapflow.errors import ComponentFailed, PipelineError
 from mocapflow.loop import settle
 from mocapflow.recordings.recording import Recording
-from mocapflow.runner import run
+from mocapflow.running.runner import run
 from mocapflow.storage.store import Store
 from tests.fixtures.stores import STAGES, actions, load, run_tiny, same, the_track, write_pipeline, write_recording
 

@@ -54,7 +54,7 @@ def noted(report: Callable[[str], None], folder: Path) -> Iterator[Callable[[str
 
 def last_word(folder: Path) -> str:
     """Return what the run that is going on in a folder has told last, "" if there is none."""
-    from mocapflow.progress import clock
+    from mocapflow.running.progress import clock
     from mocapflow.storage.locks import gone, who
 
     try:

@@ -72,8 +72,8 @@ def export(run: Run, format_: Format) -> None:
 
     Code may have changed since; pipeline and recording may not.
     """
-    from mocapflow import runner
     from mocapflow.commands.running import carry_out
+    from mocapflow.running import runner
 
     invocation = recall(run)
     pipeline = invocation.load()
@@ -96,7 +96,7 @@ def _only_formats(pipeline: Pipeline, formats: Sequence[str]) -> list[str]:
     from mocapflow_export.export import Export
 
     from mocapflow.results import Evaluation, Files
-    from mocapflow.wiring import makes
+    from mocapflow.running.wiring import makes
 
     wanted = f"[{', '.join(formats)}]"
     writers = [named for named in pipeline.stages if makes(named, Files | Evaluation)]

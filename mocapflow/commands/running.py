@@ -17,8 +17,8 @@ from mocapflow.errors import PipelineError
 
 if TYPE_CHECKING:
     from mocapflow.config.pipeline import Pipeline
-    from mocapflow.recipes import Step
-    from mocapflow.runner import RunSummary
+    from mocapflow.running.recipes import Step
+    from mocapflow.running.runner import RunSummary
 
 File = Annotated[Path, typer.Argument(metavar="PIPELINE", help="A pipeline file (.yaml).")]
 Recording = Annotated[Path | None, typer.Option(help="Use this recording folder instead of the file's.")]
@@ -120,7 +120,7 @@ def make_parts(labels: Sequence[str], invocation: Invocation, out: Path, workers
 
 def track(invocation: Invocation, out: Path, label: str) -> None:
     """Make one stage and what it needs."""
-    from mocapflow import runner
+    from mocapflow.running import runner
 
     pipeline, store = invocation.load(), Path(invocation.store)
     with reporter() as report:
@@ -156,7 +156,7 @@ def carry_out(
     made: Mapping[str, str] | None = None,
 ) -> RunSummary:
     """Run the pipeline of an invocation and return the summary; see `runner.run`."""
-    from mocapflow import runner
+    from mocapflow.running import runner
 
     store, url = Path(invocation.store), invocation.url
     with reporter() as shown, noted(shown, out) as report:
@@ -165,7 +165,7 @@ def carry_out(
 
 def _loaded(invocation: Invocation, out: Path) -> Pipeline:
     """Return the pipeline, before anything is written; a run folder or store within its recording is refused."""
-    from mocapflow.runner import check_apart
+    from mocapflow.running.runner import check_apart
 
     pipeline = invocation.load()
     check_apart(out, Path(invocation.store), pipeline.recording)
@@ -174,7 +174,7 @@ def _loaded(invocation: Invocation, out: Path) -> Pipeline:
 
 def _print_plan(invocation: Invocation) -> None:
     pipeline = invocation.load()
-    from mocapflow import runner
+    from mocapflow.running import runner
 
     for line in runner.plan(pipeline, store=Path(invocation.store), url=invocation.url):
         typer.echo(line)

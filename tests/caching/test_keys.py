@@ -10,12 +10,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mocapflow import recipes
 from mocapflow.caching import digests, sources
 from mocapflow.caching.digests import Digests
 from mocapflow.caching.keys import _plain, explain, key_of
 from mocapflow.data import Start
-from mocapflow.recipes import steps_of
+from mocapflow.running import recipes
+from mocapflow.running.recipes import steps_of
 from tests.fixtures.stores import PLUGIN, STAGES, load, write_pipeline, write_recording
 
 SHARED = Digests()  # reads each source file once; every test has files of its own

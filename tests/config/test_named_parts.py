@@ -11,7 +11,7 @@ from mocapflow.config.resolve import Resolver
 from mocapflow.config.yamlfile import read
 from mocapflow.errors import MocapflowError, PipelineError
 from mocapflow.registry import Registry
-from mocapflow.runner import keys, run
+from mocapflow.running.runner import keys, run
 from tests.fixtures.stores import actions, load, write_pipeline, write_recording
 
 PARTS = {"cameras": "lab/rig.toml", "videos": {"cam01": "a.mp4", "cam02": "b.mp4"}}

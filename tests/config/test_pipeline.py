@@ -8,8 +8,8 @@ from mocapflow.config.experiment import load_experiment
 from mocapflow.config.pipeline import load_pipeline
 from mocapflow.errors import MocapflowError
 from mocapflow.registry import load_registry
+from mocapflow.running.wiring import latest, wire
 from mocapflow.shipped import shipped
-from mocapflow.wiring import latest, wire
 from tests.fixtures import small_plugins
 
 TEXT = """\

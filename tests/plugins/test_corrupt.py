@@ -11,7 +11,7 @@ from mocapflow_robustness.hiding import together
 
 from mocapflow.errors import RecordingError
 from mocapflow.recordings.recording import open_recording
-from mocapflow.runner import plan
+from mocapflow.running.runner import plan
 from tests.fixtures.stores import STAGES, actions, load, run_tiny, write_pipeline, write_recording
 
 FRAMES, GOOD = 12, ("cam01",)

@@ -7,9 +7,9 @@ from mocapflow_sequence.flow import FollowPoints
 
 from mocapflow.caching.digests import Digests
 from mocapflow.config.pipeline import load_pipeline
-from mocapflow.recipes import steps_of
 from mocapflow.recordings.recording import open_recording
-from mocapflow.runner import run
+from mocapflow.running.recipes import steps_of
+from mocapflow.running.runner import run
 from mocapflow.storage.store import Store
 from mocapflow.testing.same import same
 from tests.fixtures.stores import PLUGIN, STAGES, write_pipeline, write_recording

@@ -10,7 +10,7 @@ import zarr
 
 from mocapflow.commands.invocation import placed
 from mocapflow.errors import ComponentFailed, StoreError
-from mocapflow.runner import plan, run
+from mocapflow.running.runner import plan, run
 from mocapflow.storage.copies import Copies
 from mocapflow.storage.shared import open_store
 from mocapflow.storage.store import Store

@@ -17,7 +17,7 @@ import zarr
 from mocapflow.assets import Background
 from mocapflow.data import Frame, Past, Pose, Silhouette, Start
 from mocapflow.errors import ComponentFailed, StoreError
-from mocapflow.execution import Execution
+from mocapflow.running.execution import Execution
 from mocapflow.series import Series
 from mocapflow.storage import locks, rows
 from mocapflow.storage.packing import FINE, match_row, quantised
@@ -547,7 +547,7 @@ def test_a_failed_run_gives_its_lock_back(tmp_path, path, monkeypatch):
 
 
 def test_other_versions_are_told(tmp_path, path, monkeypatch):
-    from mocapflow import execution
+    from mocapflow.running import execution
     from mocapflow.storage import store
 
     real = store.versions()

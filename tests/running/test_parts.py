@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from mocapflow.errors import PipelineError
-from mocapflow.parts import in_parts, split
-from mocapflow.runner import plan, run
-from mocapflow.wiring import wire
+from mocapflow.running.parts import in_parts, split
+from mocapflow.running.runner import plan, run
+from mocapflow.running.wiring import wire
 from tests.fixtures.stores import STAGES, actions, load, run_tiny, write_pipeline, write_recording
 
 IN_TWO = ("parts.count=2", "parts.overlap=3")

@@ -12,7 +12,7 @@ from dataclasses import replace
 from mocapflow.config.pipeline import NamedStage, Parts, Pipeline
 from mocapflow.data import Start
 from mocapflow.errors import PipelineError
-from mocapflow.wiring import Source, makes, wire
+from mocapflow.running.wiring import Source, makes, wire
 
 
 def in_parts(pipeline: Pipeline, indices: range) -> Pipeline:

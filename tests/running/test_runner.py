@@ -11,10 +11,10 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from mocapflow.errors import ComponentFailed, GarmentError, PipelineError, StoreError
 from mocapflow.hookspecs import hookimpl
-from mocapflow.runner import plan, run
+from mocapflow.running.runner import plan, run
 from tests.fixtures.stores import STAGES, actions, load, run_tiny, write_pipeline, write_recording
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture

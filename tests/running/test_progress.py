@@ -1,7 +1,7 @@
 """How far a stage is: counts, time left, silence of what is quick."""
 
-from mocapflow import progress
-from mocapflow.progress import Progress, clock
+from mocapflow.running import progress
+from mocapflow.running.progress import Progress, clock
 
 
 def told(monkeypatch, frames, *, seconds, first=1, brief=False):

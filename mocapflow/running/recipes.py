@@ -12,10 +12,10 @@ from mocapflow.caching.digests import Digests, digest_array
 from mocapflow.caching.keys import FORMAT, Recipe, component_recipe, key_of, without_code
 from mocapflow.config.pipeline import NamedStage, Pipeline
 from mocapflow.data import Start
-from mocapflow.parts import in_parts
 from mocapflow.recordings.recording import Recording, open_recording
 from mocapflow.results import Evaluation, Files
-from mocapflow.wiring import Source, latest, makes, wire
+from mocapflow.running.parts import in_parts
+from mocapflow.running.wiring import Source, latest, makes, wire
 
 BEGINNING = 10  # frames
 SEEN = {Start: "first", Background: "all", Rig: "all", Body: "all", Recording: "all"}  # of a stage that says none

@@ -13,12 +13,12 @@ from threadpoolctl import threadpool_limits
 from mocapflow.caching.keys import explain
 from mocapflow.config.pipeline import Pipeline
 from mocapflow.errors import MocapflowError, PipelineError, no_run_folder
-from mocapflow.execution import Execution, is_hit
-from mocapflow.former_code import as_made
-from mocapflow.recipes import Step, steps_of
+from mocapflow.running.execution import Execution, is_hit
+from mocapflow.running.former_code import as_made
+from mocapflow.running.recipes import Step, steps_of
+from mocapflow.running.wiring import SUPPLIED, Source
 from mocapflow.storage.shared import open_store
 from mocapflow.storage.store import Report, Store
-from mocapflow.wiring import SUPPLIED, Source
 
 # what a recording holds; files of a run in there would be taken for its own
 INPUTS = ("videos", "background", "subject", "keypoints", "static", "truth", "reference")

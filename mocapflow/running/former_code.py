@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from mocapflow.errors import PipelineError
-from mocapflow.execution import is_hit
-from mocapflow.recipes import Step
+from mocapflow.running.execution import is_hit
+from mocapflow.running.recipes import Step
 from mocapflow.storage.rows import Corrupted
 from mocapflow.storage.store import Artifact, Report, Store
 

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from mocapflow.assets import Body, GarmentMesh
-from mocapflow.blame import failure
 from mocapflow.components import Component, Garment
 from mocapflow.config.named_parts import whereabouts
 from mocapflow.config.pipeline import Pipeline
@@ -28,18 +27,19 @@ from mocapflow.errors import (
 )
 from mocapflow.guards.answers import of_kind
 from mocapflow.guards.cloth_answers import mesh_of
-from mocapflow.progress import Progress
-from mocapflow.recipes import Step
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import unwatched
 from mocapflow.results import RunFolder
+from mocapflow.running.blame import failure
+from mocapflow.running.progress import Progress
+from mocapflow.running.recipes import Step
+from mocapflow.running.warned import warnings_logged
+from mocapflow.running.wiring import Source, made_by
 from mocapflow.scene import Scene
 from mocapflow.storage.checkpoint import Checkpoint
 from mocapflow.storage.locks import Lock
 from mocapflow.storage.rows import Corrupted
 from mocapflow.storage.store import Artifact, Report, Store, versions, with_versions
-from mocapflow.warned import warnings_logged
-from mocapflow.wiring import Source, made_by
 
 
 def is_hit(step: Step, artifact: Artifact) -> bool:
