@@ -19,7 +19,7 @@ from pathlib import Path
 
 from long_recording import MOCAPFLOW, build, resident
 
-from mocapflow.shipped import shipped
+from mocapflow.help.shipped import shipped
 
 TRACKED = 24  # frames
 EVERY = 0.02  # s between looks at the memory

@@ -30,12 +30,12 @@ from mocapflow.assets import Background
 from mocapflow.components import Matcher, Recovery, Segmenter
 from mocapflow.data import NO_CLOTH, Frame, FrameResult, FrameState, Past, Pose, Segmentation, Silhouette, Turn
 from mocapflow.geometry import silhouettes, twists
+from mocapflow.help.shipped import shipped
 from mocapflow.io.cameras import read_cameras
 from mocapflow.loop import Steps, settle
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow.scene import Scene
-from mocapflow.shipped import shipped
 from mocapflow.steady import Steady
 from mocapflow.track import believed
 

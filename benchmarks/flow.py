@@ -27,9 +27,9 @@ from mocapflow_sequence.flow import FollowPoints
 from mocapflow.components import Matcher
 from mocapflow.data import NO_CLOTH, Change, Frame, Moment, Past, Pose, Turn
 from mocapflow.geometry.cameras import project
+from mocapflow.help.shipped import shipped
 from mocapflow.recordings.recording import open_recording
 from mocapflow.scene import Scene
-from mocapflow.shipped import shipped
 
 CLIP, ROUNDS = "shorts_steps", 20
 FIRST = Turn(index=0, cap=3)

@@ -29,11 +29,11 @@ from mocapflow_twist.solver import TwistGaussNewton
 
 from mocapflow import hookimpl, load_pipeline, load_registry
 from mocapflow.data import FrameResult, PoseBatch
+from mocapflow.help.shipped import shipped
 from mocapflow.model import ClothedModel
 from mocapflow.registry import Origin
 from mocapflow.running import runner
 from mocapflow.scene import Scene
-from mocapflow.shipped import shipped
 from mocapflow.track import CoupledLoop
 
 WARM_UP = 2  # frames

@@ -23,7 +23,7 @@ from typing import Any
 
 import yaml
 
-from mocapflow.shipped import shipped
+from mocapflow.help.shipped import shipped
 
 MOCAPFLOW = Path(sys.executable).with_name("mocapflow")
 CLIPS = [str(shipped("examples", "data", f"{name}_steps")) for name in ("skirt", "shorts")]

@@ -22,8 +22,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from mocapflow.help.shipped import shipped
 from mocapflow.results import Track
-from mocapflow.shipped import shipped
 from mocapflow.storage.store import Artifact, Store
 
 MOCAPFLOW = Path(sys.executable).with_name("mocapflow")

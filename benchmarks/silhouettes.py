@@ -22,9 +22,9 @@ from mocapflow.data import CLOTH, NO_CLOTH, Surface
 from mocapflow.geometry import meshes, silhouettes, span_kernels
 from mocapflow.geometry import silhouette_kernels as kernels
 from mocapflow.geometry.cameras import projection
+from mocapflow.help.shipped import shipped
 from mocapflow.io.cameras import read_cameras
 from mocapflow.scene import Scene
-from mocapflow.shipped import shipped
 
 CLIP = shipped("examples", "data", "skirt_steps")
 SIZE = np.array([640, 800])  # px

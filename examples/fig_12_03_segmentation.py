@@ -17,9 +17,9 @@ from mocapflow_levelset.masks import counted
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.statistics import Window
 
+from mocapflow.help.shipped import shipped
 from mocapflow.recordings.recording import open_recording
 from mocapflow.records import F32, U8
-from mocapflow.shipped import shipped
 
 STEPS = (0, 5, 15, 50)
 CAMERA = 1

@@ -24,10 +24,10 @@ from mocapflow import (
     load_pipeline,
     load_registry,
 )
+from mocapflow.help.shipped import shipped
 from mocapflow.loop import settle
 from mocapflow.recordings.recording import open_recording
 from mocapflow.records import F64, U8
-from mocapflow.shipped import shipped
 from mocapflow.timing import Stopwatch
 from mocapflow.track import CoupledLoop
 

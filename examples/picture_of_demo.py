@@ -14,9 +14,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from mocapflow_export import layout
 
+from mocapflow.help.shipped import shipped
 from mocapflow.io.columns import read_columns
 from mocapflow.records import F64, U8
-from mocapflow.shipped import shipped
 
 HEIGHT = 480  # px
 VIEWS = ("cam01", "cam04")

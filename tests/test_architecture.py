@@ -12,7 +12,7 @@ import pytest
 
 import mocapflow
 from mocapflow import hookspecs
-from mocapflow.equations import definitions, table
+from mocapflow.help.equations import definitions, table
 
 ROOT = Path(mocapflow.__file__).parent
 PLUGINS = ROOT.parent / "plugins"
@@ -45,11 +45,7 @@ LAYERS = (  # a module imports only from its own layer or an earlier one; in a f
     "track",
     "running",
     "testing",
-    "shipped",
-    "equations",
-    "describe",
-    "manual",
-    "scaffold",
+    "help",
     "commands",
     "cli",
     "__main__",

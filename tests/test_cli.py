@@ -17,9 +17,9 @@ from mocapflow import cli, registry
 from mocapflow.commands import pictures, results
 from mocapflow.commands.invocation import FILE, Invocation, remember
 from mocapflow.commands.progress import reporter
+from mocapflow.help.shipped import shipped
 from mocapflow.io.columns import read_columns
 from mocapflow.running import runner
-from mocapflow.shipped import shipped
 from mocapflow.storage.locks import myself
 from tests.fixtures.stores import STAGES, write_pipeline, write_recording
 

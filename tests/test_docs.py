@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from mocapflow import load_registry
-from mocapflow.manual import manual
+from mocapflow.help.manual import manual
 
 ROOT = Path(__file__).parents[1]
 

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 import pytest
 
-from mocapflow.shipped import shipped
+from mocapflow.help.shipped import shipped
 
 MOCAPFLOW = Path(sys.executable).with_name("mocapflow")
 PIPELINES = shipped("pipelines")

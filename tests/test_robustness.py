@@ -15,8 +15,8 @@ from mocapflow_priors.parzen import SHIPPED
 from mocapflow.config.pipeline import load_pipeline
 from mocapflow.data import NO_CLOTH, Moment, Past, Start
 from mocapflow.geometry import twists
+from mocapflow.help.shipped import shipped
 from mocapflow.model import ClothedModel
-from mocapflow.shipped import shipped
 from mocapflow.timing import Stopwatch
 from mocapflow.track import CoupledLoop
 

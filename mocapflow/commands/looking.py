@@ -42,7 +42,7 @@ def show(
     draper: Annotated[str, typer.Option(help="Lays the garment in the picture.")] = "kinematic",
 ) -> None:
     """Show what a component does and its settings; draw a garment."""
-    from mocapflow.describe import describe
+    from mocapflow.help.describe import describe
     from mocapflow.registry import load_registry
 
     registry = load_registry()
@@ -74,7 +74,7 @@ def settings(
     package: Annotated[str, typer.Argument(metavar="[PACKAGE]", help="Only its.", show_default=False)] = "",
 ) -> None:
     """Print the settings of every installed component as a Markdown document."""
-    from mocapflow.manual import manual
+    from mocapflow.help.manual import manual
     from mocapflow.registry import load_registry
 
     registry = load_registry()
@@ -86,7 +86,7 @@ def equations(
     wanted: Annotated[str, typer.Argument(metavar="[FILTER]", help="A number or a word.", show_default=False)] = "",
 ) -> None:
     """List the equations of the paper with the functions that implement them."""
-    from mocapflow.equations import table
+    from mocapflow.help.equations import table
 
     found = [row for row in table() if wanted.lower() in f"{row.number} {row.what} {row.function}".lower()]
     if not found:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from mocapflow import scaffold
+from mocapflow.help import scaffold
 
 app = typer.Typer(help="Begin something of your own.", no_args_is_help=True)
 

@@ -14,11 +14,11 @@ from mocapflow.config.measures import garment_of
 from mocapflow.config.resolve import Resolver
 from mocapflow.data import Past, Pose
 from mocapflow.errors import StoreError
+from mocapflow.help.shipped import shipped
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64, U8
 from mocapflow.registry import Registry
 from mocapflow.scene import Scene
-from mocapflow.shipped import shipped
 
 CLIPS = ("skirt_steps", "shorts_steps")
 RAISED = {"hip_l.flexion": 65.0, "knee_l.flexion": 70.0}  # deg

@@ -91,7 +91,7 @@ def status(run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run
 
 def demo(out: Annotated[Path, typer.Option(help="The run folder.")] = Path("runs/demo")) -> None:
     """Track the example recording that comes with mocapflow."""
-    from mocapflow.shipped import shipped
+    from mocapflow.help.shipped import shipped
 
     execute(_invocation(shipped("pipelines", "demo.yaml"), None, out, None, None, None), out)
     typer.echo(f"overlay videos  {out / 'overlay'}")

@@ -7,9 +7,9 @@ from mocapflow.assets import Body
 from mocapflow.config.experiment import load_experiment
 from mocapflow.config.pipeline import load_pipeline
 from mocapflow.errors import MocapflowError
+from mocapflow.help.shipped import shipped
 from mocapflow.registry import load_registry
 from mocapflow.running.wiring import latest, wire
-from mocapflow.shipped import shipped
 from tests.fixtures import small_plugins
 
 TEXT = """\

@@ -10,8 +10,8 @@ from mocapflow.assets import Background
 from mocapflow.data import Past, Turn
 from mocapflow.errors import RecordingError
 from mocapflow.geometry.cameras import project
+from mocapflow.help.shipped import shipped
 from mocapflow.recordings.recording import open_recording
-from mocapflow.shipped import shipped
 from mocapflow.testing import pictures, scenes
 from tests.fixtures.recordings import number_of, ring, write_recording
 

@@ -7,8 +7,8 @@ import pytest
 from mocapflow import testing
 from mocapflow.config.documents import Document, Place
 from mocapflow.config.resolve import Resolver
+from mocapflow.help.shipped import shipped
 from mocapflow.registry import PROVIDERS, load_registry
-from mocapflow.shipped import shipped
 
 REGISTRY = load_registry()
 CLIP = shipped("examples", "data", "skirt_steps")

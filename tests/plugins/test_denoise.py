@@ -9,8 +9,8 @@ from mocapflow_robustness import pixels
 from mocapflow_robustness.corrupt import Corrupt
 from mocapflow_robustness.denoise import Denoise, filled, in_company, noise_share
 
+from mocapflow.help.shipped import shipped
 from mocapflow.recordings.recording import open_recording
-from mocapflow.shipped import shipped
 from tests.fixtures.stores import write_recording
 
 SHAPE = (96, 128)

@@ -13,7 +13,7 @@ import readers
 from mocapflow_export.formats import FILES
 
 from mocapflow.geometry import angles
-from mocapflow.shipped import shipped
+from mocapflow.help.shipped import shipped
 
 MOCAPFLOW = Path(sys.executable).with_name("mocapflow")
 FRAMES = 3

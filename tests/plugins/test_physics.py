@@ -14,7 +14,7 @@ from mocapflow_physics.motion import between
 from mocapflow.config.pipeline import load_pipeline
 from mocapflow.data import Cloth, Moment, Past, Pose, PoseBatch
 from mocapflow.errors import PipelineError
-from mocapflow.shipped import shipped
+from mocapflow.help.shipped import shipped
 from mocapflow.testing import tiny_scene
 
 SCENE = tiny_scene(clothed=True)

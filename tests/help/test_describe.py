@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import BaseModel, Field
 
 from mocapflow.components import Predictor, Prior
-from mocapflow.describe import Setting, settings
+from mocapflow.help.describe import Setting, settings
 
 
 class Rest(BaseModel):

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from mocapflow import load_registry
 from mocapflow.cli import app
 from mocapflow.errors import PluginError
-from mocapflow.scaffold import KINDS, write_plugin
+from mocapflow.help.scaffold import KINDS, write_plugin
 
 
 @pytest.mark.parametrize("role", KINDS)

@@ -9,8 +9,8 @@ from pydantic import BaseModel
 
 from mocapflow.config.experiment import ExperimentFile
 from mocapflow.config.pipeline import PipelineFile
-from mocapflow.describe import Setting, settings
 from mocapflow.errors import UnknownComponent, alternatives
+from mocapflow.help.describe import Setting, settings
 from mocapflow.registry import PROVIDERS, Registry
 
 INTRODUCTION = """# Settings
