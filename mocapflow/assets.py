@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from mocapflow.errors import GarmentError, MocapflowError, ShapeError, alternatives
@@ -127,8 +129,12 @@ class Background:
     """The empty scene, per camera: mean and spread of every pixel."""
 
     mean: tuple[F32, ...] = arrays("H", "W", "BGR", unit="grey levels")
-    spread: tuple[F32, ...] = arrays("H", "W", "BGR", unit="grey levels, standard deviation")
-    assumed: bool = False  # from pictures with people in them: whoever stayed in place is part of it
+    spread: tuple[F32, ...] = arrays("H", "W", "BGR", unit="grey levels, standard deviation; inf where nobody knows")
+
+    @cached_property
+    def known(self) -> tuple[Bool, ...]:
+        """Where it is known what a view shows without the person: (H, W) each."""
+        return tuple(np.asarray(np.isfinite(spread).all(axis=2)) for spread in self.spread)
 
 
 def _stray(index: I32, count: int, least: int) -> int | None:

@@ -93,9 +93,11 @@ class BackgroundDifference(ShadowAware):
         calm = features(calmed(image, self.smooth_px), CHANNELS)
         values, expected = calm.reshape(len(calm), -1), plate.planes.reshape(len(calm), -1)
         density = density_of(values, expected, plate.spread.ravel(), floor.ravel(), CHANNELS, self.shadow())
-        change = cv2.GaussianBlur(np.clip(-density.reshape(model.shape), -6, 6), (0, 0), self.smooth_px)
-        if hidden is not None:
-            change[hidden] = np.clip(model[hidden], -1, 1)  # nothing else tells
+        unknown = np.isnan(density).reshape(model.shape)
+        bounded = np.nan_to_num(np.clip(-density.reshape(model.shape), -6, 6))
+        change = cv2.GaussianBlur(bounded, (0, 0), self.smooth_px)
+        untold = unknown if hidden is None else unknown | hidden
+        change[untold] = np.clip(model[untold], -1, 1)  # nothing else tells
         kept = self._person(change > 0, model)
         return np.where(kept, np.maximum(change, 0.1), np.minimum(change, -0.1)).astype(np.float32)
 

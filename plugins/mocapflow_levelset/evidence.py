@@ -22,7 +22,7 @@ class Evidence(NamedTuple):
     weight: F32  # (H, W) 1 where a pixel counts, 0 where it is masked
     stride: int
     along: Callable[[I32], F32]  # features (C, N) of the N pixels of some runs
-    outside: Callable[[I32, F32], F32] | None = None  # log density (N,) in the empty scene, from runs and features
+    outside: Callable[[I32, F32], F32] | None = None  # log density (N,) in the empty scene of runs and features, or NaN
     told: F32 | None = None  # (H, W) log ratio of inside and outside that is known besides
 
 

@@ -105,7 +105,7 @@ def near(level: F32, weights: Weights, first: int = 0) -> I32:
 def log_ratio(runs: I32, evidence: Evidence, gaussians: F32, cell_px: int, stride: int, clip: float, out: F32) -> None:
     """Write log p1 - log p2, clipped, into `out` (H, W) along the runs; masked pixels get 0.
 
-    Outside, the empty scene speaks where it is known, else the local statistics.
+    Outside, the empty scene speaks where it is known (no NaN), else the local statistics.
     """
     if not len(runs):  # the contour has left the image
         return

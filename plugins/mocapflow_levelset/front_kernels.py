@@ -41,7 +41,6 @@ def log_ratio(runs, values, weight, outside, known, gaussians, cell, first, clip
     """Add the log densities channel by channel along stretches between two cell centres."""
     rows, columns, _, entries = gaussians.shape
     zero, scale = np.float32(0), np.float32(1 / cell)
-    least = -clip if known else -np.float32(np.inf)  # of the person's density, beside a known room
     inside, beyond = np.empty(weight.shape[1], np.float32), np.empty(weight.shape[1], np.float32)
     n = 0
     for r in range(len(runs)):
@@ -55,16 +54,17 @@ def log_ratio(runs, values, weight, outside, known, gaussians, cell, first, clip
             j0, j1 = min(max(j, 0), columns - 1), min(max(j + 1, 0), columns - 1)
             start = (np.float32(x) - first) * scale - np.float32(j)
             stretch(gaussians[i, :, 0], gaussians[below, :, 0], fy, j0, j1, start, scale, values, n, inside[: stop - x])
-            if known:
-                for k in range(stop - x):
-                    beyond[k] = outside[n + k]
-            else:
+            if not known or np.isnan(outside[n : n + stop - x]).any():
                 stretch(
                     gaussians[i, :, 1], gaussians[below, :, 1], fy, j0, j1, start, scale, values, n, beyond[: stop - x]
                 )
+            if known:
+                for k in range(stop - x):
+                    if not np.isnan(outside[n + k]):
+                        inside[k], beyond[k] = max(inside[k], -clip), outside[n + k]
             counts, ratio = weight[y, x:stop], out[y, x:stop]
             for k in range(ratio.size):
-                ratio[k] = counts[k] * min(max(max(inside[k], least) - beyond[k], -clip), clip)
+                ratio[k] = counts[k] * min(max(inside[k] - beyond[k], -clip), clip)
             n += stop - x
             x = stop
 

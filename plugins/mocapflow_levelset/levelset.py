@@ -142,7 +142,9 @@ class LevelSet(ShadowAware):
 
     def _matte(self, scene: Scene, camera: int) -> Matte | None:
         background = self._background(scene)
-        return Matte(background.mean[camera], self.matte_px) if background and self.matte_px else None
+        if background is None or not self.matte_px:
+            return None
+        return Matte(background.mean[camera], background.known[camera], self.matte_px)
 
     def _background(self, scene: Scene) -> Background | None:
         return scene.background if self.use_background else None

@@ -54,12 +54,12 @@ def plate_of(mean: F32, spread: F32, channels: Sequence[ChannelName], factor: in
 def density_of(
     values: F32, plate: F32, spread: F32, floor: Bool, channels: Sequence[ChannelName], shadow: Shadow
 ) -> F32:
-    """Return the log density (N,) of pixels under the empty scene.
+    """Return the log density (N,) of pixels under the empty scene; NaN where nobody knows it.
 
     Args:
         values: (C, N) features of the pixels.
         plate: (C, N) those of the empty scene there.
-        spread: (N,) its standard deviation.
+        spread: (N,) its standard deviation, inf where nobody knows it.
         floor: (N,) True where a shadow may fall.
         channels: what the features are.
         shadow: what counts as background.
@@ -80,6 +80,9 @@ def _densities(values, plate, spread, may_fall, shadow, lab, out):  # type: igno
     floor = shadow[0]
     channels = values.shape[0]
     for n in range(out.size):
+        if np.isinf(spread[n]):
+            out[n] = np.nan
+            continue
         variance = max(spread[n] * spread[n], floor * floor)
         inverse = np.float32(0.5) / variance
         norm = LOG_ROOT - np.float32(0.5) * np.log(variance)

@@ -40,6 +40,7 @@ class Matte(NamedTuple):
     """How to place the contour within its pixels."""
 
     room: F32  # (H, W, 3) BGR, the empty room
+    known: Bool  # (H, W) True where it is known
     reach_px: int  # across the edge to either side
 
 
@@ -105,7 +106,8 @@ def find(view: View, levels: Sequence[Level], method: Method, band_px: float) ->
         front = _by_chromaticity(front, view, view.contact, crop, method)
     if view.matte is not None:
         front = redistance(front, NEAR_PX)
-        front = sharpened(front, image, crop.of(view.matte.room), _movable(view, crop), view.matte.reach_px)
+        movable = crop.of(view.matte.known) & _movable(view, crop)
+        front = sharpened(front, image, crop.of(view.matte.room), movable, view.matte.reach_px)
     new = np.clip(_brought(front, factor, 1, band_px), -band_px, band_px)
     # near the rim of a part its statistics lack a side
     kept = crop if view.moved is None else crops.around(view.moved, method.margin_px // 2, multiple)

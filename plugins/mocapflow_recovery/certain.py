@@ -43,6 +43,7 @@ class View(NamedTuple):
     cloth: Bool  # (h, w) pixels of the person that show the garment, by its colours; none are known in a first frame
     away: F32  # (h, w) px to the nearest pixel that may be the person; 0 on it
     pixel_m: float  # how large a pixel is where the person stands
+    known: float  # share of the model's area before a room that somebody knows
 
 
 @once
@@ -83,17 +84,21 @@ def views(frame: Frame, surface: Surface, room: Room, near_m: float, garment: F6
         person = _near(changed & told, model, near_m / size)
         if np.count_nonzero(person) < MOST * np.count_nonzero(model):
             cloth = np.zeros(person.shape, bool) if garment is None else person & (garment[bins_of(small)] > SURELY)
-            found.append(View(camera, person, cloth, _away(same & told, person), size))
+            known = float(np.isfinite(plate.spread)[model].mean()) if model.any() else 0.0
+            found.append(View(camera, person, cloth, _away(same & told, person), size, known))
     return found
 
 
 def _compared(image: U8, plate: Plate, floor: Bool) -> tuple[Bool, Bool]:
-    """Return where an image (h, w, 3) is not the empty room, lit or shaded, and where it looks just like it."""
+    """Return where an image (h, w, 3) is not the empty room, lit or shaded, and where it looks just like it.
+
+    Where nobody knows the room, it is neither.
+    """
     values = features(image, CHANNELS)
     flat, expected, spread = values.reshape(len(values), -1), plate.planes.reshape(len(values), -1), plate.spread
     density = density_of(flat, expected, spread.ravel(), floor.ravel(), CHANNELS, SHADOW).reshape(floor.shape)
     off = np.sum((values - plate.planes) ** 2, axis=0) / np.maximum(spread, SHADOW.floor) ** 2
-    return density < 0, off < EMPTY**2
+    return density < 0, (off < EMPTY**2) & np.isfinite(spread)
 
 
 def _away(empty: Bool, person: Bool) -> F32:

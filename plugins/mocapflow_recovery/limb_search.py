@@ -47,7 +47,7 @@ class LimbSearch(Recovery):
     The first frame starts from a pose that was given and is about right (`start_deg`). So it is searched near that one
     first, and of two poses that fit alike the nearer one is taken: crossed legs look the same exchanged.
     What shows the garment's colours calls for a search where it strays, but moves no part and is no doubt: it may fly.
-    It needs the empty scene; without one every fit is taken as it is.
+    It needs the empty scene; where little of it is known behind the person every fit is taken as it is.
     """
 
     name: ClassVar[str] = "limb_search"
@@ -57,6 +57,7 @@ class LimbSearch(Recovery):
     beginnings: bool = True  # limbs are looked for in the first frame, and in the first one after a gap
     leap_deg: PositiveOrInf = 20.0  # from what was believed and from all `poses`: a limb so far from both is looked for
     overbent_deg: PositiveOrInf = 5.0  # of a joint, beyond its limits: they are soft, and what is lost goes there
+    least_known: Annotated[float, Field(ge=0, le=1)] = 0.4  # of the room behind the model, mean of the views
     reach_m: PositiveFloat = 0.06  # what lies nearer to the other does not count
     hint_m: PositiveFloat = 0.03  # nor, as a hint, what lies nearer than this
     cloth_m: PositiveFloat = 0.2  # what lies so near to the garment may be the garment, wherever it swings
@@ -91,6 +92,8 @@ class LimbSearch(Recovery):
             return result
         room, surface = small_room(background, model.scene.cameras, self.rows), surface_of(model, result)
         seen = views(frame, surface, room, self.near_m, garment_told(past, model.scene))
+        if not seen or np.mean([view.known for view in seen]) < self.least_known:
+            return result
         stray = stray_of(surface, model.scene, seen, self._reach())
         doubtful, fitted = self._doubtful(stray), result.state.estimate.pose
         why = f"fit doubted, {stray}" if doubtful else self._suspicion(stray, fitted, state, past, model.scene.body)

@@ -56,6 +56,34 @@ def test_it_corrects_the_predicted_outline(scene, pose, known):
     assert np.mean(after) > np.mean(before) + 0.03
 
 
+def test_where_nobody_knows_the_room_local_colours_tell(scene, pose):
+    """As if there were no room."""
+    frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, believed(pose))
+    background = scene.background
+    unknown = replace(background, spread=tuple(np.full_like(part, np.inf) for part in background.spread))
+    segmenter = LevelSet(decorrelate=False, matte_px=0)
+    found, without, with_room = (
+        segmenter.segment(frame, state, Past(), scene.with_background(room), FIRST).of("person")
+        for room in (unknown, None, background)
+    )
+    for one, other, known in zip(found, without, with_room, strict=True):
+        np.testing.assert_array_equal(one.distance, other.distance)
+        assert (one.distance != known.distance).any()
+
+
+def test_the_matte_moves_nothing_where_nobody_knows_the_room(scene, pose):
+    frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, pose)
+    background = scene.background
+    unknown = replace(background, spread=tuple(np.full_like(part, np.inf) for part in background.spread))
+    brighter = replace(unknown, mean=tuple(part + 20 for part in background.mean))
+    found, same = (
+        LevelSet().segment(frame, state, Past(), scene.with_background(room), FIRST).of("person")
+        for room in (unknown, brighter)
+    )
+    for one, other in zip(found, same, strict=True):
+        np.testing.assert_array_equal(one.distance, other.distance)
+
+
 def test_later_turns_start_from_the_last_silhouettes(scene, pose):
     """A warm start with few steps stays at the solution although the model is off."""
     frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, believed(pose))

@@ -111,6 +111,9 @@ def test_beside_a_known_room_the_persons_density_has_a_least_value():
     gaussians[0, 0, 1] = -2.0, 0.0, 0.0  # of a room that is not known: there is no least value
     kernels.log_ratio(runs, values, weight, outside[:0], False, gaussians, 1, zero, clip, found)
     np.testing.assert_allclose(found[0], [2.0, -2.0, -6.0, -6.0], atol=1e-4)
+    outside[2:] = np.nan  # nor where nobody knows it, beside where it is known
+    kernels.log_ratio(runs, values, weight, outside, True, gaussians, 1, zero, clip, found)
+    np.testing.assert_allclose(found[0], [2.0, -2.0, -6.0, -6.0], atol=1e-4)
 
 
 def test_masked_pixels_do_not_count():

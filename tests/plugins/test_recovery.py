@@ -72,6 +72,18 @@ def test_a_shadow_is_neither() -> None:
         assert np.mean(after.away[part] == 0) > np.mean(before.away[part] == 0) + 0.5  # nor surely the room
 
 
+def test_where_nobody_knows_the_room_it_is_neither() -> None:
+    background = SCENE.background
+    spread = tuple(part.copy() for part in background.spread)
+    for part in spread:
+        part[:, :160] = np.inf
+    room = small_room(replace(background, spread=spread), SCENE.cameras, 120)
+    for view in views(FRAME, surface(POSE), room, 0.35):
+        assert not view.person[:, :80].any()
+        assert not view.away[:, :80].any()
+        assert view.person[:, 80:].any()
+
+
 def test_what_hides_the_person_is_neither() -> None:
     bar = np.zeros(FRAME.images[0].shape[:2], bool)
     bar[100:130] = True
@@ -214,6 +226,27 @@ def test_a_fit_that_still_strays_is_doubted(end, doubted) -> None:
     lost = pictures.tiny_state(SCENE, astray(0.9), POSE)
     past, model = scenes.tiny_past(SCENE, POSE), scenes.tiny_model(SCENE)
     assert LimbSearch().recover(FRAME, lost, settled(lost), past, model, settle).doubted == doubted
+
+
+@pytest.mark.parametrize(("columns", "looked"), [(150, True), (190, False)], ids=["half", "little"])
+def test_limbs_are_looked_for_where_enough_of_the_room_is_known(columns, looked) -> None:
+    def settle(pose, parameters):
+        return settled(pictures.tiny_state(SCENE, POSE, POSE))
+
+    spread = tuple(part.copy() for part in SCENE.background.spread)
+    for part in spread:
+        part[:, :columns] = np.inf
+    scene = SCENE.with_background(replace(SCENE.background, spread=spread))
+    lost = pictures.tiny_state(SCENE, astray(0.9), POSE)
+    shares = [
+        view.known
+        for view in views(FRAME, surface(astray(0.9)), small_room(scene.background, SCENE.cameras, 160), 0.35)
+    ]
+    assert (np.mean(shares) > LimbSearch().least_known) == looked
+    found = LimbSearch().recover(
+        FRAME, lost, settled(lost), scenes.tiny_past(SCENE, POSE), scenes.tiny_model(scene), settle
+    )
+    assert bool(found.notes) == looked
 
 
 @pytest.mark.parametrize(
