@@ -43,7 +43,6 @@ from mocapflow.functional import Functional, image_cost
 from mocapflow.guards.answers import pose_of, result_of
 from mocapflow.loop import Steps, settle
 from mocapflow.model import ClothedModel
-from mocapflow.recordings.emptiness import believable
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow.results import ImageFlow, Track, ViewChecks
@@ -104,8 +103,6 @@ class CoupledLoop(Stage):
         if scene.garment is not None and self.draper is None:
             hint = "name a draper and a cloth_fitter, or track the bare body: garment: null"
             raise PipelineError(f"the person wears a {scene.garment.name}, which the track does not drape", hint=hint)
-        if background is not None and not believable(background, recording, start, scene):
-            background = None
         scene = scene.with_background(background).simplified(self.body_faces)
         model = ClothedModel(scene=scene, draper=self.draper)
         if self.keep == "trace":

@@ -99,7 +99,7 @@ def test_a_reference_that_is_missing_is_told_before_anything_is_tracked(call):
 
 def test_what_comes_from_the_store_needs_no_files(call, tmp_path):
     shutil.copytree(CLIP, tmp_path / "clip")
-    Path("start.yaml").write_text("recording: clip\nstages: {turned: {use: background, source: plates}}\n")
+    Path("start.yaml").write_text("recording: clip\nstages: {checked: check_views}\n")
     assert call("run", "start.yaml", "--frames", "0:2").exit_code == 0
     shutil.rmtree(tmp_path / "clip/subject")  # which nobody reads
     assert call("plan", "start.yaml", "--frames", "0:2").exit_code == 0

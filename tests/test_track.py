@@ -235,20 +235,6 @@ def test_what_the_first_segmenter_finds_is_kept_where_images_fit_better_from_the
     assert kept is (approached if helps else given)
 
 
-@pytest.mark.parametrize("empty", [True, False])
-def test_an_empty_scene_that_is_not_empty_is_not_used(tmp_path, monkeypatch, empty):
-    known = []
-
-    def spy(frame, state, past, steps, model, observe):
-        known.append(model.scene.background is not None)
-        return settle(frame, state, past, steps, model, observe)
-
-    monkeypatch.setattr("mocapflow.track.settle", spy)
-    monkeypatch.setattr("mocapflow.track.believable", lambda *_: empty)
-    run_tiny(write_pipeline(tmp_path, write_recording(tmp_path / "clip")), tmp_path, frames=2)
-    assert set(known) == {empty}
-
-
 @pytest.mark.parametrize("without", [True, False])
 def test_a_first_segmenter_that_needs_the_empty_scene_is_left_out_without(tmp_path, monkeypatch, begun, without):
     monkeypatch.setattr(Segmenter, "needs_background", without)

@@ -32,7 +32,6 @@ CORE = (
     "guards.cloth_answers",
     "loop",
     "model",
-    "recordings.emptiness",
     "records",
     "results",
     "scene",
