@@ -2,24 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numba
 import numpy as np
 
 from mocapflow.io.plates import LEAST_SPREAD, NORMAL
 from mocapflow.records import F32, U8
+from mocapflow_sequence.colours import Colours
 
 ALIKE = 4.0  # standard deviations of the noise within which a pixel has the same colour in two pictures
 LEAST_ALIKE = 6.0  # grey levels: compressed pictures differ by so much where nothing moves
-
-
-class Colours(NamedTuple):
-    """One colour of each pixel of a view."""
-
-    mean: F32  # (H, W, 3) grey levels
-    spread: F32  # (H, W, 3) standard deviation, grey levels
-    share: F32  # (H, W) of the pictures that show it; 0: none is left
 
 
 def commonest(pictures: U8, count: int) -> list[Colours]:

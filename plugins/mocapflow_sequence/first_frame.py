@@ -12,20 +12,14 @@ from mocapflow.assets import Camera
 from mocapflow.data import Surface
 from mocapflow.geometry.cameras import magnification
 from mocapflow.geometry.silhouettes import mask, outline
-from mocapflow.records import F32, F64, I32, U8, Bool
-from mocapflow_sequence.commonest import Colours, commonest
+from mocapflow.records import F32, F64, U8, Bool
+from mocapflow_sequence.colours import Colours, alike, bins_of, every, more_common, shaded
+from mocapflow_sequence.commonest import commonest
 
 COLOURS = 4  # of each pixel that are looked at: the room's, of who stands there, of shadows
-ALIKE = 3.0  # standard deviations within which two colours of a pixel are the same
-NOISE = 3.0  # grey levels, the least standard deviation
-TINT, SHADE = 1.07, 2.0  # one colour in a shadow of the other: channels fall alike, to half of the levels at most
 REACH_M = 0.15  # from the body at the start pose: limbs may be off by so much, and clothes stand off
 AROUND_M = 0.5  # up to where the room beside the person is looked at
-ROOM = 1.5  # times as common beside the person as on it: a colour of the room
 ROUNDS = 2  # first the body as believed is the person, then what differs there from the room that was found
-BINS = (32, 64, 64)  # of lightness and the two colours of CIELAB
-SMOOTH = 1.0  # bins, of the densities
-RARE = 3e-4  # a colour that is rarer beside the person says nothing
 
 
 class Learnt(NamedTuple):
@@ -99,57 +93,10 @@ def lit(learnt: Learnt, pictures: U8, evidence: Evidence, usual: F32) -> Learnt:
     found = Learnt(dim.mean.copy(), dim.spread)
     for picture in pictures:
         colour = _shown(picture[floor][:, None], usual)
-        brighter = _every(colour.mean > found.mean) & ~alike(colour, found.mean)
+        brighter = every(colour.mean > found.mean) & ~alike(colour, found.mean)
         _take(found, colour, brighter & shaded(colour.mean, dim.mean) & there.of_room(colour))
     learnt.mean[floor], learnt.spread[floor] = found.mean[:, 0], found.spread[:, 0]
     return learnt
-
-
-def more_common(beside: I32, on: I32) -> Bool:
-    """Return for each colour whether it is more common among some pixels (N,) than among others (M,)."""
-    found: Bool = _density(beside) > ROOM * (_density(on) + RARE)
-    return found
-
-
-def alike(colour: Colours, other: F32) -> Bool:
-    """Return where (H, W) a colour is another one but for noise."""
-    near = np.abs(colour.mean - other) < ALIKE * np.maximum(colour.spread, NOISE)
-    return _every(near)
-
-
-def shaded(colour: F32, other: F32) -> Bool:
-    """Return where (H, W) one of two colours is the other in a neutral shadow."""
-    b, g, r = np.moveaxis((colour + 1) / (other + 1), 2, 0)
-    low, high = np.minimum(np.minimum(b, g), r), np.maximum(np.maximum(b, g), r)
-    found: Bool = (high < TINT * low) & (low > 1 / SHADE) & (high < SHADE)
-    return found
-
-
-def bins_of(image: U8 | F32) -> I32:
-    """Return the number of the colour of each pixel (H, W) of an image (H, W, 3) BGR."""
-    import cv2
-
-    number = np.zeros(image.shape[:2], np.int32)
-    lab = cv2.cvtColor(np.rint(image).astype(np.uint8), cv2.COLOR_BGR2LAB)
-    for channel, count in zip(cv2.split(lab), BINS, strict=True):
-        number = number * count + channel.astype(np.int32) * count // 256
-    return number
-
-
-def _density(bins: I32) -> F64:
-    """Return how common each colour is among pixels (N,)."""
-    from scipy.ndimage import gaussian_filter
-
-    counts = np.bincount(bins, minlength=int(np.prod(BINS))).astype(np.float64).reshape(BINS)
-    found: F64 = gaussian_filter(counts, SMOOTH).ravel() / max(len(bins), 1)
-    return found
-
-
-def _every(channels: Bool) -> Bool:
-    """Return where (H, W) all three channels hold; `all(axis=2)` takes four times as long."""
-    b, g, r = np.moveaxis(channels, 2, 0)
-    found: Bool = b & g & r
-    return found
 
 
 def _shown(picture: U8, usual: F32) -> Colours:
