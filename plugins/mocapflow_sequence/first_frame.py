@@ -39,13 +39,11 @@ class Evidence(NamedTuple):
 
     first: F32  # (H, W, 3) the first frame
     far: Bool  # (H, W) True where it shows the room, but for shadows that have moved
-    floor: Bool  # (H, W) True where the floor may be seen
-    rooms: tuple[Bool, Bool]  # elsewhere and on the floor: which colours are more common beside the person than on it
+    rooms: Bool  # for each colour, whether it is more common beside the person than on it
 
     def of_room(self, colour: Colours) -> Bool:
         """Return where (H, W) a colour is the room's."""
-        bins = bins_of(colour.mean)
-        rooms = np.where(self.floor, self.rooms[True][bins], self.rooms[False][bins])
+        rooms = self.rooms[bins_of(colour.mean)]
         return np.where(self.far, alike(colour, self.first) | (shaded(colour.mean, self.first) & rooms), rooms)
 
 
@@ -62,18 +60,17 @@ def empty_scene(pictures: U8, first: U8, body: Surface, camera: Camera, least_sh
         camera: the view.
         least_share: of the pictures that have to show a colour.
     """
-    colours, now, floor = commonest(pictures, COLOURS), bins_of(first), floor_around(body, camera)
+    colours, now = commonest(pictures, COLOURS), bins_of(first)
     usual = np.median(colours[0].spread, axis=(0, 1))
     shown = _shown(first, usual)
     person, away_m = _about(body, camera)
     far = away_m > REACH_M
     beside = far & (away_m < AROUND_M)
     for _ in range(ROUNDS):
-        rooms = [more_common(now[beside & part], now[person & part]) for part in (~floor, floor)]
-        evidence = Evidence(shown.mean, far, floor, (rooms[0], rooms[1]))
+        evidence = Evidence(shown.mean, far, more_common(now[beside], now[person]))
         learnt = chosen((*colours, shown), evidence, least_share)
         person = ~far & learnt.known & ~alike(shown, learnt.mean) & ~shaded(shown.mean, learnt.mean)
-    return lit(learnt, pictures, evidence, usual)
+    return lit(learnt, pictures, evidence, usual, floor_around(body, camera) & learnt.known)
 
 
 def chosen(colours: Iterable[Colours], evidence: Evidence, least_share: float) -> Learnt:
@@ -84,12 +81,10 @@ def chosen(colours: Iterable[Colours], evidence: Evidence, least_share: float) -
     return learnt
 
 
-def lit(learnt: Learnt, pictures: U8, evidence: Evidence, usual: F32) -> Learnt:
+def lit(learnt: Learnt, pictures: U8, evidence: Evidence, usual: F32, floor: Bool) -> Learnt:
     """Return an empty scene whose floor is as bright as any picture shows it, for the person may always shade it."""
-    floor = evidence.floor & learnt.known
     dim = Learnt(*(part[floor][:, None] for part in learnt))
     there = evidence._replace(first=evidence.first[floor][:, None], far=evidence.far[floor][:, None])
-    there = there._replace(floor=evidence.floor[floor][:, None])
     found = Learnt(dim.mean.copy(), dim.spread)
     for picture in pictures:
         colour = _shown(picture[floor][:, None], usual)
