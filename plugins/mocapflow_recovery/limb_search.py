@@ -28,6 +28,7 @@ from mocapflow_recovery.sampling import Cost, Plan, Spread, put_back, search, se
 
 CURED = 2.0  # times as far apart may be what is doubted no more: a leg lay where a skirt flew
 CLEARED = 1.1  # the same, what leaves no hint: of a foot that was lost all other limbs and the cloth tell nothing
+UNKNOWN = "too little is known of the room behind the person: limbs that are lost are not looked for"
 
 
 class LimbSearch(Recovery):
@@ -92,8 +93,8 @@ class LimbSearch(Recovery):
             return result
         room, surface = small_room(background, model.scene.cameras, self.rows), surface_of(model, result)
         seen = views(frame, surface, room, self.near_m, garment_told(past, model.scene))
-        if not seen or np.mean([view.known for view in seen]) < self.least_known:
-            return result
+        if seen and np.mean([view.known for view in seen]) < self.least_known:
+            return result if past.moments else noted(result, UNKNOWN, doubted=False)
         stray = stray_of(surface, model.scene, seen, self._reach())
         doubtful, fitted = self._doubtful(stray), result.state.estimate.pose
         why = f"fit doubted, {stray}" if doubtful else self._suspicion(stray, fitted, state, past, model.scene.body)

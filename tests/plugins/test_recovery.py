@@ -247,6 +247,8 @@ def test_limbs_are_looked_for_where_enough_of_the_room_is_known(columns, looked)
         FRAME, lost, settled(lost), scenes.tiny_past(SCENE, POSE), scenes.tiny_model(scene), settle
     )
     assert bool(found.notes) == looked
+    first = LimbSearch().recover(FRAME, lost, settled(lost), Past(), scenes.tiny_model(scene), settle)
+    assert any("limbs that are lost are not looked for" in note for note in first.notes) != looked
 
 
 @pytest.mark.parametrize(
