@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
@@ -63,14 +64,24 @@ class EmptyScene(Stage):
                 " stand",
                 recording.folder / "background",
             )
-        learnt = [self._learnt(recording, c, scene, start) for c in range(len(recording.views))]
+        learnt = list(self._learnt(recording, scene, start))
         return Background(mean=tuple(view.mean for view in learnt), spread=tuple(view.spread for view in learnt))
 
-    def _learnt(self, recording: Recording, camera: int, scene: Scene, start: Start | None) -> Learnt:
-        pictures, first = self._pictures(recording, camera), recording.frame(recording.indices[0])
-        if start is not None and first.usable[camera]:
-            body = scene.undressed.surface(start.pose, NO_CLOTH)
-            return empty_scene(pictures, first.images[camera], body, scene.cameras[camera], self.least_share)
+    def _learnt(self, recording: Recording, scene: Scene, start: Start | None) -> Iterator[Learnt]:
+        """Yield the empty scene of each view; without a start pose the commonest colours, whoever's they are."""
+        views = range(len(recording.views))
+        if start is None:
+            yield from (self._commonest(self._pictures(recording, c)) for c in views)
+            return
+        first, body = recording.frame(recording.indices[0]), scene.undressed.surface(start.pose, NO_CLOTH)
+        for c in views:
+            pictures = self._pictures(recording, c)
+            if first.usable[c]:
+                yield empty_scene(pictures, first.images[c], body, scene.cameras[c], self.least_share)
+            else:
+                yield self._commonest(pictures)
+
+    def _commonest(self, pictures: U8) -> Learnt:
         mean, spread, share = commonest(pictures, 1)[0]
         return Learnt(mean, np.where(share[..., None] >= self.least_share, spread, np.float32(np.inf)))
 

@@ -10,7 +10,7 @@ from mocapflow_levelset.background import BackgroundDifference
 from mocapflow_levelset.plates import plate_of
 from mocapflow_levelset.shadows import floor_around
 from mocapflow_sequence.background import EmptyScene
-from mocapflow_sequence.commonest import commonest
+from mocapflow_sequence.commonest import LEAST_ALIKE, commonest
 from mocapflow_sequence.first_frame import empty_scene
 
 from mocapflow.assets import Background
@@ -142,26 +142,23 @@ def test_colours_are_those_that_most_pictures_agree_about():
     first, second = commonest(shown, 2)
     for y, x in np.ndindex(9, 8):
         values = shown[:, y, x, 0].astype(int)
-        alike = np.abs(values[:, None] - values) <= REACH
+        alike = np.abs(values[:, None] - values) <= LEAST_ALIKE
         best = int(alike.sum(axis=1).argmax())
         assert first.share[y, x] == pytest.approx(alike[best].mean())
         assert first.mean[y, x] == pytest.approx(values[alike[best]].mean())
         rest = values[~alike[best]]
-        most = max(((np.abs(rest - value) <= REACH).sum() for value in rest), default=0)
+        most = max(((np.abs(rest - value) <= LEAST_ALIKE).sum() for value in rest), default=0)
         assert second.share[y, x] == pytest.approx(most / 12)
 
 
-REACH = 6  # grey levels within which colours are alike where pictures have no noise
-
-
 def taken(places, shade=1.0, seed=0):
-    """Return pictures (N, 240, 320, 3) of a striped box at places (px from its first one), the box and its camera."""
+    """Return pictures (N, 240, 320, 3) of a striped person at places (px from the first), and the truth."""
     rng = np.random.default_rng(seed)
     scene = scenes.tiny_scene()
     pose = scenes.tiny_pose(scene, 3)
     body = scene.undressed.surface(pose, scenes.tiny_cloth(scene, pose))
     mask = pictures.tiny_masks(scene, pose)[0]
-    empty = pictures.tiny_frame(scene, pose).images[0] * 0 + np.array([120, 150, 175]) * boards()
+    empty = np.array([120, 150, 175]) * boards()
     shown = []
     for place in places:
         there = np.roll(mask, place, axis=1)
