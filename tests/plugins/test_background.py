@@ -10,6 +10,7 @@ from mocapflow_levelset.background import BackgroundDifference
 from mocapflow_levelset.plates import plate_of
 from mocapflow_levelset.shadows import floor_around
 from mocapflow_sequence.background import EmptyScene
+from mocapflow_sequence.colours import more_common
 from mocapflow_sequence.commonest import LEAST_ALIKE, commonest
 from mocapflow_sequence.first_frame import empty_scene
 
@@ -190,6 +191,20 @@ def test_nobody_knows_what_is_behind_a_person_who_stays(move):
     assert known[mask].mean() < 0.03
     assert known[~mask].mean() > 0.97
     assert off[known & ~mask].max() < 15
+
+
+def test_the_room_is_known_where_the_start_pose_is_off():
+    """Most of what the body covers at the start pose is the room: what differs from it tells the person's colours."""
+    known, off, mask = learnt([0, 25] * 10, move=(0.25, 0.0, 0.0))
+    assert known[~mask].mean() > 0.97
+    assert off[known & ~mask].max() < 30
+
+
+def test_colours_that_are_rare_beside_the_person_say_nothing():
+    usual, rare, on = 70_000, 10_000, 40_000  # bins far from each other
+    beside = np.repeat(np.array([usual, rare], np.int32), [100_000, 20])
+    common = more_common(beside, np.full(1000, on, np.int32))
+    assert common[usual] and not common[rare] and not common[on]
 
 
 def test_who_steps_aside_later_was_before_the_room():
