@@ -17,6 +17,7 @@ from mocapflow.results import ImageFlow, ViewChecks
 
 LEAST_CORNER = 0.005  # share of the best corner's strength
 BLOCK = 5  # px, over which a corner is judged
+REST_PX, STEPS = 0.03, 30  # a point is found when it moves by less in a step; at most so many steps a level
 SPECK = 5  # px; what differs from the empty scene in less than half of such a square is noise
 
 
@@ -66,30 +67,43 @@ class FollowPoints(Stage):
         import cv2
 
         a, b = (np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), np.uint8) for picture in (old, new))
-        mask = None if empty is None else self._differs(old, empty).astype(np.uint8)
-        corners = cv2.goodFeaturesToTrack(a, self.points, LEAST_CORNER, self.spacing_px, mask=mask, blockSize=BLOCK)
+        corners = self._corners(a, np.ones_like(a) if empty is None else self._differs(old, empty))
         if corners is None:
             return NOTHING
-        start = np.asarray(corners, np.float32).reshape(-1, 2)
-        there, found = self._step(a, b, start)
+        there, found = self._step(a, b, corners)
         back, refound = self._step(b, a, there)
-        kept = found & refound & (np.linalg.norm(back - start, axis=1) < self.round_trip_px)
-        return Flow(pixel=start[kept], displacement=(there - start)[kept])
+        kept = found & refound & (np.linalg.norm(back - corners, axis=1) < self.round_trip_px)
+        return Flow(pixel=corners[kept], displacement=(there - corners)[kept])
+
+    def _corners(self, grey: U8, mask: U8) -> F32 | None:
+        """Return corners (N, 2) where the mask is set; strengths elsewhere are not worth their time."""
+        import cv2
+
+        left, top, width, height = cv2.boundingRect(mask)
+        left, top, right, bottom = max(left - BLOCK, 0), max(top - BLOCK, 0), left + width + BLOCK, top + height + BLOCK
+        part = slice(top, bottom), slice(left, right)
+        found = cv2.goodFeaturesToTrack(
+            grey[part], self.points, LEAST_CORNER, self.spacing_px, mask=mask[part], blockSize=BLOCK
+        )
+        return None if found is None else np.asarray(found + np.array([left, top]), np.float32).reshape(-1, 2)
 
     def _step(self, old: U8, new: U8, points: F32) -> tuple[F32, Bool]:
         import cv2
 
         window = (self.window_px, self.window_px)
-        to, found, _ = cv2.calcOpticalFlowPyrLK(old, new, points, None, winSize=window, maxLevel=self.levels)  # type: ignore[call-overload]
+        rest = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, STEPS, REST_PX)
+        to, found, _ = cv2.calcOpticalFlowPyrLK(  # type: ignore[call-overload]
+            old, new, points, None, winSize=window, maxLevel=self.levels, criteria=rest
+        )
         return np.asarray(to, np.float32), np.asarray(found, bool).ravel()
 
-    def _differs(self, picture: U8, empty: F32) -> Bool:
-        """Return where a picture differs from the empty scene, without single pixels of noise."""
+    def _differs(self, picture: U8, empty: F32) -> U8:
+        """Return 1 where a picture differs from the empty scene, without single pixels of noise, else 0."""
         import cv2
 
-        away = cv2.absdiff(picture, np.clip(np.rint(empty), 0, 255).astype(np.uint8))
+        away = cv2.absdiff(picture, cv2.convertScaleAbs(empty))  # rounds and clips to bytes
         different = cv2.max(cv2.max(away[..., 0], away[..., 1]), away[..., 2]) > self.difference
-        return np.asarray(cv2.medianBlur(different.astype(np.uint8), SPECK), bool)
+        return np.asarray(cv2.medianBlur(different.astype(np.uint8), SPECK), np.uint8)
 
 
 NOTHING = Flow(pixel=np.empty((0, 2), np.float32), displacement=np.empty((0, 2), np.float32))
