@@ -183,6 +183,6 @@ class Kinematic(Draper):
         if self.bending_m > 0 and not strands.rides:
             bend = np.exp(-strands.links / self.bending_m)
         close_batch(
-            grid, links, np.ascontiguousarray(first), strands.last, across, length, skin, self.longest, self.stiff,
+            grid, links, np.array(first, order="C"), strands.last, across, length, skin, self.longest, self.stiff,
             bend, self.sweeps, parts, fitting.fields.values, motion,
         )  # fmt: skip
