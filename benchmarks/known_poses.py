@@ -15,6 +15,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
 RATE = 30.0  # frames a second
+HAND, FOOT = 0.29, 0.22  # m, from wrist and ankle to the floor in a push-up, about
 
 
 @dataclass(frozen=True)
@@ -170,7 +171,36 @@ def spin(body: Body, t: np.ndarray) -> dict[str, np.ndarray]:
     return turn
 
 
-SCRIPTS = {"squat": squat, "dance": dance, "lunge": lunge, "spin": spin}
+def push_up(body: Body, t: np.ndarray) -> dict[str, np.ndarray]:
+    """Return rotation vectors (T,3) per joint of push-ups on upright forearms, a knee drawn up in between."""
+    turn = {name: np.zeros((len(t), 3)) for name in body.names}
+    deep, draw = (1 - np.cos(2 * np.pi * t / 1.6)) / 2, np.sin(np.pi * t / 1.6) ** 2
+    aside = 0.25 + 0.8 * deep  # rad, of the upper arms from upright
+    shoulder, elbow, wrist, ankle = (body.joint(name) for name in ("shoulder_l", "elbow_l", "wrist_l", "ankle_l"))
+    height = np.linalg.norm(elbow - shoulder) * np.cos(aside) + np.linalg.norm(wrist - elbow) + HAND - FOOT
+    turn["pelvis"][:, 0] = np.pi / 2 - np.arcsin(height / (shoulder - ankle)[2])
+    for side, sign in (("_l", 1), ("_r", -1)):
+        lift = np.clip(sign * np.sin(2 * np.pi * t / 3.2), 0, 1) * (1 - draw)
+        turn["hip" + side][:, 0], turn["knee" + side][:, 0] = 0.05 - 0.9 * lift, 0.1 + 1.2 * lift
+        upper = np.stack([sign * 0.8 * np.sin(aside), 0.6 * np.sin(aside), -np.cos(aside)], axis=1)
+        ways = np.stack([upper, np.broadcast_to([0, 0, -1], upper.shape)], axis=1)  # in the world; the trunk leans
+        leans = Rotation.from_rotvec(turn["pelvis"]).inv()
+        bent = [_bent(body, side, back.apply(way)) for back, way in zip(leans, ways, strict=True)]
+        turn["shoulder" + side], turn["elbow" + side] = np.moveaxis(np.array(bent), 1, 0)
+    return turn
+
+
+SCRIPTS = {"squat": squat, "dance": dance, "lunge": lunge, "spin": spin, "push_up": push_up}
+
+
+def _bent(body: Body, side: str, ways: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rotation vectors (3) of shoulder and elbow by which upper arm and forearm point these ways (2,3)."""
+    arm, forearm = np.diff([body.joint(name + side) for name in ("shoulder", "elbow", "wrist")], axis=0)
+    axis = np.cross(arm, [0, -1, 0]) / np.linalg.norm(arm[[0, 2]])  # the forearm bends forward
+    both = [ways[0], np.cross(*ways) / np.linalg.norm(np.cross(*ways))]
+    shoulder = Rotation.align_vectors(both, [arm / np.linalg.norm(arm), axis])[0].as_rotvec()
+    bend = _corner(ways[0], np.zeros(3), ways[1]) - _corner(arm, np.zeros(3), forearm)  # beyond that at rest
+    return shoulder, axis * np.radians(bend)
 
 
 def _reach(body: Body, side: str, towards: list[list[float]]) -> np.ndarray:

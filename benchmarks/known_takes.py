@@ -63,6 +63,7 @@ TAKES = {
     "spin_A_skirt": Take("A", "skirt", "spin", 56, PURPLE, frames=60),
     "lunge_B_shorts": Take("B", "shorts", "lunge", 57, GREY, frames=60),
     "squat_B_shorts": Take("B", "shorts", "kneebend_A", 47, PURPLE, start=120, frames=60),
+    "push_up_B_shorts": Take("B", "shorts", "push_up", 58, GREEN, frames=50),
     # other cuts than those of the shared recordings
     "walk_B_maxi": Take("B", "skirt", "walk_B", 61, PURPLE, start=40, cut=MAXI),
     "dance_A_mini": Take("A", "skirt", "dance", 62, GREY, cut=MINI),
