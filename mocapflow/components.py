@@ -82,6 +82,9 @@ class Matcher(Component):
     ) -> Matches:
         """Return pairs of image points and vertices of the posed surface."""
 
+    def need(self, recording: Recording) -> None:
+        """Raise if there is nothing in a recording that it could ever match: asked before a run computes anything."""
+
 
 class PoseSolver(Component):
     """Computes the pose from matches and priors."""

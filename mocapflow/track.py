@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
@@ -41,6 +42,7 @@ from mocapflow.data import (
 from mocapflow.errors import ComponentFailed, PipelineError
 from mocapflow.functional import Functional, image_cost
 from mocapflow.guards.answers import pose_of, result_of
+from mocapflow.guards.lacks import idle_matchers, idle_segmenter
 from mocapflow.loop import Steps, settle
 from mocapflow.model import ClothedModel
 from mocapflow.recordings.recording import Recording
@@ -51,6 +53,7 @@ from mocapflow.steady import Steady
 from mocapflow.storage.checkpoint import Checkpoint
 from mocapflow.timing import Stopwatch
 
+LOG = logging.getLogger("mocapflow")
 STEPS = ("decode", "predict", "drape", "segment", "solve", "cloth", "match", "recover")
 VIEWS = 2  # fewer than these do not fix a pose in space
 MOVING = 2  # frames before that tell how the person moves
@@ -85,6 +88,10 @@ class CoupledLoop(Stage):
             raise ValueError("name both draper and cloth_fitter, or none: one lays the cloth, the other fits it")
         return self
 
+    def need(self, recording: Recording) -> None:
+        """Raise if no matcher would find a pair in the recording."""
+        idle_matchers(self.matchers, recording)
+
     def run(
         self,
         recording: Recording,
@@ -103,6 +110,9 @@ class CoupledLoop(Stage):
         if scene.garment is not None and self.draper is None:
             hint = "name a draper and a cloth_fitter, or track the bare body: garment: null"
             raise PipelineError(f"the person wears a {scene.garment.name}, which the track does not drape", hint=hint)
+        idle = idle_matchers(self.matchers, recording) + idle_segmenter(self.first_segmenter, background is not None)
+        for said in idle:
+            LOG.warning(said)
         scene = scene.with_background(background).simplified(self.body_faces)
         model = ClothedModel(scene=scene, draper=self.draper)
         if self.keep == "trace":

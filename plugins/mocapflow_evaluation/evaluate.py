@@ -45,10 +45,10 @@ class Evaluate(Stage):
     longest_lag_s: PositiveFloat = LONGEST_LAG_S  # of one system behind the other, that is looked for
 
     def need(self, recording: Recording) -> None:
-        """Raise if the reference that is named is not there."""
+        """Raise if what the track will be compared with is not there, or can't be read."""
         path, _ = chosen(recording.folder, self.reference)
-        if self.reference and path is not None and not path.exists():
-            read_reference(path)  # says what is wrong
+        if path is not None and not path.is_dir():
+            read_reference(path)
 
     def run(self, track: Track, scene: Scene, recording: Recording, run_folder: RunFolder) -> Evaluation:
         """Return the evaluation of the track."""

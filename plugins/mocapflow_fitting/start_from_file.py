@@ -16,6 +16,7 @@ from mocapflow.errors import RecordingError
 from mocapflow.geometry import twists
 from mocapflow.geometry.joints import angles_from_rotations
 from mocapflow.io.first_pose import read_first_pose
+from mocapflow.io.rigs import examine_view
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow.scene import Scene
@@ -39,8 +40,12 @@ class StartFromFile(Stage):
         return [path, *sorted(path.parent.glob(f"{path.stem}_*{path.suffix}"))]
 
     def need(self, recording: Recording) -> None:
-        """Raise if there is no file with the first pose."""
-        self._found(recording)
+        """Raise if there is no file with the first pose, or no camera sees the root joint there."""
+        path = self._found(recording)
+        root = read_first_pose(path, ()).position
+        for finding in examine_view(recording.cameras, root, "the root joint of the first pose"):
+            if finding.severity == "error":
+                raise RecordingError(finding.message, where=str(path), hint=finding.hint)
 
     def run(self, recording: Recording, scene: Scene) -> Start:
         """Return the pose in the file; the cloth starts without forces.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from mocapflow_fitting.detections import need_keypoints
 from mocapflow_fitting.keypoint_layouts import LAYOUTS, Layout, layout_of, rows_of
 from mocapflow_fitting.landmarks import landmarks
 from mocapflow_fitting.person import scale_of
@@ -16,6 +17,7 @@ from mocapflow.components import Matcher
 from mocapflow.data import Frame, Matches, Past, Segmentation, Surface, Turn, empty_matches
 from mocapflow.geometry.cameras import centre, project, project_each
 from mocapflow.once import once
+from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64, I32
 from mocapflow.scene import Scene
 from mocapflow_matching.robust import robust_weights
@@ -38,6 +40,11 @@ class Keypoints(Matcher):
     sigma_px: PositiveFloat = 5.0  # of the estimator, where fewer than three views tell
     least_sigma_px: PositiveFloat = 1.0  # however well the keypoints agree
     scale: PositiveFloat = 2.0  # standard deviations beyond which a keypoint pulls no harder (Huber)
+
+    def need(self, recording: Recording) -> None:
+        """Raise if no camera has keypoints."""
+        if not any(recording.keypoint_folders):
+            need_keypoints(recording)
 
     def match(
         self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn

@@ -1,3 +1,4 @@
+import shutil
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -16,6 +17,7 @@ from mocapflow.errors import RecordingError
 from mocapflow.geometry import angles
 from mocapflow.io import markers
 from mocapflow.io.columns import read_columns
+from mocapflow.recordings.recording import open_recording
 from mocapflow.results import RunFolder
 
 FRAMES = np.arange(120.0)
@@ -267,3 +269,12 @@ def test_unreadable_references_say_so(tmp_path: Path) -> None:
     (tmp_path / "b.csv").write_text("knee_flexion_l\n0\n1\n")
     with pytest.raises(RecordingError, match="neither a column frame nor time"):
         read_reference(tmp_path / "b.csv")
+
+
+def test_a_reference_that_can_not_be_read_is_told_before_anything_runs(tmp_path: Path) -> None:
+    recording = tmp_path / "clip"
+    shutil.copytree(DEMO, recording, ignore=shutil.ignore_patterns("background"))
+    Evaluate().need(open_recording(recording))
+    (recording / "truth" / "angles.csv").write_text("frame,knee_flexion_l\n0,a\n")
+    with pytest.raises(RecordingError, match=r"angles.csv:2  could not convert"):
+        Evaluate().need(open_recording(recording))

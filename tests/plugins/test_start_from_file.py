@@ -140,3 +140,11 @@ def test_starts_in_a_folder_of_their_own_are_inputs(recording):
         shutil.copy(recording / "init.json", recording / "starts" / name)
     found = StartFromFile(file="starts/init.json").inputs(recording)
     assert [path.relative_to(recording).as_posix() for path in found] == ["starts/init.json", "starts/init_000012.json"]
+
+
+def test_a_pose_that_no_camera_sees_is_refused_before_anything_runs(recording):
+    StartFromFile().need(open_recording(recording))
+    content = json.loads((recording / "init.json").read_text())
+    (recording / "init.json").write_text(json.dumps(content | {"root_translation": [9.0, 9.0, 1.0]}))
+    with pytest.raises(RecordingError, match="init.json  no camera sees the root joint of the first pose"):
+        StartFromFile().need(open_recording(recording))

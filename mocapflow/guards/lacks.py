@@ -1,0 +1,36 @@
+"""What the components of a loop would do without in a recording: an error where nothing is left, else a warning."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from mocapflow.components import Matcher, Segmenter
+from mocapflow.errors import MocapflowError
+
+if TYPE_CHECKING:
+    from mocapflow.recordings.recording import Recording
+
+
+def idle_matchers(matchers: Sequence[Matcher], recording: Recording) -> list[str]:
+    """Return what to say of matchers that will never find a pair.
+
+    Raises:
+        MocapflowError: none of them will.
+    """
+    lacks: list[tuple[str, MocapflowError]] = []
+    for matcher in matchers:
+        try:
+            matcher.need(recording)
+        except MocapflowError as error:
+            lacks.append((matcher.name, error))
+    if lacks and len(lacks) == len(matchers):
+        raise lacks[0][1]
+    return [f"matcher {name} has nothing to match: {error.message}" for name, error in lacks]
+
+
+def idle_segmenter(first: Segmenter | None, background_known: bool) -> list[str]:
+    """Return what to say of a first segmenter that will not be asked."""
+    if first is None or background_known or not first.needs_background:
+        return []
+    return [f"first_segmenter {first.name} needs the empty scene, which no stage before makes: it is not asked"]

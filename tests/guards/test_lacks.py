@@ -1,0 +1,29 @@
+"""Components that would have nothing to do in a recording."""
+
+import pytest
+from mocapflow_levelset.background import BackgroundDifference
+from mocapflow_levelset.levelset import LevelSet
+from mocapflow_matching.contour_icp import ContourIcp
+from mocapflow_matching.keypoints import Keypoints
+
+from mocapflow.errors import RecordingError
+from mocapflow.guards.lacks import idle_matchers, idle_segmenter
+from mocapflow.help.shipped import shipped
+from mocapflow.recordings.recording import open_recording
+
+
+def test_a_matcher_without_keypoints_is_told_and_is_an_error_where_it_is_alone():
+    recording = open_recording(shipped("examples", "data", "skirt_steps"))
+    assert idle_matchers([ContourIcp()], recording) == []
+    (said,) = idle_matchers([ContourIcp(), Keypoints()], recording)
+    assert said.startswith("matcher keypoints has nothing to match: there are no 2D keypoints")
+    with pytest.raises(RecordingError, match="there are no 2D keypoints"):
+        idle_matchers([Keypoints()], recording)
+
+
+def test_a_first_segmenter_that_lacks_the_empty_scene_is_told():
+    needing = BackgroundDifference()
+    (said,) = idle_segmenter(needing, background_known=False)
+    assert said.startswith("first_segmenter background needs the empty scene")
+    for first, known in ((needing, True), (LevelSet(), False), (None, False)):
+        assert idle_segmenter(first, known) == []
