@@ -7,7 +7,8 @@ from collections.abc import Collection, Iterable
 from difflib import get_close_matches
 from pathlib import Path
 
-FULL = frozenset({errno.ENOSPC, errno.EDQUOT})  # what the system says of a drive that is
+FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})  # what the system says of a drive that is, or a quota
+MOST = 30  # names that a hint lists
 
 
 class MocapflowError(Exception):
@@ -93,7 +94,8 @@ class ComponentFailed(MocapflowError):
 def alternatives(wanted: str, available: Iterable[str]) -> str:
     """Return the hint `available: a, b — did you mean 'a'?` for a name that is not there."""
     names = sorted(available)
-    return " — ".join(filter(None, [f"available: {', '.join(names) or 'none'}", guess(wanted, names)]))
+    more = f" and {len(names) - MOST} more" if len(names) > MOST else ""
+    return " — ".join(filter(None, [f"available: {', '.join(names[:MOST]) or 'none'}{more}", guess(wanted, names)]))
 
 
 def guess(wanted: str, available: Collection[str]) -> str:

@@ -30,9 +30,11 @@ def garment_of(value: Any, recording: Path, resolver: Resolver) -> Garment | Non
     if value is None:
         return None
     file = recording / FILE
-    kind, measures = _measures(file)
+    kind, written = _measures(file)
+    measures = {name: measure for name, (_, measure) in written.items()}
     named = _named(value)
-    if named == FROM_RECORDING:
+    recorded = named == FROM_RECORDING
+    if recorded:
         if kind is None:
             raise _no_garment(file)
         named, value = kind, {**value, "use": kind} if isinstance(value, dict) else kind
@@ -50,8 +52,10 @@ def garment_of(value: Any, recording: Path, resolver: Resolver) -> Garment | Non
         source = f"describes a {kind}" if kind else "does not exist"
         note = f"measures, in metres, come from {file}, which {source}; a value in the pipeline overrides them"
         wrong = next((name for name in measures if error.message.startswith(f"garment.{name}: ")), "")
-        where = place(file, wrong.removesuffix("_m")) if wrong else error.where
-        raise type(error)(error.message, where=where, hint="\n".join(filter(None, [error.hint, note]))) from None
+        key = written[wrong][0] if wrong else ""
+        where = place(file, key) if wrong else str(file) if recorded else error.where
+        message = error.message.replace(wrong, key, 1) if wrong else error.message
+        raise type(error)(message, where=where, hint="\n".join(filter(None, [error.hint, note]))) from None
 
 
 def recorded_garment(recording: Path, registry: Registry) -> Garment | None:
@@ -81,12 +85,15 @@ def _no_garment(file: Path) -> RecordingError:
     )
 
 
-def _measures(path: Path) -> tuple[str | None, dict[str, Any]]:
-    """Return the garment's type and its settings from a recording's tape measures."""
+def _measures(path: Path) -> tuple[str | None, dict[str, tuple[str, Any]]]:
+    """Return the garment's type and, by its settings, each key and value of a recording's tape measures.
+
+    There the unit may be written, as in a pipeline, or left out: `length_m` is `length`.
+    """
     if not path.exists():
         return None, {}
     hint = 'write {"type": "skirt", "waist_height": 1.05, ...}, in metres'
     said = read_json(path, hint)
     if not isinstance(said, dict) or "type" not in said:
         raise RecordingError("it does not say its type", where=str(path), hint=hint)
-    return str(said["type"]), {f"{key}_m": value for key, value in said.items() if key != "type"}
+    return str(said["type"]), {f"{key.removesuffix('_m')}_m": (key, said[key]) for key in said if key != "type"}

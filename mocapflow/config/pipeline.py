@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -77,6 +77,7 @@ class NamedStage:
     where: str
     part: range | None = None  # the frames it is for; None: those of the run
     joins: tuple[str, ...] = ()  # the parts that it makes one of
+    wired: Mapping[str, str] = field(default_factory=dict)  # parameter -> where its source is written
 
 
 @dataclass(frozen=True)
@@ -137,9 +138,13 @@ def load_pipeline(
     said = plain.build(PipelineFile, document.values, ())
     assert isinstance(said, PipelineFile)
     resolver = Resolver(document, registry or _registry_with(said.plugins, plain))
+    written = "" if recording else resolver.place(("recording",))
     recording = recording or _recording(said, Path(path).stem, resolver)
     if not recording.is_dir():
-        raise RecordingError("there is no such folder", where=str(recording), hint="--recording DIR names another")
+        what = f"there is no such folder{f': {recording}' if written else ''}"
+        raise RecordingError(what, where=written or str(recording), hint="--recording DIR names another")
+    if all(value is None for value in said.stages.values()):
+        raise PipelineError("a pipeline needs stages", where=resolver.place(("stages",)))
     part = said.frames
     if part.stop is not None and part.stop <= part.start:
         raise resolver.located(PipelineError(f"{part.start}:{part.stop} holds no frame"), ("frames",))
@@ -213,4 +218,5 @@ def _stage(label: str, value: Any, resolver: Resolver) -> NamedStage:
             message = "write {parameter: label of an earlier stage}"
             raise resolver.located(PipelineError(message), (*steps, "from"))
     stage = resolver.component("stage", value, steps)
-    return NamedStage(label, stage, wiring, resolver.place(steps))
+    wired = {parameter: resolver.place((*steps, "from", parameter)) for parameter in wiring}
+    return NamedStage(label, stage, wiring, resolver.place(steps), wired=wired)

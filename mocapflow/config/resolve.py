@@ -108,6 +108,9 @@ class Resolver:
             return self.located(PipelineError(message, hint=guess(str(location[-1]), known)), (*steps, *location))
         while location and not self._is_setting(cls, location, steps):
             location = location[:-1]  # pydantic also names the members of a union
+        if first["type"] == "too_short":
+            message = f"name at least {first['ctx']['min_length']}"
+            return self.located(PipelineError(message), (*steps, *location))
         reason = first["msg"].removeprefix("Value error, ")
         got = "" if isinstance(first["input"], dict | BaseModel) else f", not {first['input']!r}"
         message = reason if first["type"] == "value_error" else reason[:1].lower() + reason[1:] + got

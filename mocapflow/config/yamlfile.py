@@ -134,7 +134,14 @@ def _extended(child: Document, path: Path) -> Document:
             f"'{name}' has no place in a file that extends another: only `extends` and `change` do",
             where=child.place((name,)).text, hint=f"write it as change: {{{name}: ...}}",
         )  # fmt: skip
-    base = _read_file(Path(os.path.normpath(path.parent / str(child.values["extends"]))))
+    extended = Path(os.path.normpath(path.parent / str(child.values["extends"])))
+    try:
+        base = _read_file(extended)
+    except PipelineError as error:
+        if error.where != str(extended):  # a line in there is wrong
+            raise
+        message = f"extends: {extended}: {error.message}"
+        raise PipelineError(message, where=child.place(("extends",)).text, hint=error.hint) from None
     if "extends" in base.values:
         message = f"{child.values['extends']} itself extends another file; `extends` goes one level deep"
         raise PipelineError(message, where=child.place(("extends",)).text)

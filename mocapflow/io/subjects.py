@@ -41,6 +41,6 @@ def _examine_scan(subject: Path, findings: list[Finding]) -> Sequence[str]:
         vertices, faces = mesh
         attempt(lambda: check_winding(faces, str(body)), findings)
         attempt(lambda: check_size(vertices, skeleton, str(body)), findings)
-        if skin.exists():
+        if skin.exists() and not any(found.severity == "error" for found in findings):  # they would seem wrong, too
             attempt(lambda: read_weights(skin, skeleton, vertices), findings)
     return skeleton.names

@@ -130,7 +130,9 @@ def test_a_plugin_file_named_by_the_pipeline(folder):
         "class Dress(Garment):\n    name = 'dress'\n    length_m: float = 1.2\n    def sew(self, body): ...\n"
         "@hookimpl\ndef mocapflow_garments():\n    return [Dress]\n"
     )
-    Path("dress.yaml").write_text("recording: clip\nplugins: [dress.py]\ngarment: dress\nstages: {}\n")
+    Path("dress.yaml").write_text(
+        "recording: clip\nplugins: [dress.py]\ngarment: dress\nstages: {start: start_from_file}\n"
+    )
     assert load_pipeline(Path("dress.yaml")).garment.length_m == 1.2
     Path("dress.py").write_text("import nothing_like_it\n")
     with pytest.raises(MocapflowError) as caught:
@@ -169,7 +171,9 @@ def test_a_plugin_file_named_by_the_pipeline(folder):
         ("smooth: smooth", "smooth: {from: 3, use: smooth}",
          "skirt.yaml:10:12  stages.smooth.from: write {parameter: label of an earlier stage}"),
         ("recording: clip", "recording: clap",
-         "clap  there is no such folder\n       --recording DIR names another"),
+         "skirt.yaml:1:1  there is no such folder: clap\n       --recording DIR names another"),
+        ("matchers: [contour_icp, {use: contour_icp, share: 0.5}]", "matchers: []",
+         "skirt.yaml:8:5  stages.track.matchers: name at least 1"),
         ("recording: clip\n", "",
          "skirt.yaml:1:1  no recording: write `recording: DIR`, or give --recording DIR"),
         ("recording: clip", "recording: clip\nspeed: 3",
@@ -212,9 +216,29 @@ def test_measures_of_another_garment_are_not_used(folder):
 
 def test_a_wrong_measure_is_told_with_the_file_it_comes_from(folder):
     Path("clip/subject/garment.json").write_text(json.dumps({**MEASURES, "length": "69 cm"}))
-    said = r"^clip/subject/garment.json:1:\d+  garment.length_m: .* not '69 cm'\n.*in metres, come from clip"
+    said = r"^clip/subject/garment.json:1:\d+  garment.length: .* not '69 cm'\n.*in metres, come from clip"
     with pytest.raises(MocapflowError, match=said):
         load()
+
+
+def test_measures_may_carry_their_unit_and_are_told_as_they_are_written(folder):
+    file = Path("clip/subject/garment.json")
+    with_units = {key if key == "type" else f"{key}_m": value for key, value in MEASURES.items()}
+    file.write_text(json.dumps(with_units))
+    assert load("garment=from_recording").garment == load().garment
+    file.write_text(json.dumps({**MEASURES, "colour": 3}))
+    with pytest.raises(MocapflowError, match=r"^clip/subject/garment.json:1:\d+  garment.colour: unknown setting"):
+        load("garment=from_recording")
+    file.write_text(json.dumps({key: value for key, value in MEASURES.items() if key != "length"}))
+    with pytest.raises(MocapflowError, match=r"^clip/subject/garment.json  garment: skirt needs length_m\n"):
+        load("garment=from_recording")
+
+
+@pytest.mark.parametrize("stages", ["{}", "{start: null}"])
+def test_a_pipeline_without_stages_is_refused(folder, stages):
+    Path("empty.yaml").write_text(f"recording: clip\nstages: {stages}\n")
+    with pytest.raises(MocapflowError, match=r"^empty.yaml:2:\d+  a pipeline needs stages$"):
+        load_pipeline(Path("empty.yaml"), small_plugins.registry())
 
 
 def test_an_unknown_garment_is_told_where_it_is_named(folder):
@@ -268,10 +292,11 @@ def test_a_stage_that_makes_a_body_replaces_it_for_later_stages(folder):
          "--set stages.start=start_late  stage 'start' needs a Background but no earlier stage makes one\n"
          "       available: none"),
         ("stages.export.from={track: start}",
-         "skirt.yaml:11:3  stage 'export' wants its track from 'start', but no earlier 'start' makes one\n"
+         "--set stages.export.from={track: start}  "
+         "stage 'export' wants its track from 'start', but no earlier 'start' makes one\n"
          "       available: smooth, track"),
         ("stages.export.from={trak: track}",
-         "skirt.yaml:11:3  stage 'export' has no input 'trak'\n"
+         "--set stages.export.from={trak: track}  stage 'export' has no input 'trak'\n"
          "       available: folder, track — did you mean 'track'?"),
         ("stages.export=untyped", "--set stages.export=untyped  stage 'export': untyped: run needs a type for track"),
     ],

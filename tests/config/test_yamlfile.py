@@ -124,7 +124,7 @@ def test_a_stage_can_be_put_before_another(folder):
         ("extends: base.yaml\nchange: 3", "bad.yaml:2:1  change: write `path.to.value: new value` lines"),
         ("extends: base.yaml\nchange:\n  stages.trak.draper: x",
          "bad.yaml:3:3  there is no 'stages.trak'\n       available: track — did you mean 'track'?"),
-        ("extends: basis.yaml", "basis.yaml  there is no such file\n"
+        ("extends: basis.yaml", "bad.yaml:1:1  extends: basis.yaml: there is no such file\n"
          "       available: bad.yaml, base.yaml, middle.yaml — did you mean 'base.yaml'?"),
     ],
 )  # fmt: skip

@@ -135,7 +135,7 @@ def test_lengths_in_mm(good):
     edit(good / "init.json", lambda pose: pose.update(root_translation=[0, 100, 900]))
     found = errors(good)
     assert any(m.startswith("15 of 15 joints lie more than 10 cm outside the mesh") for m in found)
-    assert "garment.length_m: input should be less than 4, not 483" in found
+    assert "garment.length: input should be less than 4, not 483" in found
     assert "the root joint is 906 m from the origin: it looks like mm" in found
 
 
@@ -291,9 +291,9 @@ def test_keypoints_with_nan(tmp_path):
     ("change", "message", "hint"),
     [
         (lambda g: g.update(type="gown"), "garment: no garment named 'gown'", "available: cylinder, shorts, skirt"),
-        (lambda g: g.update(lengths=1), "garment.lengths_m: unknown setting of shorts", "did you mean 'length_m'"),
+        (lambda g: g.update(lengths=1), "garment.lengths: unknown setting of shorts", "did you mean 'length_m'"),
         (lambda g: g.pop("inseam"), "garment: shorts needs inseam_m", "measures, in metres, come from"),
-        (lambda g: g.update(length=48), "garment.length_m: input should be less than 4, not 48", "measures, in metres"),
+        (lambda g: g.update(length=48), "garment.length: input should be less than 4, not 48", "measures, in metres"),
     ],
 )
 def test_garment(good, change, message, hint):
