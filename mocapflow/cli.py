@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import logging
+import os
 import shlex
 import sys
 import warnings
 from collections.abc import Callable
-from typing import Any
+from importlib import metadata
+from typing import Annotated, Any
 
 import typer
 import typer.core
 
 from mocapflow.commands import cache, comparing, looking, new, prior, results, running
 from mocapflow.errors import MocapflowError, interrupted, unwritable
+
+QUIET = {"OPENCV_LOG_LEVEL": "ERROR", "OPENCV_FFMPEG_LOGLEVEL": "-8"}  # what can't be decoded is told by mocapflow
 
 
 class Commands(typer.core.TyperGroup):
@@ -38,11 +42,28 @@ class Commands(typer.core.TyperGroup):
 
 app = typer.Typer(
     cls=Commands,
-    help="Markerless motion capture of people in their own loose clothes.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+
+
+def tell_version(asked: bool) -> None:
+    """Print the version and end, if asked."""
+    if asked:
+        typer.echo(f"mocapflow {metadata.version('mocapflow')}")
+        raise typer.Exit
+
+
+@app.callback()
+def common(
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=tell_version, help="Print the version.")
+    ] = False,
+) -> None:
+    """Markerless motion capture of people in their own loose clothes."""
+
+
 COMMANDS: tuple[Callable[..., None], ...] = (
     running.run,
     running.plan,
@@ -67,6 +88,8 @@ app.add_typer(new.app, name="new")
 
 def main() -> None:
     """Run the command line; warnings go to stderr, one line each."""
+    for library, level in QUIET.items():
+        os.environ.setdefault(library, level)
     warnings.showwarning = _show_warning
     warned = logging.StreamHandler(sys.stderr)
     warned.setLevel(logging.WARNING)  # of the handler: libraries lower that of their own loggers

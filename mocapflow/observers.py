@@ -10,6 +10,8 @@ import pluggy
 from mocapflow.data import FrameResult, FrameState
 from mocapflow.errors import interrupted
 
+LOG = logging.getLogger("mocapflow.observers")
+
 
 class Observers:
     """Broadcasts to every plugin that looks on; one that raises is reported once and switched off."""
@@ -41,4 +43,4 @@ class Observers:
                     raise KeyboardInterrupt from None
                 self._off.add(observer.function)
                 text = "observer %s of plugin '%s' raised %s: %s; it is switched off for the rest of this run"
-                logging.getLogger("mocapflow").warning(text, hook, observer.plugin_name, type(error).__name__, error)
+                LOG.warning(text, hook, observer.plugin_name, type(error).__name__, error)

@@ -5,15 +5,18 @@ import os
 import shutil
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
+from types import ModuleType
 
 import cv2
+import mocapflow_draping
 import numpy as np
 import pytest
 from mocapflow_export import layout, tables
 from typer.testing import CliRunner
 
-from mocapflow import cli, registry
+from mocapflow import cli, load_registry, registry
 from mocapflow.commands import pictures, results
 from mocapflow.commands.invocation import FILE, Invocation, remember
 from mocapflow.commands.progress import reporter
@@ -71,6 +74,12 @@ def test_a_run_folder_within_the_recording_is_refused_before_it_is_made(call, tm
         ("{start: start_from_file}", "videos/cam02.mp4", "missing camera: no video of cam02"),
         ("{start: start_from_file}", "cameras.toml", "no calibration file"),
         ("{start: start_from_keypoints}", "none", "there are no 2D keypoints of two cameras or more"),
+        (
+            "{start: start_from_file, track: {use: coupled_loop, predictor: hold, segmenter: levelset, "
+            "matchers: [keypoints], pose_solver: twist_gauss_newton}}",
+            "none",
+            "there are no 2D keypoints of two cameras or more",
+        ),
         ("{turned: align_cameras}", "none", "there are no 2D keypoints of two cameras or more"),
         ("{body: {use: fit_subject, trial: static}}", "none", "there is no standing trial"),
         ("{room: {use: background, source: plates}}", "background", "there are no clean plates"),
@@ -197,10 +206,30 @@ def test_a_prior_that_can_not_be_written(call):
     )
 
 
-def test_a_store_that_is_not_there_ends_with_1(call):
+def test_a_store_that_is_not_there_ends_with_2(call):
     result = call("cache", "list")
     assert result.stderr == "error: runs/store.zarr  there is no store here\n       --store names another\n"
-    assert result.exit_code == 1
+    assert result.exit_code == 2
+
+
+def test_the_version_is_that_of_the_package(call):
+    assert call("--version").stdout == f"mocapflow {version('mocapflow')}\n"
+
+
+def test_two_components_of_one_name_are_listed_with_a_note(call, monkeypatch):
+    doubled = ModuleType("doubled")
+    doubled.mocapflow_drapers = mocapflow_draping.mocapflow_drapers
+
+    def twice():
+        found = load_registry()
+        found.add(registry.Origin("mine", "my-drapers", "0.1"), lambda: doubled)
+        return found
+
+    monkeypatch.setattr("mocapflow.registry.load_registry", twice)
+    said = call("plugins")
+    assert said.exit_code == 0
+    assert "provide a draper 'kinematic': no pipeline can name it" in said.stderr
+    assert "my-drapers 0.1" in said.stderr
 
 
 def test_an_interrupt_ends_with_130_and_says_how_to_go_on(call, monkeypatch):

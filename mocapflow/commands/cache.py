@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mocapflow.errors import StoreError, alternatives
+from mocapflow.errors import MocapflowError, alternatives
 
 if TYPE_CHECKING:
     from mocapflow.storage.store import Artifact
@@ -92,7 +92,7 @@ def _artifacts(store: Path) -> list[Artifact]:
     from mocapflow.storage.store import Store
 
     if not store.is_dir():
-        raise StoreError("there is no store here", where=str(store), hint="--store names another")
+        raise MocapflowError("there is no store here", where=str(store), hint="--store names another")
     return Store(store).artifacts()
 
 
@@ -101,7 +101,9 @@ def _find(name: str, store: Path) -> Artifact:
     found = [artifact for artifact in artifacts if artifact.path.name == name or artifact.key.startswith(name)]
     if len(found) != 1:
         message = f"'{name}' is {'more than one result' if found else 'no result'} of this store"
-        raise StoreError(message, where=str(store), hint=alternatives(name, [a.path.name for a in found or artifacts]))
+        raise MocapflowError(
+            message, where=str(store), hint=alternatives(name, [a.path.name for a in found or artifacts])
+        )
     return found[0]
 
 

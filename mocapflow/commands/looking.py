@@ -27,6 +27,11 @@ def plugins() -> None:
             own = sorted(name for name, found in provided.items() if any(registry.origin(c) == origin for c in found))
             if own:
                 typer.echo(f"  {role + ':':<13} {', '.join(own)}")
+    for role in PROVIDERS:
+        for name, found in registry.provided(role).items():
+            if len(found) > 1:
+                owners = " and ".join(str(registry.origin(cls)) for cls in found)
+                typer.echo(f"note: {owners} provide a {role} '{name}': no pipeline can name it", err=True)
     _tell_failures(registry)
 
 
