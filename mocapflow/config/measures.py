@@ -96,4 +96,12 @@ def _measures(path: Path) -> tuple[str | None, dict[str, tuple[str, Any]]]:
     said = read_json(path, hint)
     if not isinstance(said, dict) or "type" not in said:
         raise RecordingError("it does not say its type", where=str(path), hint=hint)
-    return str(said["type"]), {f"{key.removesuffix('_m')}_m": (key, said[key]) for key in said if key != "type"}
+    measures: dict[str, tuple[str, Any]] = {}
+    for key, value in said.items():
+        setting = f"{key.removesuffix('_m')}_m"
+        if setting in measures:
+            message = f"'{measures[setting][0]}' and '{key}' are one measure"
+            raise RecordingError(message, where=place(path, key), hint="leave one of them out")
+        if key != "type":
+            measures[setting] = key, value
+    return str(said["type"]), measures

@@ -226,6 +226,11 @@ def test_measures_may_carry_their_unit_and_are_told_as_they_are_written(folder):
     with_units = {key if key == "type" else f"{key}_m": value for key, value in MEASURES.items()}
     file.write_text(json.dumps(with_units))
     assert load("garment=from_recording").garment == load().garment
+    file.write_text(json.dumps({**MEASURES, "length_m": 0.8}))
+    with pytest.raises(
+        MocapflowError, match=r"^clip/subject/garment.json:1:\d+  'length' and 'length_m' are one measure"
+    ):
+        load("garment=from_recording")
     file.write_text(json.dumps({**MEASURES, "colour": 3}))
     with pytest.raises(MocapflowError, match=r"^clip/subject/garment.json:1:\d+  garment.colour: unknown setting"):
         load("garment=from_recording")
