@@ -25,6 +25,7 @@ from mocapflow.io.plates import background
 from mocapflow.io.rigs import examine_rig, examine_view
 from mocapflow.io.subjects import examine_subject
 from mocapflow.io.video import Video, lost_frames, open_video
+from mocapflow.recordings.first_look import examine_first_frame
 from mocapflow.recordings.synchrony import measure
 from mocapflow.registry import Registry, load_registry
 
@@ -53,6 +54,8 @@ def examine(folder: Path) -> list[Finding]:
             ]
     findings += examine_subject(folder)
     findings += [] if calibration is None else _start(folder, calibration)
+    if not any(finding.severity == "error" for finding in findings):
+        findings += examine_first_frame(folder, load_registry())
     findings += _garment(folder)
     findings += _missing(folder)
     return sorted(findings, key=lambda finding: ("error", "warning", "note").index(finding.severity))

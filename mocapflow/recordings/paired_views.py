@@ -10,7 +10,7 @@ import numpy as np
 from mocapflow.assets import Camera
 from mocapflow.geometry.pencils import pencil_axes, plane_angles
 from mocapflow.recordings.recording import Recording
-from mocapflow.records import F32, F64, U8
+from mocapflow.records import F32, F64, U8, Bool
 
 Signals = Callable[[int, int], tuple[F64, F64]]
 """What two cameras see at every moment: (T, K) rad of one, (T, K) of the other; NaN where unknown."""
@@ -84,12 +84,18 @@ def _outline(image: U8, room: F32) -> F64:
     """Return the border pixels (N, 2) of the largest part of an image that differs from the empty room."""
     import cv2
 
-    away = np.abs(image.astype(np.float32) - room).max(axis=2)
-    different = cv2.medianBlur((away > DIFFERENT).astype(np.uint8), CALM)
-    borders, _ = cv2.findContours(different, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    borders, _ = cv2.findContours(away(image, room).view(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     if not borders:
         return np.empty((0, 2))
     return np.asarray(max(borders, key=cv2.contourArea), np.float64).reshape(-1, 2)
+
+
+def away(image: U8, room: F32) -> Bool:
+    """Return where (H, W) an image differs from the empty room, without single pixels of noise."""
+    import cv2
+
+    different = np.abs(image.astype(np.float32) - room).max(axis=2) > DIFFERENT
+    return np.asarray(cv2.medianBlur(different.view(np.uint8), CALM), bool)
 
 
 def _rooms(recording: Recording) -> list[F32]:

@@ -1,0 +1,61 @@
+"""Whether the first frame, its clean plates and the first pose belong together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mocapflow.data import NO_CLOTH
+from mocapflow.errors import MocapflowError
+from mocapflow.geometry.silhouettes import mask, outline
+from mocapflow.io.findings import Finding, warning
+from mocapflow.recordings.paired_views import away
+from mocapflow.recordings.recording import Recording, open_recording
+from mocapflow.records import Bool
+from mocapflow.registry import Registry
+from mocapflow.scene import Scene
+
+FOREIGN = 0.5  # share of a picture that differs from its empty room: more, and it is no picture of that room
+COVERED = 0.4  # share of the body that shows somebody: less, and nobody stands there
+POSE = "init.json"
+
+
+def examine_first_frame(folder: Path, registry: Registry) -> Iterator[Finding]:
+    """Yield what is odd about the first frame beside clean plates; what can't be read is told elsewhere."""
+    try:
+        recording = open_recording(folder)
+        plates, frame = recording.background(), recording.frame(0)
+    except MocapflowError:
+        return
+    if plates is None:
+        return
+    views = zip(frame.images, plates.mean, frame.usable, strict=True)
+    somebody = [away(image, room) if usable else None for image, room, usable in views]
+    names = [view.lens.name for view in recording.views]
+    foreign = [name for name, seen in zip(names, somebody, strict=True) if seen is not None and seen.mean() > FOREIGN]
+    if foreign:
+        hint = "was the camera moved, the light changed, or the file of another camera copied here?"
+        yield warning(f"the first frame of {', '.join(foreign)} is not of the room in its clean plate", hint, folder)
+    elif (bodies := _bodies(recording, registry)) is not None:
+        pairs = list(zip(bodies, somebody, strict=True))
+        covered = [seen[body].mean() for body, seen in pairs if seen is not None and body.any()]
+        if covered and np.median(covered) < COVERED:
+            hint = "is it the pose of frame 0, in metres, in the world of the calibration?"
+            yield warning("nobody stands where the first pose says", hint, folder / POSE)
+
+
+def _bodies(recording: Recording, registry: Registry) -> list[Bool] | None:
+    """Return the silhouette (H, W) of the scanned body at the first pose in every view; None without one of them."""
+    if not (recording.folder / POSE).exists():
+        return None
+    scanned: Any = registry.get("body", "scanned")
+    start: Any = registry.get("stage", "start_from_file")
+    try:
+        scene = Scene(cameras=recording.cameras, body=scanned().load(recording.folder))
+        surface = scene.surface(start().run(recording, scene).pose, NO_CLOTH)
+    except MocapflowError:
+        return None
+    return [mask(outline(surface, camera), camera) for camera in recording.cameras]

@@ -1,0 +1,42 @@
+"""The first frame beside its clean plates and the first pose: files of two cameras exchanged, a pose far off."""
+
+import json
+import shutil
+
+import pytest
+
+from mocapflow.help.shipped import shipped
+from mocapflow.recordings.first_look import examine_first_frame
+from mocapflow.registry import load_registry
+
+
+@pytest.fixture
+def clip(tmp_path):
+    return shutil.copytree(shipped("examples", "data", "skirt_steps"), tmp_path / "clip")
+
+
+def said(folder):
+    return [finding.message for finding in examine_first_frame(folder, load_registry())]
+
+
+def test_a_good_recording_has_nothing_odd_nor_one_without_plates_or_pose(clip):
+    assert said(clip) == []
+    (clip / "init.json").unlink()
+    assert said(clip) == []
+    shutil.rmtree(clip / "background")
+    assert said(clip) == []
+
+
+def test_videos_of_two_cameras_that_are_exchanged(clip):
+    one, other, aside = (clip / "videos" / f"{name}.mp4" for name in ("cam01", "cam02", "aside"))
+    one.rename(aside)
+    other.rename(one)
+    aside.rename(other)
+    assert said(clip) == ["the first frame of cam01, cam02 is not of the room in its clean plate"]
+
+
+def test_a_first_pose_where_nobody_stands(clip):
+    pose = json.loads((clip / "init.json").read_text())
+    pose["root_translation"][0] += 0.8
+    (clip / "init.json").write_text(json.dumps(pose))
+    assert said(clip) == ["nobody stands where the first pose says"]
