@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import kinematics
+from mocapflow.geometry.cameras import project
 from mocapflow.recordings.recording import open_recording
 from mocapflow.scene import Scene
 from tests.fixtures.turns import rotations_from_angles
@@ -148,3 +149,17 @@ def test_a_pose_that_no_camera_sees_is_refused_before_anything_runs(recording):
     (recording / "init.json").write_text(json.dumps(content | {"root_translation": [9.0, 9.0, 1.0]}))
     with pytest.raises(RecordingError, match="init.json  no camera sees the root joint of the first pose"):
         StartFromFile().need(open_recording(recording))
+
+
+def test_a_person_filmed_from_the_hips_down_may_begin_with_a_root_that_no_camera_sees(recording):
+    content = json.loads((recording / "init.json").read_text())
+    cameras = open_recording(recording).cameras
+    height = next(z for z in np.arange(1.0, 4.0, 0.05) if not seen(cameras, [*content["root_translation"][:2], z]))
+    content["root_translation"][2] = height + 0.2
+    (recording / "init.json").write_text(json.dumps(content))
+    StartFromFile().need(open_recording(recording))
+
+
+def seen(cameras, point):
+    pixels = [project(np.array([point]), camera)[0] for camera in cameras]
+    return any((p >= 0).all() and (p < camera.size).all() for p, camera in zip(pixels, cameras, strict=True))
