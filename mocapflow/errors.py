@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable
 from difflib import get_close_matches
 from pathlib import Path
 
-FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})  # what the system says of a drive that is, or a quota
+FULL = frozenset({errno.ENOSPC, errno.EDQUOT})  # what the system says of a drive that is
 MOST = 30  # names that a hint lists
 
 
@@ -69,7 +69,7 @@ def no_run_folder(out: Path, error: OSError) -> StoreError:
 
 def unwritable(error: OSError) -> StoreError | None:
     """Return what is said where a file can't be written: the drive is full, or it may not be; None for other errors."""
-    if error.errno not in {*FULL, errno.EROFS, errno.EACCES, errno.EPERM} or not error.strerror:
+    if error.errno not in {*FULL, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM} or not error.strerror:
         return None
     hint = "free some space, then run the same command" if error.errno in FULL else ""
     what = "can't be written or read" if error.filename else "a file can't be written or read"

@@ -78,7 +78,7 @@ def test_a_run_folder_within_the_recording_is_refused_before_it_is_made(call, tm
             "{start: start_from_file, track: {use: coupled_loop, predictor: hold, segmenter: levelset, "
             "matchers: [keypoints], pose_solver: twist_gauss_newton}}",
             "none",
-            "there are no 2D keypoints of two cameras or more",
+            "there are no 2D keypoints\n",
         ),
         ("{turned: align_cameras}", "none", "there are no 2D keypoints of two cameras or more"),
         ("{body: {use: fit_subject, trial: static}}", "none", "there is no standing trial"),
@@ -488,3 +488,14 @@ def test_only_a_garment_has_a_picture(call):
 def test_the_module_runs_as_the_command_does():
     done = subprocess.run([sys.executable, "-m", "mocapflow", "plugins"], capture_output=True, text=True, check=True)
     assert "levelset" in done.stdout
+
+
+def test_decoders_do_not_talk_besides(tmp_path):
+    shutil.copytree(CLIP, tmp_path / "clip")
+    video = tmp_path / "clip" / "videos" / "cam02.mp4"
+    video.write_bytes(video.read_bytes()[:20000])
+    words = [sys.executable, "-m", "mocapflow", "doctor", "clip"]
+    said = subprocess.run(words, check=False, cwd=tmp_path, capture_output=True)
+    assert said.returncode == 2
+    assert b"cam02.mp4  this video can't be decoded" in said.stdout
+    assert said.stderr == b""

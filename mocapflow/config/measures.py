@@ -33,8 +33,8 @@ def garment_of(value: Any, recording: Path, resolver: Resolver) -> Garment | Non
     kind, written = _measures(file)
     measures = {name: measure for name, (_, measure) in written.items()}
     named = _named(value)
-    recorded = named == FROM_RECORDING
-    if recorded:
+    recorded = named == FROM_RECORDING and not (isinstance(value, dict) and len(value) > 1)  # by the file alone
+    if named == FROM_RECORDING:
         if kind is None:
             raise _no_garment(file)
         named, value = kind, {**value, "use": kind} if isinstance(value, dict) else kind

@@ -109,7 +109,8 @@ class Resolver:
         while location and not self._is_setting(cls, location, steps):
             location = location[:-1]  # pydantic also names the members of a union
         if first["type"] == "too_short":
-            message = f"name at least {first['ctx']['min_length']}"
+            least = first["ctx"]["min_length"]
+            message = f"needs at least {least} entr{'y' if least == 1 else 'ies'}"
             return self.located(PipelineError(message), (*steps, *location))
         reason = first["msg"].removeprefix("Value error, ")
         got = "" if isinstance(first["input"], dict | BaseModel) else f", not {first['input']!r}"

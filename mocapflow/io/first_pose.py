@@ -10,7 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from mocapflow.assets import Body
+from mocapflow.data import Pose
 from mocapflow.errors import RecordingError, alternatives
+from mocapflow.geometry import twists
+from mocapflow.geometry.joints import angles_from_rotations
 from mocapflow.io.cameras import FARTHEST
 from mocapflow.io.findings import Finding, error
 from mocapflow.io.typed import place, read_json
@@ -52,6 +56,24 @@ def read_first_pose(path: Path, joints: Sequence[str]) -> FirstPose:
     vectors = {key: np.array(vector, np.float64) for key, vector in _vectors(content).items()}
     rotation, position = (vectors.pop(key) for key in ROOT)
     return FirstPose(rotation=rotation, position=position, turns=vectors)
+
+
+def read_pose(path: Path, body: Body) -> Pose:
+    """Return the pose of a file; of a part of a body where the file may be that of the whole.
+
+    Raises:
+        RecordingError: it is malformed, in other units, or names a joint the body lacks.
+    """
+    found = read_first_pose(path, () if body.cut.any() else body.joint_names)
+    turns = {name: turn for name, turn in found.turns.items() if name in body.joint_names}
+    return Pose(root=root_at(body, found.rotation, found.position), angles=angles_from_rotations(body, turns))
+
+
+def root_at(body: Body, rotation: F64, position: F64) -> F64:
+    """Return world_from_body (4, 4) that turns by a rotation vector (3,) and puts the root joint at (3,) m."""
+    root = twists.exp(np.append(rotation, np.zeros(3)))
+    root[:3, 3] = position - root[:3, :3] @ body.positions[0]
+    return root
 
 
 def odd_pose(path: Path, content: Any, joints: Sequence[str]) -> Iterator[Finding]:

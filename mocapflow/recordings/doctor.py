@@ -33,12 +33,12 @@ __all__ = ["Finding", "examine", "examine_timing"]
 
 
 def examine(folder: Path) -> list[Finding]:
-    """Return everything that is odd about a recording folder, errors first; every video is decoded once.
+    """Return everything that is odd about a recording folder, errors first; every video is decoded.
 
     Args:
         folder: the recording; nothing is written there.
     """
-    folder = Path(folder)
+    folder, registry = Path(folder), load_registry()
     findings: list[Finding] = []
     if not folder.is_dir():
         return [error("no such recording folder", where=folder)]
@@ -55,8 +55,8 @@ def examine(folder: Path) -> list[Finding]:
     findings += examine_subject(folder)
     findings += [] if calibration is None else _start(folder, calibration)
     if not any(finding.severity == "error" for finding in findings):
-        findings += examine_first_frame(folder, load_registry())
-    findings += _garment(folder)
+        findings += examine_first_frame(folder, registry)
+    findings += _garment(folder, registry)
     findings += _missing(folder)
     return sorted(findings, key=lambda finding: ("error", "warning", "note").index(finding.severity))
 
@@ -86,9 +86,8 @@ def examine_timing(folder: Path, write: bool = False) -> list[Finding]:
     return [*findings, warning(said, hint, folder / TIMING)]
 
 
-def _garment(folder: Path) -> list[Finding]:
+def _garment(folder: Path, registry: Registry) -> list[Finding]:
     """Return what keeps the garment that the recording describes from being sewn, or what was mended at it."""
-    registry = load_registry()
     try:
         garment = measures.recorded_garment(folder, registry)
         return [] if garment is None else _sewn(garment, folder, registry)

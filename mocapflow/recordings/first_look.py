@@ -12,6 +12,7 @@ from mocapflow.data import NO_CLOTH
 from mocapflow.errors import MocapflowError
 from mocapflow.geometry.silhouettes import mask, outline
 from mocapflow.io.findings import Finding, warning
+from mocapflow.io.first_pose import read_pose
 from mocapflow.recordings.paired_views import away
 from mocapflow.recordings.recording import Recording, open_recording
 from mocapflow.records import Bool
@@ -51,11 +52,10 @@ def _bodies(recording: Recording, registry: Registry) -> list[Bool] | None:
     """Return the silhouette (H, W) of the scanned body at the first pose in every view; None without one of them."""
     if not (recording.folder / POSE).exists():
         return None
-    scanned: Any = registry.get("body", "scanned")
-    start: Any = registry.get("stage", "start_from_file")
     try:
+        scanned: Any = registry.get("body", "scanned")
         scene = Scene(cameras=recording.cameras, body=scanned().load(recording.folder))
-        surface = scene.surface(start().run(recording, scene).pose, NO_CLOTH)
+        surface = scene.surface(read_pose(recording.folder / POSE, scene.body), NO_CLOTH)
     except MocapflowError:
         return None
     return [mask(outline(surface, camera), camera) for camera in recording.cameras]

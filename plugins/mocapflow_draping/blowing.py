@@ -45,6 +45,7 @@ def blow_batch(  # type: ignore[no-untyped-def]
     """
     many, rows = len(source), links.shape[2] + 1  # the last row of what is known of tails: as they hang
     room, near = np.empty((many + 1, rows)), np.zeros((many + 1, rows), np.int64)
+    # as in `fall_batch`: `swing` is compiled for each kind of integer
     fresh, ended = np.ones((many + 1, rows), np.bool_), np.empty(many + 1, np.int32)
     for n in range(len(last)):
         measured = -1

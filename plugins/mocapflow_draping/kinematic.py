@@ -182,7 +182,7 @@ class Kinematic(Draper):
         bend = np.zeros_like(strands.links)
         if self.bending_m > 0 and not strands.rides:
             bend = np.exp(-strands.links / self.bending_m)
-        close_batch(
+        close_batch(  # rows that may be written, always: each kind is compiled by itself
             grid, links, np.array(first, order="C"), strands.last, across, length, skin, self.longest, self.stiff,
             bend, self.sweeps, parts, fitting.fields.values, motion,
         )  # fmt: skip

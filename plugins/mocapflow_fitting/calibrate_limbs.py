@@ -14,6 +14,7 @@ from pydantic import Field, PositiveFloat, PositiveInt
 from mocapflow.assets import Background, Body
 from mocapflow.components import Draper, Matcher, Segmenter, Stage
 from mocapflow.data import Change, Frame, Matches, Past, Pose, Segmentation, Turn
+from mocapflow.guards.lacks import idle_matchers
 from mocapflow.loop import pool_matches
 from mocapflow.model import ClothedModel
 from mocapflow.recordings.recording import Recording
@@ -53,6 +54,10 @@ class CalibrateLimbs(Stage):
     passes: PositiveInt = 3  # times that the images are segmented; after the first, matching is calm
     rounds: PositiveInt = 3  # matchings a pass
     independent: Annotated[float, Field(gt=0, le=1)] = 1.0  # share of a frame's contour pairs; all frames count as one
+
+    def need(self, recording: Recording) -> None:
+        """Raise if no matcher would find a pair in the recording."""
+        idle_matchers(self.matchers, recording)
 
     def run(
         self, recording: Recording, scene: Scene, background: Background | None = None, track: Track | None = None

@@ -11,14 +11,12 @@ import numpy as np
 
 from mocapflow.assets import Body
 from mocapflow.components import Stage
-from mocapflow.data import Pose, Start
+from mocapflow.data import NO_CLOTH, Pose, Start
 from mocapflow.errors import RecordingError
-from mocapflow.geometry import twists
-from mocapflow.geometry.joints import angles_from_rotations
-from mocapflow.io.first_pose import read_first_pose
-from mocapflow.io.rigs import examine_view
+from mocapflow.geometry.cameras import project
+from mocapflow.io.first_pose import read_pose
+from mocapflow.io.rigs import PLACE
 from mocapflow.recordings.recording import Recording
-from mocapflow.records import F64
 from mocapflow.scene import Scene
 
 LOG = logging.getLogger("mocapflow")
@@ -40,18 +38,15 @@ class StartFromFile(Stage):
         return [path, *sorted(path.parent.glob(f"{path.stem}_*{path.suffix}"))]
 
     def need(self, recording: Recording) -> None:
-        """Raise if there is no file with the first pose, or no camera sees the root joint there."""
-        path = self._found(recording)
-        root = read_first_pose(path, ()).position
-        for finding in examine_view(recording.cameras, root, "the root joint of the first pose"):
-            if finding.severity == "error":
-                raise RecordingError(finding.message, where=str(path), hint=finding.hint)
+        """Raise if there is no file with the first pose."""
+        self._found(recording)
 
     def run(self, recording: Recording, scene: Scene) -> Start:
         """Return the pose in the file; the cloth starts without forces.
 
         Raises:
-            RecordingError: the file is missing or malformed, or names a joint the body lacks.
+            RecordingError: the file is missing or malformed, names a joint the body lacks, or puts it where no camera
+                sees any of it.
         """
         first, path = recording.indices[0], self._found(recording)
         if first and path == recording.folder / self.file:
@@ -60,6 +55,8 @@ class StartFromFile(Stage):
         pose = read_pose(path, scene.body)
         if odd := beyond_limits(pose, scene.body):
             LOG.warning("%s bends joints as nobody can: %s; are its turns in radians, of the right sign?", path, odd)
+        if not in_view(pose, scene):
+            raise RecordingError("no camera sees the person at the first pose", where=str(path), hint=PLACE)
         return Start(pose=pose, parameters=scene.calm)
 
     def _found(self, recording: Recording) -> Path:
@@ -78,15 +75,12 @@ def _own(path: Path, frame: int) -> Path:
     return path.with_name(f"{path.stem}_{frame:06}{path.suffix}")
 
 
-def read_pose(path: Path, body: Body) -> Pose:
-    """Return the pose of a file; of a part of a body where the file may be that of the whole.
-
-    Raises:
-        RecordingError: it is malformed, in other units, or names a joint the body lacks.
-    """
-    found = read_first_pose(path, () if body.cut.any() else body.joint_names)
-    turns = {name: turn for name, turn in found.turns.items() if name in body.joint_names}
-    return Pose(root=root_at(body, found.rotation, found.position), angles=angles_from_rotations(body, turns))
+def in_view(pose: Pose, scene: Scene) -> bool:
+    """Return whether any camera sees anything of the bare body at a pose."""
+    body = scene.undressed.surface(pose, NO_CLOTH).vertices
+    places = [(project(body, camera), camera.size) for camera in scene.cameras]
+    with np.errstate(invalid="ignore"):
+        return any(((pixel >= 0) & (pixel < size)).all(axis=1).any() for pixel, size in places)
 
 
 def beyond_limits(pose: Pose, body: Body) -> str:
@@ -95,10 +89,3 @@ def beyond_limits(pose: Pose, body: Body) -> str:
     angles = np.degrees(pose.angles)
     far = np.flatnonzero((angles < low - SLACK) | (angles > high + SLACK))
     return ", ".join(f"{body.screw_names[k]} {angles[k]:.0f}° of {low[k]:.0f}° to {high[k]:.0f}°" for k in far)
-
-
-def root_at(body: Body, rotation: F64, position: F64) -> F64:
-    """Return world_from_body (4, 4) that turns by a rotation vector (3,) and puts the root joint at (3,) m."""
-    root = twists.exp(np.append(rotation, np.zeros(3)))
-    root[:3, 3] = position - root[:3, :3] @ body.positions[0]
-    return root

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from mocapflow_fitting.detections import need_keypoints
 from mocapflow_fitting.keypoint_layouts import LAYOUTS, Layout, layout_of, rows_of
 from mocapflow_fitting.landmarks import landmarks
 from mocapflow_fitting.person import scale_of
@@ -15,6 +14,7 @@ from pydantic import PositiveFloat
 from mocapflow.assets import Body, Camera
 from mocapflow.components import Matcher
 from mocapflow.data import Frame, Matches, Past, Segmentation, Surface, Turn, empty_matches
+from mocapflow.errors import RecordingError
 from mocapflow.geometry.cameras import centre, project, project_each
 from mocapflow.once import once
 from mocapflow.recordings.recording import Recording
@@ -44,7 +44,8 @@ class Keypoints(Matcher):
     def need(self, recording: Recording) -> None:
         """Raise if no camera has keypoints."""
         if not any(recording.keypoint_folders):
-            need_keypoints(recording)
+            hint = "expected keypoints/cam01_json/*.json as OpenPose writes them; or name another matcher"
+            raise RecordingError("there are no 2D keypoints", where=str(recording.folder / "keypoints"), hint=hint)
 
     def match(
         self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn

@@ -173,7 +173,7 @@ def test_a_plugin_file_named_by_the_pipeline(folder):
         ("recording: clip", "recording: clap",
          "skirt.yaml:1:1  there is no such folder: clap\n       --recording DIR names another"),
         ("matchers: [contour_icp, {use: contour_icp, share: 0.5}]", "matchers: []",
-         "skirt.yaml:8:5  stages.track.matchers: name at least 1"),
+         "skirt.yaml:8:5  stages.track.matchers: needs at least 1 entry"),
         ("recording: clip\n", "",
          "skirt.yaml:1:1  no recording: write `recording: DIR`, or give --recording DIR"),
         ("recording: clip", "recording: clip\nspeed: 3",
@@ -237,6 +237,8 @@ def test_measures_may_carry_their_unit_and_are_told_as_they_are_written(folder):
     file.write_text(json.dumps({key: value for key, value in MEASURES.items() if key != "length"}))
     with pytest.raises(MocapflowError, match=r"^clip/subject/garment.json  garment: skirt needs length_m\n"):
         load("garment=from_recording")
+    with pytest.raises(MocapflowError, match=r"^--set .*  garment: skirt needs length_m\n"):  # it has a say, too
+        load("garment={use: from_recording, waist_height_m: 1.1}")
 
 
 @pytest.mark.parametrize("stages", ["{}", "{start: null}"])
@@ -310,6 +312,14 @@ def test_wiring_that_does_not_work(folder, change, message):
     with pytest.raises(MocapflowError) as caught:
         wire(load(change))
     assert str(caught.value) == message
+
+
+def test_a_source_that_is_wrong_is_told_where_it_is_written(folder):
+    Path("skirt.yaml").write_text(
+        TEXT.replace("export: export", "export:\n    use: export\n    from:\n      track: start")
+    )
+    with pytest.raises(MocapflowError, match=r"^skirt.yaml:14:7  stage 'export' wants its track from 'start'"):
+        wire(load())
 
 
 def test_a_stage_is_not_called_like_an_input(folder):

@@ -143,21 +143,24 @@ def test_starts_in_a_folder_of_their_own_are_inputs(recording):
     assert [path.relative_to(recording).as_posix() for path in found] == ["starts/init.json", "starts/init_000012.json"]
 
 
-def test_a_pose_that_no_camera_sees_is_refused_before_anything_runs(recording):
-    StartFromFile().need(open_recording(recording))
+def moved_to(recording, place):
     content = json.loads((recording / "init.json").read_text())
-    (recording / "init.json").write_text(json.dumps(content | {"root_translation": [9.0, 9.0, 1.0]}))
-    with pytest.raises(RecordingError, match="init.json  no camera sees the root joint of the first pose"):
-        StartFromFile().need(open_recording(recording))
+    (recording / "init.json").write_text(json.dumps(content | {"root_translation": place}))
+    return content["root_translation"]
 
 
-def test_a_person_filmed_from_the_hips_down_may_begin_with_a_root_that_no_camera_sees(recording):
-    content = json.loads((recording / "init.json").read_text())
-    cameras = open_recording(recording).cameras
-    height = next(z for z in np.arange(1.0, 4.0, 0.05) if not seen(cameras, [*content["root_translation"][:2], z]))
-    content["root_translation"][2] = height + 0.2
-    (recording / "init.json").write_text(json.dumps(content))
-    StartFromFile().need(open_recording(recording))
+def test_a_pose_that_no_camera_sees_is_refused(recording, scene):
+    moved_to(recording, [9.0, 9.0, 1.0])
+    with pytest.raises(RecordingError, match="init.json  no camera sees the person at the first pose"):
+        StartFromFile().run(open_recording(recording), scene)
+
+
+def test_a_person_of_whom_nothing_but_the_feet_is_filmed_may_begin(recording, scene):
+    """The root joint, and all within 0.6 m of it, lies above every picture."""
+    x, y, _ = moved_to(recording, [0.0, 0.0, 1.0])
+    place = next([x, y, z] for z in np.arange(1.0, 4.0, 0.05) if not seen(scene.cameras, [x, y, z - 0.6]))
+    moved_to(recording, place)
+    StartFromFile().run(open_recording(recording), scene)
 
 
 def seen(cameras, point):

@@ -248,3 +248,11 @@ def test_two_processes_on_one_store(tmp_path, path, monkeypatch):
     said = [process.communicate()[0] for process in running]
     assert [process.returncode for process in running] == [0, 0]
     assert sorted("track: running coupled_loop" in lines for lines in said) == [False, True]
+
+
+def test_a_first_segmenter_that_is_not_asked_is_told(tmp_path, path):
+    changes = ("stages.background=null", "stages.track.first_segmenter=background")
+    run_tiny(path, tmp_path, *changes, frames=2)
+    recipe = json.loads((tmp_path / "out" / "results.json").read_text())["recipe"]
+    (said,) = recipe["stages"]["track"]["warnings"]
+    assert said.startswith("first_segmenter background needs the empty scene")
