@@ -88,8 +88,8 @@ app.add_typer(new.app, name="new")
 
 def main() -> None:
     """Run the command line; warnings go to stderr, one line each."""
-    for library, level in QUIET.items():
-        os.environ.setdefault(library, level)
+    for variable, level in QUIET.items():
+        os.environ.setdefault(variable, level)
     warnings.showwarning = _show_warning
     warned = logging.StreamHandler(sys.stderr)
     warned.setLevel(logging.WARNING)  # of the handler: libraries lower that of their own loggers

@@ -101,9 +101,8 @@ def _find(name: str, store: Path) -> Artifact:
     found = [artifact for artifact in artifacts if artifact.path.name == name or artifact.key.startswith(name)]
     if len(found) != 1:
         message = f"'{name}' is {'more than one result' if found else 'no result'} of this store"
-        raise MocapflowError(
-            message, where=str(store), hint=alternatives(name, [a.path.name for a in found or artifacts])
-        )
+        hint = alternatives(name, [artifact.path.name for artifact in found or artifacts])
+        raise MocapflowError(message, where=str(store), hint=hint)
     return found[0]
 
 

@@ -77,7 +77,7 @@ class NamedStage:
     where: str
     part: range | None = None  # the frames it is for; None: those of the run
     joins: tuple[str, ...] = ()  # the parts that it makes one of
-    wired: Mapping[str, str] = field(default_factory=dict)  # parameter -> where its source is written
+    wiring_places: Mapping[str, str] = field(default_factory=dict)  # parameter -> where its source is written
 
 
 @dataclass(frozen=True)
@@ -218,5 +218,5 @@ def _stage(label: str, value: Any, resolver: Resolver) -> NamedStage:
             message = "write {parameter: label of an earlier stage}"
             raise resolver.located(PipelineError(message), (*steps, "from"))
     stage = resolver.component("stage", value, steps)
-    wired = {parameter: resolver.place((*steps, "from", parameter)) for parameter in wiring}
-    return NamedStage(label, stage, wiring, resolver.place(steps), wired=wired)
+    wiring_places = {parameter: resolver.place((*steps, "from", parameter)) for parameter in wiring}
+    return NamedStage(label, stage, wiring, resolver.place(steps), wiring_places=wiring_places)

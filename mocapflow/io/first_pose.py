@@ -20,6 +20,7 @@ from mocapflow.io.findings import Finding, error
 from mocapflow.io.typed import place, read_json
 from mocapflow.records import F64, array, record
 
+FILE = "init.json"  # in the folder of the recording
 ROOT = ("root_rotation", "root_translation")
 TURNS = "joint_rotations"
 FORM = (

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from mocapflow.geometry.angles import unmeasured
 from mocapflow.io.findings import Finding, attempt, error, warning
-from mocapflow.io.first_pose import odd_pose
+from mocapflow.io.first_pose import FILE, odd_pose
 from mocapflow.io.meshes import check_winding, read_mesh
 from mocapflow.io.scans import check_size, read_skeleton
 from mocapflow.io.typed import read_json
@@ -18,7 +18,7 @@ def examine_subject(folder: Path) -> list[Finding]:
     """Return what is wrong in subject/ and init.json of a recording folder."""
     findings: list[Finding] = []
     joints = _examine_scan(folder / "subject", findings)
-    pose = folder / "init.json"
+    pose = folder / FILE
     if pose.exists():
         attempt(lambda: findings.extend(odd_pose(pose, read_json(pose), joints)), findings)
     return findings

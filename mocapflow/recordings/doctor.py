@@ -14,10 +14,9 @@ from mocapflow.assets import Camera
 from mocapflow.components import Garment
 from mocapflow.config import measures
 from mocapflow.errors import MocapflowError, UnknownComponent
-from mocapflow.io import agreement, folders
+from mocapflow.io import agreement, first_pose, folders
 from mocapflow.io.cameras import find_calibration, read_cameras
 from mocapflow.io.findings import Finding, attempt, error, note, warning
-from mocapflow.io.first_pose import read_first_pose
 from mocapflow.io.images import name_frames
 from mocapflow.io.lateness import TIMING, late_frames, timing_text, write_late_frames
 from mocapflow.io.lenses import View
@@ -121,10 +120,10 @@ def _sewn(garment: Garment, folder: Path, registry: Registry) -> list[Finding]:
 
 def _start(folder: Path, calibration: Path) -> list[Finding]:
     """Return which cameras don't see where the person is said to begin; what can't be read is told elsewhere."""
-    pose = folder / "init.json"
+    pose = folder / first_pose.FILE
     try:
         cameras = [camera for camera in read_cameras(calibration) if camera.size.all()]
-        root = read_first_pose(pose, ()).position if pose.exists() else None
+        root = first_pose.read_first_pose(pose, ()).position if pose.exists() else None
     except MocapflowError:
         return []
     found = [] if root is None else examine_view(cameras, root, "the root joint of the first pose")
@@ -138,7 +137,7 @@ def _missing(folder: Path) -> Iterator[Finding]:
             "there is neither subject/body.obj nor a static trial",
             "a body model has to be fitted to the person; a standing trial with keypoints makes that more exact",
         )
-    if not (folder / "init.json").exists() and not (folder / "keypoints").is_dir():
+    if not (folder / first_pose.FILE).exists() and not (folder / "keypoints").is_dir():
         yield note(
             "there is neither init.json nor keypoints/: nothing tells the pose of the first frame",
             "a run needs one of them: the stage start_from_file or start_from_keypoints",

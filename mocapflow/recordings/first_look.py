@@ -11,8 +11,8 @@ import numpy as np
 from mocapflow.data import NO_CLOTH
 from mocapflow.errors import MocapflowError
 from mocapflow.geometry.silhouettes import mask, outline
+from mocapflow.io import first_pose
 from mocapflow.io.findings import Finding, warning
-from mocapflow.io.first_pose import read_pose
 from mocapflow.recordings.paired_views import away
 from mocapflow.recordings.recording import Recording, open_recording
 from mocapflow.records import Bool
@@ -21,7 +21,6 @@ from mocapflow.scene import Scene
 
 FOREIGN = 0.5  # share of a picture that differs from its empty room: more, and it is no picture of that room
 COVERED = 0.4  # share of the body that shows somebody: less, and nobody stands there
-POSE = "init.json"
 
 
 def examine_first_frame(folder: Path, registry: Registry) -> Iterator[Finding]:
@@ -45,17 +44,17 @@ def examine_first_frame(folder: Path, registry: Registry) -> Iterator[Finding]:
         covered = [seen[body].mean() for body, seen in pairs if seen is not None and body.any()]
         if covered and np.median(covered) < COVERED:
             hint = "is it the pose of frame 0, in metres, in the world of the calibration?"
-            yield warning("nobody stands where the first pose says", hint, folder / POSE)
+            yield warning("nobody stands where the first pose says", hint, folder / first_pose.FILE)
 
 
 def _bodies(recording: Recording, registry: Registry) -> list[Bool] | None:
     """Return the silhouette (H, W) of the scanned body at the first pose in every view; None without one of them."""
-    if not (recording.folder / POSE).exists():
+    if not (recording.folder / first_pose.FILE).exists():
         return None
     try:
         scanned: Any = registry.get("body", "scanned")
         scene = Scene(cameras=recording.cameras, body=scanned().load(recording.folder))
-        surface = scene.surface(read_pose(recording.folder / POSE, scene.body), NO_CLOTH)
+        surface = scene.surface(first_pose.read_pose(recording.folder / first_pose.FILE, scene.body), NO_CLOTH)
     except MocapflowError:
         return None
     return [mask(outline(surface, camera), camera) for camera in recording.cameras]

@@ -55,7 +55,7 @@ def _wire_stage(named: NamedStage, earlier: Sequence[NamedStage], registry: Regi
     for parameter in named.wiring:
         if parameter not in hints:
             message = f"stage '{named.label}' has no input '{parameter}'"
-            raise PipelineError(message, where=named.wired[parameter], hint=alternatives(parameter, hints))
+            raise PipelineError(message, where=named.wiring_places[parameter], hint=alternatives(parameter, hints))
     return {name: _source(named, name, hint, earlier, registry) for name, hint in hints.items()}
 
 
@@ -94,7 +94,7 @@ def _chosen(named: NamedStage, parameter: str, wanted: type, earlier: Sequence[N
     fitting = [other.label for other in earlier if makes(other, wanted)]
     if label not in fitting:
         message = f"stage '{named.label}' wants its {parameter} from '{label}', but no earlier '{label}' makes one"
-        raise PipelineError(message, where=named.wired[parameter], hint=alternatives(label, fitting))
+        raise PipelineError(message, where=named.wiring_places[parameter], hint=alternatives(label, fitting))
     return label
 
 

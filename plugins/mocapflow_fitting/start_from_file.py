@@ -14,7 +14,7 @@ from mocapflow.components import Stage
 from mocapflow.data import NO_CLOTH, Pose, Start
 from mocapflow.errors import RecordingError
 from mocapflow.geometry.cameras import project
-from mocapflow.io.first_pose import read_pose
+from mocapflow.io.first_pose import FILE, read_pose
 from mocapflow.io.rigs import PLACE
 from mocapflow.recordings.recording import Recording
 from mocapflow.scene import Scene
@@ -30,7 +30,7 @@ class StartFromFile(Stage):
     """
 
     name: ClassVar[str] = "start_from_file"
-    file: str = "init.json"  # from the folder of the recording
+    file: str = FILE  # from the folder of the recording
 
     def inputs(self, recording: Path) -> Sequence[Path]:
         """Return the files that are read: their content is part of the cache key."""
