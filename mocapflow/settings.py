@@ -12,7 +12,7 @@ PositiveOrInf = Annotated[PositiveFloat, Field(allow_inf_nan=True)]  # where the
 class Settings(BaseModel):
     """Settings by name; whoever has some derives from it."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, validate_default=True)
 
     @field_validator("*", mode="before")
     @classmethod

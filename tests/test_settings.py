@@ -40,6 +40,14 @@ def test_what_is_right_is_taken() -> None:
     assert (some.length_m, some.each, some.count) == (0.001, (1.0, 2.5), 2)
 
 
+def test_a_default_has_to_be_right_too() -> None:
+    class Wrong(Settings):
+        count: PositiveInt = 0
+
+    with pytest.raises(ValidationError, match="count"):
+        Wrong()
+
+
 def test_infinity_is_taken_where_it_has_a_meaning() -> None:
     assert Some(reach_px=float("inf")).reach_px == float("inf")
     for wrong in (float("nan"), -float("inf"), True):
