@@ -18,7 +18,7 @@ import pluggy
 from mocapflow import components, hookspecs
 from mocapflow.components import Component
 from mocapflow.errors import MocapflowError, PluginError, UnknownComponent, alternatives
-from mocapflow.guards.vetting import check_hooks, checked, import_file
+from mocapflow.guards.vetting import check_hooks, import_file, provided
 from mocapflow.observers import Observers
 
 GROUP = "mocapflow"  # entry point group, and the distribution of the built-in plugins
@@ -59,8 +59,9 @@ class Failure:
 
     def __str__(self) -> str:
         part = f" its {self.role} components" if self.role else ""
+        first = " ".join(str(self.error).partition("\n\n")[0].splitlines())  # pydantic adds an address behind it
         text = self.error.message if isinstance(self.error, MocapflowError) else ""
-        return f"{self.origin} did not load{part}: {text or f'{type(self.error).__name__}: {self.error}'}"
+        return f"{self.origin} did not load{part}: {text or f'{type(self.error).__name__}: {first}'}"
 
 
 class Registry:
@@ -143,7 +144,7 @@ class Registry:
             impl.function for impl in getattr(self._manager.hook, hook).get_hookimpls() if impl.plugin is plugin
         ]
         try:
-            classes = [checked(cls, base, hook) for provide in providers for cls in provide()]
+            classes = [cls for provide in providers for cls in provided(provide(), base, hook)]
         except Exception as error:
             self._failures.append(Failure(origin, error, role))
             return

@@ -53,6 +53,7 @@ def test_unknown_role():
         ("import_error", "garment", "ModuleNotFoundError: No module named 'triangle'"),
         ("unknown_hook", "garment", "unknown hook 'mocapflow_garment' — did you mean 'mocapflow_garments'?"),
         ("unmarked", "garment", "mocapflow_garments lacks @mocapflow.hookimpl"),
+        ("hookless", "garment", "it has no hook, such as mocapflow_priors, that returns its components"),
     ],
 )
 def test_a_plugin_that_does_not_load_is_told_when_something_is_missing(plugin, role, said):
@@ -68,7 +69,12 @@ def test_a_plugin_that_does_not_load_is_told_when_something_is_missing(plugin, r
     [
         ("wrong_base", "draper", "mocapflow_drapers returned Cape, which is not a Draper"),
         ("unfinished", "draper", "Draper Unfinished does not define drape"),
+        ("outdated", "draper", "Draper Outdated: drape has to take (self, poses, parameters, past, scene)"),
         ("nameless", "garment", 'Garment Nameless has no name: write `name = "..."` in the class'),
+        ("annotated", "garment", 'Garment Annotated has its name as a setting: write `name = "..."`, without a type'),
+        ("instance", "garment", "mocapflow_garments returned an instance of Cape: return the class, Cape without ()"),
+        ("unlisted", "garment", "mocapflow_garments returned Cape, not a list of classes"),
+        ("silent", "garment", "mocapflow_garments returned None, not a list of classes"),
         ("failing_provider", "draper", "ModuleNotFoundError: No module named 'triangle'"),
     ],
 )
@@ -78,6 +84,12 @@ def test_a_provider_that_returns_something_wrong(plugin, role, said):
         registry.get(role, "gown")
     note = f"note: plugin 'cape' (mocapflow-cape 0.3) did not load its {role} components: {said}"
     assert caught.value.hint == f"available: none\n{note}"
+
+
+def test_what_pydantic_says_of_a_setting_is_told_in_one_line():
+    (failure,) = registry_of((OURS, broken_plugins.without_a_type)).failures
+    assert "did not load: PydanticUserError: A non-annotated attribute was detected: `length_m = 1.1`" in str(failure)
+    assert "\n" not in str(failure)
 
 
 def test_a_failing_provider_leaves_the_other_roles_of_its_plugin():
