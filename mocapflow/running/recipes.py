@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -10,8 +10,11 @@ from typing import Any
 from mocapflow.assets import Background, Body, Camera, Rig
 from mocapflow.caching.digests import Digests, digest_array
 from mocapflow.caching.keys import FORMAT, Recipe, component_recipe, key_of, without_code
+from mocapflow.components import BodyModel, Stage
 from mocapflow.config.pipeline import NamedStage, Pipeline
 from mocapflow.data import Start
+from mocapflow.errors import PluginError, alternatives
+from mocapflow.guards.answers import WrongAnswer
 from mocapflow.recordings.recording import Recording, open_recording
 from mocapflow.results import Evaluation, Files
 from mocapflow.running.parts import in_parts
@@ -89,7 +92,7 @@ def steps_of(pipeline: Pipeline, digests: Digests) -> list[Step]:
             recipe["recording"] = _frames(part, pipeline, chain) | _content(part, digests)
         if "scene" in sources.values():
             recipe["scene"] = _scene(pipeline, recording, steps.get(body or ""), steps.get(rig or ""), digests)
-        recipe["files"] = _files(named.stage.inputs(recording.folder), digests)
+        recipe["files"] = _files(named.stage, recording.folder, digests)
         steps[named.label] = Step(named, sources, body, rig, part, recipe, key_of(recipe))
     return list(steps.values())
 
@@ -99,7 +102,11 @@ def _extent(named: NamedStage, recording: Recording) -> range:
     extent = named.stage.extent or (kinds[0] if kinds else "run")
     run = recording.indices
     onward = range(run.start, recording.length, run.step)
-    return {"first": run[:1], "beginning": onward[:BEGINNING], "run": run, "all": range(recording.length)}[extent]
+    extents = {"first": run[:1], "beginning": onward[:BEGINNING], "run": run, "all": range(recording.length)}
+    if extent not in extents:
+        message = f"stage '{named.label}': {named.stage.name} has the extent '{extent}'"
+        raise PluginError(message, where=named.where, hint=alternatives(extent, extents))
+    return extents[extent]
 
 
 def _inputs(steps: Mapping[str, Step], source: Source, of_chain: bool) -> Any:
@@ -149,11 +156,14 @@ def _scene(
 
 
 def _asset(pipeline: Pipeline, digests: Digests) -> dict[str, Any]:
-    files = _files(pipeline.body.inputs(pipeline.recording), digests)
+    files = _files(pipeline.body, pipeline.recording, digests)
     return component_recipe(pipeline.body, pipeline.registry, digests) | {"files": files}
 
 
-def _files(paths: Iterable[Path], digests: Digests) -> list[str]:
+def _files(component: BodyModel | Stage, recording: Path, digests: Digests) -> list[str]:
+    paths = component.inputs(recording)
+    if isinstance(paths, str) or not all(isinstance(path, Path) for path in paths):
+        raise WrongAnswer(component, f"the inputs {paths!r}, which are no list of Path")
     return [digests.file(path, path.name) for path in paths if path.exists()]
 
 

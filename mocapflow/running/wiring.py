@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Mapping, Sequence
+from dataclasses import is_dataclass
 from types import NoneType, UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
@@ -116,4 +117,8 @@ def _hints(named: NamedStage) -> Mapping[str, Any]:
     parameters = [name for name in inspect.signature(run).parameters if name != "self"]
     if missing := [name for name in [*parameters, "return"] if name not in hints]:
         raise PluginError(f"{who}: run needs a type for {', '.join(missing)}", where=named.where)
+    if not is_dataclass(hints["return"]):
+        hint = "put what it makes into a dataclass of its own; return Files, with their paths, if it writes files"
+        said = inspect.formatannotation(hints["return"])
+        raise PluginError(f"{who}: run returns {said}, which the store can't keep", where=named.where, hint=hint)
     return {name: hints[name] for name in [*parameters, "return"]}

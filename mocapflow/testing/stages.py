@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import is_dataclass
 from typing import get_type_hints
 
 from mocapflow.components import Stage
@@ -19,4 +20,4 @@ class StageConformance(Conformance):
         hints = get_type_hints(type(self.stage).run)
         parameters = set(type(self.stage).run.__code__.co_varnames[1 : type(self.stage).run.__code__.co_argcount])
         assert parameters <= hints.keys()
-        assert isinstance(hints["return"], type)
+        assert is_dataclass(hints["return"]), "the store keeps a dataclass: return one, or Files"

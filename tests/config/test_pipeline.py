@@ -306,6 +306,10 @@ def test_a_stage_that_makes_a_body_replaces_it_for_later_stages(folder):
          "--set stages.export.from={trak: track}  stage 'export' has no input 'trak'\n"
          "       available: folder, track — did you mean 'track'?"),
         ("stages.export=untyped", "--set stages.export=untyped  stage 'export': untyped: run needs a type for track"),
+        ("stages.export=unkept",
+         "--set stages.export=unkept  "
+         "stage 'export': unkept: run returns dict[str, float], which the store can't keep\n"
+         "       put what it makes into a dataclass of its own; return Files, with their paths, if it writes files"),
     ],
 )  # fmt: skip
 def test_wiring_that_does_not_work(folder, change, message):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from mocapflow.errors import ComponentFailed, GarmentError, PipelineError, StoreError
+from mocapflow.errors import ComponentFailed, GarmentError, PipelineError, PluginError, StoreError
 from mocapflow.hookspecs import hookimpl
 from mocapflow.running.runner import plan, run
 from tests.fixtures.stores import STAGES, actions, load, run_tiny, write_pipeline, write_recording
@@ -213,6 +213,22 @@ def test_a_body_that_raises_is_named(tmp_path, path, monkeypatch):
         ComponentFailed, match=r"^body 'tiny_body' \(plugin 'tiny_plugin' .*\) failed: ValueError: no such joint"
     ):
         run(pipeline, store=tmp_path / "store.zarr", out=tmp_path / "out")
+
+
+def test_inputs_that_are_no_paths_name_the_body(tmp_path, path, monkeypatch):
+    pipeline = load(path)
+    monkeypatch.setattr(type(pipeline.body), "inputs", lambda self, recording: "subject.txt")
+    with pytest.raises(
+        PluginError, match="'tiny_body' returned the inputs 'subject.txt', which are no list of Path"
+    ):
+        plan(pipeline, store=tmp_path / "store.zarr")
+
+
+def test_a_stage_of_an_extent_that_is_none(tmp_path, path, monkeypatch):
+    pipeline = load(path)
+    monkeypatch.setattr(type(pipeline.stages[1].stage), "extent", "al")
+    with pytest.raises(PluginError, match="tiny_start has the extent 'al'\n +available: all, beginning"):
+        plan(pipeline, store=tmp_path / "store.zarr")
 
 
 def test_measures_that_can_not_be_sewn_are_told_where_they_are_written(tmp_path, path, monkeypatch):
