@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mocapflow.components import Garment, Prior
-from mocapflow.data import Residual, Turn
+from mocapflow.components import Garment, Prior, Recovery
+from mocapflow.data import Pose, Residual, Turn
 from mocapflow.errors import ShapeError
 from mocapflow.geometry.meshes import edges
 from mocapflow.testing import (
     GarmentConformance,
     PriorConformance,
+    RecoveryConformance,
     assert_pure,
     check_jacobian,
     same,
@@ -114,6 +115,22 @@ def test_conformance_finds_a_garment_that_is_sewn_wrong():
         tests.test_faces_are_not_degenerate()
     with pytest.raises(AssertionError, match="say in a docstring what it does"):
         tests.test_it_plays_its_role()
+
+
+class TestAtRest(RecoveryConformance):
+    class AtRest(Recovery):
+        """Begins again at rest where model and person overlap badly in a view."""
+
+        name = "at_rest"
+
+        def recover(self, frame, state, result, past, model, settle):
+            if result.overlap.min() > 0.85:
+                return result
+            pose = state.estimate.pose
+            found = settle(Pose(root=pose.root, angles=np.zeros_like(pose.angles)), state.estimate.parameters)
+            return replace(found, notes=("begun again at rest",))
+
+    recovery = AtRest()
 
 
 def test_conformance_finds_a_prior_with_a_wrong_energy():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from math import inf
 
 import numpy as np
@@ -18,10 +19,10 @@ from mocapflow_recovery.sampling import Plan, Spread, parts, put_back, samples, 
 
 from mocapflow.data import NO_CLOTH, Past, Pose
 from mocapflow.geometry.cameras import project
-from mocapflow.testing import pictures, scenes, template_body
-from mocapflow.testing.recovery import settled
+from mocapflow.testing import pictures, recovery, scenes, template_body
 
 SCENE = scenes.tiny_scene()
+settled = partial(recovery.settled, scene=SCENE)
 POSE = scenes.tiny_pose(SCENE, 3, 0.1)
 FRAME = pictures.tiny_frame(SCENE, POSE)
 ROOM = small_room(SCENE.background, SCENE.cameras, 120)
