@@ -79,7 +79,10 @@ def python_files(unit: str) -> Iterable[tuple[str, Path]]:
     if origin is None:
         return
     if origin.name != "__init__.py":
-        yield unit, origin
+        yield (
+            unit if "." in unit else origin.stem,
+            origin,
+        )  # a plugin file is imported by a name that says where it lies
         return
     for path in sorted(origin.parent.rglob("*.py")):
         parts = path.relative_to(origin.parent).with_suffix("").parts

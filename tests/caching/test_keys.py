@@ -285,6 +285,17 @@ def test_an_edited_plugin_file_changes_the_keys_of_its_components(tmp_path, clip
     assert changed(found[0], found[2]) == set(TRACK)  # one file, one digest
 
 
+def test_where_a_plugin_file_lies_does_not_count(tmp_path, clip):
+    path = write_pipeline(tmp_path, clip)
+    text, found = path.read_text(), []
+    for name in ("here", "there"):
+        (tmp_path / name).mkdir()
+        copy = shutil.copy(PLUGIN, tmp_path / name)
+        path.write_text(text.replace(str(PLUGIN), str(copy)))
+        found.append([step.key for step in steps_of(load(path), Digests())])
+    assert found[0] == found[1]
+
+
 def test_explanations_name_the_change():
     component = {"role": "stage", "name": "coupled_loop", "settings": {"steady": {"turns": 2}, "draper": None}}
     draper = {"role": "draper", "name": "kinematic", "settings": {"gap_mm": "2.0"}, "code": "blake2b:12 code of x"}
