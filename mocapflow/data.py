@@ -21,6 +21,7 @@ from mocapflow.records import F32, F64, I16, I32, U8, Bool, array, record
 
 BODY, CLOTH = 0, 1  # values of Surface.layer
 REMEMBERED = 3  # frames that later ones may know: a pose, its velocity, its acceleration
+LAYERS = ("person", "garment", "skin")  # values of Silhouette.layer
 BORDER = 3  # px along the image border where a silhouette is cut, not occluding
 
 
@@ -123,7 +124,7 @@ class Silhouette:
     """A signed distance to the outline in one view, positive inside, clipped to a band; mask = distance > 0."""
 
     camera: int
-    layer: str  # person, garment or skin
+    layer: str  # one of LAYERS
     distance: F32 = array("H", "W", unit="px")
 
     @cached_property

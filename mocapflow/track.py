@@ -212,7 +212,7 @@ class CoupledLoop(Stage):
             return settle(frame, begun, past, self.steps, model, unobserved)
 
         found = self.recovery.recover(frame, state, result, past, model, settle_from)
-        return result_of(self.recovery, found, model.scene)
+        return result_of(self.recovery, found, result, model.scene)
 
     def complain(self, frame: Frame, result: FrameResult) -> None:
         """Stop at a frame that did not settle, if that is wanted."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from mocapflow.components import Component, Matcher, PoseSolver, Predictor, Prior, Recovery, Segmenter
 from mocapflow.data import (
+    LAYERS,
     Estimate,
     Frame,
     FrameResult,
@@ -30,13 +31,14 @@ if TYPE_CHECKING:  # the model asks its draper through `cloth_answers`
 
 Answer = TypeVar("Answer")
 SQUARE = 1e-6  # by how much the columns of a rotation may fail to be orthonormal
+UNIT = 1e-3  # likewise, the square of a unit vector to be one
 
 
 class WrongAnswer(PluginError):
     """A component returned what its role can't."""
 
     def __init__(self, component: Component, message: str) -> None:
-        self.component = component
+        self.component, self.what = component, message
         super().__init__(f"{component.role} '{component.name}' returned {message}")
 
 
@@ -64,13 +66,17 @@ def estimate_of(
         WrongAnswer: its pose is none of the body, or what it says besides has another shape or is not finite.
     """
     found = of_kind(solver, solver.solve(match, state, model, priors, past, turn), Estimate)
-    _possible(solver, found.pose, model.scene)
-    array_of(solver, found.parameters, state.estimate.parameters.shape, "parameters")
-    array_of(solver, found.observed, found.pose.angles.shape, "observed shares")
+    return _sound(solver, found, state.estimate, model.scene)
+
+
+def _sound(component: Component, found: Estimate, before: Estimate, scene: Scene) -> Estimate:
+    _possible(component, found.pose, scene)
+    array_of(component, found.parameters, before.parameters.shape, "parameters")
+    array_of(component, found.observed, found.pose.angles.shape, "observed shares")
     size = max(len(found.covariance), 6 + len(found.pose.angles))  # unknowns of the cloth may follow
-    array_of(solver, found.covariance, (size, size), "a covariance")
+    array_of(component, found.covariance, (size, size), "a covariance")
     if np.diag(found.covariance).min() <= 0:
-        raise WrongAnswer(solver, "a variance that is not above zero")
+        raise WrongAnswer(component, "a variance that is not above zero")
     return found
 
 
@@ -114,6 +120,9 @@ def matches_of(
             raise WrongAnswer(matcher, f"a {name} that is not finite")
     if found.weight.min() < 0:
         raise WrongAnswer(matcher, "a weight below zero")
+    squared = (found.direction * found.direction).sum(axis=1)
+    if ((np.abs(squared - 1) > UNIT) & (squared > 0)).any():
+        raise WrongAnswer(matcher, "a direction that is neither a unit vector nor zero")
     return found
 
 
@@ -140,13 +149,21 @@ def segmentation_of(
     """Return the silhouettes of a segmenter.
 
     Raises:
-        WrongAnswer: one is of a camera that is not there, of another size than its picture, or not finite.
+        WrongAnswer: one is of a camera or layer that is not there, or comes twice; is of another size than its
+            picture, or not finite.
     """
     found = of_kind(segmenter, segmenter.segment(frame, state, past, scene, turn), Segmentation)
-    for silhouette in found.silhouettes:
-        if not 0 <= silhouette.camera < len(scene.cameras):
+    if not isinstance(found.silhouettes, tuple):
+        raise WrongAnswer(segmenter, f"silhouettes as a {type(found.silhouettes).__name__}, not a tuple of them")
+    for number, silhouette in enumerate(found.silhouettes):
+        kind = silhouette.camera, silhouette.layer
+        if silhouette.camera not in range(len(scene.cameras)):
             message = f"a silhouette of camera {silhouette.camera}; there are 0 to {len(scene.cameras) - 1}"
             raise WrongAnswer(segmenter, message)
+        if silhouette.layer not in LAYERS:
+            raise WrongAnswer(segmenter, f"a silhouette of layer '{silhouette.layer}'; there are {', '.join(LAYERS)}")
+        if kind in [(other.camera, other.layer) for other in found.silhouettes[:number]]:
+            raise WrongAnswer(segmenter, f"two silhouettes of camera {silhouette.camera}, layer '{silhouette.layer}'")
         width, height = scene.cameras[silhouette.camera].size
         if silhouette.distance.shape != (height, width):
             rows, columns = silhouette.distance.shape
@@ -156,14 +173,25 @@ def segmentation_of(
     return found
 
 
-def result_of(recovery: Recovery, found: Any, scene: Scene) -> FrameResult:
-    """Return what a recovery answered.
+def result_of(recovery: Recovery, found: Any, looped: FrameResult, scene: Scene) -> FrameResult:
+    """Return what a recovery answered to what the loop had found.
 
     Raises:
-        WrongAnswer: it is no result, or its pose none of the body.
+        WrongAnswer: it is no result, its estimate is none, or something in it has another shape than the loop's.
     """
     result = of_kind(recovery, found, FrameResult)
-    _possible(recovery, result.state.estimate.pose, scene)
+    if result is looped:
+        return result
+    _sound(recovery, result.state.estimate, looped.state.estimate, scene)
+    cloth, before = result.state.cloth, looped.state.cloth
+    array_of(recovery, cloth.vertices, before.vertices.shape, "cloth")
+    array_of(recovery, cloth.parameters, before.parameters.shape, "cloth parameters")
+    for name in ("overlap", "energy"):
+        shape, meant = getattr(result, name).shape, getattr(looped, name).shape
+        if shape != meant:
+            raise WrongAnswer(recovery, f"the {name} of shape {shape}, not {meant}")
+    if not isinstance(result.notes, tuple):
+        raise WrongAnswer(recovery, f"notes as a {type(result.notes).__name__}, not a tuple of them")
     return result
 
 
@@ -182,8 +210,10 @@ def array_of(component: Component, values: F64, shape: tuple[int, ...], what: st
     """Return an array that a component answered.
 
     Raises:
-        WrongAnswer: it has another shape, or is not finite.
+        WrongAnswer: it has another shape or type, or is not finite.
     """
+    if values.dtype != np.float64:
+        raise WrongAnswer(component, f"{what} of {values.dtype}, not float64")
     if values.shape != shape:
         raise WrongAnswer(component, f"{what} of shape {values.shape}, not {shape}")
     if not finite(values):

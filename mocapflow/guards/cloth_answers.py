@@ -1,27 +1,48 @@
-"""What garments, drapers and cloth fitters answer, looked at where it comes in: see `answers`."""
+"""What bodies, garments, drapers and cloth fitters answer, looked at where it comes in: see `answers`."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mocapflow.assets import Body, GarmentMesh
-from mocapflow.components import ClothFitter, Draper, Garment
+from mocapflow.components import BodyModel, ClothFitter, Draper, Garment
 from mocapflow.data import Cloth, Estimate, Frame, Past, Pose, PoseBatch, Segmentation, Turn
-from mocapflow.guards.answers import WrongAnswer, array_of, of_kind
+from mocapflow.guards.answers import UNIT, WrongAnswer, array_of, of_kind
 from mocapflow.records import F64, I32
 from mocapflow.scene import Scene
 
 if TYPE_CHECKING:  # the model asks its draper through this module
     from mocapflow.model import ClothedModel
 
+REACH = 1.0  # m from the skin that holds it: a pin farther off is surely wrong
+SLACK = 1e-9  # beyond the bounds of a parameter: rounding
+
+
+def body_of(model: BodyModel, recording: Path) -> Body:
+    """Return the body that is loaded for a recording.
+
+    Raises:
+        WrongAnswer: it is not finite, or its skin or joints would not move as a body does.
+    """
+    body = of_kind(model, model.load(recording), Body)
+    array_of(model, body.vertices, body.vertices.shape, "vertices")
+    for what, values in (
+        ("skin weights that do not sum to one", body.skin_weight.sum(axis=1)),
+        ("a twist about an axis that is no unit vector", np.linalg.norm(body.twists[:, :3], axis=1)),
+    ):
+        if not np.allclose(values, 1, rtol=0, atol=UNIT):
+            raise WrongAnswer(model, what)
+    return body
+
 
 def mesh_of(garment: Garment, body: Body) -> GarmentMesh:
     """Return what a garment sews on a body.
 
     Raises:
-        WrongAnswer: it hangs from what the body lacks, or its parameters have no bounds.
+        WrongAnswer: it hangs from what the body lacks or from nothing near, or its parameters have no bounds.
     """
     mesh = of_kind(garment, garment.sew(body), GarmentMesh)
     for what, index, count in (
@@ -31,6 +52,11 @@ def mesh_of(garment: Garment, body: Body) -> GarmentMesh:
         odd = index[(index < 0) | (index >= count)]
         if len(odd):
             raise WrongAnswer(garment, f"cloth {what} {odd[0]}; the body has 0 to {count - 1}")
+    if not len(mesh.pinned):
+        raise WrongAnswer(garment, "cloth that is pinned nowhere")
+    away = np.linalg.norm(mesh.vertices[mesh.pinned] - body.vertices[mesh.pinned_to], axis=1).max()
+    if away > REACH:
+        raise WrongAnswer(garment, f"a pin {away:.3g} m from the skin that holds it; are its measures in metres?")
     names, bounds = mesh.parameter_names, mesh.parameter_bounds
     if len(set(names)) != len(bounds):
         raise WrongAnswer(garment, f"{len(bounds)} bounds of parameters for the names {', '.join(names) or 'none'}")
@@ -73,11 +99,16 @@ def cloth_of(
     """Return the cloth that a fitter chooses.
 
     Raises:
-        WrongAnswer: it is not that of the garment, or not finite.
+        WrongAnswer: it is not that of the garment, not finite, or a parameter is out of its bounds.
     """
     cloth = of_kind(fitter, fitter.fit(frame, segmentation, estimate, model, past, turn), Cloth)
     garment = model.scene.garment
     vertices, parameters = (0, 0) if garment is None else (len(garment.vertices), len(garment.parameter_names))
     array_of(fitter, cloth.vertices, (vertices, 3), "cloth")
     array_of(fitter, cloth.parameters, (parameters,), "cloth parameters")
+    if garment is not None:
+        ranges = zip(garment.parameter_names, cloth.parameters, garment.parameter_bounds, strict=True)
+        for name, value, (low, high) in ranges:
+            if not low - SLACK <= value <= high + SLACK:
+                raise WrongAnswer(fitter, f"{value:g} for parameter '{name}', which goes from {low:g} to {high:g}")
     return cloth

@@ -8,6 +8,8 @@ from pathlib import Path
 from types import FrameType, TracebackType
 from typing import Any
 
+from pydantic import ValidationError
+
 from mocapflow.components import Component
 from mocapflow.data import Frame, Turn
 from mocapflow.errors import ComponentFailed
@@ -27,10 +29,18 @@ def failure(error: BaseException, stage: Component, registry: Registry, saved: s
     """
     calls = list(_calls(error.__traceback__))
     component = error.component if isinstance(error, WrongAnswer) else _culprit(calls, registry) or stage
-    role, name = component.role.replace("_", " "), component.name
-    message = f"{role} '{name}' ({registry.origin(type(component))}) failed{_moment(calls)}: {_said(error)}"
+    message = f"{_named(component)} ({registry.origin(type(component))}) failed{_moment(calls)}: {_said(error)}"
     hints = [saved, _keep(error, log)]
     return ComponentFailed(message, hint="\n".join(filter(None, hints)))
+
+
+def met(error: BaseException, stage: Component, registry: Registry) -> str:
+    """Return the component in which an error was raised, for people."""
+    return _named(_culprit(list(_calls(error.__traceback__)), registry) or stage)
+
+
+def _named(component: Component) -> str:
+    return f"{component.role.replace('_', ' ')} '{component.name}'"
 
 
 def _calls(trace: TracebackType | None) -> Iterator[FrameType]:
@@ -69,6 +79,10 @@ def _moment(calls: list[FrameType]) -> str:
 
 
 def _said(error: BaseException) -> str:
+    if isinstance(error, ValidationError) and (first := error.errors()[0])["type"] == "frozen_instance":
+        return f"it sets '{first['loc'][0]}', but a component is frozen and keeps nothing between calls"
+    if isinstance(error, WrongAnswer):
+        return f"it returned {error.what}"
     text = str(error).strip().splitlines()
     return f"{type(error).__name__}: {text[0]}" if text else type(error).__name__
 

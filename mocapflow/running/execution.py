@@ -22,15 +22,16 @@ from mocapflow.errors import (
     MocapflowError,
     PluginError,
     ShapeError,
+    StoreError,
     interrupted,
     unwritable,
 )
 from mocapflow.guards.answers import of_kind
-from mocapflow.guards.cloth_answers import mesh_of
+from mocapflow.guards.cloth_answers import body_of, mesh_of
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import unwatched
 from mocapflow.results import RunFolder
-from mocapflow.running.blame import failure
+from mocapflow.running.blame import failure, met
 from mocapflow.running.progress import Progress
 from mocapflow.running.recipes import Step
 from mocapflow.running.warned import warnings_logged
@@ -195,7 +196,7 @@ class Execution:
     def _body(self) -> Body:
         model = self._pipeline.body
         with self._blaming(model):
-            return of_kind(model, model.load(self._pipeline.recording), Body)
+            return body_of(model, self._pipeline.recording)
 
     def _sewn(self, garment: Garment, body: Body) -> GarmentMesh:
         try:
@@ -215,6 +216,8 @@ class Execution:
             if interrupted(error):
                 raise KeyboardInterrupt from None
             if isinstance(error, MocapflowError) and not isinstance(error, ShapeError | PluginError):
+                if not isinstance(error, StoreError):
+                    error.where = error.where or met(error, component, self._pipeline.registry)
                 raise
             if isinstance(error, OSError) and error.errno in {*FULL, errno.EROFS} and (said := unwritable(error)):
                 raise said from error  # no component's fault

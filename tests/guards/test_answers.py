@@ -1,6 +1,7 @@
 """What components answer is looked at: a wrong answer names who gave it, and nothing wrong goes on."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from typer.testing import CliRunner
 
 from mocapflow.cli import app
 from mocapflow.components import (
+    BodyModel,
     ClothFitter,
     Draper,
     Garment,
@@ -19,7 +21,7 @@ from mocapflow.components import (
     Segmenter,
 )
 from mocapflow.data import NO_CLOTH, Matches, Past, Pose, Residual, Turn
-from mocapflow.errors import ComponentFailed
+from mocapflow.errors import MocapflowError
 from mocapflow.guards.answers import (
     WrongAnswer,
     estimate_of,
@@ -30,8 +32,9 @@ from mocapflow.guards.answers import (
     result_of,
     segmentation_of,
 )
-from mocapflow.guards.cloth_answers import cloth_of, mesh_of
+from mocapflow.guards.cloth_answers import body_of, cloth_of, mesh_of
 from mocapflow.testing import pictures, scenes
+from mocapflow.testing.recovery import settled
 from tests.fixtures.stores import STAGES, load, run_tiny, write_pipeline, write_recording
 
 SCENE = scenes.tiny_scene()
@@ -89,6 +92,7 @@ def other(name, value):
         (other("direction", np.inf), "a direction that is not finite"),
         (other("weight", np.inf), "a weight that is not finite"),
         (other("weight", -1.0), "a weight below zero"),
+        (other("direction", 17.0), "a direction that is neither a unit vector nor zero"),
     ],
 )
 def test_pairs_that_are_none(answer, said):
@@ -173,23 +177,43 @@ class Interrupted(Prior):
             raise SystemError("CPUDispatcher returned a result with an exception set") from error
 
 
+class Keeps(Prior):
+    \"\"\"Remembers the last pose.\"\"\"
+
+    name = "keeps"
+
+    def residual(self, pose, past, scene):
+        self.last = pose
+
+
+class Asks(Prior):
+    \"\"\"Asks for a joint that is not there.\"\"\"
+
+    name = "asks"
+
+    def residual(self, pose, past, scene):
+        scene.body.joint("left_hip")
+
+
 @hookimpl
 def mocapflow_priors():
-    return [Nan, Leaves, Interrupted]
+    return [Nan, Leaves, Interrupted, Keeps, Asks]
 """
 
 
 @pytest.mark.parametrize(
     ("prior", "said"),
     [
-        ("nan", r"prior 'nan' \(.*\) failed at frame 0, iteration 1: .*returned an error or a jacobian"),
+        ("nan", r"prior 'nan' \(.*\) failed at frame 0, iteration 1: it returned an error or a jacobian"),
         ("leaves", r"prior 'leaves' \(.*\) failed at frame 0, iteration 1: SystemExit: 0"),
+        ("keeps", r"prior 'keeps' \(.*\) failed .*: it sets 'last', but a component .* keeps nothing between calls"),
+        ("asks", r"^prior 'asks'  the body has no joint 'left_hip'\n +available: root, top"),
     ],
 )
 def test_a_run_names_who_answers_wrongly(tmp_path, prior, said):
     path = with_prior(tmp_path, prior)
     assert load(path)
-    with pytest.raises(ComponentFailed, match=said):
+    with pytest.raises(MocapflowError, match=said):
         run_tiny(path, tmp_path, frames=2)
 
 
@@ -243,7 +267,7 @@ CLOTH = scenes.tiny_cloth(CLOTHED, POSE)
 STATE = pictures.tiny_state(SCENE, POSE)
 
 
-class Dressing(Draper, ClothFitter, Garment, Segmenter):
+class Dressing(Draper, ClothFitter, Garment, Segmenter, BodyModel):
     """Says what it is told to."""
 
     name = "dressing"
@@ -261,6 +285,9 @@ class Dressing(Draper, ClothFitter, Garment, Segmenter):
     def sew(self, body):
         return self.answer
 
+    def load(self, recording):
+        return self.answer
+
     def segment(self, frame, state, past, scene, turn):
         return self.answer
 
@@ -271,6 +298,7 @@ class Dressing(Draper, ClothFitter, Garment, Segmenter):
         (lambda v: None, "NoneType, not ndarray"),
         (lambda v: v[:, 1:], "cloth of shape .*, not"),
         (lambda v: v * np.nan, "cloth that is not finite"),
+        (lambda v: v.astype(np.float32), "cloth of float32, not float64"),
     ],
 )
 def test_drapes_that_are_none(change, said):
@@ -295,6 +323,7 @@ def test_velocities_that_are_none():
         (NO_CLOTH, r"cloth of shape \(0, 3\), not"),
         (replace(CLOTH, vertices=CLOTH.vertices * np.nan), "cloth that is not finite"),
         (replace(CLOTH, parameters=np.zeros(9)), r"cloth parameters of shape \(9,\)"),
+        (replace(CLOTH, parameters=CLOTH.parameters + 1), "1 for parameter 'thickness_m', which goes from 0 to 0.01"),
     ],
 )
 def test_fitted_cloth_that_is_none(answer, said):
@@ -302,6 +331,23 @@ def test_fitted_cloth_that_is_none(answer, said):
     assert cloth_of(Dressing(answer=CLOTH), *asked) is CLOTH
     with pytest.raises(WrongAnswer, match=f"'dressing' returned {said}"):
         cloth_of(Dressing(answer=answer), *asked)
+
+
+BODY = CLOTHED.body
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"vertices": BODY.vertices * np.nan}, "vertices that are not finite"),
+        ({"skin_weight": 2 * BODY.skin_weight}, "skin weights that do not sum to one"),
+        ({"twists": 2 * BODY.twists}, "a twist about an axis that is no unit vector"),
+    ],
+)
+def test_bodies_that_are_none(change, said):
+    assert body_of(Dressing(answer=BODY), Path()) is BODY
+    with pytest.raises(WrongAnswer, match=f"'dressing' returned {said}"):
+        body_of(Dressing(answer=replace(BODY, **change)), Path())
 
 
 MESH = CLOTHED.garment
@@ -312,6 +358,8 @@ MESH = CLOTHED.garment
     [
         ({"pinned_to": MESH.pinned_to + 10**6}, "cloth pinned to vertex .*; the body has 0 to"),
         ({"carried_by": MESH.carried_by - 1}, "cloth carried by joint -1; the body has 0 to"),
+        ({"pinned": MESH.pinned[:0], "pinned_to": MESH.pinned_to[:0]}, "cloth that is pinned nowhere"),
+        ({"vertices": 1000 * MESH.vertices}, "a pin .* m from the skin that holds it; are its measures in metres?"),
         ({"parameter_names": ()}, "3 bounds of parameters for the names none"),
         ({"parameter_bounds": MESH.parameter_bounds[:, ::-1]}, "the bounds .* of parameter"),
         ({"parameter_bounds": np.full_like(MESH.parameter_bounds, np.inf)}, "the bounds .* of parameter"),
@@ -327,6 +375,9 @@ def test_garments_that_are_none(change, said):
     ("change", "said"),
     [
         ({"camera": 7}, "a silhouette of camera 7; there are 0 to 3"),
+        ({"camera": "cam02"}, "a silhouette of camera cam02; there are 0 to 3"),
+        ({"camera": 0}, "two silhouettes of camera 0, layer 'person'"),
+        ({"layer": "Person"}, "a silhouette of layer 'Person'; there are person, garment, skin"),
         ({"distance": SEEN.silhouettes[1].distance[1:]}, "a silhouette of .* px; the picture is"),
         ({"distance": SEEN.silhouettes[1].distance * np.float32(np.nan)}, "a silhouette that is not finite"),
     ],
@@ -338,6 +389,8 @@ def test_silhouettes_that_are_none(change, said):
     wrong = replace(SEEN, silhouettes=(one, replace(two, **change), *rest))
     with pytest.raises(WrongAnswer, match=f"'dressing' returned {said}"):
         segmentation_of(Dressing(answer=wrong), *asked)
+    with pytest.raises(WrongAnswer, match="'dressing' returned silhouettes as a Silhouette, not a tuple of them"):
+        segmentation_of(Dressing(answer=replace(SEEN, silhouettes=one)), *asked)
 
 
 class Lost(Recovery):
@@ -349,6 +402,23 @@ class Lost(Recovery):
         return None
 
 
-def test_a_recovery_that_answers_with_nothing():
-    with pytest.raises(WrongAnswer, match="recovery 'lost' returned NoneType, not FrameResult"):
-        result_of(Lost(), None, SCENE)
+LOOPED = settled(STATE, SCENE)
+ESTIMATE = STATE.estimate
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        (None, "NoneType, not FrameResult"),
+        (replace(LOOPED, overlap=np.ones(1)), r"the overlap of shape \(1,\), not \(4,\)"),
+        (replace(LOOPED, energy=np.zeros((2, 7))), r"the energy of shape \(2, 7\), not \(1, 0\)"),
+        (replace(LOOPED, notes="found"), "notes as a str, not a tuple of them"),
+        (replace(LOOPED, state=replace(STATE, cloth=CLOTH)), r"cloth of shape .*, not \(0, 3\)"),
+        (replace(LOOPED, state=replace(STATE, estimate=replace(ESTIMATE, covariance=np.nan * ESTIMATE.covariance))),
+         "a covariance that is not finite"),
+    ],
+)  # fmt: skip
+def test_a_recovery_that_answers_with_no_result(answer, said):
+    assert result_of(Lost(), replace(LOOPED, notes=("found",)), LOOPED, SCENE).notes == ("found",)
+    with pytest.raises(WrongAnswer, match=f"recovery 'lost' returned {said}"):
+        result_of(Lost(), answer, LOOPED, SCENE)

@@ -218,9 +218,7 @@ def test_a_body_that_raises_is_named(tmp_path, path, monkeypatch):
 def test_inputs_that_are_no_paths_name_the_body(tmp_path, path, monkeypatch):
     pipeline = load(path)
     monkeypatch.setattr(type(pipeline.body), "inputs", lambda self, recording: "subject.txt")
-    with pytest.raises(
-        PluginError, match="'tiny_body' returned the inputs 'subject.txt', which are no list of Path"
-    ):
+    with pytest.raises(PluginError, match="'tiny_body' returned the inputs 'subject.txt', which are no list of Path"):
         plan(pipeline, store=tmp_path / "store.zarr")
 
 
