@@ -62,6 +62,8 @@ def array_fields(record_class: type) -> dict[str, Axes]:
 
 
 def _axes(field: dataclasses.Field[Any]) -> Axes:
+    if not isinstance(field.type, str):
+        raise ShapeError(f"{field.name}: begin the module of a record with `from __future__ import annotations`")
     name, _, rest = str(field.type).partition(" | ")
     return Axes(field.metadata["axes"], field.metadata["unit"], np.dtype(DTYPES[name]), rest == "None", name == "Wide")
 

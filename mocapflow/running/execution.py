@@ -122,7 +122,8 @@ class Execution:
     def _whole(self, step: Step) -> Any:
         value = self._run(step)
         begun = self._store.begin(step.label, step.key, step.recipe)
-        self._store.save(begun, value, warnings=self.entries[step.label]["warnings"])
+        with self._blaming(step.named.stage):
+            self._store.save(begun, value, warnings=self.entries[step.label]["warnings"])
         return value
 
     def _chain(self, step: Step, started: Artifact | None, lock: Lock) -> Any:

@@ -183,4 +183,4 @@ def _untyped(value: Any, declared: str) -> Any:
     """Return a value as it was before json: tuples for lists, paths for strings."""
     if isinstance(value, list):
         return tuple(_untyped(v, "") for v in value)
-    return Path(value) if declared.startswith("Path") and value is not None else value
+    return Path(value) if "Path" in declared and value is not None else value

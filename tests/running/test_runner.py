@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from mocapflow.errors import ComponentFailed, GarmentError, PipelineError, PluginError, StoreError
 from mocapflow.hookspecs import hookimpl
 from mocapflow.running.runner import plan, run
+from mocapflow.storage.store import Store
 from tests.fixtures.stores import STAGES, actions, load, run_tiny, write_pipeline, write_recording
 
 ROOT = Path(__file__).parents[2]
@@ -213,6 +214,15 @@ def test_a_body_that_raises_is_named(tmp_path, path, monkeypatch):
         ComponentFailed, match=r"^body 'tiny_body' \(plugin 'tiny_plugin' .*\) failed: ValueError: no such joint"
     ):
         run(pipeline, store=tmp_path / "store.zarr", out=tmp_path / "out")
+
+
+def test_a_result_that_can_not_be_kept_names_its_stage(tmp_path, path, monkeypatch):
+    def save(self, artifact, value, warnings):
+        raise TypeError("Object of type set is not JSON serializable")
+
+    monkeypatch.setattr(Store, "save", save)
+    with pytest.raises(ComponentFailed, match=r"^stage 'tiny_background' .* failed: TypeError: Object of type set"):
+        run_tiny(path, tmp_path)
 
 
 def test_inputs_that_are_no_paths_name_the_body(tmp_path, path, monkeypatch):

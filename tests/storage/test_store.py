@@ -8,15 +8,18 @@ import socket
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 import zarr
 
+from mocapflow import records
 from mocapflow.assets import Background
 from mocapflow.data import Frame, Past, Pose, Silhouette, Start
-from mocapflow.errors import ComponentFailed, StoreError
+from mocapflow.errors import ComponentFailed, ShapeError, StoreError
+from mocapflow.records import F64, record
 from mocapflow.running.execution import Execution
 from mocapflow.series import Series
 from mocapflow.storage import locks, rows
@@ -66,12 +69,21 @@ def equal(one, other):
         assert one == other
 
 
+@dataclass
+class Noted:
+    """As a plugin may write it: its types are types, not text."""
+
+    where: Path
+    twin: Path | None = None
+
+
 VALUES = {
     "start": Start(pose=Pose(root=np.eye(4), angles=np.array([0.1, np.nan])), parameters=np.empty(0)),
     "background": Background(
         mean=(np.ones((2, 3, 3), "f4"), np.zeros((4, 5, 3), "f4")), spread=(np.ones((1, 1, 3), "f4"),)
     ),
     "body": tiny_body(1.0),
+    "paths": Noted(where=Path("a"), twin=Path("b")),
     "mapping": Past(moments=(), appearance={"a/b": np.ones(3), "c": np.ones((2, 2))}),
 }
 
@@ -82,6 +94,16 @@ def test_records_come_back_as_they_were(store, kind):
     made = put(store, value)
     assert made.complete
     equal(value, store.load(made))
+
+
+def test_a_record_says_how_its_types_are_to_be_written():
+    with pytest.raises(ShapeError, match="knee: begin the module of a record with `from __future__"):
+
+        @record
+        class Knees:
+            knee: F64 = records.array("T", unit="rad")
+
+        Knees(knee=np.zeros(3))
 
 
 def test_arrays_say_their_axes_and_units(store):
