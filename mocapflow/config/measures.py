@@ -8,7 +8,7 @@ from typing import Any
 from mocapflow.components import Garment
 from mocapflow.config.documents import Document, Place
 from mocapflow.config.resolve import Resolver
-from mocapflow.errors import MocapflowError, RecordingError, UnknownComponent
+from mocapflow.errors import MocapflowError, PluginError, RecordingError, UnknownComponent
 from mocapflow.io.typed import place, read_json
 from mocapflow.registry import Registry
 
@@ -46,6 +46,8 @@ def garment_of(value: Any, recording: Path, resolver: Resolver) -> Garment | Non
     except UnknownComponent as error:
         where = place(file, str(kind)) if named == kind else error.where
         raise UnknownComponent(error.message, where=where, hint=error.hint) from None
+    except PluginError:  # two garments have its name, which no measure mends
+        raise
     except MocapflowError as error:
         if error.where != resolver.place(("garment",)):
             raise

@@ -1,14 +1,16 @@
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from mocapflow.assets import Body
 from mocapflow.config.experiment import load_experiment
 from mocapflow.config.pipeline import load_pipeline
-from mocapflow.errors import MocapflowError
+from mocapflow.errors import MocapflowError, PluginError
 from mocapflow.help.shipped import shipped
-from mocapflow.registry import load_registry
+from mocapflow.hookspecs import hookimpl
+from mocapflow.registry import Origin, load_registry
 from mocapflow.running.wiring import latest, wire
 from tests.fixtures import small_plugins
 
@@ -212,6 +214,15 @@ def test_measures_of_another_garment_are_not_used(folder):
     Path("clip/subject/garment.json").write_text(json.dumps({**MEASURES, "type": "shorts"}))
     with pytest.raises(MocapflowError, match=r"garment: skirt needs waist_height_m, .*\n.*which describes a shorts"):
         load()
+
+
+def test_of_two_garments_of_one_name_no_measures_are_told(folder):
+    registry = small_plugins.registry()
+    other = SimpleNamespace(mocapflow_garments=hookimpl(lambda: [small_plugins.Skirt]))
+    registry.add(Origin("other", "other", "1.0"), lambda: other)
+    with pytest.raises(PluginError, match="two plugins provide a garment named 'skirt'") as caught:
+        load_pipeline(Path("skirt.yaml"), registry)
+    assert caught.value.hint == "uninstall one of them, or give its component another name"
 
 
 def test_a_wrong_measure_is_told_with_the_file_it_comes_from(folder):
