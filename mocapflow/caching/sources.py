@@ -79,10 +79,8 @@ def python_files(unit: str) -> Iterable[tuple[str, Path]]:
     if origin is None:
         return
     if origin.name != "__init__.py":
-        yield (
-            unit if "." in unit else origin.stem,
-            origin,
-        )  # a plugin file is imported by a name that says where it lies
+        placeless = unit if "." in unit else origin.stem  # a plugin file's name says where it lies
+        yield placeless, origin
         return
     for path in sorted(origin.parent.rglob("*.py")):
         parts = path.relative_to(origin.parent).with_suffix("").parts
