@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import zarr
 
 PLAIN = "plain"  # attribute with the fields that are no arrays
+WHOLE = "."  # between the numbers of a chunk, of arrays that are written whole: earlier ones lack chunks of zeros
 
 
 def save_record(group: zarr.Group, value: Any) -> None:
@@ -81,6 +82,7 @@ def save_array(group: zarr.Group, name: str, values: Any, axes: list[str], unit:
     made = group.create_array(
         name, shape=values.shape, chunks=chunks or (), dtype=values.dtype, dimension_names=axes,
         compressors=[ZstdCodec(level=1, checksum=True)], attributes={"unit": unit} if unit else {},
+        chunk_key_encoding={"name": "default", "separator": WHOLE}, config={"write_empty_chunks": True},
     )  # fmt: skip
     if isinstance(values, Series):
         for part in blocks(len(values)):
@@ -139,19 +141,30 @@ def _load_item(group: Any, name: str) -> Any:
 def _array(group: Any, name: str, rows: int | None) -> Any:
     if name not in group:
         return None
-    return np.asarray(group[name][:rows] if rows is not None else group[name][...])
+    values = np.asarray(group[name][:rows] if rows is not None else group[name][...])
+    _check_chunks(group[name], range(values.shape[0] if values.ndim else 0))
+    return values
+
+
+def _check_chunks(array: Any, rows: range) -> None:
+    """Raise if a chunk of these rows is not there, or was removed while they were read: it would read as zeros."""
+    encoding = array.metadata.chunk_key_encoding
+    if encoding.separator != WHOLE or not array.size or not array.ndim:
+        return
+    folder, inner = Path(array.store_path.store.root) / array.path, (0,) * (array.ndim - 1)
+    for number in range(rows.start // array.chunks[0], -(-rows.stop // array.chunks[0])):
+        if not (folder / encoding.encode_chunk_key((number, *inner))).exists():
+            raise FileNotFoundError(f"chunk {number} of {array.path} is missing")
 
 
 def _series(group: Any, name: str, rows: int | None) -> Series:
     """Return an array whose rows stay in the store until they are asked for; all of them are looked at once."""
-    import zarr
-
     kept = group[name]
 
     def block(number: int) -> F64:
         try:
             values = np.asarray(kept[number * BLOCK : (number + 1) * BLOCK])
-            zarr.open_group(group.store_path, mode="r")  # removed meanwhile, it would read as zeros
+            _check_chunks(kept, range(len(series))[number * BLOCK : (number + 1) * BLOCK])
             return values
         except Exception as error:  # as in `load_record`
             raise Corrupted(f"{name} of {group.path or group.store} can't be read back: {error}") from error
