@@ -54,7 +54,7 @@ def digest_array(values: npt.NDArray[Any]) -> str:
 
 
 class Digests:
-    """Digests of files and of packages, remembered by path, size and time of change.
+    """Digests of files and of packages, remembered by path, size and times of change.
 
     Args:
         memory: where to remember them between runs; None forgets them.
@@ -133,11 +133,11 @@ class Digests:
 
     def _remembered(self, path: Path, kind: str, read: Callable[[], list[Any]]) -> list[Any]:
         stat, name = path.stat(), f"{path.resolve()}{kind}"
-        stamp = [stat.st_size, stat.st_mtime_ns]
+        stamp = [stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns]  # copying tools set the second, nobody the third
         known = self._known.get(name)
-        if known is None or known[:2] != stamp:
+        if known is None or known[:3] != stamp:
             known = self._known[name] = [*stamp, *read()]
-        return known[2:]
+        return known[3:]
 
 
 def _read(memory: Path | None) -> dict[str, list[Any]]:

@@ -50,11 +50,17 @@ def _shared(name: str) -> str | None:
 
 
 def visible(folder: Path) -> Iterator[Path]:
-    """Yield the files below a folder in order, without those that file browsers and editors leave there."""
-    for path in sorted(folder.rglob("*")):
-        hidden = any(part.startswith(".") for part in path.relative_to(folder).parts) or path.name == "Thumbs.db"
-        if path.is_file() and not hidden:
+    """Yield the files below a folder in order, without those that file browsers and editors leave there.
+
+    Linked folders count like others: who reads the files does not see the difference.
+    """
+    for path in sorted(folder.iterdir()):
+        if path.name.startswith(".") or path.name == "Thumbs.db":
+            continue
+        if path.is_file():
             yield path
+        elif path.is_dir() and not folder.resolve().is_relative_to(path.resolve()):  # else it is a link back
+            yield from visible(path)
 
 
 def data_files(unit: str) -> Iterable[tuple[str, Path]]:
@@ -82,6 +88,6 @@ def python_files(unit: str) -> Iterable[tuple[str, Path]]:
         placeless = unit if "." in unit else origin.stem  # a plugin file's name says where it lies
         yield placeless, origin
         return
-    for path in sorted(origin.parent.rglob("*.py")):
+    for path in (path for path in visible(origin.parent) if path.suffix == ".py"):
         parts = path.relative_to(origin.parent).with_suffix("").parts
         yield ".".join((unit, *(part for part in parts if part != "__init__"))), path

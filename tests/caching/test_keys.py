@@ -341,6 +341,28 @@ def test_file_digests_are_remembered_until_the_file_changes(tmp_path, monkeypatc
     assert opened
 
 
+def test_a_file_in_the_place_of_another_of_the_same_size_and_time_is_another(tmp_path):
+    file, other, kept = tmp_path / "video.mp4", tmp_path / "other.mp4", Digests()
+    for path, content in ((file, "one"), (other, "two")):
+        path.write_text(content)
+        os.utime(path, ns=(1, 1))
+    first = kept.file(file)
+    other.replace(file)
+    assert kept.file(file) != first
+
+
+def test_files_in_linked_folders_count(tmp_path):
+    trial, elsewhere = tmp_path / "static", tmp_path / "drive" / "cam01"
+    for folder in (trial / "videos", elsewhere):
+        folder.mkdir(parents=True)
+    (elsewhere / "000000.png").write_text("one")
+    (trial / "videos" / "cam01").symlink_to(elsewhere)
+    (trial / "videos" / "back").symlink_to(trial)
+    first = Digests().file(trial)
+    (elsewhere / "000000.png").write_text("two")
+    assert Digests().file(trial) != first
+
+
 def test_arrays_count_by_dtype_shape_and_content():
     values = np.arange(6.0)
     assert digests.digest_array(values) == digests.digest_array(values.copy())
