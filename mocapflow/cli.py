@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import shlex
+import signal
 import sys
 import warnings
 from collections.abc import Callable
@@ -24,7 +25,7 @@ class Commands(typer.core.TyperGroup):
     """Prints a problem the user can mend without a traceback; anything else is a bug and shows its own."""
 
     def invoke(self, ctx: Any) -> Any:
-        """Run the command and turn errors into exit status 1 or 2, an interrupt into 130."""
+        """Run the command and turn errors into exit status 1 or 2, an interrupt or SIGTERM into 130."""
         try:
             return super().invoke(ctx)
         except (Exception, KeyboardInterrupt) as error:
@@ -94,6 +95,7 @@ def main() -> None:
     warned = logging.StreamHandler(sys.stderr)
     warned.setLevel(logging.WARNING)  # of the handler: libraries lower that of their own loggers
     logging.basicConfig(format="warning: %(message)s", handlers=[warned])
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # a scheduler's way of saying Ctrl-C
     app(prog_name="mocapflow")
 
 

@@ -1,4 +1,4 @@
-"""The real command line while it runs: asked from elsewhere, stopped by Ctrl-C, and gone on with."""
+"""The real command line while it runs: asked from elsewhere, stopped by Ctrl-C or a scheduler, and gone on with."""
 
 import os
 import re
@@ -40,14 +40,15 @@ def status(folder):
     return done.stdout
 
 
-def test_a_run_is_asked_after_interrupted_and_gone_on_with(tmp_path, path):
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM], ids=["ctrl_c", "terminated"])
+def test_a_run_is_asked_after_interrupted_and_gone_on_with(tmp_path, path, stop):
     words = ["run", path.name, "--out", "out", "--store", "store.zarr"]
     with started(words, tmp_path) as run:
         assert run.stderr is not None
         lines = iter(run.stderr)
         assert any(line.startswith("track: 1") for line in lines)
         said = status(tmp_path)
-        run.send_signal(signal.SIGINT)
+        run.send_signal(stop)
         rest = "".join(lines)
     assert re.search(r"^track +resume .* \d+ of 30 frames done", said, re.MULTILINE)
     assert re.search(rf"^process {run.pid} on \S+, 0:\d\d ago: track: ", said, re.MULTILINE)
@@ -55,6 +56,7 @@ def test_a_run_is_asked_after_interrupted_and_gone_on_with(tmp_path, path):
     assert rest.endswith(f"interrupted; finished frames are saved. To go on: mocapflow {' '.join(words)}\n")
     assert "Traceback" not in rest
     assert not (tmp_path / "out" / FILE).exists()
+    assert not list((tmp_path / "store.zarr" / ".state").glob("*.lock"))
     _, lines = run_tiny(path, tmp_path)
     assert any(re.fullmatch(r"track: going on after \d+ frames", line) for line in lines)
     whole = tmp_path / "whole"

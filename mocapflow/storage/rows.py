@@ -153,7 +153,7 @@ def write_json(path: Path, value: Any) -> None:
     Each writer has a part of its own: two that make the same store at once must not move each other's.
     """
     part = path.with_suffix(f".{uuid4().hex}.part")
-    part.write_text(json.dumps(value, ensure_ascii=False, separators=(",", ":")))
+    part.write_text(json.dumps(value, separators=(",", ":")))  # no letter but ASCII: any locale can write it
     flush(part)
     part.replace(path)
 

@@ -216,6 +216,13 @@ def test_a_damaged_row_is_noticed(tmp_path, damage):
         made.read(0)
 
 
+def test_attributes_are_written_alike_in_every_locale(tmp_path):
+    value = {"unit": "px^-2 or px⁻²", "file": "caméra \udcff.png"}  # a name that is no UTF-8 comes so from the system
+    rows.write_json(tmp_path / "zarr.json", value)
+    assert (tmp_path / "zarr.json").read_bytes().isascii()
+    assert rows.read_json(tmp_path / "zarr.json") == value
+
+
 def test_silhouettes_keep_their_mask_and_an_eighth_of_a_pixel():
     distance = np.random.default_rng(1).uniform(-20, 20, (64, 80)).astype(np.float32)
     distance[0, :4] = [0.01, -0.01, 0.0, 0.06]
