@@ -16,7 +16,7 @@ import typer
 import typer.core
 
 from mocapflow.commands import cache, comparing, looking, new, prior, results, running
-from mocapflow.errors import MocapflowError, interrupted, unwritable
+from mocapflow.errors import MocapflowError, interrupted, uncompilable, unwritable
 
 QUIET = {"OPENCV_LOG_LEVEL": "ERROR", "OPENCV_FFMPEG_LOGLEVEL": "-8"}  # what can't be decoded is told by mocapflow
 
@@ -34,7 +34,7 @@ class Commands(typer.core.TyperGroup):
                 again = shlex.join(["mocapflow", *words])
                 typer.echo(f"\ninterrupted; finished frames are saved. To go on: {again}", err=True)
                 raise typer.Exit(130) from None
-            said = unwritable(error) if isinstance(error, OSError) else error
+            said = unwritable(error) if isinstance(error, OSError) else uncompilable(error) or error
             if not isinstance(said, MocapflowError):
                 raise
             typer.echo(f"error: {said}", err=True)

@@ -76,6 +76,14 @@ def unwritable(error: OSError) -> StoreError | None:
     return StoreError(f"{what}: {error.strerror}", where=str(error.filename or ""), hint=hint)
 
 
+def uncompilable(error: BaseException) -> MocapflowError | None:
+    """Return what is said where numba finds no place for compiled code; None for other errors."""
+    if not isinstance(error, RuntimeError) or "no locator available" not in str(error):
+        return None
+    hint = "NUMBA_CACHE_DIR names a folder of yours for it"
+    return MocapflowError("compiled code can be kept neither beside its source nor in a home folder", hint=hint)
+
+
 def interrupted(error: BaseException | None) -> bool:
     """True where Ctrl-C is behind an error: compiled code that it falls into raises a SystemError of its own."""
     while error is not None:

@@ -245,6 +245,16 @@ def test_an_interrupt_ends_with_130_and_says_how_to_go_on(call, monkeypatch):
     assert call("run", "start.yaml", "--fresh").stderr.endswith("To go on: mocapflow run start.yaml\n")
 
 
+def test_no_place_for_compiled_code_is_told(call, monkeypatch):
+    def broken(*_, **__):
+        raise RuntimeError("cannot cache function '_chain': no locator available for file '/usr/kinematics.py'")
+
+    monkeypatch.setattr(runner, "run", broken)
+    result = call("run", "start.yaml")
+    assert result.exit_code == 2
+    assert result.stderr.endswith("NUMBA_CACHE_DIR names a folder of yours for it\n")
+
+
 def test_a_bug_shows_its_traceback(call, monkeypatch):
     def broken(*_, **__):
         raise ZeroDivisionError("ours")

@@ -63,16 +63,26 @@ def folder_of(said: Mapping[str, Any], name: str, resolver: Resolver) -> Path:
 
 
 def home() -> Path:
-    """Return where the folders of links lie."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "mocapflow" / "recordings"
+    """Return where the folders of links lie.
+
+    Raises:
+        RecordingError: nobody has said, and the user has no home.
+    """
+    try:
+        cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    except RuntimeError:
+        hint = "XDG_CACHE_HOME names a place"
+        raise RecordingError("there is no home folder for links to the parts of a recording", hint=hint) from None
+    return cache / "mocapflow" / "recordings"
 
 
 def whereabouts(recording: Path) -> str | dict[str, str]:
     """Return where a recording is, for people: its folder, or the path of each part where they are named."""
-    if recording.parent != home():
-        return str(recording)
-    links = sorted(path for path in recording.rglob("*") if path.is_symlink())
-    return {link.relative_to(recording).as_posix(): str(link.readlink()) for link in links}
+    with suppress(RecordingError):  # no home: no links
+        if recording.parent == home():
+            links = sorted(path for path in recording.rglob("*") if path.is_symlink())
+            return {link.relative_to(recording).as_posix(): str(link.readlink()) for link in links}
+    return str(recording)
 
 
 def _links(part: str, value: Any, resolver: Resolver) -> Iterator[tuple[str, Path]]:

@@ -148,3 +148,14 @@ def test_a_cache_that_cant_be_written_is_told(tmp_path, spread):
     home().touch()
     with pytest.raises(MocapflowError, match="XDG_CACHE_HOME names another place"):
         load(spread)
+
+
+def test_a_user_without_a_home_can_run_a_folder_and_is_told_where_links_could_lie(tmp_path, spread, monkeypatch):
+    def nowhere():
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setattr(Path, "home", nowhere)
+    assert whereabouts(tmp_path / "clip") == str(tmp_path / "clip")
+    with pytest.raises(MocapflowError, match="XDG_CACHE_HOME names a place"):
+        load(spread)
