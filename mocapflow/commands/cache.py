@@ -67,9 +67,9 @@ def prune(
     paths = [artifact.path for artifact in going] + Store(store).aside()
     freed = sum(map(_size, paths))
     for path in paths:
-        typer.echo(f"{'would remove' if dry_run else 'removed'} {path.name}")
         if not dry_run:
             remove(path)
+        typer.echo(f"{'would remove' if dry_run else 'removed'} {path.name}")
     typer.echo(f"{len(paths)} results, {freed / 1e6:.1f} MB")
 
 

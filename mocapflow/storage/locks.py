@@ -35,8 +35,11 @@ class Lock:
         """Raise if the lock is no longer ours.
 
         Raises:
-            StoreError: another run took it over, because this one gave no sign of life.
+            StoreError: another run took it over, because this one gave no sign of life, or the store is gone.
         """
+        if not self._path.parent.exists():
+            hint = "somebody removed or moved it while this run went on"
+            raise StoreError(f"the store {self._path.parents[1]} is gone", hint=hint)
         if not self._ours():
             hint = "this run stood still for too long; without --fresh the same command continues from what is saved"
             raise StoreError(f"another run took over {self._path.stem}", hint=hint)
@@ -45,7 +48,7 @@ class Lock:
         """Give the lock back."""
         self._done.set()
         self._thread.join()
-        with _guard(self._path.parent):
+        with suppress(FileNotFoundError), _guard(self._path.parent):  # the store may be gone
             if self._ours():
                 self._path.unlink()
 

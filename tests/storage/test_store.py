@@ -4,6 +4,7 @@ import errno
 import json
 import os
 import re
+import shutil
 import socket
 import threading
 import time
@@ -577,6 +578,12 @@ def test_a_lock_that_was_taken_over_is_noticed_before_the_next_write(tmp_path):
         lock.check()
     lock.release()
     assert (tmp_path / "x.lock").exists()  # it is not ours
+
+
+def test_a_store_that_is_removed_while_a_run_goes_on_is_told(store):
+    with pytest.raises(StoreError, match="store.zarr is gone"), store.writer("1" * 32, "some", print) as lock:
+        shutil.rmtree(store.path)
+        lock.check()
 
 
 def test_the_heartbeat_keeps_a_lock_fresh(tmp_path, monkeypatch):
