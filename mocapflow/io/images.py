@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mocapflow.errors import RecordingError
+from mocapflow.records import U8
 
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 DARK = 8192  # of 65535: a picture of 16 bits a pixel that reaches no more holds the 10 or 12 bits of a camera
@@ -35,6 +36,19 @@ def numbered(folder: Path, suffixes: tuple[str, ...]) -> dict[int, Path]:
                 "or remove those that are too many",
             )
     return found
+
+
+def read_image(path: Path) -> U8 | None:
+    """Return an image (H, W, 3) BGR, or None where it can't be read; a JPEG that is cut off would end in grey."""
+    import cv2
+
+    try:
+        data = path.read_bytes()
+    except OSError:
+        return None
+    cut = data.startswith(b"\xff\xd8") and data.rfind(b"\xff\xd9") < data.rfind(b"\xff\xda")  # no end after the scan
+    image = None if cut or not data else cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+    return None if image is None else np.asarray(image, np.uint8)
 
 
 def check_numbers(files: Mapping[int, Path], folder: Path) -> None:

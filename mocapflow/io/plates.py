@@ -10,7 +10,7 @@ import numpy as np
 from mocapflow.assets import Background
 from mocapflow.errors import RecordingError
 from mocapflow.io.folders import plates
-from mocapflow.io.images import check_depth
+from mocapflow.io.images import check_depth, read_image
 from mocapflow.io.lenses import View
 from mocapflow.io.video import Video, read_frames
 from mocapflow.records import F32, U8
@@ -122,9 +122,7 @@ def _check_colours(plate: F32, frame: F32, path: Path) -> None:
 
 
 def _read(path: Path, view: View) -> U8:
-    import cv2
-
-    image = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    image = read_image(path)
     if image is None:
         hint = "copy it again; without the folder the empty room is found from the videos"
         raise RecordingError("this clean plate can't be read", where=str(path), hint=hint)
@@ -136,4 +134,4 @@ def _read(path: Path, view: View) -> U8:
             where=str(path),
             hint="take it from the same camera at the same setting",
         )
-    return np.asarray(image, np.uint8)
+    return image

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from mocapflow.errors import RecordingError
-from mocapflow.io.images import IMAGES, check_depth, check_numbers, numbered
+from mocapflow.io.images import IMAGES, check_depth, check_numbers, numbered, read_image
 from mocapflow.io.stamps import grabs, number_frames, open_capture, read_stamps
 from mocapflow.records import F64, I32, U8, array, record
 
@@ -134,10 +134,8 @@ def _decoded(capture: Any, video: Video) -> Iterator[int]:
 
 
 def _open_folder(path: Path) -> Video:
-    import cv2
-
     files = numbered(path, IMAGES)
-    found = ((f, i) for f in files.values() if (i := cv2.imread(str(f), cv2.IMREAD_COLOR)) is not None)
+    found = ((f, i) for f in files.values() if (i := read_image(f)) is not None)
     first, image = next(found, (path, None))
     if image is None:
         raise RecordingError(
@@ -161,12 +159,10 @@ def _open_folder(path: Path) -> Video:
 
 
 def _folder_pictures(video: Video, indices: range) -> Iterator[tuple[U8 | None, str]]:
-    import cv2
-
     files = numbered(video.path, IMAGES)
     for index in indices:
         if index not in files:
             yield None, "there is no image of this frame"
             continue
-        image = cv2.imread(str(files[index]), cv2.IMREAD_COLOR)
-        yield (None, f"{files[index].name} can't be read") if image is None else (np.asarray(image, np.uint8), "")
+        image = read_image(files[index])
+        yield (None, f"{files[index].name} can't be read") if image is None else (image, "")
