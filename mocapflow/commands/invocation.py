@@ -79,6 +79,8 @@ def alone(out: Path) -> Iterator[None]:
         except BlockingIOError:
             print(f"{out}: waiting for another run that writes into it", file=sys.stderr, flush=True)
             fcntl.flock(folder, fcntl.LOCK_EX)
+        except OSError as error:  # its file system knows no locks
+            raise no_run_folder(out, error) from None
         yield
     finally:
         os.close(folder)

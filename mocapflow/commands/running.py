@@ -129,6 +129,9 @@ def track(invocation: Invocation, out: Path, label: str) -> None:
 
 def begin(invocation: Invocation, out: Path, steps: Sequence[Step]) -> None:
     """Have a run folder remember what is run in it; what lies there of another run is set aside."""
+    from mocapflow.running.blame import LOG
+
+    (out / LOG).unlink(missing_ok=True)
     before, now = recalled_keys(out), {step.label: step.key for step in steps}
     if before is not None and differing(before, now) and (former := set_aside(out)):
         typer.echo(f"the results of the run before are now in {former}", err=True)

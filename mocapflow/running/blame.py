@@ -16,6 +16,8 @@ from mocapflow.errors import ComponentFailed
 from mocapflow.guards.answers import WrongAnswer
 from mocapflow.registry import Registry
 
+LOG = "failed.log"  # in the run folder, the traceback of the last failure
+
 
 def failure(error: BaseException, stage: Component, registry: Registry, saved: str, log: Path) -> ComponentFailed:
     """Return the error for people: the innermost frame of the traceback in a plugin names the culprit.

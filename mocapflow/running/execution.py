@@ -31,7 +31,7 @@ from mocapflow.guards.cloth_answers import body_of, mesh_of
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import unwatched
 from mocapflow.results import RunFolder
-from mocapflow.running.blame import failure, met
+from mocapflow.running.blame import LOG, failure, met
 from mocapflow.running.progress import Progress
 from mocapflow.running.recipes import Step
 from mocapflow.running.warned import warnings_logged
@@ -223,7 +223,7 @@ class Execution:
             if isinstance(error, OSError) and error.errno in {*FULL, errno.EROFS} and (said := unwritable(error)):
                 raise said from error  # no component's fault
             kept = checkpoint.kept if checkpoint else ""
-            raise failure(error, component, self._pipeline.registry, kept, self._out / "failed.log") from error
+            raise failure(error, component, self._pipeline.registry, kept, self._out / LOG) from error
 
     def _entered(
         self, step: Step, found: Artifact | None, cpu: float = 0.0, wall: float = 0.0, said: Sequence[str] = ()

@@ -77,7 +77,11 @@ def acquire(path: Path, name: str, report: Callable[[str], None]) -> Lock:
                 if stale:
                     report(f"{name}: taking over from {who(holder)}, which ended without finishing")
                     path.unlink(missing_ok=True)
-                path.write_text(said)
+                try:
+                    path.write_text(said)
+                except OSError:  # the drive is full: nobody holds it
+                    path.unlink(missing_ok=True)
+                    raise
                 return Lock(path, said)
         if not told:
             report(f"{name}: waiting for {who(holder)}, which is making it")
@@ -125,13 +129,13 @@ def _now(folder: Path) -> float:
 
 def myself() -> dict[str, Any]:
     """Return who this process is, as others can ask after it."""
-    return {"pid": os.getpid(), "host": socket.gethostname(), "born": _born(os.getpid())}
+    return {"pid": os.getpid(), "host": socket.gethostname(), "space": _space(), "born": _born(os.getpid())}
 
 
 def gone(process: Mapping[str, Any]) -> bool | None:
-    """Return whether a process has ended, None where it can't be told: it is on another machine."""
-    pid = process.get("pid")
-    if process.get("host") != socket.gethostname() or not isinstance(pid, int):
+    """Return whether a process has ended, None where it can't be told: it is on another machine, or in a container."""
+    pid, here = process.get("pid"), (socket.gethostname(), _space())
+    if (process.get("host"), process.get("space", _space())) != here or not isinstance(pid, int):
         return None
     return not _alive(pid) or _born(pid) != process.get("born")
 
@@ -144,6 +148,14 @@ def _alive(pid: int) -> bool:
     except PermissionError:
         return True
     return not _born(pid).startswith("Z")
+
+
+def _space() -> str:
+    """Return within which container, of those on one machine, a pid is a process; "" if unknown."""
+    try:
+        return os.readlink("/proc/self/ns/pid")
+    except OSError:
+        return ""
 
 
 def _born(pid: int) -> str:

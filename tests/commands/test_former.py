@@ -1,5 +1,7 @@
 """No result passes for one of another run: results in a run folder belong to the run that it remembers."""
 
+import errno
+import fcntl
 import shutil
 import threading
 from pathlib import Path
@@ -12,6 +14,7 @@ from typer.testing import CliRunner
 from mocapflow import cli
 from mocapflow.commands.former import FORMER, differing, set_aside
 from mocapflow.commands.invocation import FILE, alone
+from mocapflow.errors import StoreError
 from tests.fixtures.stores import PLUGIN, STAGES, write_pipeline, write_recording
 
 OUT = Path("out")
@@ -172,6 +175,24 @@ def test_one_run_at_a_time_writes_into_a_folder(tmp_path, capsys):
     waiting.join(10)
     assert entered.is_set()
     assert "waiting for another run that writes into it" in capsys.readouterr().err
+
+
+def test_a_run_folder_that_can_not_be_locked_is_told(tmp_path, monkeypatch):
+    def unknown(*_):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(fcntl, "flock", unknown)
+    with pytest.raises(StoreError, match="can't write the run folder: No locks available"), alone(tmp_path):
+        pass
+
+
+def test_a_run_leaves_no_traceback_of_one_that_failed_before(call, monkeypatch):
+    monkeypatch.setenv("TINY_RAISE_AT", "1")
+    assert call("run", "tiny.yaml", "--out", "out").exit_code == 1
+    assert (OUT / "failed.log").exists()
+    monkeypatch.delenv("TINY_RAISE_AT")
+    run(call)
+    assert not (OUT / "failed.log").exists()
 
 
 def test_a_stage_is_not_blamed_for_a_full_drive(call):

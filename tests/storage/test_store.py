@@ -536,6 +536,7 @@ def test_two_runs_at_once_share_the_work(tmp_path, path, monkeypatch):
         ({"pid": 2**22 + 1, "host": socket.gethostname()}, 0, True),  # no such process
         ({"pid": os.getpid(), "host": socket.gethostname(), "born": "1"}, 0, True),  # the number is used again
         ({"pid": os.getpid(), "host": socket.gethostname(), "born": locks._born(os.getpid())}, 1e6, False),
+        ({"pid": 2**22 + 1, "host": socket.gethostname(), "space": "pid:[1]"}, 0, False),  # in a container
         ({"pid": 1, "host": "elsewhere"}, 0, False),
         ({"pid": 1, "host": "elsewhere"}, 1e6, True),  # no heartbeat
         (None, 1e6, True),  # half written
@@ -550,6 +551,17 @@ def test_stale_locks_are_taken_over_with_a_message(tmp_path, monkeypatch, holder
     assert ("taking over" if stale else "waiting for") in lines[0]
     assert len(lines) == 1
     assert not path.exists()
+
+
+def test_a_full_drive_leaves_no_lock_that_nobody_holds(tmp_path, monkeypatch):
+    def full(self, text):
+        self.touch()
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", full)
+    with pytest.raises(OSError, match="No space"):
+        locks.acquire(tmp_path / "x.lock", "track-12", print)
+    assert not (tmp_path / "x.lock").exists()
 
 
 def test_a_lock_is_held_as_long_as_its_run_is_alive(store):
