@@ -66,13 +66,29 @@ class Digests:
         self._reader = f"{PYTHON} {reader.st_size} {reader.st_mtime_ns}"
         self._known: dict[str, list[Any]] = _read(memory)  # path -> stamp, then what was found
         self._packages: dict[str, str] = {}
+        self._inputs: dict[Path, tuple[list[int], str]] = {}  # what `file` was asked for: stamp, digest
 
     def file(self, path: Path, name: str = "") -> str:
         """Return the digest of a file's content, or of all visible files in a folder with their names."""
+        stamp = _stamp(path)
         if path.is_dir():
             inside = (f"{p.relative_to(path)} {self._content(p)}" for p in sources.visible(path))
-            return digest("\n".join(inside).encode(), name)
-        return f"{MARK}{self._content(path)} {name}".rstrip()
+            found = digest("\n".join(inside).encode())
+        else:
+            found = f"{MARK}{self._content(path)}"
+        self._inputs[path] = stamp, found
+        return f"{found} {name}".rstrip()
+
+    def check_inputs(self) -> None:
+        """Check that files are as they were when `file` was asked for them; in a folder, that it lists what it did.
+
+        Raises:
+            RecordingError: one is not.
+        """
+        for path, (stamp, before) in [*self._inputs.items()]:
+            if _stamp(path) != stamp and self.file(path) != before:
+                hint = "nothing of what it is now is kept; run the same command again"
+                raise RecordingError("this has changed since the run began", where=str(path), hint=hint)
 
     def save(self) -> None:
         """Remember the digests for the next run; a folder that can't be written is no matter."""
@@ -132,12 +148,19 @@ class Digests:
         return code, imports
 
     def _remembered(self, path: Path, kind: str, read: Callable[[], list[Any]]) -> list[Any]:
-        stat, name = path.stat(), f"{path.resolve()}{kind}"
-        stamp = [stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns]  # copying tools set the second, nobody the third
+        stamp, name = _stamp(path), f"{path.resolve()}{kind}"
         known = self._known.get(name)
         if known is None or known[:3] != stamp:
             known = self._known[name] = [*stamp, *read()]
         return known[3:]
+
+
+def _stamp(path: Path) -> list[int]:
+    try:
+        stat = path.stat()
+    except OSError:
+        return []
+    return [stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns]  # tools that copy set the second, nobody the third
 
 
 def _read(memory: Path | None) -> dict[str, list[Any]]:

@@ -161,6 +161,7 @@ class Execution:
             if checkpoint is not None:
                 checkpoint.keep_warnings(said)
             value = of_kind(stage, stage.run(**inputs), made_by(step.named))
+            self._store.digests.check_inputs()
         told = said if checkpoint is None else checkpoint.warnings
         self._entered(step, None, time.process_time() - cpu, time.perf_counter() - wall, told)
         return value

@@ -135,11 +135,13 @@ class Checkpoint:
 
         Raises:
             StoreError: the store is full or can't be written; the frames before this one are saved.
+            RecordingError: what the frames are made from has changed since the run began.
         """
         state, row = result.state, self.done
         appearance = _plain(state.segmentation.appearance or past.appearance)
         if self._lock is not None:
             self._lock.check()
+        self._store.digests.check_inputs()
         with writing(self._store.path, self.kept):
             if not row:
                 self._lay_out(result)

@@ -1,6 +1,7 @@
 """Runs and plans: what is taken from the store, what goes on, what is made, and why."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -9,11 +10,11 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from mocapflow.errors import ComponentFailed, GarmentError, PipelineError, PluginError, StoreError
+from mocapflow.errors import ComponentFailed, GarmentError, PipelineError, PluginError, RecordingError, StoreError
 from mocapflow.hookspecs import hookimpl
 from mocapflow.running.runner import plan, run
 from mocapflow.storage.store import Store
-from tests.fixtures.stores import STAGES, actions, load, run_tiny, write_pipeline, write_recording
+from tests.fixtures.stores import STAGES, actions, load, run_tiny, same, the_track, write_pipeline, write_recording
 
 ROOT = Path(__file__).parents[2]
 
@@ -263,6 +264,29 @@ def test_results_do_not_depend_on_truth_and_reference(tmp_path, path):
         (tmp_path / "clip" / name / "angles.csv").write_text("frame\n")
     summary, _ = run_tiny(path, tmp_path)
     assert actions(summary)["track"] == "hit"
+
+
+@pytest.mark.parametrize("at", ["start", "track"])
+def test_a_file_that_changes_while_a_run_goes_on_ends_it(tmp_path, monkeypatch, at):
+    path = write_pipeline(tmp_path, write_recording(tmp_path / "clip", video=True))
+    file = tmp_path / "clip" / "videos" / "cam01.mp4"
+    run_tiny(path, tmp_path / "before")
+    was = file.read_bytes()
+
+    def report(line):
+        if line == "start: running tiny_start":
+            os.utime(file)  # the same content: no matter
+        if line.startswith({"start": "start: running", "track": "track: 1 of"}[at]):
+            file.write_bytes(was + b"more")
+
+    monkeypatch.setattr("mocapflow.running.progress.BEAT", 0)
+    with pytest.raises(RecordingError, match="cam01.mp4  this has changed since the run began"):
+        run(load(path), store=tmp_path / "store.zarr", out=tmp_path / "out", report=report)
+    file.write_bytes(was)
+    summary, lines = run_tiny(path, tmp_path)
+    assert ("track: going on after 1 frames" in lines) == (at == "track")
+    assert actions(summary)["start"] == ("hit" if at == "track" else "run")
+    assert same(the_track(tmp_path), the_track(tmp_path / "before"))
 
 
 def test_two_processes_on_one_store(tmp_path, path, monkeypatch):
