@@ -105,8 +105,7 @@ class Execution:
                 try:
                     return self._read(step, started)
                 except Corrupted as error:
-                    self._set_aside(started.path, error)
-                    started = None
+                    started = self._mended(step, started, error)
             return self._chain(step, started, lock) if step.chain else self._whole(step)
 
     def _started(self, step: Step) -> Artifact | None:
@@ -118,6 +117,15 @@ class Execution:
             self._store.discard(started)
             return None
         return started
+
+    def _mended(self, step: Step, made: Artifact, error: Corrupted) -> Artifact | None:
+        """Return what is left of a result that can't be read: of a track its frames, its arrays are made of them."""
+        if not step.chain:
+            self._set_aside(made.path, error)
+            return None
+        self._report(f"warning: {made.path.name} is damaged and written anew from its frames: {error.message}")
+        kept = {name: value for name, value in made.attributes.items() if name != "sealed"}
+        return Artifact(made.path, {**kept, "complete": False})
 
     def _whole(self, step: Step) -> Any:
         value = self._run(step)

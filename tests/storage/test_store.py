@@ -293,20 +293,42 @@ def remove_array(group):
     (group / "root").rename(group.parent.parent / "gone")
 
 
-@pytest.mark.parametrize("damage", [damage_zarr_json, damage_array_json, damage_chunk, remove_chunk, remove_array])
+def without_smooth(folder):
+    """Return the group of a track that somebody wants to read."""
+    (smooth,) = (folder / "store.zarr").glob("smooth-*")
+    smooth.rename(folder / "smooth")
+    (group,) = (folder / "store.zarr").glob("track-*")
+    return group
+
+
+def remove_rows(group):
+    remove_chunk(group)
+    (group / "live" / "rows" / "c.3.0").unlink()
+
+
+@pytest.mark.parametrize("damage", [damage_zarr_json, remove_rows])
 def test_a_damaged_group_is_set_aside_and_made_anew(tmp_path, path, damage):
     run_tiny(path, tmp_path)
-    whole = the_track(tmp_path)
-    (group,) = (tmp_path / "store.zarr").glob("track-*")
-    (smooth,) = (tmp_path / "store.zarr").glob("smooth-*")
-    smooth.rename(tmp_path / "smooth")  # so that somebody wants to read the track
+    whole, group = the_track(tmp_path), without_smooth(tmp_path)
     damage(group)
     _, lines = run_tiny(path, tmp_path)
-    (warning,) = [line for line in lines if "damaged" in line]
+    (warning,) = [line for line in lines if "damaged and made" in line]
     assert warning.startswith(f"warning: {group.name} is damaged and made anew: ")
     (aside,) = Store(tmp_path / "store.zarr").aside()
     assert aside.name.startswith(f"damaged-{group.name}-")
     assert warning.endswith(f"(kept as .state/{aside.name})")
+    assert same(whole, the_track(tmp_path))
+
+
+@pytest.mark.parametrize("damage", [damage_array_json, damage_chunk, remove_chunk, remove_array])
+def test_damaged_arrays_of_a_track_are_written_anew_from_its_frames(tmp_path, path, damage):
+    run_tiny(path, tmp_path)
+    whole, group = the_track(tmp_path), without_smooth(tmp_path)
+    damage(group)
+    _, lines = run_tiny(path, tmp_path)
+    assert any(line.startswith(f"warning: {group.name} is damaged and written anew from its frames") for line in lines)
+    assert not any(line.startswith("track: 1") for line in lines)  # no frame is tracked again
+    assert not Store(tmp_path / "store.zarr").aside()
     assert same(whole, the_track(tmp_path))
 
 
