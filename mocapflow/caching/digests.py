@@ -114,9 +114,8 @@ class Digests:
             files = {name: self._source(path) for name, path in sources.python_files(unit)}
             found.update({name: code for name, (code, _) in files.items()})
             found.update({f"{unit}/{name}": self._content(path) for name, path in sources.data_files(unit)})
-            wanted = {
-                sources.unit_of(name) for _, imports in files.values() for name in imports if sources.counts(name)
-            }
+            imported = {name for _, imports in files.values() for name in imports}
+            wanted = {sources.unit_of(name) for name in imported if sources.counts(name)}
             open_modules |= {w for w in wanted if not any(name == w or name.startswith(w + ".") for name in found)}
         return digest(json.dumps(found, sort_keys=True).encode(), f"code of {first}")
 

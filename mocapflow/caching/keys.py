@@ -23,7 +23,7 @@ from mocapflow.components import Component
 from mocapflow.errors import PluginError
 from mocapflow.registry import Registry
 
-FORMAT = 2  # of recipes and groups: another number makes everything anew
+FORMAT = 3  # of recipes and groups: another number makes everything anew
 CODE = frozenset({"format", "core", "code", "reader", "key"})  # what is of code in a recipe
 Recipe = Mapping[str, Any]
 

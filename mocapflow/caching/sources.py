@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+INSTALLED = {"site-packages", "dist-packages"}  # folders of what does not change but with its version
 SHARED = ("io", "recordings.recording")  # counted where a component imports them
 
 
@@ -34,7 +35,7 @@ def imports(tree: ast.Module) -> Iterator[str]:
 
 def counts(name: str) -> bool:
     """True for an import whose code a component depends on besides the core's."""
-    return name.startswith("mocapflow_") or _shared(name) is not None
+    return name.startswith("mocapflow_") or _shared(name) is not None or _uninstalled(name)
 
 
 def unit_of(module: str) -> str:
@@ -71,6 +72,15 @@ def data_files(unit: str) -> Iterable[tuple[str, Path]]:
     for path in visible(origin.parent):
         if path.suffix != ".py" and "__pycache__" not in path.parts:
             yield path.relative_to(origin.parent).as_posix(), path
+
+
+def _uninstalled(name: str) -> bool:
+    """True for a module of the author's own: its code may change, and its version does not tell."""
+    top = name.partition(".")[0]
+    if top == "mocapflow" or top in sys.stdlib_module_names:
+        return False
+    origin = _origin(top)
+    return origin is not None and origin.suffix == ".py" and not INSTALLED & set(origin.parts)
 
 
 def _origin(unit: str) -> Path | None:

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     import zarr
 
 PLAIN = "plain"  # attribute with the fields that are no arrays
-WHOLE = "."  # between the numbers of a chunk, of arrays that are written whole: earlier ones lack chunks of zeros
 
 
 def save_record(group: zarr.Group, value: Any) -> None:
@@ -82,7 +81,7 @@ def save_array(group: zarr.Group, name: str, values: Any, axes: list[str], unit:
     made = group.create_array(
         name, shape=values.shape, chunks=chunks or (), dtype=values.dtype, dimension_names=axes,
         compressors=[ZstdCodec(level=1, checksum=True)], attributes={"unit": unit} if unit else {},
-        chunk_key_encoding={"name": "default", "separator": WHOLE}, config={"write_empty_chunks": True},
+        config={"write_empty_chunks": True},  # so that a chunk that lacks is damage, and no zeros
     )  # fmt: skip
     if isinstance(values, Series):
         for part in blocks(len(values)):
@@ -148,12 +147,11 @@ def _array(group: Any, name: str, rows: int | None) -> Any:
 
 def _check_chunks(array: Any, rows: range) -> None:
     """Raise if a chunk of these rows is not there, or was removed while they were read: it would read as zeros."""
-    encoding = array.metadata.chunk_key_encoding
-    if encoding.separator != WHOLE or not array.size or not array.ndim:
+    if not array.size or not array.ndim:
         return
     folder, inner = Path(array.store_path.store.root) / array.path, (0,) * (array.ndim - 1)
     for number in range(rows.start // array.chunks[0], -(-rows.stop // array.chunks[0])):
-        if not (folder / encoding.encode_chunk_key((number, *inner))).exists():
+        if not (folder / array.metadata.encode_chunk_key((number, *inner))).exists():
             raise FileNotFoundError(f"chunk {number} of {array.path} is missing")
 
 

@@ -218,6 +218,19 @@ def test_code_that_a_plugin_imports_counts(tmp_path, monkeypatch):
     assert made(1) != before
 
 
+def test_modules_of_an_author_count_however_they_are_called(tmp_path, monkeypatch):
+    (tmp_path / "mocapflow_upper.py").write_text("import numpy\nimport my_helpers.flat")
+    (tmp_path / "my_helpers").mkdir()
+    (tmp_path / "my_helpers" / "__init__.py").write_text("")
+    monkeypatch.syspath_prepend(tmp_path)
+    found = []
+    for value in (1, 1, 2):
+        (tmp_path / "my_helpers" / "flat.py").write_text(f"def f():\n    return {value}")
+        found.append(Digests().package("mocapflow_upper"))
+    assert found[0] == found[1] != found[2]
+    assert not sources.counts("numpy.linalg") and not sources.counts("json")
+
+
 @pytest.mark.parametrize(
     "line",
     [
