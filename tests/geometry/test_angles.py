@@ -75,6 +75,22 @@ def test_hip_flexion_is_that_of_the_truth(clip: str) -> None:
             assert abs(np.degrees(np.arctan2(thigh @ forward, -thigh @ up)) - truth[row, column]) < 0.02
 
 
+@pytest.mark.parametrize("flexion", [-20.0, 0.0, 35.0, 110.0])
+def test_a_thigh_that_swings_forward_flexes_the_hip_by_as_much(flexion: float) -> None:
+    body = stick_body()
+    forward, up, right = angles.anatomical_axes(body)
+    assert (body.positions[body.joint("toe_l")] - body.positions[body.joint("ankle_l")]) @ forward > 0.05
+    hip = int(np.flatnonzero(body.screw_joint == body.joint("hip_l"))[0])
+    axes = body.twists[:, :3].copy()
+    axes[hip] = right  # a turn about it takes what hangs down to the front
+    body = replace(body, twists=twists.screw(axes, body.positions[body.screw_joint]))
+    thigh, at = body.positions[body.joint("knee_l")] - body.positions[body.joint("hip_l")], np.zeros((1, len(axes)))
+    at[0, hip] = np.radians(flexion)
+    series = angles.measure(body, twists.exp(np.random.default_rng(1).normal(size=(1, 6))), at)
+    rest = np.degrees(np.arctan2(thigh @ forward, -thigh @ up))
+    assert series.value[0, series.names.index("hip_flexion_l")] == pytest.approx(rest + flexion)
+
+
 def test_gradients_agree_with_finite_differences() -> None:
     body = stick_body()
     rng = np.random.default_rng(3)
@@ -151,3 +167,13 @@ def test_an_angle_is_observed_as_far_as_the_joint_that_makes_it() -> None:
     shares = angles.measure(body, root, at, observed=seen)
     assert shares.observed[0] == pytest.approx([float(name != "knee_flexion_l") for name in shares.names])
     assert np.isnan(angles.measure(body, root, at).observed).all()
+
+
+def test_an_angle_is_observed_as_far_as_seen_joints_make_its_variance() -> None:
+    body, rng = stick_body(), np.random.default_rng(2)
+    count = len(body.twists)
+    root, at, seen = np.eye(4)[None], np.full((1, count), 0.2), rng.uniform(size=(1, count))
+    alone = [np.diag(np.arange(6 + count) == 6 + k).astype(float)[None] for k in range(count)]
+    made = np.concatenate([angles.measure(body, root, at, spread).sd for spread in alone]) ** 2  # by each joint angle
+    found = angles.measure(body, root, at, observed=seen).observed
+    np.testing.assert_allclose(found, seen @ made / made.sum(axis=0), rtol=1e-9)
