@@ -15,10 +15,10 @@ from mocapflow_twist.covariance import effective_share
 from mocapflow_twist.motion import ClothMotion
 from mocapflow_twist.problem import Anchor, Guess, Problem
 from mocapflow_twist.solver import TwistGaussNewton
-from test_twist_solver import FREE, start_from
-from twist_fixtures import exact_matches, make_pose, make_scene
+from test_twist_solver import EXACT, FREE, start_from
+from twist_fixtures import exact_matches, make_pose, make_scene, make_state
 
-from mocapflow.data import NO_CLOTH, Moment, Past
+from mocapflow.data import NO_CLOTH, Moment, Past, Turn
 from mocapflow.model import ClothedModel, moved
 
 SCENE, TRUTH = make_scene(), make_pose(1)
@@ -105,3 +105,28 @@ def test_unweighted_equations_count_every_pair_once() -> None:
     assert share.max() < 1
     assert correlated.measurements == pytest.approx(2 * share.sum())
     assert correlated.body.weight == pytest.approx(np.repeat(share, 3) / 0.003**2)
+
+
+def test_balanced_views_pull_alike_and_together_as_hard_as_before() -> None:
+    matches = exact_matches(SCENE, TRUTH, np.arange(0, 300, 9), directed=False)
+    matches = replace(matches, weight=np.where(matches.camera == 0, 9.0, 1.0))
+    plain, balanced = (
+        np.bincount(matches.camera[rows.match], rows.weight)
+        for rows in (
+            TwistGaussNewton(balance_views=balance, correlation_px=0.0)._data(matches, MODEL).body
+            for balance in (False, True)
+        )
+    )
+    assert plain.max() > 8 * plain.min()
+    assert balanced == pytest.approx(plain.mean())
+
+
+def test_damping_never_falls_below_that_of_its_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+    step = Mock(side_effect=solve.step)
+    monkeypatch.setattr(solve, "step", step)
+    matches = exact_matches(SCENE, TRUTH, np.arange(0, 300, 9), directed=False)
+    solver = TwistGaussNewton(**{**EXACT, "iterations": 4, "damping": 1e-3}, damping_per_turn=10.0)
+    solver.solve(lambda _: matches, make_state(start_from(TRUTH, 1)), MODEL, [], Past(), Turn(index=1, cap=8))
+    used = [call.args[2] for call in step.call_args_list]
+    assert len(used) > 2
+    assert min(used) == pytest.approx(1e-2)
