@@ -89,6 +89,21 @@ def test_priors_on_the_root_pull_about_the_root_as_their_energy_says() -> None:
     assert np.abs(slope[3:6]).max() > 1  # of which the lever would make turns
 
 
+def test_the_damping_pulls_about_the_root_as_its_energy_says() -> None:
+    solver = TwistGaussNewton(root_damping_deg=20.0, root_damping_m=0.05, angle_damping_deg=30.0)
+    problem, guess = problem_of(solver, Guess(start_from(TRUTH, 1), NO_CLOTH)), Guess(TRUTH, NO_CLOTH)
+    columns = solve.about_origin(problem.centre(guess), UNKNOWNS).T
+
+    def energy(step: np.ndarray) -> float:
+        return problem.energies(Guess(moved(TRUTH, step), NO_CLOTH))["damping"]
+
+    slope = [(energy(1e-5 * c) - energy(-1e-5 * c)) / 2e-5 for c in columns]
+    prior = problem.quadratic(guess, None).prior
+    assert prior.gradient == pytest.approx(slope, rel=1e-6)
+    sd = np.repeat([np.radians(20), 0.05, np.radians(30)], [3, 3, UNKNOWNS - 6])
+    assert prior.hessian == pytest.approx(np.diag(sd**-2))
+
+
 def test_unweighted_equations_count_every_pair_once() -> None:
     """The chapter's: a pair is there or not, whatever its weight; of its three components two are independent."""
     matches = exact_matches(SCENE, TRUTH, np.arange(0, 300, 9), directed=False)
