@@ -135,6 +135,14 @@ def test_cloth_parameters_stay_within_their_bounds() -> None:
     assert estimate.energies["data"] < unmoved.energies["data"]
 
 
+def test_forces_that_nothing_shows_go_to_calm_and_are_as_unsure_as_stated() -> None:
+    truth, given = make_pose(0), np.array([0.2, 0.3])
+    matches, state = make_matches(truth, given, np.arange(0)), clothed_state(truth, given)
+    estimate = solve(matches, state, cloth_unknowns=True, cloth_sd=0.06)
+    assert estimate.parameters == pytest.approx(MODEL.scene.calm, abs=1e-9)
+    assert np.sqrt(np.diag(estimate.covariance))[18:] == pytest.approx(0.06 * np.array([2.0, 0.5]))  # of the ranges
+
+
 def test_the_take_up_is_left_to_the_cloth_fitter() -> None:
     truth, given = make_pose(0), np.array([0.2, 0.3])
     folding = replace(
