@@ -50,12 +50,12 @@ def test_reduces_noise_at_high_frame_rates() -> None:
     assert smoothed.raw_angles is not None and (smoothed.raw_angles == noisy).all()
 
 
-def test_constant_velocity_is_left_alone() -> None:
-    count = 20
-    steps = np.arange(count)[:, None]
+@pytest.mark.parametrize("gap", [1, 4])
+def test_constant_velocity_is_left_alone(gap: int) -> None:
+    steps = np.cumsum(np.where(np.arange(20) == 8, gap, 1))[:, None]
     root = twists.exp(steps * np.array([[0.0, 0.0, 0.1, 0.0, 0.0, 0.0]]))
     root[:, :3, 3] = steps * np.array([0.01, 0.02, 0.0]) + [3.0, 5.0, 1.0]
-    track = make_track(root, steps * 0.01 * np.ones((1, 4)))
+    track = replace(make_track(root, steps * 0.01 * np.ones((1, 4))), time=steps[:, 0] / 30)
     smoothed = smoothed_by_default(track)
     assert np.abs(smoothed.root - root).max() < 1e-9
     assert np.abs(smoothed.angles - track.angles).max() < 1e-9
