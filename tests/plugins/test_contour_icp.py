@@ -89,11 +89,12 @@ def test_the_reach_narrows_once_the_body_is_calm(truth):
     assert len(later.vertex) < len(first.vertex)
 
 
-def test_the_loss_gives_way_to_a_redescending_one_once_the_body_is_calm(truth):
+@pytest.mark.parametrize("sigma", [1.0, 2.5])
+def test_the_loss_gives_way_to_a_redescending_one_once_the_body_is_calm(truth, sigma):
     surface, segmentation = surface_at(truth), seen(surface_at(raised(truth, 0.05)), SCENE)
     for turn, loss in ((FIRST, "huber"), (CALM, "geman_mcclure")):
-        matches = match(ContourIcp(), surface, segmentation, turn)
-        expected = robust_weights(np.abs(along(surface, matches)), loss, 2.0)
+        matches = match(ContourIcp(sigma_px=sigma), surface, segmentation, turn)
+        expected = robust_weights(np.abs(along(surface, matches)) / sigma, loss, 2.0) / sigma**2
         np.testing.assert_allclose(matches.weight, expected, atol=1e-9)
 
 

@@ -7,7 +7,7 @@ from matching_scenes import CALM, FIRST, FRAME, knee_error_deg, seen
 from mocapflow_matching.carried import carried_points
 from mocapflow_matching.contour_icp import ContourIcp
 from mocapflow_matching.optical_flow import OpticalFlow
-from mocapflow_matching.shape_flow import register
+from mocapflow_matching.shape_flow import _relax, register
 from mocapflow_priors.constant_velocity import ConstantVelocity
 from mocapflow_priors.image_flow import ImageFlowPredictor
 from mocapflow_priors.joint_limits import JointLimits
@@ -56,6 +56,23 @@ def test_the_flow_of_an_ellipse(shift, turn, most):
 def test_a_shape_that_stays_has_no_flow():
     distance = mask_distance(ellipse((3, -2), 0.2)[0])
     assert np.abs(register(distance, distance, 1.0, 3, 30.0)).max() < 1e-3
+
+
+def test_relaxation_ends_where_the_equation_says():
+    """g (g . w - wanted) is smoothness times the sum of what the neighbours inside differ by."""
+    rng, inside = np.random.default_rng(0), np.ones((12, 14), bool)
+    inside[3:5, 6:9] = False
+    gx, gy, wanted = rng.normal(size=(3, *inside.shape)).astype(np.float32)
+    flow, smoothness = np.zeros((*inside.shape, 2), np.float32), np.float32(3.0)
+    for _ in range(60):
+        _relax(inside, gx, gy, wanted, smoothness, flow)
+    slope, away = np.stack([gx, gy], axis=2), np.zeros(flow.shape)
+    for axis in (0, 1):
+        step = np.diff(flow, axis=axis) * np.logical_and(*(np.delete(inside, end, axis) for end in (0, -1)))[..., None]
+        away += np.diff(step, axis=axis, prepend=0, append=0)
+    pull = slope * (np.sum(slope * flow, axis=2) - wanted)[..., None]
+    assert np.abs(pull).max() > 0.5
+    np.testing.assert_allclose(pull[inside], smoothness * away[inside], atol=1e-4)
 
 
 def test_targets_lie_on_the_contour_and_the_shift_is_found():
