@@ -1,5 +1,6 @@
 import shutil
 from pathlib import Path
+from statistics import NormalDist
 from types import SimpleNamespace
 
 import numpy as np
@@ -66,6 +67,12 @@ def test_rms_of_a_known_sinusoid_and_offset() -> None:
     assert got["rms_low_deg"] < got["rms_deg"] < got["rms_high_deg"]
 
 
+def test_figures_of_errors_from_none_to_a_hundred() -> None:
+    got = row(np.arange(101.0), np.zeros(101))
+    names = ("mae_deg", "offset_deg", "p95_deg", "max_deg", "worst_frame", "rom_deg", "rom_reference_deg")
+    assert [got[name] for name in names] == pytest.approx([50, 50, 95, 100, 100, 100, 0])
+
+
 @pytest.mark.parametrize("delay", [-3.4, -0.5, 0.0, 0.3, 2.75])
 @pytest.mark.parametrize("noise", [0.0, 0.5])
 def test_lag_is_recovered_to_a_tenth_of_a_frame(delay: float, noise: float) -> None:
@@ -102,6 +109,13 @@ def test_the_interval_of_an_rms_does_not_hang_on_the_frame_rate(rate: float) -> 
     assert 0.72 < np.mean((low <= np.sqrt(2)) & (np.sqrt(2) <= high)) < 0.95
 
 
+def test_the_interval_of_independent_errors_is_that_of_their_theory() -> None:
+    """The RMS of n of them deviates by 1 / sqrt(2 n) of itself, and 95 % lie within 1.96 deviations."""
+    errors = np.random.default_rng(0).normal(size=(20, 3000))
+    low, high = np.transpose([compare.rms_interval(error, 30.0) for error in errors])
+    assert np.mean(high - low) == pytest.approx(2 * 1.96 / np.sqrt(2 * 3000), rel=0.05)
+
+
 @pytest.mark.parametrize("count", [1, 3])
 def test_a_few_frames_tell_no_interval(count: int) -> None:
     assert np.isnan(compare.rms_interval(np.ones(count), 30.0)).all()
@@ -109,8 +123,8 @@ def test_a_few_frames_tell_no_interval(count: int) -> None:
 
 def test_coverage_counts_our_own_intervals() -> None:
     truth = np.zeros(120)
-    error = np.random.default_rng(0).normal(size=120)
-    assert row(error, truth)["coverage_90"] == pytest.approx(0.9, abs=0.06)
+    error = np.array([NormalDist().inv_cdf((k + 0.5) / 120) for k in range(120)])
+    assert row(error, truth)["coverage_90"] == pytest.approx(0.9)
     assert row(3 * error, truth)["coverage_90"] < 0.6
 
 
