@@ -191,15 +191,16 @@ def test_a_waistband_that_sits_lower_than_the_tape_says_pulls_at_nothing():
     assert abs(np.median(off(slid, pose)[cloth])) < 0.3
 
 
-def test_skin_that_the_garment_covers_at_rest_is_believed_only_where_its_edge_is_near():
+@pytest.mark.parametrize("sigma", [1.0, 1.5])
+def test_skin_that_the_garment_covers_at_rest_is_believed_only_where_its_edge_is_near(sigma):
     """The same edge, 6 px off, of a vertex under the garment and of one beyond its hem; of both when it is calm."""
     pose, camera = leaning(0.0), SCENE.cameras[0]
     under, beyond = np.flatnonzero(SCENE.covered)[0], np.flatnonzero(~SCENE.near_garment)[0]
     surface, pair = surface_at(pose), np.array([under, beyond], np.int32)
     across = np.tile([1.0, 0.0], (2, 1))
     inner = replace(
-        empty_matches(), camera=np.zeros(2, np.int16), vertex=pair, direction=across, weight=np.ones(2),
-        pixel=project(surface.vertices[pair], camera) + 6 * across,
+        empty_matches(), camera=np.zeros(2, np.int16), vertex=pair, direction=across,
+        weight=np.full(2, sigma**-2), pixel=project(surface.vertices[pair], camera) + 6 * across,
     )  # fmt: skip
     segmentation, frame = replace(tiny_segmentation(SCENE, pose), inner=inner), painted(dressed, pose)
     moved = [Change(body=body, cloth=0.0, angles=0.0, sigmas=1.0) for body in (0.1, 0.001)]
@@ -209,9 +210,10 @@ def test_skin_that_the_garment_covers_at_rest_is_believed_only_where_its_edge_is
             (InnerContours(), moved[0]), (InnerContours(covered="far"), moved[0]), (InnerContours(), moved[1]),
         )
     )  # fmt: skip
-    given_up = (2.0**2 / (2.0**2 + 6.0**2)) ** 2
-    assert wide == pytest.approx([given_up, 2 / 6])
-    assert far == pytest.approx([2 / 6, 2 / 6])
+    off = 6 / sigma
+    given_up, held = (2.0**2 / (2.0**2 + off**2)) ** 2 / sigma**2, 2 / off / sigma**2
+    assert wide == pytest.approx([given_up, held])
+    assert far == pytest.approx([held, held])
     assert calm == pytest.approx([given_up, given_up])
 
 
