@@ -14,7 +14,7 @@ from mocapflow_twist.solver import TwistGaussNewton
 
 from mocapflow.data import NO_CLOTH, Frame, Past, Segmentation, Turn
 from mocapflow.geometry import kinematics
-from mocapflow.geometry.cameras import project
+from mocapflow.geometry.cameras import centre, project
 from mocapflow.io.cameras import read_cameras
 from mocapflow.model import ClothedModel, moved
 from mocapflow.scene import Scene
@@ -114,6 +114,16 @@ def test_the_weight_is_learned_from_the_reprojection():
         seen = np.stack([view[0] for view in frame_of(POSE, noise_px=2.0, seed=seed).keypoints])
         estimates.append(Keypoints()._estimator_px(seen, SCENE.cameras))
     assert np.mean(estimates) == pytest.approx(2.0, rel=0.1)
+
+
+def test_a_landmark_pulls_once_however_many_vertices_stand_for_it():
+    """The estimator is exact, so it is trusted to a pixel; the landmark may be off by its spread, seen from there."""
+    marks = marks_on(BODY)
+    places = np.einsum("lk,lka->la", marks.share, SCENE.surface(POSE, NO_CLOTH).vertices[marks.vertex])
+    matches = match(frame_of(POSE), matcher=Keypoints(scale=1e6, least_sigma_px=1.0))
+    for index, camera in enumerate(SCENE.cameras):
+        spread = camera.intrinsics[0, 0] * marks.spread / np.linalg.norm(places - centre(camera), axis=1)
+        assert matches.weight[matches.camera == index].sum() == pytest.approx((1 / (1 + spread**2)).sum())
 
 
 def test_points_astray_pull_little():
