@@ -70,6 +70,19 @@ def test_rectangles_and_stripe():
     assert rows.tolist() == list(range(45, 55))
 
 
+def test_rectangles_are_as_many_and_as_large_as_asked():
+    white, rng = np.full((100, 200, 3), 255, np.uint8), np.random.default_rng(3)
+    sides = []
+    for _ in range(60):
+        behind = (pixels.with_rectangles(white, (1, 1), rng) != 255).any(axis=2)
+        rows, columns = behind.any(axis=1), behind.any(axis=0)
+        np.testing.assert_array_equal(behind, np.outer(rows, columns))
+        sides.append([rows.mean(), columns.mean()])
+    known = np.array(sides)[np.min(sides, axis=1) > 0]  # but for white ones
+    assert len(known) > 50
+    assert 0.05 <= known.min() < 0.08 and 0.22 < known.max() <= 0.25
+
+
 @pytest.mark.parametrize(
     ("event", "source"),
     [
