@@ -14,7 +14,7 @@ from mocapflow_priors.joint_limits import JointLimits
 from mocapflow_report.raster import Canvas
 from mocapflow_sequence.flow import FollowPoints
 
-from mocapflow.data import CLOTH, NO_CLOTH, Flow, Frame, Past, Segmentation
+from mocapflow.data import CLOTH, NO_CLOTH, Flow, Frame, Matches, Past, Segmentation
 from mocapflow.geometry.cameras import project
 from mocapflow.geometry.silhouettes import mask_distance, outline, samples
 from mocapflow.model import moved
@@ -207,6 +207,25 @@ def test_points_on_cloth_count_less():
     assert cloth.sum() > 20
     np.testing.assert_allclose(np.median(matches.weight[cloth]), 0.2)
     np.testing.assert_allclose(np.median(matches.weight[~cloth]), 1.0)
+
+
+def test_points_on_cloth_stand_for_the_skin_that_it_touches():
+    before = tiny_pose(DRESSED)
+    past = tiny_past(DRESSED, before)
+    surface = DRESSED.surface(before, past.moments[-1].cloth)
+    skin, cloth = np.flatnonzero(surface.layer != CLOTH), np.flatnonzero(surface.layer == CLOTH)
+    away = np.linalg.norm(surface.vertices[cloth, None] - surface.vertices[None, skin], axis=2)
+    reach = np.median(away.min(axis=1)) + 1e-6
+    step = np.array([3.0, -2.0])
+    on_cloth = Matches(
+        camera=np.zeros(len(cloth), np.int16), vertex=cloth.astype(np.int32), weight=np.ones(len(cloth)),
+        pixel=project(surface.vertices[cloth], DRESSED.cameras[0]) + step, direction=np.zeros((len(cloth), 2)),
+    )  # fmt: skip
+    moved_on = ImageFlowPredictor(touching_mm=1000 * reach).on_skin(on_cloth, past, DRESSED)
+    np.testing.assert_array_equal(moved_on.vertex, skin[away.argmin(axis=1)[away.min(axis=1) < reach]])
+    image = project(surface.vertices[moved_on.vertex], DRESSED.cameras[0])
+    np.testing.assert_allclose(moved_on.pixel, image + step)
+    np.testing.assert_allclose(moved_on.weight, 0.2)
 
 
 def test_without_flow_the_motion_goes_on():

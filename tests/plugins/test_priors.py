@@ -15,6 +15,7 @@ from twist_fixtures import make_pose, make_scene
 from mocapflow.components import Prior
 from mocapflow.data import NO_CLOTH, Moment, Past, Pose
 from mocapflow.geometry import twists
+from mocapflow.geometry.kinematics import root_position
 from mocapflow.model import moved
 from mocapflow.testing import PriorConformance
 
@@ -88,6 +89,16 @@ def test_smooth_motion_expects_the_last_motion_again() -> None:
     assert prior.residual(bent, make_past(first, second), scene).error[6:] == pytest.approx(1.0)
     slower = prior.residual(bent, make_past(first, second, step=1 / 15), scene)
     assert slower.error[6:] == pytest.approx(0.25)
+
+
+def test_smooth_motion_counts_root_turns_and_shifts_in_their_deviations() -> None:
+    scene, first = make_scene(), make_pose(0)
+    prior, past = SmoothMotion(root_sd_deg=3.0, root_sd_mm=10.0), make_past(first, first)
+    joint = root_position(scene.body, first.root)
+    turn = np.append(twists.screw(np.array([0.0, 0.0, 1.0]), joint) * np.radians(3), np.zeros(12))
+    shift = np.append([0.0, 0.0, 0.0, 0.0, 0.01, 0.0], np.zeros(12))
+    for step, row in ((turn, 2), (shift, 4)):
+        assert prior.residual(moved(first, step), past, scene).error == pytest.approx(np.eye(18)[row], abs=1e-9)
 
 
 def test_smooth_motion_says_nothing_without_two_frames_or_time_between_them() -> None:

@@ -78,6 +78,16 @@ def test_where_rest_has_its_origin_does_not_matter() -> None:
     np.testing.assert_allclose(*places, atol=1e-9)
 
 
+def test_which_way_the_world_is_turned_does_not_matter() -> None:
+    track, rng = stepping(ball_body()), np.random.default_rng(4)
+    noise = 0.1 * rng.normal(size=(len(track.root), 6)) * [1, 1, 1, 0, 0, 0]
+    shaken = replace(track, root=track.root @ twists.exp(noise))
+    turn = twists.exp(np.array([0.5, -0.8, 1.1, 0.0, 0.0, 0.0]))
+    here, there = smoothed_by_default(shaken), smoothed_by_default(replace(shaken, root=turn @ shaken.root))
+    assert np.abs(here.root - shaken.root).max() > 1e-2
+    np.testing.assert_allclose(there.root, turn @ here.root, atol=1e-9)
+
+
 def test_lost_frame_is_bridged_and_uncertain() -> None:
     body = ball_body()
     track = stepping(body)
@@ -94,6 +104,21 @@ def test_lost_frame_is_bridged_and_uncertain() -> None:
     sd = angles.measure(body, smoothed.root, smoothed.angles, smoothed.covariance).sd[:, 0]
     assert sd[10] > 1.5 * sd[9]
     assert np.isfinite(smoothed.covariance).all()
+
+
+def test_a_bridge_is_as_unsure_wherever_the_world_has_its_origin() -> None:
+    body, track = ball_body(), stepping(ball_body())
+    size, turns = 6 + track.angles.shape[1], np.where(np.arange(len(track.root)) == 10, 0, 3).astype(np.int16)
+    spreads = []
+    for shift in (np.zeros(3), np.array([3.0, -2.0, 1.0])):
+        root = track.root.copy()
+        root[:, :3, 3] += shift
+        about = _about(kinematics.root_position(body, root), size)
+        back = np.linalg.inv(about)  # of increments about the root joint, sure to 0.01 in each
+        covariance = 1e-4 * back @ np.swapaxes(back, 1, 2)
+        smoothed = smoothed_by_default(replace(track, root=root, covariance=covariance, iterations=turns))
+        spreads.append(about[10] @ smoothed.covariance[10] @ about[10].T)
+    np.testing.assert_allclose(*spreads, atol=1e-12)
 
 
 def test_weights_by_covariance() -> None:
