@@ -163,6 +163,12 @@ def test_solution_is_the_least_squares_minimum_and_its_covariance() -> None:
     assert np.allclose(bridged[0], np.linalg.inv(hessian)[9:12, 9:12], atol=1e-7)
 
 
+def test_three_samples_give_the_acceleration_of_a_parabola_however_far_apart() -> None:
+    time = np.cumsum(np.random.default_rng(5).uniform(0.5, 2.0, 9))
+    three = np.lib.stride_tricks.sliding_window_view(3 * time**2 - 2 * time + 1, 3)
+    np.testing.assert_allclose(np.sum(difference_weights(time) * three, axis=1), 6.0)
+
+
 @pytest.mark.parametrize(("count", "block"), [(3, 2), (7, 2), (7, 3), (7, 6), (12, 4), (13, 4)])
 def test_blocks_on_their_own_give_what_the_whole_gives(count: int, block: int) -> None:
     rng = np.random.default_rng(count + block)
