@@ -67,6 +67,19 @@ def test_knee_about_its_axis_is_signed() -> None:
         assert got[0] == pytest.approx(np.degrees(angle))
 
 
+def test_shoulders_lie_below_the_acromia_along_the_trunk() -> None:
+    """Rab 2002: by 17 % of the distance between them; the hips' middle is straight below theirs."""
+    front, back = 0.24 * 0.15 + 0.0099, 0.24 * 0.15 + 0.0099 - 0.15  # of who looks along x
+    marks = {
+        f"{name}_{side}": np.array([[x, sign * aside, up]])
+        for name, x, aside, up in (("asis", front, 0.12, 0.95), ("psis", back, 0.05, 0.95), ("acromion", 0.0, 0.2, 1.4))
+        for side, sign in (("l", 1), ("r", -1))
+    }
+    centres = marker_joints.joint_centres(marks)
+    for side, sign in (("l", 1), ("r", -1)):
+        np.testing.assert_allclose(centres[f"shoulder_{side}"], [[0, sign * 0.2, 1.4 - 0.17 * 0.4]], atol=1e-12)
+
+
 def test_knee_axes_of_both_sides_point_to_the_left(own: Ours) -> None:
     marks = {name: PLACES[:, k] for name, k in landmarks(LABELS, Path()).items()}
     left = own.stick.places[:, own.stick.names.index("hip_l")] - own.stick.places[:, own.stick.names.index("hip_r")]
