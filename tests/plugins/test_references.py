@@ -199,6 +199,9 @@ def test_a_faster_marker_system_that_started_later(own: Ours, tmp_path: Path) ->
     assert knee["frames"] == 53  # ours from 0.2 to 1.93 s
     assert float(knee["rms_aligned_deg"]) < 0.5
     assert float(knee["rms_deg"]) > 2
+    far = {row["joint"]: row for row in tables_of_words(tmp_path / layout.DISTANCES)}
+    for ankle in (far["ankle_l"], far["ankle_r"]):
+        assert float(ankle["mean_aligned_mm"]) < 0.2 * float(ankle["mean_mm"])
     assert any("we come 2.0 frames (67 ms) earlier than the reference" in note for note in got.notes)
     assert any("reference at 100 per second, interpolated at our 30" in note for note in got.notes)
 
