@@ -30,7 +30,10 @@ def test_area_is_the_squared_difference_of_the_distance_fields():
     surface, camera = SCENE.surface(POSE, CLOTH), SCENE.cameras[0]
     seen = pictures.tiny_segmentation(SCENE, POSE).silhouettes[0]
     model = model_distance(surface, camera, pictures.BAND)  # narrower than the functional's
-    assert area(surface, seen, camera) == pytest.approx(SHAPE_WEIGHT * np.sum((model - seen.distance) ** 2), rel=1e-4)
+    thin = replace(seen, distance=np.minimum(seen.distance, np.float32(2.0)))  # nowhere as deep inside as its band
+    for shown in (seen, thin):
+        squares = np.sum((model - shown.distance) ** 2)
+        assert area(surface, shown, camera) == pytest.approx(SHAPE_WEIGHT * squares, rel=1e-4)
 
 
 def test_contour_is_half_the_weighted_squared_error_along_the_direction_or_in_full():
