@@ -155,3 +155,13 @@ def test_frames_without_people_are_passed_over(body, pose, recording, tmp_path):
 def test_no_keypoints(body, cameras):
     with pytest.raises(RecordingError, match="no 2D keypoints(.|\n)*the recording has: .*videos(.|\n)*start_from_file"):
         StartFromKeypoints().run(open_recording(DEMO), Scene(cameras=cameras, body=body))
+
+
+def test_a_camera_that_contradicts_the_others_is_trusted_by_cauchys_rule():
+    cameras, place = open_recording(DEMO).cameras, np.array([[0.1, 0.0, 1.0]])
+    pixels = np.stack([project(place, camera) for camera in cameras])
+    pixels[0] += [0.0, 40.0]
+    found = triangulate(pixels, np.ones((len(cameras), 1)), cameras, scale_px=8.0, rounds=50)
+    assert np.linalg.norm(found.position - place) < 0.01
+    assert found.error[0, 0] > 30
+    np.testing.assert_allclose(found.weight, 1 / (1 + (found.error / 8.0) ** 2), rtol=1e-6)
