@@ -23,7 +23,7 @@ from mocapflow.errors import ComponentFailed, ShapeError, StoreError
 from mocapflow.records import F64, record
 from mocapflow.running.execution import Execution
 from mocapflow.series import Series
-from mocapflow.storage import archive, locks, rows
+from mocapflow.storage import locks, rows
 from mocapflow.storage.packing import FINE, match_row, quantised
 from mocapflow.storage.rows import Corrupted, Rows
 from mocapflow.storage.store import Store, group_meta, remove
