@@ -32,9 +32,10 @@ class Event(Settings):
 
     def source(self, index: int, length: int) -> int:
         """Return which frame, of `length`, stands in the place of a frame."""
+        stop = self.first + self.count if self.count else index + 1
         wanted = {
             "frozen": self.first - 1,
             "late": index - self.by,
-            "other_time": index + self.by if self.first + self.by + (self.count or 1) <= length else index - self.by,
+            "other_time": index + self.by if stop + self.by <= length else index - self.by,
         }.get(self.what, index)
         return min(max(wanted, 0), length - 1)

@@ -90,6 +90,7 @@ def test_rectangles_are_as_many_and_as_large_as_asked():
         (dict(what="late", by=3), (0, 3)),
         (dict(what="other_time", first=5, count=2, by=4), (0, 10)),
         (dict(what="other_time", first=5, count=6, by=4), (0, 2)),
+        (dict(what="other_time", by=6), (0, 0)),  # to the end, which 6 + 6 is beyond
         (dict(what="other_camera"), (1, 6)),
     ],
 )
