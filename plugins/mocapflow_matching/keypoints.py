@@ -24,6 +24,8 @@ from mocapflow_matching.robust import robust_weights
 
 NEIGHBOURS = 60  # vertices that a landmark may be a mean of
 MEDIAN_RADIUS = 1.177  # median length of a normal 2D error, in standard deviations of its components
+TRUSTED_PX = 8.0  # error of a keypoint that is usual at most
+OUTLYING = 4.0  # standard deviations from which on an error is none of the noise
 SAME_PERSON = 3.0  # times the scale of a person's keypoints: the median of their errors, at most
 
 
@@ -83,8 +85,15 @@ class Keypoints(Matcher):
         return seen
 
     def _estimator_px(self, seen: F64, cameras: tuple[Camera, ...]) -> float:
-        """Return the standard deviation of the keypoints, from their triangulation."""
-        error = triangulate(seen[..., :2], seen[..., 2], cameras, rounds=5).error
+        """Return the standard deviation of the keypoints, from their triangulation.
+
+        That takes what is far off for outliers, so where all are, it has to be done again with more patience.
+        """
+        spread = self._spread_px(seen, cameras, TRUSTED_PX)
+        return self._spread_px(seen, cameras, OUTLYING * spread) if OUTLYING * spread > TRUSTED_PX else spread
+
+    def _spread_px(self, seen: F64, cameras: tuple[Camera, ...], scale_px: float) -> float:
+        error = triangulate(seen[..., :2], seen[..., 2], cameras, scale_px, rounds=5).error
         views = np.isfinite(error).sum(axis=0)
         told = error[:, views >= 3]
         if not np.isfinite(told).any():
