@@ -20,12 +20,14 @@ def distance(surface: Surface, views: Sequence[View], cap_m: float) -> float:
 
     Both ways: the person's pixels by their distance from the model, the model's by theirs from where the person may
     be, each at most `cap_m`. Unlike the area in which they differ it tells a limb that is near from one that is far.
+    Cloth that lies off the model counts as none: no limb shall be led astray to explain a skirt that flies.
     """
     total = 0.0
     for view in views:
         covered, off = _of(surface, view)
         cap = cap_m / view.pixel_m
-        apart = np.minimum(off[view.person], cap).sum() + np.minimum(view.away[covered], cap).sum()
+        skin = view.person & ~view.cloth
+        apart = np.minimum(off[skin], cap).sum() + np.minimum(view.away[covered], cap).sum()
         total += float(apart) * view.pixel_m / max(int(np.count_nonzero(view.person)), 1)
     return total / max(len(views), 1)
 

@@ -19,6 +19,7 @@ from mocapflow_recovery.sampling import Plan, Spread, parts, put_back, samples, 
 
 from mocapflow.data import NO_CLOTH, Past, Pose
 from mocapflow.geometry.cameras import project
+from mocapflow.geometry.silhouettes import mask, outline
 from mocapflow.testing import pictures, recovery, scenes, template_body
 
 SCENE = scenes.tiny_scene()
@@ -121,6 +122,16 @@ def test_what_shows_the_colours_of_the_garment_is_told_from_a_limb(told, lost) -
     assert near > skin if lost else near == 0
     assert (skin > 150e-4 and cloth == 0) if lost else (skin == 0 and cloth > 150e-4)
     assert all((view.cloth == (view.person & (told > 0))).all() for view in looked)
+
+
+def test_a_skirt_that_flies_leads_no_limb_astray() -> None:
+    """Cloth where a spread leg would be brings that leg no nearer to the person, though it would explain it."""
+    flying = []
+    for view in seen():
+        flown = mask(outline(surface(astray(0.8)), view.camera), view.camera) & ~view.person
+        away = np.where(flown, 0, view.away)
+        flying.append(view._replace(person=view.person | flown, cloth=flown, away=away))
+    assert distance(surface(astray(0.8)), flying, 0.2) > 10 * distance(surface(POSE), flying, 0.2)
 
 
 def test_parts_of_a_person() -> None:
