@@ -98,6 +98,7 @@ def python_files(unit: str) -> Iterable[tuple[str, Path]]:
         placeless = unit if "." in unit else origin.stem  # a plugin file's name says where it lies
         yield placeless, origin
         return
-    for path in (path for path in visible(origin.parent) if path.suffix == ".py"):
-        parts = path.relative_to(origin.parent).with_suffix("").parts
-        yield ".".join((unit, *(part for part in parts if part != "__init__"))), path
+    for path in visible(origin.parent):
+        if path.suffix == ".py":
+            parts = path.relative_to(origin.parent).with_suffix("").parts
+            yield ".".join((unit, *(part for part in parts if part != "__init__"))), path

@@ -158,11 +158,13 @@ def _check_chunks(array: Any, rows: range) -> None:
 def _series(group: Any, name: str, rows: int | None) -> Series:
     """Return an array whose rows stay in the store until they are asked for; all of them are looked at once."""
     kept = group[name]
+    wanted = range(kept.shape[0])[:rows]
 
     def block(number: int) -> F64:
+        here = slice(number * BLOCK, (number + 1) * BLOCK)
         try:
-            values = np.asarray(kept[number * BLOCK : (number + 1) * BLOCK])
-            _check_chunks(kept, range(len(series))[number * BLOCK : (number + 1) * BLOCK])
+            values = np.asarray(kept[here])
+            _check_chunks(kept, wanted[here])
             return values
         except Exception as error:  # as in `load_record`
             raise Corrupted(f"{name} of {group.path or group.store} can't be read back: {error}") from error
@@ -176,7 +178,7 @@ def _series(group: Any, name: str, rows: int | None) -> Series:
             values[here] = latest(int(number))[numbers[here] % BLOCK]
         return values
 
-    series = Series((len(range(kept.shape[0])[:rows]), *kept.shape[1:]), read)
+    series = Series((len(wanted), *kept.shape[1:]), read)
     for part in blocks(len(series)):
         block(part.start // BLOCK)  # damaged rows are found now, and made anew
     return series

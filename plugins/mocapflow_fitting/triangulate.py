@@ -10,6 +10,8 @@ from mocapflow.assets import Camera
 from mocapflow.geometry.cameras import projection
 from mocapflow.records import F64, array, record
 
+USUAL_PX = 8.0  # error of a detection that is usual at most
+
 
 @record
 class Points:
@@ -21,7 +23,7 @@ class Points:
 
 
 def triangulate(
-    pixels: F64, confidence: F64, cameras: Sequence[Camera], scale_px: float = 8.0, rounds: int = 20
+    pixels: F64, confidence: F64, cameras: Sequence[Camera], scale_px: float = USUAL_PX, rounds: int = 20
 ) -> Points:
     """Return the points (K, 3) m that reproject best, by least squares reweighted with Cauchy's rule.
 

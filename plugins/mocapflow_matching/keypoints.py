@@ -8,7 +8,7 @@ import numpy as np
 from mocapflow_fitting.keypoint_layouts import LAYOUTS, Layout, layout_of, rows_of
 from mocapflow_fitting.landmarks import landmarks
 from mocapflow_fitting.person import scale_of
-from mocapflow_fitting.triangulate import triangulate
+from mocapflow_fitting.triangulate import USUAL_PX, triangulate
 from pydantic import PositiveFloat
 
 from mocapflow.assets import Body, Camera
@@ -24,7 +24,6 @@ from mocapflow_matching.robust import robust_weights
 
 NEIGHBOURS = 60  # vertices that a landmark may be a mean of
 MEDIAN_RADIUS = 1.177  # median length of a normal 2D error, in standard deviations of its components
-TRUSTED_PX = 8.0  # error of a keypoint that is usual at most
 OUTLYING = 4.0  # standard deviations from which on an error is none of the noise
 SAME_PERSON = 3.0  # times the scale of a person's keypoints: the median of their errors, at most
 
@@ -89,8 +88,8 @@ class Keypoints(Matcher):
 
         That takes what is far off for outliers, so where all are, it has to be done again with more patience.
         """
-        spread = self._spread_px(seen, cameras, TRUSTED_PX)
-        return self._spread_px(seen, cameras, OUTLYING * spread) if OUTLYING * spread > TRUSTED_PX else spread
+        spread = self._spread_px(seen, cameras, USUAL_PX)
+        return self._spread_px(seen, cameras, OUTLYING * spread) if OUTLYING * spread > USUAL_PX else spread
 
     def _spread_px(self, seen: F64, cameras: tuple[Camera, ...], scale_px: float) -> float:
         error = triangulate(seen[..., :2], seen[..., 2], cameras, scale_px, rounds=5).error
