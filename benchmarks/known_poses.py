@@ -190,7 +190,49 @@ def push_up(body: Body, t: np.ndarray) -> dict[str, np.ndarray]:
     return turn
 
 
-SCRIPTS = {"squat": squat, "dance": dance, "lunge": lunge, "spin": spin, "push_up": push_up}
+def swing(body: Body, t: np.ndarray) -> dict[str, np.ndarray]:
+    """Return rotation vectors (T,3) per joint of the left leg swinging to and fro, then the right one to the side."""
+    turn = {name: np.zeros((len(t), 3)) for name in body.names}
+    wave, half = np.sin(2 * np.pi * t / 1.2), t[-1] / 2
+    fore = wave * (1 - np.exp(-t / 0.3)) / (1 + np.exp((t - half) / 0.05))
+    side = np.clip(np.sin(np.pi * (t - half) / half), 0, 1) ** 1.5
+    turn["pelvis"] = np.stack([0.05 - 0.08 * fore, 0.08 * side, 0.1 * fore], axis=1)
+    turn["spine"] = np.stack([0.03 + 0.05 * fore, -0.1 * side, -0.08 * fore], axis=1)
+    turn["hip_l"] = np.stack([-0.1 - 0.65 * fore, -0.08 * side, 0 * t], axis=1)
+    turn["knee_l"][:, 0], turn["ankle_l"][:, 0] = 0.15 + 0.45 * np.clip(-fore, 0, 1), 0.25 * np.abs(fore)
+    turn["hip_r"], turn["knee_r"][:, 0] = np.stack([-0.08 + 0 * t, 0.85 * side, 0 * t], axis=1), 0.12
+    for name, sign in (("_l", 1), ("_r", -1)):
+        ways = [[sign * (0.3 + 0.8 * s), -0.2 + sign * 0.6 * f, -1] for s, f in zip(side, fore, strict=True)]
+        turn["shoulder" + name], turn["elbow" + name][:, 0] = _reach(body, name, ways), -0.25
+    return turn
+
+
+def bow(body: Body, t: np.ndarray) -> dict[str, np.ndarray]:
+    """Return rotation vectors (T,3) per joint of bending down to the floor on soft knees, a step before and after."""
+    turn = {name: np.zeros((len(t), 3)) for name in body.names}
+    down = np.sin(np.pi * t / t[-1]) ** 2
+    step = np.sin(2 * np.pi * t / 1.0) * (1 - down) ** 2
+    turn["pelvis"] = np.stack([0.03 + 0.75 * down, 0.04 * step, 0.25 * down], axis=1)
+    turn["spine"], turn["chest"] = np.outer(down, [0.30, 0, 0.05]), np.outer(down, [0.20, 0, 0.05])
+    for side, sign in (("_l", 1), ("_r", -1)):
+        lift = np.clip(sign * step, 0, 1)
+        hip, knee = 0.1 + 0.5 * lift + (0.95 + 0.15 * sign) * down, 0.18 + 0.9 * lift + (0.45 + 0.2 * sign) * down
+        turn["hip" + side] = np.stack([-hip, 0 * t, sign * 0.08 * down], axis=1)
+        turn["knee" + side][:, 0], turn["ankle" + side][:, 0] = knee, 0.9 * (hip - knee - turn["pelvis"][:, 0])
+        ways = [[sign * (0.35 - 0.2 * d), -0.1 - 1.6 * d, -1 + 0.2 * d] for d in down]
+        turn["shoulder" + side], turn["elbow" + side][:, 0] = _reach(body, side, ways), -0.3 + 0.15 * down
+    return turn
+
+
+SCRIPTS = {
+    "squat": squat,
+    "dance": dance,
+    "lunge": lunge,
+    "spin": spin,
+    "push_up": push_up,
+    "swing": swing,
+    "bow": bow,
+}
 
 
 def _bent(body: Body, side: str, ways: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

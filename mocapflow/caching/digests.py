@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import hashlib
 import json
-import os
 import sys
 import threading
 from collections.abc import Callable
@@ -18,6 +17,7 @@ import numpy.typing as npt
 
 from mocapflow.caching import sources
 from mocapflow.errors import RecordingError
+from mocapflow.io.whole import whole
 
 PARSER = threading.Lock()  # CPython 3.11 counts the parser's recursion across threads (python/cpython#106905)
 MARK = "blake2b:"  # a digest reads "blake2b:<hex> <name>"; the name is for people and never counts
@@ -94,10 +94,8 @@ class Digests:
         """Remember the digests for the next run; a folder that can't be written is no matter."""
         if self._memory is None or self._known == _read(self._memory):
             return
-        with suppress(OSError):
-            part = self._memory.with_suffix(f".{os.getpid()}.part")
+        with suppress(OSError), whole(self._memory) as part:
             part.write_text(json.dumps(self._known))
-            part.replace(self._memory)
 
     def package(self, module: str) -> str:
         """Return the digest of a component's top package with the shared modules and plugins it imports."""

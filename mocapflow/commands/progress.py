@@ -12,6 +12,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TextIO
 
+from mocapflow.io.whole import whole
+
 FILE = "progress.json"
 COUNT = re.compile(r"^(\S+): (\d+) of (\d+) (frames.*)$")
 WIDTH = 30
@@ -36,12 +38,11 @@ def noted(report: Callable[[str], None], folder: Path) -> Iterator[Callable[[str
     """Give a reporter that also keeps its last line in the run folder as long as the run goes on."""
     from mocapflow.storage.locks import myself
 
-    path, part = folder / FILE, folder / f"{FILE}.part"
+    path = folder / FILE
 
     def show(line: str) -> None:
-        with suppress(OSError):  # a full disk is for the store to tell
+        with suppress(OSError), whole(path) as part:  # a full disk is for the store to tell
             part.write_text(json.dumps({**myself(), "at": time.time(), "said": line}), encoding="utf-8")
-            part.replace(path)
         report(line)
 
     try:
@@ -49,7 +50,6 @@ def noted(report: Callable[[str], None], folder: Path) -> Iterator[Callable[[str
     finally:
         with suppress(OSError):
             path.unlink(missing_ok=True)
-            part.unlink(missing_ok=True)
 
 
 def last_word(folder: Path) -> str:

@@ -14,6 +14,7 @@ from mocapflow.errors import RecordingError, guess
 from mocapflow.geometry import twists
 from mocapflow.io.calibrated import bad, make_camera
 from mocapflow.io.typed import place, read_toml
+from mocapflow.io.whole import whole
 
 FARTHEST = 100.0  # m; a camera further from the origin is one calibrated in centimetres
 MILLIMETRES = 1000.0  # m; beyond, in millimetres
@@ -82,7 +83,9 @@ def calibration_files(path: Path) -> tuple[Path, ...]:
 
 def write_cameras(path: Path, cameras: Sequence[Camera]) -> None:
     """Write cameras as Pose2Sim TOML, one table each; reading it again gives the same numbers."""
-    path.write_text("\n".join(_table(camera) for camera in cameras), encoding="utf-8")
+    text = "\n".join(_table(camera) for camera in cameras)
+    with whole(path) as part:
+        part.write_text(text, encoding="utf-8")
 
 
 def metadata(path: Path) -> Mapping[str, Any]:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from mocapflow.errors import RecordingError, alternatives
 from mocapflow.io.typed import place, read_json
+from mocapflow.io.whole import whole
 
 TIMING = "recording.json"
 FORM = 'expected {"late_frames": {"cam03": 2.8}}: by how many frames its pictures come after those of the others'
@@ -47,7 +48,8 @@ def write_late_frames(folder: Path, late: Mapping[str, float]) -> Path:
     """
     path = folder / TIMING
     try:
-        path.write_text(timing_text(late) + "\n")
+        with whole(path) as part:
+            part.write_text(timing_text(late) + "\n")
     except OSError as error:
         raise RecordingError(f"can't be written: {error.strerror}", where=str(path)) from error
     return path

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from mocapflow.errors import RecordingError
+from mocapflow.io.whole import whole
 from mocapflow.records import F64
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
@@ -51,7 +52,8 @@ def write_trc(path: Path, names: Sequence[str], positions: F64, frame_rate: floa
     for row, markers in enumerate(positions):
         cells = ["" if np.isnan(x) else f"{x:.8f}" for x in markers.ravel()]
         lines.append("\t".join([str(row + 1), f"{start + row / frame_rate:.8f}", *cells]))
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    with whole(path) as part:
+        part.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def read_trc(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
@@ -102,7 +104,8 @@ def write_mot(path: Path, columns: Mapping[str, F64], time: F64) -> None:
     ]  # fmt: skip
     table = np.column_stack([time, *columns.values()])
     lines += ["\t".join(f"{x:.8f}" for x in row) for row in table]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    with whole(path) as part:
+        part.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def read_mot(path: Path) -> tuple[dict[str, F64], F64]:

@@ -25,6 +25,7 @@ from mocapflow.data import (
     Pose,
     Turn,
 )
+from mocapflow.io.whole import forget_parts
 from mocapflow.records import F64
 from mocapflow.results import Track
 from mocapflow.storage import packing
@@ -76,8 +77,7 @@ class Checkpoint:
         self._earlier, self._said = artifact.warnings, list[str]()
         self._iteration_done, self._frame_done = iteration_done, frame_done
         self._growing = Growing(artifact.path, indices, cameras)
-        for part in artifact.path.glob("*.part"):  # of a commit that was cut off; zarr would complain of it
-            part.unlink()
+        forget_parts(artifact.path)  # of a commit that was cut off; zarr would complain of them
 
     @property
     def done(self) -> int:

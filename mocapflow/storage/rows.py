@@ -14,13 +14,13 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
-from uuid import uuid4
 
 import numpy as np
 import numpy.typing as npt
 from numcodecs.zstd import Zstd
 
 from mocapflow.errors import StoreError
+from mocapflow.io.whole import whole
 
 LEVEL = 1
 
@@ -148,14 +148,10 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Replace the metadata of a zarr node in one step: a reader sees the old or the new, never a part.
-
-    Each writer has a part of its own: two that make the same store at once must not move each other's.
-    """
-    part = path.with_suffix(f".{uuid4().hex}.part")
-    part.write_text(json.dumps(value, separators=(",", ":")))  # no letter but ASCII: any locale can write it
-    flush(part)
-    part.replace(path)
+    """Replace the metadata of a zarr node in one step."""
+    with whole(path) as part:
+        part.write_text(json.dumps(value, separators=(",", ":")))  # no letter but ASCII: any locale can write it
+        flush(part)
 
 
 def flush(path: Path) -> None:

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from mocapflow.io.whole import whole
+
 OURS, RAW, TRUTH = "#1f5fbf", "#8fb4e8", "black"
 HELD, LOST = "#888888", "#d62728"
 DOTS_PER_INCH = 110
@@ -41,7 +43,8 @@ def legend(figure: Any, every: Sequence[Any]) -> None:
 
 def save(figure: Any, path: Path) -> Path:
     """Write a figure and return its path."""
-    figure.savefig(path, dpi=DOTS_PER_INCH)
+    with whole(path) as part:
+        figure.savefig(part, dpi=DOTS_PER_INCH)
     return path
 
 

@@ -14,6 +14,7 @@ from mocapflow_sequence.lost import lost_rows
 
 from mocapflow.data import unseen
 from mocapflow.geometry.angles import AngleSeries
+from mocapflow.io.whole import whole
 from mocapflow.results import RunFolder, Track
 from mocapflow_export.misgivings import overlap_medians
 
@@ -72,7 +73,9 @@ def held_by_priors(series: AngleSeries) -> dict[str, int]:
 
 def write(path: Path, content: Mapping[str, Any]) -> Path:
     """Write a summary as JSON; numbers that are not finite become null."""
-    path.write_text(json.dumps(plain(content), indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
+    text = json.dumps(plain(content), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    with whole(path) as part:
+        part.write_text(text, encoding="utf-8")
     return path
 
 

@@ -16,6 +16,7 @@ from mocapflow_export.uncertainty import measured
 from mocapflow_sequence.lost import lost_rows
 
 from mocapflow.components import Stage
+from mocapflow.io.whole import whole
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow.results import Evaluation, Files, RunFolder, Track
@@ -72,7 +73,8 @@ class Report(Stage):
         counts = f"{len(track.frame)} frames, {len(scene.cameras)} cameras, {recording.frame_rate:g} per second"
         subtitle = f"{recording.folder.name}: {counts}"
         path = layout.place(run_folder.path, layout.REPORT)
-        path.write_text(page.page(run_folder.path.resolve().name, subtitle, sections), encoding="utf-8")
+        with whole(path) as part:
+            part.write_text(page.page(run_folder.path.resolve().name, subtitle, sections), encoding="utf-8")
         return Files(paths=(path, *pictures))
 
 

@@ -20,6 +20,7 @@ from mocapflow import records
 from mocapflow.assets import Background
 from mocapflow.data import Frame, Past, Pose, Silhouette, Start
 from mocapflow.errors import ComponentFailed, ShapeError, StoreError
+from mocapflow.io.whole import PART
 from mocapflow.records import F64, record
 from mocapflow.running.execution import Execution
 from mocapflow.series import Series
@@ -160,7 +161,7 @@ def test_others_read_the_store_without_complaint(tmp_path, path, damaged):
     if damaged:
         for group in store.glob("*-*"):
             damage_zarr_json(group)
-            (group / "zarr.0.part").touch()  # as a machine leaves it that stops at a commit
+            (group / f"{PART}0.json").touch()  # as a machine leaves it that stops at a commit
         run_tiny(path, tmp_path, frames=5)
     whole = zarr.open_group(str(store), mode="r")
     names = {name.partition("-")[0] for name, _ in whole.members(max_depth=None) if "/" not in name}
@@ -187,9 +188,9 @@ def test_a_store_of_before_becomes_one_that_others_read(tmp_path, path):
 def test_what_a_stopped_commit_leaves_is_gone_when_the_track_goes_on(tmp_path, path):
     run_tiny(path, tmp_path, frames=5)
     (group,) = (tmp_path / "store.zarr").glob("track-*")
-    (group / "zarr.0.part").touch()
+    (group / f"{PART}0.json").touch()
     run_tiny(path, tmp_path)
-    assert not list(group.glob("*.part"))
+    assert not list(group.glob(f"{PART}*"))
 
 
 def test_rows_are_plain_zarr(tmp_path):

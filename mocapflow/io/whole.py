@@ -1,0 +1,31 @@
+"""Files that are there as a whole or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from uuid import uuid4
+
+PART = ".part-"  # begins the name of what is not whole yet
+
+
+@contextmanager
+def whole(path: Path) -> Iterator[Path]:
+    """Give a path to write to, in whose file's place a file comes in one step when all of it is written.
+
+    A reader sees the old file or the new one, never a part, whatever ends the writer. Each writer has a path of its
+    own, with the ending of the file's: some libraries go by it.
+    """
+    part = path.with_name(f"{PART}{uuid4().hex}{path.suffix}")
+    try:
+        yield part
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def forget_parts(folder: Path) -> None:
+    """Remove what writers left in a folder that were killed; nobody may be writing there."""
+    for part in folder.glob(f"{PART}*"):
+        part.unlink(missing_ok=True)

@@ -1,0 +1,31 @@
+import pytest
+
+from mocapflow.io.whole import PART, forget_parts, whole
+
+
+def test_a_file_comes_in_one_step(tmp_path):
+    path = tmp_path / "angles.csv"
+    path.write_text("old")
+    with whole(path) as part:
+        assert part.suffix == ".csv"
+        part.write_text("new")
+        assert path.read_text() == "old"
+    assert path.read_text() == "new"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_the_old_file_stays_where_writing_fails(tmp_path):
+    path = tmp_path / "angles.csv"
+    path.write_text("old")
+    with pytest.raises(OSError, match="full"), whole(path) as part:
+        part.write_text("ne")
+        raise OSError("full")
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_what_a_killed_writer_left_is_forgotten(tmp_path):
+    (tmp_path / f"{PART}0.csv").touch()
+    (tmp_path / "angles.csv").touch()
+    forget_parts(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["angles.csv"]
