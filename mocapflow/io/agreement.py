@@ -92,6 +92,12 @@ def gap_warnings(cameras: Sequence[Camera], videos: Sequence[Video]) -> list[str
     ]
 
 
+def first_warnings(videos: Sequence[Video]) -> list[str]:
+    """Say which image is frame 0 where that is not the one with number 0."""
+    first = videos[0].first
+    return [f"the images are numbered from {first} on: number {first} is frame 0"] if first else []
+
+
 def common_rate(cameras: Sequence[Camera], videos: Sequence[Video], calibration: Path) -> tuple[float, list[str]]:
     """Return the frames per second: as [metadata] says, or as the videos do.
 

@@ -13,7 +13,7 @@ from mocapflow.io.cameras import find_calibration, read_cameras
 from mocapflow.io.images import IMAGES
 from mocapflow.io.keypoints import odd_keypoints
 from mocapflow.io.lateness import late_frames
-from mocapflow.io.video import VIDEOS, Video, open_video
+from mocapflow.io.video import VIDEOS, Video, count_from_first, open_video
 from mocapflow.records import record
 
 KEYPOINTS = "keypoints"
@@ -46,14 +46,15 @@ def gather(folder: Path, calibration: Path | None) -> Parts:
     cameras = read_cameras(calibration)
     paths = match_videos(folder, [camera.name for camera in cameras], calibration)
     late = late_frames(folder, [camera.name for camera in cameras])
-    videos = tuple(replace(open_video(path), late=frames) for path, frames in zip(paths, late, strict=True))
+    opened = count_from_first([open_video(path) for path in paths])
+    videos = tuple(replace(video, late=frames) for video, frames in zip(opened, late, strict=True))
     lenses, cut = agreement.fit_sizes(cameras, videos, calibration)
     length, broken = agreement.agree_on_length(cameras, videos, folder)
     agreement.check_lateness(cameras, videos, length, folder)
-    gaps = agreement.gap_warnings(cameras, videos)
+    gaps = [*agreement.first_warnings(videos), *agreement.gap_warnings(cameras, videos)]
     rate, assumed = agreement.common_rate(cameras, videos, calibration)
     keypoints = tuple(keypoint_folder(folder / KEYPOINTS, camera.name) for camera in cameras)
-    odd = keypoint_warnings(cameras, keypoints, length)
+    odd = keypoint_warnings(cameras, keypoints, length, videos[0].first)
     return Parts(
         lenses=lenses,
         videos=videos,
@@ -133,12 +134,12 @@ def keypoint_folder(place: Path, camera: str) -> Path | None:
     return next((place for place in places if place.is_dir()), None)
 
 
-def keypoint_warnings(cameras: Sequence[Camera], places: Sequence[Path | None], length: int) -> list[str]:
-    """Say what is odd about the keypoints of all cameras; nothing where none has any."""
+def keypoint_warnings(cameras: Sequence[Camera], places: Sequence[Path | None], length: int, first: int) -> list[str]:
+    """Say what is odd about the keypoints of all cameras, for images from a number on; nothing where none has any."""
     if not any(places):
         return []
     rows = [
-        odd_keypoints(camera.name, place, length)
+        odd_keypoints(camera.name, place, length, first)
         if place
         else [f"{camera.name}: no keypoints, though others have them"]
         for camera, place in zip(cameras, places, strict=True)

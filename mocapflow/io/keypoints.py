@@ -15,13 +15,19 @@ from mocapflow.records import F64
 FORM = 'expected OpenPose\'s format: {"people": [{"pose_keypoints_2d": [x, y, confidence, ...]}]}'
 
 
-def keypoint_files(folder: Path) -> dict[int, Path]:
+def keypoint_files(folder: Path, first: int = 0) -> dict[int, Path]:
     """Return the files of one camera's folder by frame number.
+
+    Args:
+        folder: of one camera.
+        first: number of frame 0's image, which files that are named after images count from, too.
 
     Raises:
         RecordingError: two files have one number.
     """
-    return numbered(folder, (".json",))
+    files = numbered(folder, (".json",))
+    begin = first if files and min(files) >= first else 0
+    return {number - begin: path for number, path in files.items()}
 
 
 def read_keypoints(path: Path) -> F64:
@@ -55,9 +61,9 @@ def people_at(files: Mapping[int, Path] | None, index: int) -> F64:
     return np.where(lost, 0.0, people)
 
 
-def odd_keypoints(camera: str, folder: Path, length: int) -> list[str]:
+def odd_keypoints(camera: str, folder: Path, length: int, first: int = 0) -> list[str]:
     """Say what is odd about the keypoints of a camera with `length` frames; every file is read (60 us each)."""
-    files = keypoint_files(folder)
+    files = keypoint_files(folder, first)
     broken, gaps, counts = [], [], set()
     for index, path in files.items():
         try:

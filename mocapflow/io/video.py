@@ -8,7 +8,7 @@ the same pixels.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -34,6 +34,7 @@ class Video:
     declared: int  # frames, as the file says; more than `frames` where it breaks off
     stamps: F64 = array("N", unit="ms, time of each frame in the file, ascending; counted for images")
     numbers: I32 = array("N", unit="frame number of each stamp")
+    first: int = 0  # number in the name of frame 0's image
     late: int = 0  # frames by which its pictures come after those of the other cameras
 
     @property
@@ -72,6 +73,17 @@ def open_video(path: Path) -> Video:
         declared=max(declared, int(numbers[-1]) + 1),
         stamps=stamps,
         numbers=numbers,
+    )
+
+
+def count_from_first(videos: Sequence[Video]) -> tuple[Video, ...]:
+    """Return videos whose frame 0 is the first image that any camera has, where all are folders of images.
+
+    Who cuts a video into images counts from 1, and who takes a part of a recording keeps its numbers.
+    """
+    first = min(int(video.numbers[0]) if video.path.is_dir() else 0 for video in videos)
+    return tuple(
+        replace(video, numbers=video.numbers - first, declared=video.declared - first, first=first) for video in videos
     )
 
 
@@ -160,9 +172,9 @@ def _open_folder(path: Path) -> Video:
 
 def _folder_pictures(video: Video, indices: range) -> Iterator[tuple[U8 | None, str]]:
     files = numbered(video.path, IMAGES)
-    for index in indices:
-        if index not in files:
+    for number in range(indices.start + video.first, indices.stop + video.first, indices.step):
+        if number not in files:
             yield None, "there is no image of this frame"
             continue
-        image = read_image(files[index])
-        yield (None, f"{files[index].name} can't be read") if image is None else (image, "")
+        image = read_image(files[number])
+        yield (None, f"{files[number].name} can't be read") if image is None else (image, "")

@@ -23,7 +23,7 @@ from mocapflow.io.lenses import View
 from mocapflow.io.plates import background
 from mocapflow.io.rigs import examine_rig, examine_view
 from mocapflow.io.subjects import examine_subject
-from mocapflow.io.video import Video, lost_frames, open_video
+from mocapflow.io.video import Video, count_from_first, lost_frames, open_video
 from mocapflow.recordings.first_look import examine_first_frame
 from mocapflow.recordings.synchrony import measure
 from mocapflow.registry import Registry, load_registry
@@ -155,11 +155,12 @@ def _trial(folder: Path, calibration: Path, rig: bool = True) -> list[Finding]:
     videos = None if paths is None else [attempt(partial(open_video, path), findings) for path in paths]
     if videos is None or any(video is None for video in videos):
         return findings + (list(examine_rig(cameras)) if rig and all(c.size.all() for c in cameras) else [])
-    whole = [video for video in videos if video is not None]
+    whole = count_from_first([video for video in videos if video is not None])
     fitted = attempt(lambda: agreement.fit_sizes(cameras, whole, calibration), findings)
     agreed = attempt(lambda: agreement.agree_on_length(cameras, whole, folder), findings)
     rate = attempt(lambda: agreement.common_rate(cameras, whole, calibration), findings)
     findings += [warning(text, where=folder) for part in (fitted, agreed, rate) if part is not None for text in part[1]]
+    findings += [note(text, where=folder) for text in agreement.first_warnings(whole)]
     lenses = cameras if fitted is None else fitted[0]
     findings += examine_rig(lenses) if rig else []
     findings += [*_copies(cameras, whole), *_lost(cameras, whole)]
@@ -168,7 +169,7 @@ def _trial(folder: Path, calibration: Path, rig: bool = True) -> list[Finding]:
         delayed = [replace(video, late=frames) for video, frames in zip(whole, late, strict=True)]
         attempt(lambda: agreement.check_lateness(cameras, delayed, length, folder), findings)
     places = [folders.keypoint_folder(folder / folders.KEYPOINTS, camera.name) for camera in cameras]
-    odd = attempt(lambda: folders.keypoint_warnings(cameras, places, length), findings)
+    odd = attempt(lambda: folders.keypoint_warnings(cameras, places, length, whole[0].first), findings)
     unused = attempt(lambda: folders.plate_warnings(folder, cameras), findings)
     findings += [warning(text, where=folder) for text in (*(odd or ()), *(unused or ()))]
     if fitted is not None and unused is not None:

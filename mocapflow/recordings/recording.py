@@ -107,7 +107,8 @@ class Recording:
 
     @cached_property
     def _keypoint_files(self) -> tuple[dict[int, Path] | None, ...]:
-        return tuple(None if folder is None else keypoint_files(folder) for folder in self.keypoint_folders)
+        places = zip(self.keypoint_folders, self.videos, strict=True)
+        return tuple(None if place is None else keypoint_files(place, video.first) for place, video in places)
 
     @cached_property
     def content(self) -> Mapping[str, Path]:

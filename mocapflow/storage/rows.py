@@ -83,12 +83,12 @@ class Rows:
         assert values.shape[1:] == self.shape[1:] and len(values) <= self._chunk[0], (values.shape, self._chunk)
         if not values.size:
             return
-        whole = np.ascontiguousarray(values, self._dtype)
+        full = np.ascontiguousarray(values, self._dtype)
         if len(values) < self._chunk[0]:  # zarr keeps whole chunks
-            whole = np.full(self._chunk, self._fill, self._dtype)
-            whole[: len(values)] = values
+            full = np.full(self._chunk, self._fill, self._dtype)
+            full[: len(values)] = values
         file = self._file(block)
-        file.write_bytes(self._zstd.encode(whole))
+        file.write_bytes(self._zstd.encode(full))
         flush(file)
 
     def read(self, row: int) -> npt.NDArray[Any]:

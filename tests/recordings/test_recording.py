@@ -253,6 +253,29 @@ def test_folders_of_images(tmp_path):
     assert open_recording(tmp_path).frame_rate == 60
 
 
+@pytest.mark.parametrize("first", [1, 240])
+def test_frame_0_is_the_first_image_that_any_camera_has(tmp_path, first):
+    write_cameras(tmp_path / "cameras.toml", ring())
+    for name in NAMES:
+        (tmp_path / "videos" / name).mkdir(parents=True)
+        for number in range(name == "cam02", 4):
+            cv2.imwrite(str(tmp_path / "videos" / name / f"{first + number:06d}.png"), picture(number))
+    write_keypoints(tmp_path, 4)  # counted as OpenPose does for videos
+    for number in (3, 2, 1, 0):  # named after the images
+        place = tmp_path / "keypoints" / "cam02_json"
+        (place / f"cam02.{number:04d}.json").rename(place / f"cam02.{first + number:04d}.json")
+    recording = open_recording(tmp_path)
+    assert (recording.length, recording.indices) == (4, range(4))
+    assert recording.warnings[0] == f"the images are numbered from {first} on: number {first} is frame 0"
+    assert not any("keypoints" in warning for warning in recording.warnings)
+    frames = list(recording.frames())
+    assert [number_of(frame.images[0]) for frame in frames] == [0, 1, 2, 3]
+    assert frames[0].usable.tolist() == [True, False, True]
+    assert number_of(frames[1].images[1]) == 1
+    assert [[people.shape[0] for people in frame.keypoints] for frame in frames] == [[1, 1, 1]] * 4
+    np.testing.assert_allclose([frame.keypoints[1][0, 0, 0] for frame in frames], [10, 11, 12, 13])
+
+
 @pytest.mark.parametrize("rate", ["'thirty'", "0", "-30.0", "nan", "true"])
 def test_a_frame_rate_that_is_none(tmp_path, rate):
     write_recording(tmp_path, frames=2)
