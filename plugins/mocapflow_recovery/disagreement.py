@@ -14,22 +14,29 @@ from mocapflow.geometry.silhouettes import mask, outline
 from mocapflow.records import F32, F64, I32, Bool
 from mocapflow_recovery.certain import View
 
-LOOSE = 0.3  # what a pixel of cloth off the model counts: a limb may hold it there, or it flies
+HANGS, FLIES = 1.0, 0.3  # what a pixel of cloth counts: the body holds it where it is, or nothing does
 
 
-def distance(surface: Surface, views: Sequence[View], cap_m: float) -> float:
+def distance(surface: Surface, bare: Surface, views: Sequence[View], cap_m: float, cloth: float = HANGS) -> float:
     """Return the mean over the views of what stands apart, in m per unit of the person's area.
 
     Both ways: the person's pixels by their distance from the model, the model's by theirs from where the person may
     be, each at most `cap_m`. Unlike the area in which they differ it tells a limb that is near from one that is far.
-    Cloth counts less: a raised knee is found by the skirt it holds, but none shall be led astray by one that flies.
+
+    Args:
+        surface: the person as believed.
+        bare: its body alone.
+        views: what the images surely show.
+        cap_m: beyond, it does not matter how far.
+        cloth: what a pixel of cloth counts, of the person's off the model and of the model's where nobody is.
     """
     total = 0.0
     for view in views:
         covered, off = _of(surface, view)
         cap = cap_m / view.pixel_m
-        counts = np.where(view.cloth[view.person], LOOSE, 1.0)
-        apart = counts @ np.minimum(off[view.person], cap) + np.minimum(view.away[covered], cap).sum()
+        skin = covered if cloth == HANGS else mask(outline(bare, view.camera), view.camera)
+        lacks, juts = np.minimum(off[view.person], cap), np.minimum(view.away[covered], cap)
+        apart = np.where(view.cloth[view.person], cloth, 1.0) @ lacks + np.where(skin[covered], 1.0, cloth) @ juts
         total += float(apart) * view.pixel_m / max(int(np.count_nonzero(view.person)), 1)
     return total / max(len(views), 1)
 

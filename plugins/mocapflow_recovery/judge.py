@@ -74,24 +74,27 @@ class Judge(NamedTuple):
     past: Past
     reach: Reach
     given: Given | None  # None: nothing was
+    cloth: float  # what a pixel of cloth counts, on either side
 
     def of(self, result: FrameResult) -> Fit:
         """Return a result judged by its full surface."""
         pose, surface = result.state.estimate.pose, surface_of(self.model, result)
         stray = stray_of(surface, self.model.scene, self.seen, self.reach)
-        return Fit(result, stray, self._apart(pose, surface))
+        return Fit(result, stray, self._apart(pose, surface, self.model.scene))
 
     def apart(self, poses: Sequence[Pose]) -> F64:
         """Return for each pose (B,) how far surface and person are apart, m per unit of its area, times the strain."""
-        return np.array([self._apart(*each) for each in zip(poses, self._surfaces(poses), strict=True)])
+        pairs = zip(poses, self._surfaces(poses), strict=True)
+        return np.array([self._apart(pose, surface, self.coarse) for pose, surface in pairs])
 
     def stray(self, poses: Sequence[Pose]) -> F64:
         """Return for each pose (B,) how much of surface and person strays, without cloth, cm²."""
         strays = [stray_of(surface, self.coarse, self.seen, self.reach) for surface in self._surfaces(poses)]
         return np.array([stray.uncovered + stray.floating for stray in strays])
 
-    def _apart(self, pose: Pose, surface: Surface) -> float:
-        return distance(surface, self.seen, self.reach.cap_m) * (self.given.strain(pose) if self.given else 1.0)
+    def _apart(self, pose: Pose, surface: Surface, scene: Scene) -> float:
+        strain = self.given.strain(pose) if self.given else 1.0
+        return strain * distance(surface, scene.bare(surface), self.seen, self.reach.cap_m, self.cloth)
 
     def _surfaces(self, poses: Sequence[Pose]) -> list[Surface]:
         clothes = drapes(self.model, poses, self.parameters, self.past)

@@ -22,12 +22,14 @@ from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow.settings import PositiveOrInf
 from mocapflow_recovery.certain import View, small_room, views
+from mocapflow_recovery.disagreement import FLIES, HANGS
 from mocapflow_recovery.judge import Fit, Given, Judge, Reach, Stray, stray_of, surface_of
 from mocapflow_recovery.leaps import eased, leapt, overbent
 from mocapflow_recovery.sampling import Cost, Plan, Spread, put_back, search, seen_samples, without_idle_parts
 
 CURED = 2.0  # times as far apart may be what is doubted no more: a leg lay where a skirt flew
 CLEARED = 1.1  # the same, what leaves no hint: of a foot that was lost all other limbs and the cloth tell nothing
+Look = Callable[[np.random.Generator, Pose, Pose, Judge], Pose]
 UNKNOWN = "too little is known of the room behind the person: limbs that are lost are not looked for"
 
 
@@ -48,6 +50,8 @@ class LimbSearch(Recovery):
     The first frame starts from a pose that was given and is about right (`start_deg`). So it is searched near that one
     first, and of two poses that fit alike the nearer one is taken: crossed legs look the same exchanged.
     What shows the garment's colours calls for a search where it strays, but moves no part and is no doubt: it may fly.
+    So it is searched twice, once as if cloth lay where the body holds it, which tells of legs that nobody sees, once as
+    if it flew, which leads none astray; the fit that agrees better by what is skin, and a little by cloth, is taken.
     It needs the empty scene; where little of it is known behind the person every fit is taken as it is.
     """
 
@@ -102,18 +106,22 @@ class LimbSearch(Recovery):
             return result
         judge = self._judge(state, result, seen, past, model)
         fit = judge.of(result)
-        best = fit
-        far = partial(self._far, astray=doubtful)
-        looks = ([self._near] if judge.given else []) + ([far] if doubtful or not judge.given else [])
-        if judge.given and doubtful:  # where all begins, chance shall not decide
-            looks *= self.first_looks
-        for number, look in enumerate(looks):
+        fits = []
+        for number, look in enumerate(self._looks(judge, doubtful)):
             rng = np.random.default_rng([frame.index, number])
             found = look(rng, state.estimate.pose, fitted, judge)
-            best = self._better(judge.of(settle(found, judge.parameters)), best)
+            fits.append(judge.of(settle(found, judge.parameters)))
+        best = self._better(min(fits, key=lambda other: (self._doubtful(other.stray), other.apart)), fit)
         if best is fit:
             return noted(result, f"{why}: search found nothing better", doubted=True) if doubtful else result
         return noted(best.result, f"{why}: found again by search; then {best.stray}", self._doubtful(best.stray))
+
+    def _looks(self, judge: Judge, doubtful: bool) -> list[Look]:
+        """Return the ways to look for the pose, each from its own samples."""
+        far = partial(self._far, astray=doubtful)
+        if judge.given:  # where all begins, chance shall not decide
+            return [self._near, partial(far, cloth=HANGS)] * self.first_looks if doubtful else [self._near]
+        return [partial(far, cloth=belief) for belief in ((HANGS, FLIES) if judge.model.clothed else (HANGS,))]
 
     def _better(self, other: Fit, fit: Fit) -> Fit:
         """Return another fit if it is clearly nearer to the person, or free of a doubt or hint and not much farther."""
@@ -152,10 +160,12 @@ class LimbSearch(Recovery):
         found = search(judge.apart, Pose(root=fitted.root, angles=believed.angles), body, plan, rng)
         return self._tidied(found, fitted, believed, judge, judge.apart)
 
-    def _far(self, rng: np.random.Generator, believed: Pose, fitted: Pose, judge: Judge, astray: bool) -> Pose:
+    def _far(
+        self, rng: np.random.Generator, believed: Pose, fitted: Pose, judge: Judge, astray: bool, cloth: float
+    ) -> Pose:
         """Return the pose that agrees best with the views, sampled around those at hand and as people were seen."""
         body = judge.model.scene.body
-        judge = judge._replace(given=None)  # it may have been far off
+        judge = judge._replace(given=None, cloth=cloth)  # it may have been far off
         plan, before = self._plan(body), [moment.pose for moment in judge.past.moments[-1:]]
         at_rest, every = np.zeros(len(body.twists)), np.arange(len(body.twists), dtype=np.int32)
         seen_poses = seen_samples(Pose(root=believed.root, angles=at_rest), every, body, plan, rng)
@@ -176,7 +186,9 @@ class LimbSearch(Recovery):
     ) -> Judge:
         given = None if past.moments or past.after_gap else Given(state.estimate.pose, np.radians(self.start_deg))
         coarse = model.scene.simplified(self.faces)
-        return Judge(model, coarse, seen, result.state.cloth.parameters, past, self._reach(), given)
+        return Judge(
+            model, coarse, seen, result.state.cloth.parameters, past, self._reach(), given, HANGS if given else FLIES
+        )
 
     def _plan(self, body: Body) -> Plan:
         spread = Spread(np.radians(self.spread_deg), np.radians(self.root_spread_deg), self.root_spread_m)

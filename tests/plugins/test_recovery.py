@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 from math import inf
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from mocapflow_levelset.colours import BINS
 from mocapflow_priors.density import Density, write
 from mocapflow_recovery.certain import shrunk, small_room, views
-from mocapflow_recovery.disagreement import distance, floating_area, uncovered_areas
+from mocapflow_recovery.disagreement import FLIES, HANGS, distance, floating_area, uncovered_areas
 from mocapflow_recovery.judge import Fit, Given, Stray
 from mocapflow_recovery.leaps import eased, leapt
 from mocapflow_recovery.limb_search import LimbSearch
@@ -44,6 +45,10 @@ def surface(pose: Pose):
 
 def seen(frame=FRAME):
     return views(frame, surface(POSE), ROOM, 0.35)
+
+
+def apart(pose: Pose, looked, cloth=HANGS) -> float:
+    return distance(surface(pose), surface(pose), looked, 0.2, cloth)
 
 
 def test_a_small_camera_sees_the_same() -> None:
@@ -110,7 +115,7 @@ def test_a_leg_astray_counts_by_its_area_and_by_its_way(angle) -> None:
     assert uncovered_areas(wrong, seen(), [0.06], 0.2)[0, 0] > 150e-4
     assert floating_area(surface(POSE), seen(), 0.06) < 20e-4
     assert 150e-4 < floating_area(wrong, seen(), 0.06) < 0.25  # m², the skin of a leg
-    ways = [distance(surface(astray(part * angle)), seen(), 0.2) for part in (0, 0.5, 1)]
+    ways = [apart(astray(part * angle), seen()) for part in (0, 0.5, 1)]
     assert ways == sorted(ways)
     assert ways[2] > 3 * ways[0]
 
@@ -131,7 +136,27 @@ def test_a_skirt_that_flies_leads_no_limb_astray() -> None:
         flown = mask(outline(surface(astray(0.8)), view.camera), view.camera) & ~view.person
         away = np.where(flown, 0, view.away)
         flying.append(view._replace(person=view.person | flown, cloth=flown, away=away))
-    assert distance(surface(astray(0.8)), flying, 0.2) > 2 * distance(surface(POSE), flying, 0.2)
+    assert apart(astray(0.8), flying, FLIES) > 2 * apart(POSE, flying, FLIES)
+    assert apart(astray(0.8), flying, HANGS) < apart(POSE, flying, HANGS)  # where it hangs it tells of a leg
+
+
+def test_a_skirt_that_flies_where_the_model_hangs_leads_no_limb_astray() -> None:
+    """What the model has where nobody is counts less where it is cloth; skin counts fully, whatever cloth does."""
+    skin, low = surface(POSE), surface(astray(0.8))  # as if a hem hung where the leg is astray
+    hangs, flies = (distance(low, skin, seen(), 0.2, cloth) for cloth in (HANGS, FLIES))
+    assert flies < 0.8 * hangs
+    assert distance(low, low, seen(), 0.2, FLIES) == pytest.approx(hangs)
+
+
+@pytest.mark.parametrize(("clothed", "given", "doubtful", "near", "far"), [
+    (True, False, True, 0, [HANGS, FLIES]), (False, False, True, 0, [HANGS]), (True, False, False, 0, [HANGS, FLIES]),
+    (True, True, False, 1, []), (True, True, True, 2, [HANGS, HANGS]),
+])  # fmt: skip
+def test_it_is_searched_as_if_cloth_hung_and_as_if_it_flew(clothed, given, doubtful, near, far) -> None:
+    judge = SimpleNamespace(given=given, model=SimpleNamespace(clothed=clothed))
+    looks = LimbSearch()._looks(judge, doubtful)
+    beliefs = [look.keywords["cloth"] for look in looks if isinstance(look, partial)]
+    assert (len(looks) - len(beliefs), beliefs) == (near, far)
 
 
 def test_parts_of_a_person() -> None:
@@ -158,7 +183,7 @@ def test_samples_differ_in_their_part_and_keep_the_limits() -> None:
 
 def test_search_finds_a_leg() -> None:
     def cost(poses):
-        return np.array([distance(surface(pose), seen_now, 0.2) for pose in poses])
+        return np.array([apart(pose, seen_now) for pose in poses])
 
     seen_now = seen()
     found = search(cost, astray(0.8), SCENE.body, PLAN, np.random.default_rng(1))
