@@ -186,9 +186,8 @@ class LimbSearch(Recovery):
     ) -> Judge:
         given = None if past.moments or past.after_gap else Given(state.estimate.pose, np.radians(self.start_deg))
         coarse = model.scene.simplified(self.faces)
-        return Judge(
-            model, coarse, seen, result.state.cloth.parameters, past, self._reach(), given, HANGS if given else FLIES
-        )
+        cloth = HANGS if given else FLIES  # where all begins, the garment's colours are not known
+        return Judge(model, coarse, seen, result.state.cloth.parameters, past, self._reach(), given, cloth)
 
     def _plan(self, body: Body) -> Plan:
         spread = Spread(np.radians(self.spread_deg), np.radians(self.root_spread_deg), self.root_spread_m)
