@@ -72,12 +72,12 @@ TAKES = {
     "walk_A_culottes": Take("A", "shorts", "walk_A", 65, GREEN, start=120, cut=CULOTTES),
     "kneeup_B_culottes": Take("B", "shorts", "kneeup_B", 66, GREY, start=60, cut=CULOTTES),
     "walk_B_trousers": Take("B", "shorts", "walk_B", 67, PURPLE, start=60, cut=TROUSERS),
-    # motions that nothing was chosen on
+    "squat_A_trousers": Take("A", "shorts", "kneebend_A", 68, DARK, start=60, cut=TROUSERS),
+    # made when all had been chosen; the kick has had a say since
     "swing_A_skirt": Take("A", "skirt", "swing", 71, GREY, frames=60),
     "swing_B_shorts": Take("B", "shorts", "swing", 72, PURPLE, frames=60),
     "bow_B_skirt": Take("B", "skirt", "bow", 73, GREEN, frames=60),
     "bow_A_shorts": Take("A", "shorts", "bow", 74, GREY, frames=60),
     "kick_A_skirt": Take("A", "skirt", "kick_B", 75, GREEN, start=20, frames=50),
     "walk_B_skirt2": Take("B", "skirt", "walk_B", 76, PURPLE, start=20, frames=60),
-    "squat_A_trousers": Take("A", "shorts", "kneebend_A", 68, DARK, start=60, cut=TROUSERS),
 }

@@ -92,7 +92,8 @@ def read_frames(video: Video, indices: range) -> Iterator[tuple[U8 | None, str]]
 
     Index 0 is the first frame of a punctual camera; a late camera's pictures are taken from further on.
     """
-    indices = range(indices.start + video.late, indices.stop + video.late, indices.step)
+    ahead = video.late + video.first  # first is 0 in files
+    indices = range(indices.start + ahead, indices.stop + ahead, indices.step)
     pictures = _folder_pictures(video, indices) if video.path.is_dir() else _file_pictures(video, indices)
     for image, reason in pictures:
         if image is not None and image.shape != (video.height, video.width, 3):
@@ -172,7 +173,7 @@ def _open_folder(path: Path) -> Video:
 
 def _folder_pictures(video: Video, indices: range) -> Iterator[tuple[U8 | None, str]]:
     files = numbered(video.path, IMAGES)
-    for number in range(indices.start + video.first, indices.stop + video.first, indices.step):
+    for number in indices:
         if number not in files:
             yield None, "there is no image of this frame"
             continue

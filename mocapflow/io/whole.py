@@ -21,6 +21,10 @@ def whole(path: Path) -> Iterator[Path]:
     try:
         yield part
         part.replace(path)
+    except OSError as error:
+        if error.filename == str(part):  # people know the file by its own name
+            error.filename = str(path)
+        raise
     finally:
         part.unlink(missing_ok=True)
 

@@ -29,8 +29,8 @@ from mocapflow_recovery.sampling import Cost, Plan, Spread, put_back, search, se
 
 CURED = 2.0  # times as far apart may be what is doubted no more: a leg lay where a skirt flew
 CLEARED = 1.1  # the same, what leaves no hint: of a foot that was lost all other limbs and the cloth tell nothing
-Look = Callable[[np.random.Generator, Pose, Pose, Judge], Pose]
 UNKNOWN = "too little is known of the room behind the person: limbs that are lost are not looked for"
+Look = Callable[[np.random.Generator, Pose, Pose, Judge], Pose]  # samples, pose believed, pose fitted, judge
 
 
 class LimbSearch(Recovery):

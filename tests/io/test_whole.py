@@ -29,3 +29,10 @@ def test_what_a_killed_writer_left_is_forgotten(tmp_path):
     (tmp_path / "angles.csv").touch()
     forget_parts(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["angles.csv"]
+
+
+def test_an_error_names_the_file_itself(tmp_path):
+    path = tmp_path / "nowhere" / "angles.csv"
+    with pytest.raises(FileNotFoundError) as caught, whole(path) as part:
+        part.write_text("new")
+    assert caught.value.filename == str(path)
