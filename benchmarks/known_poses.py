@@ -191,7 +191,7 @@ def push_up(body: Body, t: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def swing(body: Body, t: np.ndarray) -> dict[str, np.ndarray]:
-    """Return rotation vectors (T,3) per joint of the left leg swinging forth and back, then the right one to the side."""
+    """Return rotation vectors (T,3) per joint of the left leg swinging forth and back, then the right one aside."""
     turn = {name: np.zeros((len(t), 3)) for name in body.names}
     wave, half = np.sin(2 * np.pi * t / 1.2), t[-1] / 2
     fore = wave * (1 - np.exp(-t / 0.3)) / (1 + np.exp((t - half) / 0.05))
