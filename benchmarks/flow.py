@@ -71,8 +71,8 @@ def main() -> None:
     follow = FollowPoints()
 
     def flow_of_frame() -> tuple:  # type: ignore[type-arg]
-        pairs = zip(old.images, new.images, background.mean, strict=True)
-        return tuple(follow.follow(*pair) for pair in pairs)
+        pairs = enumerate(zip(old.images, new.images, strict=True))
+        return tuple(follow.follow(a, b, follow.differs(a, background, camera)) for camera, (a, b) in pairs)
 
     believed = bent(scene, pose, 5.0, np.random.default_rng(0))
     surface, silhouettes = scene.surface(believed, NO_CLOTH), shown(scene, pose)

@@ -24,8 +24,8 @@ SPECK = 5  # px; what differs from the empty scene in less than half of such a s
 class FollowPoints(Stage):
     """Follows corners by pyramids of Lucas-Kanade steps, forward and back; those that do not come back are dropped.
 
-    Where the empty scene is known, corners are looked for where the picture differs from it; else everywhere. What
-    moves into a frame depends on no later frame.
+    Where the empty scene is known, corners are looked for only if they differ from it. What moves into a frame depends
+    on no later frame.
     """
 
     name: ClassVar[str] = "flow"
@@ -56,18 +56,22 @@ class FollowPoints(Stage):
         before: Frame | None = None
         for frame in frames:
             for camera in range(len(frame.usable)):
-                both = before is not None and before.usable[camera] and frame.usable[camera]
-                mean = None if background is None else background.mean[camera]
-                flow = self.follow(before.images[camera], frame.images[camera], mean) if both and before else NOTHING
+                flow = NOTHING
+                if before is not None and before.usable[camera] and frame.usable[camera]:
+                    old, new = before.images[camera], frame.images[camera]
+                    flow = self.follow(old, new, None if background is None else self.differs(old, background, camera))
                 yield frame.index, camera, flow
             before = frame
 
-    def follow(self, old: U8, new: U8, empty: F32 | None = None) -> Flow:
-        """Return corners of the old picture (H, W, 3) that are found in the new one and from there back."""
+    def follow(self, old: U8, new: U8, where: U8 | None = None) -> Flow:
+        """Return corners of the old picture (H, W, 3) that are found in the new one and from there back.
+
+        `where` (H, W) is above 0 where they are looked for; None: everywhere.
+        """
         import cv2
 
         a, b = (np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), np.uint8) for picture in (old, new))
-        corners = self._corners(a, np.ones_like(a) if empty is None else self._differs(old, empty))
+        corners = self._corners(a, np.ones_like(a) if where is None else where)
         if corners is None:
             return NOTHING
         there, found = self._step(a, b, corners)
@@ -97,13 +101,13 @@ class FollowPoints(Stage):
         )
         return np.asarray(to, np.float32), np.asarray(found, bool).ravel()
 
-    def _differs(self, picture: U8, empty: F32) -> U8:
-        """Return 1 where a picture differs from the empty scene, without single pixels of noise, else 0."""
+    def differs(self, picture: U8, background: Background, camera: int) -> U8:
+        """Return 1 where a picture differs from the empty scene (specks are noise) or nobody knows it, else 0."""
         import cv2
 
-        away = cv2.absdiff(picture, cv2.convertScaleAbs(empty))  # rounds and clips to bytes
+        away = cv2.absdiff(picture, cv2.convertScaleAbs(background.mean[camera]))  # rounds and clips to bytes
         different = cv2.max(cv2.max(away[..., 0], away[..., 1]), away[..., 2]) > self.difference
-        return np.asarray(cv2.medianBlur(different.astype(np.uint8), SPECK), np.uint8)
+        return np.where(background.known[camera], cv2.medianBlur(different.astype(np.uint8), SPECK), np.uint8(1))
 
 
 NOTHING = Flow(pixel=np.empty((0, 2), np.float32), displacement=np.empty((0, 2), np.float32))

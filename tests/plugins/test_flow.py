@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from mocapflow_sequence.flow import FollowPoints
 
+from mocapflow.assets import Background
 from mocapflow.caching.digests import Digests
 from mocapflow.config.pipeline import load_pipeline
 from mocapflow.recordings.recording import open_recording
@@ -48,13 +49,19 @@ def test_what_does_not_come_back_is_dropped():
     assert gone.sum() < 0.3 * anyway.sum()
 
 
-def test_points_lie_on_what_differs_from_the_empty_scene():
+def test_points_lie_on_what_differs_from_the_empty_scene_or_where_nobody_knows_it():
     room = pattern(2)
     old = room.copy()
     old[40:90, 60:110] = pattern()[40:90, 60:110]
-    flow = FollowPoints(spacing_px=2).follow(old, old, room.astype(np.float32))
-    assert len(flow.pixel) > 20
-    assert ((flow.pixel >= [58, 38]) & (flow.pixel <= [111, 91])).all()
+    flow, stage = [], FollowPoints(spacing_px=2)
+    for nobody_knows in (np.s_[:0], np.s_[:20, :50]):
+        spread = np.ones(room.shape, np.float32)
+        spread[nobody_knows] = np.inf
+        background = Background(mean=(room.astype(np.float32),), spread=(spread,))
+        flow.append(stage.follow(old, old, stage.differs(old, background, 0)).pixel)
+    on_it = [((pixel >= [58, 38]) & (pixel <= [111, 91])).all(axis=1) for pixel in flow]
+    assert on_it[0].sum() > 20 and on_it[0].all()
+    assert on_it[1].sum() > 20 and (flow[1][~on_it[1]] < [50, 20]).all() and (~on_it[1]).sum() > 5
 
 
 def test_at_most_so_many_points():

@@ -14,6 +14,7 @@ from mocapflow_priors.joint_limits import JointLimits
 from mocapflow_report.raster import Canvas
 from mocapflow_sequence.flow import FollowPoints
 
+from mocapflow.assets import Background
 from mocapflow.data import CLOTH, NO_CLOTH, Flow, Frame, Matches, Past, Segmentation
 from mocapflow.geometry.cameras import project
 from mocapflow.geometry.silhouettes import mask_distance, outline, samples
@@ -156,8 +157,10 @@ def textured(scene, before, after, index=5):
     """The frame after a motion, with the flow that is found into it."""
     colours = np.random.default_rng(0).uniform(0.1, 1, (2000, 3)).astype(np.float32)
     old, new = pictures(scene, before, colours), pictures(scene, after, colours)
-    empty = np.full(old[0].shape, 0.4 * 255, np.float32)
-    flow = tuple(FollowPoints().follow(a, b, empty) for a, b in zip(old, new, strict=True))
+    grey, one, stage = np.full(old[0].shape, 0.4 * 255, np.float32), np.ones(old[0].shape, np.float32), FollowPoints()
+    empty = Background(mean=(grey,) * len(old), spread=(one,) * len(old))
+    pairs = enumerate(zip(old, new, strict=True))
+    flow = tuple(stage.follow(a, b, stage.differs(a, empty, camera)) for camera, (a, b) in pairs)
     return Frame(index=index, time=index / 30, images=tuple(new), usable=np.ones(len(new), bool), flow=flow)
 
 
