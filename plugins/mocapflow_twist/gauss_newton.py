@@ -105,6 +105,8 @@ class Task(NamedTuple):
         low, high = self.garment.parameter_bounds.T
         parameters, downhill = cloth.parameters, -equations.gradient
         free = ~solve.at_bound(parameters, downhill, low, high) & self._fitted
+        if not free.any():  # the garment knows no forces, or each stands at a bound
+            return cloth
         part = Equations(equations.hessian[np.ix_(free, free)], equations.gradient[free], equations.energy)
         increment = np.zeros(len(parameters))
         increment[free] = solve.step(part, solve.CLOTH_LEVER / (high - low)[free], damping)

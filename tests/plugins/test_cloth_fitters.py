@@ -13,6 +13,7 @@ from mocapflow_twist.gauss_newton import GaussNewton, Task
 
 from mocapflow.data import Estimate, Frame, Moment, Past, Pose, Segmentation, Silhouette, Turn
 from mocapflow.geometry.misfit import misfit, unclipped
+from mocapflow.geometry.sewing import THICKNESS
 from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.model import ClothedModel
 from mocapflow.testing.views import SIZE, tiny_camera
@@ -153,6 +154,14 @@ def test_three_values_of_a_parabola_tell_where_it_is_lowest():
 def test_forces_that_gain_nothing_are_left_alone(model):
     truth = parameters(model, flare_rad=0.1)
     np.testing.assert_array_equal(fitted(SampledForces(), model, truth, truth, later(model)).parameters, truth)
+
+
+def test_a_garment_without_forces_hangs_as_it_does(fitter, model):
+    garment = model.scene.garment
+    thick = replace(garment, parameter_names=(THICKNESS,), parameter_bounds=garment.parameter_bounds[:1])
+    plain = replace(model, scene=replace(model.scene, garment=thick))
+    found = fitted(fitter, plain, np.array([0.004]), np.array([0.004]), later(plain))
+    assert found.parameters == pytest.approx([0.004])
 
 
 def test_the_misfit_grows_with_the_distance_between_outlines(model):
