@@ -10,7 +10,7 @@ from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.geometry.cameras import project
 from mocapflow.records import F64, array, record
-from mocapflow_fitting.triangulate import Points, triangulate
+from mocapflow_fitting.triangulate import USUAL_PX, Points, triangulate
 
 ALIKE_PX_SHARE = 0.05  # of the height of a detection: keypoints of one person reproject within about this
 
@@ -80,7 +80,8 @@ def _person(detections: Sequence[F64], cameras: Sequence[Camera], chosen: tuple[
     count = max((d.shape[1] for d in detections if len(d)), default=0)
     rows = np.stack([detections[c][row] if row >= 0 else np.zeros((count, 3)) for c, row in enumerate(chosen)])
     sizes = [scale_of(points) for points in rows if points[:, 2].any()]
-    points = triangulate(rows[..., :2], rows[..., 2], cameras, scale_px=float(np.median(sizes)))
+    scale = float(np.median(sizes)) if sizes else USUAL_PX  # estimators list people of whom they see no point
+    points = triangulate(rows[..., :2], rows[..., 2], cameras, scale)
     found = np.isfinite(points.position).all(axis=1)
     support = float(points.weight[:, found].sum())
     return Person(

@@ -90,6 +90,7 @@ def test_the_person_is_who_reprojects_best(body, pose, cameras):
     with pytest.raises(RecordingError, match="cameras list 25 and 26 keypoints"):
         find_person([np.ones((1, 25, 3)), np.ones((1, 26, 3)), *(np.empty((0, 0, 3)),) * 2], cameras)
     assert find_person([np.array(detections[0]), *(np.empty((0, 0, 3)),) * 3], cameras) is None
+    assert find_person([np.zeros((1, 25, 3))] * 4, cameras) is None  # as a detector lists whom it hardly sees
 
 
 def test_landmarks_lie_where_their_names_say(body):
