@@ -1,4 +1,4 @@
-"""Colours of pixels in coarse bins, for histograms."""
+"""BGR colours of pixels in coarse bins, for histograms of what a layer or a room has shown."""
 
 from __future__ import annotations
 

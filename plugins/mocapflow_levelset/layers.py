@@ -23,7 +23,7 @@ from mocapflow_levelset.colours import BINS, SIDE, bins_of
 COLOURS = "layers"  # of Segmentation.appearance: (L, BINS) pixels of each layer by colour, older ones discounted
 SMOOTH = 0.7  # bins; standard deviation by which colours are smoothed
 UNSEEN = 0.1  # share of pixels by which a layer may have any colour: shadows, highlights
-ALIKE = 0.5  # Bhattacharyya coefficient from which on two layers are one to the eye
+OVERLAP = 0.5  # Bhattacharyya coefficient of their colours from which on two layers are one to the eye
 LEAST = 50.0  # pixels that a layer has to have shown to be known
 CLIP = 4.0  # bound on the log ratio of a pixel
 SURELY = -2.0  # log ratio below which a pixel is another layer's, whatever the surface says
@@ -93,7 +93,7 @@ def shown(past: Past) -> Shown:
     known = counts.sum(axis=1) >= LEAST
     density = densities(counts)
     root = np.sqrt(density)
-    apart = (root @ root.T < ALIKE) & known[:, None] & known[None]
+    apart = (root @ root.T < OVERLAP) & known[:, None] & known[None]
     likely = np.log((1 - UNSEEN) * density + UNSEEN / BINS)
     ratio = np.zeros(counts.shape, np.float32)
     for layer in np.flatnonzero(apart.any(axis=1)):

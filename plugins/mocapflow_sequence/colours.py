@@ -45,8 +45,8 @@ def shaded(colour: F32, other: F32) -> Bool:
     return found
 
 
-def bins_of(image: U8 | F32) -> I32:
-    """Return the number of the colour of each pixel (H, W) of an image (H, W, 3) BGR."""
+def lab_bins(image: U8 | F32) -> I32:
+    """Return the bin in CIELAB (H, W) of each pixel of an image (H, W, 3) BGR; finer in tint than in lightness."""
     import cv2
 
     number = np.zeros(image.shape[:2], np.int32)

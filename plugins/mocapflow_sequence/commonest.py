@@ -9,8 +9,8 @@ from mocapflow.io.plates import LEAST_SPREAD, NORMAL
 from mocapflow.records import F32, U8
 from mocapflow_sequence.colours import Colours
 
-ALIKE = 4.0  # standard deviations of the noise within which a pixel has the same colour in two pictures
-LEAST_ALIKE = 6.0  # grey levels: compressed pictures differ by so much where nothing moves
+SAME = 4.0  # standard deviations of the noise within which a pixel has the same colour in two pictures
+LEAST_SAME = 6.0  # grey levels: compressed pictures differ by so much where nothing moves
 
 
 def commonest(pictures: U8, count: int) -> list[Colours]:
@@ -20,11 +20,11 @@ def commonest(pictures: U8, count: int) -> list[Colours]:
         pictures: (N, H, W, 3), of one camera; what moves covers each pixel in some of them only.
         count: how many.
     """
-    alike = np.maximum(ALIKE * np.sqrt(2) * noise(pictures), LEAST_ALIKE).astype(np.int32)
+    within = np.maximum(SAME * np.sqrt(2) * noise(pictures), LEAST_SAME).astype(np.int32)
     shape = (count, *pictures.shape[1:])
     mean, spread = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
     share = np.zeros(shape[:3], np.float32)
-    _commonest(pictures, alike, mean, spread, share)
+    _commonest(pictures, within, mean, spread, share)
     spread = np.maximum(spread, np.maximum(np.median(spread[0], axis=(0, 1)), LEAST_SPREAD), dtype=np.float32)
     return [Colours(*view) for view in zip(mean, spread, share, strict=True)]
 
@@ -36,7 +36,7 @@ def noise(pictures: U8) -> F32:
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _commonest(pictures, alike, mean, spread, share):  # type: ignore[no-untyped-def]
+def _commonest(pictures, within, mean, spread, share):  # type: ignore[no-untyped-def]
     number, height, width, _ = pictures.shape
     row, left = np.empty((width, number, 3), np.int32), np.empty(number, np.bool_)
     for y in range(height):
@@ -45,37 +45,37 @@ def _commonest(pictures, alike, mean, spread, share):  # type: ignore[no-untyped
         for x in range(width):
             left[:] = True
             for k in range(len(mean)):
-                best, count = _seed(row[x], alike, left)
+                best, count = _seed(row[x], within, left)
                 if not count:
                     break
                 share[k, y, x] = count / number
-                _describe(row[x], best, alike, left, mean[k, y, x], spread[k, y, x])
+                _describe(row[x], best, within, left, mean[k, y, x], spread[k, y, x])
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _seed(values, alike, left):  # type: ignore[no-untyped-def]
+def _seed(values, within, left):  # type: ignore[no-untyped-def]
     """Return which of the values (N, 3) that are left has most others like it, and how many; 0 where none is left."""
     best, count, remaining = -1, 0, left.sum()
     for i in range(len(values)):
         if 2 * count > remaining:
             break
-        if not left[i] or (best >= 0 and _same(values[i], values[best], alike)):
+        if not left[i] or (best >= 0 and _same(values[i], values[best], within)):
             continue
         found = 0
         for j in range(len(values)):
-            found += left[j] and _same(values[i], values[j], alike)
+            found += left[j] and _same(values[i], values[j], within)
         if found > count:
             best, count = i, found
     return best, count
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _describe(values, best, alike, left, mean, spread):  # type: ignore[no-untyped-def]
+def _describe(values, best, within, left, mean, spread):  # type: ignore[no-untyped-def]
     """Write mean and spread (3,) of what is left like the best of some values (N, 3), and take it out."""
     count = 0
     mean[:], spread[:] = 0, 0
     for j in range(len(values)):
-        if left[j] and _same(values[best], values[j], alike):
+        if left[j] and _same(values[best], values[j], within):
             count, left[j] = count + 1, False
             for c in range(3):  # off the best, so that the sum of squares is exact
                 off = np.float32(values[j, c] - values[best, c])
@@ -88,9 +88,9 @@ def _describe(values, best, alike, left, mean, spread):  # type: ignore[no-untyp
 
 
 @numba.njit(cache=True, error_model="numpy", inline="always")
-def _same(one, other, alike):  # type: ignore[no-untyped-def]
+def _same(one, other, within):  # type: ignore[no-untyped-def]
     for c in range(3):
         off = one[c] - other[c]
-        if off > alike[c] or off < -alike[c]:
+        if off > within[c] or off < -within[c]:
             return False
     return True

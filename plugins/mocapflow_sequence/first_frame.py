@@ -13,7 +13,7 @@ from mocapflow.data import Surface
 from mocapflow.geometry.cameras import magnification
 from mocapflow.geometry.silhouettes import mask, outline
 from mocapflow.records import F32, F64, U8, Bool
-from mocapflow_sequence.colours import Colours, alike, bins_of, every, more_common, shaded
+from mocapflow_sequence.colours import Colours, alike, every, lab_bins, more_common, shaded
 from mocapflow_sequence.commonest import commonest
 
 COLOURS = 4  # of each pixel that are looked at: the room's, of who stands there, of shadows
@@ -43,7 +43,7 @@ class Evidence(NamedTuple):
 
     def of_room(self, colour: Colours) -> Bool:
         """Return where (H, W) a colour is the room's."""
-        rooms = self.rooms[bins_of(colour.mean)]
+        rooms = self.rooms[lab_bins(colour.mean)]
         return np.where(self.far, alike(colour, self.first) | (shaded(colour.mean, self.first) & rooms), rooms)
 
 
@@ -60,7 +60,7 @@ def empty_scene(pictures: U8, first: U8, body: Surface, camera: Camera, least_sh
         camera: the view.
         least_share: of the pictures that have to show a colour.
     """
-    colours, now = commonest(pictures, COLOURS), bins_of(first)
+    colours, now = commonest(pictures, COLOURS), lab_bins(first)
     usual = np.median(colours[0].spread, axis=(0, 1))
     shown = _shown(first, usual)
     person, away_m = _about(body, camera)

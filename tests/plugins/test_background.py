@@ -11,7 +11,7 @@ from mocapflow_levelset.plates import plate_of
 from mocapflow_levelset.shadows import floor_around
 from mocapflow_sequence.background import EmptyScene
 from mocapflow_sequence.colours import more_common
-from mocapflow_sequence.commonest import LEAST_ALIKE, commonest
+from mocapflow_sequence.commonest import LEAST_SAME, commonest
 from mocapflow_sequence.first_frame import empty_scene
 
 from mocapflow.assets import Background
@@ -143,12 +143,12 @@ def test_colours_are_those_that_most_pictures_agree_about():
     first, second = commonest(shown, 2)
     for y, x in np.ndindex(9, 8):
         values = shown[:, y, x, 0].astype(int)
-        alike = np.abs(values[:, None] - values) <= LEAST_ALIKE
+        alike = np.abs(values[:, None] - values) <= LEAST_SAME
         best = int(alike.sum(axis=1).argmax())
         assert first.share[y, x] == pytest.approx(alike[best].mean())
         assert first.mean[y, x] == pytest.approx(values[alike[best]].mean())
         rest = values[~alike[best]]
-        most = max(((np.abs(rest - value) <= LEAST_ALIKE).sum() for value in rest), default=0)
+        most = max(((np.abs(rest - value) <= LEAST_SAME).sum() for value in rest), default=0)
         assert second.share[y, x] == pytest.approx(most / 12)
 
 
