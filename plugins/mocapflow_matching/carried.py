@@ -8,7 +8,7 @@ from mocapflow.components import pool
 from mocapflow.data import Frame, Matches, Past, Surface, empty_matches
 from mocapflow.geometry.cameras import project_each
 from mocapflow.geometry.visibility import front_vertices
-from mocapflow.records import F64
+from mocapflow.records import F64, I32
 from mocapflow.scene import Scene
 
 
@@ -30,7 +30,7 @@ def carried_points(frame: Frame, past: Past, scene: Scene) -> Matches:
     return pool([(1.0, part) for part in parts])
 
 
-def _pairs(camera: int, pixel: F64, vertex: np.ndarray) -> Matches:
+def _pairs(camera: int, pixel: F64, vertex: I32) -> Matches:
     return Matches(
         camera=np.full(len(vertex), camera, np.int16),
         pixel=pixel,

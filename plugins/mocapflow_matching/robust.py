@@ -15,9 +15,9 @@ def robust_weights(distance: F64, loss: Loss, scale: float) -> F64:
     """Return a factor (M,) in [0, 1] for the weight of each squared residual.
 
     Args:
-        distance: (M,) px, absolute residuals.
+        distance: (M,) absolute residuals, in standard deviations or any other unit.
         loss: the loss function.
-        scale: px, where the loss begins to give way (Zhang: the distance D that counts as a good fit).
+        scale: in the same unit, where the loss begins to give way (Zhang: the distance D that counts as a good fit).
     """
     if loss == "huber":
         return scale / np.maximum(distance, scale)
@@ -33,12 +33,14 @@ def zhang_keeps(distance: F64, good: float) -> Bool:
     """Return which pairs the statistics of their distances let pass.
 
     Args:
-        distance: (M,) px, distances of the pairs.
-        good: px, the distance D that counts as a good fit.
+        distance: (M,) of the pairs.
+        good: in the same unit, the distance D that counts as a good fit.
 
     Source: Zhang 1994, section 3.4 (the adaptive threshold of iterative point matching)
     """
-    mean, spread = float(distance.mean()) if len(distance) else 0.0, float(distance.std()) if len(distance) else 0.0
+    if not len(distance):
+        return np.ones(0, bool)
+    mean, spread = float(distance.mean()), float(distance.std())
     if mean < good:
         limit = mean + 3 * spread
     elif mean < 3 * good:
