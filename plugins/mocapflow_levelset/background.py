@@ -18,7 +18,7 @@ from mocapflow_levelset.evidence import calmed
 from mocapflow_levelset.evolve import Rhythm, Weights
 from mocapflow_levelset.levelset import INNER_BAND_PX, PERSON
 from mocapflow_levelset.masks import counted
-from mocapflow_levelset.plates import Plate, density_of, plate_of
+from mocapflow_levelset.plates import Plate, density_of, plate_in
 from mocapflow_levelset.shadows import ShadowAware, floor_around
 from mocapflow_levelset.statistics import Window
 from mocapflow_levelset.view import Empty, Level, Method, View, find
@@ -79,7 +79,7 @@ class BackgroundDifference(ShadowAware):
             camera: which of its views.
             hidden: (H, W) True where the picture shows nothing of the person; None: nowhere.
         """
-        plate = plate_of(background.mean[camera], background.spread[camera], CHANNELS)
+        plate = plate_in(background, camera, CHANNELS)
         start = self._start(image, model, plate, floor, hidden)
         view = View(image, start, start, counted(start.shape, 0, hidden), Empty({1: plate}, floor))
         against_plate = Level(1, Rhythm(REFINE_STEPS, 3, 3), Window(12.0, 8, 0.02))

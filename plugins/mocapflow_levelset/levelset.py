@@ -11,7 +11,6 @@ from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, Pos
 from mocapflow.assets import Background, Camera
 from mocapflow.data import Frame, FrameState, Past, Segmentation, Silhouette, Surface, Turn
 from mocapflow.geometry.silhouettes import model_distance
-from mocapflow.once import once
 from mocapflow.records import F32, Bool
 from mocapflow.scene import Scene
 from mocapflow.settings import PositiveOrInf
@@ -20,7 +19,7 @@ from mocapflow_levelset.contact import contact_zone
 from mocapflow_levelset.evolve import Rhythm, Weights
 from mocapflow_levelset.masks import counted, without_cut
 from mocapflow_levelset.moved import moved_outline
-from mocapflow_levelset.plates import Plate, plate_of
+from mocapflow_levelset.plates import plate_in
 from mocapflow_levelset.shadows import ShadowAware, floor_around
 from mocapflow_levelset.statistics import Window
 from mocapflow_levelset.view import Contact, Empty, Level, Matte, Method, View, find
@@ -127,7 +126,8 @@ class LevelSet(ShadowAware):
         background = self._background(scene)
         if background is None:
             return None
-        plates = {level.factor: _plate(background, camera, self.channels, level.factor) for level in levels}
+        factors = [level.factor for level in levels if level.use_plate]
+        plates = {factor: plate_in(background, camera, self.channels, factor) for factor in factors}
         return Empty(plates, floor_around(surface, scene.cameras[camera], self.shadow_reach_m))
 
     def _colours(self, past: Past, camera: int) -> F32 | None:
@@ -181,9 +181,3 @@ class LevelSet(ShadowAware):
             stride=self.stride_px,
             margin_px=self.margin_px,
         )
-
-
-@once
-def _plate(background: Background, camera: int, channels: tuple[ChannelName, ...], factor: int) -> Plate:
-    """Return a view of the empty scene, shrunk; computed once, forgotten with the background."""
-    return plate_of(background.mean[camera], background.spread[camera], channels, factor)

@@ -13,6 +13,8 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from mocapflow.assets import Background
+from mocapflow.once import once
 from mocapflow.records import F32, Bool
 from mocapflow_levelset import crops
 from mocapflow_levelset.channels import PLANES, ChannelName, features
@@ -49,6 +51,12 @@ def plate_of(mean: F32, spread: F32, channels: Sequence[ChannelName], factor: in
     mean, spread = crops.shrink(mean, factor), crops.shrink(spread, factor) / np.float32(255)
     levels = np.clip(np.rint(mean), 0, 255).astype(np.uint8)
     return Plate(features(levels, channels), np.sqrt(np.mean(spread * spread, axis=2)))
+
+
+@once
+def plate_in(background: Background, camera: int, channels: tuple[ChannelName, ...], factor: int = 1) -> Plate:
+    """Return the plate of a view of the empty scene; made once, forgotten with the background."""
+    return plate_of(background.mean[camera], background.spread[camera], channels, factor)
 
 
 def density_of(

@@ -7,7 +7,7 @@ import pytest
 from mocapflow_bodies.scanned import Scanned
 from mocapflow_fitting.start_from_file import StartFromFile
 from mocapflow_levelset.background import BackgroundDifference
-from mocapflow_levelset.plates import plate_of
+from mocapflow_levelset.plates import plate_in
 from mocapflow_levelset.shadows import floor_around
 from mocapflow_sequence.background import EmptyScene
 from mocapflow_sequence.colours import more_common
@@ -105,13 +105,9 @@ def test_where_nobody_knows_the_room_the_model_tells():
     background.spread[0].flags.writeable = True
     background.spread[0][:, :101] = np.inf
     moved = np.roll(model(), -6, axis=1)  # off by 6 px
-    start = BackgroundDifference()._start(picture(1.0), moved, plate(background), FLOOR, None) > 0
+    start = BackgroundDifference()._start(picture(1.0), moved, plate_in(background, 0, ("lab",)), FLOOR, None) > 0
     np.testing.assert_array_equal(start[:, :95], moved[:, :95] > 0)
     assert (start[:, 106:] == (person() > 0)[:, 106:]).mean() > 0.99
-
-
-def plate(background):
-    return plate_of(background.mean[0], background.spread[0], ("lab",))
 
 
 def test_without_a_background_it_says_what_to_do():
