@@ -16,13 +16,18 @@ from mocapflow_fitting.person import Person, find_person
 LEAST_POINTS = 8  # triangulated keypoints that make a usable frame
 
 
+def has_keypoints(recording: Recording) -> bool:
+    """True where at least two cameras have keypoints: fewer place nothing in space."""
+    return sum(folder is not None for folder in recording.keypoint_folders) >= 2
+
+
 def need_keypoints(recording: Recording) -> None:
     """Check that at least two cameras have keypoints.
 
     Raises:
         RecordingError: they have not.
     """
-    if sum(folder is not None for folder in recording.keypoint_folders) >= 2:
+    if has_keypoints(recording):
         return
     there = ", ".join(sorted(path.name for path in recording.folder.iterdir()))
     raise RecordingError(

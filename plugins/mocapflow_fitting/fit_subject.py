@@ -15,7 +15,7 @@ from mocapflow.errors import RecordingError
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow.scene import Scene
-from mocapflow_fitting.detections import layout, need_keypoints, persons, seen, spread
+from mocapflow_fitting.detections import has_keypoints, layout, need_keypoints, persons, seen, spread
 from mocapflow_fitting.keypoint_fit import Seen, fit
 from mocapflow_fitting.keypoint_layouts import Layout
 from mocapflow_fitting.landmarks import landmarks
@@ -65,7 +65,7 @@ class FitSubject(Stage):
         self.need(recording)
         static = None if self.trial == "recording" else recording.static()
         moving = [] if self.trial == "static" else self._seen(recording, names, self.frames, scene.cameras)
-        standing = self._seen(static, names, 4, scene.cameras) if static is not None and _has_keypoints(static) else []
+        standing = self._seen(static, names, 4, scene.cameras) if static is not None and has_keypoints(static) else []
         if moving and standing and (difference := unlike(moving, standing, names)) > DIFFERENT:
             LOG.warning(
                 "static/ is left out: its limbs differ by %.0f %% from those in the recording", 100 * difference
@@ -95,7 +95,3 @@ def limb_lengths(frames: Sequence[Seen], names: Sequence[str]) -> F64:
     length = np.linalg.norm(position[:, ends[:, 0]] - position[:, ends[:, 1]], axis=2)
     never = ~np.isfinite(length).any(axis=0)
     return np.where(never, np.nan, np.nanmedian(np.where(never, 0.0, length), axis=0))
-
-
-def _has_keypoints(recording: Recording) -> bool:
-    return sum(folder is not None for folder in recording.keypoint_folders) >= 2

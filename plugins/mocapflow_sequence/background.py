@@ -39,9 +39,10 @@ class EmptyScene(Stage):
     least_share: Annotated[float, Field(ge=0, le=1)] = 0.06  # of them: a colour seen in fewer may be anything
 
     def need(self, recording: Recording) -> None:
-        """Raise if plates are wanted and missing."""
-        found = self.source == "recording" or plate_files(recording.folder, recording.views)
-        if self.source == "plates" and not found:
+        """Raise if plates are wanted and missing, or if a camera lacks one though others have theirs."""
+        if self.source == "recording":
+            return
+        if not plate_files(recording.folder, recording.views) and self.source == "plates":
             raise RecordingError(
                 "there are no clean plates",
                 where=str(recording.folder / "background"),
@@ -52,7 +53,7 @@ class EmptyScene(Stage):
         """Return mean and spread of every pixel of the empty scene.
 
         Raises:
-            RecordingError: plates are wanted and missing, or a camera has too few readable frames to learn from.
+            RecordingError: plates are missing, see `need`, or a camera has too few readable frames to learn from.
         """
         self.need(recording)
         plates = None if self.source == "recording" else recording.background()
