@@ -45,9 +45,9 @@ class LevelSet(ShadowAware):
     name: ClassVar[str] = "levelset"
 
     channels: tuple[ChannelName, ...] = Field(("lab",), min_length=1)  # independent, their likelihoods add
-    decorrelate: bool = True  # turn the channels to the image's principal axes, where no empty scene is known
+    decorrelate: bool = True  # turn the channels to the image's principal axes, where the empty scene gives no density
     rho_px: PositiveOrInf = 12.0  # Gaussian window of the local statistics at full size; inf: one Gaussian per region
-    cell_px: PositiveInt = 8  # the statistics are summed over cells of this size
+    cell_px: PositiveInt = 8  # the statistics are summed over cells of this size, in whole strides
     stride_px: PositiveInt = 4  # and taken from every so many-th pixel; 1: from all
     variance_floor: PositiveFloat = 0.03  # smallest standard deviation inside and outside, share of a channel's range
     sigma_px: PositiveFloat = 1.5  # width of the smooth step
@@ -76,7 +76,7 @@ class LevelSet(ShadowAware):
 
         The first turn starts from the projected model, later turns from the last turn's silhouettes. Where the model's
         outline has hardly moved they would stay as they are, and are not looked at; in the first frame, which starts
-        far off, from the second turn on.
+        far off, from the third turn on.
         """
         surface = scene.surface(state.estimate.pose, state.cloth)
         # a view in which nobody was begins anew from the model, which may stand in it by now

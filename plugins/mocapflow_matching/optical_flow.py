@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import NonNegativeFloat, NonNegativeInt, PositiveFloat
 
 from mocapflow.components import Matcher, pool
-from mocapflow.data import CLOTH, Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn, empty_matches
+from mocapflow.data import Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn, empty_matches
 from mocapflow.geometry import silhouettes
 from mocapflow.records import F32, F64, Bool
 from mocapflow.scene import Scene
@@ -66,8 +66,7 @@ class OpticalFlow(Matcher):
         matches = carried_points(frame, past, scene)
         away = distances(matches, surface, scene)
         weight = self._robust(away, np.full(len(away), self.image_sigma_px))
-        on_cloth = surface.layer[matches.vertex] == CLOTH
-        return replace(matches, weight=weight * np.where(on_cloth, self.cloth_share, 1.0))
+        return replace(matches, weight=weight * np.where(surface.cloth[matches.vertex], self.cloth_share, 1.0))
 
     def registered(self, silhouette: Silhouette, surface: Surface, scene: Scene) -> Matches:
         """Return the pairs of one view by flow between distance images."""

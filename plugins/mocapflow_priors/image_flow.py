@@ -12,7 +12,7 @@ from mocapflow_twist.solver import TwistGaussNewton
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
 from mocapflow.components import PoseSolver, Predictor, Prior
-from mocapflow.data import CLOTH, NO_CLOTH, Frame, Matches, Past, Pose, Surface, Turn
+from mocapflow.data import NO_CLOTH, Frame, Matches, Past, Pose, Surface, Turn
 from mocapflow.geometry.cameras import project_each
 from mocapflow.model import ClothedModel
 from mocapflow.scene import Scene
@@ -68,7 +68,7 @@ class ImageFlowPredictor(Predictor):
         from scipy.spatial import cKDTree
 
         surface = scene.surface(past.moments[-1].pose, past.moments[-1].cloth)
-        skin = surface.vertices[surface.layer != CLOTH]
+        skin = surface.vertices[~surface.cloth]
         reach = self.touching_mm / 1000
         _, below = cKDTree(skin).query(surface.vertices[matches.vertex[cloth]], distance_upper_bound=reach)
         vertex, touching = matches.vertex.copy(), np.ones(len(cloth), bool)
