@@ -9,7 +9,19 @@ from pydantic import PositiveFloat, PositiveInt
 
 from mocapflow.assets import GarmentMesh
 from mocapflow.components import ClothFitter, pool
-from mocapflow.data import Cloth, Estimate, Frame, Matches, Past, PoseBatch, Segmentation, Surface, Turn
+from mocapflow.data import (
+    Cloth,
+    Contour,
+    Estimate,
+    Frame,
+    Matches,
+    Past,
+    PoseBatch,
+    Segmentation,
+    Silhouette,
+    Surface,
+    Turn,
+)
 from mocapflow.geometry.differences import drape_differences
 from mocapflow.geometry.misfit import bilinear, dressed, misfit, outlines
 from mocapflow.geometry.sewing import TAKE_UP, THICKNESS
@@ -134,23 +146,19 @@ class Task(NamedTuple):
 
     def _matches(self, surface: Surface) -> Matches:
         """Return the points of the outline, each with where the distance field says the silhouette is."""
-        parts, spacing = [], self.fitter.spacing_px
-        for silhouette, contour in outlines(surface, self.segmentation, self.model.scene.cameras, spacing):
-            slope = np.stack([bilinear(axis, contour.pixel) for axis in np.gradient(silhouette.distance)[::-1]], axis=1)
-            steep = np.linalg.norm(slope, axis=1)
-            seen = steep > 0.5  # beyond the band the field is level
-            outward = -slope[seen] / steep[seen, None]
-            inside = bilinear(silhouette.distance, contour.pixel[seen])[:, None]
-            parts.append(
-                (
-                    1.0,
-                    Matches(
-                        camera=np.full(len(outward), silhouette.camera, np.int16),
-                        pixel=contour.anchor[seen] + inside * outward,
-                        direction=outward,
-                        vertex=contour.vertex[seen],
-                        weight=np.full(len(outward), self.weight),
-                    ),
-                )
-            )
-        return pool(parts)
+        views = outlines(surface, self.segmentation, self.model.scene.cameras, self.fitter.spacing_px)
+        return pool([(1.0, self._matches_in(silhouette, contour)) for silhouette, contour in views])
+
+    def _matches_in(self, silhouette: Silhouette, contour: Contour) -> Matches:
+        slope = np.stack([bilinear(axis, contour.pixel) for axis in np.gradient(silhouette.distance)[::-1]], axis=1)
+        steep = np.linalg.norm(slope, axis=1)
+        seen = steep > 0.5  # beyond the band the field is level
+        outward = -slope[seen] / steep[seen, None]
+        inside = bilinear(silhouette.distance, contour.pixel[seen])[:, None]
+        return Matches(
+            camera=np.full(len(outward), silhouette.camera, np.int16),
+            pixel=contour.anchor[seen] + inside * outward,
+            direction=outward,
+            vertex=contour.vertex[seen],
+            weight=np.full(len(outward), self.weight),
+        )

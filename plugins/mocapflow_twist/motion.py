@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -28,16 +28,16 @@ class ClothMotion:
     unknowns: bool  # the cloth parameters are solved for
     redrape: bool  # drape at every new pose; else move the cloth linearly
     measure_once: bool
-    _measured: list[tuple[Guess, F64]] = field(default_factory=list)
+    _measured: tuple[Guess, F64] | None = None  # the last velocities, and of what
 
     def velocity(self, guess: Guess) -> F64:
         """Return velocities (W, 3, S) of the cloth for increments about the origin."""
-        if not self._measured or not (self.measure_once or self._measured[0][0] is guess):
+        if self._measured is None or not (self.measure_once or self._measured[0] is guess):
             every = np.arange(len(guess.cloth.vertices), dtype=np.int32)
             velocity = self.model.velocity(guess.pose, guess.cloth, every, self.past)
             columns = velocity.shape[2] if self.unknowns else 6 + len(guess.pose.angles)
-            self._measured[:] = [(guess, np.ascontiguousarray(velocity[..., :columns]))]
-        return self._measured[0][1]
+            self._measured = guess, np.ascontiguousarray(velocity[..., :columns])
+        return self._measured[1]
 
     def moved(self, guess: Guess, increment: F64) -> Guess:
         """Return the guess after an increment (S,) about the origin."""
