@@ -34,6 +34,7 @@ class EmptyScene(Stage):
     """
 
     name: ClassVar[str] = "background"
+    extent: ClassVar[Literal["first"]] = "first"  # that of the `Start`; pictures come from all over the recording
     source: Literal["auto", "plates", "recording"] = "auto"  # auto: the plates where there are any
     samples: Annotated[int, Field(ge=3)] = 50  # pictures of each camera that are looked at
     least_share: Annotated[float, Field(ge=0, le=1)] = 0.06  # of them: a colour seen in fewer may be anything

@@ -15,14 +15,18 @@ from mocapflow_sequence.commonest import LEAST_SAME, commonest
 from mocapflow_sequence.first_frame import empty_scene
 
 from mocapflow.assets import Background
+from mocapflow.caching.digests import Digests
+from mocapflow.config.pipeline import load_pipeline
 from mocapflow.data import Past, Turn
 from mocapflow.errors import RecordingError
 from mocapflow.geometry.cameras import project
 from mocapflow.help.shipped import shipped
 from mocapflow.recordings.recording import open_recording
+from mocapflow.running.recipes import steps_of
 from mocapflow.scene import Scene
 from mocapflow.testing import pictures, scenes
 from tests.fixtures.recordings import number_of, ring, write_recording
+from tests.fixtures.stores import PLUGIN, write_pipeline
 
 FIRST = Turn(index=0, cap=8)
 SHAPE = (200, 240)
@@ -252,6 +256,14 @@ def test_the_stage_prefers_plates_and_can_do_without():
         shaded = (ratio.max(axis=1) < 1.15 * ratio.min(axis=1)) & (ratio.min(axis=1) > 0.4)
         same = np.abs(learnt - plate)[known].max(axis=1) < 16
         assert (same | shaded).mean() > 0.98  # the person covers a tenth
+
+
+def test_the_frame_that_a_start_pose_is_compared_with_is_its_own(tmp_path):
+    clip = write_recording(tmp_path / "clip", frames=6)
+    stages = {"start": "tiny_start", "background": {"use": "background", "source": "recording"}}
+    path = write_pipeline(tmp_path, clip, stages=stages, plugins=[str(PLUGIN)])
+    steps = steps_of(load_pipeline(path, frames=slice(2, 5)), Digests())
+    assert [step.recording.indices[0] for step in steps] == [2, 2]
 
 
 @pytest.mark.parametrize("length", [5, 25, 26, 48, 49, 63])
