@@ -83,6 +83,8 @@ def chosen(colours: Iterable[Colours], evidence: Evidence, least_share: float) -
 
 def lit(learnt: Learnt, pictures: U8, evidence: Evidence, usual: F32, floor: Bool) -> Learnt:
     """Return an empty scene whose floor is as bright as any picture shows it, for the person may always shade it."""
+    if not floor.any():  # a view that shows none, or none that is known
+        return learnt
     dim = Learnt(*(part[floor][:, None] for part in learnt))
     there = evidence._replace(first=evidence.first[floor][:, None], far=evidence.far[floor][:, None])
     found = Learnt(dim.mean.copy(), dim.spread)
@@ -105,6 +107,8 @@ def _about(body: Surface, camera: Camera) -> tuple[Bool, F64]:
     import cv2
 
     person = mask(outline(body, camera), camera)
+    if not person.any():  # beside the picture or behind the camera
+        return person, np.full(person.shape, np.inf)
     away_px = np.asarray(cv2.distanceTransform((~person).view(np.uint8), cv2.DIST_L2, 3), np.float64)
     return person, away_px / magnification(camera, body.vertices.mean(axis=0))
 

@@ -193,6 +193,14 @@ def test_nobody_knows_what_is_behind_a_person_who_stays(move):
     assert off[known & ~mask].max() < 15
 
 
+def test_a_view_that_the_person_is_not_in_is_all_room():
+    """Beside the picture, and behind the camera, where nothing is so many pixels away."""
+    camera = taken([0])[-1]
+    for away_m in (20.0 * camera.camera_from_world[0, :3], -20.0 * camera.camera_from_world[2, :3]):
+        known, off, _ = learnt([80] * 20, move=away_m)
+        assert known.mean() > 0.97
+
+
 def test_the_room_is_known_where_the_start_pose_is_off():
     """Most of what the body covers at the start pose is the room: what differs from it tells the person's colours."""
     known, off, mask = learnt([0, 25] * 10, move=(0.25, 0.0, 0.0))
