@@ -22,7 +22,7 @@ from mocapflow.records import F64
 from mocapflow.results import Track
 from mocapflow.scene import Scene
 from mocapflow.track import believed
-from mocapflow_fitting.detections import layout, persons, seen, spread
+from mocapflow_fitting.detections import frames_seen, spread
 from mocapflow_fitting.keypoint_fit import fit
 from mocapflow_fitting.landmarks import landmarks
 from mocapflow_fitting.pose_fit import Solution, Spreads
@@ -91,9 +91,9 @@ class CalibrateLimbs(Stage):
         return [int(track.frame[r]) for r in rows], [track.pose(int(r)) for r in rows], clothes
 
     def _from_keypoints(self, recording: Recording, scene: Scene) -> tuple[list[int], list[Pose], list[F64]]:
-        found = persons(recording, spread(recording.indices, self.frames), scene.cameras)
-        names, order = landmarks(scene.body).names, layout(recording, list(found), None)
-        _, poses = fit(scene.body, [seen(person, order, names) for person in found.values()], scene.cameras)
+        indices, names = spread(recording.indices, self.frames), landmarks(scene.body).names
+        found = frames_seen(recording, indices, scene.cameras, names)
+        _, poses = fit(scene.body, list(found.values()), scene.cameras)
         return list(found), list(poses), [scene.calm] * len(found)
 
     def _model(self, scene: Scene, body: Body) -> ClothedModel:

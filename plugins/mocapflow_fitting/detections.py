@@ -14,6 +14,7 @@ from mocapflow_fitting.keypoint_layouts import LAYOUTS, Layout, layout_of, rows_
 from mocapflow_fitting.person import Person, find_person
 
 LEAST_POINTS = 8  # triangulated keypoints that make a usable frame
+LEAST_LANDMARKS = 3  # of the body's among them: fewer do not say how it is turned
 
 
 def has_keypoints(recording: Recording) -> bool:
@@ -80,6 +81,34 @@ def layout(recording: Recording, indices: Sequence[int], wanted: Layout | None) 
         )
         raise RecordingError(message, where=str(recording.folder / "keypoints"), hint=hint)
     return LAYOUTS[told]
+
+
+def frames_seen(
+    recording: Recording,
+    indices: Sequence[int],
+    cameras: Sequence[Camera],
+    landmarks: Sequence[str],
+    wanted: Layout | None = None,
+) -> dict[int, Seen]:
+    """Return the person's landmarks in each frame that tells a pose.
+
+    Raises:
+        RecordingError: there are no keypoints, or they tell no pose in any frame; see `persons` and `layout`.
+    """
+    found = persons(recording, indices, cameras)
+    names = layout(recording, list(found), wanted)
+    frames = {index: seen(person, names, landmarks) for index, person in found.items()}
+    telling = {index: frame for index, frame in frames.items() if tells_pose(frame)}
+    if not telling:
+        hint = f"the body has {', '.join(landmarks)}; choose one with the parts that are seen"
+        where = str(recording.folder / "keypoints")
+        raise RecordingError("the keypoints show too little of the body", where=where, hint=hint)
+    return telling
+
+
+def tells_pose(frame: Seen) -> bool:
+    """True where enough of the body's landmarks are triangulated."""
+    return int(np.isfinite(frame.position).all(axis=1).sum()) >= LEAST_LANDMARKS
 
 
 def seen(person: Person, names: Sequence[str], wanted: Sequence[str]) -> Seen:

@@ -15,7 +15,7 @@ from mocapflow.errors import RecordingError
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow.scene import Scene
-from mocapflow_fitting.detections import has_keypoints, layout, need_keypoints, persons, seen, spread
+from mocapflow_fitting.detections import frames_seen, has_keypoints, need_keypoints, spread
 from mocapflow_fitting.keypoint_fit import Seen, fit
 from mocapflow_fitting.keypoint_layouts import Layout
 from mocapflow_fitting.landmarks import landmarks
@@ -59,7 +59,7 @@ class FitSubject(Stage):
         """Return the scaled body.
 
         Raises:
-            RecordingError: there are no keypoints, or no frame in which two cameras see the same person.
+            RecordingError: there are no keypoints, or no frame in which two cameras see enough of the same person.
         """
         names = landmarks(scene.body).names
         self.need(recording)
@@ -76,9 +76,8 @@ class FitSubject(Stage):
         return scaled(scene.body, factors)
 
     def _seen(self, recording: Recording, names: Sequence[str], count: int, cameras: Sequence[Camera]) -> list[Seen]:
-        found = persons(recording, spread(recording.indices, count), cameras)
-        order = layout(recording, list(found), self.layout)
-        return [seen(person, order, names) for person in found.values()]
+        indices = spread(recording.indices, count)
+        return list(frames_seen(recording, indices, cameras, names, self.layout).values())
 
 
 def unlike(first: Sequence[Seen], second: Sequence[Seen], names: Sequence[str]) -> float:

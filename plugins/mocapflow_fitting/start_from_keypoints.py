@@ -9,7 +9,7 @@ from mocapflow.data import Start
 from mocapflow.errors import RecordingError
 from mocapflow.recordings.recording import Recording
 from mocapflow.scene import Scene
-from mocapflow_fitting.detections import layout, need_keypoints, person_at, seen
+from mocapflow_fitting.detections import layout, need_keypoints, person_at, seen, tells_pose
 from mocapflow_fitting.keypoint_fit import fit
 from mocapflow_fitting.keypoint_layouts import Layout
 from mocapflow_fitting.landmarks import landmarks
@@ -18,7 +18,8 @@ from mocapflow_fitting.landmarks import landmarks
 class StartFromKeypoints(Stage):
     """Finds the person whose detections reproject best, and the pose of the body that explains them.
 
-    Only the first frame is used; where keypoints of fewer than two cameras agree, the next one of the first ten.
+    Only the first frame is used; where keypoints of fewer than two cameras agree, or show too little of what the body
+    has, the next one of the first ten.
     """
 
     name: ClassVar[str] = "start_from_keypoints"
@@ -33,19 +34,21 @@ class StartFromKeypoints(Stage):
         """Return the pose of the first usable frame; the cloth starts without forces.
 
         Raises:
-            RecordingError: there are no keypoints, or no frame in which two cameras see the same person.
+            RecordingError: there are no keypoints, or no frame in which two cameras see enough of the same person.
         """
         need_keypoints(recording)
         names = landmarks(scene.body).names
         for index in recording.indices:
             person = person_at(recording, index, scene.cameras)
-            if person is not None:
-                points = seen(person, layout(recording, [index], self.layout), names)
+            if person is None:
+                continue
+            points = seen(person, layout(recording, [index], self.layout), names)
+            if tells_pose(points):
                 _, (pose,) = fit(scene.body, [points], scene.cameras)
                 return Start(pose=pose, parameters=scene.calm)
         first, last = recording.indices[0], recording.indices[-1]
         raise RecordingError(
-            f"in frames {first} to {last} no two cameras see the same person",
+            f"in frames {first} to {last} no two cameras see enough of the same person",
             where=str(recording.folder / "keypoints"),
             hint="check that keypoints and cameras belong together (`mocapflow doctor`), or write init.json",
         )

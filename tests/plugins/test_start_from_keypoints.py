@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from keypoint_recording import DEMO, NAMES, bystander_of, copy_demo, keypoints, write
 from mocapflow_bodies.template import Template
+from mocapflow_fitting.detections import frames_seen
 from mocapflow_fitting.keypoint_layouts import LAYOUTS, layout_of
 from mocapflow_fitting.landmarks import landmarks
 from mocapflow_fitting.person import find_person
@@ -149,8 +150,31 @@ def test_frames_without_people_are_passed_over(body, pose, recording, tmp_path):
     scene = Scene(cameras=recording.cameras, body=body)
     start = StartFromKeypoints().run(open_recording(folder), scene)
     assert np.linalg.norm(start.pose.root[:3, 3] - pose.root[:3, 3]) < 0.1
-    with pytest.raises(RecordingError, match="in frames 0 to 0 no two cameras see the same person"):
+    with pytest.raises(RecordingError, match="in frames 0 to 0 no two cameras see enough of the same person"):
         StartFromKeypoints().run(open_recording(folder, stop=1), scene)
+
+
+def test_frames_that_show_nothing_of_what_the_body_has_are_passed_over(body, pose, recording, tmp_path):
+    """Legs, of a person whose legs are behind a table in the first frame."""
+    folder = copy_demo(tmp_path / "recording")
+    write(folder, body, [pose, pose], recording.cameras)
+    below = [NAMES.index(name) for name in landmarks(Template(part="legs").load(DEMO)).names]
+    for path in folder.glob("keypoints/*/*.0000.json"):
+        people = [np.reshape(person["pose_keypoints_2d"], (-1, 3)) for person in json.loads(path.read_text())["people"]]
+        for person in people:
+            person[below] = 0.0
+        path.write_text(json.dumps({"people": [{"pose_keypoints_2d": person.ravel().tolist()} for person in people]}))
+    whole, legs = (Scene(cameras=recording.cameras, body=Template(part=part).load(DEMO)) for part in ("full", "legs"))
+    first, both = (open_recording(folder, stop=stop) for stop in (1, 2))
+    stage, names = StartFromKeypoints(layout="body_25b"), landmarks(legs.body).names
+    start = stage.run(both, legs)
+    assert np.linalg.norm(start.pose.root[:3, 3] - pose.root[:3, 3]) < 0.1
+    assert np.isfinite(stage.run(first, whole).pose.root).all()
+    with pytest.raises(RecordingError, match="no two cameras see enough of the same person"):
+        stage.run(first, legs)
+    assert list(frames_seen(both, [0, 1], legs.cameras, names, "body_25b")) == [1]
+    with pytest.raises(RecordingError, match="keypoints show too little of the body\n(.|\n)*the body has hip_l"):
+        frames_seen(first, [0], legs.cameras, names, "body_25b")
 
 
 def test_no_keypoints(body, cameras):
