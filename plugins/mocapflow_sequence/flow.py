@@ -24,8 +24,8 @@ SPECK = 5  # px; what differs from the empty scene in less than half of such a s
 class FollowPoints(Stage):
     """Follows corners by pyramids of Lucas-Kanade steps, forward and back; those that do not come back are dropped.
 
-    Where the empty scene is known, corners are looked for only if they differ from it. What moves into a frame depends
-    on no later frame.
+    Where the empty scene is known, corners are looked for only if they differ from it; what hides the scene has none.
+    What moves into a frame depends on no later frame.
     """
 
     name: ClassVar[str] = "flow"
@@ -58,8 +58,8 @@ class FollowPoints(Stage):
             for camera in range(len(frame.usable)):
                 flow = NOTHING
                 if before is not None and before.usable[camera] and frame.usable[camera]:
-                    old, new = before.images[camera], frame.images[camera]
-                    flow = self.follow(old, new, None if background is None else self.differs(old, background, camera))
+                    where = self._worth_following(before, background, camera)
+                    flow = self.follow(before.images[camera], frame.images[camera], where)
                 yield frame.index, camera, flow
             before = frame
 
@@ -100,6 +100,18 @@ class FollowPoints(Stage):
             old, new, points, None, winSize=window, maxLevel=self.levels, criteria=rest
         )
         return np.asarray(to, np.float32), np.asarray(found, bool).ravel()
+
+    def _worth_following(self, frame: Frame, background: Background | None, camera: int) -> U8:
+        """Return 1 where a view (H, W) may show the person, else 0."""
+        import cv2
+
+        picture, hidden = frame.images[camera], frame.hidden_in(camera)
+        everywhere = np.ones(picture.shape[:2], np.uint8)
+        where = everywhere if background is None else self.differs(picture, background, camera)
+        if hidden is None:
+            return where
+        beside = np.ones((self.window_px, self.window_px), np.uint8)  # there the edge of what hides is followed
+        return np.where(cv2.dilate(hidden.view(np.uint8), beside) > 0, np.uint8(0), where)
 
     def differs(self, picture: U8, background: Background, camera: int) -> U8:
         """Return 1 where a picture differs from the empty scene (specks are noise) or nobody knows it, else 0."""

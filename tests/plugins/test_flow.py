@@ -8,6 +8,7 @@ from mocapflow_sequence.flow import FollowPoints
 from mocapflow.assets import Background
 from mocapflow.caching.digests import Digests
 from mocapflow.config.pipeline import load_pipeline
+from mocapflow.data import Frame
 from mocapflow.recordings.recording import open_recording
 from mocapflow.running.recipes import steps_of
 from mocapflow.running.runner import run
@@ -62,6 +63,18 @@ def test_points_lie_on_what_differs_from_the_empty_scene_or_where_nobody_knows_i
     on_it = [((pixel >= [58, 38]) & (pixel <= [111, 91])).all(axis=1) for pixel in flow]
     assert on_it[0].sum() > 20 and on_it[0].all()
     assert on_it[1].sum() > 20 and (flow[1][~on_it[1]] < [50, 20]).all() and (~on_it[1]).sum() > 5
+
+
+def test_what_hides_the_scene_is_not_followed():
+    picture, usable = pattern(), np.ones(1, bool)
+    hidden = np.zeros(picture.shape[:2], bool)
+    hidden[50:70] = True
+    frames = [Frame(index=k, time=k / 30, images=(picture,), usable=usable, hidden=(hidden,)) for k in (0, 1)]
+    dark, one = np.zeros(picture.shape, np.float32), np.ones(picture.shape, np.float32)
+    for background in (None, Background(mean=(dark,), spread=(one,))):
+        _, (_, _, flow) = FollowPoints(window_px=11)._parts(frames, background)
+        row = flow.pixel[:, 1]
+        assert (row < 45).any() and (row > 74).any() and not ((row >= 45) & (row <= 74)).any()
 
 
 def test_at_most_so_many_points():
