@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 from mocapflow_levelset.background import BackgroundDifference
+from mocapflow_levelset.grabcut import GrabCut
 from mocapflow_levelset.levelset import LevelSet
 
 from mocapflow.data import NO_CLOTH, Matches, Past, Turn
@@ -64,7 +65,7 @@ def test_segmenters_keep_to_the_model_where_the_person_is_hidden():
     barred = frame.images[0].copy()
     barred[rows] = 0
     spoiled = replace(frame, images=(barred, *frame.images[1:]))
-    for segmenter in (BackgroundDifference(), LevelSet()):
+    for segmenter in (BackgroundDifference(), GrabCut(), LevelSet()):
         off = []
         for given in (spoiled, behind_bar(spoiled, rows)):
             found = segmenter.segment(given, state, Past(), scene, Turn(index=0, cap=8)).of("person")[0]

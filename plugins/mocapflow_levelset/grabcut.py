@@ -10,7 +10,7 @@ from pydantic import Field, PositiveFloat, PositiveInt
 from mocapflow.components import Segmenter
 from mocapflow.data import Frame, FrameState, Past, Segmentation, Silhouette, Turn
 from mocapflow.geometry.silhouettes import model_distance
-from mocapflow.records import F32, U8
+from mocapflow.records import F32, U8, Bool
 from mocapflow.scene import Scene
 from mocapflow_levelset import crops
 from mocapflow_levelset.levelset import PERSON
@@ -38,12 +38,15 @@ class GrabCut(Segmenter):
         for c, camera in enumerate(scene.cameras):
             if not frame.usable[c]:
                 continue
-            distance = self.find(frame.images[c], model_distance(surface, camera, reach))
+            distance = self.find(frame.images[c], model_distance(surface, camera, reach), frame.hidden_in(c))
             silhouettes.append(Silhouette(camera=c, layer=PERSON, distance=distance))
         return Segmentation(silhouettes=tuple(silhouettes))
 
-    def find(self, image: U8, model: F32) -> F32:
-        """Return the signed distance (H, W) px to the person's outline, from the model's signed distance (H, W)."""
+    def find(self, image: U8, model: F32, hidden: Bool | None = None) -> F32:
+        """Return the signed distance (H, W) px to the person's outline, from the model's signed distance (H, W).
+
+        Where the person is hidden (H, W) it is the model's.
+        """
         import cv2
 
         distance = np.full(model.shape, -self.band_px, np.float32)
@@ -60,6 +63,8 @@ class GrabCut(Segmenter):
             picture = np.ascontiguousarray(crop.of(image))
             cv2.grabCut(picture, labels, None, *mixtures, self.iterations, cv2.GC_INIT_WITH_MASK)  # type: ignore[call-overload]
         person = (labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)
+        if hidden is not None:
+            person = np.where(crop.of(hidden), near > 0, person)
         crop.of(distance)[:] = redistance(np.where(person, np.float32(1), np.float32(-1)), self.band_px)
         return distance
 
