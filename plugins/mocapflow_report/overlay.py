@@ -41,7 +41,7 @@ class Overlay(Stage):
                 if frame.index in rows:
                     for view, video in enumerate(opened):
                         video.write(painter.paint(frame, track, rows[frame.index], view))
-        return Files(paths=tuple(path for path in paths if path.exists()))
+        return Files(paths=tuple(paths))
 
 
 class Painter:

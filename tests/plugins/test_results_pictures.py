@@ -239,6 +239,19 @@ def test_unwritable_video_is_an_error_for_people(tmp_path: Path) -> None:
         video.write(np.zeros((64, 64, 3), np.uint8))
 
 
+def test_a_video_that_is_cut_off_leaves_the_one_before_it(tmp_path: Path) -> None:
+    path, image = tmp_path / "a.mp4", np.zeros((64, 64, 3), np.uint8)
+    with drawing.videos([path], 30.0, "mp4v") as (video,):
+        video.write(image)
+    before = path.read_bytes()
+    with pytest.raises(KeyboardInterrupt), drawing.videos([path], 30.0, "mp4v") as (video,):
+        video.write(image)
+        video.write(image)
+        raise KeyboardInterrupt
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
 def test_cloth_that_cuts_through_the_skin_it_lies_on_covers_it_and_cloth_behind_it_does_not() -> None:
     camera = raster.look_at(np.array([0.0, -3.0, 0.0]), np.zeros(3), (64, 64), 40.0)
     square = np.array([[-1.0, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]])
