@@ -88,13 +88,13 @@ def evaluate_run(run_folder: Path, truth: Path, longest_lag_s: float = LONGEST_L
 def evaluate(own: Ours, path: Path, folder: Path, longest_lag_s: float = LONGEST_LAG_S) -> Evaluation:
     """Compare with a reference file; writes tables, what was found of both systems, and pictures into a run folder."""
     reference = read_reference(path)
-    known = at_our_frames(reference, own.columns)
+    known = cycles.shared(own.columns, at_our_frames(reference, own.columns))
     alignment = align(own.columns, reference, longest_lag_s)
     aligned = at_our_frames(reference, own.columns, alignment.worth)
     strides = cycles.gait_cycles(own.stick.names, own.stick.places, own.frame_rate)
     rows = [
-        _row(own, name, known[name], alignment.signs[name] * aligned[name], strides) | {"sign": alignment.signs[name]}
-        for name in cycles.shared(own.columns, known)
+        _row(own, name, curve, alignment.signs[name] * aligned[name], strides) | {"sign": alignment.signs[name]}
+        for name, curve in known.items()
     ]
     rigs = compare_rigs(own, reference, alignment.worth, path.parent / layout.COMMON_POINTS)
     notes = [*reference.notes, *rigs.notes]
@@ -109,14 +109,14 @@ def evaluate(own: Ours, path: Path, folder: Path, longest_lag_s: float = LONGEST
     runjson.write(layout.place(folder, layout.FINDINGS), {**found, "registration": rigs.figures})
     written = rigs.write(folder, own.frame_rate, float(own.columns["time"][0]))
     pictures = [*comparison_plots.draw(own.columns, known, strides, folder), *written]
-    return Evaluation(reference=str(path), rows=tuple(rows), notes=tuple(notes), pictures=tuple(pictures))
+    return Evaluation(reference=str(path), rows=tuple(rows), notes=tuple(notes), pictures=tuple(pictures), curves=known)
 
 
 def _write_tables(
     folder: Path, columns: Mapping[str, F64], known: Mapping[str, F64], rows: Sequence[Row], strides: Sequence[Cycle]
 ) -> None:
     """Write the figures of each angle, its errors frame by frame, and the figures of each stride."""
-    errors = {name: columns[name] - known[name] for name in cycles.shared(columns, known)}
+    errors = {name: columns[name] - curve for name, curve in known.items()}
     tables.write_rows(layout.place(folder, layout.EVALUATION), rows)
     tables.write_columns(layout.place(folder, layout.ERRORS), {"frame": columns["frame"], **errors})
     if walked := cycles.rows(strides, columns, known):

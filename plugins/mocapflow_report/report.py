@@ -7,15 +7,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import ClassVar
 
-from mocapflow_evaluation import comparison_plots, cycles, ours
-from mocapflow_evaluation.alignment import at_our_frames
-from mocapflow_evaluation.references import read_reference
+from mocapflow_evaluation import comparison_plots, cycles
 from mocapflow_export import layout, runjson, tables
 from mocapflow_export.export import before_smoothing
 from mocapflow_export.uncertainty import measured
 from mocapflow_sequence.lost import lost_rows
 
 from mocapflow.components import Stage
+from mocapflow.geometry import kinematics
 from mocapflow.io.whole import whole
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
@@ -82,15 +81,14 @@ def draw(
     track: Track, scene: Scene, columns: Mapping[str, F64], evaluation: Evaluation | None, folder: Path
 ) -> list[Path]:
     """Draw angles, overlap and, of somebody who walks without a reference, the gait cycle; return the files."""
-    known: Mapping[str, F64] = {}
-    if evaluation is not None and evaluation.rows:
-        known = at_our_frames(read_reference(Path(evaluation.reference)), columns)
     raw, lost = tables.angle_columns(track, measured(before_smoothing(track), scene)), lost_rows(track)
     curves, overlap = layout.place(folder, layout.PLOT), layout.place(folder, layout.OVERLAP)
-    plots.plot_angles(curves, columns, raw, known, evaluation, lost)
+    plots.plot_angles(curves, columns, raw, evaluation, lost)
     plots.plot_overlap(overlap, track, [camera.name for camera in scene.cameras], lost)
-    stick = ours.of_track(track, scene).stick
-    strides = [] if known else cycles.gait_cycles(stick.names, stick.places, track.frame_rate)
+    if evaluation is not None and evaluation.rows:  # which has drawn the strides of both
+        return [curves, overlap]
+    places = kinematics.joint_centres(scene.body, track.root, track.angles)
+    strides = cycles.gait_cycles(scene.body.joint_names, places, track.frame_rate)
     names = [name for name in tables.angle_names(columns) if cycles.own(strides, name)]
     if not names:
         return [curves, overlap]

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 from mocapflow_evaluation.evaluate import Evaluate
-from mocapflow_export import layout
+from mocapflow_export import layout, tables
 from mocapflow_report import drawing, raster, report_rows
 from mocapflow_report.overlay import Overlay, Painter
 from mocapflow_report.report import Report
@@ -18,6 +18,7 @@ from results_scene import DEMO, demo_scene, stepping
 
 from mocapflow.errors import StoreError
 from mocapflow.geometry import cameras
+from mocapflow.io.columns import read_columns
 from mocapflow.recordings.recording import Recording, open_recording
 from mocapflow.results import Evaluation, RunFolder, Track
 from mocapflow.scene import Scene
@@ -213,6 +214,18 @@ def test_report_without_reference(scene: Scene, track: Track, recording: Recordi
     Report().run(track=track, scene=scene, recording=recording, run_folder=run_folder, evaluation=nothing)
     assert "no truth/angles.csv" in (tmp_path / layout.REPORT).read_text()
     assert "Deviation" not in page
+
+
+def test_an_angle_that_the_reference_never_has_is_drawn_without_it(
+    scene: Scene, track: Track, recording: Recording, tmp_path: Path
+) -> None:
+    truth = read_columns(DEMO / "truth" / "angles.csv")
+    truth["ankle_l"] = np.full(len(truth["frame"]), np.nan)
+    tables.write_columns(tmp_path / "known.csv", truth)
+    given = {"track": track, "scene": scene, "recording": recording, "run_folder": RunFolder(path=tmp_path, recipe={})}
+    evaluation = Evaluate(reference=str(tmp_path / "known.csv")).run(**given)
+    assert "ankle_r" in evaluation.curves and "ankle_l" not in evaluation.curves
+    Report().run(**given, evaluation=evaluation)
 
 
 def test_shown_frames_are_best_median_and_worst(track: Track) -> None:
