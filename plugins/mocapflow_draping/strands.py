@@ -69,7 +69,7 @@ def strands_of(garment: GarmentMesh, body: Body) -> Strands:
     """Return the strands of a garment.
 
     Raises:
-        PluginError: a strand does not begin at a pinned vertex.
+        PluginError: a vertex lies on no strand or on two, a strand begins at no pin, a ring leaves its row.
     """
     vertex, first, last = _rows(garment)
     rows = garment.vertices[vertex]
@@ -105,6 +105,13 @@ def _rows(garment: GarmentMesh) -> tuple[I32, I32, I32]:
     """Return vertices by strand and row (N, L), and each strand's first and last row (N,)."""
     used = garment.strands >= 0
     counts = used.sum(axis=1)
+    often = np.bincount(garment.strands[used], minlength=len(garment.vertices))
+    if (often != 1).any():
+        odd = int((often != 1).argmax())
+        raise PluginError(
+            f"garment {garment.name}: vertex {odd} lies on {often[odd]} strands",
+            hint="every vertex lies on one strand: strands alone are draped",
+        )
     strand, place = np.full((2, len(garment.vertices)), -1)
     strand[garment.strands[used]], place[garment.strands[used]] = np.nonzero(used)
     a, b = garment.rings.T

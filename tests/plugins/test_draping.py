@@ -1,5 +1,7 @@
 """The drape on analytic bodies (T-CL1 to T-CL3), and the distance fields under it."""
 
+from dataclasses import replace
+
 import drape_bodies
 import numpy as np
 import pytest
@@ -233,6 +235,21 @@ def test_a_draper_without_a_garment_says_so(skirted):
     scene, poses = skirted
     with pytest.raises(PluginError, match="no garment to drape"):
         draper().drape(poses, calm(scene, 4), Past(), Scene(cameras=(), body=scene.body))
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (lambda g: dict(strands=g.strands[1:]), "vertex 0 lies on 0 strands"),
+        (lambda g: dict(strands=np.append(g.strands, g.strands[:1], axis=0)), "vertex 0 lies on 2 strands"),
+        (lambda g: dict(pinned=g.pinned[1:], pinned_to=g.pinned_to[1:]), "strand of vertex 0 hangs from nothing"),
+        (lambda g: dict(rings=g.rings + np.eye(len(g.rings), 2, 1, dtype=np.int32)), "ring link .* of two rows"),
+    ],
+)
+def test_a_garment_that_no_strands_make_up_says_so(skirted, spoil, said):
+    scene, _ = skirted
+    with pytest.raises(PluginError, match=said):
+        strands_of(replace(scene.garment, **spoil(scene.garment)), scene.body)
 
 
 def test_joints_that_it_can_not_touch_do_not_move_the_cloth():
