@@ -89,12 +89,16 @@ def test_the_report_says_at_once_which_frames_the_images_contradict(track: Track
     assert report_rows.mishaps(doubted, {}) == ["frames that the images contradict: 1"]
 
 
-def test_overlay_of_a_doubted_frame_says_so(scene: Scene, track: Track, recording: Recording) -> None:
+@pytest.mark.parametrize(
+    "odd",
+    [{"doubted": np.ones(4, bool)}, {"usable": np.tile([True, False, True, True], (4, 1))}],
+    ids=["doubted", "not used"],
+)
+def test_overlay_of_an_odd_frame_says_so(
+    scene: Scene, track: Track, recording: Recording, odd: dict[str, np.ndarray]
+) -> None:
     frame = next(recording.frames())
-    plain, said = (
-        Painter(scene).paint(frame, replace(track, doubted=np.full(len(track.frame), doubted)), 0, 1)
-        for doubted in (False, True)
-    )
+    plain, said = (Painter(scene).paint(frame, each, 0, 1) for each in (track, replace(track, **odd)))
     differs = np.flatnonzero(np.any(plain != said, axis=(1, 2)))
     assert 0 < len(differs) < 80  # a line of text at the top
     assert differs.max() < 160
