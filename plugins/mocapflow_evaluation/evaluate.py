@@ -21,7 +21,7 @@ from mocapflow_evaluation.cycles import Cycle
 from mocapflow_evaluation.keypoint_reference import write_triangulated
 from mocapflow_evaluation.ours import Ours
 from mocapflow_evaluation.references import SUFFIXES, read_reference
-from mocapflow_evaluation.rigs import compare_rigs
+from mocapflow_evaluation.rigs import COMMON_POINTS, compare_rigs
 
 LONGEST_LAG_S = 0.5  # s
 Row = Mapping[str, float | str]
@@ -67,7 +67,7 @@ def chosen(recording: Path, wanted: str) -> tuple[Path | None, str]:
     if wanted or truth.is_file():
         return (recording / wanted if wanted else truth), ""
     files = sorted((recording / "reference").glob("*"))
-    there = [path for path in files if path.suffix.lower() in SUFFIXES and path.name != layout.COMMON_POINTS]
+    there = [path for path in files if path.suffix.lower() in SUFFIXES and path.name != COMMON_POINTS]
     if len(there) == 1:
         return there[0], ""
     if not there:
@@ -96,7 +96,7 @@ def evaluate(own: Ours, path: Path, folder: Path, longest_lag_s: float = LONGEST
         _row(own, name, curve, alignment.signs[name] * aligned[name], strides) | {"sign": alignment.signs[name]}
         for name, curve in known.items()
     ]
-    rigs = compare_rigs(own, reference, alignment.worth, path.parent / layout.COMMON_POINTS)
+    rigs = compare_rigs(own, reference, alignment.worth, path.parent / COMMON_POINTS)
     notes = [*reference.notes, *rigs.notes]
     if not rows:  # a comparison that a command wrote before stays
         had = ", ".join(tables.angle_names(own.columns))

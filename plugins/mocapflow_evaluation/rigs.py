@@ -18,6 +18,7 @@ from mocapflow_evaluation.ours import Ours
 from mocapflow_evaluation.references import Reference
 from mocapflow_evaluation.stick import Stick
 
+COMMON_POINTS = "registration.csv"  # beside the reference: points that both rigs have measured
 ODD = 0.002  # of scale: calibrations are better than that
 
 
