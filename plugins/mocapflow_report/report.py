@@ -47,7 +47,7 @@ class Report(Stage):
         """Write the report and return its paths."""
         series = measured(track, scene)
         columns = tables.angle_columns(track, series)
-        pictures = draw(track, scene, columns, evaluation, run_folder.path)
+        curves, overlap, *strides = draw(track, scene, columns, evaluation, run_folder.path)
         recipe = runjson.plain(run_folder.recipe)
         happened = [
             *recording.warnings,
@@ -59,11 +59,11 @@ class Report(Stage):
         names = [camera.name for camera in scene.cameras]
         sections = [
             ("At a glance", page.listing(report_rows.glance(track, names, evaluation))),
-            ("Angles", _shown(pictures[:1]) + page.table(report_rows.ranges(columns))),
-            ("Gait cycle", _shown(pictures[2:])),
+            ("Angles", _shown([curves]) + page.table(report_rows.ranges(columns))),
+            ("Gait cycle", _shown(strides)),
             ("Deviation from the reference", _deviations(evaluation)),
             ("Overlay", "\n".join(page.picture(jpeg, "jpeg", said) for said, jpeg in stills(track, scene, recording))),
-            ("Overlap of model and image", _shown(pictures[1:2])),
+            ("Overlap of model and image", _shown([overlap])),
             ("What happened", page.listing(happened)),
             ("CPU time", page.table(report_rows.times(track))),
             ("Versions", page.listing([f"{name} {version}" for name, version in recipe.get("versions", {}).items()])),
@@ -74,7 +74,7 @@ class Report(Stage):
         path = layout.place(run_folder.path, layout.REPORT)
         with whole(path) as part:
             part.write_text(page.page(run_folder.path.resolve().name, subtitle, sections), encoding="utf-8")
-        return Files(paths=(path, *pictures))
+        return Files(paths=(path, curves, overlap, *strides))
 
 
 def draw(
@@ -85,15 +85,16 @@ def draw(
     curves, overlap = layout.place(folder, layout.PLOT), layout.place(folder, layout.OVERLAP)
     plots.plot_angles(curves, columns, raw, evaluation, lost)
     plots.plot_overlap(overlap, track, [camera.name for camera in scene.cameras], lost)
-    if evaluation is not None and evaluation.rows:  # which has drawn the strides of both
-        return [curves, overlap]
+    compared = evaluation is not None and evaluation.rows  # then the strides of both are drawn
+    return [curves, overlap, *([] if compared else _draw_strides(track, scene, columns, folder))]
+
+
+def _draw_strides(track: Track, scene: Scene, columns: Mapping[str, F64], folder: Path) -> list[Path]:
     places = kinematics.joint_centres(scene.body, track.root, track.angles)
     strides = cycles.gait_cycles(scene.body.joint_names, places, track.frame_rate)
     names = [name for name in tables.angle_names(columns) if cycles.own(strides, name)]
-    if not names:
-        return [curves, overlap]
     walked = {name: {"mocapflow": cycles.normalised(strides, columns[name], name)} for name in names}
-    return [curves, overlap, comparison_plots.draw_cycles(layout.place(folder, layout.CYCLES_PLOT), walked)]
+    return [comparison_plots.draw_cycles(layout.place(folder, layout.CYCLES_PLOT), walked)] if walked else []
 
 
 def _shown(pictures: Sequence[Path]) -> str:
