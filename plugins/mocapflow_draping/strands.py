@@ -69,7 +69,8 @@ def strands_of(garment: GarmentMesh, body: Body) -> Strands:
     """Return the strands of a garment.
 
     Raises:
-        PluginError: a vertex lies on no strand or on two, a strand begins at no pin, a ring leaves its row.
+        PluginError: a vertex lies on no strand or on two, a strand begins at no pin or stands out nowhere, a ring
+            leaves its row.
     """
     vertex, first, last = _rows(garment)
     rows = garment.vertices[vertex]
@@ -80,7 +81,7 @@ def strands_of(garment: GarmentMesh, body: Body) -> Strands:
     carrier = garment.carried_by[vertex[:, -1]]
     under = np.asarray(cKDTree(body.vertices).query(rows)[1], np.int32)
     rides = bool(np.mean(_limbs(body.parents)[carrier, body.main_joint[under[:, -1]]]) > 0.5)
-    facing = _from_middle(rows, beside) if rides else _along(rows)
+    facing = _from_middle(rows, beside) if rides else _along(garment.name, rows)
     return Strands(
         vertex=vertex,
         first=first,
@@ -185,12 +186,18 @@ def _limbs(parents: I32) -> Bool:
     return limb
 
 
-def _along(rows: F64) -> F64:
+def _along(garment: str, rows: F64) -> F64:
     """Return the horizontal directions (N, 3) in which strands stand out, or of their roots where they do not."""
     out = (rows[:, -1] - rows[:, 0]) * [1.0, 1.0, 0.0]
     straight = np.linalg.norm(out, axis=1) < 1e-6 * np.ptp(rows[..., 2])
     out = np.where(straight[:, None], (rows[:, 0] - rows[:, 0].mean(axis=0)) * [1.0, 1.0, 0.0], out)
-    along: F64 = out / np.linalg.norm(out, axis=1, keepdims=True)
+    far = np.linalg.norm(out, axis=1, keepdims=True)
+    if (far < 1e-9).any():
+        raise PluginError(
+            f"garment {garment}: strand {far.argmin()} hangs straight down, from the middle of all",
+            hint="let it stand off the body at rest: the way in which it does is the way from which it falls",
+        )
+    along: F64 = out / far
     return along
 
 

@@ -28,7 +28,7 @@ from mocapflow_garments.skirt import Skirt
 
 from mocapflow.data import Past, PoseBatch
 from mocapflow.errors import PluginError
-from mocapflow.geometry import kinematics
+from mocapflow.geometry import kinematics, sewing
 from mocapflow.scene import Scene
 from mocapflow.testing.bodies import tiny_body
 
@@ -250,6 +250,14 @@ def test_a_garment_that_no_strands_make_up_says_so(skirted, spoil, said):
     scene, _ = skirted
     with pytest.raises(PluginError, match=said):
         strands_of(replace(scene.garment, **spoil(scene.garment)), scene.body)
+
+
+def test_a_sheet_whose_middle_hangs_straight_down_says_so():
+    body = tiny_body()
+    line, down = np.linspace(-0.1, 0.1, 5), np.linspace(0.0, -0.4, 6)
+    straight = np.stack(np.broadcast_arrays(line[:, None], -0.2, 1.0 + down), axis=-1)
+    with pytest.raises(PluginError, match="apron: strand 2 hangs straight down"):
+        strands_of(sewing.sheet("apron", body, straight, closed=False), body)
 
 
 def test_joints_that_it_can_not_touch_do_not_move_the_cloth():
