@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mocapflow_evaluation.evaluate import Evaluate
 from mocapflow_export import layout, tables
-from mocapflow_report import drawing, raster, report_rows
+from mocapflow_report import drawing, portrait, raster, report_rows
 from mocapflow_report.overlay import Overlay, Painter
 from mocapflow_report.report import Report
 from mocapflow_report.stills import chosen_rows, stills
@@ -267,6 +267,14 @@ def test_a_video_that_is_cut_off_leaves_the_one_before_it(tmp_path: Path) -> Non
         raise KeyboardInterrupt
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_strands_without_rings_have_a_pattern_of_their_length_alone(scene: Scene) -> None:
+    assert scene.garment is not None
+    rings, length = scene.garment.rings, scene.garment.ring_length
+    fringe = replace(scene.garment, rings=rings[:0], ring_length=length[:0])
+    ink = [portrait.pattern(garment).std() for garment in (fringe, scene.garment)]
+    assert 0 < ink[0] < ink[1]
 
 
 def test_cloth_that_cuts_through_the_skin_it_lies_on_covers_it_and_cloth_behind_it_does_not() -> None:
