@@ -78,7 +78,9 @@ def shown(scene: Scene, pose: Pose) -> Segmentation:
     """The exact silhouettes of a pose."""
     surface = scene.surface(pose, NO_CLOTH)
     fields = [silhouettes.model_distance(surface, camera, 10.0) for camera in scene.cameras]
-    return Segmentation(silhouettes=tuple(Silhouette(camera=k, distance=field) for k, field in enumerate(fields)))
+    return Segmentation(
+        silhouettes=tuple(Silhouette(camera=k, layer="person", distance=field) for k, field in enumerate(fields))
+    )
 
 
 def pictured(scene: Scene, seen: Segmentation) -> Frame:

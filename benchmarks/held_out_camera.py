@@ -71,7 +71,7 @@ def errors(fitter: ClothFitter, states: Sequence[FrameState], model: ClothedMode
     lasting = np.array([name in (THICKNESS, TAKE_UP) for name in garment.parameter_names])
     for index, state in enumerate(states):
         frame = Frame(index=index, time=index / 30, images=(), usable=np.empty(0, bool))  # fitters read silhouettes
-        others = tuple(s for s in state.segmentation.silhouettes if s.camera != view)
+        others = tuple(s for s in state.segmentation.of("person") if s.camera != view)
         estimate, seen = replace(state.estimate, parameters=parameters), Segmentation(silhouettes=others)
         short = TakeUp().fit(frame, seen, estimate, model, past, TURN)
         cloth = fitter.fit(frame, seen, replace(estimate, parameters=short.parameters), model, past, TURN)
@@ -84,7 +84,7 @@ def errors(fitter: ClothFitter, states: Sequence[FrameState], model: ClothedMode
 
 def differing(state: FrameState, cloth: Cloth, model: ClothedModel, view: int) -> int:
     """Return how many pixels of a view only one of the two silhouettes covers."""
-    seen = next(s for s in state.segmentation.silhouettes if s.camera == view)
+    seen = next(s for s in state.segmentation.of("person") if s.camera == view)
     camera, surface = model.scene.cameras[view], model.surface(state.estimate.pose, cloth)
     covered = silhouettes.mask(silhouettes.outline(surface, camera), camera)
     return int(np.count_nonzero(covered != (seen.distance > 0)))

@@ -110,7 +110,11 @@ class Parts:
     def __exit__(self, *_: object) -> None:
         packing.quantised, packing.match_row, packing.row_of, Rows.write, rows.flush = self._real  # type: ignore[method-assign]
         for name, ms in self._now.items():
-            kind = name.replace("write track-000000000000", "write cloth")
+            kind = (
+                "write silhouettes"
+                if name == "write person"
+                else name.replace("write track-000000000000", "write cloth")
+            )
             self.spent.setdefault(kind, []).append(ms)
 
     def _wait(self, path: Path) -> None:
@@ -136,7 +140,7 @@ def scenes(count: int):  # type: ignore[no-untyped-def]
     for index in range(count):
         frame = images[index % len(images)]
         silhouettes = tuple(
-            Silhouette(camera=c, distance=outline(image, plate))
+            Silhouette(camera=c, layer="person", distance=outline(image, plate))
             for c, (image, plate) in enumerate(zip(frame.images, plates, strict=True))
         )
         yield Frame(index=index, time=index / 30, images=(), usable=np.ones(4, bool)), result_of(silhouettes, dice)

@@ -21,6 +21,7 @@ from mocapflow.records import F32, F64, I16, I32, U8, Bool, array, record
 
 BODY, CLOTH = 0, 1  # values of Surface.layer
 REMEMBERED = 3  # frames that later ones may know: a pose, its velocity, its acceleration
+LAYERS = ("person", "garment", "skin")  # values of Silhouette.layer
 BORDER = 3  # px along the image border where a silhouette is cut, not occluding
 
 
@@ -120,9 +121,10 @@ class Contour:
 
 @record
 class Silhouette:
-    """A signed distance to the person's outline in a view, positive inside, clipped to a band; mask = distance > 0."""
+    """A signed distance to the outline in one view, positive inside, clipped to a band; mask = distance > 0."""
 
     camera: int
+    layer: str  # one of LAYERS
     distance: F32 = array("H", "W", unit="px")
 
     @cached_property
@@ -150,12 +152,16 @@ class Matches:
 
 @record
 class Segmentation:
-    """The silhouettes of one frame, one per usable view, what is found inside them, and what they cost."""
+    """The silhouettes of one frame, one per usable view and layer, what is found inside them, and what they cost."""
 
     silhouettes: tuple[Silhouette, ...]
     inner: Matches | None = None  # contours of parts before others, with the vertices whose edges they are
     energies: Mapping[str, float] = field(default_factory=dict)
     appearance: Mapping[str, F64] = field(default_factory=dict)  # region statistics for the next frame
+
+    def of(self, layer: str) -> list[Silhouette]:
+        """Return the silhouettes of one layer."""
+        return [silhouette for silhouette in self.silhouettes if silhouette.layer == layer]
 
 
 @record

@@ -57,7 +57,7 @@ class Functional:
         said = state.segmentation.energies
         views = np.array([[said.get(f"{camera.name}.{term}", np.nan) for term in IN_VIEW] for camera in cameras])
         matched = contours(surface, state.matches, cameras)
-        for silhouette in state.segmentation.silhouettes:
+        for silhouette in state.segmentation.of("person"):
             c = silhouette.camera
             views[c, 2], views[c, 3] = area(surface, silhouette, cameras[c]), matched[c]
         return np.concatenate([views.ravel(), self._priors(state.estimate.pose)])
@@ -70,7 +70,7 @@ class Functional:
     def pull(self, segmentation: Segmentation, pose: Pose, cloth: Cloth) -> float:
         """Return the terms that pose and cloth can change, summed: area and priors."""
         surface, cameras = self.model.surface(pose, cloth), self.model.scene.cameras
-        areas = [area(surface, silhouette, cameras[silhouette.camera]) for silhouette in segmentation.silhouettes]
+        areas = [area(surface, silhouette, cameras[silhouette.camera]) for silhouette in segmentation.of("person")]
         return sum(areas) + sum(self._priors(pose))
 
     def step(

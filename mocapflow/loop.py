@@ -119,7 +119,7 @@ def unhidden(matches: Matches, frame: Frame, surface: Surface, cameras: Sequence
 def overlaps(surface: Surface, segmentation: Segmentation, cameras: Sequence[Camera]) -> F64:
     """Return intersection over union (C,) of the model's silhouette and the person's in each view; NaN where unseen."""
     overlap = np.full(len(cameras), np.nan)
-    for silhouette in segmentation.silhouettes:
+    for silhouette in segmentation.of("person"):
         camera = cameras[silhouette.camera]
         covered = silhouettes.mask(silhouettes.outline(surface, camera), camera)
         overlap[silhouette.camera] = silhouettes.intersection_over_union(covered, silhouette.distance > 0)

@@ -52,7 +52,7 @@ def outlines(
     surface: Surface, segmentation: Segmentation, cameras: Sequence[Camera], spacing_px: float
 ) -> Iterator[tuple[Silhouette, Contour]]:
     """Yield every silhouette of the person with the occluding contour of the surface in its view."""
-    for silhouette in segmentation.silhouettes:
+    for silhouette in segmentation.of("person"):
         yield silhouette, occluding_contour(surface, cameras[silhouette.camera], spacing_px)
 
 

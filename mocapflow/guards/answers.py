@@ -9,6 +9,7 @@ import numpy as np
 
 from mocapflow.components import Component, Matcher, PoseSolver, Predictor, Prior, Recovery, Segmenter
 from mocapflow.data import (
+    LAYERS,
     Estimate,
     Frame,
     FrameResult,
@@ -148,18 +149,21 @@ def segmentation_of(
     """Return the silhouettes of a segmenter.
 
     Raises:
-        WrongAnswer: one is of a camera that is not there, or comes twice; is of another size than its
+        WrongAnswer: one is of a camera or layer that is not there, or comes twice; is of another size than its
             picture, or not finite.
     """
     found = of_kind(segmenter, segmenter.segment(frame, state, past, scene, turn), Segmentation)
     if not isinstance(found.silhouettes, tuple):
         raise WrongAnswer(segmenter, f"silhouettes as a {type(found.silhouettes).__name__}, not a tuple of them")
     for number, silhouette in enumerate(found.silhouettes):
+        kind = silhouette.camera, silhouette.layer
         if silhouette.camera not in range(len(scene.cameras)):
             message = f"a silhouette of camera {silhouette.camera}; there are 0 to {len(scene.cameras) - 1}"
             raise WrongAnswer(segmenter, message)
-        if silhouette.camera in [other.camera for other in found.silhouettes[:number]]:
-            raise WrongAnswer(segmenter, f"two silhouettes of camera {silhouette.camera}")
+        if silhouette.layer not in LAYERS:
+            raise WrongAnswer(segmenter, f"a silhouette of layer '{silhouette.layer}'; there are {', '.join(LAYERS)}")
+        if kind in [(other.camera, other.layer) for other in found.silhouettes[:number]]:
+            raise WrongAnswer(segmenter, f"two silhouettes of camera {silhouette.camera}, layer '{silhouette.layer}'")
         width, height = scene.cameras[silhouette.camera].size
         if silhouette.distance.shape != (height, width):
             rows, columns = silhouette.distance.shape

@@ -1,7 +1,7 @@
 """The arrays of a track while it grows, one row of each for a frame.
 
 `live/rows` holds all numbers of a frame in one row of float64, `cloth` one chunk per frame, `matches/<capacity>` one
-padded row per frame, `silhouettes/<camera>` int8 at 1/8 px, `trace` the poses of a frame's turns where they are
+padded row per frame, `silhouettes/<layer>/<camera>` int8 at 1/8 px, `trace` the poses of a frame's turns where they are
 kept, and `live/appearance-<size>` the last two appearances in turns, each behind the number of its frame.
 """
 
@@ -65,7 +65,7 @@ class Growing:
     def write_seen(self, row: int, silhouettes: Sequence[Silhouette], matches: Matches) -> None:
         """Write what was found in the images of a frame."""
         for silhouette in silhouettes:
-            name = f"silhouettes/{self._cameras[silhouette.camera]}"
+            name = f"silhouettes/{silhouette.layer}/{self._cameras[silhouette.camera]}"
             steps = packing.quantised(silhouette)
             self._like(name, steps, packing.UNSEEN, "y", "x", unit=f"1/{packing.FINE} px").write(row, steps)
         packed = packing.match_row(matches)

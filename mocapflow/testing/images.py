@@ -48,8 +48,9 @@ class SegmenterConformance(Conformance):
         frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, believed)
         past = scenes.tiny_past(scene, believed)
         found = assert_pure(self.segmenter.segment, frame, state, past, scene, TURN)
-        assert [silhouette.camera for silhouette in found.silhouettes] == list(range(len(scene.cameras)))
-        for silhouette, truth in zip(found.silhouettes, pictures.tiny_masks(scene, pose), strict=True):
+        persons = found.of("person")
+        assert [silhouette.camera for silhouette in persons] == list(range(len(scene.cameras)))
+        for silhouette, truth in zip(persons, pictures.tiny_masks(scene, pose), strict=True):
             assert silhouette.distance.shape == truth.shape
             inside = silhouette.distance > 0
             overlap = (inside & truth).sum() / (inside | truth).sum()

@@ -39,7 +39,8 @@ def tiny_segmentation(scene: Scene, pose: Pose) -> Segmentation:
     """Return the true silhouettes as signed distances."""
     return Segmentation(
         silhouettes=tuple(
-            Silhouette(camera=camera, distance=_distance(mask)) for camera, mask in enumerate(tiny_masks(scene, pose))
+            Silhouette(camera=camera, layer="person", distance=_distance(mask))
+            for camera, mask in enumerate(tiny_masks(scene, pose))
         )
     )
 

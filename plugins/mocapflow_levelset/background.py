@@ -16,7 +16,7 @@ from mocapflow.scene import Scene
 from mocapflow_levelset.channels import ChannelName, features
 from mocapflow_levelset.evidence import calmed
 from mocapflow_levelset.evolve import Rhythm, Weights
-from mocapflow_levelset.levelset import INNER_BAND_PX
+from mocapflow_levelset.levelset import INNER_BAND_PX, PERSON
 from mocapflow_levelset.masks import counted
 from mocapflow_levelset.plates import Plate, density_of, plate_of
 from mocapflow_levelset.shadows import ShadowAware, floor_around
@@ -63,7 +63,7 @@ class BackgroundDifference(ShadowAware):
             model = model_distance(surface, camera, self.band_px)
             floor = floor_around(surface, camera, self.shadow_reach_m)
             distance = self.find(frame.images[c], model, floor, scene.background, c, frame.hidden_in(c))
-            silhouettes.append(Silhouette(camera=c, distance=distance))
+            silhouettes.append(Silhouette(camera=c, layer=PERSON, distance=distance))
         return Segmentation(silhouettes=tuple(silhouettes))
 
     def find(

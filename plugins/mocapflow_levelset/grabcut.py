@@ -13,6 +13,7 @@ from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.records import F32, U8
 from mocapflow.scene import Scene
 from mocapflow_levelset import crops
+from mocapflow_levelset.levelset import PERSON
 from mocapflow_levelset.redistance import redistance
 
 
@@ -38,7 +39,7 @@ class GrabCut(Segmenter):
             if not frame.usable[c]:
                 continue
             distance = self.find(frame.images[c], model_distance(surface, camera, reach))
-            silhouettes.append(Silhouette(camera=c, distance=distance))
+            silhouettes.append(Silhouette(camera=c, layer=PERSON, distance=distance))
         return Segmentation(silhouettes=tuple(silhouettes))
 
     def find(self, image: U8, model: F32) -> F32:

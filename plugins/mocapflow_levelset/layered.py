@@ -14,7 +14,7 @@ from mocapflow.records import F32
 from mocapflow.scene import Scene
 from mocapflow_levelset.inner import Search, inner_contours, told_apart
 from mocapflow_levelset.layers import COLOURS, gathered, layer_of, shown
-from mocapflow_levelset.levelset import LevelSet
+from mocapflow_levelset.levelset import PERSON, LevelSet
 from mocapflow_levelset.surround import ROOM, beside, told
 
 
@@ -54,9 +54,9 @@ class Layered(LevelSet):
         surface = scene.surface(state.estimate.pose, state.cloth)
         colours = dict(state.segmentation.appearance if turn.index > 1 else past.appearance)
         if turn.index == 1:
-            colours[COLOURS] = gathered(frame, found.silhouettes, surface, scene, past, self.keep, self.grid_px)
+            colours[COLOURS] = gathered(frame, found.of(PERSON), surface, scene, past, self.keep, self.grid_px)
             if self.colour_weight:
-                colours[ROOM] = beside(frame, found.silhouettes, past, self.keep, self.grid_px, self.margin_px)
+                colours[ROOM] = beside(frame, found.of(PERSON), past, self.keep, self.grid_px, self.margin_px)
         return replace(found, inner=self._inner(frame, found, surface, past, scene, turn), appearance=colours)
 
     def _inner(
@@ -68,7 +68,7 @@ class Layered(LevelSet):
         findable = told_apart(scene, layers, known)
         parts = [
             inner_contours(frame.images[s.camera], s, surface, scene.cameras[s.camera], layers, findable, known, search)
-            for s in found.silhouettes
+            for s in found.of(PERSON)
         ]
         return pool([(1.0, part) for part in parts]) if parts else None
 

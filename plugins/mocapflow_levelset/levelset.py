@@ -27,6 +27,7 @@ from mocapflow_levelset.view import Contact, Empty, Level, Matte, Method, View, 
 
 Share = Annotated[float, Field(ge=0, lt=1)]
 
+PERSON = "person"
 INNER_BAND_PX = 7.0  # while the contour moves
 REDUCED_RHO_PX = 8.0  # Gaussian window of the local statistics at reduced sizes, in px of the shrunken image
 COARSE, HALF, FULL = 4, 2, 1  # what the image is shrunk by
@@ -80,7 +81,7 @@ class LevelSet(ShadowAware):
         """
         surface = scene.surface(state.estimate.pose, state.cloth)
         # a view in which nobody was begins anew from the model, which may stand in it by now
-        last = {s.camera: s for s in state.segmentation.silhouettes if len(s.zero_level[0])} if turn.index else {}
+        last = {s.camera: s for s in state.segmentation.of(PERSON) if len(s.zero_level[0])} if turn.index else {}
         parts = {c: self._moved(surface, scene.cameras[c], past, turn) for c in last}
         due = [c for c in np.flatnonzero(frame.usable).tolist() if (part := parts.get(c)) is None or part.any()]
         if last and not due:
@@ -92,7 +93,7 @@ class LevelSet(ShadowAware):
             if c in last:
                 view = view._replace(start=last[c].distance, moved=parts[c])
             found = find(view, levels, self._method(), self.band_px)
-            silhouettes[c] = Silhouette(camera=c, distance=found.level)
+            silhouettes[c] = Silhouette(camera=c, layer=PERSON, distance=found.level)
             for term, cost in found.costs._asdict().items():
                 key = f"{scene.cameras[c].name}.{term}"
                 energies[key] = cost if view.moved is None else energies.get(key, np.nan) + cost

@@ -57,7 +57,7 @@ class OpticalFlow(Matcher):
         if self.between != "shapes":
             parts.append(self.carried(frame, surface, past, scene))
         if self.between != "frames" and first:
-            parts += [self.registered(silhouette, surface, scene) for silhouette in segmentation.silhouettes]
+            parts += [self.registered(silhouette, surface, scene) for silhouette in segmentation.of("person")]
         share = self.first_share if first else self.later_share
         return pool([(share, part) for part in parts])
 

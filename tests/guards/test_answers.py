@@ -376,7 +376,8 @@ def test_garments_that_are_none(change, said):
     [
         ({"camera": 7}, "a silhouette of camera 7; there are 0 to 3"),
         ({"camera": "cam02"}, "a silhouette of camera cam02; there are 0 to 3"),
-        ({"camera": 0}, "two silhouettes of camera 0"),
+        ({"camera": 0}, "two silhouettes of camera 0, layer 'person'"),
+        ({"layer": "Person"}, "a silhouette of layer 'Person'; there are person, garment, skin"),
         ({"distance": SEEN.silhouettes[1].distance[1:]}, "a silhouette of .* px; the picture is"),
         ({"distance": SEEN.silhouettes[1].distance * np.float32(np.nan)}, "a silhouette that is not finite"),
     ],

@@ -45,7 +45,7 @@ class Cluttered(Silhouette):
 
     @property
     def zero_level(self) -> tuple[F64, F64]:
-        contour = Silhouette(camera=self.camera, distance=self.distance).zero_level
+        contour = Silhouette(camera=self.camera, layer=self.layer, distance=self.distance).zero_level
         pixel, normal = (np.concatenate(pair) for pair in zip(contour, (self.stray, self.outward), strict=True))
         order = np.argsort(pixel[:, 1], kind="stable")
         return pixel[order], normal[order]
@@ -63,7 +63,9 @@ class Given(Segmenter):
 def seen(surface: Surface, scene: Scene) -> Segmentation:
     """The exact silhouettes of a surface, to a fraction of a pixel."""
     fields = [silhouettes.model_distance(surface, camera, BAND) for camera in scene.cameras]
-    return Segmentation(silhouettes=tuple(Silhouette(camera=k, distance=field) for k, field in enumerate(fields)))
+    return Segmentation(
+        silhouettes=tuple(Silhouette(camera=k, layer="person", distance=field) for k, field in enumerate(fields))
+    )
 
 
 def cluttered(segmentation: Segmentation, share: float, seed: int) -> Segmentation:
@@ -78,6 +80,7 @@ def _cluttered(silhouette: Silhouette, share: float, rng: np.random.Generator) -
     turn = rng.uniform(0, 2 * np.pi, count)
     return Cluttered(
         camera=silhouette.camera,
+        layer=silhouette.layer,
         distance=silhouette.distance,
         stray=rng.uniform(pixel.min(axis=0) - BAND, pixel.max(axis=0) + BAND, (count, 2)),
         outward=np.column_stack([np.cos(turn), np.sin(turn)]),

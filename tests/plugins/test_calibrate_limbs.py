@@ -53,7 +53,9 @@ def masks_of(body, poses, garment=None):
             pose = poses[frame.index]
             surface = model.surface(pose, model.drape(pose, model.scene.calm, past))
             distances = [model_distance(surface, camera, 12.0) for camera in scene.cameras]
-            return Segmentation(silhouettes=tuple(Silhouette(camera=c, distance=d) for c, d in enumerate(distances)))
+            return Segmentation(
+                silhouettes=tuple(Silhouette(camera=c, layer="person", distance=d) for c, d in enumerate(distances))
+            )
 
     return Known()
 

@@ -37,7 +37,7 @@ def seen(model, truth):
     """Return the silhouettes of the person whose garment hangs by the true parameters."""
     surface = model.surface(STANDING, model.drape(STANDING, truth, Past()))
     found = [
-        Silhouette(camera=index, distance=model_distance(surface, camera, 12.0))
+        Silhouette(camera=index, layer="person", distance=model_distance(surface, camera, 12.0))
         for index, camera in enumerate(model.scene.cameras)
     ]
     return Segmentation(silhouettes=tuple(found))

@@ -103,7 +103,7 @@ def test_pairs_whose_normals_disagree_are_none(truth):
     surface = surface_at(truth)
     clean = seen(surface, SCENE).silhouettes[0]
     pixel, normal = clean.zero_level
-    strange = Cluttered(camera=0, distance=clean.distance, stray=pixel, outward=-normal)
+    strange = Cluttered(camera=0, layer="person", distance=clean.distance, stray=pixel, outward=-normal)
     for angle, share in ((60, 1.0), (180, 2.0)):
         matcher = ContourIcp(spacing_px=1.0, direction="forward", first_reach_px=5.0, normal_angle_deg=angle)
         pairs = matcher.match_view(strange, surface, SCENE, FIRST)

@@ -63,7 +63,7 @@ def test_where_nobody_knows_the_room_local_colours_tell(scene, pose):
     unknown = replace(background, spread=tuple(np.full_like(part, np.inf) for part in background.spread))
     segmenter = LevelSet(decorrelate=False, matte_px=0)
     found, without, with_room = (
-        segmenter.segment(frame, state, Past(), scene.with_background(room), FIRST).silhouettes
+        segmenter.segment(frame, state, Past(), scene.with_background(room), FIRST).of("person")
         for room in (unknown, None, background)
     )
     for one, other, known in zip(found, without, with_room, strict=True):
@@ -77,7 +77,7 @@ def test_the_matte_moves_nothing_where_nobody_knows_the_room(scene, pose):
     unknown = replace(background, spread=tuple(np.full_like(part, np.inf) for part in background.spread))
     brighter = replace(unknown, mean=tuple(part + 20 for part in background.mean))
     found, same = (
-        LevelSet().segment(frame, state, Past(), scene.with_background(room), FIRST).silhouettes
+        LevelSet().segment(frame, state, Past(), scene.with_background(room), FIRST).of("person")
         for room in (unknown, brighter)
     )
     for one, other in zip(found, same, strict=True):

@@ -149,8 +149,8 @@ def test_a_track_has_named_arrays_whose_equal_axes_are_equally_long(tmp_path, pa
             assert lengths.setdefault(axis, length) == length, (name, axis)
     assert {"root", "angles", "covariance", "cloth", "usable", "seconds"} <= set(group.array_keys())
     assert group["cloth"].chunks == (1, 4, 3)
-    assert group["silhouettes/cam01"].metadata.dimension_names == ("T", "y", "x")
-    assert group["silhouettes/cam01"].attrs["unit"] == "1/8 px"
+    assert group["silhouettes/person/cam01"].metadata.dimension_names == ("T", "y", "x")
+    assert group["silhouettes/person/cam01"].attrs["unit"] == "1/8 px"
 
 
 @pytest.mark.parametrize("damaged", [False, True])
@@ -228,7 +228,7 @@ def test_attributes_are_written_alike_in_every_locale(tmp_path):
 def test_silhouettes_keep_their_mask_and_an_eighth_of_a_pixel():
     distance = np.random.default_rng(1).uniform(-20, 20, (64, 80)).astype(np.float32)
     distance[0, :4] = [0.01, -0.01, 0.0, 0.06]
-    back = quantised(Silhouette(camera=0, distance=distance)) / np.float32(FINE)
+    back = quantised(Silhouette(camera=0, layer="person", distance=distance)) / np.float32(FINE)
     assert np.array_equal(back > 0, distance > 0)
     near = np.abs(distance) < 15
     assert np.abs(back - distance)[near].max() <= 1 / FINE
@@ -251,7 +251,7 @@ def test_what_was_seen_can_be_read_back(tmp_path, path):
     (found,) = [a for a in store.artifacts() if a.path.name.startswith("track-")]
     group = zarr.open_group(str(found.path), mode="r")
     for camera in ("cam01", "cam02"):
-        steps = group[f"silhouettes/{camera}"][6]
+        steps = group[f"silhouettes/person/{camera}"][6]
         assert steps.shape == (16, 24) and steps.max() > 0 > steps.min()
     assert group["match_count"][6] == 100
     assert (group["matches/128"][6, :, 6] > 0).sum() == 100
