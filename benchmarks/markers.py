@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from mocapflow_evaluation.evaluate import evaluate, evaluate_run
 from mocapflow_evaluation.ours import Ours
+from mocapflow_evaluation.rigs import COMMON_POINTS
 from mocapflow_evaluation.stick import Stick
 from mocapflow_export import layout
 from scipy.interpolate import CubicSpline
@@ -127,7 +128,7 @@ def write(folder: Path, time: F64, marks: dict[str, F64]) -> Path:
     wand = np.random.default_rng(1).uniform([-1, -1, 0], [1, 1, 2], (12, 3))
     other = turn.apply(wand) + shift + np.random.default_rng(2).normal(scale=NOISE, size=wand.shape)
     header = "x,y,z,marker_x,marker_y,marker_z"
-    np.savetxt(folder / layout.COMMON_POINTS, np.hstack([wand, other]), delimiter=",", header=header, comments="")
+    np.savetxt(folder / COMMON_POINTS, np.hstack([wand, other]), delimiter=",", header=header, comments="")
     return folder / "markers.c3d"
 
 

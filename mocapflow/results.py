@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from dataclasses import field, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -122,3 +122,4 @@ class Evaluation:
     rows: tuple[Mapping[str, float | str], ...]
     notes: tuple[str, ...] = ()  # what a reader of the rows should know, or why there are none
     pictures: tuple[Path, ...] = ()  # drawn of the comparison
+    curves: Mapping[str, F64] = field(default_factory=dict)  # (T,) deg, of the reference at our frames: those compared

@@ -117,6 +117,22 @@ def test_conformance_finds_a_garment_that_is_sewn_wrong():
         tests.test_it_plays_its_role()
 
 
+def test_conformance_finds_a_vertex_that_lies_on_no_strand():
+    class Loose(Garment):
+        """Leaves a strand out."""
+
+        name = "loose"
+
+        def sew(self, body):
+            mesh = tiny_garment(body)
+            return replace(mesh, strands=mesh.strands[1:])
+
+    tests = GarmentConformance()
+    tests.garment = Loose()
+    with pytest.raises(AssertionError, match=r"vertex \d+ lies on 0 strands"):
+        tests.test_every_vertex_lies_on_one_strand()
+
+
 class TestAtRest(RecoveryConformance):
     class AtRest(Recovery):
         """Begins again at rest where model and person overlap badly in a view."""

@@ -43,7 +43,8 @@ def tilts(garment: GarmentMesh, parameters: F64, azimuth: F64) -> tuple[F64, F64
         else:
             out += amount * np.sin(order * azimuth)
             aside += amount * np.cos(order * azimuth) / order
-    return np.clip(out, -STEEPEST, STEEPEST), np.clip(aside, -STEEPEST, STEEPEST)
+    beyond = np.maximum(np.hypot(out, aside) / STEEPEST, 1.0)
+    return out / beyond, aside / beyond
 
 
 def _meaning(garment: GarmentMesh, name: str) -> tuple[int, str]:

@@ -51,7 +51,7 @@ class Kinematic(Draper):
     skin_m: NonNegativeFloat = 0.005  # room between skin and cloth of no thickness
     voxel_m: PositiveFloat = 0.010  # edge of a voxel of the body's distance fields
     start_deg: Annotated[float, Field(gt=0, lt=180)] = 95.0  # how far out from straight down a strand begins to fall
-    rule: Literal["contact", "literal"] = "contact"  # from contact to contact, or step by step as printed
+    rule: Literal["contact", "literal"] = "contact"  # from contact to contact; or in steps, as printed, a wind alone
     step_deg: PositiveFloat = 2.0  # literal: of one iteration
     iterations: PositiveInt = 50  # literal: at most
     limited: bool = False  # literal: stop at straight down instead of swinging about it

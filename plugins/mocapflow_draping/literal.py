@@ -12,6 +12,10 @@ import numpy as np
 
 from mocapflow_draping.distance import body_distance
 
+FLOOR = -10.0  # m: what falls past everything stops here
+STEP = math.radians(2.0)  # of a wind, so that it blows no tail past what it would touch
+HALVINGS = 8  # of a step that would touch, before the tail is left where it is
+
 
 @numba.njit(cache=True)
 def settle_batch(grid, fixed, first, last, skin, step, iterations, limited, in_space, lower, parts, values):  # type: ignore[no-untyped-def]
@@ -42,9 +46,6 @@ def settle_batch(grid, fixed, first, last, skin, step, iterations, limited, in_s
         for _ in range(iterations):
             _turn(grid[b], fixed[b], first, last, step, limited, in_space)
             _touch(grid[b], fixed[b], first, last, skin[b], parts[b], values)
-
-
-FLOOR = -10.0  # m: what falls past everything stops here
 
 
 @numba.njit(cache=True)
@@ -123,19 +124,9 @@ def blow_batch(grid, fixed, first, last, skin, force, amount, parts, values):  #
                 continue
             turned = 0.0
             while turned < amount[b] - 1e-12:
-                angle = min(math.radians(2.0), amount[b] - turned)
-                for _ in range(8):
-                    if _blown(
-                        grid[b, n],
-                        pivot,
-                        last[n],
-                        force[b],
-                        angle,
-                        skin[b],
-                        parts[b],
-                        values,
-                        trial,
-                    ):
+                angle = min(STEP, amount[b] - turned)
+                for _ in range(HALVINGS):
+                    if _blown(grid[b, n], pivot, last[n], force[b], angle, skin[b], parts[b], values, trial):
                         break
                     angle *= 0.5
                 else:

@@ -69,7 +69,8 @@ def strands_of(garment: GarmentMesh, body: Body) -> Strands:
     """Return the strands of a garment.
 
     Raises:
-        PluginError: a strand does not begin at a pinned vertex.
+        PluginError: a vertex lies on no strand or on two, a strand begins at no pin or stands out nowhere, a ring
+            leaves its row.
     """
     vertex, first, last = _rows(garment)
     rows = garment.vertices[vertex]
@@ -80,7 +81,7 @@ def strands_of(garment: GarmentMesh, body: Body) -> Strands:
     carrier = garment.carried_by[vertex[:, -1]]
     under = np.asarray(cKDTree(body.vertices).query(rows)[1], np.int32)
     rides = bool(np.mean(_limbs(body.parents)[carrier, body.main_joint[under[:, -1]]]) > 0.5)
-    facing = _from_middle(rows, beside) if rides else _along(rows)
+    facing = _from_middle(rows, beside) if rides else _along(garment.name, rows)
     return Strands(
         vertex=vertex,
         first=first,
@@ -105,6 +106,13 @@ def _rows(garment: GarmentMesh) -> tuple[I32, I32, I32]:
     """Return vertices by strand and row (N, L), and each strand's first and last row (N,)."""
     used = garment.strands >= 0
     counts = used.sum(axis=1)
+    often = np.bincount(garment.strands[used], minlength=len(garment.vertices))
+    if (often != 1).any():
+        odd = int((often != 1).argmax())
+        raise PluginError(
+            f"garment {garment.name}: vertex {odd} lies on {often[odd]} strands",
+            hint="every vertex lies on one strand: strands alone are draped",
+        )
     strand, place = np.full((2, len(garment.vertices)), -1)
     strand[garment.strands[used]], place[garment.strands[used]] = np.nonzero(used)
     a, b = garment.rings.T
@@ -178,12 +186,18 @@ def _limbs(parents: I32) -> Bool:
     return limb
 
 
-def _along(rows: F64) -> F64:
+def _along(garment: str, rows: F64) -> F64:
     """Return the horizontal directions (N, 3) in which strands stand out, or of their roots where they do not."""
     out = (rows[:, -1] - rows[:, 0]) * [1.0, 1.0, 0.0]
     straight = np.linalg.norm(out, axis=1) < 1e-6 * np.ptp(rows[..., 2])
     out = np.where(straight[:, None], (rows[:, 0] - rows[:, 0].mean(axis=0)) * [1.0, 1.0, 0.0], out)
-    along: F64 = out / np.linalg.norm(out, axis=1, keepdims=True)
+    far = np.linalg.norm(out, axis=1, keepdims=True)
+    if (far < 1e-9).any():
+        raise PluginError(
+            f"garment {garment}: strand {far.argmin()} hangs straight down, from the middle of all",
+            hint="let it stand off the body at rest: the way in which it does is the way from which it falls",
+        )
+    along: F64 = out / far
     return along
 
 

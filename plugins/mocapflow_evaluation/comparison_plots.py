@@ -19,12 +19,11 @@ MOMENTS = 6  # in which the stick models are drawn
 
 
 def draw(ours: Mapping[str, F64], reference: Mapping[str, F64], strides: Sequence[Cycle], folder: Path) -> list[Path]:
-    """Draw agreement, and strides where there are some, into a run folder and return the files."""
-    names = cycles.shared(ours, reference)
-    both = {name: _common_strides(strides, ours[name], reference[name], name) for name in names}
+    """Draw agreement with each curve of the reference, and strides where there are some; return the files."""
+    both = {name: _common_strides(strides, ours[name], curve, name) for name, curve in reference.items()}
     walked = {name: pair for name, pair in both.items() if len(pair["mocapflow"])}
     agreement, cycle = (layout.place(folder, part) for part in (layout.AGREEMENT_PLOT, layout.CYCLES_PLOT))
-    drawn = [draw_agreement(agreement, {name: (ours[name], reference[name]) for name in names})] if names else []
+    drawn = [draw_agreement(agreement, {name: (ours[name], curve) for name, curve in reference.items()})]
     return [*drawn, draw_cycles(cycle, walked)] if walked else drawn
 
 

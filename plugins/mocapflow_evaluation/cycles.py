@@ -69,7 +69,7 @@ def rows(
 ) -> list[dict[str, float | str]]:
     """Return the rows of cycles.csv: for every angle and every stride of its side how far the two differ (deg)."""
     found: list[dict[str, float | str]] = []
-    for name in shared(ours, reference):
+    for name in reference:
         for number, cycle in enumerate(own(cycles, name), 1):
             part = slice(cycle.first, cycle.last + 1)
             a, b = ours[name][part], reference[name][part]
@@ -107,6 +107,7 @@ def own(cycles: Sequence[Cycle], name: str) -> list[Cycle]:
     return [cycle for cycle in cycles if name.endswith(f"_{cycle.side}")]
 
 
-def shared(ours: Mapping[str, F64], reference: Mapping[str, F64]) -> list[str]:
-    """Return the angles that both have somewhere."""
-    return [name for name in ours if name in reference and np.isfinite(ours[name] - reference[name]).any()]
+def shared(ours: Mapping[str, F64], reference: Mapping[str, F64]) -> dict[str, F64]:
+    """Return the curves of the reference for the angles that both have somewhere, in our order."""
+    both = (name for name in ours if name in reference)
+    return {name: reference[name] for name in both if np.isfinite(ours[name] - reference[name]).any()}

@@ -21,7 +21,7 @@ from mocapflow_evaluation.cycles import Cycle
 from mocapflow_evaluation.keypoint_reference import write_triangulated
 from mocapflow_evaluation.ours import Ours
 from mocapflow_evaluation.references import SUFFIXES, read_reference
-from mocapflow_evaluation.rigs import compare_rigs
+from mocapflow_evaluation.rigs import COMMON_POINTS, compare_rigs
 
 LONGEST_LAG_S = 0.5  # s
 Row = Mapping[str, float | str]
@@ -67,7 +67,7 @@ def chosen(recording: Path, wanted: str) -> tuple[Path | None, str]:
     if wanted or truth.is_file():
         return (recording / wanted if wanted else truth), ""
     files = sorted((recording / "reference").glob("*"))
-    there = [path for path in files if path.suffix.lower() in SUFFIXES and path.name != layout.COMMON_POINTS]
+    there = [path for path in files if path.suffix.lower() in SUFFIXES and path.name != COMMON_POINTS]
     if len(there) == 1:
         return there[0], ""
     if not there:
@@ -88,15 +88,15 @@ def evaluate_run(run_folder: Path, truth: Path, longest_lag_s: float = LONGEST_L
 def evaluate(own: Ours, path: Path, folder: Path, longest_lag_s: float = LONGEST_LAG_S) -> Evaluation:
     """Compare with a reference file; writes tables, what was found of both systems, and pictures into a run folder."""
     reference = read_reference(path)
-    known = at_our_frames(reference, own.columns)
+    known = cycles.shared(own.columns, at_our_frames(reference, own.columns))
     alignment = align(own.columns, reference, longest_lag_s)
     aligned = at_our_frames(reference, own.columns, alignment.worth)
     strides = cycles.gait_cycles(own.stick.names, own.stick.places, own.frame_rate)
     rows = [
-        _row(own, name, known[name], alignment.signs[name] * aligned[name], strides) | {"sign": alignment.signs[name]}
-        for name in cycles.shared(own.columns, known)
+        _row(own, name, curve, alignment.signs[name] * aligned[name], strides) | {"sign": alignment.signs[name]}
+        for name, curve in known.items()
     ]
-    rigs = compare_rigs(own, reference, alignment.worth, path.parent / layout.COMMON_POINTS)
+    rigs = compare_rigs(own, reference, alignment.worth, path.parent / COMMON_POINTS)
     notes = [*reference.notes, *rigs.notes]
     if not rows:  # a comparison that a command wrote before stays
         had = ", ".join(tables.angle_names(own.columns))
@@ -109,14 +109,14 @@ def evaluate(own: Ours, path: Path, folder: Path, longest_lag_s: float = LONGEST
     runjson.write(layout.place(folder, layout.FINDINGS), {**found, "registration": rigs.figures})
     written = rigs.write(folder, own.frame_rate, float(own.columns["time"][0]))
     pictures = [*comparison_plots.draw(own.columns, known, strides, folder), *written]
-    return Evaluation(reference=str(path), rows=tuple(rows), notes=tuple(notes), pictures=tuple(pictures))
+    return Evaluation(reference=str(path), rows=tuple(rows), notes=tuple(notes), pictures=tuple(pictures), curves=known)
 
 
 def _write_tables(
     folder: Path, columns: Mapping[str, F64], known: Mapping[str, F64], rows: Sequence[Row], strides: Sequence[Cycle]
 ) -> None:
     """Write the figures of each angle, its errors frame by frame, and the figures of each stride."""
-    errors = {name: columns[name] - known[name] for name in cycles.shared(columns, known)}
+    errors = {name: columns[name] - curve for name, curve in known.items()}
     tables.write_rows(layout.place(folder, layout.EVALUATION), rows)
     tables.write_columns(layout.place(folder, layout.ERRORS), {"frame": columns["frame"], **errors})
     if walked := cycles.rows(strides, columns, known):

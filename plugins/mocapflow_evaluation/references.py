@@ -65,14 +65,14 @@ def read_reference(path: Path) -> Reference:
             around, or goes back in time.
     """
     readers = {".csv": _table, ".mot": _motion, ".sto": _motion, ".trc": _trc, ".c3d": _c3d}
+    if not path.is_file():
+        raise RecordingError("no such reference", where=str(path))
     if path.suffix.lower() not in readers:
         raise RecordingError(
             f"can't compare with a {path.suffix or 'file without ending'}",
             where=str(path),
             hint=f"known: {', '.join(SUFFIXES)}, and folders like keypoints/",
         )
-    if not path.is_file():
-        raise RecordingError("no such reference", where=str(path))
     reference = readers[path.suffix.lower()](path)
     grows = np.diff(reference.at) > 0  # what is interpolated has to; nan does not
     if not grows.all():

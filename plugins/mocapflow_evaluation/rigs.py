@@ -18,6 +18,7 @@ from mocapflow_evaluation.ours import Ours
 from mocapflow_evaluation.references import Reference
 from mocapflow_evaluation.stick import Stick
 
+COMMON_POINTS = "registration.csv"  # beside the reference: points that both rigs have measured
 ODD = 0.002  # of scale: calibrations are better than that
 
 
@@ -67,7 +68,7 @@ def compare_rigs(own: Ours, reference: Reference, lag: float, common_points: Pat
     measured = common_points.is_file()
     found = stick.between_points(common_points) if measured else stick.between_joints(ours, aligned)
     if found is None:
-        return Rigs(ours=ours, frame=frame)
+        return Rigs(ours=ours, frame=frame, notes=("no joint distances: too few joint centres that both systems have",))
     theirs, aligned = (Stick(names=each.names, places=found.apply(each.places)) for each in (theirs, aligned))
     by = f"{len(found.residual)} points of {common_points.name}" if measured else "joint centres of both systems"
     return Rigs(

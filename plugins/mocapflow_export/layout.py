@@ -32,7 +32,6 @@ COMPARISON = (
     AGREEMENT_PLOT,
     CYCLES_PLOT,
 )
-COMMON_POINTS = "registration.csv"  # in reference/ of the recording: points that both rigs have measured
 PLOT = RESULTS / "angles.png"
 OVERLAP = RESULTS / "overlap.png"
 RUN = Path("run.json")

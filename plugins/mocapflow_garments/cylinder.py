@@ -31,16 +31,16 @@ class Cylinder(Garment):
 
     def sew(self, body: Body) -> GarmentMesh:
         """Return the tube on the rest body."""
-        upper, away = self._upper(body)
-        band = sections.band(upper[1], away, self.strands)
-        sewn = max(self.upper_circumference_m, sections.perimeter(band[0]))
+        plane, outline, away = self._upper(body)
+        band, facing = sections.band(outline, away, self.strands)
+        sewn = max(self.upper_circumference_m, sections.perimeter(band))
+        band, facing = band[::-1], facing[::-1]  # the plane is seen from above: its normal points down the limb
         around = np.linspace(sewn, self.lower_circumference_m, self.rings)
-        flat, facing = band[0][::-1], band[1][::-1]  # the plane is seen from above: its normal points down the limb
         out = (around - around[0]) / (2 * math.pi)
         link = self.length_m / (self.rings - 1)
         along = np.linspace(0.0, self.length_m, self.rings)
-        rows = upper[0].lift(flat[:, None] + out[None, :, None] * facing[:, None])
-        rows = pattern.even_links(rows + along[:, None] * upper[0].normal, link)
+        rows = plane.lift(band[:, None] + out[None, :, None] * facing[:, None])
+        rows = pattern.even_links(rows + along[:, None] * plane.normal, link)
         carried = [sewing.main_joint(body, sewing.nearest_skin(body, rows[:, row])) for row in range(self.rings)]
         return sewing.sheet(
             self.name,
@@ -53,8 +53,8 @@ class Cylinder(Garment):
             repairs=sewing.widened(upper_circumference_m=(self.upper_circumference_m, sewn)),
         )
 
-    def _upper(self, body: Body) -> tuple[tuple[sections.Plane, F64], float]:
-        """Return the plane across the limb with the limb's outline in it, and the tube's distance from it."""
+    def _upper(self, body: Body) -> tuple[sections.Plane, F64, float]:
+        """Return the plane across the limb, the limb's outline in it, and the tube's distance from that."""
         joint = body.joint(self.joint)
         below = np.flatnonzero(body.parents == joint)
         if not len(below):
@@ -66,10 +66,10 @@ class Cylinder(Garment):
         outlines = sections.outlines(body, plane)
         if not outlines:
             raise GarmentError(f"cylinder: there is no body around '{self.joint}'", hint="change `start`")
-        limb_outline = min(outlines, key=lambda closed: float(np.linalg.norm(closed.mean(axis=0))))
-        tape = sections.perimeter(limb_outline)
+        outline = min(outlines, key=lambda closed: float(np.linalg.norm(closed.mean(axis=0))))
+        tape = sections.perimeter(outline)
         away = pattern.room(self.name, "upper_circumference_m", self.upper_circumference_m, tape)
-        return (plane, limb_outline), away
+        return plane, outline, away
 
 
 def _across(point: F64, limb: F64) -> sections.Plane:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mocapflow.errors import StoreError
+from mocapflow.io.whole import whole
 from mocapflow.records import F64, U8
 
 Colour = tuple[int, int, int]  # BGR
@@ -89,7 +90,8 @@ class Video:
             )
             if not self._writer.isOpened():
                 hint = "is the folder writable? this build of OpenCV may lack the codec: mp4v is always there"
-                raise StoreError(f"can't write a video with codec {self._codec}", where=str(self._path), hint=hint)
+                folder = str(self._path.parent)  # people do not know the file by the name that it has yet
+                raise StoreError(f"can't write a video with codec {self._codec}", where=folder, hint=hint)
         self._writer.write(image)
 
     def close(self) -> None:
@@ -100,10 +102,7 @@ class Video:
 
 @contextmanager
 def videos(paths: list[Path], frame_rate: float, codec: str) -> Iterator[list[Video]]:
-    """Open videos for writing and close them whatever happens."""
-    opened = [Video(path, frame_rate, codec) for path in paths]
-    try:
-        yield opened
-    finally:
-        for video in opened:
-            video.close()
+    """Open videos for writing; they come in their places when all frames are written, or not at all."""
+    with ExitStack() as open_files:
+        parts = [open_files.enter_context(whole(path)) for path in paths]
+        yield [open_files.enter_context(closing(Video(part, frame_rate, codec))) for part in parts]

@@ -41,7 +41,7 @@ class Overlay(Stage):
                 if frame.index in rows:
                     for view, video in enumerate(opened):
                         video.write(painter.paint(frame, track, rows[frame.index], view))
-        return Files(paths=tuple(path for path in paths if path.exists()))
+        return Files(paths=tuple(paths))
 
 
 class Painter:
@@ -90,10 +90,12 @@ def _cloth_surface(vertices: F64, faces: I32, edges: I32, body: Surface) -> Surf
 
 
 def _remarks(frame: Frame, track: Track, row: int, view: int) -> list[str]:
-    """Return what a viewer should know of a view: no image, a lost frame, a fit that images contradict."""
+    """Return what a viewer should know of a view: no image or a wrong one, a lost frame, a fit in doubt."""
     said = []
     if not frame.usable[view]:
         said.append(f"no image: {frame.reasons[view]}" if frame.reasons else "no image")
+    elif not track.usable[row, view]:
+        said.append("not used: this picture was not trusted")
     if is_lost(track, row):
         said.append("frame lost, bridged")
     if track.doubted[row]:

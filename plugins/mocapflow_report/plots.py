@@ -20,7 +20,6 @@ def plot_angles(
     path: Path,
     ours: Mapping[str, F64],
     raw: Mapping[str, F64],
-    reference: Mapping[str, F64],
     evaluation: Evaluation | None,
     lost: Bool,
 ) -> Path:
@@ -32,12 +31,12 @@ def plot_angles(
         path: the png.
         ours: columns of angles.csv.
         raw: columns of angles_raw.csv.
-        reference: curves (T,) in degrees at our frames, by the same names; may be empty.
-        evaluation: where the RMS comes from.
+        evaluation: where the reference's curves and the RMS come from.
         lost: (T,), True where a frame was bridged.
     """
     names = tables.angle_names(ours)
     figure, every = panels(len(names), 2, 2.3, sharex=True)
+    reference = evaluation.curves if evaluation else {}
     deviations = {str(row["angle"]): float(row["rms_deg"]) for row in (evaluation.rows if evaluation else ())}
     for panel, name in zip(every, names, strict=True):
         _curves(panel, name, ours, raw, reference)

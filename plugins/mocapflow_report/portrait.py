@@ -60,9 +60,12 @@ def pattern(garment: GarmentMesh) -> U8:
     """Return the image (H, W, 3) BGR of a garment laid flat: each row as long as it is around, at its depth."""
     width, height = SIZE
     image = np.full((height, width, 3), np.round(255 * WALL), np.uint8)
+    depth = float(meshes.lengths_along(garment.vertices, garment.strands).max())
+    drawing.label(image, f"{depth:.2f} m along the cloth", line=1)
+    if not len(garment.rings):  # strands alone have no width
+        return image
     rows = _rows(garment)
     half = max(reach for _, _, reach in rows)
-    depth = max(below for below, _, _ in rows)
     scale = min(0.8 * width / (2 * half), 0.7 * height / depth)
     origin = np.array([width / 2, 0.2 * height])
     ends = np.array([[[left, below], [right, below]] for below, left, right in rows])
@@ -70,7 +73,6 @@ def pattern(garment: GarmentMesh) -> U8:
     for (below, left, right), shift in ((rows[0], -8), (rows[-1], 20)):
         x, y = origin + scale * np.array([(left + right) / 2, below])
         drawing.note(image, f"{right - left:.2f} m", (x - 22, y + shift))
-    drawing.label(image, f"{depth:.2f} m along the cloth", line=1)
     return image
 
 

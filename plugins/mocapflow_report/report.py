@@ -7,15 +7,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import ClassVar
 
-from mocapflow_evaluation import comparison_plots, cycles, ours
-from mocapflow_evaluation.alignment import at_our_frames
-from mocapflow_evaluation.references import read_reference
+from mocapflow_evaluation import comparison_plots, cycles
 from mocapflow_export import layout, runjson, tables
 from mocapflow_export.export import before_smoothing
 from mocapflow_export.uncertainty import measured
 from mocapflow_sequence.lost import lost_rows
 
 from mocapflow.components import Stage
+from mocapflow.geometry import kinematics
 from mocapflow.io.whole import whole
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
@@ -48,7 +47,7 @@ class Report(Stage):
         """Write the report and return its paths."""
         series = measured(track, scene)
         columns = tables.angle_columns(track, series)
-        pictures = draw(track, scene, columns, evaluation, run_folder.path)
+        curves, overlap, *strides = draw(track, scene, columns, evaluation, run_folder.path)
         recipe = runjson.plain(run_folder.recipe)
         happened = [
             *recording.warnings,
@@ -60,11 +59,11 @@ class Report(Stage):
         names = [camera.name for camera in scene.cameras]
         sections = [
             ("At a glance", page.listing(report_rows.glance(track, names, evaluation))),
-            ("Angles", _shown(pictures[:1]) + page.table(report_rows.ranges(columns))),
-            ("Gait cycle", _shown(pictures[2:])),
+            ("Angles", _shown([curves]) + page.table(report_rows.ranges(columns))),
+            ("Gait cycle", _shown(strides)),
             ("Deviation from the reference", _deviations(evaluation)),
             ("Overlay", "\n".join(page.picture(jpeg, "jpeg", said) for said, jpeg in stills(track, scene, recording))),
-            ("Overlap of model and image", _shown(pictures[1:2])),
+            ("Overlap of model and image", _shown([overlap])),
             ("What happened", page.listing(happened)),
             ("CPU time", page.table(report_rows.times(track))),
             ("Versions", page.listing([f"{name} {version}" for name, version in recipe.get("versions", {}).items()])),
@@ -75,27 +74,27 @@ class Report(Stage):
         path = layout.place(run_folder.path, layout.REPORT)
         with whole(path) as part:
             part.write_text(page.page(run_folder.path.resolve().name, subtitle, sections), encoding="utf-8")
-        return Files(paths=(path, *pictures))
+        return Files(paths=(path, curves, overlap, *strides))
 
 
 def draw(
     track: Track, scene: Scene, columns: Mapping[str, F64], evaluation: Evaluation | None, folder: Path
 ) -> list[Path]:
     """Draw angles, overlap and, of somebody who walks without a reference, the gait cycle; return the files."""
-    known: Mapping[str, F64] = {}
-    if evaluation is not None and evaluation.rows:
-        known = at_our_frames(read_reference(Path(evaluation.reference)), columns)
     raw, lost = tables.angle_columns(track, measured(before_smoothing(track), scene)), lost_rows(track)
     curves, overlap = layout.place(folder, layout.PLOT), layout.place(folder, layout.OVERLAP)
-    plots.plot_angles(curves, columns, raw, known, evaluation, lost)
+    plots.plot_angles(curves, columns, raw, evaluation, lost)
     plots.plot_overlap(overlap, track, [camera.name for camera in scene.cameras], lost)
-    stick = ours.of_track(track, scene).stick
-    strides = [] if known else cycles.gait_cycles(stick.names, stick.places, track.frame_rate)
+    compared = evaluation is not None and evaluation.rows  # then the strides of both are drawn
+    return [curves, overlap, *([] if compared else _draw_strides(track, scene, columns, folder))]
+
+
+def _draw_strides(track: Track, scene: Scene, columns: Mapping[str, F64], folder: Path) -> list[Path]:
+    places = kinematics.joint_centres(scene.body, track.root, track.angles)
+    strides = cycles.gait_cycles(scene.body.joint_names, places, track.frame_rate)
     names = [name for name in tables.angle_names(columns) if cycles.own(strides, name)]
-    if not names:
-        return [curves, overlap]
     walked = {name: {"mocapflow": cycles.normalised(strides, columns[name], name)} for name in names}
-    return [curves, overlap, comparison_plots.draw_cycles(layout.place(folder, layout.CYCLES_PLOT), walked)]
+    return [comparison_plots.draw_cycles(layout.place(folder, layout.CYCLES_PLOT), walked)] if walked else []
 
 
 def _shown(pictures: Sequence[Path]) -> str:

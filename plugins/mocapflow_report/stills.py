@@ -19,7 +19,7 @@ def stills(track: Track, scene: Scene, recording: Recording) -> list[tuple[str, 
 
     chosen = chosen_rows(track)
     painter, found = Painter(scene), {}
-    last = max((int(track.frame[row]) for row in chosen.values()), default=-1)
+    last = max(int(track.frame[row]) for row in chosen.values())
     for frame in recording.until(last).frames():
         for what, row in chosen.items():
             if track.frame[row] == frame.index:
@@ -34,8 +34,7 @@ def chosen_rows(track: Track) -> dict[str, int]:
     seen = np.isfinite(track.overlap)
     known = np.flatnonzero(seen.any(axis=1))
     if not len(known):
-        middle = len(track.frame) // 2
-        return {"first": 0, "middle": middle, "last": len(track.frame) - 1} if len(track.frame) else {}
+        return {"first": 0, "middle": len(track.frame) // 2, "last": len(track.frame) - 1}
     mean = np.where(seen, track.overlap, 0).sum(1)[known] / seen.sum(1)[known]
     order = known[np.argsort(-mean, kind="stable")]
     return {"best": int(order[0]), "median": int(order[len(order) // 2]), "worst": int(order[-1])}

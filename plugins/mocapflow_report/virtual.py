@@ -29,8 +29,6 @@ class Virtual(Stage):
 
     def run(self, track: Track, scene: Scene, run_folder: RunFolder) -> Files:
         """Write the video and return its path."""
-        if not len(track.frame):
-            return Files(paths=())
         path = layout.place(run_folder.path, layout.VIRTUAL)
         room = Room(scene, track.root, (self.width_px, self.height_px))
         with drawing.videos([path], track.frame_rate / self.every, self.codec) as (video,):

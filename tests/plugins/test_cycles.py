@@ -97,4 +97,4 @@ def test_limits_of_agreement_hold_95_per_cent() -> None:
 
 def test_shared_angles_are_those_that_both_have(tmp_path: Path) -> None:
     curve, nothing = np.ones(3), np.full(3, np.nan)
-    assert cycles.shared({"frame": curve, "a": curve, "b": curve}, {"a": nothing, "b": curve}) == ["b"]
+    assert list(cycles.shared({"frame": curve, "a": curve, "b": curve}, {"a": nothing, "b": curve})) == ["b"]

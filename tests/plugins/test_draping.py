@@ -1,5 +1,7 @@
 """The drape on analytic bodies (T-CL1 to T-CL3), and the distance fields under it."""
 
+from dataclasses import replace
+
 import drape_bodies
 import numpy as np
 import pytest
@@ -26,7 +28,7 @@ from mocapflow_garments.skirt import Skirt
 
 from mocapflow.data import Past, PoseBatch
 from mocapflow.errors import PluginError
-from mocapflow.geometry import kinematics
+from mocapflow.geometry import kinematics, sewing
 from mocapflow.scene import Scene
 from mocapflow.testing.bodies import tiny_body
 
@@ -233,6 +235,29 @@ def test_a_draper_without_a_garment_says_so(skirted):
     scene, poses = skirted
     with pytest.raises(PluginError, match="no garment to drape"):
         draper().drape(poses, calm(scene, 4), Past(), Scene(cameras=(), body=scene.body))
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (lambda g: dict(strands=g.strands[1:]), "vertex 0 lies on 0 strands"),
+        (lambda g: dict(strands=np.append(g.strands, g.strands[:1], axis=0)), "vertex 0 lies on 2 strands"),
+        (lambda g: dict(pinned=g.pinned[1:], pinned_to=g.pinned_to[1:]), "strand of vertex 0 hangs from nothing"),
+        (lambda g: dict(rings=g.rings + np.eye(len(g.rings), 2, 1, dtype=np.int32)), "ring link .* of two rows"),
+    ],
+)
+def test_a_garment_that_no_strands_make_up_says_so(skirted, spoil, said):
+    scene, _ = skirted
+    with pytest.raises(PluginError, match=said):
+        strands_of(replace(scene.garment, **spoil(scene.garment)), scene.body)
+
+
+def test_a_sheet_whose_middle_hangs_straight_down_says_so():
+    body = tiny_body()
+    line, down = np.linspace(-0.1, 0.1, 5), np.linspace(0.0, -0.4, 6)
+    straight = np.stack(np.broadcast_arrays(line[:, None], -0.2, 1.0 + down), axis=-1)
+    with pytest.raises(PluginError, match="apron: strand 2 hangs straight down"):
+        strands_of(sewing.sheet("apron", body, straight, closed=False), body)
 
 
 def test_joints_that_it_can_not_touch_do_not_move_the_cloth():

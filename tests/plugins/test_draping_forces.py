@@ -70,6 +70,14 @@ def test_wind_against_a_wall_moves_nothing_into_it():
     np.testing.assert_allclose(blown(wall, touching, [1, 0, 0], 30.0), touching, atol=1e-3)
 
 
+def test_forces_together_lift_no_tail_above_its_support(skirted):
+    names = [name for name in skirted.garment.parameter_names if name.endswith("_rad")]
+    out, aside = tilts(skirted.garment, parameters(skirted.garment, **dict.fromkeys(names, 0.7)), np.linspace(0, 6, 99))
+    amount = np.degrees(np.hypot(out, aside))
+    assert amount.max() == pytest.approx(80)
+    assert np.abs(np.degrees(aside)).max() > 30  # both parts count
+
+
 @pytest.mark.parametrize("towards", [0.0, 1.0, 2.5])
 def test_order_one_is_a_wind_that_turns_every_strand_alike(skirted, towards):
     azimuth = np.linspace(0, 2 * np.pi, 12, endpoint=False)

@@ -275,6 +275,9 @@ def test_joint_centres_give_three_point_angles(tmp_path: Path, style: str) -> No
 
 
 def test_unreadable_references_say_so(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="keypoints  no such reference"):  # a folder that is not there
+        read_reference(tmp_path / "keypoints")
+    (tmp_path / "a.xlsx").touch()
     with pytest.raises(RecordingError, match=r"can't compare with a \.xlsx"):
         read_reference(tmp_path / "a.xlsx")
     (tmp_path / "a.csv").write_text("frame,knee_flexion_l\n0,1\n1,x\n")

@@ -188,3 +188,12 @@ def test_rerun_holds_everything_on_one_timeline(result: Result, tmp_path: Path) 
         assert cv2.imdecode(image, cv2.IMREAD_COLOR).shape == (*camera.size[::-1], 3)
         outline = np.concatenate(logged[f"/world/{camera.name}/outline"]["LineStrips2D:strips"][3])
         assert (outline.min(0) > 0).all() and (outline.max(0) < camera.size).all()
+
+
+def test_rerun_shows_no_picture_where_a_view_was_not_used(result: Result, tmp_path: Path) -> None:
+    usable = result.track.usable.copy()
+    usable[2, 1] = False
+    spoiled = replace(result, track=replace(result.track, usable=usable))
+    image = readers.rerun_entities(write("rrd", spoiled, tmp_path))["/world/cam02/image"]
+    assert sorted(image["frame"]) == result.track.frame.tolist()
+    assert len(image["EncodedImage:blob"]) == 4 and len(image["Clear:is_recursive"]) == 1

@@ -165,6 +165,15 @@ def test_without_common_points_joint_centres_do(own: Ours, tmp_path: Path) -> No
 
 
 @pytest.mark.usefixtures("unrendered")
+def test_rigs_without_common_joint_centres_are_not_compared_and_that_is_told(own: Ours, tmp_path: Path) -> None:
+    read(tmp_path, moved(PLACES)[0])
+    strange = replace(own.stick, names=tuple(f"{name}_of_another" for name in own.stick.names))
+    got = evaluate(replace(own, stick=strange), tmp_path / "markers.c3d", tmp_path)
+    assert got.rows and not (tmp_path / layout.DISTANCES).exists()
+    assert "no joint distances: too few joint centres that both systems have" in got.notes
+
+
+@pytest.mark.usefixtures("unrendered")
 def test_the_stick_model_has_the_times_of_the_track(own: Ours, tmp_path: Path) -> None:
     read(tmp_path, moved(PLACES)[0])
     columns, raw = ({name: values[10:] for name, values in part.items()} for part in (own.columns, own.raw))

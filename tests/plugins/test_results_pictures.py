@@ -7,8 +7,8 @@ import cv2
 import numpy as np
 import pytest
 from mocapflow_evaluation.evaluate import Evaluate
-from mocapflow_export import layout
-from mocapflow_report import drawing, raster, report_rows
+from mocapflow_export import layout, tables
+from mocapflow_report import drawing, portrait, raster, report_rows
 from mocapflow_report.overlay import Overlay, Painter
 from mocapflow_report.report import Report
 from mocapflow_report.stills import chosen_rows, stills
@@ -18,6 +18,7 @@ from results_scene import DEMO, demo_scene, stepping
 
 from mocapflow.errors import StoreError
 from mocapflow.geometry import cameras
+from mocapflow.io.columns import read_columns
 from mocapflow.recordings.recording import Recording, open_recording
 from mocapflow.results import Evaluation, RunFolder, Track
 from mocapflow.scene import Scene
@@ -88,12 +89,16 @@ def test_the_report_says_at_once_which_frames_the_images_contradict(track: Track
     assert report_rows.mishaps(doubted, {}) == ["frames that the images contradict: 1"]
 
 
-def test_overlay_of_a_doubted_frame_says_so(scene: Scene, track: Track, recording: Recording) -> None:
+@pytest.mark.parametrize(
+    "odd",
+    [{"doubted": np.ones(4, bool)}, {"usable": np.tile([True, False, True, True], (4, 1))}],
+    ids=["doubted", "not used"],
+)
+def test_overlay_of_an_odd_frame_says_so(
+    scene: Scene, track: Track, recording: Recording, odd: dict[str, np.ndarray]
+) -> None:
     frame = next(recording.frames())
-    plain, said = (
-        Painter(scene).paint(frame, replace(track, doubted=np.full(len(track.frame), doubted)), 0, 1)
-        for doubted in (False, True)
-    )
+    plain, said = (Painter(scene).paint(frame, each, 0, 1) for each in (track, replace(track, **odd)))
     differs = np.flatnonzero(np.any(plain != said, axis=(1, 2)))
     assert 0 < len(differs) < 80  # a line of text at the top
     assert differs.max() < 160
@@ -215,6 +220,18 @@ def test_report_without_reference(scene: Scene, track: Track, recording: Recordi
     assert "Deviation" not in page
 
 
+def test_an_angle_that_the_reference_never_has_is_drawn_without_it(
+    scene: Scene, track: Track, recording: Recording, tmp_path: Path
+) -> None:
+    truth = read_columns(DEMO / "truth" / "angles.csv")
+    truth["ankle_l"] = np.full(len(truth["frame"]), np.nan)
+    tables.write_columns(tmp_path / "known.csv", truth)
+    given = {"track": track, "scene": scene, "recording": recording, "run_folder": RunFolder(path=tmp_path, recipe={})}
+    evaluation = Evaluate(reference=str(tmp_path / "known.csv")).run(**given)
+    assert "ankle_r" in evaluation.curves and "ankle_l" not in evaluation.curves
+    Report().run(**given, evaluation=evaluation)
+
+
 def test_shown_frames_are_best_median_and_worst(track: Track) -> None:
     overlap = np.array([[0.5, 0.7], [0.9, np.nan], [0.8, 0.8], [np.nan, np.nan]])
     assert chosen_rows(replace(track, overlap=overlap, usable=np.ones((4, 2), bool))) == {
@@ -237,6 +254,27 @@ def test_unwritable_video_is_an_error_for_people(tmp_path: Path) -> None:
     video = drawing.Video(tmp_path / "no" / "folder.mp4", 30.0, "mp4v")
     with pytest.raises(StoreError, match="can't write a video with codec mp4v"):
         video.write(np.zeros((64, 64, 3), np.uint8))
+
+
+def test_a_video_that_is_cut_off_leaves_the_one_before_it(tmp_path: Path) -> None:
+    path, image = tmp_path / "a.mp4", np.zeros((64, 64, 3), np.uint8)
+    with drawing.videos([path], 30.0, "mp4v") as (video,):
+        video.write(image)
+    before = path.read_bytes()
+    with pytest.raises(KeyboardInterrupt), drawing.videos([path], 30.0, "mp4v") as (video,):
+        video.write(image)
+        video.write(image)
+        raise KeyboardInterrupt
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_strands_without_rings_have_a_pattern_of_their_length_alone(scene: Scene) -> None:
+    assert scene.garment is not None
+    rings, length = scene.garment.rings, scene.garment.ring_length
+    fringe = replace(scene.garment, rings=rings[:0], ring_length=length[:0])
+    ink = [portrait.pattern(garment).std() for garment in (fringe, scene.garment)]
+    assert 0 < ink[0] < ink[1]
 
 
 def test_cloth_that_cuts_through_the_skin_it_lies_on_covers_it_and_cloth_behind_it_does_not() -> None:

@@ -74,10 +74,10 @@ def log_images(rr: Any, stream: Any, result: Result, row: int, images: Any) -> N
     track = result.track
     surface = result.surface(row)
     for camera, image, usable in zip(result.scene.cameras, images, track.usable[row], strict=True):
+        shown = rr.Clear(recursive=False)  # else the viewer goes on showing the picture before
         if usable:
             _, encoded = cv2.imencode(".jpg", np.asarray(image), [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
-            stream.log(
-                f"world/{camera.name}/image", rr.EncodedImage(contents=encoded.tobytes(), media_type="image/jpeg")
-            )
+            shown = rr.EncodedImage(contents=encoded.tobytes(), media_type="image/jpeg")
+        stream.log(f"world/{camera.name}/image", shown)
         outline = silhouettes.outline(surface, camera).pixel
         stream.log(f"world/{camera.name}/outline", rr.LineStrips2D(outline, colors=[OUTLINE]))

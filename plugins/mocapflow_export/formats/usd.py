@@ -37,7 +37,6 @@ class Author:
         self._skel, self._gf, self._vt = (library(f"pxr.{name}", "usd") for name in ("UsdSkel", "Gf", "Vt"))
         self._result, self._body = result, result.scene.body
         self._frames = [int(frame) for frame in result.track.frame]
-        path.unlink(missing_ok=True)
         self._stage: Any = self._usd.Stage.CreateNew(str(path))
 
     def save(self) -> None:
@@ -46,9 +45,8 @@ class Author:
         geom.SetStageUpAxis(stage, geom.Tokens.z)
         geom.SetStageMetersPerUnit(stage, 1.0)
         stage.SetTimeCodesPerSecond(self._result.recording.frame_rate)  # codes are frames of the videos
-        if self._frames:
-            stage.SetStartTimeCode(self._frames[0])
-            stage.SetEndTimeCode(self._frames[-1])
+        stage.SetStartTimeCode(self._frames[0])
+        stage.SetEndTimeCode(self._frames[-1])
         stage.SetDefaultPrim(geom.Xform.Define(stage, "/World").GetPrim())
         self._skel.Root.Define(stage, PERSON)
         self._add_skeleton()
