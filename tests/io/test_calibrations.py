@@ -257,6 +257,17 @@ def test_easymocap_lacks_a_matrix(tmp_path):
         read_cameras(tmp_path)
 
 
+@pytest.mark.parametrize(("old", "new"), [("rows: 3", "rows: 4"), ("dt: d", "dt: q")])
+def test_easymocap_with_no_matrix_where_one_should_be(tmp_path, old, new):
+    write_easymocap(tmp_path, ring())
+    path = tmp_path / "intri.yml"
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(RecordingError, match=r"intri\.yml:\d+:1  camera 'cam01' has no matrix in K_cam01\n.*as many"):
+        read_cameras(tmp_path)
+
+
 def test_one_name_twice(tmp_path):
     path = tmp_path / "cameras.toml"
     write_cameras(path, ring())
