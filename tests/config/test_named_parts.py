@@ -131,6 +131,8 @@ def test_what_is_wrong_is_told_by_its_line(tmp_path, spread):
         "       available: body, garment, skeleton, weights — did you mean 'body'?\n"
         "       for other files name the folder: subject: DIR"
     )
+    touched(tmp_path, *(f"poses/{number:02}.json" for number in range(40)))
+    assert refused(tmp_path, init="poses/39.jsn").endswith("28.json, 29.json and 10 more — did you mean '39.json'?")
     assert refused(tmp_path, init=3) == "HERE/mine.yaml:6:3  recording.init: a path is expected, not 3"
     (tmp_path / "few.yaml").write_text("recording: {cameras: lab/rig.toml}\n")
     with pytest.raises(PipelineError, match=r"few.yaml:1:1  recording: a recording needs videos"):
