@@ -361,6 +361,7 @@ MESH = CLOTHED.garment
         ({"pinned": MESH.pinned[:0], "pinned_to": MESH.pinned_to[:0]}, "cloth that is pinned nowhere"),
         ({"vertices": 1000 * MESH.vertices}, "a pin .* m from the skin that holds it; are its measures in metres?"),
         ({"parameter_names": ()}, "3 bounds of parameters for the names none"),
+        ({"parameter_names": ("a", "a", "b", "c")}, "3 bounds of parameters for the names a, a, b, c"),
         ({"parameter_bounds": MESH.parameter_bounds[:, ::-1]}, "the bounds .* of parameter"),
         ({"parameter_bounds": np.full_like(MESH.parameter_bounds, np.inf)}, "the bounds .* of parameter"),
     ],
