@@ -69,11 +69,6 @@ def plan(pipeline: Pipeline, *, store: Path, url: str | None = None) -> list[Pla
     return lines
 
 
-def keys(pipeline: Pipeline, *, store: Path, url: str | None = None) -> dict[str, str]:
-    """Return the key of what each stage would make, by label."""
-    return {step.label: step.key for step in steps(pipeline, store=store, url=url)}
-
-
 def steps(pipeline: Pipeline, *, store: Path, url: str | None = None) -> list[Step]:
     """Return the stages of a pipeline with their recipes and keys."""
     kept = open_store(store, url)
