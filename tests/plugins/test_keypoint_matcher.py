@@ -57,7 +57,7 @@ def test_landmarks_are_means_of_the_skin_around_them(by):
     """At rest and bent, within what the skin slides over a joint."""
     pose = moved(POSE, np.r_[np.zeros(6), by * np.random.default_rng(0).normal(size=len(POSE.angles))])
     places, marks = landmarks(BODY), marks_on(BODY)
-    exact = kinematics.skin(places.body, kinematics.chain(places.body, pose)[0])
+    exact = kinematics.skin(places.body, kinematics.chain(places.body, pose)[0], pose.angles)
     skin = SCENE.surface(pose, NO_CLOTH).vertices
     means = np.einsum("lk,lka->la", marks.share, skin[marks.vertex])
     np.testing.assert_allclose(marks.share.sum(axis=1), 1)
@@ -83,7 +83,9 @@ def test_the_pose_is_found_from_keypoints_alone():
         again = partial(Keypoints().match, frame, NOTHING, past=Past(), scene=SCENE, turn=turn)
         pose = TwistGaussNewton().solve(again, state, model, (), Past(), turn).pose
     places = landmarks(BODY).body
-    truth, before, after = (kinematics.skin(places, kinematics.chain(places, p)[0]) for p in (POSE, start, pose))
+    truth, before, after = (
+        kinematics.skin(places, kinematics.chain(places, p)[0], p.angles) for p in (POSE, start, pose)
+    )
     assert np.linalg.norm(before - truth, axis=1).mean() > 0.05
     assert np.linalg.norm(after - truth, axis=1).mean() < 0.01
 
