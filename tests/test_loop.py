@@ -114,9 +114,9 @@ def test_a_frame_that_begins_like_a_first_may_take_more_turns(frame):
 
 def test_onlookers_see_every_turn_in_order(frame):
     seen = []
-    result = go(frame, 1.0, lambda index, turn, state: seen.append((index, turn.index, turn.cap, state)))
-    assert [s[:3] for s in seen] == [(5, 0, 8), (5, 1, 8), (5, 2, 8)]
-    assert seen[-1][3] is result.state
+    result = go(frame, 1.0, lambda index, turn, state: seen.append((index, turn.index, state)))
+    assert [s[:2] for s in seen] == [(5, 0), (5, 1), (5, 2)]
+    assert seen[-1][2] is result.state
 
 
 def test_the_change_is_the_largest_move_of_the_surface(frame):

@@ -41,7 +41,7 @@ def test_same():
     assert same({"a": (nan, 1, float("nan"))}, {"a": (nan.copy(), 1, float("nan"))})
     assert not same(np.zeros(2), np.zeros(2, np.float32))
     assert not same(np.zeros(2), np.zeros(3))
-    assert not same(Turn(index=0, cap=8), Turn(index=1, cap=8))
+    assert not same(Turn(index=0), Turn(index=1))
     assert not same([1], (1,))
 
 

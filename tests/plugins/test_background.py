@@ -24,7 +24,7 @@ from mocapflow.scene import Scene
 from mocapflow.testing import pictures, scenes
 from tests.fixtures.recordings import number_of, ring, write_recording
 
-FIRST = Turn(index=0, cap=8)
+FIRST = Turn(index=0)
 SHAPE = (200, 240)
 FLOOR = np.ones(SHAPE, bool)
 

@@ -24,7 +24,7 @@ BODY = Scanned().load(DEMO)
 SCENE = Scene(cameras=read_cameras(DEMO), body=BODY)
 POSE = read_pose(DEMO / "init.json", BODY)
 NOTHING = Segmentation(silhouettes=())
-FIRST = Turn(index=0, cap=5)
+FIRST = Turn(index=0)
 
 
 def frame_of(pose, noise_px=0.0, bystander=(), wild=(), seed=0):
@@ -79,7 +79,7 @@ def test_the_pose_is_found_from_keypoints_alone():
     frame, model = frame_of(POSE, noise_px=0.3), ClothedModel(scene=SCENE)
     pose = start
     for index in range(3):
-        state, turn = believed(pose, np.empty(0), NO_CLOTH), Turn(index=index, cap=3)
+        state, turn = believed(pose, np.empty(0), NO_CLOTH), Turn(index=index)
         again = partial(Keypoints().match, frame, NOTHING, past=Past(), scene=SCENE, turn=turn)
         pose = TwistGaussNewton().solve(again, state, model, (), Past(), turn).pose
     places = landmarks(BODY).body
