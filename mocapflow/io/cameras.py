@@ -12,6 +12,7 @@ import numpy as np
 from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError, guess
 from mocapflow.geometry import twists
+from mocapflow.io import opencv, qualisys
 from mocapflow.io.calibrated import bad, make_camera
 from mocapflow.io.typed import place, read_toml
 from mocapflow.io.whole import whole
@@ -36,8 +37,6 @@ def read_cameras(path: Path) -> tuple[Camera, ...]:
         RecordingError: the file is missing, incomplete, not a calibration, not in metres, or has its
             frame rate where nobody looks for it.
     """
-    from mocapflow.io import opencv, qualisys
-
     path = find_calibration(path) if path.is_dir() else path
     if not path.is_file():
         raise RecordingError("no such calibration file", where=str(path))
