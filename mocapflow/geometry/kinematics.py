@@ -148,7 +148,7 @@ def part_of(body: Body, vertices: npt.NDArray[np.integer[Any]]) -> Body:
     )  # fmt: skip
 
 
-def descendants(parents: Any) -> np.ndarray:
+def descendants(parents: I32) -> Bool:
     """Return (J, J) booleans: [i, j] is True where joint j is joint i or below it."""
     count = len(parents)
     below = np.eye(count, dtype=bool)
