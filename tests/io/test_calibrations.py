@@ -202,6 +202,18 @@ def test_a_fisheye_with_the_coefficients_of_another_lens(tmp_path):
         read_cameras(path)
 
 
+def test_skew_goes_with_a_lens_without_distortion_alone(tmp_path):
+    path = write_changed(tmp_path / "cameras.toml", "matrix = [[60.0, 0.0,", "matrix = [[60.0, 3.0,")
+    assert read_cameras(path)[0].intrinsics[0, 1] == 3
+    path.write_text(path.read_text().replace("distortions = [0.0,", "distortions = [-0.1,", 1))
+    with pytest.raises(RecordingError, match="camera 'cam01' has a skew of 3 px\n.*without skew"):
+        read_cameras(path)
+    qualisys = tmp_path / "trial.qca.txt"
+    qualisys.write_text(QUALISYS.replace('skew="0"', 'skew="128"'))
+    with pytest.raises(RecordingError, match="camera '26578' has a skew of 2 px"):
+        read_cameras(qualisys)
+
+
 def test_trailing_zero_coefficients_are_left_out(tmp_path):
     path = write_changed(tmp_path / "cameras.toml", "distortions = [0.0,", "distortions = [0, 0, 0, 0, 0.0,")
     assert read_cameras(path)[0].distortion.shape == (5,)
