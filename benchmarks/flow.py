@@ -32,8 +32,8 @@ from mocapflow.recordings.recording import open_recording
 from mocapflow.scene import Scene
 
 CLIP, ROUNDS = "shorts_steps", 20
-FIRST = Turn(index=0, cap=3)
-CALM = Turn(index=2, cap=3, change=Change(body=0.005, cloth=0.0, angles=0.0, sigmas=1.0))
+FIRST = Turn(index=0)
+CALM = Turn(index=2, change=Change(body=0.005, cloth=0.0, angles=0.0, sigmas=1.0))
 ALL, ONE_TURN = 18, 6  # calls a frame
 
 

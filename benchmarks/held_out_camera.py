@@ -33,7 +33,7 @@ from mocapflow.scene import Scene
 
 RECORDING = Path("examples/data/skirt_steps")
 TRACK_ONLY = tuple(f"stages.{stage}=null" for stage in ("smooth", "export", "evaluate", "overlay", "virtual", "report"))
-TURN = Turn(index=0, cap=1)
+TURN = Turn(index=0)
 
 
 def main() -> None:

@@ -221,7 +221,6 @@ class Turn:
     """Where the loop stands: schedules (coarse to fine, shares) read it."""
 
     index: int
-    cap: int
     change: Change | None = None
 
     def calm(self, body_mm: float) -> bool:

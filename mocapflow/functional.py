@@ -30,7 +30,7 @@ from mocapflow.records import F32, F64
 
 SHAPE_WEIGHT = 0.05  # lambda, px^-2; a segmenter may descend with another one
 BAND_PX = 12.0  # around both contours, at most; beyond, the area term does not grow
-SLACK = 0.01  # share that the area may rise by in a step: what a step lowers is the error of contours
+SLACK = 0.01  # share that area and priors may rise by in a step: what a step lowers is the error of contours
 IN_VIEW = ("data", "length", "shape", "contour")  # contour: what the pose solver lowers; not part of the sum
 
 

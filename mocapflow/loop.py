@@ -45,11 +45,11 @@ def settle(
     """
     functional, watch = Functional(model, steps.priors, past), Stopwatch()
     steady = steps.steady if past.moments else steps.steady.beginning
-    calm, turn = 0, Turn(index=0, cap=steady.max_turns)
+    calm, change = 0, None
     last = before_last = Shown(state.estimate.pose, model.surface(state.estimate.pose, state.cloth))
     energy, cost = np.full((steps.steady.cap, len(functional.terms)), np.nan), np.nan
     for index in range(steady.max_turns):
-        turn = Turn(index=index, cap=turn.cap, change=turn.change)
+        turn = Turn(index=index, change=change)
         segmentation = segmentation_of(steps.segmenter, frame, state, past, model.scene, turn)
         watch.lap("segment")
         match = partial(pool_matches, steps.matchers, frame, segmentation, past, model.scene, turn)
@@ -69,17 +69,16 @@ def settle(
         watch.lap("match")
         observe(frame.index, turn, state)
         before_last, last = last, now
-        turn = Turn(index=index, cap=turn.cap, change=change)
         calm = calm + 1 if steady.holds(change, index + 1) and steady.even(last_cost, cost) else 0
         if calm >= steady.turns:
             break
-    assert turn.change is not None
+    assert change is not None
     return FrameResult(
         state=state,
-        iterations=turn.index + 1,
+        iterations=index + 1,
         steady=calm >= steady.turns,
-        oscillating=calm == 0 and turn.index > 1 and steady.holds(swing, turn.index + 1),
-        change=turn.change,
+        oscillating=calm == 0 and index > 1 and steady.holds(swing, index + 1),
+        change=change,
         overlap=overlaps(surface, segmentation, model.scene.cameras),
         energy=energy,
         energy_terms=functional.terms,

@@ -31,6 +31,8 @@ class Series:
 
     def __getitem__(self, which: Any) -> Values:
         first, *others = which if isinstance(which, tuple) else (which,)
+        if first is Ellipsis:
+            first, others = slice(None), [Ellipsis, *others]
         numbers = np.arange(len(self))[first]
         values = self._rows(np.atleast_1d(numbers))
         return values[(slice(None) if np.ndim(numbers) else 0, *others)]

@@ -68,7 +68,7 @@ def test_segmenters_keep_to_the_model_where_the_person_is_hidden():
     for segmenter in (BackgroundDifference(), GrabCut(), LevelSet()):
         off = []
         for given in (spoiled, behind_bar(spoiled, rows)):
-            found = segmenter.segment(given, state, Past(), scene, Turn(index=0, cap=8)).of("person")[0]
+            found = segmenter.segment(given, state, Past(), scene, Turn(index=0)).of("person")[0]
             off.append(np.count_nonzero((found.distance > 0)[rows] != truth[0][rows]))
         assert off[1] < 0.2 * off[0]
         assert off[1] < 0.1 * np.count_nonzero(truth[0][rows])

@@ -24,8 +24,12 @@ def series(asked):
 
 
 @pytest.mark.parametrize(
-    "which", [7, -1, slice(3, 9), slice(None, None, -40), np.array([5, 2, 5]), np.arange(150) % 50 == 1, (slice(4), 1)]
-)
+    "which",
+    [
+        7, -1, slice(3, 9), slice(None, None, -40), np.array([5, 2, 5]), np.arange(150) % 50 == 1, (slice(4), 1),
+        ..., (..., 1), (3, ..., 1),
+    ],
+)  # fmt: skip
 def test_it_is_indexed_as_an_array_is(series, which):
     np.testing.assert_array_equal(series[which], VALUES[which])
 

@@ -5,14 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mocapflow.components import Garment, Prior, Recovery
-from mocapflow.data import Pose, Residual, Turn
+from mocapflow.components import Garment, Prior, Recovery, Stage
+from mocapflow.data import Pose, Residual, Start, Turn
 from mocapflow.errors import ShapeError
 from mocapflow.geometry.meshes import edges
 from mocapflow.testing import (
     GarmentConformance,
     PriorConformance,
     RecoveryConformance,
+    StageConformance,
     assert_pure,
     check_jacobian,
     same,
@@ -40,7 +41,7 @@ def test_same():
     assert same({"a": (nan, 1, float("nan"))}, {"a": (nan.copy(), 1, float("nan"))})
     assert not same(np.zeros(2), np.zeros(2, np.float32))
     assert not same(np.zeros(2), np.zeros(3))
-    assert not same(Turn(index=0, cap=8), Turn(index=1, cap=8))
+    assert not same(Turn(index=0), Turn(index=1))
     assert not same([1], (1,))
 
 
@@ -163,6 +164,21 @@ def test_conformance_finds_a_prior_with_a_wrong_energy():
     tests.prior = Doubled()
     with pytest.raises(AssertionError, match="Not equal to tolerance"):
         tests.test_its_jacobian_is_its_derivative(1, 0.1)
+
+
+def test_conformance_finds_a_stage_with_an_input_of_no_type():
+    class Blind(Stage):
+        """Takes it does not say what."""
+
+        name = "blind"
+
+        def run(self, *, recording) -> Start:
+            return recording
+
+    tests = StageConformance()
+    tests.stage = Blind()
+    with pytest.raises(AssertionError, match="run needs a type for recording"):
+        tests.test_its_inputs_and_output_are_typed()
 
 
 def test_the_tiny_garment_hangs_on_the_tiny_body():

@@ -60,11 +60,15 @@ def prune(
 
     if days is not None and not days >= 0:  # so says nan, too
         raise typer.BadParameter("a number of days, 0 or more", param_hint="--days")
-    going = [artifact for artifact in _artifacts(store) if everything or _goes(artifact, days, unfinished)]
-    for artifact in filter(_in_use, going):
-        typer.echo(f"kept {artifact.path.name}: a run is writing it", err=True)
-    going = [artifact for artifact in going if not _in_use(artifact)]
-    paths = [artifact.path for artifact in going] + Store(store).aside()
+    kept, paths = Store(store), list[Path]()
+    for artifact in _artifacts(store):
+        if not (everything or _goes(artifact, days, unfinished)):
+            continue
+        if kept.busy(artifact.key):
+            typer.echo(f"kept {artifact.path.name}: a run is writing it", err=True)
+        else:
+            paths.append(artifact.path)
+    paths += kept.aside()
     freed = sum(map(_size, paths))
     for path in paths:
         if not dry_run:
@@ -80,12 +84,6 @@ def _goes(artifact: Artifact, days: float | None, unfinished: bool) -> bool:
         return False
     made = datetime.fromisoformat(str(artifact.attributes["created"]))
     return (datetime.now(made.tzinfo) - made).total_seconds() > days * DAY
-
-
-def _in_use(artifact: Artifact) -> bool:
-    from mocapflow.storage.store import Store
-
-    return Store(artifact.path.parent).busy(artifact.key)
 
 
 def _artifacts(store: Path) -> list[Artifact]:

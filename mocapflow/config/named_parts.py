@@ -32,7 +32,6 @@ ALONE = {"truth": "angles", "reference": "reference"}  # what a single file in p
 REQUIRED = ("cameras", "videos")
 LATER_START = re.compile(r"init_\d{6}")  # of a part that begins at that frame
 AT = ("recording",)
-SHOWN = 20  # names of files in an error
 
 
 def folder_of(said: Mapping[str, Any], name: str, resolver: Resolver) -> Path:
@@ -135,7 +134,6 @@ def _there(value: Any, steps: Steps, resolver: Resolver, folder: bool | None = N
         return path
     kind = {None: "file or folder", False: "file", True: "folder"}[folder]
     near = next(place for place in path.parents if place.is_dir())
-    names = sorted(p.name for p in near.iterdir() if folder is None or p.is_dir() == folder)
-    more = f"\nand {len(names) - SHOWN} more" if len(names) > SHOWN else ""
-    hint = f"in {near}: {alternatives(path.name, names[:SHOWN]).removeprefix('available: ')}{more}"
+    names = [p.name for p in near.iterdir() if folder is None or p.is_dir() == folder]
+    hint = f"in {near}: {alternatives(path.name, names).removeprefix('available: ')}"
     raise resolver.located(RecordingError(f"there is no {kind} {path}", hint=hint), steps)

@@ -67,7 +67,7 @@ class Resolver:
 
     def file(self, value: str, steps: Steps) -> Path:
         """Return a path written in the file; a relative one starts at the folder of the file."""
-        return Path(os.path.normpath(self._document.place(steps).folder / Path(value).expanduser()))
+        return Path(os.path.normpath(self._document.place(steps).folder / os.path.expanduser(value)))
 
     def _name_and_settings(self, role: str, value: Any, steps: Steps) -> tuple[str, dict[str, Any]]:
         if isinstance(value, str):

@@ -40,13 +40,13 @@ def chain_batch(body: Body, poses: PoseBatch) -> F64:
     return joints
 
 
-def skin(body: Body, joints: F64, angles: F64 | None = None) -> F64:
+def skin(body: Body, joints: F64, angles: F64) -> F64:
     """Return the posed body vertices (V, 3) m of a chain `joints` (J, 4, 4), by linear blend skinning.
 
     Args:
         body: the body at rest.
         joints: (J, 4, 4) m, world_from_rest of each joint.
-        angles: (D,) rad; needed only by a body whose shape changes with an angle.
+        angles: (D,) rad, with one of which the shape of some bodies changes.
     """
     rest = rest_shape(body, angles)
     posed = np.empty_like(rest)
@@ -54,12 +54,10 @@ def skin(body: Body, joints: F64, angles: F64 | None = None) -> F64:
     return posed
 
 
-def rest_shape(body: Body, angles: F64 | None) -> F64:
+def rest_shape(body: Body, angles: F64) -> F64:
     """Return the vertices at rest (V, 3) m of the shape that the body has at joint angles (D,) rad."""
     if body.morph_offset is None:
         return body.vertices
-    if angles is None:
-        raise ValueError("the shape of this body changes with an angle: pass the angles to skin()")
     start, stop = body.morph_range
     share = np.clip((angles[body.morph_screw] - start) / (stop - start), 0.0, 1.0)
     shape: F64 = body.vertices + share * body.morph_offset
@@ -150,7 +148,7 @@ def part_of(body: Body, vertices: npt.NDArray[np.integer[Any]]) -> Body:
     )  # fmt: skip
 
 
-def descendants(parents: Any) -> np.ndarray:
+def descendants(parents: I32) -> Bool:
     """Return (J, J) booleans: [i, j] is True where joint j is joint i or below it."""
     count = len(parents)
     below = np.eye(count, dtype=bool)

@@ -9,6 +9,7 @@ import numpy as np
 
 from mocapflow.assets import Camera
 from mocapflow.data import Surface
+from mocapflow.geometry.silhouette_kernels import NEAREST
 from mocapflow.geometry.silhouettes import projected
 from mocapflow.records import F64, I32
 
@@ -51,7 +52,7 @@ def _front(image, depth, facing, faces, cloth, points, low, first, after, vertex
     height, width = first.shape
     cells = np.full((len(image), 2), BEHIND, np.int32)  # of every vertex
     for v in range(len(image)):
-        if depth[v] > 1e-6:
+        if depth[v] > NEAREST:
             cells[v, 0], cells[v, 1] = math.floor(image[v, 0] / CELL) - low[0], math.floor(image[v, 1] / CELL) - low[1]
     nearest = np.zeros(len(points))  # one over the depth, which is linear in the image
     for f in range(len(faces)):

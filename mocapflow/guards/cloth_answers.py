@@ -58,7 +58,7 @@ def mesh_of(garment: Garment, body: Body) -> GarmentMesh:
     if away > REACH:
         raise WrongAnswer(garment, f"a pin {away:.3g} m from the skin that holds it; are its measures in metres?")
     names, bounds = mesh.parameter_names, mesh.parameter_bounds
-    if len(set(names)) != len(bounds):
+    if not len(set(names)) == len(names) == len(bounds):
         raise WrongAnswer(garment, f"{len(bounds)} bounds of parameters for the names {', '.join(names) or 'none'}")
     for name, (low, high) in zip(names, bounds, strict=True):
         if not (np.isfinite([low, high]).all() and low <= high):

@@ -111,16 +111,15 @@ def common_rate(cameras: Sequence[Camera], videos: Sequence[Video], calibration:
     if stated is not None:
         hint = "write frames per second, or leave it out: then the videos say it"
         raise RecordingError(f"frame_rate is {stated!r}", where=place(calibration, "frame_rate"), hint=hint)
+    toml = calibration.name if calibration.suffix == ".toml" else "a cameras.toml, which this calibration has to become"
+    told = f"frame_rate under [metadata] in {toml}"
     if not rates:
-        return USUAL_RATE, [
-            f"nothing says the frame rate: {USUAL_RATE:g} frames per second assumed; "
-            f"write frame_rate under [metadata] in {calibration.name}"
-        ]
+        return USUAL_RATE, [f"nothing says the frame rate: {USUAL_RATE:g} frames per second assumed; write {told}"]
     if max(rates.values()) > 1.01 * min(rates.values()):
         raise RecordingError(
             "the videos differ in frame rate",
-            where=str(calibration.parent / "videos"),
+            where=str(videos[0].path.parent),
             hint=", ".join(f"{name}: {rate:g} per second" for name, rate in rates.items())
-            + "\nrecord all cameras at one rate, or write the true frame_rate under [metadata] in cameras.toml",
+            + f"\nrecord all cameras at one rate, or write the true {told}",
         )
     return Counter(rates.values()).most_common(1)[0][0], []

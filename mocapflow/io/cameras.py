@@ -12,12 +12,15 @@ import numpy as np
 from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError, guess
 from mocapflow.geometry import twists
+from mocapflow.geometry.cameras import bends
+from mocapflow.io import opencv, qualisys
 from mocapflow.io.calibrated import bad, make_camera
 from mocapflow.io.typed import place, read_toml
 from mocapflow.io.whole import whole
 
 FARTHEST = 100.0  # m; a camera further from the origin is one calibrated in centimetres
 MILLIMETRES = 1000.0  # m; beyond, in millimetres
+SKEW = 0.1  # px; a camera matrix with more does not go with a distorted lens: OpenCV's model of one has none
 YAML = (".yml", ".yaml")
 FIELDS = ("size", "matrix", "distortions", "rotation", "translation")
 OPTIONAL = ("name", "fisheye")
@@ -36,8 +39,6 @@ def read_cameras(path: Path) -> tuple[Camera, ...]:
         RecordingError: the file is missing, incomplete, not a calibration, not in metres, or has its
             frame rate where nobody looks for it.
     """
-    from mocapflow.io import opencv, qualisys
-
     path = find_calibration(path) if path.is_dir() else path
     if not path.is_file():
         raise RecordingError("no such calibration file", where=str(path))
@@ -127,6 +128,9 @@ def _check(camera: Camera, path: Path) -> None:
         raise bad(camera.name, path, f"has the size {camera.size[0]} x {camera.size[1]}")
     if not (k[0, 0] > 0 and k[1, 1] > 0 and k[2, 2] == 1) or k[1, 0] or k[2, 0] or k[2, 1]:
         raise bad(camera.name, path, "has no camera matrix", "expected [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] in pixels")
+    if abs(k[0, 1]) > SKEW and bends(camera):
+        hint = "lens distortion is corrected without skew: calibrate with a skew of 0, as OpenCV always does"
+        raise bad(camera.name, path, f"has a skew of {k[0, 1]:g} px", hint)
     if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-3 or np.linalg.det(rotation) < 0:
         raise bad(
             camera.name,

@@ -150,11 +150,11 @@ def read_c3d(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
         raise RecordingError("C3D files need ezc3d", where=str(path), hint="pip install 'mocapflow[c3d]'") from error
     try:
         content = ezc3d.c3d(str(path))
-    except OSError as error:
+    except (OSError, ValueError) as error:  # the latter of one that ends before its first frame
         raise RecordingError(f"this C3D file can't be read: {error}", where=str(path)) from error
     point = content["parameters"]["POINT"]
     names = tuple(str(name) for name in point["LABELS"]["value"])
-    unit = str(point["UNITS"]["value"][0]).strip()
+    unit = "".join(point["UNITS"]["value"][:1]).strip()  # a file may have none
     if unit not in METRES:
         raise RecordingError(f"unknown unit '{unit}'", where=str(path), hint=f"known: {', '.join(METRES)}")
     rate = float(point["RATE"]["value"][0])

@@ -10,6 +10,7 @@ import numpy as np
 from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.io.calibrated import make_camera
+from mocapflow.io.typed import place
 from mocapflow.records import F64
 
 
@@ -17,7 +18,7 @@ def cameras(folder: Path) -> tuple[Camera, ...]:
     """Read the pair `intri.yml` and `extri.yml` of a folder.
 
     Raises:
-        RecordingError: a file or a matrix is missing, or a file can't be read.
+        RecordingError: a file or a matrix is missing, or can't be read.
     """
     inner, outer = _open(folder / "intri.yml"), _open(folder / "extri.yml")
     names = inner.getNode("names")
@@ -55,7 +56,12 @@ def _open(path: Path) -> Any:
 
 
 def _matrix(node: Any, key: str, name: str, path: Path) -> F64:
-    found = None if node.empty() else node.mat()
-    if found is None:
+    import cv2
+
+    if node.empty():
         raise RecordingError(f"camera '{name}' lacks {key}", where=str(path))
-    return np.asarray(found, np.float64)
+    try:
+        return np.asarray(node.mat(), np.float64)
+    except cv2.error:
+        hint = "expected !!opencv-matrix with rows, cols, dt, and as many numbers in data"
+        raise RecordingError(f"camera '{name}' has no matrix in {key}", where=place(path, key), hint=hint) from None

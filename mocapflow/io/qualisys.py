@@ -50,7 +50,8 @@ def _camera(node: ElementTree.Element, path: Path) -> Camera:
     turn = np.array([[_number(place, f"r{i}{j}", name, path) for j in (1, 2, 3)] for i in (1, 2, 3)])
     rotation = np.diag([1.0, -1.0, -1.0]) @ turn  # Qualisys cameras look along -z, with y up
     position = np.array([_number(place, key, name, path) for key in "xyz"]) / METRE
-    matrix = [[fx, 0, cx - left], [0, fy, cy - top], [0, 0, 1]]
+    skew = _number(lens, "skew", name, path) / FRACTION if "skew" in lens.attrib else 0.0
+    matrix = [[fx, skew, cx - left], [0, fy, cy - top], [0, 0, 1]]
     size = [right - left + 1, bottom - top + 1]
     return make_camera(name, size, matrix, [k1, k2, p1, p2, k3], rotation, -rotation @ position, where=path)
 

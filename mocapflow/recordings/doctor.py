@@ -28,8 +28,6 @@ from mocapflow.recordings.first_look import examine_first_frame
 from mocapflow.recordings.synchrony import measure
 from mocapflow.registry import Registry, load_registry
 
-__all__ = ["Finding", "examine", "examine_timing"]
-
 
 def examine(folder: Path) -> list[Finding]:
     """Return everything that is odd about a recording folder, errors first; every video is decoded.

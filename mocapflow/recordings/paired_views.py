@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from mocapflow.assets import Camera
+from mocapflow.data import BORDER
 from mocapflow.geometry.pencils import pencil_axes, plane_angles
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F32, F64, U8, Bool
@@ -18,7 +19,6 @@ Signals = Callable[[int, int], tuple[F64, F64]]
 CONFIDENT = 0.3  # of a keypoint
 DIFFERENT = 25  # grey levels from the empty room
 SAMPLES = 15  # pictures that the empty room is the median of, without clean plates
-BORDER = 3  # px; a silhouette that comes so near to the border is cut by it
 CALM = 5  # px, median filter of a silhouette
 
 

@@ -48,6 +48,12 @@ def is_hit(step: Step, artifact: Artifact) -> bool:
     return artifact.complete and (not step.chain or artifact.frames >= step.frames)
 
 
+def find_hit(step: Step, store: Store) -> Artifact | None:
+    """Return the artifact that holds all that a stage would make, None where it has to be made."""
+    found = store.find(step.key) if step.stored else None
+    return found if found is not None and is_hit(step, found) else None
+
+
 class Execution:
     """Finishes the stages of a pipeline, each at most once."""
 
@@ -80,8 +86,7 @@ class Execution:
         return self._results[label]
 
     def _find(self, step: Step) -> Artifact | None:
-        found = self._store.find(step.key) if step.stored and not self._fresh else None
-        return found if found is not None and is_hit(step, found) else None
+        return None if self._fresh else find_hit(step, self._store)
 
     def _loaded(self, step: Step, found: Artifact) -> Any:
         try:

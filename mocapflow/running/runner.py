@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from mocapflow.caching.keys import explain
 from mocapflow.config.pipeline import Pipeline
 from mocapflow.errors import MocapflowError, PipelineError, no_run_folder
-from mocapflow.running.execution import Execution, is_hit
+from mocapflow.running.execution import Execution, find_hit, is_hit
 from mocapflow.running.former_code import as_made
 from mocapflow.running.recipes import Step, steps_of
 from mocapflow.running.wiring import SUPPLIED, Source
@@ -69,11 +69,6 @@ def plan(pipeline: Pipeline, *, store: Path, url: str | None = None) -> list[Pla
     return lines
 
 
-def keys(pipeline: Pipeline, *, store: Path, url: str | None = None) -> dict[str, str]:
-    """Return the key of what each stage would make, by label."""
-    return {step.label: step.key for step in steps(pipeline, store=store, url=url)}
-
-
 def steps(pipeline: Pipeline, *, store: Path, url: str | None = None) -> list[Step]:
     """Return the stages of a pipeline with their recipes and keys."""
     kept = open_store(store, url)
@@ -107,18 +102,13 @@ def check_inputs(pipeline: Pipeline, steps: Sequence[Step], store: Store, fresh:
         try:
             need()
         except MocapflowError:
-            if any(fresh or not _made(step, store) for step in readers):
+            if any(fresh or find_hit(step, store) is None for step in readers):
                 raise
 
     for step in steps:
         asked(partial(step.named.stage.need, step.recording), [step])
     dressed = [step for step in steps if "scene" in step.sources.values() and step.body is None]
     asked(partial(pipeline.body.need, pipeline.recording), dressed)
-
-
-def _made(step: Step, store: Store) -> bool:
-    found = store.find(step.key) if step.stored else None
-    return found is not None and is_hit(step, found)
 
 
 def run(

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mocapflow.errors import StoreError
+from mocapflow.errors import ShapeError, StoreError
 from mocapflow.records import F64, array_fields
 from mocapflow.results import notes_of
 from mocapflow.series import BLOCK, Numbers, Series, blocks
@@ -27,7 +27,11 @@ PLAIN = "plain"  # attribute with the fields that are no arrays
 
 
 def save_record(group: zarr.Group, value: Any) -> None:
-    """Write a record into an empty group."""
+    """Write a record into an empty group.
+
+    Raises:
+        ShapeError: a tuple or mapping holds numbers or text beside arrays or records.
+    """
     cls: type = type(value)
     declared = array_fields(cls)
     plain: dict[str, Any] = {}
@@ -118,8 +122,11 @@ def _save_nested(group: zarr.Group, value: Any, axes: tuple[str, ...] = (), unit
         order.append(name)
         if isinstance(inner, np.ndarray):  # its axes are its own: equal names would have to have equal lengths
             save_array(group.create_group(name), "values", inner, axis_names("axis", axes, inner.ndim), unit)
-        elif inner is not None:
+        elif is_dataclass(inner) or isinstance(inner, Mapping | tuple | list):
             _save_nested(group.create_group(name), inner, axes, unit)
+        elif inner is not None:
+            what = f"{group.path}: {name!r} is {type(inner).__name__}, beside arrays or records"
+            raise ShapeError(what, hint="give it a field of its own")
     group.update_attributes({"kind": "mapping" if isinstance(value, Mapping) else "tuple", "order": order})
 
 

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from mocapflow.components import Component
 from mocapflow.data import Turn
 
-TURN = Turn(index=0, cap=8)  # the first of a frame
+TURN = Turn(index=0)  # the first of a frame
 
 
 class Conformance:

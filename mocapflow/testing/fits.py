@@ -82,7 +82,7 @@ class PoseSolverConformance(Conformance):
         pose = moved(truth, np.full(6 + len(truth.angles), 0.03))
         matches, model = scenes.exact_matches(scene, truth), ClothedModel(scene=scene)
         for index in range(4):
-            state, turn = pictures.tiny_state(scene, pose, truth), Turn(index=index, cap=8)
+            state, turn = pictures.tiny_state(scene, pose, truth), Turn(index=index)
             estimate = assert_pure(self.pose_solver.solve, lambda surface: matches, state, model, (), Past(), turn)
             pose = estimate.pose
         unknowns = 6 + len(truth.angles)

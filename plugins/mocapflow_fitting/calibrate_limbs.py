@@ -76,7 +76,7 @@ class CalibrateLimbs(Stage):
         for done in range(self.passes):
             model = self._model(scene, scaled(body, solution.factors(spreads)))
             views = self._segmented(recording, model, indices, solution.poses, clothes)
-            turn = Turn(index=done, cap=self.passes, change=AT_REST if done else None)
+            turn = Turn(index=done, change=AT_REST if done else None)
             matchers = [partial(self._match, scene, *view, turn) for view in views]
             solution = refine(body, matchers, solution, scene.cameras, spreads, share, self.rounds)
         factors = solution.factors(spreads)
@@ -110,7 +110,7 @@ class CalibrateLimbs(Stage):
             if frame.index in wanted:
                 pose, cloth = wanted[frame.index]
                 state = believed(pose, cloth, model.drape(pose, cloth, past))
-                found = self.segmenter.segment(frame, state, past, model.scene, Turn(index=0, cap=1))
+                found = self.segmenter.segment(frame, state, past, model.scene, Turn(index=0))
                 views.append((replace(frame, images=(), flow=None), found, cloth))
         return views
 

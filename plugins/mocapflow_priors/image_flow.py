@@ -56,7 +56,7 @@ class ImageFlowPredictor(Predictor):
             return replace(followed, weight=followed.weight * robust / self.sigma_px**2)
 
         state = believed(guess, np.empty(0), NO_CLOTH)
-        pose = self.pose_solver.solve(match, state, model, self.priors, past, Turn(index=0, cap=1)).pose
+        pose = self.pose_solver.solve(match, state, model, self.priors, past, Turn(index=0)).pose
         reached = distances(followed, model.surface(pose, NO_CLOTH), scene)
         return pose if np.mean(reached < self.agreeing_px) >= self.least_agreement else guess
 

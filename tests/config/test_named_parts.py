@@ -11,7 +11,7 @@ from mocapflow.config.resolve import Resolver
 from mocapflow.config.yamlfile import read
 from mocapflow.errors import MocapflowError, PipelineError
 from mocapflow.registry import Registry
-from mocapflow.running.runner import keys, run
+from mocapflow.running.runner import run, steps
 from tests.fixtures.stores import actions, load, write_pipeline, write_recording
 
 PARTS = {"cameras": "lab/rig.toml", "videos": {"cam01": "a.mp4", "cam02": "b.mp4"}}
@@ -57,17 +57,21 @@ def refused(folder, **parts):
     return str(caught.value).replace(str(folder), "HERE")
 
 
+def keys(pipeline, store):
+    return {step.label: step.key for step in steps(pipeline, store=store)}
+
+
 def test_named_parts_run_with_the_keys_of_a_folder(tmp_path, spread):
     store, whole = tmp_path / "store.zarr", write_recording(tmp_path / "whole", video=True)
     (whole / "subject.txt").unlink()
-    expected = keys(load(spread, f"recording={whole}"), store=store)
-    assert keys(load(spread), store=store) == expected
+    expected = keys(load(spread, f"recording={whole}"), store)
+    assert keys(load(spread), store) == expected
     summary = run(load(spread, frames=3), store=store, out=tmp_path / "out")
     assert actions(summary)["track"] == "run"
     again = run(load(spread, f"recording={whole}", frames=3), store=store, out=tmp_path / "other")
     assert actions(again)["track"] == "hit"
     (tmp_path / "b.mp4").write_bytes((tmp_path / "a.mp4").read_bytes())
-    assert keys(load(spread), store=store)["track"] != expected["track"]
+    assert keys(load(spread), store)["track"] != expected["track"]
 
 
 def test_the_option_replaces_all_parts(tmp_path, spread):
@@ -131,6 +135,8 @@ def test_what_is_wrong_is_told_by_its_line(tmp_path, spread):
         "       available: body, garment, skeleton, weights — did you mean 'body'?\n"
         "       for other files name the folder: subject: DIR"
     )
+    touched(tmp_path, *(f"poses/{number:02}.json" for number in range(40)))
+    assert refused(tmp_path, init="poses/39.jsn").endswith("28.json, 29.json and 10 more — did you mean '39.json'?")
     assert refused(tmp_path, init=3) == "HERE/mine.yaml:6:3  recording.init: a path is expected, not 3"
     (tmp_path / "few.yaml").write_text("recording: {cameras: lab/rig.toml}\n")
     with pytest.raises(PipelineError, match=r"few.yaml:1:1  recording: a recording needs videos"):

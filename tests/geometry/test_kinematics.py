@@ -29,8 +29,9 @@ def pose(body):
 
 
 def test_rest_pose_reproduces_the_mesh(body):
-    joints, screws = kinematics.chain(body, Pose(root=np.eye(4), angles=np.zeros(len(body.twists))))
-    np.testing.assert_allclose(kinematics.skin(body, joints), body.vertices, atol=1e-12)
+    rest = Pose(root=np.eye(4), angles=np.zeros(len(body.twists)))
+    joints, screws = kinematics.chain(body, rest)
+    np.testing.assert_allclose(kinematics.skin(body, joints, rest.angles), body.vertices, atol=1e-12)
     np.testing.assert_allclose(screws, body.twists, atol=1e-15)
 
 
@@ -55,7 +56,7 @@ def test_one_joint_moves_only_its_subtree(body):
     joints, _ = kinematics.chain(body, Pose(root=np.eye(4), angles=angles))
     below = kinematics.descendants(body.parents)[body.joint("knee_l")]
     assert [n for n, b in zip(body.joint_names, below, strict=True) if b] == ["knee_l", "ankle_l", "toe_l"]
-    moved = np.linalg.norm(kinematics.skin(body, joints) - body.vertices, axis=1)
+    moved = np.linalg.norm(kinematics.skin(body, joints, angles) - body.vertices, axis=1)
     share = np.where(below[body.skin_joint], body.skin_weight, 0.0).sum(axis=1)
     assert (moved[share == 0] < 1e-12).all() and moved[share > 0.5].min() > 1e-3
     np.testing.assert_allclose(joints[~below], np.broadcast_to(np.eye(4), joints[~below].shape), atol=1e-12)
@@ -81,10 +82,8 @@ def test_morph_changes_the_shape_with_its_angle(body, pose):
         angles = np.zeros(len(body.twists))
         angles[screw] = angle
         joints, _ = kinematics.chain(body, Pose(root=pose.root, angles=angles))
-        expected = kinematics.skin(replace(body, vertices=body.vertices + share * offset), joints)
+        expected = kinematics.skin(replace(body, vertices=body.vertices + share * offset), joints, angles)
         np.testing.assert_allclose(kinematics.skin(morphing, joints, angles), expected, atol=1e-12)
-    with pytest.raises(ValueError, match="pass the angles"):
-        kinematics.skin(morphing, joints)
 
 
 @pytest.mark.parametrize("morphing", [False, True])

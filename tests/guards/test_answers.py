@@ -67,7 +67,7 @@ class Saying(Matcher, PoseSolver, Predictor, Prior):
 
 
 def matches(answer):
-    return matches_of(Saying(answer=answer), FRAME, SEEN, SURFACE, Past(), SCENE, Turn(index=0, cap=1))
+    return matches_of(Saying(answer=answer), FRAME, SEEN, SURFACE, Past(), SCENE, Turn(index=0))
 
 
 def residual(error=0.0, jacobian=0.0, energy=0.0, width=WIDTH):
@@ -250,7 +250,7 @@ def with_prior(tmp_path, prior):
 def test_an_estimate_that_is_none_names_the_solver(change, said) -> None:
     state = pictures.tiny_state(SCENE, POSE, POSE)
     good = state.estimate
-    asked = (None, state, scenes.tiny_model(SCENE), (), Past(), Turn(index=0, cap=1))
+    asked = (None, state, scenes.tiny_model(SCENE), (), Past(), Turn(index=0))
     assert estimate_of(Saying(answer=good), *asked) is good
     with pytest.raises(WrongAnswer, match=f"'saying' returned .*{said}"):
         estimate_of(Saying(answer=replace(good, **change)), *asked)
@@ -327,7 +327,7 @@ def test_velocities_that_are_none():
     ],
 )
 def test_fitted_cloth_that_is_none(answer, said):
-    asked = (FRAME, SEEN, STATE.estimate, MODEL, Past(), Turn(index=0, cap=1))
+    asked = (FRAME, SEEN, STATE.estimate, MODEL, Past(), Turn(index=0))
     assert cloth_of(Dressing(answer=CLOTH), *asked) is CLOTH
     with pytest.raises(WrongAnswer, match=f"'dressing' returned {said}"):
         cloth_of(Dressing(answer=answer), *asked)
@@ -361,6 +361,7 @@ MESH = CLOTHED.garment
         ({"pinned": MESH.pinned[:0], "pinned_to": MESH.pinned_to[:0]}, "cloth that is pinned nowhere"),
         ({"vertices": 1000 * MESH.vertices}, "a pin .* m from the skin that holds it; are its measures in metres?"),
         ({"parameter_names": ()}, "3 bounds of parameters for the names none"),
+        ({"parameter_names": ("a", "a", "b", "c")}, "3 bounds of parameters for the names a, a, b, c"),
         ({"parameter_bounds": MESH.parameter_bounds[:, ::-1]}, "the bounds .* of parameter"),
         ({"parameter_bounds": np.full_like(MESH.parameter_bounds, np.inf)}, "the bounds .* of parameter"),
     ],
@@ -383,7 +384,7 @@ def test_garments_that_are_none(change, said):
     ],
 )
 def test_silhouettes_that_are_none(change, said):
-    asked = (FRAME, STATE, Past(), SCENE, Turn(index=0, cap=1))
+    asked = (FRAME, STATE, Past(), SCENE, Turn(index=0))
     assert segmentation_of(Dressing(answer=SEEN), *asked) is SEEN
     one, two, *rest = SEEN.silhouettes
     wrong = replace(SEEN, silhouettes=(one, replace(two, **change), *rest))

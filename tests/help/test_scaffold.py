@@ -5,15 +5,19 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
 
 from mocapflow import load_registry
 from mocapflow.cli import app
+from mocapflow.data import NO_CLOTH, Past, Turn
 from mocapflow.errors import PluginError
 from mocapflow.help.scaffold import KINDS, write_plugin
+from mocapflow.testing import same, tiny_frame, tiny_pose, tiny_scene, tiny_segmentation
 
 
 @pytest.mark.parametrize("role", KINDS)
@@ -30,6 +34,19 @@ def test_a_new_plugin_loads_and_conforms(role: str, tmp_path: Path) -> None:
     assert run.returncode == 0, run.stdout
     ruff = [sys.executable, "-m", "ruff", "check", "--isolated", "--select", "E,F,I,B", "--line-length", "120", folder]
     assert subprocess.run(ruff, capture_output=True, check=False).returncode == 0
+
+
+def test_a_new_matcher_leaves_silhouettes_of_other_layers_alone(tmp_path: Path) -> None:
+    write_plugin("my-own", "matcher", tmp_path / "new")
+    matcher: Any = load_registry([tmp_path / "new" / "mocapflow_my_own.py"]).get("matcher", "my_own")()
+    scene = tiny_scene()
+    pose = tiny_pose(scene)
+    surface, seen = scene.surface(pose, NO_CLOTH), tiny_segmentation(scene, pose)
+    skin = tuple(replace(silhouette, layer="skin") for silhouette in seen.silhouettes)
+    asked = (surface, Past(), scene, Turn(index=0))
+    frame = tiny_frame(scene, pose)
+    found = matcher.match(frame, replace(seen, silhouettes=(*seen.silhouettes, *skin)), *asked)
+    assert same(found, matcher.match(frame, seen, *asked))
 
 
 def test_errors(tmp_path: Path) -> None:

@@ -202,6 +202,18 @@ def test_a_fisheye_with_the_coefficients_of_another_lens(tmp_path):
         read_cameras(path)
 
 
+def test_skew_goes_with_a_lens_without_distortion_alone(tmp_path):
+    path = write_changed(tmp_path / "cameras.toml", "matrix = [[60.0, 0.0,", "matrix = [[60.0, 3.0,")
+    assert read_cameras(path)[0].intrinsics[0, 1] == 3
+    path.write_text(path.read_text().replace("distortions = [0.0,", "distortions = [-0.1,", 1))
+    with pytest.raises(RecordingError, match="camera 'cam01' has a skew of 3 px\n.*without skew"):
+        read_cameras(path)
+    qualisys = tmp_path / "trial.qca.txt"
+    qualisys.write_text(QUALISYS.replace('skew="0"', 'skew="128"'))
+    with pytest.raises(RecordingError, match="camera '26578' has a skew of 2 px"):
+        read_cameras(qualisys)
+
+
 def test_trailing_zero_coefficients_are_left_out(tmp_path):
     path = write_changed(tmp_path / "cameras.toml", "distortions = [0.0,", "distortions = [0, 0, 0, 0, 0.0,")
     assert read_cameras(path)[0].distortion.shape == (5,)
@@ -254,6 +266,17 @@ def test_easymocap_lacks_a_matrix(tmp_path):
     path = tmp_path / "extri.yml"
     path.write_text(path.read_text().replace("T_cam02", "T_cam99"))
     with pytest.raises(RecordingError, match=r"extri\.yml  camera 'cam02' lacks T_cam02"):
+        read_cameras(tmp_path)
+
+
+@pytest.mark.parametrize(("old", "new"), [("rows: 3", "rows: 4"), ("dt: d", "dt: q")])
+def test_easymocap_with_no_matrix_where_one_should_be(tmp_path, old, new):
+    write_easymocap(tmp_path, ring())
+    path = tmp_path / "intri.yml"
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(RecordingError, match=r"intri\.yml:\d+:1  camera 'cam01' has no matrix in K_cam01\n.*as many"):
         read_cameras(tmp_path)
 
 

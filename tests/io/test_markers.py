@@ -135,8 +135,14 @@ def test_c3d(tmp_path):
     assert rate == 100
     np.testing.assert_allclose(read, points, atol=1e-6)
     np.testing.assert_allclose(time, np.arange(5) / 100)
-    path.write_bytes(b"nothing")
-    with pytest.raises(RecordingError, match="this C3D file can't be read"):
+    whole = path.read_bytes()
+    for broken in (b"nothing", whole[:-512]):  # the last block is that of the frames
+        path.write_bytes(broken)
+        with pytest.raises(RecordingError, match="this C3D file can't be read"):
+            read_c3d(path)
+    made["parameters"]["POINT"]["UNITS"]["value"] = []
+    made.write(str(path))
+    with pytest.raises(RecordingError, match=r"a\.c3d  unknown unit ''\n.*known: m, cm, mm"):
         read_c3d(path)
 
 

@@ -19,7 +19,7 @@ NAMES = LAYOUTS["body_25b"]
 def keypoints(body, pose, camera, rng, noise_px, confidence=0.8):
     """Return (25, 3): the landmarks the body has, the others unseen."""
     marks = landmarks(body)
-    points = kinematics.skin(marks.body, kinematics.chain(marks.body, pose)[0])
+    points = kinematics.skin(marks.body, kinematics.chain(marks.body, pose)[0], pose.angles)
     pixels = project(points, camera) + rng.normal(scale=noise_px, size=(len(points), 2))
     rows = np.zeros((len(NAMES), 3))
     for name, pixel in zip(marks.names, pixels, strict=True):

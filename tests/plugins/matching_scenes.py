@@ -31,8 +31,8 @@ from mocapflow.testing import tiny_pose, tiny_state
 from mocapflow.testing.scenes import tiny_past
 
 BAND = 12.0  # px
-FIRST = Turn(index=0, cap=5)
-CALM = Turn(index=3, cap=5, change=Change(body=0.005, cloth=0.0, angles=0.0, sigmas=1.0))
+FIRST = Turn(index=0)
+CALM = Turn(index=3, change=Change(body=0.005, cloth=0.0, angles=0.0, sigmas=1.0))
 FRAME = Frame(index=0, time=0.0, images=(), usable=np.ones(4, bool))
 
 

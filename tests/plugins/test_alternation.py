@@ -54,7 +54,7 @@ def test_the_pose_step_lowers_the_area_at_a_fixed_silhouette(settled):
 def test_segmentation_lowers_the_area_at_a_fixed_pose():
     """From silhouettes that are 2 cm off, where the images agree with the model."""
     functional, state = Functional(MODEL, (), Past()), pictures.tiny_state(SCENE, TRUTH, START)
-    found = LevelSet().segment(FRAME, state, Past(), SCENE, Turn(index=1, cap=8))
+    found = LevelSet().segment(FRAME, state, Past(), SCENE, Turn(index=1))
     before, after = (functional.pull(each, TRUTH, state.cloth) for each in (state.segmentation, found))
     assert after < 0.5 * before
 

@@ -28,7 +28,7 @@ from mocapflow.testing import pictures, scenes
 from tests.fixtures.recordings import number_of, ring, write_recording
 from tests.fixtures.stores import PLUGIN, write_pipeline
 
-FIRST = Turn(index=0, cap=8)
+FIRST = Turn(index=0)
 SHAPE = (200, 240)
 FLOOR = np.ones(SHAPE, bool)
 

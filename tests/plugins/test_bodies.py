@@ -37,7 +37,7 @@ def start_angles(body, name="skirt_steps"):
 
 def posed(body, angles):
     joints, _ = kinematics.chain(body, Pose(root=np.eye(4), angles=angles))
-    return kinematics.skin(body, joints), kinematics.joint_positions(body, joints)
+    return kinematics.skin(body, joints, angles), kinematics.joint_positions(body, joints)
 
 
 def test_files_are_kept_as_they_are(body):

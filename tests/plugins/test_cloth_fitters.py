@@ -19,7 +19,7 @@ from mocapflow.model import ClothedModel
 from mocapflow.testing.views import SIZE, tiny_camera
 
 STEP = np.radians(10.0)  # between the amounts that are tried first
-TURN = Turn(index=0, cap=8)
+TURN = Turn(index=0)
 STANDING = Pose(root=np.eye(4), angles=np.zeros(4))
 
 

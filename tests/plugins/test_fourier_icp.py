@@ -70,7 +70,7 @@ def test_the_first_turns_are_low_passed_the_later_ones_full():
     truth = tiny_pose(SCENE)
     far, shown = bent(truth, 0.5), seen(SCENE.surface(truth, NO_CLOTH), SCENE)
     full = view(ContourIcp(), far, shown, FIRST)
-    for turn, low in ((FIRST, True), (Turn(index=1, cap=5), True), (CALM, False)):
+    for turn, low in ((FIRST, True), (Turn(index=1), True), (CALM, False)):
         image, model = view(FourierIcp(), far, shown, turn)
         assert image.curvature.any() == model.curvature.any() == low
         assert (model.contour.pixel.shape == full[1].contour.pixel.shape) or low

@@ -27,7 +27,7 @@ def floor(height: float) -> GroundPlane:
 def lowest(pose: Pose) -> list[float]:
     body = make_body()
     joints, _ = kinematics.chain(body, pose)
-    height = kinematics.skin(body, joints)[:, 2]
+    height = kinematics.skin(body, joints, pose.angles)[:, 2]
     carrier = body.skin_joint[np.arange(len(height)), body.skin_weight.argmax(axis=1)]
     return [height[carrier == body.joint(name)].min() for name in FEET]
 

@@ -22,7 +22,7 @@ from mocapflow.geometry.silhouettes import outline
 from mocapflow.testing import tiny_cloth, tiny_pose, tiny_segmentation
 
 ONE, OTHER = SKIN, CLOTHS
-FIRST = Turn(index=0, cap=4)
+FIRST = Turn(index=0)
 
 
 def halves(edge, turn=0.0, one=ONE, other=OTHER, noise=0.0):
@@ -205,7 +205,7 @@ def test_skin_that_the_garment_covers_at_rest_is_believed_only_where_its_edge_is
     segmentation, frame = replace(tiny_segmentation(SCENE, pose), inner=inner), painted(dressed, pose)
     moved = [Change(body=body, cloth=0.0, angles=0.0, sigmas=1.0) for body in (0.1, 0.001)]
     wide, far, calm = (
-        matcher.match(frame, segmentation, surface, Past(), SCENE, Turn(index=1, cap=4, change=change)).weight
+        matcher.match(frame, segmentation, surface, Past(), SCENE, Turn(index=1, change=change)).weight
         for matcher, change in (
             (InnerContours(), moved[0]), (InnerContours(covered="far"), moved[0]), (InnerContours(), moved[1]),
         )

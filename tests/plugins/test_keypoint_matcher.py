@@ -24,7 +24,7 @@ BODY = Scanned().load(DEMO)
 SCENE = Scene(cameras=read_cameras(DEMO), body=BODY)
 POSE = read_pose(DEMO / "init.json", BODY)
 NOTHING = Segmentation(silhouettes=())
-FIRST = Turn(index=0, cap=5)
+FIRST = Turn(index=0)
 
 
 def frame_of(pose, noise_px=0.0, bystander=(), wild=(), seed=0):
@@ -57,7 +57,7 @@ def test_landmarks_are_means_of_the_skin_around_them(by):
     """At rest and bent, within what the skin slides over a joint."""
     pose = moved(POSE, np.r_[np.zeros(6), by * np.random.default_rng(0).normal(size=len(POSE.angles))])
     places, marks = landmarks(BODY), marks_on(BODY)
-    exact = kinematics.skin(places.body, kinematics.chain(places.body, pose)[0])
+    exact = kinematics.skin(places.body, kinematics.chain(places.body, pose)[0], pose.angles)
     skin = SCENE.surface(pose, NO_CLOTH).vertices
     means = np.einsum("lk,lka->la", marks.share, skin[marks.vertex])
     np.testing.assert_allclose(marks.share.sum(axis=1), 1)
@@ -79,11 +79,13 @@ def test_the_pose_is_found_from_keypoints_alone():
     frame, model = frame_of(POSE, noise_px=0.3), ClothedModel(scene=SCENE)
     pose = start
     for index in range(3):
-        state, turn = believed(pose, np.empty(0), NO_CLOTH), Turn(index=index, cap=3)
+        state, turn = believed(pose, np.empty(0), NO_CLOTH), Turn(index=index)
         again = partial(Keypoints().match, frame, NOTHING, past=Past(), scene=SCENE, turn=turn)
         pose = TwistGaussNewton().solve(again, state, model, (), Past(), turn).pose
     places = landmarks(BODY).body
-    truth, before, after = (kinematics.skin(places, kinematics.chain(places, p)[0]) for p in (POSE, start, pose))
+    truth, before, after = (
+        kinematics.skin(places, kinematics.chain(places, p)[0], p.angles) for p in (POSE, start, pose)
+    )
     assert np.linalg.norm(before - truth, axis=1).mean() > 0.05
     assert np.linalg.norm(after - truth, axis=1).mean() < 0.01
 

@@ -55,8 +55,8 @@ def apart(evaluation: Evaluation, track: Track) -> float:
     names, places, time, _ = markers.read_trc(Path(evaluation.reference))
     np.testing.assert_allclose(time[:FRAMES], track.time, atol=1e-6)
     marks = landmarks(BODY)
-    chains = [kinematics.chain(marks.body, track.pose(t))[0] for t in range(FRAMES)]
-    known = np.stack([kinematics.skin(marks.body, chain) for chain in chains])
+    poses = [track.pose(t) for t in range(FRAMES)]
+    known = np.stack([kinematics.skin(marks.body, kinematics.chain(marks.body, p)[0], p.angles) for p in poses])
     columns = [names.index(name.replace("big_toe", "toe")) for name in marks.names]
     return float(np.abs(markers.world_from_opensim(places)[:FRAMES, columns] - known).max())
 

@@ -101,11 +101,11 @@ def test_a_part_does_not_learn_what_is_surely_another_s():
 
 def test_the_segmenter_hands_them_on():
     """Learned on the second turn; in the next frame, contours are looked for by them from the first turn on."""
-    past, turn = tiny_past(SCENE, POSE), Turn(index=1, cap=4)
+    past, turn = tiny_past(SCENE, POSE), Turn(index=1)
     frame, state = tiny_frame(SCENE, POSE), tiny_state(SCENE, POSE)
     found = Layered().segment(frame, state, past, SCENE, turn)
     assert found.inner is None
-    then = Layered().segment(frame, state, replace(past, appearance=found.appearance), SCENE, Turn(index=0, cap=4))
+    then = Layered().segment(frame, state, replace(past, appearance=found.appearance), SCENE, Turn(index=0))
     assert then.inner is not None
     assert then.appearance == found.appearance
     assert len(found.silhouettes) == len(SCENE.cameras)

@@ -20,7 +20,7 @@ from mocapflow.geometry.silhouettes import model_distance, occluding_contour
 from mocapflow.model import moved
 from mocapflow.testing import pictures, scenes
 
-FIRST, LATER = Turn(index=0, cap=8), Turn(index=1, cap=8)
+FIRST, LATER = Turn(index=0), Turn(index=1)
 
 
 @pytest.fixture(scope="module")

@@ -105,7 +105,7 @@ def test_an_unseen_leg_comes_to_rest_in_a_training_pose(tmp_path: Path) -> None:
 
     def solved(*priors: Parzen) -> Estimate:
         state = make_state(Pose(root=truth.root, angles=np.full(12, 0.05)))
-        return solver.solve(lambda _: matches, state, ClothedModel(scene=scene), priors, Past(), Turn(index=0, cap=1))
+        return solver.solve(lambda _: matches, state, ClothedModel(scene=scene), priors, Past(), Turn(index=0))
 
     with_prior, without = solved(Parzen(poses=tmp_path / "poses.npz")), solved()
     np.testing.assert_allclose(with_prior.pose.angles[:5], poses.mean(axis=0), atol=0.01)

@@ -64,7 +64,7 @@ def test_body_and_pose_reproduce_the_recordings_kinematics(scene):
     positions, vertices = readme_kinematics(scene.body, content, turns)
     joints, _ = kinematics.chain(scene.body, pose)
     np.testing.assert_allclose(kinematics.joint_positions(scene.body, joints), positions, atol=1e-9)
-    np.testing.assert_allclose(kinematics.skin(scene.body, joints), vertices, atol=1e-9)
+    np.testing.assert_allclose(kinematics.skin(scene.body, joints, pose.angles), vertices, atol=1e-9)
 
 
 def test_a_part_of_the_body_starts_from_the_same_file(scene):

@@ -22,7 +22,7 @@ from mocapflow.scene import Scene
 
 FREE = {"root_damping_m": 1e6, "root_damping_deg": 1e8, "angle_damping_deg": 1e8, "damping": 1e-12}
 EXACT = {**FREE, "stop_sigmas": 0.0, "cap_deg": 60.0, "cap_mm": 500.0, "correlation_px": 0.0}
-TURN = Turn(index=0, cap=8)
+TURN = Turn(index=0)
 DEMO = Path(__file__).parents[2] / "examples" / "data" / "skirt_steps"
 HIDDEN = [9, 10, 11]  # the screws of joints 6 and 7
 
@@ -187,7 +187,7 @@ def test_growing_damping_shortens_the_steps_of_later_turns() -> None:
     solver = TwistGaussNewton(iterations=1, damping=0.1, damping_per_turn=10.0, cap_deg=90.0, cap_mm=1000.0)
     moves = []
     for index in range(3):
-        turn = Turn(index=index, cap=8)
+        turn = Turn(index=index)
         pose = solver.solve(lambda _: matches, make_state(start), ClothedModel(scene=scene), [], Past(), turn).pose
         moves.append(np.linalg.norm(pose.angles - start.angles))
     assert moves[0] > 1.5 * moves[1] > 3 * moves[2]

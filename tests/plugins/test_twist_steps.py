@@ -141,7 +141,7 @@ def test_damping_never_falls_below_that_of_its_turn(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(solve, "step", step)
     matches = exact_matches(SCENE, TRUTH, np.arange(0, 300, 9), directed=False)
     solver = TwistGaussNewton(**{**EXACT, "iterations": 4, "damping": 1e-3}, damping_per_turn=10.0)
-    solver.solve(lambda _: matches, make_state(start_from(TRUTH, 1)), MODEL, [], Past(), Turn(index=1, cap=8))
+    solver.solve(lambda _: matches, make_state(start_from(TRUTH, 1)), MODEL, [], Past(), Turn(index=1))
     used = [call.args[2] for call in step.call_args_list]
     assert len(used) > 2
     assert min(used) == pytest.approx(1e-2)

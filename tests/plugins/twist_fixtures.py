@@ -81,7 +81,7 @@ def make_pose(seed: int, angle: float = 0.3) -> Pose:
 def exact_matches(scene: Scene, pose: Pose, vertices: np.ndarray, directed: bool, seed: int = 0) -> Matches:
     """Where the vertices of a posed body are seen, in every view; with random directions, or with none."""
     rng = np.random.default_rng(seed)
-    points = kinematics.skin(scene.body, kinematics.chain(scene.body, pose)[0])[vertices]
+    points = kinematics.skin(scene.body, kinematics.chain(scene.body, pose)[0], pose.angles)[vertices]
     count = len(scene.cameras) * len(vertices)
     angle = rng.uniform(0, 2 * np.pi, count)
     direction = np.stack([np.cos(angle), np.sin(angle)], axis=1) if directed else np.zeros((count, 2))

@@ -14,6 +14,7 @@ from mocapflow.errors import RecordingError
 from mocapflow.io.cameras import write_cameras
 from mocapflow.recordings.recording import open_recording
 from tests.fixtures.recordings import NAMES, avi_frames, number_of, picture, ring, write_recording, write_video
+from tests.io.test_calibrations import write_easymocap
 
 DEMO = Path(__file__).parents[2] / "examples" / "data" / "skirt_steps"
 
@@ -287,7 +288,20 @@ def test_a_frame_rate_that_is_none(tmp_path, rate):
 def test_different_frame_rates(tmp_path):
     write_recording(tmp_path, frames=4)
     write_video(tmp_path / "videos" / "cam02.mp4", 4, rate=50.0)
-    assert "the videos differ in frame rate\n       cam01: 25 per second, cam02: 50 per second" in refused(tmp_path)
+    said = "the videos differ in frame rate\n       cam01: 25 per second, cam02: 50 per second"
+    assert said in refused(tmp_path)
+    shutil.move(tmp_path / "videos", tmp_path / "static" / "videos")
+    calibration = tmp_path / "cameras.toml"
+    assert f"{tmp_path}/static/videos  {said}" in refused(tmp_path / "static", calibration=calibration)
+
+
+def test_a_calibration_that_has_no_place_for_a_frame_rate(tmp_path):
+    write_easymocap(tmp_path, ring())
+    for name in NAMES:
+        (tmp_path / "videos" / name).mkdir(parents=True)
+        cv2.imwrite(str(tmp_path / "videos" / name / "0.png"), picture(0))
+    (said,) = open_recording(tmp_path).warnings
+    assert said.endswith("write frame_rate under [metadata] in a cameras.toml, which this calibration has to become")
 
 
 @pytest.mark.parametrize("part", [{"start": 10}, {"stop": 11}, {"start": 5, "stop": 5}, {"start": -1}])

@@ -98,6 +98,13 @@ def test_records_come_back_as_they_were(store, kind):
     equal(value, store.load(made))
 
 
+@pytest.mark.parametrize(("other", "kind"), [(3, "int"), ("text", "str")])
+def test_numbers_and_text_do_not_go_beside_arrays(store, other, kind):
+    mixed = Past(appearance={"mean": np.ones(3), "count": other})
+    with pytest.raises(ShapeError, match=f"appearance: 'count' is {kind}, beside arrays or records\n.*its own"):
+        put(store, mixed)
+
+
 def test_a_record_says_how_its_types_are_to_be_written():
     with pytest.raises(ShapeError, match="knee: begin the module of a record with `from __future__"):
 
