@@ -114,7 +114,7 @@ def follow_length(rate, n, row, bar, link, grow):  # type: ignore[no-untyped-def
 
 
 @numba.njit(cache=True, error_model="numpy", forceinline=True)
-def follow_draw(rate, n, m, row, way, share, most, moves, other_moves):  # type: ignore[no-untyped-def]
+def follow_draw(rate, n, m, row, way, share, most, here, there):  # type: ignore[no-untyped-def]
     """Change the rates of two particles that are drawn together by a share of the way between them.
 
     Args:
@@ -125,19 +125,17 @@ def follow_draw(rate, n, m, row, way, share, most, moves, other_moves):  # type:
         way: m, three components, from the one to the other, before.
         share: of the way; it grows with the way, up to `most` for an endless one.
         most: see there.
-        moves: the one is not pinned.
-        other_moves: nor is the other.
+        here: 0 to 1, what the one does of it; 0 if it is pinned.
+        there: what the other does.
     """
     dx, dy, dz = way
-    half = 0.5 if moves and other_moves else 1.0
-    keep, grow = half * share, half * (most - share) / (dx * dx + dy * dy + dz * dz)
-    here, there = (1.0 if moves else 0.0), (1.0 if other_moves else 0.0)
+    grow = (most - share) / (dx * dx + dy * dy + dz * dz)
     for s in range(rate.shape[3]):
         ex = rate[m, row, 0, s] - rate[n, row, 0, s]
         ey = rate[m, row, 1, s] - rate[n, row, 1, s]
         ez = rate[m, row, 2, s] - rate[n, row, 2, s]
         apart = grow * (dx * ex + dy * ey + dz * ez)
-        mx, my, mz = keep * ex + apart * dx, keep * ey + apart * dy, keep * ez + apart * dz
+        mx, my, mz = share * ex + apart * dx, share * ey + apart * dy, share * ez + apart * dz
         rate[n, row, 0, s] += here * mx
         rate[n, row, 1, s] += here * my
         rate[n, row, 2, s] += here * mz

@@ -11,11 +11,24 @@ DOWN = np.array([0.0, 0.0, -1.0])
 
 
 def standing_out(strands: Strands, chain: F64) -> F64:
-    """Return the horizontal unit directions (B, N, 3) in which strands stand out, at posed joints (B, J, 4, 4)."""
-    facing = np.einsum("bnij,nj->bni", chain[:, strands.carrier, :3, :3], strands.facing)
+    """Return the horizontal unit directions (B, N, 3) in which strands stand out, at posed joints (B, J, 4, 4).
+
+    On top of a trunk that leans far over what faces up lies along it, towards the legs.
+    """
+    turned = chain[:, strands.carrier, :3, :3]
+    facing = np.einsum("bnij,nj->bni", turned, strands.facing)
+    facing -= np.maximum(facing[..., 2:], 0.0) * turned[..., 2]
     facing[..., 2] = 0.0
     level: F64 = facing / np.maximum(np.linalg.norm(facing, axis=-1, keepdims=True), 1e-9)
     return level
+
+
+def along_limbs(strands: Strands, chain: F64) -> F64:
+    """Return the unit directions (B, N, 3) of strands that move with the limb under them, at joints (B, J, 4, 4)."""
+    way = strands.rest[:, -1] - strands.rest[:, 0]
+    way /= np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), 1e-9)
+    along: F64 = np.einsum("bnij,nj->bni", chain[:, strands.limb, :3, :3], way)
+    return along
 
 
 def blown(facing: F64, out: F64, aside: F64) -> tuple[F64, F64, F64]:

@@ -19,7 +19,7 @@ from mocapflow.records import F64, I32, Bool, record
 from mocapflow.scene import Scene
 from mocapflow_draping.fields import BodyFields, build_fields, touchable_joints
 from mocapflow_draping.forces import remaining_length, thickness, tilts, wind
-from mocapflow_draping.frames import riding, standing, standing_out
+from mocapflow_draping.frames import along_limbs, riding, standing, standing_out
 from mocapflow_draping.laying import distinct, follow, lay, moving
 from mocapflow_draping.parts import posed_parts, rates
 from mocapflow_draping.strands import Strands, roots, strands_of
@@ -56,10 +56,12 @@ class Kinematic(Draper):
     iterations: PositiveInt = 50  # literal: at most
     limited: bool = False  # literal: stop at straight down instead of swinging about it
     pivot: Literal["strand", "space"] = "strand"  # literal: where the nearest fixed point is looked for
-    sweeps: NonNegativeInt = 20  # of the rings, at most, per row; 0 leaves them as they fell
+    sweeps: NonNegativeInt = 40  # of the rings, at most, per row; 0 leaves them as they fell
     longest: Annotated[float, Field(ge=1)] = 1.0  # of a ring link, over its rest length
     stiff: Annotated[float, Field(ge=0, le=1)] = 0.3  # how much a ring resists being shortened
     bending_m: NonNegativeFloat = 0.06  # along which a hanging strand takes up a new direction
+    near_deg: Annotated[float, Field(gt=0, le=180)] = 45.0  # from the limb under it, at most, before cloth sinks
+    slips: Annotated[float, Field(gt=0, le=1)] = 0.1  # how much what lies on the body gives way beside what hangs
     _fittings: WeakKeyDictionary[GarmentMesh, Fitting] = PrivateAttr(default_factory=WeakKeyDictionary)
 
     def drape(self, poses: PoseBatch, parameters: F64, past: Past, scene: Scene) -> F64:
@@ -85,7 +87,7 @@ class Kinematic(Draper):
             where = roots(strands, chain), standing_out(strands, chain), links
             grid = lay(strands, fitting.fields, where, winds, source, skin, parts, math.radians(self.start_deg)).grid
         if self.sweeps:
-            self._close(fitting, grid, first, links[source], skin[source], parts[source])
+            self._close(fitting, grid, first, links[source], chain[source], skin[source], parts[source])
         vertices: F64 = grid.reshape(len(grid), -1, 3)[:, strands.place]
         return vertices
 
@@ -116,7 +118,7 @@ class Kinematic(Draper):
             grid, rate = laid.grid, follow(strands, fitting.fields, near, winds, laid, parts, moved)
         if self.sweeps:
             motion = rate, np.zeros_like(rate), moved.carry, moved.swell, moved.grow
-            self._close(fitting, grid, strands.first[None], links[-1:], skin[-1:], parts, motion)
+            self._close(fitting, grid, strands.first[None], links[-1:], chain[-1:], skin[-1:], parts, motion)
         row, unknowns = strands.place[vertices], 6 + len(pose.angles) + len(parameters)
         return all_columns(grid.reshape(-1, 3)[row], rate.reshape(-1, 3, len(steps))[row], tried, pose, unknowns)
 
@@ -172,7 +174,15 @@ class Kinematic(Draper):
         return grid, blow_batch(grid, fixed, *blown)
 
     def _close(
-        self, fitting: Fitting, grid: F64, first: I32, links: F64, skin: F64, parts: F64, motion: Motion | None = None
+        self,
+        fitting: Fitting,
+        grid: F64,
+        first: I32,
+        links: F64,
+        chain: F64,
+        skin: F64,
+        parts: F64,
+        motion: Motion | None = None,
     ) -> None:
         """Close the rings, in place, of all that hangs below the rows `first` (B, N); those stay."""
         from mocapflow_draping.rings import close_batch
@@ -184,5 +194,6 @@ class Kinematic(Draper):
             bend = np.exp(-strands.links / self.bending_m)
         close_batch(  # rows that may be written, always: each kind is compiled by itself
             grid, links, np.array(first, order="C"), strands.last, across, length, skin, self.longest, self.stiff,
-            bend, self.sweeps, parts, fitting.fields.values, motion,
+            bend, along_limbs(strands, chain), math.radians(180.0 if strands.rides else self.near_deg), self.slips,
+            self.sweeps, parts, fitting.fields.values, motion,
         )  # fmt: skip

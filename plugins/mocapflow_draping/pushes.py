@@ -15,6 +15,8 @@ from mocapflow_draping.distance import body_distance, outwards
 from mocapflow_draping.following import follow_length, follow_move, lack
 
 CLEAR = 2e-4  # m beyond contact to which a particle is pushed, so that it need not be pushed again at once
+LIES = 0.003  # m, so near to contact a particle lies on the body
+LEVEL = 0.7  # of its normal that points up where the body holds it as well as a floor
 PUSHES = 5  # out of the body and back to the bar's length
 TURNS = 12  # of a bar that pushing did not free, towards straight out of the body
 
@@ -87,6 +89,15 @@ def lift(grid, first, last, beside, row, seen, room, near, between, clear, parts
                 move(grid, n, row, CLEAR - d, out)
             if row > first[m]:
                 move(grid, m, row, CLEAR - d, out)
+
+
+@numba.njit(cache=True, error_model="numpy", forceinline=True)
+def supported(grid, n, row, room, near, parts, values):  # type: ignore[no-untyped-def]
+    """Return how well (0 to 1) the body under a particle keeps it from falling."""
+    if room[n] >= LIES:
+        return 0.0
+    p = place(grid, n, row)
+    return min(max(outwards(p[0], p[1], p[2], near[n], parts, values)[2] / LEVEL, 0.0), 1.0)
 
 
 @numba.njit(cache=True, error_model="numpy", forceinline=True)

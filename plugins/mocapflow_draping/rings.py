@@ -5,7 +5,8 @@ cloth between them pull together, links that are too short push apart as far as 
 links inside the body move out, and every particle keeps the length of its bar to the row above exactly.
 
 Particles 8, 4 and 2 links apart pull as well: a ring around a raised thigh lacks half its length, and neighbours
-alone would hand that on too slowly.
+alone would hand that on too slowly. What lies on a limb gives way less than what hangs, and what hangs far off the
+limb that carries it sinks there little by little: else a raised leg ends up beside its skirt.
 """
 
 from __future__ import annotations
@@ -16,15 +17,35 @@ import numba
 import numpy as np
 
 from mocapflow_draping.following import follow_draw
-from mocapflow_draping.pushes import lift, move, place, push_out, square, to_length
+from mocapflow_draping.pushes import lift, move, place, push_out, square, supported, to_length
+from mocapflow_draping.sinking import hold, sink
 
 ENOUGH = 0.03  # of its length: a ring none of whose links is longer by more than that is let be
 LEAST = 3  # sweeps, before that
+SINKING = 15  # sweeps in which cloth sinks away from the limb that carries it
 STRIDE = 0.02  # m beyond its room that a particle may go in one sweep, so that it can't end up across a limb
 
 
 @numba.njit(cache=True, error_model="numpy")
-def close_batch(grid, links, first, last, across, length, skin, longest, stiff, bend, sweeps, parts, values, motion):  # type: ignore[no-untyped-def]
+def close_batch(  # type: ignore[no-untyped-def]
+    grid,
+    links,
+    first,
+    last,
+    across,
+    length,
+    skin,
+    longest,
+    stiff,
+    bend,
+    limb,
+    near,
+    slips,
+    sweeps,
+    parts,
+    values,
+    motion,
+):
     """Close the rings of B drapes in place.
 
     Args:
@@ -38,6 +59,9 @@ def close_batch(grid, links, first, last, across, length, skin, longest, stiff, 
         longest: largest length of a link over its rest length.
         stiff: 0 to 1, the share of a shortened link's lack that one sweep makes good.
         bend: (N, L - 1) 0 to 1, how much each bar keeps the direction of the one above it.
+        limb: (B, N, 3) unit direction of each strand if it moved with the limb under it.
+        near: rad, how far from there bars stand at most before they sink.
+        slips: 0 to 1, how much what lies on top of the body gives way beside what hangs.
         sweeps: passes over each row, at most.
         parts: (B, P, COLUMNS), the bodies, see `parts`.
         values: their voxels.
@@ -47,31 +71,58 @@ def close_batch(grid, links, first, last, across, length, skin, longest, stiff, 
     """
     for b in range(len(grid)):
         _close(
-            grid[b], links[b], first[b], last, across, length, skin[b], longest, stiff, bend, sweeps, parts[b], values,
-            motion,
+            grid[b], links[b], first[b], last, across, length, skin[b], longest, stiff, bend, limb[b], near, slips,
+            sweeps, parts[b], values, motion,
         )  # fmt: skip
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _close(grid, links, first, last, across, length, skin, longest, stiff, bend, sweeps, parts, values, motion):  # type: ignore[no-untyped-def]
+def _close(  # type: ignore[no-untyped-def]
+    grid,
+    links,
+    first,
+    last,
+    across,
+    length,
+    skin,
+    longest,
+    stiff,
+    bend,
+    limb,
+    near,
+    slips,
+    sweeps,
+    parts,
+    values,
+    motion,
+):
     strands, rows = grid.shape[0], grid.shape[1]
     bars, seen = np.empty((strands, rows, 3)), grid[:, 0].copy()
-    room, near = np.full(strands, -1.0), np.zeros(strands, np.int64)
+    room, part = np.full(strands, -1.0), np.zeros(strands, np.int64)
     between, clear = seen.copy(), np.full(strands, -1.0)
+    gives, target, left = np.ones(strands), np.zeros((strands, 3)), np.zeros(strands)
+    turns = max(min(SINKING, sweeps - LEAST), 1)
     _bars(grid, links, first, last, bars)
     if motion is not None:
         _bars(motion[0], links, first, last, motion[1])
     for row in range(1, rows):
         _place(grid, bars, links, first, last, row, bend, motion)
+        least = LEAST + turns if hold(grid, limb, links, first, last, row, near, target, left) else LEAST
+        gives[:] = 1.0
         for sweep in range(sweeps):
+            if 0 < sweep <= least - LEAST:
+                sink(grid, links, row, target, left, turns)
             back = sweep % 2 == 1
             for k in range(len(across) - 1, 0, -1):
-                _pull(grid, first, last, across[k], length[k], row, longest, 0.0, back, motion)
-            excess = _pull(grid, first, last, across[0], length[0], row, longest, stiff, back, motion)
+                _pull(grid, first, last, across[k], length[k], row, longest, 0.0, gives, back, motion)
+            excess = _pull(grid, first, last, across[0], length[0], row, longest, stiff, gives, back, motion)
             if sweep > 0:
-                lift(grid, first, last, across[0], row, seen, room, near, between, clear, parts, values, motion)
-            _clear(grid, links, first, last, row, sweep > 0, skin, seen, room, near, parts, values, motion)
-            if sweep + 1 >= LEAST and excess < ENOUGH:
+                lift(grid, first, last, across[0], row, seen, room, part, between, clear, parts, values, motion)
+            _clear(grid, links, first, last, row, sweep > 0, skin, seen, room, part, parts, values, motion)
+            if slips < 1.0:
+                for n in range(strands):
+                    gives[n] = 1.0 - (1.0 - slips) * supported(grid, n, row, room, part, parts, values)
+            if sweep + 1 >= least and excess < ENOUGH:
                 break
 
 
@@ -104,7 +155,7 @@ def _place(grid, bars, links, first, last, row, bend, motion):  # type: ignore[n
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _pull(grid, first, last, across, length, row, longest, stiff, backwards, motion):  # type: ignore[no-untyped-def]
+def _pull(grid, first, last, across, length, row, longest, stiff, gives, backwards, motion):  # type: ignore[no-untyped-def]
     """Draw together what is too far apart; return the largest such excess, as a share of the distance."""
     strands, worst = grid.shape[0], 0.0
     for step in range(strands):
@@ -112,7 +163,7 @@ def _pull(grid, first, last, across, length, row, longest, stiff, backwards, mot
         m = across[n, row]
         if m < 0 or row > last[n]:
             continue
-        here, there = row > first[n], row > first[m]  # what is pinned stays
+        here, there = (gives[n] if row > first[n] else 0.0), (gives[m] if row > first[m] else 0.0)  # 0: pinned
         dx, dy, dz = (
             grid[m, row, 0] - grid[n, row, 0],
             grid[m, row, 1] - grid[n, row, 1],
@@ -120,8 +171,9 @@ def _pull(grid, first, last, across, length, row, longest, stiff, backwards, mot
         )
         way, rest = dx * dx + dy * dy + dz * dz, length[n, row]
         most = longest * rest
-        if not (here or there):
+        if here + there == 0.0:
             continue
+        here, there = here / (here + there), there / (here + there)
         if way > most * most:
             share, limit = 1.0 - most / math.sqrt(way), 1.0
             worst = max(worst, share)
@@ -131,11 +183,8 @@ def _pull(grid, first, last, across, length, row, longest, stiff, backwards, mot
             continue
         if motion is not None:
             follow_draw(motion[0], n, m, row, (dx, dy, dz), share, limit, here, there)
-        part = 0.5 * share if here and there else share
-        if here:
-            move(grid, n, row, part, (dx, dy, dz))
-        if there:
-            move(grid, m, row, -part, (dx, dy, dz))
+        move(grid, n, row, here * share, (dx, dy, dz))
+        move(grid, m, row, -there * share, (dx, dy, dz))
     return worst
 
 

@@ -34,6 +34,7 @@ class Strands:
     facing: F64 = array("N", 3, unit="1, horizontal unit direction in which the strand stands out, at rest")
     azimuth: F64 = array("N", unit="rad, of facing")
     carrier: I32 = array("N", unit="joint that turns the strand before it falls")
+    limb: I32 = array("N", unit="joint that moves the skin under the strand, a third of the way down")
     tail: Bool = array("N", "L", unit="True for particles that move with `carrier`")
     skin_joint: I32 = array("N", "L", 5, unit="joint index, of the skin nearest at rest")
     skin_weight: F64 = array("N", "L", 5, unit="1")
@@ -93,6 +94,7 @@ def strands_of(garment: GarmentMesh, body: Body) -> Strands:
         facing=facing,
         azimuth=np.arctan2(facing[:, 1], facing[:, 0]),
         carrier=carrier,
+        limb=body.main_joint[under[:, vertex.shape[1] // 3]],
         rides=rides,
         tail=garment.carried_by[vertex] == carrier[:, None],
         skin_joint=body.skin_joint[under],
