@@ -61,7 +61,7 @@ class Kinematic(Draper):
     stiff: Annotated[float, Field(ge=0, le=1)] = 0.3  # how much a ring resists being shortened
     bending_m: NonNegativeFloat = 0.06  # along which a hanging strand takes up a new direction
     near_deg: Annotated[float, Field(gt=0, le=180)] = 45.0  # from the limb under it, at most, before cloth sinks
-    slips: Annotated[float, Field(gt=0, le=1)] = 0.1  # how much what lies on the body gives way beside what hangs
+    slips: Annotated[float, Field(gt=0, le=1)] = 0.3  # how much what lies on the body gives way beside what hangs
     _fittings: WeakKeyDictionary[GarmentMesh, Fitting] = PrivateAttr(default_factory=WeakKeyDictionary)
 
     def drape(self, poses: PoseBatch, parameters: F64, past: Past, scene: Scene) -> F64:
