@@ -174,26 +174,20 @@ class Kinematic(Draper):
         return grid, blow_batch(grid, fixed, *blown)
 
     def _close(
-        self,
-        fitting: Fitting,
-        grid: F64,
-        first: I32,
-        links: F64,
-        chain: F64,
-        skin: F64,
-        parts: F64,
+        self, fitting: Fitting, grid: F64, first: I32, links: F64, chain: F64, skin: F64, parts: F64,
         motion: Motion | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """Close the rings, in place, of all that hangs below the rows `first` (B, N); those stay."""
         from mocapflow_draping.rings import close_batch
 
         strands = fitting.strands
         across, length = strands.spans
-        bend = np.zeros_like(strands.links)
-        if self.bending_m > 0 and not strands.rides:
-            bend = np.exp(-strands.links / self.bending_m)
+        bend, near, slips = np.zeros_like(strands.links), math.pi, 1.0
+        if not strands.rides:
+            near, slips = math.radians(self.near_deg), self.slips
+            if self.bending_m > 0:
+                bend = np.exp(-strands.links / self.bending_m)
         close_batch(  # rows that may be written, always: each kind is compiled by itself
             grid, links, np.array(first, order="C"), strands.last, across, length, skin, self.longest, self.stiff,
-            bend, along_limbs(strands, chain), math.radians(180.0 if strands.rides else self.near_deg), self.slips,
-            self.sweeps, parts, fitting.fields.values, motion,
+            bend, along_limbs(strands, chain), near, slips, self.sweeps, parts, fitting.fields.values, motion,
         )  # fmt: skip

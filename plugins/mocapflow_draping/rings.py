@@ -28,24 +28,9 @@ STRIDE = 0.02  # m beyond its room that a particle may go in one sweep, so that 
 
 @numba.njit(cache=True, error_model="numpy")
 def close_batch(  # type: ignore[no-untyped-def]
-    grid,
-    links,
-    first,
-    last,
-    across,
-    length,
-    skin,
-    longest,
-    stiff,
-    bend,
-    limb,
-    near,
-    slips,
-    sweeps,
-    parts,
-    values,
+    grid, links, first, last, across, length, skin, longest, stiff, bend, limb, near, slips, sweeps, parts, values,
     motion,
-):
+):  # fmt: skip
     """Close the rings of B drapes in place.
 
     Args:
@@ -78,24 +63,9 @@ def close_batch(  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, error_model="numpy")
 def _close(  # type: ignore[no-untyped-def]
-    grid,
-    links,
-    first,
-    last,
-    across,
-    length,
-    skin,
-    longest,
-    stiff,
-    bend,
-    limb,
-    near,
-    slips,
-    sweeps,
-    parts,
-    values,
+    grid, links, first, last, across, length, skin, longest, stiff, bend, limb, near, slips, sweeps, parts, values,
     motion,
-):
+):  # fmt: skip
     strands, rows = grid.shape[0], grid.shape[1]
     bars, seen = np.empty((strands, rows, 3)), grid[:, 0].copy()
     room, part = np.full(strands, -1.0), np.zeros(strands, np.int64)
