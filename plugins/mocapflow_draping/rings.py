@@ -82,6 +82,8 @@ def _close(  # type: ignore[no-untyped-def]
         for sweep in range(sweeps):
             if 0 < sweep <= least - LEAST:
                 sink(grid, links, row, target, left, turns)
+            if sweep > 0 and slips < 1.0:
+                _weigh(grid, row, slips, gives, room, part, parts, values)
             back = sweep % 2 == 1
             for k in range(len(across) - 1, 0, -1):
                 _pull(grid, first, last, across[k], length[k], row, longest, 0.0, gives, back, motion)
@@ -89,9 +91,6 @@ def _close(  # type: ignore[no-untyped-def]
             if sweep > 0:
                 lift(grid, first, last, across[0], row, seen, room, part, between, clear, parts, values, motion)
             _clear(grid, links, first, last, row, sweep > 0, skin, seen, room, part, parts, values, motion)
-            if slips < 1.0:
-                for n in range(strands):
-                    gives[n] = 1.0 - (1.0 - slips) * supported(grid, n, row, room, part, parts, values)
             if sweep + 1 >= least and excess < ENOUGH:
                 break
 
@@ -122,6 +121,13 @@ def _place(grid, bars, links, first, last, row, bend, motion):  # type: ignore[n
                     turn += share / links[n, row - 2] * (rate[row - 1] - rate[row - 2])
                 rate[row] = rate[row - 1] + link * turn
             to_length(grid, n, row, link, motion)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _weigh(grid, row, slips, gives, room, near, parts, values):  # type: ignore[no-untyped-def]
+    """Write how much each particle of a row gives way: as it hangs, or as it lies on the body."""
+    for n in range(len(gives)):
+        gives[n] = 1.0 - (1.0 - slips) * supported(grid, n, row, room, near, parts, values)
 
 
 @numba.njit(cache=True, error_model="numpy")
