@@ -22,6 +22,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import open3d as o3d
 from known_garments import measures_for, sew
 from known_poses import RATE, SCRIPTS, Body, Motion, angles, chain, ground, read_body, skin
 from known_takes import TAKES, Take
@@ -182,7 +183,13 @@ def finish(take: Take, out: Path, room: Path) -> None:
     """Lay what was drawn around the person over empty rooms; write videos, clean plates and the true cloth."""
     quads, random = np.load(out / "work/scene.npz")["quads"], np.random.default_rng(take.seed)
     faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]).astype("i4")
-    np.savez_compressed(out / "truth/cloth.npz", vertices=np.load(out / "work/cloth.npy"), faces=faces)
+    cloth, joints = np.load(out / "work/cloth.npy"), np.load(out / "truth/joints.npz")
+    np.savez_compressed(out / "truth/cloth.npz", vertices=cloth, faces=faces)
+    legs = zip(cloth, joints["positions"], strict=True)
+    if wrong := sum(pierced(sheet, places, faces, list(joints["names"])) for sheet, places in legs):
+        told = f"A leg comes through the cloth in {wrong} of {len(cloth)} frames: the simulation has failed."
+        (out / "README.md").write_text((out / "README.md").read_text() + "\n" + told + "\n")
+        print(told)
     for camera, boxes in json.loads((out / "work/boxes.json").read_text()).items():
         empty = np.stack([cv2.imread(str(room / f"{camera}_{k}.png")) for k in range(PLATES)]).astype("f4")
         cv2.imwrite(str(out / f"background/{camera}.png"), _soft(empty.mean(0)).round().astype("u1"))
@@ -194,6 +201,17 @@ def finish(take: Take, out: Path, room: Path) -> None:
             noisy = _soft(picture) * TONE + random.normal(0, NOISE, picture.shape)
             pictures.append(np.clip(noisy.round(), 0, 255).astype("u1"))
         write_video(out / f"videos/{camera}.mp4", np.stack(pictures))
+
+
+def pierced(cloth: np.ndarray, positions: np.ndarray, faces: np.ndarray, names: list[str]) -> bool:
+    """Return whether a leg, as a line through its joint centres (J,3), passes through the cloth (C,3), as none can."""
+    sheet = o3d.t.geometry.RaycastingScene()
+    sheet.add_triangles(np.ascontiguousarray(cloth, "f4"), np.ascontiguousarray(faces, "u4"))
+    legs = [[positions[names.index(part + side)] for part in ("hip", "knee", "ankle")] for side in ("_l", "_r")]
+    ways = np.array([[*a, *(b - a)] for leg in legs for a, b in zip(leg, leg[1:], strict=False)])
+    far = ways + np.pad(ways[:, 3:], ((0, 0), (0, 3)))  # from the lower end on
+    counts = sheet.count_intersections(np.concatenate([ways, far]).astype("f4")).numpy()
+    return bool((counts[: len(ways)] != counts[len(ways) :]).any())
 
 
 def write_video(file: Path, pictures: np.ndarray) -> None:

@@ -108,3 +108,13 @@ def test_garments_have_their_measures(wearer):
             hem = garment.vertices[-50:]
             assert lengths(hem) == pytest.approx(measures["leg_opening_circumference"], rel=0.02)
             assert along == pytest.approx(measures["length"] - measures["inseam"], rel=0.03)
+
+
+def test_a_leg_that_comes_through_the_cloth_is_told():
+    body = made.read_body(SKIRT / "subject")
+    garment = sew(body, json.loads((SKIRT / "subject/garment.json").read_text()))
+    quads, raised = garment.quads, at_rest(body)
+    faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    assert not made.pierced(garment.vertices, body.joints, faces, body.names)
+    raised.rotations[0, body.names.index("hip_l"), 0] = -np.pi / 2
+    assert made.pierced(garment.vertices, made.chain(body, raised)[1][0], faces, body.names)
