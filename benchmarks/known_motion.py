@@ -3,11 +3,12 @@
 `apt install blender python3-numpy ffmpeg`, then `python benchmarks/known_motion.py TAKE DATA OUT`. TAKE is one of
 `known_takes.TAKES`; DATA holds the recordings walk_skirt (subject A, her skirt) and kneeup_shorts (subject B, his
 shorts) and the folder motions; OUT/TAKE becomes a recording folder: cameras, videos, clean plates, subject, init.json,
-truth. The body is posed in `known_poses.py`, the garment sewn in `known_garments.py`; `known_motion_blender.py` drapes
-it with Blender's cloth and draws what each camera sees; softness of the lens and noise of the sensor are added here.
-Nothing of the tracker takes part, its kinematics neither: what shared code with it could not tell that it is wrong. On
-one core about 2 s a view: 8 minutes a take of 50 frames. OUT/room_A and room_B keep the empty rooms for the next take;
-delete them when the room, the light or the cameras here have changed.
+truth. The body is posed in `known_poses.py`, by a motion of DATA or of `known_scripts.py`, the garment sewn in
+`known_garments.py`; `known_motion_blender.py` drapes it with Blender's cloth and draws what each camera sees; softness
+of the lens and noise of the sensor are added here. Nothing of the tracker takes part, its kinematics neither: what
+shared code with it could not tell that it is wrong. On one core about 2 s a view: 8 minutes a take of 50 frames.
+OUT/room_A and room_B keep the empty rooms for the next take; delete them when the room, the light or the cameras here
+have changed. Where a leg has come through the cloth, which the simulation does not prevent, the take's README says so.
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ import cv2
 import numpy as np
 import open3d as o3d
 from known_garments import measures_for, sew
-from known_poses import RATE, SCRIPTS, Body, Motion, angles, chain, ground, read_body, skin
+from known_poses import RATE, Body, Motion, angles, chain, ground, read_body, skin
+from known_scripts import SCRIPTS
 from known_takes import TAKES, Take
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation, Slerp

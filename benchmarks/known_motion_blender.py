@@ -78,10 +78,10 @@ def follow(thing: Any, places: np.ndarray) -> None:
 def set_up_cloth(cloth: Any, self_collision: bool, frames: int) -> None:
     """Give the cloth its fabric and tell it what it touches."""
     fabric, touch = cloth.settings, cloth.collision_settings
-    fabric.quality, fabric.mass, fabric.air_damping, fabric.vertex_group_mass = 8, 0.17, 1.0, "pins"
+    fabric.quality, fabric.mass, fabric.air_damping, fabric.vertex_group_mass = 24, 0.17, 1.0, "pins"
     fabric.tension_stiffness = fabric.compression_stiffness = 40.0
     fabric.shear_stiffness, fabric.bending_stiffness = 20.0, 0.3
-    touch.collision_quality, touch.distance_min, touch.friction = 4, 0.004, 3.3
+    touch.collision_quality, touch.distance_min, touch.friction = 8, 0.004, 3.3
     touch.use_self_collision, touch.self_distance_min = self_collision, 0.003
     bpy.context.scene.frame_start = cloth.point_cache.frame_start = 1
     bpy.context.scene.frame_end = cloth.point_cache.frame_end = frames

@@ -80,4 +80,8 @@ TAKES = {
     "bow_A_shorts": Take("A", "shorts", "bow", 74, GREY, frames=60),
     "kick_A_skirt": Take("A", "skirt", "kick_B", 75, GREEN, start=20, frames=50),
     "walk_B_skirt2": Take("B", "skirt", "walk_B", 76, PURPLE, start=20, frames=60),
+    # made after that
+    "run_A_skirt": Take("A", "skirt", "run", 81, GREEN),
+    "jack_B_skirt": Take("B", "skirt", "jack", 83, PURPLE),
+    "kneel_A_skirt": Take("A", "skirt", "kneel", 85, GREY, frames=60),
 }
