@@ -42,7 +42,7 @@ def main() -> None:
     assert isinstance(loop, CoupledLoop) and pipeline.garment is not None
     wrong = scaled(body, WRONG)
     scene = Scene(cameras=recording.cameras, body=wrong, garment=pipeline.garment.sew(wrong))
-    background = stages["background"].run(recording)
+    background = stages["background"].run(recording, scene)
     count = min(int(sys.argv[3]), recording.length) if len(sys.argv) > 3 else recording.length
     rows = np.linspace(0, count - 1, frames).round().astype(int).tolist()
     truth = true_poses(folder, replace(scene, body=body), rows)

@@ -70,7 +70,7 @@ def main() -> None:
     assert isinstance(loop, CoupledLoop) and garment is not None
     scene = Scene(cameras=recording.cameras, body=body, garment=garment.sew(body))
     truth = true_poses(folder, scene, range(frames))
-    model = ClothedModel(scene=scene.with_background(stages["background"].run(recording)), draper=loop.draper)
+    model = ClothedModel(scene=scene.with_background(stages["background"].run(recording, scene)), draper=loop.draper)
     print(f"{'RMS over ' + str(frames) + ' frames':28} knees °      shank °  hip centre mm  pelvis yaw °")
     for label, (segmenter, priors) in variants(loop.segmenter, truth, dressed(folder, scene, truth)).items():
         tracked = track(recording.frames(), loop, model, segmenter, priors, truth)
