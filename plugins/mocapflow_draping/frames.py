@@ -25,9 +25,7 @@ def standing_out(strands: Strands, chain: F64) -> F64:
 
 def along_limbs(strands: Strands, chain: F64) -> F64:
     """Return the unit directions (B, N, 3) of strands that move with the limb under them, at joints (B, J, 4, 4)."""
-    way = strands.rest[:, -1] - strands.rest[:, 0]
-    way /= np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), 1e-9)
-    along: F64 = np.einsum("bnij,nj->bni", chain[:, strands.limb, :3, :3], way)
+    along: F64 = np.einsum("bnij,nj->bni", chain[:, strands.limb, :3, :3], strands.way)
     return along
 
 

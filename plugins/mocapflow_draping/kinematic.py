@@ -60,7 +60,7 @@ class Kinematic(Draper):
     longest: Annotated[float, Field(ge=1)] = 1.0  # of a ring link, over its rest length
     stiff: Annotated[float, Field(ge=0, le=1)] = 0.3  # how much a ring resists being shortened
     bending_m: NonNegativeFloat = 0.06  # along which a hanging strand takes up a new direction
-    near_deg: Annotated[float, Field(gt=0, le=180)] = 45.0  # off the limb under it, at most, before cloth sinks
+    hold_deg: Annotated[float, Field(gt=0, le=180)] = 45.0  # off the limb under it, at most, before cloth sinks
     slips: Annotated[float, Field(gt=0, le=1)] = 0.3  # how much what lies on the body gives way beside what hangs
     _fittings: WeakKeyDictionary[GarmentMesh, Fitting] = PrivateAttr(default_factory=WeakKeyDictionary)
 
@@ -182,12 +182,12 @@ class Kinematic(Draper):
 
         strands = fitting.strands
         across, length = strands.spans
-        bend, near, slips = np.zeros_like(strands.links), math.pi, 1.0
+        bend, hold, slips = np.zeros_like(strands.links), math.pi, 1.0
         if self.bending_m > 0 and not strands.rides:
             bend = np.exp(-strands.links / self.bending_m)
         if self.rule == "contact" and not strands.rides:
-            near, slips = math.radians(self.near_deg), self.slips
+            hold, slips = math.radians(self.hold_deg), self.slips
         close_batch(  # rows that may be written, always: each kind is compiled by itself
             grid, links, np.array(first, order="C"), strands.last, across, length, skin, self.longest, self.stiff,
-            bend, along_limbs(strands, chain), near, slips, self.sweeps, parts, fitting.fields.values, motion,
+            bend, along_limbs(strands, chain), hold, slips, self.sweeps, parts, fitting.fields.values, motion,
         )  # fmt: skip

@@ -28,7 +28,7 @@ STRIDE = 0.02  # m beyond its room that a particle may go in one sweep, so that 
 
 @numba.njit(cache=True, error_model="numpy")
 def close_batch(  # type: ignore[no-untyped-def]
-    grid, links, first, last, across, length, skin, longest, stiff, bend, limb, near, slips, sweeps, parts, values,
+    grid, links, first, last, across, length, skin, longest, stiff, bend, limb, hold_rad, slips, sweeps, parts, values,
     motion,
 ):  # fmt: skip
     """Close the rings of B drapes in place.
@@ -45,7 +45,7 @@ def close_batch(  # type: ignore[no-untyped-def]
         stiff: 0 to 1, the share of a shortened link's lack that one sweep makes good.
         bend: (N, L - 1) 0 to 1, how much each bar keeps the direction of the one above it.
         limb: (B, N, 3) unit direction of each strand if it moved with the limb under it.
-        near: rad, how far from there bars stand at most before they sink.
+        hold_rad: how far from there bars stand at most before they sink; pi: they hang as they fell.
         slips: 0 to 1, how much what lies on top of the body gives way beside what hangs.
         sweeps: passes over each row, at most.
         parts: (B, P, COLUMNS), the bodies, see `parts`.
@@ -56,42 +56,44 @@ def close_batch(  # type: ignore[no-untyped-def]
     """
     for b in range(len(grid)):
         _close(
-            grid[b], links[b], first[b], last, across, length, skin[b], longest, stiff, bend, limb[b], near, slips,
+            grid[b], links[b], first[b], last, across, length, skin[b], longest, stiff, bend, limb[b], hold_rad, slips,
             sweeps, parts[b], values, motion,
         )  # fmt: skip
 
 
 @numba.njit(cache=True, error_model="numpy")
 def _close(  # type: ignore[no-untyped-def]
-    grid, links, first, last, across, length, skin, longest, stiff, bend, limb, near, slips, sweeps, parts, values,
+    grid, links, first, last, across, length, skin, longest, stiff, bend, limb, hold_rad, slips, sweeps, parts, values,
     motion,
 ):  # fmt: skip
     strands, rows = grid.shape[0], grid.shape[1]
     bars, seen = np.empty((strands, rows, 3)), grid[:, 0].copy()
-    room, part = np.full(strands, -1.0), np.zeros(strands, np.int64)
+    room, near = np.full(strands, -1.0), np.zeros(strands, np.int64)
     between, clear = seen.copy(), np.full(strands, -1.0)
     gives, target, left = np.ones(strands), np.zeros((strands, 3)), np.zeros(strands)
-    turns = max(min(SINKING, sweeps - LEAST), 1)
+    turns = min(SINKING, sweeps - LEAST)  # fewer sweeps have no time for it
+    may_hold = turns > 0 and hold_rad < math.pi
     _bars(grid, links, first, last, bars)
     if motion is not None:
         _bars(motion[0], links, first, last, motion[1])
     for row in range(1, rows):
         _place(grid, bars, links, first, last, row, bend, motion)
-        least = LEAST + turns if hold(grid, limb, links, first, last, row, near, target, left) else LEAST
+        held = may_hold and hold(grid, limb, links, first, last, row, hold_rad, target, left)
+        sinking = turns if held else 0
         gives[:] = 1.0
         for sweep in range(sweeps):
-            if 0 < sweep <= least - LEAST:
+            if 0 < sweep <= sinking:
                 sink(grid, links, row, target, left, turns)
             if sweep > 0 and slips < 1.0:
-                _weigh(grid, row, slips, gives, room, part, parts, values)
+                _weigh(grid, row, slips, gives, room, near, parts, values)
             back = sweep % 2 == 1
             for k in range(len(across) - 1, 0, -1):
                 _pull(grid, first, last, across[k], length[k], row, longest, 0.0, gives, back, motion)
             excess = _pull(grid, first, last, across[0], length[0], row, longest, stiff, gives, back, motion)
             if sweep > 0:
-                lift(grid, first, last, across[0], row, seen, room, part, between, clear, parts, values, motion)
-            _clear(grid, links, first, last, row, sweep > 0, skin, seen, room, part, parts, values, motion)
-            if sweep + 1 >= least and excess < ENOUGH:
+                lift(grid, first, last, across[0], row, seen, room, near, between, clear, parts, values, motion)
+            _clear(grid, links, first, last, row, sweep > 0, skin, seen, room, near, parts, values, motion)
+            if sweep + 1 >= LEAST + sinking and excess < ENOUGH:
                 break
 
 

@@ -2,6 +2,7 @@
 
 Fallen by itself, a strand beside a raised thigh hangs straight down, and its ring would be drawn together next to the
 leg, or across it. So bars begin near the direction in which the limb carries them and turn down from sweep to sweep.
+Rates stay those of the bars as they fell: where nothing holds them, they end there.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ from mocapflow_draping.pushes import place
 
 
 @numba.njit(cache=True, error_model="numpy")
-def hold(grid, limb, links, first, last, row, near, target, left):  # type: ignore[no-untyped-def]
-    """Turn the bars of a row back until they stand `near` rad from the limb; return whether any has to.
+def hold(grid, limb, links, first, last, row, most, target, left):  # type: ignore[no-untyped-def]
+    """Turn the bars of a row back until they stand `most` rad from the limb; return whether any has to.
 
     Args:
         grid: (N, L, 3) m, overwritten.
@@ -24,7 +25,7 @@ def hold(grid, limb, links, first, last, row, near, target, left):  # type: igno
         first: (N,) row down to which each strand stays as it is.
         last: (N,) row of the last particle of each strand.
         row: of the lower ends.
-        near: rad.
+        most: rad.
         target: (N, 3) unit directions in which the bars hung, written.
         left: (N,) rad by which each was turned back, written.
     """
@@ -34,8 +35,8 @@ def hold(grid, limb, links, first, last, row, near, target, left):  # type: igno
         if first[n] < row <= last[n]:
             target[n] = _direction(grid, n, row, links[n, row - 1])
             angle = _angle(target[n], limb[n])
-            if angle > near:
-                held, left[n] = True, angle - near
+            if angle > most:
+                held, left[n] = True, angle - most
                 _turn(grid, n, row, links[n, row - 1], target[n], limb[n], angle, left[n])
     return held
 

@@ -48,6 +48,13 @@ class Strands:
         return _own(self.first, self.last, self.vertex.shape[1])
 
     @cached_property
+    def way(self) -> F64:
+        """(N, 3), the unit direction from each strand's root to its end, at rest."""
+        way = self.rest[:, -1] - self.rest[:, 0]
+        unit: F64 = way / np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), 1e-9)
+        return unit
+
+    @cached_property
     def place(self) -> I32:
         """(W,), where each cloth vertex stands among the N x L particles."""
         place = np.zeros(self.vertex.max() + 1, np.int32)

@@ -9,7 +9,7 @@ import numpy as np
 from mocapflow_levelset import crops
 from mocapflow_levelset.channels import ChannelName, features
 from mocapflow_levelset.colours import bins_of
-from mocapflow_levelset.plates import Plate, Shadow, density_of, plate_of
+from mocapflow_levelset.plates import Plate, Shadow, density_of, plate_in
 from mocapflow_levelset.shadows import floor_around
 
 from mocapflow.assets import Background, Camera
@@ -51,7 +51,7 @@ def small_room(background: Background, cameras: tuple[Camera, ...], rows: int) -
     """Return the empty room in images of about so many rows; made once, forgotten with the background."""
     factors = [max(round(camera.size[1] / rows), 1) for camera in cameras]
     small = tuple(map(shrunk, cameras, factors))
-    plates = map(plate_of, background.mean, background.spread, [CHANNELS] * len(cameras), factors)
+    plates = (plate_in(background, number, CHANNELS, factor) for number, factor in enumerate(factors))
     return Room(small, tuple(plates))
 
 

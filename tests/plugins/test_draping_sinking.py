@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drape_bodies import SKIN, SKIRT, draper, legs, lying_cylinder, prepared, skirted
+from drape_bodies import SKIN, SKIRT, draper, leg_poses, legs, lying_cylinder, prepared, skirted
 from mocapflow_draping.frames import along_limbs, standing_out
 from mocapflow_draping.pushes import LEVEL, supported
 from mocapflow_draping.sinking import hold, sink
@@ -96,3 +96,13 @@ def test_a_skirt_closes_over_a_leg_that_is_raised_aside():
     a, b = scene.garment.rings.T
     longer = np.linalg.norm(cloth[a] - cloth[b], axis=1) / scene.garment.ring_length - 1
     assert np.quantile(longer, 0.99) < 0.12
+
+
+@pytest.mark.parametrize("sweeps", [1, 3])
+def test_cloth_that_has_no_time_to_sink_is_not_held(sweeps):
+    scene, poses = skirted(), leg_poses()
+    calm = np.zeros((len(poses.root), len(scene.garment.parameter_names)))
+    held, free = (draper(sweeps=sweeps, hold_deg=d).drape(poses, calm, Past(), scene) for d in (45.0, 180.0))
+    np.testing.assert_array_equal(held, free)
+    longer, loose = (draper(sweeps=8, hold_deg=d).drape(poses, calm, Past(), scene) for d in (45.0, 180.0))
+    assert np.abs(longer - loose).max() > 1e-3  # with time, some bars are
