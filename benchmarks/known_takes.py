@@ -82,6 +82,8 @@ TAKES = {
     "walk_B_skirt2": Take("B", "skirt", "walk_B", 76, PURPLE, start=20, frames=60),
     # made after that
     "run_A_skirt": Take("A", "skirt", "run", 81, GREEN),
+    "run_B_skirt": Take("B", "skirt", "run", 82, GREY),
+    "run_A_shorts": Take("A", "shorts", "run", 84, PURPLE),
     "jack_B_skirt": Take("B", "skirt", "jack", 83, PURPLE),
     "kneel_A_skirt": Take("A", "skirt", "kneel", 85, GREY, frames=60),
 }
