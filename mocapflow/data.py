@@ -222,6 +222,7 @@ class Turn:
 
     index: int
     change: Change | None = None
+    far: bool = False  # the frame began far from the person: a first one, or one whose first turn moved the body far
 
     def calm(self, body_mm: float) -> bool:
         """True where the turn before moved the body by less; the first turn never is."""

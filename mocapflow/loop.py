@@ -44,12 +44,13 @@ def settle(
     Source: Rosenhahn 2008, Fig. 12.14
     """
     functional, watch = Functional(model, steps.priors, past), Stopwatch()
-    steady = steps.steady if past.moments else steps.steady.beginning
+    far = not past.moments
+    steady = steps.steady.beginning if far else steps.steady
     calm, change = 0, None
     last = before_last = Shown(state.estimate.pose, model.surface(state.estimate.pose, state.cloth))
     energy, cost = np.full((steps.steady.cap, len(functional.terms)), np.nan), np.nan
-    for index in range(steady.max_turns):
-        turn = Turn(index=index, change=change)
+    for index in range(steady.cap):
+        turn = Turn(index=index, change=change, far=far)
         segmentation = segmentation_of(steps.segmenter, frame, state, past, model.scene, turn)
         watch.lap("segment")
         match = partial(pool_matches, steps.matchers, frame, segmentation, past, model.scene, turn)
@@ -66,11 +67,13 @@ def settle(
         last_cost, cost = cost, functional.total(energy[index])
         now = Shown(estimate.pose, surface)
         change, swing = (measure_change(old, now, estimate.covariance) for old in (last, before_last))
+        if index == 0 and steady.far(change):
+            far, steady = True, steady.beginning
         watch.lap("match")
         observe(frame.index, turn, state)
         before_last, last = last, now
         calm = calm + 1 if steady.holds(change, index + 1) and steady.even(last_cost, cost) else 0
-        if calm >= steady.turns:
+        if calm >= steady.turns or index + 1 >= steady.max_turns:
             break
     assert change is not None
     return FrameResult(

@@ -26,7 +26,8 @@ class Steady(Settings):
     energy_share: PositiveOrInf = float("inf")  # largest change of the functional from turn to turn
     turns: PositiveInt = 2  # in a row within the tolerances, then the frame is at rest
     max_turns: PositiveInt = 8  # then the frame is left as it is
-    first_turns: NonNegativeInt = 0  # the same, if more, of a first frame, and of one after frames that were lost
+    first_turns: NonNegativeInt = 0  # the same, if more, of a frame that begins far off, as first ones may
+    far_mm: PositiveOrInf = float("inf")  # move of the body in a first turn beyond which the frame began far off
     halvings: NonNegativeInt = 0  # at most, of a step that raises the functional; 0: it is taken whole
 
     @property
@@ -36,8 +37,12 @@ class Steady(Settings):
 
     @property
     def beginning(self) -> Steady:
-        """What holds for a frame that begins like a first: it may start far off, and how sure it is says little."""
+        """What holds for a frame that begins far off: it may take long, and how sure it is says little."""
         return self.model_copy(update={"sigmas": (), "max_turns": self.cap})
+
+    def far(self, change: Change) -> bool:
+        """True where a change in the first turn tells that a frame began far from the person."""
+        return change.body > self.far_mm / 1000
 
     def holds(self, change: Change, turns: int) -> bool:
         """True where a change is within both tolerances, or less than the pose is known to."""

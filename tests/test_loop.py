@@ -112,6 +112,23 @@ def test_a_frame_that_begins_like_a_first_may_take_more_turns(frame):
     assert go(frame, 0.05, max_turns=3, first_turns=2).iterations == 3
 
 
+@pytest.mark.parametrize(("far_mm", "turns"), [(1, 6), (1000, 3)])
+def test_a_frame_whose_first_turn_moves_the_body_far_is_one_that_began_far_off(frame, far_mm, turns):
+    """It may take more turns, what it is known to is no rest, and every later turn says so."""
+    before = Past(moments=(Moment(time=0.0, pose=Pose(root=np.eye(4), angles=np.zeros(2)), cloth=NO_CLOTH),))
+    seen = []
+    steady = dict(far_mm=far_mm)
+    result = go(frame, 0.05, lambda *args: seen.append(args[1].far), 3, (0, 0.01), before, first_turns=6, steady=steady)
+    assert result.iterations == turns
+    assert seen == ([False, *[True] * 5] if far_mm == 1 else [False] * 3)
+    assert len(result.energy) == 6
+
+
+def test_the_only_turn_of_a_frame_is_the_last_however_far_it_moves(frame):
+    before = Past(moments=(Moment(time=0.0, pose=Pose(root=np.eye(4), angles=np.zeros(2)), cloth=NO_CLOTH),))
+    assert go(frame, 0.5, max_turns=1, past=before, steady=dict(far_mm=1)).iterations == 1
+
+
 def test_onlookers_see_every_turn_in_order(frame):
     seen = []
     result = go(frame, 1.0, lambda index, turn, state: seen.append((index, turn.index, state)))

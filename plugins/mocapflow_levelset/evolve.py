@@ -26,6 +26,7 @@ class Weights(NamedTuple):
     clip: float  # bound on the log ratio
     step: float  # size of a time step
     band_px: float
+    any_colour: float = -6.0  # least log density inside, where the outside's is that of the empty scene
 
 
 class Rhythm(NamedTuple):
@@ -81,7 +82,7 @@ def settle(level: F32, prior: F32, evidence: Evidence, window: Window, weights: 
             sparse = np.ascontiguousarray(level[::stride, ::stride]) / np.float32(stride)
             gaussians = local_gaussians(evidence.sparse, weight, sparse, sums, grid, weights.sigma_px / stride, reach)
             runs = near(level, weights, first) if step else runs
-            log_ratio(runs, evidence, gaussians, grid.cell_px * stride, stride, weights.clip, ratio)
+            log_ratio(runs, evidence, gaussians, grid.cell_px * stride, stride, weights, ratio)
             if evidence.told is not None:
                 ratio = np.clip(ratio + evidence.told, -weights.clip, weights.clip)
         advance(level, ratio, prior, runs, change, weights)
@@ -102,10 +103,13 @@ def near(level: F32, weights: Weights, first: int = 0) -> I32:
     return runs
 
 
-def log_ratio(runs: I32, evidence: Evidence, gaussians: F32, cell_px: int, stride: int, clip: float, out: F32) -> None:
+def log_ratio(
+    runs: I32, evidence: Evidence, gaussians: F32, cell_px: int, stride: int, weights: Weights, out: F32
+) -> None:
     """Write log p1 - log p2, clipped, into `out` (H, W) along the runs; masked pixels get 0.
 
-    Outside, the empty scene speaks where it is known (no NaN), else the local statistics.
+    Outside, the empty scene speaks where it is known (no NaN), else the local statistics. Beside it no colour is less
+    likely on the person than `any_colour`: what the room surely does not show is the person, seen there before or not.
     """
     if not len(runs):  # the contour has left the image
         return
@@ -113,7 +117,8 @@ def log_ratio(runs: I32, evidence: Evidence, gaussians: F32, cell_px: int, strid
     known = evidence.outside is not None
     outside = evidence.outside(runs, values) if evidence.outside is not None else np.empty(0, np.float32)
     first = np.float32((cell_px // stride - 1) * stride / 2)  # centre of the first cell's pixels
-    kernels.log_ratio(runs, values, evidence.weight, outside, known, gaussians, cell_px, first, np.float32(clip), out)
+    bounds = np.float32(weights.clip), np.float32(weights.any_colour)
+    kernels.log_ratio(runs, values, evidence.weight, outside, known, gaussians, cell_px, first, *bounds, out)
 
 
 def advance(level: F32, ratio: F32, prior: F32, runs: I32, change: F32, weights: Weights) -> None:

@@ -37,7 +37,7 @@ def find_runs(level, reach, block, first):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, error_model="numpy")
-def log_ratio(runs, values, weight, outside, known, gaussians, cell, first, clip, out):  # type: ignore[no-untyped-def]
+def log_ratio(runs, values, weight, outside, known, gaussians, cell, first, clip, any_colour, out):  # type: ignore[no-untyped-def]
     """Add the log densities channel by channel along stretches between two cell centres."""
     rows, columns, _, entries = gaussians.shape
     zero, scale = np.float32(0), np.float32(1 / cell)
@@ -61,7 +61,7 @@ def log_ratio(runs, values, weight, outside, known, gaussians, cell, first, clip
             if known:
                 for k in range(stop - x):
                     if not np.isnan(outside[n + k]):
-                        inside[k], beyond[k] = max(inside[k], -clip), outside[n + k]
+                        inside[k], beyond[k] = max(inside[k], any_colour), outside[n + k]
             counts, ratio = weight[y, x:stop], out[y, x:stop]
             for k in range(ratio.size):
                 ratio[k] = counts[k] * min(max(inside[k] - beyond[k], -clip), clip)

@@ -54,7 +54,8 @@ class LevelSet(ShadowAware):
     length_weight: NonNegativeFloat = 0.9  # nu; explicit steps are stable below 0.94
     shape_weight: NonNegativeFloat = 0.05  # lambda: 0.05 clean, 0.1 with occlusion, 0.1-0.3 in heavy noise, 0 uncoupled
     ratio_clip: PositiveFloat = 6.0  # bound on log p1/p2
-    coarse_steps: NonNegativeInt = 8  # at a quarter of the size, on the first turn
+    any_colour: float = -3.0  # log density on the person, at least, of any colour, where the empty scene is known
+    coarse_steps: NonNegativeInt = 32  # at a quarter of the size, on the first turn
     half_steps: NonNegativeInt = 4  # at half the size
     steps: PositiveInt = 3  # at full size
     later_steps: PositiveInt = 3  # at full size on later turns, which start from the last turn's contour
@@ -75,13 +76,13 @@ class LevelSet(ShadowAware):
         """Return the person's silhouette in each usable view.
 
         The first turn starts from the projected model, later turns from the last turn's silhouettes. Where the model's
-        outline has hardly moved they would stay as they are, and are not looked at; in the first frame, which starts
-        far off, from the third turn on.
+        outline has hardly moved they would stay as they are, and are not looked at; in a frame that began far off,
+        from the third turn on: the contour may have had farther to go than its steps reached.
         """
         surface = scene.surface(state.estimate.pose, state.cloth)
         # a view in which nobody was begins anew from the model, which may stand in it by now
         last = {s.camera: s for s in state.segmentation.of(PERSON) if len(s.zero_level[0])} if turn.index else {}
-        parts = {c: self._moved(surface, scene.cameras[c], past, turn) for c in last}
+        parts = {c: self._moved(surface, scene.cameras[c], turn) for c in last}
         due = [c for c in np.flatnonzero(frame.usable).tolist() if (part := parts.get(c)) is None or part.any()]
         if last and not due:
             return state.segmentation
@@ -116,9 +117,9 @@ class LevelSet(ShadowAware):
             matte=self._matte(scene, camera),
         )
 
-    def _moved(self, surface: Surface, camera: Camera, past: Past, turn: Turn) -> Bool | None:
+    def _moved(self, surface: Surface, camera: Camera, turn: Turn) -> Bool | None:
         """Return around where (H, W) the contour has to be found anew; None: everywhere."""
-        if not self.keep_px or turn.change is None or not (past.moments or turn.index > 1):
+        if not self.keep_px or turn.change is None or (turn.far and turn.index == 1):
             return None
         return moved_outline(surface, turn.change, camera, self.keep_px)
 
@@ -172,6 +173,7 @@ class LevelSet(ShadowAware):
                 length=self.length_weight,
                 shape=self.shape_weight,
                 clip=self.ratio_clip,
+                any_colour=self.any_colour,
                 step=1.0,  # `length_weight` is stable with it
                 band_px=INNER_BAND_PX,
             ),

@@ -58,6 +58,7 @@ class ContourIcp(Matcher):
     spacing_px: PositiveFloat = 4.0  # between the points of a contour
     hem_guard_px: NonNegativeFloat = 12.0  # skin so near to cloth counts as cloth: a hem is uncertain
     calm_mm: PositiveFloat = 15.0  # change of the body in a turn below which reach and loss are the later ones
+    far_calm_mm: PositiveFloat = 15.0  # the same, if less, in a frame that began far off
     first_reach_px: PositiveFloat = 40.0  # pairs farther apart are left out
     later_reach_px: PositiveFloat = 10.0  # the same once it is calm
     cloth_reach_px: PositiveOrInf = float("inf")  # pairs on cloth reach no farther: a hem that swings turns the pelvis
@@ -83,7 +84,7 @@ class ContourIcp(Matcher):
     def match_view(self, silhouette: Silhouette, surface: Surface, scene: Scene, turn: Turn) -> Matches:
         """Return the pairs of one view."""
         image, (model, curvature) = self.contours(silhouette, surface, scene, turn)
-        reach = self.later_reach_px if turn.calm(self.calm_mm) else self.first_reach_px
+        reach = self.later_reach_px if self._calm(turn) else self.first_reach_px
         cosine = float(np.cos(np.radians(self.normal_angle_deg)))
         one = self.described(*image)
         other = self.described(model.pixel, model.normal, curvature)
@@ -104,6 +105,9 @@ class ContourIcp(Matcher):
         away = np.linalg.norm(pixel - model.pixel.take(shown, axis=0), axis=1)
         return np.asarray((away <= self.cloth_reach_px) | ~surface.cloth.take(model.vertex.take(shown)))
 
+    def _calm(self, turn: Turn) -> bool:
+        return turn.calm(min(self.calm_mm, self.far_calm_mm) if turn.far else self.calm_mm)
+
     def contours(
         self, silhouette: Silhouette, surface: Surface, scene: Scene, turn: Turn
     ) -> tuple[ImageContour, ModelContour]:
@@ -123,7 +127,7 @@ class ContourIcp(Matcher):
         pixel, direction, vertex, spread, distance = paired_points(
             seen, shown, image.pixel, image.normal, model.pixel, model.anchor, model.vertex, sigma, slides
         )
-        loss = self.later_loss if turn.calm(self.calm_mm) else self.first_loss
+        loss = self.later_loss if self._calm(turn) else self.first_loss
         return Matches(
             camera=np.full(len(seen), index, np.int16),
             pixel=pixel,

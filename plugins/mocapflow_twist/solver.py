@@ -34,7 +34,7 @@ class TwistGaussNewton(PoseSolver):
     name = "twist_gauss_newton"
 
     iterations: PositiveInt = 10  # times that it matches anew, at most
-    first_iterations: NonNegativeInt = 0  # the same in the first frame, if it is more: its start is far off
+    first_iterations: NonNegativeInt = 0  # the same, if it is more, in a frame that begins far off
     steps_per_match: PositiveInt = 1  # steps with the same pairs
     residual: Literal["image", "line"] = "image"  # pixels, or distance to projection rays in space
     line_sigma_mm: PositiveFloat = 3.0  # standard deviation of every distance to a ray
@@ -71,7 +71,7 @@ class TwistGaussNewton(PoseSolver):
         surface, damping = model.surface(guess.pose, guess.cloth), self._least_damping(past, turn)
         tried: dict[Pose, Sequence[Residual]] = {}
         found: Quadratic | None = None  # the last quadratic models, for the covariance
-        for _ in range(self.iterations if past.moments else max(self.iterations, self.first_iterations)):
+        for _ in range(max(self.iterations, self.first_iterations) if turn.far else self.iterations):
             matches, found = match(surface), None
             problem = Problem(model, self._data(matches, model), priors, past, anchor, tried)
             if problem.data.measurements == 0:

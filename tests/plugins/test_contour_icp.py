@@ -89,6 +89,16 @@ def test_the_reach_narrows_once_the_body_is_calm(truth):
     assert len(later.vertex) < len(first.vertex)
 
 
+def test_a_frame_that_began_far_off_is_calm_later(truth):
+    surface, segmentation = surface_at(truth), seen(surface_at(raised(truth, 0.12)), SCENE)
+    moved = replace(CALM, change=replace(CALM.change, body=0.03))
+    icp = ContourIcp(calm_mm=40)
+    near, far = (match(icp, surface, segmentation, turn) for turn in (moved, replace(moved, far=True)))
+    assert len(near.vertex) < len(far.vertex)
+    still = match(icp, surface, segmentation, replace(CALM, far=True))
+    assert len(still.vertex) == len(near.vertex)
+
+
 @pytest.mark.parametrize("sigma", [1.0, 2.5])
 def test_the_loss_gives_way_to_a_redescending_one_once_the_body_is_calm(truth, sigma):
     surface, segmentation = surface_at(truth), seen(surface_at(raised(truth, 0.05)), SCENE)

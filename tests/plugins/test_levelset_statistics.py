@@ -50,14 +50,14 @@ def test_windowed_statistics_equal_brute_force():
 def test_coarse_cells_give_nearly_the_same():
     planes, _ = ramp_scene()
     level = ellipse()
-    weights = Weights(SIGMA, 0.5, 0.0, 6.0, 1.0, 7.0)
+    weights = Weights(SIGMA, 0.5, 0.0, 50.0, 1.0, 7.0)
     ratios = []
     for cell in (1, 8):
         window = Window(12.0, cell, 0.02)
         gaussians = local_gaussians(planes, ONES, level, totals(planes, ONES, cell), window, SIGMA)
         ratio = np.zeros_like(level)
         runs = near(level, weights, (cell - 1) // 2)
-        log_ratio(runs, from_features(planes, ONES), gaussians, cell, 1, 50.0, ratio)
+        log_ratio(runs, from_features(planes, ONES), gaussians, cell, 1, weights, ratio)
         ratios.append(ratio[np.abs(level) < 4])
     assert np.sqrt(np.mean((ratios[0] - ratios[1]) ** 2)) < 0.06 * ratios[0].std()
 
@@ -81,8 +81,9 @@ def test_known_gaussians_give_the_known_ratio():
     hard = np.where(inside, np.float32(12), np.float32(-12))  # so that the smooth step is 0 or 1
     gaussians = local_gaussians(planes, ONES, hard, totals(planes, ONES, 1), window, SIGMA)
     ratio = np.zeros_like(level)
-    runs = near(level, Weights(SIGMA, 0.5, 0.0, 6.0, 1.0, 7.0))
-    log_ratio(runs, from_features(planes, ONES), gaussians, 1, 1, 100.0, ratio)
+    weights = Weights(SIGMA, 0.5, 0.0, 100.0, 1.0, 7.0)
+    runs = near(level, weights)
+    log_ratio(runs, from_features(planes, ONES), gaussians, 1, 1, weights, ratio)
     at = np.abs(level) < 4
     np.testing.assert_allclose(ratio[at], known[at], rtol=1e-3, atol=5e-3)
 
@@ -99,20 +100,20 @@ def test_a_region_that_a_window_hardly_holds_has_its_global_statistics():
 
 
 def test_beside_a_known_room_the_persons_density_has_a_least_value():
-    """A colour that nobody has yet worn is no proof of the room: there its density is at least exp(-6)."""
+    """A colour that nobody has yet worn is no proof of the room: there its density is at least `any_colour`."""
     gaussians = np.zeros((1, 1, 2, 3), np.float32)
     gaussians[0, 0, 0] = 0.0, 0.5, 400.0  # of the person: mean 0.5, and 400 (F - 0.5)^2 below zero
     values, runs = np.array([[0.5, 0.6, 0.8, 1.0]], np.float32), np.array([[0, 0, 4]], np.int32)
     outside = np.array([-2.0, -2.0, -2.0, -9.0], np.float32)
     weight, found = np.ones((1, 4), np.float32), np.zeros((1, 4), np.float32)
-    zero, clip = np.float32(0), np.float32(6)
-    kernels.log_ratio(runs, values, weight, outside, True, gaussians, 1, zero, clip, found)
-    np.testing.assert_allclose(found[0], [2.0, -2.0, -4.0, 3.0], atol=1e-4)
+    zero, bounds = np.float32(0), (np.float32(6), np.float32(-4))
+    kernels.log_ratio(runs, values, weight, outside, True, gaussians, 1, zero, *bounds, found)
+    np.testing.assert_allclose(found[0], [2.0, -2.0, -2.0, 5.0], atol=1e-4)
     gaussians[0, 0, 1] = -2.0, 0.0, 0.0  # of a room that is not known: there is no least value
-    kernels.log_ratio(runs, values, weight, outside[:0], False, gaussians, 1, zero, clip, found)
+    kernels.log_ratio(runs, values, weight, outside[:0], False, gaussians, 1, zero, *bounds, found)
     np.testing.assert_allclose(found[0], [2.0, -2.0, -6.0, -6.0], atol=1e-4)
     outside[2:] = np.nan  # nor where nobody knows it, beside where it is known
-    kernels.log_ratio(runs, values, weight, outside, True, gaussians, 1, zero, clip, found)
+    kernels.log_ratio(runs, values, weight, outside, True, gaussians, 1, zero, *bounds, found)
     np.testing.assert_allclose(found[0], [2.0, -2.0, -6.0, -6.0], atol=1e-4)
 
 

@@ -85,14 +85,14 @@ def test_only_the_first_frame_starts_gently() -> None:
     assert first < second < free
 
 
-def test_only_the_first_frame_looks_for_matches_more_often() -> None:
+def test_only_a_frame_that_began_far_off_looks_for_matches_more_often() -> None:
     scene, truth = make_scene(), make_pose(1)
     matches, start = exact_matches(scene, truth, np.arange(0, 300, 9), directed=False), start_from(truth, 1)
     solver = TwistGaussNewton(**{**EXACT, "iterations": 1}, first_iterations=3)
     later = Past(moments=(Moment(time=0.0, pose=start, cloth=NO_CLOTH),))
-    for past, wanted in ((Past(), 3), (later, 1)):
-        looked = Mock(return_value=matches)
-        solver.solve(looked, make_state(start), ClothedModel(scene=scene), [], past, TURN)
+    for far, wanted in ((True, 3), (False, 1)):
+        looked, turn = Mock(return_value=matches), replace(TURN, far=far)
+        solver.solve(looked, make_state(start), ClothedModel(scene=scene), [], later, turn)
         assert looked.call_count == wanted
 
 
