@@ -90,7 +90,7 @@ def test_a_limb_that_came_back_elsewhere_is_found_by_its_colours():
     state, past = tiny_state(SCENE, believed), past_of(frame)
 
     def overlap(weight):
-        segmenter = Layered(use_background=False, colour_weight=weight)
+        segmenter = Layered(use_background=False, colour_weight=weight, coarse_steps=8)  # with more, both arrive
         found = segmenter.segment(frame, state, past, SCENE, Turn(index=0))
         true = [silhouette(POSE, camera) for camera in SCENE.cameras]
         return np.array([intersection_over_union(s.distance > 0, true[s.camera]) for s in found.silhouettes])
