@@ -55,7 +55,7 @@ class LevelSet(ShadowAware):
     shape_weight: NonNegativeFloat = 0.05  # lambda: 0.05 clean, 0.1 with occlusion, 0.1-0.3 in heavy noise, 0 uncoupled
     ratio_clip: PositiveFloat = 6.0  # bound on log p1/p2
     any_colour: float = -3.0  # log density on the person, at least, of any colour, where the empty scene is known
-    coarse_steps: NonNegativeInt = 32  # at a quarter of the size, on the first turn
+    coarse_steps: NonNegativeInt = 32  # at most, at a quarter of the size, on the first turn
     half_steps: NonNegativeInt = 4  # at half the size
     steps: PositiveInt = 3  # at full size
     later_steps: PositiveInt = 3  # at full size on later turns, which start from the last turn's contour
@@ -153,7 +153,7 @@ class LevelSet(ShadowAware):
     def _levels(self, warm: bool) -> list[Level]:
         reduced, full = self._window(REDUCED_RHO_PX), self._window(self.rho_px)
         levels = [
-            Level(COARSE, self._rhythm(0 if warm else self.coarse_steps), reduced),
+            Level(COARSE, self._rhythm(0 if warm else self.coarse_steps)._replace(to_rest=True), reduced),
             Level(HALF, self._rhythm(self.half_steps), reduced),
             Level(FULL, self._rhythm(self.later_steps if warm else self.steps), full, use_plate=False),
         ]

@@ -34,11 +34,11 @@ def ramp_scene(disturbance="clean", seed=0):
     return np.clip(planes, 0, 1).astype(np.float32), inside
 
 
-def descend(planes, start, prior, steps, shape=0.0, rho=12.0, cell=2, every=1, length=0.5):
+def descend(planes, start, prior, steps, shape=0.0, rho=12.0, cell=2, every=1, length=0.5, to_rest=False):
     """Return the level set after some steps with the literal constants of the chapter's specification."""
     weights = Weights(1.5, length, shape, 6.0, 1.0, BAND)
     evidence = from_features(planes, np.ones(start.shape, np.float32))
-    return settle(start, prior, evidence, Window(rho, cell, 0.02), weights, Rhythm(steps, every, 5)).level
+    return settle(start, prior, evidence, Window(rho, cell, 0.02), weights, Rhythm(steps, every, 5, to_rest)).level
 
 
 def from_features(planes, weight):

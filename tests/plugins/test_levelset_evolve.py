@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from levelset_scenes import descend, ellipse, overlap, ramp_scene
+from mocapflow_levelset import evolve
 
 LAMBDAS = (0.0, 0.01, 0.03, 0.05, 0.1, 0.3, 1.0)
 SPECIFIED = {  # IoU after 40 iterations with the prior 3 px off, one column per lambda
@@ -54,3 +55,13 @@ def test_a_median_filter_helps_where_most_pixels_are_replaced():
     plain = overlap(descend(planes, prior, prior, 40, 0.05), mask)
     robust = overlap(descend(filtered.astype(np.float32), prior, prior, 40, 0.05), mask)
     assert robust > plain + 0.02
+
+
+@pytest.mark.parametrize(("start", "least", "most"), [(ellipse(), 4, 20), (ellipse(a=30, b=30), 28, 199)])
+def test_a_descent_to_rest_takes_as_many_steps_as_its_way_needs(start, least, most, monkeypatch):
+    planes, mask = ramp_scene()
+    whole, steps, step = descend(planes, start, start, 200, every=4), [], evolve.advance
+    monkeypatch.setattr(evolve, "advance", lambda *given: (steps.append(1), step(*given)))
+    found = descend(planes, start, start, 200, every=4, to_rest=True)
+    assert overlap(found, mask) > overlap(whole, mask) - 0.01
+    assert least <= len(steps) <= most
