@@ -15,7 +15,6 @@ from mocapflow_levelset.statistics import Window, local_gaussians, step_table, t
 FRONT = 3.5  # sigmas: beyond, the slope of the smooth step is below 0.3 % of its peak
 
 REST = 4  # pixels that the contour sweeps between two estimates of the statistics, at most, when it rests
-
 BLOCK = 8  # pixels in a vector; runs are made of whole blocks
 
 
@@ -37,7 +36,7 @@ class Rhythm(NamedTuple):
     steps: int
     statistics_every: int
     redistance_every: int
-    to_rest: bool = False  # ends where the contour no longer moves
+    to_rest: bool = False  # fewer, if the contour rests
 
 
 class Settled(NamedTuple):
@@ -77,12 +76,12 @@ def settle(level: F32, prior: F32, evidence: Evidence, window: Window, weights: 
     sums = totals(evidence.sparse, weight, grid.cell_px)
     level = np.clip(level, -np.float32(weights.band_px), np.float32(weights.band_px))
     ratio, change = np.zeros_like(level), np.empty_like(level)
-    runs, before = near(level, weights, first), level > 0
+    runs, before = near(level, weights, first), level > 0 if rhythm.to_rest else None
     for step in range(rhythm.steps):
         if step and step % rhythm.redistance_every == 0:
             level = redistance(level, weights.band_px)
         if step % rhythm.statistics_every == 0:
-            if step and rhythm.to_rest:
+            if step and before is not None:
                 now = level > 0
                 if np.count_nonzero(now != before) <= REST:
                     break

@@ -153,7 +153,7 @@ class LevelSet(ShadowAware):
     def _levels(self, warm: bool) -> list[Level]:
         reduced, full = self._window(REDUCED_RHO_PX), self._window(self.rho_px)
         levels = [
-            Level(COARSE, self._rhythm(0 if warm else self.coarse_steps)._replace(to_rest=True), reduced),
+            Level(COARSE, self._rhythm(0 if warm else self.coarse_steps, to_rest=True), reduced),
             Level(HALF, self._rhythm(self.half_steps), reduced),
             Level(FULL, self._rhythm(self.later_steps if warm else self.steps), full, use_plate=False),
         ]
@@ -162,8 +162,8 @@ class LevelSet(ShadowAware):
     def _window(self, rho_px: float) -> Window:
         return Window(rho_px, self.cell_px, self.variance_floor)
 
-    def _rhythm(self, steps: int) -> Rhythm:
-        return Rhythm(steps, self.statistics_every, self.redistance_every)
+    def _rhythm(self, steps: int, to_rest: bool = False) -> Rhythm:
+        return Rhythm(steps, self.statistics_every, self.redistance_every, to_rest)
 
     def _method(self) -> Method:
         return Method(
