@@ -11,6 +11,7 @@ from mocapflow.records import F32, F64, I32, U8, Bool
 ALIKE = 3.0  # standard deviations within which two colours of a pixel are the same
 NOISE = 3.0  # grey levels, the least standard deviation
 TINT, SHADE = 1.07, 2.0  # one colour in a shadow of the other: channels fall alike, to half of the levels at most
+DEEP = 2.6  # the same, where feet may have stood close by: what `plates.Shadow` takes for a shadow, too
 ROOM = 1.5  # times as common beside the person as on it: a colour of the room
 RARE = 3e-4  # a colour that is rarer beside the person says nothing
 BINS = (32, 64, 64)  # of lightness and the two colours of CIELAB
@@ -37,11 +38,11 @@ def alike(colour: Colours, other: F32) -> Bool:
     return every(near)
 
 
-def shaded(colour: F32, other: F32) -> Bool:
-    """Return where (H, W) one of two colours is the other in a neutral shadow."""
+def shaded(colour: F32, other: F32, most: float = SHADE) -> Bool:
+    """Return where (H, W) one of two colours is the other in a neutral shadow, which divides it by so much at most."""
     b, g, r = np.moveaxis((colour + 1) / (other + 1), 2, 0)
     low, high = np.minimum(np.minimum(b, g), r), np.maximum(np.maximum(b, g), r)
-    found: Bool = (high < TINT * low) & (low > 1 / SHADE) & (high < SHADE)
+    found: Bool = (high < TINT * low) & (low > 1 / most) & (high < most)
     return found
 
 

@@ -13,7 +13,7 @@ from mocapflow.data import Surface
 from mocapflow.geometry.cameras import magnification
 from mocapflow.geometry.silhouettes import mask, outline
 from mocapflow.records import F32, F64, U8, Bool
-from mocapflow_sequence.colours import Colours, alike, every, lab_bins, more_common, shaded
+from mocapflow_sequence.colours import DEEP, Colours, alike, every, lab_bins, more_common, shaded
 from mocapflow_sequence.commonest import commonest
 
 COLOURS = 4  # of each pixel that are looked at: the room's, of who stands there, of shadows
@@ -40,11 +40,13 @@ class Evidence(NamedTuple):
     first: F32  # (H, W, 3) the first frame
     far: Bool  # (H, W) True where it shows the room, but for shadows that have moved
     rooms: Bool  # for each colour, whether it is more common beside the person than on it
+    persons: Bool  # for each colour, whether it is more common on the person
 
     def of_room(self, colour: Colours) -> Bool:
         """Return where (H, W) a colour is the room's."""
-        rooms = self.rooms[lab_bins(colour.mean)]
-        return np.where(self.far, alike(colour, self.first) | (shaded(colour.mean, self.first) & rooms), rooms)
+        bins = lab_bins(colour.mean)
+        lit = shaded(colour.mean, self.first, DEEP) & ~self.persons[bins]  # the first frame need not show it anywhere
+        return np.where(self.far, alike(colour, self.first) | lit, self.rooms[bins])
 
 
 def empty_scene(pictures: U8, first: U8, body: Surface, camera: Camera, least_share: float) -> Learnt:
@@ -67,7 +69,8 @@ def empty_scene(pictures: U8, first: U8, body: Surface, camera: Camera, least_sh
     far = away_m > REACH_M
     beside = far & (away_m < AROUND_M)
     for _ in range(ROUNDS):
-        evidence = Evidence(shown.mean, far, more_common(now[beside], now[person]))
+        rooms, persons = more_common(now[beside], now[person]), more_common(now[person], now[beside])
+        evidence = Evidence(shown.mean, far, rooms, persons)
         learnt = chosen((*colours, shown), evidence, least_share)
         person = ~far & learnt.known & ~alike(shown, learnt.mean) & ~shaded(shown.mean, learnt.mean)
     return lit(learnt, pictures, evidence, usual, floor_around(body, camera) & learnt.known)
@@ -91,7 +94,7 @@ def lit(learnt: Learnt, pictures: U8, evidence: Evidence, usual: F32, floor: Boo
     for picture in pictures:
         colour = _shown(picture[floor][:, None], usual)
         brighter = every(colour.mean > found.mean) & ~alike(colour, found.mean)
-        _take(found, colour, brighter & shaded(colour.mean, dim.mean) & there.of_room(colour))
+        _take(found, colour, brighter & shaded(colour.mean, dim.mean, DEEP) & there.of_room(colour))
     learnt.mean[floor], learnt.spread[floor] = found.mean[:, 0], found.spread[:, 0]
     return learnt
 
