@@ -24,6 +24,7 @@ SHADOW = Shadow()
 EMPTY = 3.0  # standard deviations within which a pixel is that of the empty room
 SPECK = 0.01  # of the largest part's area: smaller parts are noise
 MOST = 3.0  # of the model's area: more can't be the person
+LEAST = 0.1  # of it: less is hardly the person; something may stand before them
 SURELY = 1.0  # log density of a colour on the garment over that elsewhere from which on it is the garment's
 SEAM = np.ones((5, 5), np.uint8)  # gaps in the person so narrow are the person's
 
@@ -41,6 +42,7 @@ class View(NamedTuple):
     camera: Camera
     person: Bool  # (h, w) surely no empty room, lit or in a shadow
     cloth: Bool  # (h, w) pixels of the person that show the garment, by its colours; none are known in a first frame
+    shown: bool  # whether the person is more than a scrap; else the view tells nothing of a pose
     away: F32  # (h, w) px to the nearest pixel that may be the person; 0 on it
     pixel_m: float  # how large a pixel is where the person stands
     known: float  # share of the model's area before a room that somebody knows
@@ -82,10 +84,13 @@ def views(frame: Frame, surface: Surface, room: Room, near_m: float, garment: F6
         changed, same = _compared(small, plate, floor_around(surface, camera))
         told = True if hidden is None else crops.shrink(hidden.astype(np.float32), factor) == 0
         person = _near(changed & told, model, near_m / size)
-        if np.count_nonzero(person) < MOST * np.count_nonzero(model):
+        seen, expected = np.count_nonzero(person), np.count_nonzero(model)
+        if seen < MOST * expected:
             cloth = np.zeros(person.shape, bool) if garment is None else person & (garment[bins_of(small)] > SURELY)
             known = float(np.isfinite(plate.spread)[model].mean()) if model.any() else 0.0
-            found.append(View(camera, person, cloth, _away(same & told, person), size, known))
+            found.append(
+                View(camera, person, cloth, bool(seen > LEAST * expected), _away(same & told, person), size, known)
+            )
     return found
 
 

@@ -26,19 +26,19 @@ def distance(surface: Surface, bare: Surface, views: Sequence[View], cap_m: floa
     Args:
         surface: the person as believed.
         bare: its body alone.
-        views: what the images surely show.
+        views: what the images surely show; without those that hardly show the person.
         cap_m: beyond, it does not matter how far.
         cloth: what a pixel of cloth counts, of the person's off the model and of the model's where nobody is.
     """
-    total = 0.0
-    for view in views:
+    total, shown = 0.0, [view for view in views if view.shown]
+    for view in shown:
         covered, off = _of(surface, view)
         cap = cap_m / view.pixel_m
         skin = covered if cloth == HANGS else mask(outline(bare, view.camera), view.camera)
         lacks, juts = np.minimum(off[view.person], cap), np.minimum(view.away[covered], cap)
         apart = np.where(view.cloth[view.person], cloth, 1.0) @ lacks + np.where(skin[covered], 1.0, cloth) @ juts
-        total += float(apart) * view.pixel_m / max(int(np.count_nonzero(view.person)), 1)
-    return total / max(len(views), 1)
+        total += float(apart) * view.pixel_m / int(np.count_nonzero(view.person))
+    return total / max(len(shown), 1)
 
 
 def uncovered_areas(surface: Surface, views: Sequence[View], reaches_m: Sequence[float], cloth_m: float) -> F64:

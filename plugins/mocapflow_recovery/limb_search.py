@@ -30,6 +30,7 @@ from mocapflow_recovery.sampling import Cost, Plan, Spread, put_back, search, se
 CURED = 2.0  # times as far apart may be what is doubted no more: a leg lay where a skirt flew
 CLEARED = 1.1  # the same, what leaves no hint: of a foot that was lost all other limbs and the cloth tell nothing
 UNKNOWN = "too little is known of the room behind the person: limbs that are lost are not looked for"
+UNSEEN = "fit doubted: no picture tells person from room where it lies"
 Look = Callable[[np.random.Generator, Pose, Pose, Judge], Pose]  # samples, pose believed, pose fitted, judge
 
 
@@ -97,7 +98,9 @@ class LimbSearch(Recovery):
             return result
         room, surface = small_room(background, model.scene.cameras, self.rows), surface_of(model, result)
         seen = views(frame, surface, room, self.near_m, garment_told(past, model.scene))
-        if seen and np.mean([view.known for view in seen]) < self.least_known:
+        if not seen:
+            return noted(result, UNSEEN, doubted=True)
+        if np.mean([view.known for view in seen]) < self.least_known:
             return result if past.moments else noted(result, UNKNOWN, doubted=False)
         stray = stray_of(surface, model.scene, seen, self._reach())
         doubtful, fitted = self._doubtful(stray), result.state.estimate.pose

@@ -99,7 +99,7 @@ def put_back(cost: Cost, found: Pose, poses: Sequence[Pose], body: Body, toleran
         found: the pose with the least cost.
         poses: whose parts are preferred, of each the one that fits best.
         body: whose parts are tried.
-        tolerance: share of the cost that each may add.
+        tolerance: share of the cost that all together may add.
     """
     least = float(cost([found])[0])
     for part in [*parts(body), *joints(body)]:

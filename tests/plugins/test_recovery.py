@@ -478,6 +478,27 @@ def test_seen_samples_bend_what_was_seen_and_nothing_else() -> None:
     assert not seen_samples(POSE, parts(SCENE.body)[1], SCENE.body, plan, np.random.default_rng(0))
 
 
+@pytest.mark.parametrize("left", [0, 8])
+def test_a_view_in_which_something_stands_before_the_person_leads_nobody_astray(left) -> None:
+    """Its picture shows the empty room, or a scrap of the person."""
+    hidden = SCENE.background.mean[0].round().astype(np.uint8)
+    row, column = np.argwhere(mask(outline(surface(POSE), SCENE.cameras[0]), SCENE.cameras[0])).mean(axis=0).astype(int)
+    scrap = np.s_[row : row + left, column : column + left]
+    hidden[scrap] = FRAME.images[0][scrap]
+    looked = seen(replace(FRAME, images=(hidden, *FRAME.images[1:])))
+    assert len(looked) == len(seen()) and not looked[0].shown
+    assert apart(POSE, looked) == pytest.approx(apart(POSE, seen()[1:]))
+    assert apart(POSE, looked) < apart(astray(0.3), looked)
+
+
+def test_where_no_picture_tells_person_from_room_a_fit_is_doubted() -> None:
+    noise = np.random.default_rng(0).integers(0, 255, FRAME.images[0].shape, np.uint8)
+    right, model = pictures.tiny_state(SCENE, POSE, POSE), scenes.tiny_model(SCENE)
+    frame = replace(FRAME, images=(noise,) * len(FRAME.images))
+    found = LimbSearch().recover(frame, right, settled(right), Past(), model, lambda *_: settled(right))
+    assert found.doubted and "no picture tells" in found.notes[0]
+
+
 def test_a_view_without_the_room_shows_nothing_surely() -> None:
     noise = np.random.default_rng(0).integers(0, 255, FRAME.images[0].shape, np.uint8)
     assert len(seen(replace(FRAME, images=(noise, *FRAME.images[1:])))) == len(seen()) - 1
