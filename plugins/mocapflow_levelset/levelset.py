@@ -69,7 +69,6 @@ class LevelSet(ShadowAware):
     border_px: NonNegativeInt = 3  # left out at the image's border
     margin_px: PositiveInt = 40  # of the crop around the start contour
     use_background: bool = True  # take the outside's density from the empty scene, where it is known
-    calm_px: NonNegativeFloat = 1.0  # smoothing of the image before it is compared with the empty scene
     shadow_share: Share = 0.5  # of the background; 0: shadows count as changes
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
@@ -178,7 +177,7 @@ class LevelSet(ShadowAware):
                 band_px=INNER_BAND_PX,
             ),
             shadow=self.shadow(),
-            calm_px=self.calm_px,
+            calm_px=0.0,  # the empty scene is compared with small images alone, which are calm
             decorrelate=self.decorrelate,
             stride=self.stride_px,
             margin_px=self.margin_px,
