@@ -65,7 +65,7 @@ def _parts(
         wiring = named.wiring
         if start is not None and number > 1:
             own = f"{start.label}_{number}"
-            wiring = {name: own if source == start.label else source for name, source in wiring.items()}
+            wiring = {**wiring, **{name: own for name, source in inputs.items() if source == start.label}}
             yield replace(start, label=own, stage=parts.start or start.stage, part=part)
         yield replace(named, label=label, wiring=wiring, part=part)
     yield NamedStage(named.label, parts.join, {}, named.where, joins=labels)

@@ -95,7 +95,8 @@ def _chosen(named: NamedStage, parameter: str, wanted: type, earlier: Sequence[N
     fitting = [other.label for other in earlier if makes(other, wanted)]
     if label not in fitting:
         message = f"stage '{named.label}' wants its {parameter} from '{label}', but no earlier '{label}' makes one"
-        raise PipelineError(message, where=named.wiring_places[parameter], hint=alternatives(label, fitting))
+        place = named.wiring_places.get(parameter, named.where)
+        raise PipelineError(message, where=place, hint=alternatives(label, fitting))
     return label
 
 

@@ -64,6 +64,12 @@ def test_another_stage_starts_the_later_parts(path):
     assert [named.stage.angle_rad for named in pipeline.stages if named.label.startswith("start")] == [0.0, 1.0]
 
 
+def test_what_is_to_start_the_later_parts_makes_a_start(path):
+    pipeline = in_parts(load(path, *IN_TWO, "parts.start=tiny_background"), range(20))
+    with pytest.raises(PipelineError, match="wants its start from 'start_2', but no earlier 'start_2' makes one"):
+        wire(pipeline)
+
+
 def test_one_part_is_the_whole(path):
     pipeline = load(path, "parts.count=1", "parts.overlap=50")
     assert in_parts(pipeline, range(20)) is pipeline
