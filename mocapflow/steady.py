@@ -16,8 +16,7 @@ from mocapflow.settings import PositiveOrInf, Settings
 class Steady(Settings):
     """When the loop counts as at rest, how long it may go on, and how it is kept from getting worse.
 
-    Turns beyond the last of `sigmas` are held against the last one; the first frame, which may start far off, against
-    none.
+    Turns beyond the last of `sigmas` are held against the last one; a frame that begins far off against none.
     """
 
     surface_mm: PositiveFloat = 0.5  # largest move of a body vertex from turn to turn, RMS move of the cloth

@@ -196,7 +196,7 @@ class CoupledLoop(Stage):
             return state
         steps = replace(self.steps, segmenter=first)
         near = settle(frame, state, past, steps, model, unobserved).state
-        begins = (believed(near.estimate.pose, near.cloth.parameters, near.cloth), state)
+        begins = (state, believed(near.estimate.pose, near.cloth.parameters, near.cloth))
         once = replace(self.steps, steady=Steady(max_turns=1))
         return min(begins, key=lambda begin: image_cost(settle(frame, begin, past, once, model, unobserved)))
 
@@ -235,7 +235,12 @@ def unobserved(frame: int, turn: Turn, state: FrameState) -> None:
 
 def seen(frame: Frame) -> bool:
     """True where enough views are usable to fix a pose."""
-    return int(frame.usable.sum()) >= min(VIEWS, len(frame.usable))
+    return int(frame.usable.sum()) >= enough(frame)
+
+
+def enough(frame: Frame) -> int:
+    """Return how many views fix a pose as well as the cameras allow."""
+    return min(VIEWS, len(frame.usable))
 
 
 def believed(pose: Pose, parameters: F64, cloth: Cloth) -> FrameState:
@@ -272,7 +277,7 @@ def notes_on(frame: Frame, scene: Scene, known: Past, result: FrameResult) -> Se
     views = zip(scene.cameras, frame.usable, reasons, strict=True)
     notes = [f"{camera.name} not usable: {reason or 'no image'}" for camera, usable, reason in views if not usable]
     if not seen(frame):
-        return [*notes, f"lost, fewer than {VIEWS} views; the prediction is kept"]
+        return [*notes, f"lost, fewer than {enough(frame)} views; the prediction is kept"]
     if blind(result.state.estimate.observed):
         return [*notes, "no view shows the person; the prediction is kept"]
     anew = "begun anew, like a first frame: the frames before do not show the person"

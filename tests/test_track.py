@@ -218,9 +218,9 @@ def test_the_first_segmenter_settles_frames_before_which_no_velocity_is_known(tm
     assert [frame for frame in once if begun.count(frame) > 1] == once[:2]
 
 
-@pytest.mark.parametrize("helps", [True, False])
-def test_what_the_first_segmenter_finds_is_kept_where_images_fit_better_from_there(tmp_path, monkeypatch, helps):
-    begins, costs = [], iter([0.0, 1.0] if helps else [1.0, 0.0])
+@pytest.mark.parametrize(("cost", "helps"), [(0.0, True), (1.0, False), (2.0, False)])
+def test_what_the_first_segmenter_finds_is_kept_where_images_fit_better_from_there(tmp_path, monkeypatch, cost, helps):
+    begins, costs = [], iter([1.0, cost])
 
     def spy(frame, state, *rest):
         begins.append(state)
@@ -230,7 +230,7 @@ def test_what_the_first_segmenter_finds_is_kept_where_images_fit_better_from_the
     monkeypatch.setattr("mocapflow.track.image_cost", lambda result: next(costs))
     stages = SHORT | {"track": SHORT["track"] | {"first_segmenter": "tiny_segmenter"}}
     run_tiny(write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=stages), tmp_path, frames=1)
-    given, approached, stayed, kept = begins
+    given, stayed, approached, kept = begins
     assert stayed is given
     assert kept is (approached if helps else given)
 

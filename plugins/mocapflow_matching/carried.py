@@ -17,7 +17,7 @@ def carried_points(frame: Frame, past: Past, scene: Scene) -> Matches:
 
     A point lies between vertices; the nearest vertex of what is seen there stands for it and is shifted as it is.
     """
-    if frame.flow is None or not past.moments:
+    if frame.flow is None or not past.moments or past.moments[-1].blind:  # a pose that nobody saw carries nothing
         return empty_matches()
     before = past.moments[-1]
     surface = scene.surface(before.pose, before.cloth)

@@ -1,5 +1,7 @@
 """Flow between distance images and between frames: as pairs, and as a guess of the next pose."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -199,6 +201,13 @@ def test_a_lost_view_is_not_used():
     frame = textured(SCENE, before, before)
     lost = Frame(index=5, time=1 / 6, images=frame.images, usable=np.array([True, False, True, True]), flow=frame.flow)
     assert 1 not in carried_points(lost, tiny_past(SCENE, before), SCENE).camera
+
+
+def test_a_pose_that_nobody_saw_carries_nothing():
+    before = tiny_pose(SCENE)
+    past = tiny_past(SCENE, before)
+    unseen = replace(past.moments[-1], observed=np.zeros(len(before.angles)))
+    assert not len(carried_points(textured(SCENE, before, before), Past(moments=(unseen,)), SCENE).camera)
 
 
 def test_points_on_cloth_count_less():
