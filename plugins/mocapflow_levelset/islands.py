@@ -12,8 +12,7 @@ def without_islands(level: F32, evidence: Evidence) -> F32:
     """Return a level set (H, W) without islands that the empty scene explains better than a uniform density.
 
     An arm of the model that has left the person encloses nothing but room; both sides of its contour then have the
-    statistics of the room, and what no statistics tell apart, the shape prior keeps. What touches the rim may hang
-    together with the person beyond it.
+    statistics of the room, and what no statistics tell apart, the shape prior keeps.
     """
     import cv2
 
@@ -26,7 +25,6 @@ def without_islands(level: F32, evidence: Evidence) -> F32:
     islands = (label > 0) & (label != 1 + area[1:].argmax())
     runs = runs_of(islands)
     explained = np.bincount(label[islands], evidence.outside(runs, evidence.along(runs)), minlength=count) > 0
-    explained[label[[0, -1]]] = explained[label[:, [0, -1]]] = False
     return np.where(explained[label], -np.abs(level), level)
 
 
