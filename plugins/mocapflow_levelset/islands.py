@@ -13,6 +13,9 @@ def without_islands(level: F32, evidence: Evidence) -> F32:
 
     An arm of the model that has left the person encloses nothing but room; both sides of its contour then have the
     statistics of the room, and what no statistics tell apart, the shape prior keeps.
+
+    Where the level set is but a crop around what moved, a limb cut off by its rim counts as an island too, and goes if
+    it shows nothing but room. Spared, legs that run stay beside the person; see docs/notebook/robustness.md.
     """
     import cv2
 

@@ -1,6 +1,7 @@
 """Islands of a silhouette: what the empty scene explains goes, what it does not stays."""
 
 import numpy as np
+import pytest
 from levelset_scenes import ellipse
 from mocapflow_levelset.evidence import Room, from_image, in_room
 from mocapflow_levelset.islands import runs_of, without_islands
@@ -10,9 +11,10 @@ SHADOW = Shadow()
 
 
 def evidence(image, known=True):
-    seen = from_image(image, np.ones((160, 160), np.float32), ("lab",), 1)
-    grey = np.full((160, 160, 3), 120, np.float32)
-    room = Room(plate_of(grey, np.full_like(grey, 3), ("lab",)), np.ones((160, 160), bool), SHADOW)
+    shape = image.shape[:2]
+    seen = from_image(image, np.ones(shape, np.float32), ("lab",), 1)
+    grey = np.full((*shape, 3), 120, np.float32)
+    room = Room(plate_of(grey, np.full_like(grey, 3), ("lab",)), np.ones(shape, bool), SHADOW)
     return in_room(seen, image, ("lab",), room) if known else seen
 
 
@@ -37,6 +39,14 @@ def test_all_stay_where_the_room_is_not_known_or_there_is_one_part():
     level = np.maximum(person, stray)
     assert without_islands(level, evidence(image, known=False)) is level
     assert without_islands(stray, evidence(image)) is stray  # a person lost altogether is no island
+
+
+@pytest.mark.parametrize("cut", [np.s_[:, :120], np.s_[:120], np.s_[120:]], ids=["side", "foot", "head"])
+def test_a_limb_cut_off_by_a_crop_goes_if_it_shows_nothing_but_room(cut):
+    image, person, hand, stray = scene()
+    level = np.ascontiguousarray(np.maximum(np.maximum(person, hand), stray)[cut])
+    found = without_islands(level, evidence(np.ascontiguousarray(image[cut])))
+    np.testing.assert_array_equal((level > 0) & (found <= 0), stray[cut] > 0)
 
 
 def test_runs_cover_a_mask():
