@@ -41,7 +41,7 @@ def test_all_stay_where_the_room_is_not_known_or_there_is_one_part():
     assert without_islands(stray, evidence(image)) is stray  # a person lost altogether is no island
 
 
-@pytest.mark.parametrize("cut", [np.s_[:, :120], np.s_[:120], np.s_[120:]], ids=["side", "foot", "head"])
+@pytest.mark.parametrize("cut", [np.s_[:, :120], np.s_[:120]], ids=["side", "foot"])
 def test_a_limb_cut_off_by_a_crop_goes_if_it_shows_nothing_but_room(cut):
     image, person, hand, stray = scene()
     level = np.ascontiguousarray(np.maximum(np.maximum(person, hand), stray)[cut])
