@@ -60,10 +60,8 @@ def outline(surface: Surface, camera: Camera) -> Outline:
 
     Edges that lie inside the silhouette (a leg before the other) are not part of the boundary.
     """
-    view = projected(surface, camera)
-    vertex, layers = kernels.occluding_edges(surface.edges, view.facing, surface.cloth)
-    image = view.image.take(vertex, axis=0)  # several times faster than view.image[vertex]
-    return _bounded(vertex, image, layers, span_kernels.crossings(image, camera.size), camera)
+    vertex, image, layers, crossings = _crossed(surface, camera)
+    return _bounded(vertex, image, layers, crossings, camera)
 
 
 @once
@@ -82,10 +80,29 @@ def _bounded(vertex: I32, image: F64, layers: I32, crossings: tuple[I32, I32, I3
     )
 
 
+def covered(surface: Surface, camera: Camera) -> Bool:
+    """Return the silhouette of a surface as a mask (H, W): the `mask` of its outline, whose pieces are not made."""
+    _, _, layers, crossings = _crossed(surface, camera)
+    first, spans = span_kernels.covered(*crossings, layers, camera.size[0])
+    return _filled(first, spans, camera)
+
+
+def _crossed(surface: Surface, camera: Camera) -> tuple[I32, F64, I32, tuple[I32, I32, I32]]:
+    """Return the occluding edges, as `Outline` has them, with their layers, and where they cross rows of the image."""
+    view = projected(surface, camera)
+    vertex, layers = kernels.occluding_edges(surface.edges, view.facing, surface.cloth)
+    image = view.image.take(vertex, axis=0)  # several times faster than view.image[vertex]
+    return vertex, image, layers, span_kernels.crossings(image, camera.size)
+
+
 def mask(boundary: Outline, camera: Camera) -> Bool:
     """Return the silhouette as a mask (H, W)."""
+    return _filled(boundary.first, boundary.span, camera)
+
+
+def _filled(first: I32, spans: I32, camera: Camera) -> Bool:
     full = np.zeros((camera.size[1], camera.size[0]), bool)
-    span_kernels.fill(boundary.first, boundary.span, full)
+    span_kernels.fill(first, spans, full)
     return full
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from mocapflow.data import NO_CLOTH
 from mocapflow.errors import MocapflowError
-from mocapflow.geometry.silhouettes import mask, outline
+from mocapflow.geometry.silhouettes import covered
 from mocapflow.io import first_pose
 from mocapflow.io.findings import Finding, warning
 from mocapflow.recordings.paired_views import away
@@ -57,4 +57,4 @@ def _bodies(recording: Recording, registry: Registry) -> list[Bool] | None:
         surface = scene.surface(first_pose.read_pose(recording.folder / first_pose.FILE, scene.body), NO_CLOTH)
     except MocapflowError:
         return None
-    return [mask(outline(surface, camera), camera) for camera in recording.cameras]
+    return [covered(surface, camera) for camera in recording.cameras]

@@ -6,14 +6,16 @@ from collections.abc import Sequence
 
 import numba
 import numpy as np
+from mocapflow_levelset.crops import around
 
 from mocapflow.data import Surface
 from mocapflow.geometry.cameras import projection
 from mocapflow.geometry.silhouette_kernels import project
-from mocapflow.geometry.silhouettes import mask, outline
+from mocapflow.geometry.silhouettes import covered
 from mocapflow.records import F32, F64, I32, Bool
 from mocapflow_recovery.certain import View
 
+BEYOND = 1.1  # times the cap, from the person: no nearer by the distance transform, which is a twentieth short
 HANGS, FLIES = 1.0, 0.3  # what a pixel of cloth counts: the body holds it where it is, or nothing does
 
 
@@ -32,12 +34,14 @@ def distance(surface: Surface, bare: Surface, views: Sequence[View], cap_m: floa
     """
     total, shown = 0.0, [view for view in views if view.shown]
     for view in shown:
-        covered, off = _of(surface, view)
         cap = cap_m / view.pixel_m
-        skin = covered if cloth == HANGS else mask(outline(bare, view.camera), view.camera)
-        lacks, juts = np.minimum(off[view.person], cap), np.minimum(view.away[covered], cap)
-        apart = np.where(view.cloth[view.person], cloth, 1.0) @ lacks + np.where(skin[covered], 1.0, cloth) @ juts
-        total += float(apart) * view.pixel_m / int(np.count_nonzero(view.person))
+        model = covered(surface, view.camera)
+        skin = model if cloth == HANGS else covered(bare, view.camera)
+        near = around(view.person, round(BEYOND * cap) + 2, 1)
+        assert near is not None
+        off = _from_model(near.of(model))
+        apart = _apart(model, skin, off, near.top, near.left, view.person, view.cloth, view.away, cap, cloth)
+        total += apart * view.pixel_m / np.count_nonzero(view.person)
     return total / max(len(shown), 1)
 
 
@@ -48,7 +52,8 @@ def uncovered_areas(surface: Surface, views: Sequence[View], reaches_m: Sequence
     """
     areas = np.zeros((len(reaches_m), 2))
     for view in views:
-        off, loose = _of(surface, view)[1], view.person & (_from_cloth(surface, view) > cloth_m / view.pixel_m)
+        off = _from_model(covered(surface, view.camera))
+        loose = view.person & (_from_cloth(surface, view) > cloth_m / view.pixel_m)
         for row, reach_m in enumerate(reaches_m):
             stray = loose & (off > reach_m / view.pixel_m)
             worn = np.count_nonzero(stray & view.cloth)
@@ -106,10 +111,24 @@ def _within(pixels, height, width):  # type: ignore[no-untyped-def]
     return rows[:count], column[:count], row[:count]
 
 
-def _of(surface: Surface, view: View) -> tuple[Bool, F32]:
-    """Return the silhouette (h, w) of a surface and the distance (h, w) px of every pixel from it."""
+def _from_model(model: Bool) -> F32:
+    """Return the distance (h, w) px of every pixel from a silhouette (h, w)."""
     import cv2
 
-    covered = mask(outline(surface, view.camera), view.camera)
-    off = cv2.distanceTransform((~covered).view(np.uint8), cv2.DIST_L2, 3)
-    return covered, np.asarray(off, np.float32)
+    return np.asarray(cv2.distanceTransform((~model).view(np.uint8), cv2.DIST_L2, 3), np.float32)
+
+
+@numba.njit(cache=True)
+def _apart(model, skin, off, top, left, person, worn, away, cap, cloth):  # type: ignore[no-untyped-def]
+    """Return what stands apart in a view, px summed over its pixels: see `distance`.
+
+    `off` begins at the row `top` and the column `left`, and holds all of the person.
+    """
+    total = 0.0
+    for y in range(model.shape[0]):
+        for x in range(model.shape[1]):
+            if person[y, x]:
+                total += min(off[y - top, x - left], cap) * (cloth if worn[y, x] else 1.0)
+            if model[y, x]:
+                total += min(away[y, x], cap) * (1.0 if skin[y, x] else cloth)
+    return total
