@@ -171,6 +171,42 @@ def kneel(body: Body, t: np.ndarray) -> dict[str, np.ndarray]:
     return turn
 
 
+def plie(body: Body, t: np.ndarray) -> dict[str, np.ndarray]:
+    """Return rotation vectors (T,3) per joint of bending knees that point outward; the arms fold before the chest."""
+    turn = {name: np.zeros((len(t), 3)) for name in body.names}
+    down, fold = (1 - np.cos(2 * np.pi * t / 1.6)) / 2, (1 - np.cos(2 * np.pi * t / 2.3)) / 2
+    turn["pelvis"], turn["spine"] = np.outer(down, [0.08, 0, 0]), np.outer(np.sin(2 * np.pi * t / 2.3), [0, 0.05, 0.1])
+    for side, sign in (("_l", 1), ("_r", -1)):
+        out, flex = 0.45 + 0.4 * down, 0.12 + 0.9 * down
+        legs = Rotation.from_euler("ZX", np.stack([sign * out, -flex - 0.08 * down], axis=1))
+        turn["hip" + side], turn["knee" + side][:, 0] = legs.as_rotvec(), flex
+        turn["ankle" + side][:, 0] = -0.05 * down
+        at_side, folded = (
+            [[sign * 0.4, -0.1, -1], [sign * 0.2, -0.6, -1]],
+            [[sign * 0.3, -0.55, -0.8], [-sign, -0.4, 0.1]],
+        )
+        ways = np.multiply.outer(1 - fold, at_side) + np.multiply.outer(fold, folded)
+        bent = [_bent(body, side, way / np.linalg.norm(way, axis=1, keepdims=True)) for way in ways]
+        turn["shoulder" + side], turn["elbow" + side] = np.moveaxis(np.array(bent), 1, 0)
+    return turn
+
+
+def grapevine(body: Body, t: np.ndarray) -> dict[str, np.ndarray]:
+    """Return rotation vectors (T,3) per joint of legs that cross, one before and one behind; arms swing across."""
+    turn = {name: np.zeros((len(t), 3)) for name in body.names}
+    wave = np.sin(2 * np.pi * t / 1.4)
+    turn["pelvis"] = np.outer(wave, [0, 0.03, -0.3]) + [0.05, 0, 0]
+    turn["spine"] = turn["chest"] = np.outer(wave, [0, -0.015, 0.15])  # a back shares its twist
+    before, behind = np.clip(wave, 0, 1), np.clip(-wave, 0, 1)
+    for side, sign, lift, fore in (("_l", 1, before, 1), ("_r", -1, behind, -1)):
+        lean, knee = (-0.55 * lift, 0.7 * lift) if fore > 0 else (0.1 * lift, 0.75 * lift)
+        turn["hip" + side] = np.stack([lean - 0.12, sign * (0.55 * lift - 0.08), 0 * t], axis=1)
+        turn["knee" + side][:, 0], turn["ankle" + side][:, 0] = 0.22 + knee, -0.1 + 0.2 * lift
+        ways = [[0.9 * w + sign * 0.35, -0.7, -1 + 0.5 * abs(w)] for w in wave]
+        turn["shoulder" + side], turn["elbow" + side][:, 0] = _reach(body, side, ways), -0.4
+    return turn
+
+
 SCRIPTS = {
     "squat": squat,
     "dance": dance,
@@ -182,6 +218,8 @@ SCRIPTS = {
     "run": run,
     "jack": jack,
     "kneel": kneel,
+    "plie": plie,
+    "grapevine": grapevine,
 }
 
 

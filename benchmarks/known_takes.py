@@ -86,4 +86,6 @@ TAKES = {
     "run_A_shorts": Take("A", "shorts", "run", 84, PURPLE),
     "jack_B_skirt": Take("B", "skirt", "jack", 83, PURPLE),
     "kneel_A_skirt": Take("A", "skirt", "kneel", 85, GREY, frames=60),
+    "plie_A_skirt": Take("A", "skirt", "plie", 91, PURPLE),
+    "grapevine_B_skirt": Take("B", "skirt", "grapevine", 92, DARK, frames=60),
 }
