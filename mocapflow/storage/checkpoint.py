@@ -190,12 +190,13 @@ class Checkpoint:
         self._attributes["energy_terms"] = list(result.energy_terms)
         self._attributes["cloth_vertices"] = len(result.state.cloth.vertices)
 
-    def _moment(self, numbers: F64, cloth: F64) -> Moment:
+    def _moment(self, numbers: F64, vertices: F64) -> Moment:
         pose = Pose(root=column(self._columns, numbers, "root"), angles=column(self._columns, numbers, "angles"))
         parameters = column(self._columns, numbers, "cloth_parameters")
         time = float(column(self._columns, numbers, "time"))
-        observed = column(self._columns, numbers, "observed")
-        return Moment(time=time, pose=pose, cloth=Cloth(vertices=cloth, parameters=parameters), observed=observed)
+        observed, doubted = (column(self._columns, numbers, name) for name in ("observed", "doubted"))
+        cloth = Cloth(vertices=vertices, parameters=parameters)
+        return Moment(time=time, pose=pose, cloth=cloth, observed=observed, doubted=bool(doubted))
 
     def _cloth(self, row: int) -> F64:
         return self._growing.cloth(row) if self._attributes["cloth_vertices"] else _copy(NO_CLOTH.vertices)

@@ -17,7 +17,7 @@ from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, Pos
 
 from mocapflow.assets import Body
 from mocapflow.components import Recovery
-from mocapflow.data import Frame, FrameResult, FrameState, Past, Pose
+from mocapflow.data import REMEMBERED, Frame, FrameResult, FrameState, Past, Pose
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow.settings import PositiveOrInf
@@ -53,6 +53,7 @@ class LimbSearch(Recovery):
     What shows the garment's colours calls for a search where it strays, but moves no part and is no doubt: it may fly.
     So it is searched twice, once as if cloth lay where the body holds it, which tells of legs that nobody sees, once as
     if it flew, which leads none astray; the fit that agrees better by what is skin, and a little by cloth, is taken.
+    A doubt that lasts is mostly one about the room, so it is looked into now and then only (`vain_every`).
     It needs the empty scene; where little of it is known behind the person every fit is taken as it is.
     """
 
@@ -75,6 +76,7 @@ class LimbSearch(Recovery):
     cap_m: PositiveFloat = 0.2  # beyond, it does not matter how far
     samples: PositiveInt = 40  # of each part in a round
     poses: Path = SHIPPED  # that people were seen in, made by `mocapflow prior fit`: limbs are tried as they are there
+    vain_every: PositiveInt = 4  # where the three frames before are doubted, one frame of so many is searched
     seen_samples: NonNegativeInt = 100  # of each limb in the first round, from `poses`
     shares: Annotated[tuple[PositiveFloat, ...], Field(min_length=1)] = (1.0, 0.6, 0.4, 0.25, 0.12)  # of the spread
     first_looks: PositiveInt = 2  # of the first frame where its fit is doubted: each search is repeated so often
@@ -105,8 +107,8 @@ class LimbSearch(Recovery):
         stray = stray_of(surface, model.scene, seen, self._reach())
         doubtful, fitted = self._doubtful(stray), result.state.estimate.pose
         why = f"fit doubted, {stray}" if doubtful else self._suspicion(stray, fitted, state, past, model.scene.body)
-        if not why:
-            return result
+        if not why or (doubtful and in_vain(past) and frame.index % self.vain_every):
+            return noted(result, f"{why}: not searched, in the frames before in vain", doubted=True) if why else result
         judge = self._judge(state, result, seen, past, model)
         fit = judge.of(result)
         fits = []
@@ -202,6 +204,11 @@ class LimbSearch(Recovery):
 
     def _reach(self) -> Reach:
         return Reach(self.reach_m, self.hint_m, self.cloth_m, self.cap_m)
+
+
+def in_vain(past: Past) -> bool:
+    """True where all frames that are remembered are doubted: searched, and for all that."""
+    return len(past.moments) == REMEMBERED and all(moment.doubted for moment in past.moments)
 
 
 def nearest(cost: Cost, poses: Sequence[Pose]) -> Pose:

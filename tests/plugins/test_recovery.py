@@ -255,6 +255,25 @@ def test_a_foot_does_not_turn_because_its_leg_was_found() -> None:
     assert found.angles[hip].all() and not np.delete(found.angles, hip).any()
 
 
+@pytest.mark.parametrize(
+    ("index", "doubts", "looked"), [(8, 3, True), (9, 3, False), (9, 2, True)], ids=["in turn", "not in turn", "new"]
+)
+def test_doubts_that_last_are_looked_into_now_and_then(index, doubts, looked) -> None:
+    """As where the room behind the person is not known rightly: the search takes as long as twenty frames."""
+    calls = []
+
+    def settle(pose, parameters):
+        calls.append(pose)
+        return settled(pictures.tiny_state(SCENE, POSE, POSE))
+
+    moments = scenes.tiny_past(SCENE, POSE, POSE, POSE).moments
+    past = Past(moments=tuple(replace(moment, doubted=k < doubts) for k, moment in enumerate(moments)))
+    lost, model = pictures.tiny_state(SCENE, astray(0.9), POSE), scenes.tiny_model(SCENE)
+    found = LimbSearch(vain_every=4).recover(replace(FRAME, index=index), lost, settled(lost), past, model, settle)
+    assert bool(calls) == looked
+    assert found.doubted != looked and ("not searched" in found.notes[-1]) != looked
+
+
 @pytest.mark.parametrize(("end", "doubted"), [(0.0, False), (0.9, True)], ids=["found", "still astray"])
 def test_a_fit_that_still_strays_is_doubted(end, doubted) -> None:
     def settle(pose, parameters):
