@@ -76,10 +76,10 @@ class LimbSearch(Recovery):
     cap_m: PositiveFloat = 0.2  # beyond, it does not matter how far
     samples: PositiveInt = 40  # of each part in a round
     poses: Path = SHIPPED  # that people were seen in, made by `mocapflow prior fit`: limbs are tried as they are there
-    vain_every: PositiveInt = 4  # where the three frames before are doubted, one frame of so many is searched
     seen_samples: NonNegativeInt = 100  # of each limb in the first round, from `poses`
     shares: Annotated[tuple[PositiveFloat, ...], Field(min_length=1)] = (1.0, 0.6, 0.4, 0.25, 0.12)  # of the spread
     first_looks: PositiveInt = 2  # of the first frame where its fit is doubted: each search is repeated so often
+    vain_every: PositiveInt = 4  # where the three frames before are doubted, one frame of so many is searched
     start_deg: PositiveFloat = 6.0  # how far off, in each angle, the pose may be that the first frame starts from
     spread_deg: PositiveFloat = 25.0  # standard deviation of the first samples; less where a joint at rest hardly bends
     root_spread_deg: PositiveFloat = 8.0  # likewise, of the root's turn
