@@ -164,6 +164,7 @@ class Recovery(Component):
     """Notices that a fit is lost, and finds the person again."""
 
     role: ClassVar[str] = "recovery"
+    needs_background: ClassVar[bool] = False  # True: it is not asked without the empty scene
 
     @abstractmethod
     def recover(

@@ -42,7 +42,7 @@ from mocapflow.data import (
 from mocapflow.errors import ComponentFailed, PipelineError
 from mocapflow.functional import Functional, image_cost
 from mocapflow.guards.answers import pose_of, result_of
-from mocapflow.guards.lacks import idle_matchers, idle_segmenter
+from mocapflow.guards.lacks import idle_matchers, idle_without_scene
 from mocapflow.loop import Steps, settle
 from mocapflow.model import ClothedModel
 from mocapflow.recordings.recording import Recording
@@ -110,8 +110,8 @@ class CoupledLoop(Stage):
         if scene.garment is not None and self.draper is None:
             hint = "name a draper and a cloth_fitter, or track the bare body: garment: null"
             raise PipelineError(f"the person wears a {scene.garment.name}, which the track does not drape", hint=hint)
-        idle = idle_matchers(self.matchers, recording) + idle_segmenter(self.first_segmenter, background is not None)
-        for said in idle:
+        idle = idle_without_scene(self.first_segmenter, self.recovery, background is not None)
+        for said in [*idle_matchers(self.matchers, recording), *idle]:
             LOG.warning(said)
         scene = scene.with_background(background).simplified(self.body_faces)
         model = ClothedModel(scene=scene, draper=self.draper)
@@ -204,15 +204,16 @@ class CoupledLoop(Stage):
         self, frame: Frame, state: FrameState, result: FrameResult, past: Past, model: ClothedModel
     ) -> FrameResult:
         """Return the result of the loop, or a better one if the loop was lost."""
-        if self.recovery is None or not seen(frame):
+        finder = self.recovery
+        if finder is None or not seen(frame) or (finder.needs_background and model.scene.background is None):
             return result
 
         def settle_from(pose: Pose, parameters: F64) -> FrameResult:
             begun = believed(pose, parameters, model.drape(pose, parameters, past))
             return settle(frame, begun, past, self.steps, model, unobserved)
 
-        found = self.recovery.recover(frame, state, result, past, model, settle_from)
-        return result_of(self.recovery, found, result, model.scene)
+        found = finder.recover(frame, state, result, past, model, settle_from)
+        return result_of(finder, found, result, model.scene)
 
     def complain(self, frame: Frame, result: FrameResult) -> None:
         """Stop at a frame that did not settle, if that is wanted."""

@@ -243,6 +243,12 @@ def test_a_first_segmenter_that_needs_the_empty_scene_is_left_out_without(tmp_pa
     assert (begun.count((0, 0)) == 1) is without
 
 
+def test_a_recovery_that_needs_the_empty_scene_is_not_asked_without(tmp_path, caplog):
+    stages = SHORT | {"track": SHORT["track"] | {"recovery": "limb_search"}}
+    run_tiny(write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=stages), tmp_path, frames=1)
+    assert "recovery limb_search needs the empty scene, which no stage before makes: it is not asked" in caplog.text
+
+
 def test_the_first_frame_that_shows_the_person_begins_like_a_first(tmp_path, begun):
     """However many lost frames come before it: with the first segmenter, and without a past."""
     clip = write_recording(tmp_path / "clip", frames=8)

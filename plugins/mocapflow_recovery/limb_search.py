@@ -58,6 +58,7 @@ class LimbSearch(Recovery):
     """
 
     name: ClassVar[str] = "limb_search"
+    needs_background: ClassVar[bool] = True
     uncovered_cm2: PositiveFloat = 30.0  # of the person off the model, in all views: more, and the fit is doubted
     floating_cm2: PositiveFloat = 30.0  # likewise, of skin in empty space
     hint_cm2: PositiveOrInf = inf  # of the person off it by `hint_m`: more, and limbs are looked for; noise has it, too
@@ -96,8 +97,7 @@ class LimbSearch(Recovery):
     ) -> FrameResult:
         """Return the result, or a better one; see the class."""
         background = model.scene.background
-        if background is None:
-            return result
+        assert background is not None
         room, surface = small_room(background, model.scene.cameras, self.rows), surface_of(model, result)
         seen = views(frame, surface, room, self.near_m, garment_told(past, model.scene))
         if not seen:

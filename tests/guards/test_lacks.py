@@ -5,9 +5,10 @@ from mocapflow_levelset.background import BackgroundDifference
 from mocapflow_levelset.levelset import LevelSet
 from mocapflow_matching.contour_icp import ContourIcp
 from mocapflow_matching.keypoints import Keypoints
+from mocapflow_recovery.limb_search import LimbSearch
 
 from mocapflow.errors import RecordingError
-from mocapflow.guards.lacks import idle_matchers, idle_segmenter
+from mocapflow.guards.lacks import idle_matchers, idle_without_scene
 from mocapflow.help.shipped import shipped
 from mocapflow.recordings.recording import open_recording
 
@@ -21,9 +22,12 @@ def test_a_matcher_without_keypoints_is_told_and_is_an_error_where_it_is_alone()
         idle_matchers([Keypoints()], recording)
 
 
-def test_a_first_segmenter_that_lacks_the_empty_scene_is_told():
-    needing = BackgroundDifference()
-    (said,) = idle_segmenter(needing, background_known=False)
-    assert said.startswith("first_segmenter background needs the empty scene")
-    for first, known in ((needing, True), (LevelSet(), False), (None, False)):
-        assert idle_segmenter(first, known) == []
+def test_a_first_segmenter_and_a_recovery_that_lack_the_empty_scene_are_told():
+    needing, search = BackgroundDifference(), LimbSearch()
+    said = idle_without_scene(needing, search, background_known=False)
+    assert [line.partition(" needs the empty scene")[0] for line in said] == [
+        "first_segmenter background",
+        "recovery limb_search",
+    ]
+    for first, recovery, known in ((needing, search, True), (LevelSet(), None, False), (None, None, False)):
+        assert idle_without_scene(first, recovery, known) == []
