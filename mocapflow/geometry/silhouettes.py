@@ -81,7 +81,10 @@ def _bounded(vertex: I32, image: F64, layers: I32, crossings: tuple[I32, I32, I3
 
 
 def covered(surface: Surface, camera: Camera) -> Bool:
-    """Return the silhouette of a surface as a mask (H, W): the `mask` of its outline, whose pieces are not made."""
+    """Return the silhouette of a surface that is looked at once as a mask (H, W), without the pieces of its outline.
+
+    Where the outline is needed, too, it is remembered, and its `mask` costs less.
+    """
     _, _, layers, crossings = _crossed(surface, camera)
     first, spans = span_kernels.covered(*crossings, layers, camera.size[0])
     return _filled(first, spans, camera)

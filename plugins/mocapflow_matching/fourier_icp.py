@@ -44,7 +44,7 @@ class FourierIcp(ContourIcp):
         if np.median(np.abs(inside_px(silhouette, model.contour.pixel))) < self.near_px:
             return image, model
         camera = scene.cameras[silhouette.camera]
-        covered = silhouettes.covered(surface, camera)
+        covered = silhouettes.mask(silhouettes.outline(surface, camera), camera)
         curves = self._comparable(silhouette.distance > 0, covered, self.harmonics[turn.index])
         if curves is None:
             return image, model

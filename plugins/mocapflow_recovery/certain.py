@@ -15,7 +15,7 @@ from mocapflow_levelset.shadows import floor_around
 from mocapflow.assets import Background, Camera
 from mocapflow.data import Frame, Surface
 from mocapflow.geometry.cameras import magnification, scaled
-from mocapflow.geometry.silhouettes import covered
+from mocapflow.geometry.silhouettes import mask, outline
 from mocapflow.once import once
 from mocapflow.records import F32, F64, U8, Bool
 
@@ -77,7 +77,7 @@ def views(frame: Frame, surface: Surface, room: Room, near_m: float, garment: F6
     found, middle = [], surface.vertices.mean(axis=0)
     for number in np.flatnonzero(frame.usable):
         camera, plate = room.cameras[number], room.plates[number]
-        model, size = covered(surface, camera), 1 / magnification(camera, middle)
+        model, size = mask(outline(surface, camera), camera), 1 / magnification(camera, middle)
         image, hidden = frame.images[number], frame.hidden_in(int(number))
         factor = image.shape[1] // int(camera.size[0])
         small = crops.shrink(image, factor)

@@ -11,7 +11,7 @@ from mocapflow_levelset.crops import around
 from mocapflow.data import Surface
 from mocapflow.geometry.cameras import projection
 from mocapflow.geometry.silhouette_kernels import project
-from mocapflow.geometry.silhouettes import covered
+from mocapflow.geometry.silhouettes import covered, mask, outline
 from mocapflow.records import F32, F64, I32, Bool
 from mocapflow_recovery.certain import View
 
@@ -52,7 +52,7 @@ def uncovered_areas(surface: Surface, views: Sequence[View], reaches_m: Sequence
     """
     areas = np.zeros((len(reaches_m), 2))
     for view in views:
-        off = _from_model(covered(surface, view.camera))
+        off = _from_model(mask(outline(surface, view.camera), view.camera))
         loose = view.person & (_from_cloth(surface, view) > cloth_m / view.pixel_m)
         for row, reach_m in enumerate(reaches_m):
             stray = loose & (off > reach_m / view.pixel_m)

@@ -107,19 +107,26 @@ class LimbSearch(Recovery):
         stray = stray_of(surface, model.scene, seen, self._reach())
         doubtful, fitted = self._doubtful(stray), result.state.estimate.pose
         why = f"fit doubted, {stray}" if doubtful else self._suspicion(stray, fitted, state, past, model.scene.body)
-        if not why or (doubtful and in_vain(past) and frame.index % self.vain_every):
-            return noted(result, f"{why}: not searched, in the frames before in vain", doubted=True) if why else result
+        if not why:
+            return result
+        if doubtful and all_doubted(past) and frame.index % self.vain_every:
+            return noted(result, f"{why}: not searched, as the frames before are doubted, too", doubted=True)
         judge = self._judge(state, result, seen, past, model)
-        fit = judge.of(result)
-        fits = []
+        return self._searched(frame.index, state.estimate.pose, judge.of(result), judge, why, settle)
+
+    def _searched(
+        self, index: int, believed: Pose, fit: Fit, judge: Judge, why: str, settle: Callable[[Pose, F64], FrameResult]
+    ) -> FrameResult:
+        """Return the result of the best pose that is found, or that of the fit where none is better."""
+        doubtful, fitted, fits = self._doubtful(fit.stray), fit.result.state.estimate.pose, []
         for number, look in enumerate(self._looks(judge, doubtful)):
-            rng = np.random.default_rng([frame.index, number])
-            found = look(rng, state.estimate.pose, fitted, judge)
+            rng = np.random.default_rng([index, number])
+            found = look(rng, believed, fitted, judge)
             fits.append(judge.of(settle(found, judge.parameters)))
         best = self._better(min(fits, key=lambda other: (self._doubtful(other.stray), other.apart)), fit)
-        if best is fit:
-            return noted(result, f"{why}: search found nothing better", doubted=True) if doubtful else result
-        return noted(best.result, f"{why}: found again by search; then {best.stray}", self._doubtful(best.stray))
+        if best is not fit:
+            return noted(best.result, f"{why}: found again by search; then {best.stray}", self._doubtful(best.stray))
+        return noted(fit.result, f"{why}: search found nothing better", doubted=True) if doubtful else fit.result
 
     def _looks(self, judge: Judge, doubtful: bool) -> list[Look]:
         """Return the ways to look for the pose, each from its own samples."""
@@ -206,8 +213,8 @@ class LimbSearch(Recovery):
         return Reach(self.reach_m, self.hint_m, self.cloth_m, self.cap_m)
 
 
-def in_vain(past: Past) -> bool:
-    """True where all frames that are remembered are doubted: searched, and for all that."""
+def all_doubted(past: Past) -> bool:
+    """True where all frames that a past can hold are there, and doubted."""
     return len(past.moments) == REMEMBERED and all(moment.doubted for moment in past.moments)
 
 
