@@ -259,7 +259,7 @@ def test_a_foot_does_not_turn_because_its_leg_was_found() -> None:
     ("index", "doubts", "looked"), [(8, 3, True), (9, 3, False), (9, 2, True)], ids=["in turn", "not in turn", "new"]
 )
 def test_doubts_that_last_are_looked_into_now_and_then(index, doubts, looked) -> None:
-    """As where the room behind the person is not known rightly: the search takes as long as twenty frames."""
+    """As where the room behind the person is not known rightly: the search takes as long as tens of frames."""
     calls = []
 
     def settle(pose, parameters):
