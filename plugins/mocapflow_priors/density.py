@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
+from typing import Annotated
+from zipfile import BadZipFile
 
 import numpy as np
+from pydantic import AfterValidator
 from scipy.spatial import KDTree
 
 from mocapflow.errors import PipelineError
@@ -90,10 +93,22 @@ def read(path: Path) -> Density:
     """
     hint = "`mocapflow prior fit FILES --out PATH` makes one from recorded angles"
     try:
-        with np.load(path) as file:
+        with path.open("rb") as stream, np.load(stream) as file:
             names, poses = tuple(str(name) for name in file["names"]), file["poses"].astype(np.float64)
             return Density(names=names, poses=poses, bandwidth=float(file["bandwidth"]))
     except FileNotFoundError:
         raise PipelineError("there is no such file of training poses", where=str(path), hint=hint) from None
-    except (OSError, ValueError, KeyError, AttributeError) as error:
-        raise PipelineError(f"this is no file of training poses: {error}", where=str(path), hint=hint) from None
+    except (OSError, ValueError, KeyError, AttributeError, EOFError, BadZipFile):  # what numpy says is about pickles
+        raise PipelineError("this is no file of training poses", where=str(path), hint=hint) from None
+
+
+def _readable(path: Path) -> Path:
+    """Return a path that a pipeline gives, if it can be read: it is told there, before anything is computed."""
+    try:
+        read(path)
+    except PipelineError as error:
+        raise ValueError(f"{path}: {error.message}; {error.hint}") from None
+    return path
+
+
+Poses = Annotated[Path, AfterValidator(_readable)]  # a setting: a file of training poses

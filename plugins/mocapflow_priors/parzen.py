@@ -14,7 +14,7 @@ from mocapflow.components import Prior
 from mocapflow.data import Past, Pose, Residual
 from mocapflow.once import once
 from mocapflow.scene import Scene
-from mocapflow_priors.density import Density, log_density, read
+from mocapflow_priors.density import Density, Poses, log_density, read
 
 SHIPPED = Path(__file__).parent / "data" / "motions.npz"  # walks, squats, raised knees, jumps, kicks, crossed legs
 
@@ -29,7 +29,7 @@ class Parzen(Prior):
     """
 
     name: ClassVar[str] = "parzen"
-    poses: Path = SHIPPED  # made by `mocapflow prior fit`; leave out the take that is tracked
+    poses: Poses = SHIPPED  # made by `mocapflow prior fit`; leave out the take that is tracked
 
     def residual(self, pose: Pose, past: Past, scene: Scene) -> Residual:
         """Return one row for each trained angle the body has; the energy is -log p above the least it can be."""

@@ -6,12 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from math import inf
-from pathlib import Path
 from typing import Annotated, ClassVar
 
 import numpy as np
 from mocapflow_levelset.layers import garment_told
-from mocapflow_priors.density import Density, read
+from mocapflow_priors.density import Density, Poses, read
 from mocapflow_priors.parzen import SHIPPED
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
@@ -76,7 +75,7 @@ class LimbSearch(Recovery):
     near_m: PositiveFloat = 0.35  # changes further than this from the model are somebody else
     cap_m: PositiveFloat = 0.2  # beyond, it does not matter how far
     samples: PositiveInt = 40  # of each part in a round
-    poses: Path = SHIPPED  # that people were seen in, made by `mocapflow prior fit`: limbs are tried as they are there
+    poses: Poses = SHIPPED  # that people were seen in, made by `mocapflow prior fit`: limbs are tried as they are there
     seen_samples: NonNegativeInt = 100  # of each limb in the first round, from `poses`
     shares: Annotated[tuple[PositiveFloat, ...], Field(min_length=1)] = (1.0, 0.6, 0.4, 0.25, 0.12)  # of the spread
     first_looks: PositiveInt = 2  # of the first frame where its fit is doubted: each search is repeated so often

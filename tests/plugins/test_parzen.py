@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mocapflow_priors.density import Density, bandwidth, log_density, read, write
-from mocapflow_priors.parzen import Parzen
+from mocapflow_priors.parzen import SHIPPED, Parzen
 from mocapflow_twist.solver import TwistGaussNewton
+from pydantic import ValidationError
 from twist_fixtures import exact_matches, make_pose, make_scene, make_state
 
 from mocapflow.data import Estimate, Past, Pose, Turn
@@ -138,8 +139,11 @@ def test_the_shipped_poses_are_walks_squats_and_more() -> None:
 
 
 def test_a_file_of_something_else(tmp_path: Path) -> None:
-    (tmp_path / "poses.npz").write_text("hello")
-    with pytest.raises(PipelineError, match=r"this is no file of training poses"):
-        read(tmp_path / "poses.npz")
+    for content in (b"hello", b"", SHIPPED.read_bytes()[:2000]):
+        (tmp_path / "poses.npz").write_bytes(content)
+        with pytest.raises(PipelineError, match=r"this is no file of training poses"):
+            read(tmp_path / "poses.npz")
     with pytest.raises(PipelineError, match=r"there is no such file of training poses"):
         read(tmp_path / "none.npz")
+    with pytest.raises(ValidationError, match=r"none\.npz: there is no such file .*`mocapflow prior fit"):
+        Parzen(poses=tmp_path / "none.npz")
