@@ -52,7 +52,8 @@ class LimbSearch(Recovery):
     What shows the garment's colours calls for a search where it strays, but moves no part and is no doubt: it may fly.
     So it is searched twice, once as if cloth lay where the body holds it, which tells of legs that nobody sees, once as
     if it flew, which leads none astray; the fit that agrees better by what is skin, and a little by cloth, is taken.
-    A doubt that lasts is mostly one about the room, so it is looked into now and then only (`vain_every`).
+    A doubt that lasts is mostly one about the room, and a joint that stays beyond its limits can be bent so far: such
+    frames are searched now and then only (`vain_every`).
     It needs the empty scene; where little of it is known behind the person every fit is taken as it is.
     """
 
@@ -79,7 +80,7 @@ class LimbSearch(Recovery):
     seen_samples: NonNegativeInt = 100  # of each limb in the first round, from `poses`
     shares: Annotated[tuple[PositiveFloat, ...], Field(min_length=1)] = (1.0, 0.6, 0.4, 0.25, 0.12)  # of the spread
     first_looks: PositiveInt = 2  # of the first frame where its fit is doubted: each search is repeated so often
-    vain_every: PositiveInt = 4  # where the three frames before are doubted, one frame of so many is searched
+    vain_every: PositiveInt = 4  # where the three frames before are doubted or overbent, one of so many is searched
     start_deg: PositiveFloat = 6.0  # how far off, in each angle, the pose may be that the first frame starts from
     spread_deg: PositiveFloat = 25.0  # standard deviation of the first samples; less where a joint at rest hardly bends
     root_spread_deg: PositiveFloat = 8.0  # likewise, of the root's turn
@@ -108,8 +109,9 @@ class LimbSearch(Recovery):
         why = f"fit doubted, {stray}" if doubtful else self._suspicion(stray, fitted, state, past, model.scene.body)
         if not why:
             return result
-        if doubtful and all_doubted(past) and frame.index % self.vain_every:
-            return noted(result, f"{why}: not searched, as the frames before are doubted, too", doubted=True)
+        if self._lasts(doubtful, past, model.scene.body) and frame.index % self.vain_every:
+            unsearched = f"{why}: not searched, as the frames before are doubted, too"
+            return noted(result, unsearched, doubted=True) if doubtful else result
         judge = self._judge(state, result, seen, past, model)
         return self._searched(frame.index, state.estimate.pose, judge.of(result), judge, why, settle)
 
@@ -159,6 +161,12 @@ class LimbSearch(Recovery):
             return "a joint is bent beyond its limits"
         leap = leapt(fitted, believed.estimate.pose, body, self._density, np.radians(self.leap_deg))
         return "a limb leapt into a pose that nobody was seen in" if leap else ""
+
+    def _lasts(self, doubtful: bool, past: Past, body: Body) -> bool:
+        """Return whether all frames that are remembered are doubted, or have a joint beyond its limits."""
+        limit = np.radians(self.overbent_deg)
+        alike = [moment.doubted if doubtful else overbent(moment.pose, body, limit) for moment in past.moments]
+        return len(alike) == REMEMBERED and all(alike)
 
     def _doubtful(self, stray: Stray) -> bool:
         return stray.uncovered > self.uncovered_cm2 or stray.floating > self.floating_cm2
@@ -210,11 +218,6 @@ class LimbSearch(Recovery):
 
     def _reach(self) -> Reach:
         return Reach(self.reach_m, self.hint_m, self.cloth_m, self.cap_m)
-
-
-def all_doubted(past: Past) -> bool:
-    """True where all frames that a past can hold are there, and doubted."""
-    return len(past.moments) == REMEMBERED and all(moment.doubted for moment in past.moments)
 
 
 def nearest(cost: Cost, poses: Sequence[Pose]) -> Pose:

@@ -444,9 +444,13 @@ def test_cloth_that_strays_calls_for_a_search_and_is_not_doubted(monkeypatch, fo
     assert bool(result.notes) == found and not result.doubted
 
 
-@pytest.mark.parametrize(("beyond", "looked"), [(0.07, False), (0.12, True)])
-def test_a_joint_beyond_its_limits_is_looked_for_though_nothing_strays(beyond, looked) -> None:
-    """5 degrees are 0.09: a limit is soft."""
+@pytest.mark.parametrize(
+    ("beyond", "index", "before", "looked"),
+    [(0.07, 9, 1, False), (0.12, 9, 1, True), (0.12, 9, 3, False), (0.12, 8, 3, True)],
+    ids=["a little", "new", "not in turn", "in turn"],
+)
+def test_a_joint_beyond_its_limits_is_looked_for_though_nothing_strays(beyond, index, before, looked) -> None:
+    """5 degrees are 0.09: a limit is soft, and who is made so stays beyond it."""
 
     def settle(pose, parameters):
         return settled(pictures.tiny_state(SCENE, POSE, POSE))
@@ -454,8 +458,8 @@ def test_a_joint_beyond_its_limits_is_looked_for_though_nothing_strays(beyond, l
     limits = SCENE.body.limits.copy()
     limits[1] = POSE.angles[1] - 1, POSE.angles[1] + 0.06 - beyond
     body, near = replace(SCENE.body, limits=limits), pictures.tiny_state(SCENE, astray(0.06), POSE)
-    past, model = scenes.tiny_past(SCENE, POSE), scenes.tiny_model(replace(SCENE, body=body))
-    found = LimbSearch().recover(FRAME, near, settled(near), past, model, settle)
+    past, model = scenes.tiny_past(SCENE, *[astray(0.06)] * before), scenes.tiny_model(replace(SCENE, body=body))
+    found = LimbSearch().recover(replace(FRAME, index=index), near, settled(near), past, model, settle)
     assert (found.state.estimate.pose.angles == POSE.angles).all() == looked
     assert bool(found.notes) == looked
 
