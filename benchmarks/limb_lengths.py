@@ -64,7 +64,7 @@ def track_of(scene: Scene, rows: Sequence[int], truth: Sequence[Pose]) -> Track:
         angles=np.stack([p.angles for p in truth]) + OFF * np.random.default_rng(0).normal(size=(count, size)),
         covariance=np.zeros((count, 6 + size, 6 + size)), observed=np.ones((count, size)),
         cloth=np.zeros((count, 0, 3)), cloth_parameters=np.tile(parameters, (count, 1)),
-        iterations=np.ones(count, np.int16), steady=np.ones(count, bool),
+        iterations=np.ones(count, np.int16), steady=np.ones(count, bool), oscillating=np.zeros(count, bool),
         doubted=np.zeros(count, bool),
         usable=np.ones((count, len(scene.cameras)), bool), overlap=np.ones((count, len(scene.cameras))),
         seconds=np.zeros((count, 1)), step_names=("none",), energy=np.zeros((count, 1, 1)), energy_terms=("none",),

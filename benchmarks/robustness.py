@@ -30,7 +30,7 @@ from mocapflow.records import F64
 from mocapflow.results import ViewChecks
 from mocapflow.scene import Scene
 from mocapflow.timing import Stopwatch
-from mocapflow.track import CoupledLoop
+from mocapflow.track import TIMED, CoupledLoop
 
 BEFORE, AFTER = 20, 5  # frames
 KINDS = ("other_time", "other_camera", "torn", "black")
@@ -50,7 +50,7 @@ class Tracker:
         start = StartFromFile().run(recording, self.model.scene)
         for picture in recording.frames(since):
             frame = checks.passed(picture)
-            found = self.stage.fit(frame, past, start, self.model, lambda *_: None, Stopwatch()).state
+            found = self.stage.fit(frame, past, start, self.model, lambda *_: None, Stopwatch(TIMED)).state
             estimate = found.estimate
             moment = Moment(time=frame.time, pose=estimate.pose, cloth=found.cloth, observed=estimate.observed)
             past = past.after(moment, found.segmentation.appearance or past.appearance)

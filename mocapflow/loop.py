@@ -23,6 +23,8 @@ from mocapflow.scene import Scene
 from mocapflow.steady import Shown, Steady, measure_change
 from mocapflow.timing import Stopwatch
 
+LAPS = ("segment", "solve", "cloth", "match")  # of a turn, timed
+
 
 @record
 class Steps:
@@ -43,7 +45,7 @@ def settle(
 
     Source: Rosenhahn 2008, Fig. 12.14
     """
-    functional, watch = Functional(model, steps.priors, past), Stopwatch()
+    functional, watch = Functional(model, steps.priors, past), Stopwatch(LAPS)
     far = not past.moments
     steady = steps.steady.beginning if far else steps.steady
     calm, change = 0, None

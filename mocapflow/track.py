@@ -42,8 +42,8 @@ from mocapflow.data import (
 from mocapflow.errors import ComponentFailed, PipelineError
 from mocapflow.functional import Functional, image_cost
 from mocapflow.guards.answers import pose_of, result_of
-from mocapflow.guards.lacks import idle_matchers, idle_without_scene
-from mocapflow.loop import Steps, settle
+from mocapflow.guards.lacks import idle_matchers
+from mocapflow.loop import LAPS, Steps, settle
 from mocapflow.model import ClothedModel
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
@@ -54,7 +54,7 @@ from mocapflow.storage.checkpoint import Checkpoint
 from mocapflow.timing import Stopwatch
 
 LOG = logging.getLogger("mocapflow")
-STEPS = ("decode", "predict", "drape", "segment", "solve", "cloth", "match", "recover")
+TIMED = ("decode", "predict", "drape", *LAPS, "recover")
 VIEWS = 2  # fewer than these do not fix a pose in space
 MOVING = 2  # frames before that tell how the person moves
 UNKNOWN = np.pi**2  # rad^2 and m^2, the variance where nothing was seen
@@ -110,27 +110,34 @@ class CoupledLoop(Stage):
         if scene.garment is not None and self.draper is None:
             hint = "name a draper and a cloth_fitter, or track the bare body: garment: null"
             raise PipelineError(f"the person wears a {scene.garment.name}, which the track does not drape", hint=hint)
-        idle = idle_without_scene(self.first_segmenter, self.recovery, background is not None)
-        for said in [*idle_matchers(self.matchers, recording), *idle]:
+        for said in idle_matchers(self.matchers, recording):
             LOG.warning(said)
+        able = self if background else self.without_scene()
         scene = scene.with_background(background).simplified(self.body_faces)
         model = ClothedModel(scene=scene, draper=self.draper)
         if self.keep == "trace":
             checkpoint.keep_turns(self.steady.cap)
         if self.looks_back:
             self._refuse(rest for rest in checkpoint.rests() if rest[0] in recording.indices)
-        past, watch = checkpoint.past(), Stopwatch()
+        past, watch = checkpoint.past(), Stopwatch(TIMED)
         for raw in recording.frames(since=checkpoint.next_index):
             # `frame` is what failures are told of: here it would still be the one before
             picture = checks.passed(raw) if checks else raw
             picture = replace(picture, flow=flow.into(picture.index)) if flow else picture
             watch.lap("decode")
-            result = self.fit(picture, past, start, model, checkpoint.observe, watch)
-            notes = [*notes_on(picture, scene, past.believable(), result), *result.notes]
-            past = checkpoint.commit(picture, past, result, notes)
+            result = able.fit(picture, past, start, model, checkpoint.observe, watch)
+            past = checkpoint.commit(picture, past, result)
             self.complain(picture, result)
-            watch = Stopwatch()
+            watch = Stopwatch(TIMED)
         return checkpoint.track()
+
+    def without_scene(self) -> CoupledLoop:
+        """Return the loop without those parts that need the empty scene, which nobody has made; they are told."""
+        parts = {"first_segmenter": self.first_segmenter, "recovery": self.recovery}
+        idle = {role: part for role, part in parts.items() if part and part.needs_background}
+        for role, part in idle.items():
+            LOG.warning(f"{role} {part.name} needs the empty scene, which no stage before makes: it is not asked")
+        return self.model_copy(update=dict.fromkeys(idle))
 
     @property
     def looks_back(self) -> bool:
@@ -161,17 +168,18 @@ class CoupledLoop(Stage):
         self, frame: Frame, past: Past, start: Start, model: ClothedModel, observe: Observe, watch: Stopwatch
     ) -> FrameResult:
         """Return what is found of one frame: begun where it is believed, settled, and looked for if it was lost."""
-        known, state = past.believable(), self.begin(frame, past, start, model, watch)
-        near = state if len(known.moments) >= MOVING else self.approach(frame, state, known, model)
-        watch.lap("predict")
-        settled = settle if seen(frame) else lost
-        result = settled(frame, near, known, self.steps, model, observe)
-        spent = result.seconds
-        watch.lap("loop")
-        result = self.recovered(frame, state, result, known, model)
-        watch.lap("recover")
-        seconds = {step: watch.seconds.get(step, 0.0) + spent.get(step, 0.0) for step in STEPS}
-        return replace(result, seconds=seconds)
+        known, begun = past.believable(), self.begin(frame, past, start, model, watch)
+        if seen(frame):
+            near = begun if len(known.moments) >= MOVING else self.approach(frame, begun, known, model)
+            watch.lap("predict")
+            result = settle(frame, near, known, self.steps, model, observe)
+            watch.take(result.seconds)
+            result = self.recovered(frame, begun, result, known, model)
+            watch.lap("recover")
+        else:
+            result = lost(frame, begun, self.steps, model)
+        notes = (*notes_on(frame, model.scene, known, result), *result.notes)
+        return replace(result, notes=notes, seconds=watch.seconds)
 
     def begin(self, frame: Frame, past: Past, start: Start, model: ClothedModel, watch: Stopwatch) -> FrameState:
         """Return what is believed of a frame before looking: the predicted pose, clothed."""
@@ -191,10 +199,9 @@ class CoupledLoop(Stage):
         behind leads a segmenter astray that knows no more than the room: unless the images then fit better, the state
         stays.
         """
-        first = self.first_segmenter
-        if first is None or not seen(frame) or (first.needs_background and model.scene.background is None):
+        if self.first_segmenter is None:
             return state
-        steps = replace(self.steps, segmenter=first)
+        steps = replace(self.steps, segmenter=self.first_segmenter)
         near = settle(frame, state, past, steps, model, unobserved).state
         begins = (state, believed(near.estimate.pose, near.cloth.parameters, near.cloth))
         once = replace(self.steps, steady=Steady(max_turns=1))
@@ -205,7 +212,7 @@ class CoupledLoop(Stage):
     ) -> FrameResult:
         """Return the result of the loop, or a better one if the loop was lost."""
         finder = self.recovery
-        if finder is None or not seen(frame) or (finder.needs_background and model.scene.background is None):
+        if finder is None:
             return result
 
         def settle_from(pose: Pose, parameters: F64) -> FrameResult:
@@ -255,13 +262,11 @@ def believed(pose: Pose, parameters: F64, cloth: Cloth) -> FrameState:
     )
 
 
-def lost(
-    frame: Frame, state: FrameState, past: Past, steps: Steps, model: ClothedModel, observe: Observe
-) -> FrameResult:
-    """Return the prediction as the result of a frame that too few cameras have seen; see `settle`."""
-    terms = Functional(model, steps.priors, past).terms
+def lost(frame: Frame, begun: FrameState, steps: Steps, model: ClothedModel) -> FrameResult:
+    """Return the prediction as the result of a frame that too few cameras have seen."""
+    terms = Functional(model, steps.priors, Past()).terms
     return FrameResult(
-        state=state,
+        state=begun,
         iterations=0,
         steady=False,
         oscillating=False,

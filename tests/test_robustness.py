@@ -18,7 +18,7 @@ from mocapflow.geometry import twists
 from mocapflow.help.shipped import shipped
 from mocapflow.model import ClothedModel
 from mocapflow.timing import Stopwatch
-from mocapflow.track import CoupledLoop
+from mocapflow.track import TIMED, CoupledLoop
 
 MOCAPFLOW = Path(sys.executable).with_name("mocapflow")
 CLIP = shipped("examples", "data", "skirt_steps")
@@ -109,6 +109,6 @@ def followed(scene, begin, frames):
     stage = next(named.stage for named in stages if isinstance(named.stage, CoupledLoop))
     model, past, start = ClothedModel(scene=scene), Past(), Start(pose=begin, parameters=np.empty(0))
     for frame in frames:
-        found = stage.fit(frame, past, start, model, lambda *_: None, Stopwatch()).state.estimate
+        found = stage.fit(frame, past, start, model, lambda *_: None, Stopwatch(TIMED)).state.estimate
         past = past.after(Moment(time=frame.time, pose=found.pose, cloth=NO_CLOTH, observed=found.observed), {})
         yield found.pose

@@ -236,11 +236,14 @@ def test_what_the_first_segmenter_finds_is_kept_where_images_fit_better_from_the
 
 
 @pytest.mark.parametrize("without", [True, False])
-def test_a_first_segmenter_that_needs_the_empty_scene_is_left_out_without(tmp_path, monkeypatch, begun, without):
+def test_a_first_segmenter_that_needs_the_empty_scene_is_left_out_without(
+    tmp_path, monkeypatch, begun, caplog, without
+):
     monkeypatch.setattr(Segmenter, "needs_background", without)
     stages = SHORT | {"track": SHORT["track"] | {"first_segmenter": "tiny_segmenter"}}
     run_tiny(write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=stages), tmp_path, frames=1)
     assert (begun.count((0, 0)) == 1) is without
+    assert ("first_segmenter tiny_segmenter needs the empty scene" in caplog.text) is without
 
 
 def test_a_recovery_that_needs_the_empty_scene_is_not_asked_without(tmp_path, caplog):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from mocapflow.components import Matcher, Recovery, Segmenter
+from mocapflow.components import Matcher
 from mocapflow.errors import MocapflowError
 
 if TYPE_CHECKING:
@@ -27,13 +27,3 @@ def idle_matchers(matchers: Sequence[Matcher], recording: Recording) -> list[str
     if lacks and len(lacks) == len(matchers):
         raise lacks[0][1]
     return [f"matcher {name} has nothing to match: {error.message}" for name, error in lacks]
-
-
-def idle_without_scene(first: Segmenter | None, recovery: Recovery | None, background_known: bool) -> list[str]:
-    """Return what to say of a first segmenter and a recovery that will not be asked."""
-    asked = {"first_segmenter": first, "recovery": recovery}
-    idle = {} if background_known else {role: part for role, part in asked.items() if part and part.needs_background}
-    return [
-        f"{role} {part.name} needs the empty scene, which no stage before makes: it is not asked"
-        for role, part in idle.items()
-    ]

@@ -130,7 +130,7 @@ class Checkpoint:
             self._turns.append(state.estimate.pose)
         self._iteration_done(frame, turn.index, state)
 
-    def commit(self, frame: Frame, past: Past, result: FrameResult, notes: Sequence[str] = ()) -> Past:
+    def commit(self, frame: Frame, past: Past, result: FrameResult) -> Past:
         """Save a frame and return the past of the next: arrays first, the count of frames last.
 
         Raises:
@@ -155,7 +155,7 @@ class Checkpoint:
                 self._growing.write_trace(row, self._turns, self._cap, len(state.estimate.pose.angles))
                 self._turns.clear()
             news = {
-                "notes": self._notes(frame.index, notes), "warnings": self.warnings,
+                "notes": self._notes(frame.index, result.notes), "warnings": self.warnings,
                 "appearance": [[name, list(values.shape)] for name, values in appearance.items()],
                 "frames_done": row + 1, "complete": False,
             }  # fmt: skip

@@ -17,7 +17,6 @@ FINE = 8  # steps per px of a stored silhouette
 UNSEEN = -128  # stored where a view has no silhouette
 MATCH = ("camera", "x px", "y px", "direction x", "direction y", "vertex", "weight px^-2")
 UNITS = {  # of the columns that `Track` does not have
-    "oscillating": "1 where the loop swung between two states, else 0",
     "body_change": "m, largest move of a body vertex in the last turn",
     "cloth_change": "m, root mean square move of the cloth in the last turn",
     "angle_change": "rad, largest change of an angle in the last turn",

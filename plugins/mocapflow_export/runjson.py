@@ -35,6 +35,7 @@ def summary(track: Track, series: AngleSeries, run_folder: RunFolder, warnings: 
             "first": int(track.frame[0]),
             "last": int(track.frame[-1]),
             "not_at_rest": track.frame[~track.steady],
+            "oscillating": track.frame[track.oscillating],
             "lost": track.frame[lost],
             "doubted": track.frame[track.doubted],
             "bridged_by": "the neighbouring frames, in `smooth`" if lost.any() and track.raw_root is not None else None,

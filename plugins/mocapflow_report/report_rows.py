@@ -75,6 +75,8 @@ def mishaps(track: Track, held: Mapping[str, int]) -> list[str]:
         said.append(f"frames that the images contradict: {_spans(track, track.doubted)}")
     if restless.any():
         said.append(f"{restless.sum()} of {len(restless)} frames did not come to rest: {_spans(track, restless)}")
+    if track.oscillating.any():
+        said.append(f"frames that swing between two states, which damping calms: {_spans(track, track.oscillating)}")
     return said + [f"{title(name)}: held by the priors in {n} frames" for name, n in held.items()]
 
 

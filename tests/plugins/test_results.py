@@ -138,7 +138,7 @@ def test_run_json_says_how_it_was_made_and_how_it_went(scene: Scene, recording: 
     note = "frame 3: seen by too few cameras; the prediction is kept"
     broken = replace(
         track, iterations=turns, steady=steady, usable=usable, overlap=overlap, notes=("frame 3: cam02 black", note),
-        doubted=np.arange(6) == 4,
+        doubted=np.arange(6) == 4, oscillating=np.arange(6) == 2,
     )  # fmt: skip
     observed = track.observed.copy()
     observed[4:, scene.body.screw_names.index("knee_l.x")] = 0.2
@@ -149,7 +149,7 @@ def test_run_json_says_how_it_was_made_and_how_it_went(scene: Scene, recording: 
     assert set(got["recipe"]) == {"pipeline", "stages"}
     assert got["frames"]["lost"] == [3]
     assert "neighbouring" in got["frames"]["bridged_by"]
-    assert got["frames"]["not_at_rest"] == [2, 3]
+    assert (got["frames"]["not_at_rest"], got["frames"]["oscillating"]) == ([2, 3], [2])
     assert got["frames"]["doubted"] == [4]
     assert [frame.get("doubted", False) for frame in got["per_frame"]] == [False] * 4 + [True, False]
     assert got["frames"]["held_by_priors"] == {"knee_flexion_l": 2}
