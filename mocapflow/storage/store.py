@@ -96,10 +96,8 @@ class Store:
         with writing(self.path):
             for folder, meta in ((self.path, group_meta({})), (self.state, state)):
                 folder.mkdir(parents=True, exist_ok=True)
-                if _kind(folder) != meta["node_type"]:  # not there yet, or of an earlier version
+                if _kind(folder) != meta["node_type"]:  # not there yet, or damaged
                     write_json(folder / "zarr.json", meta)
-            for damaged in self.path.glob(f"damaged-*-{'[0-9]' * 19}"):  # where earlier versions set them aside
-                damaged.rename(self.state / damaged.name)
 
     def artifacts(self) -> list[Artifact]:
         """Return what is in the store, oldest first; what can't be read is left out."""

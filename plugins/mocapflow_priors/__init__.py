@@ -9,7 +9,6 @@ from mocapflow.hookspecs import hookimpl
 @hookimpl
 def mocapflow_priors() -> list[type[Prior]]:
     """Return the priors of this plugin."""
-    from mocapflow_priors.foot_contact import FootContact
     from mocapflow_priors.ground_plane import GroundPlane
     from mocapflow_priors.joint_limits import JointLimits
     from mocapflow_priors.parzen import Parzen
@@ -17,7 +16,7 @@ def mocapflow_priors() -> list[type[Prior]]:
     from mocapflow_priors.smooth_motion import SmoothMotion
     from mocapflow_priors.spine_coupling import SpineCoupling
 
-    return [FootContact, GroundPlane, JointLimits, Parzen, RestPose, SmoothMotion, SpineCoupling]
+    return [GroundPlane, JointLimits, Parzen, RestPose, SmoothMotion, SpineCoupling]
 
 
 @hookimpl

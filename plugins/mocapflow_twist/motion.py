@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mocapflow.data import Cloth, Past
+from mocapflow.data import Past
 from mocapflow.geometry.sewing import TAKE_UP
 from mocapflow.model import ClothedModel, moved
 from mocapflow.records import F64, Bool
@@ -19,25 +19,23 @@ from mocapflow_twist.solve import at_bound
 class ClothMotion:
     """Moves pose and cloth together; lives as long as one call of the solver.
 
-    Measuring the motion of the cloth takes many drapes, so it is done once a guess, only when a match needs it, and
-    with `measure_once` for the first guess alone.
+    The cloth is draped anew at every pose. Measuring how it moves takes many drapes, so that is done once, only when a
+    match needs it, of the guess at hand.
     """
 
     model: ClothedModel
     past: Past
     unknowns: bool  # the cloth parameters are solved for
-    redrape: bool  # drape at every new pose; else move the cloth linearly
-    measure_once: bool
-    _measured: tuple[Guess, F64] | None = None  # the last velocities, and of what
+    _velocity: F64 | None = None
 
     def velocity(self, guess: Guess) -> F64:
-        """Return velocities (W, 3, S) of the cloth for increments about the origin."""
-        if self._measured is None or not (self.measure_once or self._measured[0] is guess):
+        """Return velocities (W, 3, S) of the cloth for increments about the origin, measured at the first guess."""
+        if self._velocity is None:
             every = np.arange(len(guess.cloth.vertices), dtype=np.int32)
             velocity = self.model.velocity(guess.pose, guess.cloth, every, self.past)
             columns = velocity.shape[2] if self.unknowns else 6 + len(guess.pose.angles)
-            self._measured = guess, np.ascontiguousarray(velocity[..., :columns])
-        return self._measured[1]
+            self._velocity = np.ascontiguousarray(velocity[..., :columns])
+        return self._velocity
 
     def moved(self, guess: Guess, increment: F64) -> Guess:
         """Return the guess after an increment (S,) about the origin."""
@@ -48,12 +46,7 @@ class ClothMotion:
         if self.unknowns:
             low, high = self._bounds.T
             parameters = np.clip(parameters + increment[6 + len(pose.angles) :], low, high)
-        if self.redrape:
-            return Guess(pose, self.model.drape(pose, parameters, self.past))
-        taken = np.concatenate([increment[: 6 + len(pose.angles)], parameters - guess.cloth.parameters])
-        velocity = self.velocity(guess)
-        vertices = guess.cloth.vertices + velocity @ taken[: velocity.shape[2]]
-        return Guess(pose, Cloth(vertices=vertices, parameters=parameters))
+        return Guess(pose, self.model.drape(pose, parameters, self.past))
 
     def within_bounds(self, equations: Equations, guess: Guess) -> Equations:
         """Return the equations with cloth parameters held that stand at a bound and would leave it, and the take-up."""

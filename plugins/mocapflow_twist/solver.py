@@ -47,8 +47,6 @@ class TwistGaussNewton(PoseSolver):
     correlation_px: NonNegativeFloat = 15.0  # length over which contour errors agree; 0: independent
     balance_views: bool = False  # every view counts the same
     cloth_unknowns: bool = False  # also solves for the cloth parameters
-    redrape: Literal["every", "once"] = "every"  # drape at each new pose, or once and move the cloth linearly
-    cloth_jacobian: Literal["every", "once"] = "once"  # how often the motion of the cloth is measured
     root_damping_m: PositiveFloat = 0.1  # standard deviation about the pose that a turn of the loop begins from
     root_damping_deg: PositiveFloat = 11.5  # likewise
     angle_damping_deg: PositiveFloat = 60.0  # likewise, of every joint angle
@@ -66,7 +64,7 @@ class TwistGaussNewton(PoseSolver):
     ) -> Estimate:
         """Return the pose that explains the matches best, its covariance, and what the images told of it."""
         guess = Guess(state.estimate.pose, state.cloth)
-        motion = ClothMotion(model, past, self.cloth_unknowns, self.redrape == "every", self.cloth_jacobian == "once")
+        motion = ClothMotion(model, past, self.cloth_unknowns)
         anchor = Anchor(calmed(guess, model), self._precision(model, guess))
         surface, damping = model.surface(guess.pose, guess.cloth), self._least_damping(past, turn)
         tried: dict[Pose, Sequence[Residual]] = {}

@@ -65,7 +65,7 @@ class Grudging(NamedTuple):
 def test_a_worse_step_is_damped_ten_times_more_and_a_better_one_as_much_less(refusals: int, factor: float) -> None:
     solver, start = TwistGaussNewton(), Guess(start_from(TRUTH, 1), NO_CLOTH)
     problem = Grudging(problem_of(solver, start), Mock(), refusals)
-    motion = ClothMotion(MODEL, Past(), False, True, True)
+    motion = ClothMotion(MODEL, Past(), False)
     total = problem.problem.quadratic(start, None).total
     found, damping = solver._descend(problem, start, total, motion, 1e-3)
     assert damping == pytest.approx(1e-3 * factor)

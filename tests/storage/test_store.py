@@ -27,7 +27,7 @@ from mocapflow.series import Series
 from mocapflow.storage import locks, rows
 from mocapflow.storage.packing import FINE, match_row, quantised
 from mocapflow.storage.rows import Corrupted, Rows
-from mocapflow.storage.store import Store, group_meta, remove
+from mocapflow.storage.store import Store, remove
 from tests.fixtures.stores import actions, run_tiny, same, the_track, write_pipeline, write_recording
 from tests.fixtures.tiny_plugin import TinyMatcher, tiny_body
 
@@ -178,18 +178,6 @@ def test_others_read_the_store_without_complaint(tmp_path, path, damaged):
     tree = xarray.open_datatree(str(store), engine="zarr", consolidated=False).load()
     (track,) = (name for name in tree.children if name.startswith("track-"))
     assert tree[track]["angles"].shape == (5, 2)
-
-
-def test_a_store_of_before_becomes_one_that_others_read(tmp_path, path):
-    state = tmp_path / "store.zarr" / ".state"
-    damaged = state.parent / "damaged-track-3d6ffcac11d8-1795600194923539224"
-    for folder in (state, damaged):
-        folder.mkdir(parents=True)
-    rows.write_json(state / "zarr.json", group_meta({}))
-    (damaged / "zarr.json").touch()
-    run_tiny(path, tmp_path, frames=2)
-    assert len(list(zarr.open_group(str(state.parent), mode="r").members(max_depth=None))) > 20
-    assert [group.name for group in Store(state.parent).aside()] == [damaged.name]
 
 
 def test_what_a_stopped_commit_leaves_is_gone_when_the_track_goes_on(tmp_path, path):
