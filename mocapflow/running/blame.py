@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType, TracebackType
 from typing import Any
@@ -12,23 +14,50 @@ from pydantic import ValidationError
 
 from mocapflow.components import Component
 from mocapflow.data import Frame, Turn
-from mocapflow.errors import ComponentFailed
+from mocapflow.errors import (
+    FULL,
+    ComponentFailed,
+    MocapflowError,
+    PluginError,
+    ShapeError,
+    StoreError,
+    interrupted,
+    unwritable,
+)
 from mocapflow.guards.answers import WrongAnswer
 from mocapflow.registry import Registry
 
 LOG = "failed.log"  # in the run folder, the traceback of the last failure
 
 
-def failure(error: BaseException, stage: Component, registry: Registry, saved: str, log: Path) -> ComponentFailed:
-    """Return the error for people: the innermost frame of the traceback in a plugin names the culprit.
+@contextmanager
+def blaming(component: Component, registry: Registry, kept: Callable[[], str], log: Path) -> Iterator[None]:
+    """If a component raises, say who it was, what is saved and how to go on.
 
     Args:
-        error: what was raised.
-        stage: what was running.
+        component: what is running, or what it runs.
         registry: knows which packages are plugins.
-        saved: what is kept, and how to go on.
+        kept: says what is saved, and how to go on.
         log: where to write the whole traceback.
     """
+    try:
+        yield
+    except ComponentFailed:
+        raise
+    except (Exception, SystemExit) as error:
+        if interrupted(error):
+            raise KeyboardInterrupt from None
+        if isinstance(error, MocapflowError) and not isinstance(error, ShapeError | PluginError):
+            if not isinstance(error, StoreError):
+                error.where = error.where or _met(error, component, registry)
+            raise
+        if isinstance(error, OSError) and error.errno in {*FULL, errno.EROFS} and (said := unwritable(error)):
+            raise said from error  # no component's fault
+        raise _failure(error, component, registry, kept(), log) from error
+
+
+def _failure(error: BaseException, stage: Component, registry: Registry, saved: str, log: Path) -> ComponentFailed:
+    """Return the error for people: the innermost frame of the traceback in a plugin names the culprit."""
     calls = list(_calls(error.__traceback__))
     component = error.component if isinstance(error, WrongAnswer) else _culprit(calls, registry) or stage
     message = f"{_named(component)} ({registry.origin(type(component))}) failed{_moment(calls)}: {_said(error)}"
@@ -36,7 +65,7 @@ def failure(error: BaseException, stage: Component, registry: Registry, saved: s
     return ComponentFailed(message, hint="\n".join(filter(None, hints)))
 
 
-def met(error: BaseException, stage: Component, registry: Registry) -> str:
+def _met(error: BaseException, stage: Component, registry: Registry) -> str:
     """Return the component in which an error was raised, for people."""
     return _named(_culprit(list(_calls(error.__traceback__)), registry) or stage)
 

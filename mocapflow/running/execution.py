@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import errno
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,23 +14,13 @@ from mocapflow.components import Component, Garment
 from mocapflow.config.named_parts import whereabouts
 from mocapflow.config.pipeline import Pipeline
 from mocapflow.data import FrameResult
-from mocapflow.errors import (
-    FULL,
-    ComponentFailed,
-    GarmentError,
-    MocapflowError,
-    PluginError,
-    ShapeError,
-    StoreError,
-    interrupted,
-    unwritable,
-)
+from mocapflow.errors import GarmentError
 from mocapflow.guards.answers import of_kind
 from mocapflow.guards.cloth_answers import body_of, mesh_of
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import unwatched
 from mocapflow.results import RunFolder
-from mocapflow.running.blame import LOG, failure, met
+from mocapflow.running.blame import LOG, blaming
 from mocapflow.running.progress import Progress
 from mocapflow.running.recipes import Step
 from mocapflow.running.warned import warnings_logged
@@ -220,24 +209,10 @@ class Execution:
         except GarmentError as error:
             raise GarmentError(error.message, where=self._pipeline.garment_where, hint=error.hint) from None
 
-    @contextmanager
-    def _blaming(self, component: Component, checkpoint: Checkpoint | None = None) -> Iterator[None]:
-        """If a component raises, say who it was, what is saved and how to go on."""
-        try:
-            yield
-        except ComponentFailed:
-            raise
-        except (Exception, SystemExit) as error:
-            if interrupted(error):
-                raise KeyboardInterrupt from None
-            if isinstance(error, MocapflowError) and not isinstance(error, ShapeError | PluginError):
-                if not isinstance(error, StoreError):
-                    error.where = error.where or met(error, component, self._pipeline.registry)
-                raise
-            if isinstance(error, OSError) and error.errno in {*FULL, errno.EROFS} and (said := unwritable(error)):
-                raise said from error  # no component's fault
-            kept = checkpoint.kept if checkpoint else ""
-            raise failure(error, component, self._pipeline.registry, kept, self._out / LOG) from error
+    def _blaming(self, component: Component, checkpoint: Checkpoint | None = None) -> AbstractContextManager[None]:
+        return blaming(
+            component, self._pipeline.registry, lambda: checkpoint.kept if checkpoint else "", self._out / LOG
+        )
 
     def _entered(
         self, step: Step, found: Artifact | None, cpu: float = 0.0, wall: float = 0.0, said: Sequence[str] = ()
