@@ -10,13 +10,8 @@ from twist_fixtures import make_body, make_pose, make_scene
 
 from mocapflow.data import NO_CLOTH, Moment, Past, Pose
 from mocapflow.model import moved
-from mocapflow.testing import PriorConformance
 
 FEET = ("joint3", "joint5")
-
-
-class TestFootContactConforms(PriorConformance):
-    prior = FootContact()
 
 
 def contact(height: float) -> FootContact:
