@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from mocapflow.records import F64
+from mocapflow_evaluation.compare import turning_point
 from mocapflow_evaluation.references import SLACK, Reference
 
 GAP = 1.5  # samples; across a longer one nothing is interpolated
@@ -82,17 +82,7 @@ def align(columns: Mapping[str, F64], reference: Reference, longest_lag_s: float
     signs = {name: -1 if each else 1 for name, each in zip(names, flipped[best], strict=True)}
     unlike = 1 - score[reach]  # without a lag; infinite where too few frames have both then
     gain = float((score[best] - score[reach]) / unlike) if 0 < unlike < np.inf else float(unlike > 0)
-    return Alignment(_summit(score, shifts, best), signs, gain)
-
-
-def _summit(score: F64, shifts: npt.NDArray[np.intp], best: int) -> float:
-    """Return where a parabola through the best of the scores and its neighbours is greatest; NaN at the ends."""
-    if best in (0, len(score) - 1):
-        return np.nan
-    before, at, after = score[best - 1 : best + 2]
-    bend = before - 2 * at + after
-    fraction = 0.5 * (before - after) / bend if np.isfinite(bend) and bend < 0 else 0.0
-    return float(shifts[best] + fraction)
+    return Alignment(turning_point(shifts, score, best), signs, gain)
 
 
 def _products(ours: F64, theirs: F64) -> tuple[float, float, float]:
