@@ -14,7 +14,7 @@ from mocapflow_evaluation.references import SLACK, Reference
 GAP = 1.5  # samples; across a longer one nothing is interpolated
 FEWEST = 10  # frames that both must have; fewer are alike, or opposed, by chance
 LEAST = 0.5  # of our frames must have a counterpart at every shift that is tried
-HALF = 0.5  # frames; a smaller lag is lost in the resampling
+HALF = 0.5  # frames; a smaller lag is lost in the resampling, and times that differ less are the same
 LIKE = 0.5  # correlation below which two systems show no common lag
 GAIN = 0.2  # of what is unlike without a lag; a lag that explains less may be chance
 TURNED = -0.8  # correlation; what is less opposed may be chance
