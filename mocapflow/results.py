@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import field, replace
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mocapflow.data import Flow, Frame, Pose
+from mocapflow.data import Flow, Frame, Pose, blind
 from mocapflow.records import F32, F64, I16, I32, Bool, Watch, array, record, unwatched
 from mocapflow.series import Wide
 
@@ -82,6 +83,21 @@ class Track:
     def frame_rate(self) -> float:
         """Frames per second, see `frame_rate_of`."""
         return frame_rate_of(self.time)
+
+    @cached_property
+    def lost(self) -> Bool:
+        """True (T,) where nothing was fitted: no turn, no usable view, none that told anything, or nothing is known."""
+        unused = (self.usable.shape[1] > 0) & ~self.usable.any(axis=1)
+        empty = np.array([blind(row) for row in self.observed], bool)
+        known = np.array([np.isfinite(spread).all() for spread in self.covariance], bool)
+        return np.asarray((self.iterations == 0) | unused | empty | ~known)
+
+    @property
+    def before_smoothing(self) -> Track:
+        """The track as the loop left it."""
+        if self.raw_root is None or self.raw_angles is None:
+            return self
+        return replace(self, root=self.raw_root, angles=self.raw_angles)
 
     def pose(self, row: int) -> Pose:
         """Return the pose of one row."""

@@ -73,6 +73,13 @@ def three_point(positions: F64) -> F64:
     return angle
 
 
+def hip_flexion(thigh: F64, pelvis: F64) -> F64:
+    """Return the hip flexion (...,) in degrees of thighs (..., 3), by the pelvis' forward and up (..., 2, 3)."""
+    forward, up = np.einsum("...ac,...c->a...", pelvis, thigh)
+    angle: F64 = np.degrees(np.arctan2(forward, -up))
+    return angle
+
+
 def between_centres(places: Mapping[str, F64]) -> dict[str, F64]:
     """Return the three-point angles (T,) in degrees that joint centres (T, 3) by name allow."""
     return {
@@ -168,4 +175,4 @@ def _flexion(places: F64, moves: F64, pelvis: F64, turn: F64) -> tuple[float, F6
     forward, up = pelvis @ thigh
     relative = moves[1] - moves[0] + twists.hat(thigh) @ turn  # how the thigh moves as seen from the pelvis
     gradient = (-up * pelvis[0] + forward * pelvis[1]) @ relative / (forward**2 + up**2)
-    return float(np.degrees(np.arctan2(forward, -up))), gradient
+    return float(hip_flexion(thigh, pelvis)), gradient

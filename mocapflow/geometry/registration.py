@@ -30,7 +30,7 @@ class Registration:
 def register(source: F64, target: F64, groups: npt.ArrayLike | None = None) -> Registration:
     """Return the rigid motion that takes source to target with the least sum of squares.
 
-    The solution by singular values is Kabsch's (Acta Cryst. A32, 1976), the scale Umeyama's (IEEE PAMI 13, 1991).
+    The scale is Umeyama's (IEEE PAMI 13, 1991).
 
     Args:
         source: (N, 3) m, points in the rig that is moved.
@@ -59,6 +59,17 @@ def register(source: F64, target: F64, groups: npt.ArrayLike | None = None) -> R
     )
 
 
+def rigid_motion(source: F64, target: F64) -> tuple[F64, F64]:
+    """Return rotation (3, 3) and translation (3,) m that take points (N, 3) m to others with the least sum of squares.
+
+    The solution by singular values is Kabsch's (Acta Cryst. A32, 1976); how points on one line turn about it is chance.
+    """
+    middle, centre = source.mean(axis=0), target.mean(axis=0)
+    u, _, vt = np.linalg.svd((target - centre).T @ (source - middle))
+    rotation: F64 = u @ np.diag([1, 1, np.linalg.det(u @ vt)]) @ vt
+    return rotation, centre - rotation @ middle
+
+
 def _fit(source: F64, target: F64) -> tuple[F64, F64, float]:
     if len(source) < 3:
         raise MocapflowError(f"{len(source)} common points; a registration needs three that are not on one line")
@@ -66,7 +77,5 @@ def _fit(source: F64, target: F64) -> tuple[F64, F64, float]:
     spread = np.linalg.svd(a, compute_uv=False)
     if spread[1] <= FLAT * spread[0]:
         raise MocapflowError("the common points lie on one line: they do not tell how one rig is turned about it")
-    u, stretch, vt = np.linalg.svd(b.T @ a)
-    mirrored = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
-    rotation: F64 = (u * mirrored) @ vt
-    return rotation, target.mean(0) - rotation @ source.mean(0), float(stretch @ mirrored / np.sum(a**2))
+    rotation, translation = rigid_motion(source, target)
+    return rotation, translation, float(np.sum(b * (a @ rotation.T)) / np.sum(a**2))

@@ -6,15 +6,15 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from mocapflow.records import F64
+from mocapflow_evaluation.compare import turning_point
 from mocapflow_evaluation.references import SLACK, Reference
 
 GAP = 1.5  # samples; across a longer one nothing is interpolated
 FEWEST = 10  # frames that both must have; fewer are alike, or opposed, by chance
 LEAST = 0.5  # of our frames must have a counterpart at every shift that is tried
-HALF = 0.5  # frames; a smaller lag is lost in the resampling
+HALF = 0.5  # frames; a smaller lag is lost in the resampling, and times that differ less are the same
 LIKE = 0.5  # correlation below which two systems show no common lag
 GAIN = 0.2  # of what is unlike without a lag; a lag that explains less may be chance
 TURNED = -0.8  # correlation; what is less opposed may be chance
@@ -82,17 +82,7 @@ def align(columns: Mapping[str, F64], reference: Reference, longest_lag_s: float
     signs = {name: -1 if each else 1 for name, each in zip(names, flipped[best], strict=True)}
     unlike = 1 - score[reach]  # without a lag; infinite where too few frames have both then
     gain = float((score[best] - score[reach]) / unlike) if 0 < unlike < np.inf else float(unlike > 0)
-    return Alignment(_summit(score, shifts, best), signs, gain)
-
-
-def _summit(score: F64, shifts: npt.NDArray[np.intp], best: int) -> float:
-    """Return where a parabola through the best of the scores and its neighbours is greatest; NaN at the ends."""
-    if best in (0, len(score) - 1):
-        return np.nan
-    before, at, after = score[best - 1 : best + 2]
-    bend = before - 2 * at + after
-    fraction = 0.5 * (before - after) / bend if np.isfinite(bend) and bend < 0 else 0.0
-    return float(shifts[best] + fraction)
+    return Alignment(turning_point(shifts, score, best), signs, gain)
 
 
 def _products(ours: F64, theirs: F64) -> tuple[float, float, float]:

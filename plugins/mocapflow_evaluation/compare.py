@@ -129,7 +129,16 @@ def lag(ours: F64, truth: F64, rate: float) -> float:
     best = int(np.argmin(spread))
     if spread[best] == 0:
         return float(shifts[best])
-    if best in (0, len(spread) - 1):
+    return turning_point(shifts, spread, best)
+
+
+def turning_point(shifts: npt.NDArray[np.intp], values: F64, best: int) -> float:
+    """Return where a parabola through the best of values (S,) and its neighbours turns; NaN at the first and the last.
+
+    It is the whole shift where a neighbour is not known (infinite).
+    """
+    if best in (0, len(values) - 1):
         return np.nan
-    before, at, after = spread[best - 1 : best + 2]
-    return float(shifts[best] + 0.5 * (before - after) / (before - 2 * at + after))
+    before, at, after = values[best - 1 : best + 2]
+    bend = before - 2 * at + after
+    return float(shifts[best] + (0.5 * (before - after) / bend if np.isfinite(bend) and bend else 0.0))

@@ -6,12 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mocapflow_evaluation.alignment import Alignment
+from mocapflow_evaluation.alignment import HALF, Alignment
 from mocapflow_evaluation.cycles import Cycle
 from mocapflow_evaluation.ours import Ours
 from mocapflow_evaluation.references import Reference
 
-HALF = 0.5  # frames of the video; times that differ less are the same
 BENT = 20.0  # deg that some angle of a person who moves exceeds
 
 

@@ -79,14 +79,6 @@ def signed_flexion(hip: F64, knee: F64, ankle: F64, axis: F64) -> F64:
     return angle
 
 
-def hip_flexion(hip: F64, knee: F64, pelvis: F64) -> F64:
-    """Return the angle (T,) in degrees of the thigh from straight down in the pelvis' sagittal plane, to the front."""
-    thigh = knee - hip
-    forward, up = (np.sum(pelvis[:, axis] * thigh, axis=-1) for axis in (0, 1))
-    angle: F64 = np.degrees(np.arctan2(forward, -up))
-    return angle
-
-
 def _shoulder_centres(marks: Mapping[str, F64], centres: Mapping[str, F64]) -> dict[str, F64]:
     """Return the shoulder centres, below the acromia along the trunk."""
     between = float(np.nanmedian(np.linalg.norm(marks["acromion_r"] - marks["acromion_l"], axis=-1)))

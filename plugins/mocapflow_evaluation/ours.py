@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 from mocapflow_export import layout, tables
-from mocapflow_export.export import before_smoothing
 from mocapflow_export.uncertainty import measured
 
 from mocapflow.errors import RecordingError
@@ -39,7 +38,7 @@ class Ours:
 def of_track(track: Track, scene: Scene) -> Ours:
     """Return what a track has."""
     places = kinematics.joint_centres(scene.body, track.root, track.angles)
-    columns, raw = (_columns(each, scene) for each in (track, before_smoothing(track)))
+    columns, raw = (_columns(each, scene) for each in (track, track.before_smoothing))
     return Ours(columns=columns, raw=raw, stick=Stick(names=scene.body.joint_names, places=places))
 
 

@@ -148,7 +148,7 @@ def _about_axes(marks: Mapping[str, F64], centres: Mapping[str, F64]) -> dict[st
     for side in ("l", "r"):
         hip, knee, ankle = (centres.get(f"{joint}_{side}") for joint in ("hip", "knee", "ankle"))
         if hip is not None and knee is not None:
-            found[f"hip_flexion_{side}"] = marker_joints.hip_flexion(hip, knee, marker_joints.pelvis_axes(marks))
+            found[f"hip_flexion_{side}"] = angles.hip_flexion(knee - hip, marker_joints.pelvis_axes(marks)[:, :2])
             if ankle is not None:
                 axis = marker_joints.knee_axis(marks, side)
                 found[f"knee_angle_{side}"] = marker_joints.signed_flexion(hip, knee, ankle, axis)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar, Literal
 
@@ -56,13 +55,6 @@ class Export(WriteFormats):
         return Files(paths=(*files.paths, runjson.write(layout.place(run_folder.path, layout.RUN), content)))
 
 
-def before_smoothing(track: Track) -> Track:
-    """Return the track as the loop left it."""
-    if track.raw_root is None or track.raw_angles is None:
-        return track
-    return replace(track, root=track.raw_root, angles=track.raw_angles)
-
-
 def written(name: str, result: Result, folder: Path) -> list[Path]:
     """Write one format into a run folder and return its files."""
     own = {"csv": write_angles, "mot": write_motion, "trc": write_joints}
@@ -74,7 +66,7 @@ def write_angles(result: Result, folder: Path) -> list[Path]:
     track, scene = result.track, result.scene
     columns = {
         layout.ANGLES: tables.angle_columns(track, measured(track, scene)),
-        layout.RAW_ANGLES: tables.angle_columns(track, measured(before_smoothing(track), scene)),
+        layout.RAW_ANGLES: tables.angle_columns(track, measured(track.before_smoothing, scene)),
         layout.ENERGY: tables.energy_columns(track),
     }
     return [tables.write_columns(layout.place(folder, part), each) for part, each in columns.items()]

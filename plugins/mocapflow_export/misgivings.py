@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from mocapflow_sequence.lost import lost_rows
 
 from mocapflow.records import F64
 from mocapflow.results import Track
@@ -16,7 +15,7 @@ POOR = 0.7  # median overlap of all views below which the model is not where the
 
 def misgivings(track: Track, cameras: Sequence[str]) -> list[str]:
     """Return in words what to look at: frames that are guesses, views that show something else than the model."""
-    count, lost = len(track.frame), int(lost_rows(track).sum())
+    count, lost = len(track.frame), int(track.lost.sum())
     said = [f"{lost} of {count} frames are lost: their pose is a guess"] if lost else []
     if track.doubted.any():
         said.append(f"{track.doubted.sum()} of {count} frames are doubted: the images contradict them")

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mocapflow_sequence.lost import lost_rows
 
 from mocapflow.data import unseen
 from mocapflow.geometry.angles import AngleSeries
@@ -24,7 +23,7 @@ FRAME = re.compile(r"^frame (\d+): ?(.*)$")
 def summary(track: Track, series: AngleSeries, run_folder: RunFolder, warnings: tuple[str, ...]) -> dict[str, Any]:
     """Return what run.json says: versions, settings, recipe, seconds per step, and what happened frame by frame."""
     seconds = track.seconds
-    lost, said = lost_rows(track), by_frame(track.notes)
+    lost, said = track.lost, by_frame(track.notes)
     made = {name: run_folder.recipe.get(name, {}) for name in ("versions", "settings")}
     return {
         **made,

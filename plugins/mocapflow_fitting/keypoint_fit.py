@@ -10,6 +10,7 @@ import numpy as np
 from mocapflow.assets import Body, Camera
 from mocapflow.data import Pose
 from mocapflow.geometry.cameras import projection
+from mocapflow.geometry.registration import rigid_motion
 from mocapflow.records import F64, array, record
 from mocapflow_fitting.landmarks import Landmarks, landmarks
 from mocapflow_fitting.pose_fit import Observed, Solution, Spreads, View, descend, projected
@@ -69,14 +70,10 @@ def in_images(points: F64, seen: Seen, spread: F64, cameras: Sequence[Camera]) -
 
 
 def _first_root(marks: Landmarks, seen: Seen) -> F64:
-    """Return the rigid motion of the trunk at rest on to its triangulated landmarks (Kabsch)."""
+    """Return the rigid motion (4, 4) of the trunk at rest on to its triangulated landmarks."""
     known = np.isfinite(seen.position).all(axis=1)
     hips, top = (known & np.array([n.startswith(part) for n in marks.names]) for part in ("hip", ("shoulder", "neck")))
     use = hips | top if hips.any() and top.sum() >= 2 else known  # three points in a line say nothing of the tilt
-    rest, found = marks.body.vertices[use], seen.position[use]
-    middle, centre = rest.mean(axis=0), found.mean(axis=0)
-    u, _, vt = np.linalg.svd((found - centre).T @ (rest - middle))
     root = np.eye(4)
-    root[:3, :3] = u @ np.diag([1, 1, np.linalg.det(u @ vt)]) @ vt
-    root[:3, 3] = centre - root[:3, :3] @ middle
+    root[:3, :3], root[:3, 3] = rigid_motion(marks.body.vertices[use], seen.position[use])
     return root

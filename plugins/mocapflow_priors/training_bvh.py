@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mocapflow.errors import RecordingError
-from mocapflow.geometry.angles import between_centres
+from mocapflow.geometry.angles import between_centres, hip_flexion
 from mocapflow.records import F64
 
 ALIASES: Mapping[str, tuple[str, ...]] = {  # ours: also those of CMU and HDM05 conversions, Mixamo, MotionBuilder
@@ -34,7 +34,8 @@ def columns(path: Path) -> dict[str, F64]:
     found = between_centres(places)
     for side in ("l", "r"):
         if {"hip_l", "hip_r", "spine", f"knee_{side}"} <= set(places):
-            found[f"hip_flexion_{side}"] = hip_flexion(places, side)
+            thigh = places[f"knee_{side}"] - places[f"hip_{side}"]
+            found[f"hip_flexion_{side}"] = hip_flexion(thigh, pelvis_axes(places))
     return found
 
 
@@ -94,13 +95,10 @@ def mirrored(name: str) -> str:
     return name.replace("left", "right") if name.startswith("left") else "r" + name[1:]
 
 
-def hip_flexion(places: Mapping[str, F64], side: str) -> F64:
-    """Return the angle (T,) in degrees of a thigh from straight down in the pelvis' sagittal plane."""
+def pelvis_axes(places: Mapping[str, F64]) -> F64:
+    """Return the axes of the pelvis as rows: forward and up (T, 2, 3)."""
     left = places["hip_l"] - places["hip_r"]
-    up = places["spine"] - 0.5 * (places["hip_l"] + places["hip_r"])
-    forward = np.cross(left, up)
-    up = np.cross(forward, left)
-    thigh = places[f"knee_{side}"] - places[f"hip_{side}"]
-    ahead, above = ((thigh * axis).sum(axis=1) / np.linalg.norm(axis, axis=1) for axis in (forward, up))
-    angle: F64 = np.degrees(np.arctan2(ahead, -above))
-    return angle
+    forward = np.cross(left, places["spine"] - 0.5 * (places["hip_l"] + places["hip_r"]))
+    axes: F64 = np.stack([forward, np.cross(forward, left)], axis=1)
+    axes /= np.linalg.norm(axes, axis=2, keepdims=True)
+    return axes

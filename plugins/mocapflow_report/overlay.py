@@ -6,7 +6,6 @@ from typing import ClassVar, Literal
 
 import numpy as np
 from mocapflow_export import layout
-from mocapflow_sequence.lost import is_lost
 
 from mocapflow.assets import Camera
 from mocapflow.components import Stage
@@ -96,7 +95,7 @@ def _remarks(frame: Frame, track: Track, row: int, view: int) -> list[str]:
         said.append(f"no image: {frame.reasons[view]}" if frame.reasons else "no image")
     elif not track.usable[row, view]:
         said.append("not used: this picture was not trusted")
-    if is_lost(track, row):
+    if track.lost[row]:
         said.append("frame lost, bridged")
     if track.doubted[row]:
         said.append("doubted: the images contradict this pose")

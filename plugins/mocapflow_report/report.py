@@ -9,9 +9,7 @@ from typing import ClassVar
 
 from mocapflow_evaluation import comparison_plots, cycles
 from mocapflow_export import layout, runjson, tables
-from mocapflow_export.export import before_smoothing
 from mocapflow_export.uncertainty import measured
-from mocapflow_sequence.lost import lost_rows
 
 from mocapflow.components import Stage
 from mocapflow.geometry import kinematics
@@ -81,10 +79,10 @@ def draw(
     track: Track, scene: Scene, columns: Mapping[str, F64], evaluation: Evaluation | None, folder: Path
 ) -> list[Path]:
     """Draw angles, overlap and, of somebody who walks without a reference, the gait cycle; return the files."""
-    raw, lost = tables.angle_columns(track, measured(before_smoothing(track), scene)), lost_rows(track)
+    raw = tables.angle_columns(track, measured(track.before_smoothing, scene))
     curves, overlap = layout.place(folder, layout.PLOT), layout.place(folder, layout.OVERLAP)
-    plots.plot_angles(curves, columns, raw, evaluation, lost)
-    plots.plot_overlap(overlap, track, [camera.name for camera in scene.cameras], lost)
+    plots.plot_angles(curves, columns, raw, evaluation, track.lost)
+    plots.plot_overlap(overlap, track, [camera.name for camera in scene.cameras], track.lost)
     compared = evaluation is not None and evaluation.rows  # then the strides of both are drawn
     return [curves, overlap, *([] if compared else _draw_strides(track, scene, columns, folder))]
 

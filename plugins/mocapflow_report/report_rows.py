@@ -11,7 +11,6 @@ from mocapflow_evaluation.compare import NINETY
 from mocapflow_evaluation.panels import title
 from mocapflow_export import runjson, tables
 from mocapflow_export.misgivings import misgivings
-from mocapflow_sequence.lost import lost_rows
 
 from mocapflow.data import unseen
 from mocapflow.records import F64, Bool
@@ -69,7 +68,7 @@ def against(evaluation: Evaluation) -> list[str]:
 
 def mishaps(track: Track, held: Mapping[str, int]) -> list[str]:
     """Return which frames were lost, doubted or not at rest, and which angles the priors held in how many frames."""
-    lost, restless = lost_rows(track), ~track.steady
+    lost, restless = track.lost, ~track.steady
     said = [f"frames lost and bridged: {_spans(track, lost)}"] if lost.any() else []
     if track.doubted.any():
         said.append(f"frames that the images contradict: {_spans(track, track.doubted)}")

@@ -16,7 +16,6 @@ from mocapflow.results import Track
 from mocapflow.scene import Scene
 from mocapflow.series import Numbers, changed
 from mocapflow_sequence.banded import difference_weights, minimise
-from mocapflow_sequence.lost import lost_rows
 
 LOST = 100.0  # rad^2 and m^2, the variance of a lost frame: its neighbours decide
 
@@ -43,7 +42,7 @@ class Smooth(Stage):
         """
         if len(track.frame) < 3:
             return replace(track, raw_root=track.root, raw_angles=track.angles)
-        lost = lost_rows(track)
+        lost = track.lost
         joint = np.eye(4)
         joint[:3, 3] = scene.body.positions[0]
         placed = track.root @ joint

@@ -11,13 +11,8 @@ from twist_fixtures import make_body, make_pose, make_scene
 from mocapflow.data import Past, Pose
 from mocapflow.geometry import kinematics
 from mocapflow.model import moved
-from mocapflow.testing import PriorConformance
 
 FEET = ("joint3", "joint5")
-
-
-class TestGroundPlaneConforms(PriorConformance):
-    prior = GroundPlane()
 
 
 def floor(height: float) -> GroundPlane:

@@ -14,23 +14,10 @@ from twist_fixtures import make_pose, make_scene
 
 from mocapflow.data import NO_CLOTH, Frame, Moment, Past, Pose
 from mocapflow.model import moved
-from mocapflow.testing import PredictorConformance
 
 STEP = np.concatenate([[0.1, 0.2, -0.3, 0.01, 0.03, 0.02], np.full(12, 0.05)])
 FIRST = make_pose(0)
 SECOND = moved(FIRST, STEP)
-
-
-class TestHoldConforms(PredictorConformance):
-    predictor = Hold()
-
-
-class TestConstantVelocityConforms(PredictorConformance):
-    predictor = ConstantVelocity()
-
-
-class TestConstantAccelerationConforms(PredictorConformance):
-    predictor = ConstantAcceleration()
 
 
 def frame(time: float) -> Frame:

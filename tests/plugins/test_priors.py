@@ -17,27 +17,10 @@ from mocapflow.data import NO_CLOTH, Moment, Past, Pose
 from mocapflow.geometry import twists
 from mocapflow.geometry.kinematics import root_position
 from mocapflow.model import moved
-from mocapflow.testing import PriorConformance
 
 
 def make_past(first: Pose, second: Pose, step: float = 1 / 30) -> Past:
     return Past(moments=tuple(Moment(time=k * step, pose=p, cloth=NO_CLOTH) for k, p in enumerate((first, second))))
-
-
-class TestJointLimitsConform(PriorConformance):
-    prior = JointLimits()
-
-
-class TestRestPoseConforms(PriorConformance):
-    prior = RestPose()
-
-
-class TestSmoothMotionConforms(PriorConformance):
-    prior = SmoothMotion()
-
-
-class TestSpineCouplingConforms(PriorConformance):
-    prior = SpineCoupling()
 
 
 @pytest.mark.parametrize("prior", [JointLimits(), RestPose(), SmoothMotion()])

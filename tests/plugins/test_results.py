@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from mocapflow_export import layout, runjson, tables
 from mocapflow_export.export import Export
-from mocapflow_sequence.lost import lost_rows
 from mocapflow_sequence.smooth import Smooth
 from results_scene import DEMO, ball_body, cameras, demo_scene, stepping
 
@@ -126,7 +125,7 @@ def test_a_frame_that_shows_nobody_is_lost(scene: Scene) -> None:
     track = stepping(scene.body, 4)
     observed = track.observed.copy()
     observed[2] = 1e-12  # rounding, of priors alone
-    assert lost_rows(replace(track, observed=observed)).tolist() == [False, False, True, False]
+    assert replace(track, observed=observed).lost.tolist() == [False, False, True, False]
 
 
 def test_run_json_says_how_it_was_made_and_how_it_went(scene: Scene, recording: Recording, tmp_path: Path) -> None:
