@@ -10,7 +10,7 @@ from mocapflow.components import Draper
 from mocapflow.data import NO_CLOTH, Cloth, Past, Pose, PoseBatch, Surface
 from mocapflow.geometry import twists
 from mocapflow.guards.cloth_answers import drape_of, velocity_of
-from mocapflow.once import once
+from mocapflow.memo import memoised
 from mocapflow.records import F64, I32, record
 from mocapflow.scene import Scene
 
@@ -54,7 +54,7 @@ class ClothedModel:
         return velocity_of(self.draper, pose, cloth.parameters, vertices, past, self.scene)
 
 
-@once
+@memoised
 def _laid(pose: Pose, parameters: tuple[float, ...], past: ref[Past], model: ClothedModel) -> Cloth:
     """Return the garment laid on a pose; the past holds earlier poses, which are to be forgotten, so it is weak."""
     values, known = np.array(parameters, float), past()

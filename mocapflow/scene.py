@@ -11,7 +11,7 @@ from mocapflow.assets import Background, Body, Camera, GarmentMesh
 from mocapflow.data import BODY, CLOTH, Cloth, Pose, Surface
 from mocapflow.geometry import kinematics, meshes, simplify
 from mocapflow.geometry.angles import unmeasured
-from mocapflow.once import once
+from mocapflow.memo import memoised
 from mocapflow.records import F64, I32, U8, Bool, record
 
 HEM_REACH = 0.15  # m from the garment, at rest: skin that its edge can come to cover or lay bare
@@ -134,7 +134,7 @@ class Scene:
         return _posed(pose, cloth, self)
 
 
-@once
+@memoised
 def _posed(pose: Pose, cloth: Cloth, scene: Scene) -> Surface:
     joints, screws = kinematics.chain(scene.body, pose)
     vertices = kinematics.skin(scene.body, joints, pose.angles)

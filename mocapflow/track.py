@@ -42,7 +42,7 @@ from mocapflow.data import (
 from mocapflow.errors import ComponentFailed, PipelineError
 from mocapflow.functional import Functional, image_cost
 from mocapflow.guards.answers import pose_of, result_of
-from mocapflow.guards.lacks import idle_matchers
+from mocapflow.guards.idle import idle_matchers
 from mocapflow.loop import LAPS, Steps, settle
 from mocapflow.model import ClothedModel
 from mocapflow.recordings.recording import Recording

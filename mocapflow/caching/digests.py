@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from mocapflow.caching import sources
 from mocapflow.errors import RecordingError
-from mocapflow.io.whole import whole
+from mocapflow.io.atomic import atomic_write
 
 PARSER = threading.Lock()  # CPython 3.11 counts the parser's recursion across threads (python/cpython#106905)
 MARK = "blake2b:"  # a digest reads "blake2b:<hex> <name>"; the name is for people and never counts
@@ -94,7 +94,7 @@ class Digests:
         """Remember the digests for the next run; a folder that can't be written is no matter."""
         if self._memory is None or self._known == _read(self._memory):
             return
-        with suppress(OSError), whole(self._memory) as part:
+        with suppress(OSError), atomic_write(self._memory) as part:
             part.write_text(json.dumps(self._known))
 
     def package(self, module: str) -> str:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mocapflow.errors import PipelineError, no_run_folder
-from mocapflow.io.whole import whole
+from mocapflow.io.atomic import atomic_write
 
 if TYPE_CHECKING:
     from mocapflow.config.pipeline import Pipeline
@@ -93,7 +93,7 @@ def remember(
     """Write an invocation into its run folder, with the keys of what its stages make, and those whatever the code."""
     said = {**asdict(invocation.absolute()), **dict(zip(KEYS, (keys, contents or {}), strict=True))}
     try:
-        with whole(out / FILE) as part:
+        with atomic_write(out / FILE) as part:
             part.write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
     except OSError as error:
         raise no_run_folder(out, error) from None

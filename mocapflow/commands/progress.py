@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TextIO
 
-from mocapflow.io.whole import whole
+from mocapflow.io.atomic import atomic_write
 
 FILE = "progress.json"
 COUNT = re.compile(r"^(\S+): (\d+) of (\d+) (frames.*)$")
@@ -41,7 +41,7 @@ def noted(report: Callable[[str], None], folder: Path) -> Iterator[Callable[[str
     path = folder / FILE
 
     def show(line: str) -> None:
-        with suppress(OSError), whole(path) as part:  # a full disk is for the store to tell
+        with suppress(OSError), atomic_write(path) as part:  # a full disk is for the store to tell
             part.write_text(json.dumps({**myself(), "at": time.time(), "said": line}), encoding="utf-8")
         report(line)
 

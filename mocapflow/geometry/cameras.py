@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from mocapflow.assets import Camera
-from mocapflow.once import once
+from mocapflow.memo import memoised
 from mocapflow.records import F64, I16
 
 UNDISTORT_STEPS = 100
@@ -16,7 +16,7 @@ UNDISTORT_TOLERANCE = 1e-12  # of the focal length
 UNDISTORT_OFF = 0.1  # px; a pixel that is found is shown nearer than this to where it was
 
 
-@once
+@memoised
 def projection(camera: Camera) -> F64:
     """Return the 3 x 4 matrix that maps world points (m) to homogeneous pixels of an undistorted view."""
     return camera.intrinsics @ camera.camera_from_world[:3]

@@ -15,7 +15,7 @@ from mocapflow.data import CLOTH, Contour, Surface
 from mocapflow.geometry import boundary_kernels, span_kernels
 from mocapflow.geometry import silhouette_kernels as kernels
 from mocapflow.geometry.cameras import projection
-from mocapflow.once import once
+from mocapflow.memo import memoised
 from mocapflow.records import F32, F64, I8, I32, Bool, array, record
 
 PIECE = 4.0  # px; longer edges are judged piece by piece, for a part of one may be hidden
@@ -44,7 +44,7 @@ class Projected:
     facing: I8 = array("F", unit="1 faces that look at the camera, -1 away from it, 0 partly behind it")
 
 
-@once
+@memoised
 def projected(surface: Surface, camera: Camera) -> Projected:
     """Return where the vertices of a surface project, and which of its faces look at the camera."""
     image, depth = np.empty((len(surface.vertices), 2)), np.empty(len(surface.vertices))
@@ -54,7 +54,7 @@ def projected(surface: Surface, camera: Camera) -> Projected:
     return Projected(image=image, depth=depth, facing=facing)
 
 
-@once
+@memoised
 def outline(surface: Surface, camera: Camera) -> Outline:
     """Return the boundary of the silhouette of a surface, parts outside the image included.
 
@@ -64,7 +64,7 @@ def outline(surface: Surface, camera: Camera) -> Outline:
     return _bounded(vertex, image, layers, crossings, camera)
 
 
-@once
+@memoised
 def skin_outline(surface: Surface, camera: Camera) -> Outline:
     """Return the boundary of the silhouette that the body of a surface has without its cloth."""
     whole = outline(surface, camera)
@@ -141,13 +141,13 @@ def squared_difference(one: F32, other: F32, band_px: float) -> float:
     return float(columns.sum(dtype=np.float64))
 
 
-@once
+@memoised
 def model_distance(surface: Surface, camera: Camera, band_px: float) -> F32:
     """Return the signed distance (H, W) px to the silhouette of a surface, positive inside, clipped to the band."""
     return signed_distance(outline(surface, camera), camera, band_px)
 
 
-@once
+@memoised
 def occluding_contour(surface: Surface, camera: Camera, spacing_px: float, skin: bool = False) -> Contour:
     """Return points on the boundary of the silhouette of a surface, or of its body without its cloth; see `samples`."""
     return samples((skin_outline if skin else outline)(surface, camera), surface, camera, spacing_px)

@@ -8,10 +8,10 @@ import numpy as np
 
 from mocapflow.assets import Body
 from mocapflow.geometry.kinematics import part_of
-from mocapflow.once import once
+from mocapflow.memo import memoised
 
 
-@once
+@memoised
 def simplified(body: Body, faces: int) -> Body:
     """Return a body of about as many faces, each vertex moved like the one of the full body that is nearest at rest.
 

@@ -14,9 +14,9 @@ from mocapflow.errors import RecordingError, guess
 from mocapflow.geometry import twists
 from mocapflow.geometry.cameras import bends
 from mocapflow.io import opencv, qualisys
+from mocapflow.io.atomic import atomic_write
 from mocapflow.io.calibrated import bad, make_camera
 from mocapflow.io.typed import place, read_toml
-from mocapflow.io.whole import whole
 
 FARTHEST = 100.0  # m; a camera further from the origin is one calibrated in centimetres
 MILLIMETRES = 1000.0  # m; beyond, in millimetres
@@ -85,7 +85,7 @@ def calibration_files(path: Path) -> tuple[Path, ...]:
 def write_cameras(path: Path, cameras: Sequence[Camera]) -> None:
     """Write cameras as Pose2Sim TOML, one table each; reading it again gives the same numbers."""
     text = "\n".join(_table(camera) for camera in cameras)
-    with whole(path) as part:
+    with atomic_write(path) as part:
         part.write_text(text, encoding="utf-8")
 
 

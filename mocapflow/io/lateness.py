@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from mocapflow.errors import RecordingError, alternatives
+from mocapflow.io.atomic import atomic_write
 from mocapflow.io.typed import place, read_json
-from mocapflow.io.whole import whole
 
 TIMING = "recording.json"
 FORM = 'expected {"late_frames": {"cam03": 2.8}}: by how many frames its pictures come after those of the others'
@@ -48,7 +48,7 @@ def write_late_frames(folder: Path, late: Mapping[str, float]) -> Path:
     """
     path = folder / TIMING
     try:
-        with whole(path) as part:
+        with atomic_write(path) as part:
             part.write_text(timing_text(late) + "\n")
     except OSError as error:
         raise RecordingError(f"can't be written: {error.strerror}", where=str(path)) from error

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from mocapflow.errors import RecordingError
-from mocapflow.io.whole import whole
+from mocapflow.io.atomic import atomic_write
 from mocapflow.records import F64
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
@@ -52,7 +52,7 @@ def write_trc(path: Path, names: Sequence[str], positions: F64, frame_rate: floa
     for row, markers in enumerate(positions):
         cells = ["" if np.isnan(x) else f"{x:.8f}" for x in markers.ravel()]
         lines.append("\t".join([str(row + 1), f"{start + row / frame_rate:.8f}", *cells]))
-    with whole(path) as part:
+    with atomic_write(path) as part:
         part.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
@@ -104,7 +104,7 @@ def write_mot(path: Path, columns: Mapping[str, F64], time: F64) -> None:
     ]  # fmt: skip
     table = np.column_stack([time, *columns.values()])
     lines += ["\t".join(f"{x:.8f}" for x in row) for row in table]
-    with whole(path) as part:
+    with atomic_write(path) as part:
         part.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 

@@ -25,7 +25,7 @@ from mocapflow.data import (
     Pose,
     Turn,
 )
-from mocapflow.io.whole import forget_parts
+from mocapflow.io.atomic import forget_parts
 from mocapflow.records import F64
 from mocapflow.results import Track
 from mocapflow.storage import packing

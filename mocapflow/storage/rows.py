@@ -20,7 +20,7 @@ import numpy.typing as npt
 from numcodecs.zstd import Zstd
 
 from mocapflow.errors import StoreError
-from mocapflow.io.whole import whole
+from mocapflow.io.atomic import atomic_write
 
 LEVEL = 1
 
@@ -149,7 +149,7 @@ def read_json(path: Path) -> dict[str, Any]:
 
 def write_json(path: Path, value: Any) -> None:
     """Replace the metadata of a zarr node in one step."""
-    with whole(path) as part:
+    with atomic_write(path) as part:
         part.write_text(json.dumps(value, separators=(",", ":")))  # no letter but ASCII: any locale can write it
         flush(part)
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from mocapflow.io.whole import whole
+from mocapflow.io.atomic import atomic_write
 
 OURS, RAW, TRUTH = "#1f5fbf", "#8fb4e8", "black"
 HELD, LOST = "#888888", "#d62728"
@@ -43,7 +43,7 @@ def legend(figure: Any, every: Sequence[Any]) -> None:
 
 def save(figure: Any, path: Path) -> Path:
     """Write a figure and return its path."""
-    with whole(path) as part:
+    with atomic_write(path) as part:
         figure.savefig(part, dpi=DOTS_PER_INCH)
     return path
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from mocapflow.data import unseen
 from mocapflow.geometry.angles import AngleSeries
-from mocapflow.io.whole import whole
+from mocapflow.io.atomic import atomic_write
 from mocapflow.results import RunFolder, Track
 from mocapflow_export.misgivings import overlap_medians
 
@@ -74,7 +74,7 @@ def held_by_priors(series: AngleSeries) -> dict[str, int]:
 def write(path: Path, content: Mapping[str, Any]) -> Path:
     """Write a summary as JSON; numbers that are not finite become null."""
     text = json.dumps(plain(content), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    with whole(path) as part:
+    with atomic_write(path) as part:
         part.write_text(text, encoding="utf-8")
     return path
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mocapflow.geometry.angles import AngleSeries
-from mocapflow.io.whole import whole
+from mocapflow.io.atomic import atomic_write
 from mocapflow.records import F64
 from mocapflow.results import Track
 
@@ -41,14 +41,14 @@ def write_columns(path: Path, columns: Mapping[str, F64]) -> Path:
     formats = {"frame": "%d", "turn": "%d", "time": "%.6f"}
     styles = [formats.get(name, "%.4f") for name in columns]
     rows = np.column_stack(list(columns.values()))
-    with whole(path) as part:
+    with atomic_write(path) as part:
         np.savetxt(part, rows, fmt=styles, delimiter=",", header=",".join(columns), comments="")
     return path
 
 
 def write_rows(path: Path, rows: Sequence[Mapping[str, float | str]]) -> Path:
     """Write one line per mapping, four decimals; the keys of the first are the header."""
-    with whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
+    with atomic_write(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         if rows:
             writer.writerow(rows[0])

@@ -14,7 +14,7 @@ from pydantic import Field, PositiveFloat, PositiveInt
 from mocapflow.assets import Background, Body
 from mocapflow.components import Draper, Matcher, Segmenter, Stage
 from mocapflow.data import Change, Frame, Matches, Past, Pose, Segmentation, Turn
-from mocapflow.guards.lacks import idle_matchers
+from mocapflow.guards.idle import idle_matchers
 from mocapflow.loop import pool_matches
 from mocapflow.model import ClothedModel
 from mocapflow.recordings.recording import Recording

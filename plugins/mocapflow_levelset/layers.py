@@ -15,7 +15,7 @@ from mocapflow.assets import Camera
 from mocapflow.data import Frame, Past, Silhouette, Surface
 from mocapflow.geometry.skeleton import unsided
 from mocapflow.geometry.visibility import front_vertices
-from mocapflow.once import once
+from mocapflow.memo import memoised
 from mocapflow.records import F32, F64, I32, Bool
 from mocapflow.scene import Scene
 from mocapflow_levelset.colours import BINS, SIDE, bins_of
@@ -37,7 +37,7 @@ class Shown(NamedTuple):
     likely: F64  # (L, BINS) log density in a layer, part of which may have any colour
 
 
-@once
+@memoised
 def layer_of(scene: Scene) -> I32:
     """Return the layer (N,) of each surface vertex: that of the joint that moves it, sides together; cloth is last."""
     body = scene.body
@@ -86,7 +86,7 @@ def _drawn(surface: Surface, camera: Camera, layers: I32, inside: Bool, grid: in
     return np.stack([column, row], axis=1).astype(np.int32) * np.int32(grid), drawn[row, column]
 
 
-@once
+@memoised
 def shown(past: Past) -> Shown:
     """Return what colours say of the layers, by what earlier frames have shown."""
     counts = past.appearance[COLOURS]

@@ -14,7 +14,7 @@ import numba
 import numpy as np
 
 from mocapflow.assets import Background
-from mocapflow.once import once
+from mocapflow.memo import memoised
 from mocapflow.records import F32, Bool
 from mocapflow_levelset import crops
 from mocapflow_levelset.channels import PLANES, ChannelName, features
@@ -53,7 +53,7 @@ def plate_of(mean: F32, spread: F32, channels: Sequence[ChannelName], factor: in
     return Plate(features(levels, channels), np.sqrt(np.mean(spread * spread, axis=2)))
 
 
-@once
+@memoised
 def plate_in(background: Background, camera: int, channels: tuple[ChannelName, ...], factor: int = 1) -> Plate:
     """Return the plate of a view of the empty scene; made once, forgotten with the background."""
     return plate_of(background.mean[camera], background.spread[camera], channels, factor)

@@ -11,7 +11,7 @@ from mocapflow.assets import Camera
 from mocapflow.components import Segmenter
 from mocapflow.data import Surface
 from mocapflow.geometry.cameras import project
-from mocapflow.once import once
+from mocapflow.memo import memoised
 from mocapflow.records import F64, Bool
 from mocapflow_levelset.plates import Shadow
 
@@ -34,7 +34,7 @@ class ShadowAware(Segmenter):
         return Shadow(self.spread_floor, self.shadow_share, self.darkest_shadow, self.shadow_chroma)
 
 
-@once
+@memoised
 def _circle(surface: Surface, radius_m: float) -> F64:
     """Return points (CORNERS, 3) m of a circle around the person, on the floor."""
     feet = surface.vertices[:, 2].min()

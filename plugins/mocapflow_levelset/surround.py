@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mocapflow.data import Frame, Past, Silhouette
-from mocapflow.once import once
+from mocapflow.memo import memoised
 from mocapflow.records import F32, F64
 from mocapflow_levelset import crops
 from mocapflow_levelset.colours import BINS, bins_of
@@ -38,7 +38,7 @@ def beside(frame: Frame, silhouettes: Sequence[Silhouette], past: Past, keep: fl
     return counts
 
 
-@once
+@memoised
 def told(past: Past, camera: int) -> F32:
     """Return the log density (BINS,) of colours on the person over that in a view of the room, bounded; 0: unknown."""
     counts = np.stack([past.appearance[COLOURS].sum(axis=0), past.appearance[ROOM][camera]])

@@ -21,7 +21,7 @@ from mocapflow.data import (
 )
 from mocapflow.geometry.contours import pairs
 from mocapflow.geometry.silhouettes import occluding_contour
-from mocapflow.once import once
+from mocapflow.memo import memoised
 from mocapflow.records import F64, I32, Bool
 from mocapflow.scene import Scene
 from mocapflow.settings import PositiveOrInf
@@ -137,7 +137,7 @@ class ContourIcp(Matcher):
         )
 
 
-@once
+@memoised
 def image_contour(silhouette: Silhouette, stride: int) -> ImageContour:
     """Return every so many-th point of the contour of a silhouette."""
     pixel, normal = (np.ascontiguousarray(rows[::stride]) for rows in silhouette.zero_level)

@@ -16,7 +16,7 @@ from mocapflow.components import Matcher
 from mocapflow.data import Frame, Matches, Past, Segmentation, Surface, Turn, empty_matches
 from mocapflow.errors import RecordingError
 from mocapflow.geometry.cameras import centre, project, project_each
-from mocapflow.once import once
+from mocapflow.memo import memoised
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64, I32
 from mocapflow.scene import Scene
@@ -111,7 +111,7 @@ class Marks(NamedTuple):
     spread: F64
 
 
-@once
+@memoised
 def marks_on(body: Body) -> Marks:
     """Return the landmarks of a body, each as the mean of vertices around it that comes nearest to it."""
     from scipy.optimize import nnls

@@ -13,7 +13,7 @@ from pydantic import AfterValidator
 from scipy.spatial import KDTree
 
 from mocapflow.errors import PipelineError
-from mocapflow.io.whole import whole
+from mocapflow.io.atomic import atomic_write
 from mocapflow.records import F64, array, record
 from mocapflow_priors import density_kernels
 from mocapflow_priors.density_kernels import TURN
@@ -81,7 +81,7 @@ def bandwidth(poses: F64, percentile: float = 100.0) -> float:
 def write(path: Path, density: Density) -> None:
     """Write a density; poses are kept to about 0.001 degrees."""
     content = {"names": np.array(density.names), "poses": density.poses.astype(np.float32)}
-    with whole(path) as part, part.open("wb") as file:  # by its name alone numpy would add a suffix
+    with atomic_write(path) as part, part.open("wb") as file:  # by its name alone numpy would add a suffix
         np.savez_compressed(file, allow_pickle=False, bandwidth=np.array(density.bandwidth), **content)
 
 

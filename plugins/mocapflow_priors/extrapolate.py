@@ -8,7 +8,7 @@ import numpy as np
 
 from mocapflow.data import Frame, Moment, Past, Pose, unseen
 from mocapflow.geometry import twists
-from mocapflow.once import once
+from mocapflow.memo import memoised
 from mocapflow.records import F64, Bool
 
 FASTEST = np.radians(1200)  # per s, of a joint angle; in motion capture of kicks a knee reaches 1130
@@ -37,7 +37,7 @@ def ahead(frame: Frame, past: Past) -> float:
     return max(frame.time - past.moments[-1].time, 0.0) / step if step else 0.0
 
 
-@once
+@memoised
 def continued(past: Past, steps: float, acceleration: float = 0.0) -> Pose:
     """Return the last pose moved on by `steps` times its last motion: the root by its twist, the angles linearly.
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from mocapflow.assets import Body
 from mocapflow.components import Prior
 from mocapflow.data import Past, Pose, Residual
-from mocapflow.once import once
+from mocapflow.memo import memoised
 from mocapflow.scene import Scene
 from mocapflow_priors.density import Density, Poses, log_density, read
 
@@ -47,7 +47,7 @@ class Parzen(Prior):
         return read(self.poses)
 
 
-@once
+@memoised
 def _known(body: Body, density: Density) -> tuple[Density, npt.NDArray[np.intp]]:
     """Return the density of the angles that a body has, and their screws (K,)."""
     screws = [k for k, name in enumerate(body.screw_names) if name in density.names]

@@ -7,7 +7,7 @@ import numpy as np
 from mocapflow.assets import Body
 from mocapflow.data import Pose
 from mocapflow.geometry import kinematics
-from mocapflow.once import once
+from mocapflow.memo import memoised
 from mocapflow.records import F64
 
 FEET = ("ankle_l", "toe_l", "ankle_r", "toe_r")  # joints that carry the soles
@@ -34,7 +34,7 @@ def lowest_points(body: Body, pose: Pose, parts: tuple[str, ...]) -> tuple[F64, 
     return np.array(heights, np.float64), np.array(slopes, np.float64).reshape(-1, 6 + len(pose.angles))
 
 
-@once
+@memoised
 def _parts(body: Body, names: tuple[str, ...]) -> list[Body]:
     """Return bodies of the skin that each of the joints carries most of."""
     carrier = body.main_joint

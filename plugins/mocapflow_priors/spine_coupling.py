@@ -10,7 +10,7 @@ from pydantic import PositiveFloat
 from mocapflow.assets import Body
 from mocapflow.components import Prior
 from mocapflow.data import Past, Pose, Residual
-from mocapflow.once import once
+from mocapflow.memo import memoised
 from mocapflow.scene import Scene
 from mocapflow_priors.rows import whitened
 
@@ -37,7 +37,7 @@ class SpineCoupling(Prior):
         return whitened(jacobian[:, 6:] @ pose.angles, jacobian)
 
 
-@once
+@memoised
 def _namesakes(body: Body, lower: str, upper: str) -> list[tuple[int, int]]:
     """Return the screws of the lower and of the upper joint that have the same name, e.g. flexion."""
     number = {name: index for index, name in enumerate(body.screw_names)}

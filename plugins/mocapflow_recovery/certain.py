@@ -16,7 +16,7 @@ from mocapflow.assets import Background, Camera
 from mocapflow.data import Frame, Surface
 from mocapflow.geometry.cameras import magnification, scaled
 from mocapflow.geometry.silhouettes import mask, outline
-from mocapflow.once import once
+from mocapflow.memo import memoised
 from mocapflow.records import F32, F64, U8, Bool
 
 CHANNELS: tuple[ChannelName, ...] = ("lab",)
@@ -48,7 +48,7 @@ class View(NamedTuple):
     known: float  # share of the model's area before a room that somebody knows
 
 
-@once
+@memoised
 def small_room(background: Background, cameras: tuple[Camera, ...], rows: int) -> Room:
     """Return the empty room in images of about so many rows; made once, forgotten with the background."""
     factors = [max(round(camera.size[1] / rows), 1) for camera in cameras]

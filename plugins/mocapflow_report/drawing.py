@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from mocapflow.errors import StoreError
-from mocapflow.io.whole import whole
+from mocapflow.io.atomic import atomic_write
 from mocapflow.records import F64, U8
 
 Colour = tuple[int, int, int]  # BGR
@@ -104,5 +104,5 @@ class Video:
 def videos(paths: list[Path], frame_rate: float, codec: str) -> Iterator[list[Video]]:
     """Open videos for writing; they come in their places when all frames are written, or not at all."""
     with ExitStack() as open_files:
-        parts = [open_files.enter_context(whole(path)) for path in paths]
+        parts = [open_files.enter_context(atomic_write(path)) for path in paths]
         yield [open_files.enter_context(closing(Video(part, frame_rate, codec))) for part in parts]

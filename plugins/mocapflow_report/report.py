@@ -13,7 +13,7 @@ from mocapflow_export.uncertainty import measured
 
 from mocapflow.components import Stage
 from mocapflow.geometry import kinematics
-from mocapflow.io.whole import whole
+from mocapflow.io.atomic import atomic_write
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow.results import Evaluation, Files, RunFolder, Track
@@ -70,7 +70,7 @@ class Report(Stage):
         counts = f"{len(track.frame)} frames, {len(scene.cameras)} cameras, {recording.frame_rate:g} per second"
         subtitle = f"{recording.folder.name}: {counts}"
         path = layout.place(run_folder.path, layout.REPORT)
-        with whole(path) as part:
+        with atomic_write(path) as part:
             part.write_text(page.page(run_folder.path.resolve().name, subtitle, sections), encoding="utf-8")
         return Files(paths=(path, curves, overlap, *strides))
 

@@ -20,7 +20,7 @@ from mocapflow import records
 from mocapflow.assets import Background
 from mocapflow.data import Frame, Past, Pose, Silhouette, Start
 from mocapflow.errors import ComponentFailed, ShapeError, StoreError
-from mocapflow.io.whole import PART
+from mocapflow.io.atomic import PART
 from mocapflow.records import F64, record
 from mocapflow.running.execution import Execution
 from mocapflow.series import Series

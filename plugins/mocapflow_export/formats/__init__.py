@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
 
-from mocapflow.io.whole import whole
+from mocapflow.io.atomic import atomic_write
 from mocapflow_export.formats.result import Result
 
 __all__ = ["FILES", "Result", "write"]
@@ -25,6 +25,6 @@ def write(name: str, result: Result, folder: Path) -> Path:
     """Write a result in one of the formats into a folder and return the path."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / FILES[name]
-    with whole(path) as part:
+    with atomic_write(path) as part:
         import_module(f"mocapflow_export.formats.{name}").write(result, part)
     return path

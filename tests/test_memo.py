@@ -5,7 +5,6 @@ import gc
 import numpy as np
 
 from mocapflow.data import Pose
-from mocapflow.once import once
 
 
 def test_computed_once_for_the_same_arguments_and_forgotten_with_the_first() -> None:
@@ -15,7 +14,7 @@ def test_computed_once_for_the_same_arguments_and_forgotten_with_the_first() -> 
         def __del__(self) -> None:
             forgotten.append(self)
 
-    @once
+    @memoised
     def said(pose: Pose, factor: float) -> Said:
         asked.append(factor)
         return Said()

@@ -5,7 +5,7 @@ from mocapflow_matching.contour_icp import ContourIcp
 from mocapflow_matching.keypoints import Keypoints
 
 from mocapflow.errors import RecordingError
-from mocapflow.guards.lacks import idle_matchers
+from mocapflow.guards.idle import idle_matchers
 from mocapflow.help.shipped import shipped
 from mocapflow.recordings.recording import open_recording
 

@@ -11,7 +11,7 @@ PART = ".part-"  # begins the name of what is not whole yet
 
 
 @contextmanager
-def whole(path: Path) -> Iterator[Path]:
+def atomic_write(path: Path) -> Iterator[Path]:
     """Give a path to write to, in whose file's place a file comes in one step when all of it is written.
 
     A reader sees the old file or the new one, never a part, whatever ends the writer. Each writer has a path of its

@@ -1,12 +1,12 @@
 import pytest
 
-from mocapflow.io.whole import PART, forget_parts, whole
+from mocapflow.io.atomic import PART, atomic_write, forget_parts
 
 
 def test_a_file_comes_in_one_step(tmp_path):
     path = tmp_path / "angles.csv"
     path.write_text("old")
-    with whole(path) as part:
+    with atomic_write(path) as part:
         assert part.suffix == ".csv"
         part.write_text("new")
         assert path.read_text() == "old"
@@ -17,7 +17,7 @@ def test_a_file_comes_in_one_step(tmp_path):
 def test_the_old_file_stays_where_writing_fails(tmp_path):
     path = tmp_path / "angles.csv"
     path.write_text("old")
-    with pytest.raises(OSError, match="full"), whole(path) as part:
+    with pytest.raises(OSError, match="full"), atomic_write(path) as part:
         part.write_text("ne")
         raise OSError("full")
     assert path.read_text() == "old"
@@ -33,6 +33,6 @@ def test_what_a_killed_writer_left_is_forgotten(tmp_path):
 
 def test_an_error_names_the_file_itself(tmp_path):
     path = tmp_path / "nowhere" / "angles.csv"
-    with pytest.raises(FileNotFoundError) as caught, whole(path) as part:
+    with pytest.raises(FileNotFoundError) as caught, atomic_write(path) as part:
         part.write_text("new")
     assert caught.value.filename == str(path)

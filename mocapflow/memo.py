@@ -12,7 +12,7 @@ Others = ParamSpec("Others")
 Result = TypeVar("Result")
 
 
-def once(compute: Callable[Concatenate[Owner, Others], Result]) -> Callable[Concatenate[Owner, Others], Result]:
+def memoised(compute: Callable[Concatenate[Owner, Others], Result]) -> Callable[Concatenate[Owner, Others], Result]:
     """Make a pure function of a record remember what it returned for the same other arguments.
 
     Records are told apart by identity, for they don't change; nor may the results. They are forgotten with the first
