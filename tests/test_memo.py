@@ -5,6 +5,7 @@ import gc
 import numpy as np
 
 from mocapflow.data import Pose
+from mocapflow.memo import memoised
 
 
 def test_computed_once_for_the_same_arguments_and_forgotten_with_the_first() -> None:
