@@ -34,10 +34,10 @@ from mocapflow.help.shipped import shipped
 from mocapflow.io.cameras import read_cameras
 from mocapflow.loop import Steps, settle
 from mocapflow.model import ClothedModel
+from mocapflow.prediction import believed
 from mocapflow.records import F64
 from mocapflow.scene import Scene
 from mocapflow.steady import Steady
-from mocapflow.track import believed
 
 CLIPS = ("skirt_steps", "shorts_steps")
 SPREADS = (5.0, 10.0, 20.0)  # degrees

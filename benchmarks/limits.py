@@ -40,10 +40,11 @@ from mocapflow.geometry.cameras import project
 from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.loop import settle
 from mocapflow.model import ClothedModel, moved
+from mocapflow.prediction import believed
 from mocapflow.recordings.recording import open_recording
 from mocapflow.records import F64, Bool
 from mocapflow.scene import Scene
-from mocapflow.track import CoupledLoop, believed
+from mocapflow.track import CoupledLoop
 
 CENTRE_SD = 5e-5  # m, of the true joint centres
 LOOSE = np.radians(90.0)  # rad, spread of angles that are free

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
@@ -24,27 +24,14 @@ from mocapflow.components import (
     Segmenter,
     Stage,
 )
-from mocapflow.data import (
-    Change,
-    Cloth,
-    Estimate,
-    Frame,
-    FrameResult,
-    FrameState,
-    Past,
-    Pose,
-    Segmentation,
-    Start,
-    Turn,
-    blind,
-    empty_matches,
-)
+from mocapflow.data import Frame, FrameResult, FrameState, Past, Pose, Start, Turn
 from mocapflow.errors import ComponentFailed, PipelineError
-from mocapflow.functional import Functional, image_cost
+from mocapflow.functional import image_cost
 from mocapflow.guards.answers import pose_of, result_of
 from mocapflow.guards.idle import idle_matchers
 from mocapflow.loop import LAPS, Steps, settle
 from mocapflow.model import ClothedModel
+from mocapflow.prediction import believed, lost, notes_on, seen
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow.results import ImageFlow, Track, ViewChecks
@@ -55,9 +42,7 @@ from mocapflow.timing import Stopwatch
 
 LOG = logging.getLogger("mocapflow")
 TIMED = ("decode", "predict", "drape", *LAPS, "recover")
-VIEWS = 2  # fewer than these do not fix a pose in space
 MOVING = 2  # frames before that tell how the person moves
-UNKNOWN = np.pi**2  # rad^2 and m^2, the variance where nothing was seen
 GO_ON = "the frame is saved; on_unsteady: go_on continues after it, steady: {max_turns: …} gives it more turns"
 
 
@@ -239,52 +224,3 @@ class CoupledLoop(Stage):
 
 def unobserved(frame: int, turn: Turn, state: FrameState) -> None:
     """Look on at no turn."""
-
-
-def seen(frame: Frame) -> bool:
-    """True where enough views are usable to fix a pose."""
-    return int(frame.usable.sum()) >= enough(frame)
-
-
-def enough(frame: Frame) -> int:
-    """Return how many views fix a pose as well as the cameras allow."""
-    return min(VIEWS, len(frame.usable))
-
-
-def believed(pose: Pose, parameters: F64, cloth: Cloth) -> FrameState:
-    """Return the state of a frame nobody has looked at."""
-    covariance = UNKNOWN * np.eye(6 + len(pose.angles) + len(parameters))
-    return FrameState(
-        estimate=Estimate(pose=pose, parameters=parameters, covariance=covariance, observed=np.zeros(len(pose.angles))),
-        cloth=cloth,
-        segmentation=Segmentation(silhouettes=()),
-        matches=empty_matches(),
-    )
-
-
-def lost(frame: Frame, begun: FrameState, steps: Steps, model: ClothedModel) -> FrameResult:
-    """Return the prediction as the result of a frame that too few cameras have seen."""
-    terms = Functional(model, steps.priors, Past()).terms
-    return FrameResult(
-        state=begun,
-        iterations=0,
-        steady=False,
-        oscillating=False,
-        change=Change(body=0.0, cloth=0.0, angles=0.0, sigmas=0.0),
-        overlap=np.full(len(frame.usable), np.nan),
-        energy=np.full((steps.steady.cap, len(terms)), np.nan),
-        energy_terms=terms,
-    )
-
-
-def notes_on(frame: Frame, scene: Scene, known: Past, result: FrameResult) -> Sequence[str]:
-    """Return what went wrong with the views of a frame and with those before it; see `Past.believable`."""
-    reasons = frame.reasons or ("",) * len(frame.usable)
-    views = zip(scene.cameras, frame.usable, reasons, strict=True)
-    notes = [f"{camera.name} not usable: {reason or 'no image'}" for camera, usable, reason in views if not usable]
-    if not seen(frame):
-        return [*notes, f"lost, fewer than {enough(frame)} views; the prediction is kept"]
-    if blind(result.state.estimate.observed):
-        return [*notes, "no view shows the person; the prediction is kept"]
-    anew = "begun anew, like a first frame: the frames before do not show the person"
-    return [*notes, anew] if known.after_gap else notes

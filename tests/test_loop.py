@@ -12,9 +12,9 @@ from mocapflow.functional import Functional
 from mocapflow.geometry.kinematics import chain, skin
 from mocapflow.loop import Steps, settle
 from mocapflow.model import ClothedModel
+from mocapflow.prediction import believed
 from mocapflow.scene import Scene
 from mocapflow.steady import Steady
-from mocapflow.track import believed
 from tests.fixtures.tiny_plugin import TinyMatcher, TinySegmenter, tiny_body
 
 

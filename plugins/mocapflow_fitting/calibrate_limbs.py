@@ -17,11 +17,11 @@ from mocapflow.data import Change, Frame, Matches, Past, Pose, Segmentation, Tur
 from mocapflow.guards.idle import idle_matchers
 from mocapflow.loop import pool_matches
 from mocapflow.model import ClothedModel
+from mocapflow.prediction import believed
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow.results import Track
 from mocapflow.scene import Scene
-from mocapflow.track import believed
 from mocapflow_fitting.detections import frames_seen, spread
 from mocapflow_fitting.keypoint_fit import fit
 from mocapflow_fitting.landmarks import landmarks

@@ -15,8 +15,8 @@ from mocapflow.components import PoseSolver, Predictor, Prior
 from mocapflow.data import NO_CLOTH, Frame, Matches, Past, Pose, Surface, Turn
 from mocapflow.geometry.cameras import project_each
 from mocapflow.model import ClothedModel
+from mocapflow.prediction import believed
 from mocapflow.scene import Scene
-from mocapflow.track import believed
 from mocapflow_priors.constant_velocity import ConstantVelocity
 from mocapflow_priors.joint_limits import JointLimits
 from mocapflow_priors.rest_pose import RestPose

@@ -15,9 +15,9 @@ from mocapflow.data import Past, Turn
 from mocapflow.functional import Functional
 from mocapflow.loop import Steps, settle
 from mocapflow.model import increment_between, moved
+from mocapflow.prediction import believed
 from mocapflow.steady import Steady
 from mocapflow.testing import pictures, scenes
-from mocapflow.track import believed
 
 SCENE = scenes.tiny_scene(clothed=True)
 MODEL = scenes.tiny_model(SCENE)

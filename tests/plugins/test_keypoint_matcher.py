@@ -17,8 +17,8 @@ from mocapflow.geometry import kinematics
 from mocapflow.geometry.cameras import centre, project
 from mocapflow.io.cameras import read_cameras
 from mocapflow.model import ClothedModel, moved
+from mocapflow.prediction import believed
 from mocapflow.scene import Scene
-from mocapflow.track import believed
 
 BODY = Scanned().load(DEMO)
 SCENE = Scene(cameras=read_cameras(DEMO), body=BODY)
