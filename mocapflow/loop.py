@@ -50,30 +50,19 @@ def settle(
     steady = steps.steady.beginning if far else steps.steady
     calm, change = 0, None
     last = before_last = Shown(state.estimate.pose, model.surface(state.estimate.pose, state.cloth))
-    energy, cost = np.full((steps.steady.cap, len(functional.terms)), np.nan), np.nan
+    energy, cost = np.full((steady.cap, len(functional.terms)), np.nan), np.nan
     for index in range(steady.cap):
         turn = Turn(index=index, change=change, far=far)
-        segmentation = segmentation_of(steps.segmenter, frame, state, past, model.scene, turn)
-        watch.lap("segment")
-        match = partial(pool_matches, steps.matchers, frame, segmentation, past, model.scene, turn)
-        estimate = estimate_of(steps.pose_solver, match, state, model, steps.priors, past, turn)
-        watch.lap("solve")
-        fitter = steps.cloth_fitter
-        cloth = cloth_of(fitter, frame, segmentation, estimate, model, past, turn) if fitter else NO_CLOTH
-        estimate, cloth = functional.step(state, segmentation, estimate, cloth, steady.halvings)
-        watch.lap("cloth")
-        surface = model.surface(estimate.pose, cloth)
-        matches = match(surface) if estimate.matches is None else estimate.matches
-        state = FrameState(segmentation=segmentation, matches=matches, estimate=estimate, cloth=cloth)
-        energy[index] = functional.values(state, surface)
+        state = take_turn(frame, state, past, steps, functional, turn, watch)
+        now = Shown(state.estimate.pose, model.surface(state.estimate.pose, state.cloth))
+        energy[index] = functional.values(state, now.surface)
         last_cost, cost = cost, functional.total(energy[index])
-        now = Shown(estimate.pose, surface)
-        change, swing = (measure_change(old, now, estimate.covariance) for old in (last, before_last))
+        change, swing = (measure_change(old, now, state.estimate.covariance) for old in (last, before_last))
+        before_last, last = last, now
         if index == 0 and steady.far(change):
             far, steady = True, steady.beginning
         watch.lap("match")
         observe(frame.index, turn, state)
-        before_last, last = last, now
         calm = calm + 1 if steady.holds(change, index + 1) and steady.even(last_cost, cost) else 0
         if calm >= steady.turns or index + 1 >= steady.max_turns:
             break
@@ -84,11 +73,29 @@ def settle(
         steady=calm >= steady.turns,
         oscillating=calm == 0 and index > 1 and steady.holds(swing, index + 1),
         change=change,
-        overlap=overlaps(surface, segmentation, model.scene.cameras),
+        overlap=overlaps(last.surface, state.segmentation, model.scene.cameras),
         energy=energy,
         energy_terms=functional.terms,
         seconds=watch.seconds,
     )
+
+
+def take_turn(
+    frame: Frame, state: FrameState, past: Past, steps: Steps, functional: Functional, turn: Turn, watch: Stopwatch
+) -> FrameState:
+    """Return the state after one turn: silhouettes, then the pose by the matches, then the cloth."""
+    model = functional.model
+    segmentation = segmentation_of(steps.segmenter, frame, state, past, model.scene, turn)
+    watch.lap("segment")
+    match = partial(pool_matches, steps.matchers, frame, segmentation, past, model.scene, turn)
+    estimate = estimate_of(steps.pose_solver, match, state, model, steps.priors, past, turn)
+    watch.lap("solve")
+    fitter = steps.cloth_fitter
+    cloth = cloth_of(fitter, frame, segmentation, estimate, model, past, turn) if fitter else NO_CLOTH
+    estimate, cloth = functional.step(state, segmentation, estimate, cloth, steps.steady.halvings)
+    watch.lap("cloth")
+    matches = match(model.surface(estimate.pose, cloth)) if estimate.matches is None else estimate.matches
+    return FrameState(segmentation=segmentation, matches=matches, estimate=estimate, cloth=cloth)
 
 
 def pool_matches(
