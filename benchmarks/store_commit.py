@@ -105,7 +105,7 @@ class Parts:
         packing.match_row = self._watch("pack", packing.match_row)
         packing.row_of = self._watch("pack", packing.row_of)
         write = Rows.write
-        Rows.write = lambda rows, *a: self._watch(f"write {rows._path.parent.name}", write)(rows, *a)  # type: ignore[method-assign]
+        Rows.write = lambda rows, *a, **k: self._watch(f"write {rows._path.parent.name}", write)(rows, *a, **k)  # type: ignore[method-assign]
 
     def __exit__(self, *_: object) -> None:
         packing.quantised, packing.match_row, packing.row_of, Rows.write, rows.flush = self._real  # type: ignore[method-assign]
@@ -123,9 +123,9 @@ class Parts:
         self.waited[-1] += 1000 * (time.perf_counter() - start)
 
     def _watch(self, name: str, call: Callable) -> Callable:  # type: ignore[type-arg]
-        def watched(*args):  # type: ignore[no-untyped-def]
+        def watched(*args, **named):  # type: ignore[no-untyped-def]
             start = time.process_time()
-            value = call(*args)
+            value = call(*args, **named)
             self._now[name] = self._now.get(name, 0.0) + 1000 * (time.process_time() - start)
             return value
 

@@ -174,6 +174,7 @@ class Checkpoint:
             rows = self._growing.array(NUMBERS)
             if self._attributes["cloth_vertices"]:
                 self._growing.array(CLOTH).resize(self.done)
+            self._growing.flush()
             told = self._attributes | {"warnings": self.warnings}
             self._attributes = seal(self._path, told, rows, self._columns, self._indices[: self.done])
         track: Track = self._store.load(Artifact(self._path, self._attributes), self._wanted or self.done)

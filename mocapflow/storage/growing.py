@@ -3,6 +3,8 @@
 `live/rows` holds all numbers of a frame in one row of float64, `cloth` one chunk per frame, `matches/<capacity>` one
 padded row per frame, `silhouettes/<layer>/<camera>` int8 at 1/8 px, `trace` the poses of a frame's turns where they are
 kept, and `live/appearance-<size>` the last two appearances in turns, each behind the number of its frame.
+
+No run goes on from what was seen (`SEEN`): it is sure to be on the drive once the track is finished, the rest at once.
 """
 
 from __future__ import annotations
@@ -19,10 +21,11 @@ from mocapflow.data import Matches, Pose, Silhouette
 from mocapflow.records import F64
 from mocapflow.storage import packing
 from mocapflow.storage.packing import Columns, column
-from mocapflow.storage.rows import Corrupted, Rows, write_json
+from mocapflow.storage.rows import Corrupted, Rows, flush_all, write_json
 from mocapflow.storage.store import group_meta
 
 NUMBERS, CLOTH = "live/rows", "cloth"
+SEEN = ("silhouettes", "matches", "trace")
 Shapes = Mapping[str, tuple[int, ...]]
 
 
@@ -67,11 +70,12 @@ class Growing:
         for silhouette in silhouettes:
             name = f"silhouettes/{silhouette.layer}/{self._cameras[silhouette.camera]}"
             steps = packing.quantised(silhouette)
-            self._like(name, steps, packing.UNSEEN, "y", "x", unit=f"1/{packing.FINE} px").write(row, steps)
+            seen = self._like(name, steps, packing.UNSEEN, "y", "x", unit=f"1/{packing.FINE} px")
+            seen.write(row, steps, durable=False)
         packed = packing.match_row(matches)
         name = f"matches/{len(packed)}"
         about = {"unit": "by column", "columns": packing.MATCH}
-        self._like(name, packed, 0, f"M{len(packed)}", "match", **about).write(row, packed)
+        self._like(name, packed, 0, f"M{len(packed)}", "match", **about).write(row, packed, durable=False)
 
     def appearance(self, row: int, shapes: Shapes) -> dict[str, F64]:
         """Return what frames have shown up to this one, one of the last two.
@@ -100,7 +104,12 @@ class Growing:
         for turn, pose in enumerate(turns):
             poses[turn] = np.concatenate([pose.root.ravel(), pose.angles])
         unit = "root (4, 4) in m, world_from_body, then angles in rad; NaN after the last turn"
-        self._like("trace", poses, np.nan, "turn", "root_and_angles", unit=unit).write(row, poses)
+        self._like("trace", poses, np.nan, "turn", "root_and_angles", unit=unit).write(row, poses, durable=False)
+
+    def flush(self) -> None:
+        """Wait until what was not flushed when it was written is on the drive."""
+        for name in SEEN:
+            flush_all(self._path / name)
 
     def array(self, name: str) -> Rows:
         """Return an array that is there."""

@@ -25,6 +25,7 @@ from mocapflow.records import F64, record
 from mocapflow.running.execution import Execution
 from mocapflow.series import Series
 from mocapflow.storage import locks, rows
+from mocapflow.storage.growing import SEEN
 from mocapflow.storage.packing import FINE, match_row, quantised
 from mocapflow.storage.rows import Corrupted, Rows
 from mocapflow.storage.store import Store, remove
@@ -410,20 +411,20 @@ def test_a_half_done_track_whose_files_are_missing_is_made_anew(tmp_path, path, 
 @pytest.fixture
 def unsafe(monkeypatch):
     """The files of a track that a power loss would take: written, but not known to be on the drive."""
-    found, real = set(), (Path.write_bytes, Path.write_text, os.fsync)
+    found, real = {}, (Path.write_bytes, Path.write_text, os.fsync)
 
     def written(kind):
         def write(self, *args, **kwargs):
             size = real[kind](self, *args, **kwargs)
             if "track-" in str(self):
-                found.add(self.stat().st_ino)
+                found[self.stat().st_ino] = str(self)
             return size
 
         return write
 
     def fsync(number):
         real[2](number)
-        found.discard(os.fstat(number).st_ino)
+        found.pop(os.fstat(number).st_ino, None)
 
     monkeypatch.setattr(Path, "write_bytes", written(0))
     monkeypatch.setattr(Path, "write_text", written(1))
@@ -432,16 +433,19 @@ def unsafe(monkeypatch):
 
 
 def test_a_frame_is_on_the_drive_before_it_counts(tmp_path, path, monkeypatch, unsafe):
-    left, replace = [], Path.replace
+    """What was seen of it, which no run goes on from, before the track is complete."""
+    left, seen, replace = [], [], Path.replace
 
     def counted(self, target):
         if Path(target).parent.name.startswith("track-"):
-            left.append(len(unsafe))
+            seen.append(sum(any(f"/{name}/" in file for name in SEEN) for file in unsafe.values()))
+            left.append(len(unsafe) - seen[-1])
         return replace(self, target)
 
     monkeypatch.setattr(Path, "replace", counted)
     run_tiny(path, tmp_path)
     assert left == [0] * 14  # begun, twelve frames, sealed
+    assert (seen[0], seen[-1]) == (0, 0) and seen[1] > 0
 
 
 def test_a_result_is_on_the_drive_before_it_is_complete(store, monkeypatch):
@@ -459,11 +463,11 @@ def test_a_result_is_on_the_drive_before_it_is_complete(store, monkeypatch):
 def test_a_full_store_says_so_and_keeps_the_frames(tmp_path, path, monkeypatch):
     real, left = Rows.write, [23]
 
-    def write(self, row, values):
+    def write(self, row, values, **how):
         left[0] -= 1
         if left[0] < 0:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        real(self, row, values)
+        real(self, row, values, **how)
 
     monkeypatch.setattr(rows.Rows, "write", write)
     with pytest.raises(StoreError) as raised:
