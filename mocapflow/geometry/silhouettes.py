@@ -95,6 +95,7 @@ def _crossed(surface: Surface, camera: Camera) -> tuple[I32, F64, I32, tuple[I32
     view = projected(surface, camera)
     vertex, layers = kernels.occluding_edges(surface.edges, view.facing, surface.cloth)
     image = view.image.take(vertex, axis=0)  # several times faster than view.image[vertex]
+    image.setflags(write=False)  # as in an `Outline`: kernels are compiled anew for arrays that may be written
     return vertex, image, layers, span_kernels.crossings(image, camera.size)
 
 
