@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from mocapflow.errors import StoreError
+from mocapflow.errors import PipelineError, StoreError
 
 app = typer.Typer(help="Learn which poses are likely.", no_args_is_help=True)
 
@@ -36,6 +36,9 @@ def fit(
     from mocapflow_bodies.template import Template
     from mocapflow_priors import density, training
 
+    if out.suffix != ".npz" or out.resolve() in {file.resolve() for file in files}:
+        hint = "--out poses.npz, beside the files it is learned from"
+        raise PipelineError("--out names the file to write, a .npz that is none of FILES", where=str(out), hint=hint)
     learned = training.fit(files, Template().load(Path()), angles or training.FREE, percentile)
     try:
         density.write(out, learned)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mocapflow.errors import RecordingError
+from mocapflow.io.paths import for_opencv
 from mocapflow.records import U8
 
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
@@ -74,7 +75,7 @@ def check_depth(path: Path) -> None:
     """
     import cv2
 
-    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    image = cv2.imread(for_opencv(path), cv2.IMREAD_UNCHANGED)
     if image is not None and image.dtype == np.uint16 and 0 < image.max() < DARK:
         raise RecordingError(
             f"a picture of 16 bits a pixel that reaches {image.max()} of 65535: as 8 bits it is nearly black",

@@ -61,14 +61,16 @@ def read_trc(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
 
     Returns:
         names (K), positions (T, K, 3) m in the axes of the file (see `world_from_opensim`), time (T,) s and the
-        frame rate; markers that are not seen are NaN.
+        frame rate; markers that are not seen (no numbers, or three zeros) are NaN.
 
     Raises:
-        RecordingError: not a TRC file, no markers, an unknown unit, no rate, or a row of another width.
+        RecordingError: not a TRC file, no markers, an unknown unit, no rate, no row, or one of another width.
     """
     lines = _text(path).splitlines()
-    if len(lines) < 6 or not lines[0].startswith("PathFileType"):
+    if not lines or not lines[0].startswith("PathFileType"):
         raise RecordingError("not a TRC file: its first word is not PathFileType", where=str(path))
+    if not any(map(str.strip, lines[5:])):
+        raise RecordingError("there is no row of positions below the header", where=str(path))
     header = dict(zip(lines[1].split("\t"), lines[2].split("\t"), strict=False))
     names = tuple(name for name in (cell.strip() for cell in lines[3].split("\t")[2:]) if name)
     if not names:
@@ -86,7 +88,7 @@ def read_trc(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
         if line.strip()
     ]
     table = np.array(rows).reshape(-1, width)
-    positions = table[:, 2:].reshape(-1, len(names), 3) * METRES[unit]
+    positions = _seen(table[:, 2:].reshape(-1, len(names), 3) * METRES[unit])
     return names, positions, table[:, 1].copy(), rate
 
 
@@ -160,7 +162,12 @@ def read_c3d(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
     rate = float(point["RATE"]["value"][0])
     positions = np.moveaxis(content["data"]["points"][:3], 0, -1).swapaxes(0, 1)[:, : len(names)] * METRES[unit]
     first = int(content["header"]["points"]["first_frame"])
-    return names, positions, (first + np.arange(len(positions))) / rate, rate
+    return names, _seen(positions), (first + np.arange(len(positions))) / rate, rate
+
+
+def _seen(positions: F64) -> F64:
+    """Return marker positions (T, K, 3) with NaN where all three are zero, as many programs write what is not seen."""
+    return np.where((positions == 0).all(axis=-1, keepdims=True), np.nan, positions)
 
 
 def _text(path: Path) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.io.calibrated import make_camera
+from mocapflow.io.paths import for_opencv
 from mocapflow.io.typed import place
 from mocapflow.records import F64
 
@@ -22,6 +23,10 @@ def cameras(folder: Path) -> tuple[Camera, ...]:
     """
     inner, outer = _open(folder / "intri.yml"), _open(folder / "extri.yml")
     names = inner.getNode("names")
+    listed = names.isSeq() and all(names.at(i).isString() for i in range(names.size()))
+    if not (names.empty() or listed):
+        hint = 'names: ["cam01", "cam02"], and K_cam01, dist_cam01 … for each'
+        raise RecordingError("names is no list of camera names", where=str(folder / "intri.yml"), hint=hint)
     return tuple(_camera(names.at(i).string(), inner, outer, folder) for i in range(names.size()))
 
 
@@ -47,7 +52,7 @@ def _open(path: Path) -> Any:
             hint="EasyMocap calibrations are a pair: intri.yml and extri.yml",
         )
     try:
-        storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
+        storage = cv2.FileStorage(for_opencv(path), cv2.FILE_STORAGE_READ)
     except (cv2.error, SystemError) as error:
         raise RecordingError("not an OpenCV YAML file", where=str(path)) from error
     if not storage.isOpened():

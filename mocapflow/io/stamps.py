@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from mocapflow.io.paths import for_opencv
 from mocapflow.records import F64, I32
 
 
@@ -17,7 +18,7 @@ def open_capture(path: Path, *options: int) -> Iterator[Any]:
     """Open a video file with one thread; options are pairs of cv2.CAP_PROP_* and value."""
     import cv2
 
-    capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG, [cv2.CAP_PROP_N_THREADS, 1, *options])
+    capture = cv2.VideoCapture(for_opencv(path), cv2.CAP_FFMPEG, [cv2.CAP_PROP_N_THREADS, 1, *options])
     try:
         yield capture
     finally:

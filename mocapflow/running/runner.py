@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits
 from mocapflow.caching.keys import explain
 from mocapflow.config.pipeline import Pipeline
 from mocapflow.errors import MocapflowError, PipelineError, no_run_folder
+from mocapflow.io.paths import for_opencv
 from mocapflow.running.execution import Execution, find_hit, is_hit
 from mocapflow.running.former_code import as_made
 from mocapflow.running.recipes import Step, steps_of
@@ -142,6 +143,7 @@ def run(
         MocapflowError: the pipeline or an input is wrong.
     """
     check_apart(out, store, pipeline.recording)
+    for_opencv(out)  # of a path that it can't take people hear now, not when videos are drawn
     kept = open_store(store, url)
     steps = steps_of(pipeline, kept.digests)
     if made is not None:

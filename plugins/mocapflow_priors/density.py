@@ -18,6 +18,8 @@ from mocapflow.records import F64, array, record
 from mocapflow_priors import density_kernels
 from mocapflow_priors.density_kernels import TURN
 
+LARGEST = 2 * TURN  # of an angle: whoever writes degrees has larger ones
+
 
 @record
 class Density:
@@ -95,11 +97,16 @@ def read(path: Path) -> Density:
     try:
         with path.open("rb") as stream, np.load(stream) as file:
             names, poses = tuple(str(name) for name in file["names"]), file["poses"].astype(np.float64)
-            return Density(names=names, poses=poses, bandwidth=float(file["bandwidth"]))
+            density = Density(names=names, poses=poses, bandwidth=float(file["bandwidth"]))
     except FileNotFoundError:
         raise PipelineError("there is no such file of training poses", where=str(path), hint=hint) from None
     except (OSError, ValueError, KeyError, AttributeError, EOFError, BadZipFile):  # what numpy says is about pickles
         raise PipelineError("this is no file of training poses", where=str(path), hint=hint) from None
+    usable = poses.ndim == 2 and poses.shape[1] == len(names) and poses.size and np.abs(poses).max() <= LARGEST
+    if not (usable and 0 < density.bandwidth < np.inf):  # NaN is neither
+        what = "these poses are no finite angles in radians, a column for each name, with a bandwidth above zero"
+        raise PipelineError(what, where=str(path), hint=hint)
+    return density
 
 
 def _readable(path: Path) -> Path:

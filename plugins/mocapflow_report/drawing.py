@@ -11,6 +11,8 @@ import numpy as np
 
 from mocapflow.errors import StoreError
 from mocapflow.io.atomic import atomic_write
+from mocapflow.io.paths import for_opencv
+from mocapflow.io.stamps import open_capture
 from mocapflow.records import F64, U8
 
 Colour = tuple[int, int, int]  # BGR
@@ -86,7 +88,7 @@ class Video:
         if self._writer is None:
             size = (image.shape[1], image.shape[0])
             self._writer = cv2.VideoWriter(
-                str(self._path), cv2.VideoWriter.fourcc(*self._codec), self._frame_rate, size
+                for_opencv(self._path), cv2.VideoWriter.fourcc(*self._codec), self._frame_rate, size
             )
             if not self._writer.isOpened():
                 hint = "is the folder writable? this build of OpenCV may lack the codec: mp4v is always there"
@@ -99,10 +101,25 @@ class Video:
         if self._writer is not None:
             self._writer.release()
 
+    def finish(self) -> None:
+        """Finish the file and see that it can be read: OpenCV does not tell of a full drive.
+
+        Raises:
+            StoreError: it can't.
+        """
+        self.close()
+        with open_capture(self._path) as video:
+            if self._writer is not None and not video.isOpened():
+                folder = str(self._path.parent)
+                raise StoreError("a video is not whole after it was written", where=folder, hint="is the drive full?")
+
 
 @contextmanager
 def videos(paths: list[Path], frame_rate: float, codec: str) -> Iterator[list[Video]]:
     """Open videos for writing; they come in their places when all frames are written, or not at all."""
     with ExitStack() as open_files:
         parts = [open_files.enter_context(atomic_write(path)) for path in paths]
-        yield [open_files.enter_context(closing(Video(part, frame_rate, codec))) for part in parts]
+        files = [open_files.enter_context(closing(Video(part, frame_rate, codec))) for part in parts]
+        yield files
+        for file in files:
+            file.finish()

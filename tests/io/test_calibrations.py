@@ -261,6 +261,14 @@ def test_not_opencv_yaml(tmp_path, content):
         read_cameras(tmp_path)
 
 
+@pytest.mark.parametrize("names", ["4", '"cam01"', "[ 1, 2 ]", "{ cam01: 1 }"])
+def test_easymocap_whose_names_are_no_list(tmp_path, names):
+    write_easymocap(tmp_path, ring())
+    (tmp_path / "intri.yml").write_text(f"%YAML:1.0\n---\nnames: {names}\n")
+    with pytest.raises(RecordingError, match=r"intri\.yml  names is no list of camera names"):
+        read_cameras(tmp_path)
+
+
 def test_easymocap_lacks_a_matrix(tmp_path):
     write_easymocap(tmp_path, ring())
     path = tmp_path / "extri.yml"

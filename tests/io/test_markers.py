@@ -82,6 +82,14 @@ def test_mot_in_radians_is_read_in_degrees(tmp_path):
     np.testing.assert_allclose(time, [0, 0.1, 0.2])
 
 
+def test_a_marker_at_three_zeros_is_not_seen(tmp_path):
+    path, points = tmp_path / "a.trc", positions(3, 2)
+    points[1, 0], points[2, 1, 0] = 0.0, 0.0
+    write_trc(path, ["p", "q"], points, 60.0)
+    found = read_trc(path)[1]
+    assert np.isnan(found[1, 0]).all() and np.isfinite(np.delete(found.reshape(6, 3), 2, axis=0)).all()
+
+
 def test_bad_trc(tmp_path):
     path = tmp_path / "a.trc"
     with pytest.raises(RecordingError, match="no such file"):
@@ -93,6 +101,9 @@ def test_bad_trc(tmp_path):
     good = path.read_text()
     path.write_text(good.replace("\tm\t", "\tfurlong\t"))
     with pytest.raises(RecordingError, match="unknown unit 'furlong'\n       known: m, cm, mm"):
+        read_trc(path)
+    path.write_text("\n".join(good.splitlines()[:6]))
+    with pytest.raises(RecordingError, match="no row of positions below the header"):
         read_trc(path)
     path.write_text(good.rstrip() + "\t1.0\n")
     with pytest.raises(RecordingError, match=r"a\.trc:11  9 columns; expected 8"):

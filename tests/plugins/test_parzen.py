@@ -145,5 +145,15 @@ def test_a_file_of_something_else(tmp_path: Path) -> None:
             read(tmp_path / "poses.npz")
     with pytest.raises(PipelineError, match=r"there is no such file of training poses"):
         read(tmp_path / "none.npz")
+    density = read(SHIPPED)
+    for wrong in (np.nan, 1000.0):
+        poses = density.poses.copy()
+        poses[3, 4] = wrong
+        write(tmp_path / "poses.npz", replace(density, poses=poses))
+        with pytest.raises(PipelineError, match=r"no finite angles in radians"):
+            read(tmp_path / "poses.npz")
+    write(tmp_path / "poses.npz", replace(density, bandwidth=-0.1))
+    with pytest.raises(PipelineError, match=r"with a bandwidth above zero"):
+        read(tmp_path / "poses.npz")
     with pytest.raises(ValidationError, match=r"none\.npz: there is no such file .*`mocapflow prior fit"):
         Parzen(poses=tmp_path / "none.npz")

@@ -271,6 +271,24 @@ def test_a_video_that_is_cut_off_leaves_the_one_before_it(tmp_path: Path) -> Non
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_a_video_that_the_drive_had_no_room_for_is_an_error(tmp_path: Path, monkeypatch) -> None:
+    """OpenCV says nothing: the table of contents, at the end, is missing."""
+    close = drawing.Video.close
+
+    def cut(video: drawing.Video) -> None:
+        close(video)
+        (part,) = tmp_path.iterdir()
+        part.write_bytes(part.read_bytes()[:200])
+
+    monkeypatch.setattr(drawing.Video, "close", cut)
+    with (
+        pytest.raises(StoreError, match=r"a video is not whole after it was written\n.*is the drive full\?"),
+        drawing.videos([tmp_path / "a.mp4"], 30.0, "mp4v") as (video,),
+    ):
+        video.write(np.zeros((64, 64, 3), np.uint8))
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_strands_without_rings_have_a_pattern_of_their_length_alone(scene: Scene) -> None:
     assert scene.garment is not None
     rings, length = scene.garment.rings, scene.garment.ring_length

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from mocapflow.assets import Body
 from mocapflow.cli import app
-from mocapflow.errors import RecordingError
+from mocapflow.errors import PipelineError, RecordingError
 from mocapflow.geometry import angles
 from mocapflow.io import markers, opensim
 from mocapflow.recordings.recording import open_recording
@@ -199,6 +199,14 @@ def test_the_command(body: Body, motion: np.ndarray, tmp_path: Path) -> None:
     assert said.exit_code == 0, said.output
     assert "12 poses" in said.output
     assert read(out).names == ("knee_l.flexion", "knee_r.flexion")
+
+
+@pytest.mark.parametrize("out", ["take.npz", "take.csv"])
+def test_what_is_learned_is_not_written_over_a_recording(tmp_path: Path, out: str) -> None:
+    (tmp_path / "take.npz").write_bytes(b"mine")
+    said = CliRunner().invoke(app, ["prior", "fit", str(tmp_path / "take.npz"), "--out", str(tmp_path / out)])
+    assert said.exit_code != 0 and (tmp_path / "take.npz").read_bytes() == b"mine"
+    assert isinstance(said.exception, PipelineError) or "a .npz that is none of FILES" in said.output
 
 
 def test_errors(body: Body, tmp_path: Path) -> None:

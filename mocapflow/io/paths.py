@@ -1,0 +1,22 @@
+"""Paths as OpenCV takes them."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from mocapflow.errors import MocapflowError
+
+
+def for_opencv(path: Path) -> str:
+    """Return a path that OpenCV can open: absolute, for it takes the `take:` of `take:1` for a protocol.
+
+    Raises:
+        MocapflowError: the path is not UTF-8, at which OpenCV kills the process.
+    """
+    text = os.path.abspath(path)
+    if text.isascii() or not any("\ud800" <= letter <= "\udfff" for letter in text):
+        return text
+    where = text.encode("utf-8", "backslashreplace").decode()
+    hint = "rename the file or folder, or set a UTF-8 locale (LC_ALL=C.UTF-8)"
+    raise MocapflowError("this path holds bytes that are no UTF-8", where=where, hint=hint)
