@@ -5,12 +5,35 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+from mocapflow.errors import PipelineError
+
 FORMER = "former"
 
 
 def differing(one: Mapping[str, str], other: Mapping[str, str]) -> list[str]:
     """Return the labels of the stages that two runs, given by their keys, would make otherwise."""
     return [label for label in {**one, **other} if one.get(label) != other.get(label)]
+
+
+def check_store(out: Path, store: Path) -> None:
+    """Check that a store does not lie among the files of a run, which the next one sets aside.
+
+    Raises:
+        PipelineError: it does.
+    """
+    from mocapflow_export import layout
+
+    taken = [(out / part).resolve() for part in (*layout.WRITTEN, Path(FORMER))]
+    if any(store.resolve().is_relative_to(part) for part in taken):
+        hint = f"beside it: --store {out / 'store.zarr'}"
+        raise PipelineError("the store would lie among the files of the run", where=str(store), hint=hint)
+
+
+def holds_results(out: Path) -> bool:
+    """True where files lie in a folder, of whomever, that a run would write over."""
+    from mocapflow_export import layout
+
+    return any((out / part).exists() for part in (layout.ANGLES, layout.RUN, layout.REPORT))
 
 
 def set_aside(out: Path) -> Path | None:

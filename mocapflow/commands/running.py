@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mocapflow.commands.former import differing, set_aside
+from mocapflow.commands.former import check_store, differing, holds_results, set_aside
 from mocapflow.commands.invocation import Invocation, alone, placed, recall, recalled_keys, remember
 from mocapflow.commands.progress import last_word, noted, reporter
 from mocapflow.commands.workers import Scheduler, Workers, finished
@@ -133,8 +133,10 @@ def begin(invocation: Invocation, out: Path, steps: Sequence[Step]) -> None:
 
     (out / LOG).unlink(missing_ok=True)
     before, now = recalled_keys(out), {step.label: step.key for step in steps}
-    if before is not None and differing(before, now) and (former := set_aside(out)):
-        typer.echo(f"the results of the run before are now in {former}", err=True)
+    another = holds_results(out) if before is None else differing(before, now)
+    if another and (former := set_aside(out)):
+        what = "what lay there under the names of results is" if before is None else "the results of the run before are"
+        typer.echo(f"{what} now in {former}", err=True)
     remember(invocation, out, now, {step.label: step.content for step in steps})
 
 
@@ -172,6 +174,7 @@ def _loaded(invocation: Invocation, out: Path) -> Pipeline:
 
     pipeline = invocation.load()
     check_apart(out, Path(invocation.store), pipeline.recording)
+    check_store(out, Path(invocation.store))
     return pipeline
 
 

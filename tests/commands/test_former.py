@@ -57,6 +57,20 @@ def test_results_of_another_run_are_set_aside(call):
     assert len((OUT / FORMER / "1" / layout.ANGLES).read_text().splitlines()) == 4
 
 
+def test_what_is_no_run_s_is_set_aside_too(call):
+    (OUT / layout.ANGLES).parent.mkdir(parents=True)
+    (OUT / layout.ANGLES).write_text("mine")
+    assert "what lay there under the names of results is now in out/former/1" in run(call).stderr
+    assert (OUT / FORMER / "1" / layout.ANGLES).read_text() == "mine"
+
+
+def test_a_store_among_the_results_is_refused(call):
+    for store in (OUT / "results", OUT / FORMER / "store"):
+        done = call("run", "tiny.yaml", "--out", "out", "--store", str(store))
+        assert done.exit_code == 2 and "the store would lie among the files of the run" in done.stderr
+    run(call, "--store", "out/store.zarr")
+
+
 def test_a_run_that_fails_leaves_no_results_of_another(call):
     run(call)
     failed = call("run", "tiny.yaml", "--out", "out", "--set", "stages.evaluate={use: evaluate, reference: videos}")
