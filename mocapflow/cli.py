@@ -37,7 +37,8 @@ class Commands(typer.core.TyperGroup):
             said = unwritable(error) if isinstance(error, OSError) else uncompilable(error) or error
             if not isinstance(said, MocapflowError):
                 raise
-            typer.echo(f"error: {said}", err=True)
+            shown = str(said).encode("utf-8", "backslashreplace").decode()  # it may quote what nobody can print
+            typer.echo(f"error: {shown}", err=True)
             raise typer.Exit(said.exit_status) from None
 
 

@@ -41,6 +41,11 @@ def call(tmp_path, monkeypatch):
     return invoke
 
 
+def test_an_error_about_what_nobody_can_print_is_printed(call):
+    done = call("plan", "\udcff.yaml")
+    assert done.exit_code == 2 and done.stderr.startswith("error: \\udcff.yaml  there is no such file")
+
+
 def test_a_run_is_made_once_and_then_found(call):
     first = call("run", "start.yaml")
     assert first.exit_code == 0, first.output

@@ -36,6 +36,8 @@ def read_json(path: Path, hint: str = "") -> Any:
     except json.JSONDecodeError as error:
         where = f"{path}:{error.lineno}:{error.colno}"
         raise RecordingError(f"not JSON: {error.msg}", where=where, hint=hint) from None
+    except (ValueError, RecursionError) as error:  # a number of thousands of digits, a thousand brackets
+        raise RecordingError(f"this JSON can't be read: {error}", where=str(path), hint=hint) from None
 
 
 def read_toml(path: Path, hint: str = "") -> dict[str, Any]:

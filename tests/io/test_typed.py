@@ -31,6 +31,13 @@ def test_a_byte_order_mark_is_passed_over(tmp_path, read, text):
     assert read(tmp_path / "file") == {"a": 1}
 
 
+@pytest.mark.parametrize("kind", ["brackets", "digits"])
+def test_json_that_no_reader_takes(tmp_path, kind):
+    (tmp_path / "file").write_text({"brackets": "[" * 200_000, "digits": "9" * 20_000}[kind])
+    with pytest.raises(RecordingError, match="this JSON can't be read: "):
+        read_json(tmp_path / "file")
+
+
 def test_a_file_that_is_not_there(tmp_path):
     with pytest.raises(RecordingError, match="can't be read: No such file"):
         read_json(tmp_path / "file")
