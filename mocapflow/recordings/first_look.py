@@ -20,7 +20,7 @@ from mocapflow.registry import Registry
 from mocapflow.scene import Scene
 
 FOREIGN = 0.5  # share of a picture that differs from its empty room: more, and it is no picture of that room
-COVERED = 0.4  # share of the body that shows somebody: less, and nobody stands there
+COVERED = 0.5  # share of the body that shows somebody, 0.6 to 0.9 where the pose is about right: less, and nobody is
 
 
 def examine_first_frame(folder: Path, registry: Registry) -> Iterator[Finding]:
@@ -40,11 +40,15 @@ def examine_first_frame(folder: Path, registry: Registry) -> Iterator[Finding]:
         hint = "was the camera moved, the light changed, or the file of another camera copied here?"
         yield warning(f"the first frame of {', '.join(foreign)} is not of the room in its clean plate", hint, folder)
     elif (bodies := _bodies(recording, registry)) is not None:
-        pairs = list(zip(bodies, somebody, strict=True))
-        covered = [seen[body].mean() for body, seen in pairs if seen is not None and body.any()]
-        if covered and np.median(covered) < COVERED:
+        triples = zip(names, bodies, somebody, strict=True)
+        shares = {name: seen[body].mean() for name, body, seen in triples if seen is not None and body.any()}
+        odd = [name for name, share in shares.items() if share < COVERED]
+        if shares and np.median(list(shares.values())) < COVERED:
             hint = "is it the pose of frame 0, in metres, in the world of the calibration?"
             yield warning("nobody stands where the first pose says", hint, folder / first_pose.FILE)
+        elif odd:
+            hint = "are its calibration and its video its own? the other views agree with the pose"
+            yield warning(f"nobody stands where the first pose says in {', '.join(odd)}", hint, folder)
 
 
 def _bodies(recording: Recording, registry: Registry) -> list[Bool] | None:

@@ -2,10 +2,12 @@
 
 import json
 import shutil
+from dataclasses import replace
 
 import pytest
 
 from mocapflow.help.shipped import shipped
+from mocapflow.io.cameras import read_cameras, write_cameras
 from mocapflow.recordings.first_look import examine_first_frame
 from mocapflow.registry import load_registry
 
@@ -40,3 +42,12 @@ def test_a_first_pose_where_nobody_stands(clip):
     pose["root_translation"][0] += 0.8
     (clip / "init.json").write_text(json.dumps(pose))
     assert said(clip) == ["nobody stands where the first pose says"]
+
+
+def test_a_camera_whose_calibration_is_another_s(clip):
+    cameras = list(read_cameras(clip / "cameras.toml"))
+    moved = cameras[1].camera_from_world.copy()
+    moved[0, 3] += 0.5
+    cameras[1] = replace(cameras[1], camera_from_world=moved)
+    write_cameras(clip / "cameras.toml", cameras)
+    assert said(clip) == [f"nobody stands where the first pose says in {cameras[1].name}"]
