@@ -24,6 +24,7 @@ POSE2SIM = {
     "Shoulder": "shoulder", "Elbow": "elbow", "Wrist": "wrist",
 }  # fmt: skip
 SLACK = 0.03  # of a sample: times in files are rounded
+SPARSE = 1.0  # s between samples; between such that are farther apart a curve would be made up
 AROUND = 360.0  # deg; no angle between two bones is larger
 SUFFIXES = (".csv", ".mot", ".sto", ".trc", ".c3d")
 
@@ -62,7 +63,7 @@ def read_reference(path: Path) -> Reference:
 
     Raises:
         RecordingError: the file is missing, of another kind, has none of our angles, or one that turns more than once
-            around, or goes back in time.
+            around, goes back in time, or has its samples far apart.
     """
     readers = {".csv": _table, ".mot": _motion, ".sto": _motion, ".trc": _trc, ".c3d": _c3d}
     if not path.is_file():
@@ -79,6 +80,9 @@ def read_reference(path: Path) -> Reference:
         row, clock = int(np.argmin(grows)) + 1, "frame" if reference.by_frame else "time"
         hint = "one row for each moment, in their order"
         raise RecordingError(f"the {clock} does not grow from row {row} to row {row + 1}", where=str(path), hint=hint)
+    if not reference.by_frame and reference.step > SPARSE:
+        what = f"its samples are {reference.step:.4g} s apart: too far to compare with what lies between them"
+        raise RecordingError(what, where=str(path), hint="times are in seconds; are these milliseconds?")
     for name, curve in reference.curves.items():
         if (size := float(np.nanmax(np.abs(curve), initial=0.0))) > AROUND:
             hint = "angles are in degrees; mend or leave out this column"

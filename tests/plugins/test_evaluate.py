@@ -221,6 +221,12 @@ def test_a_reference_in_radians_or_out_of_order_is_told(tmp_path: Path) -> None:
         evaluate_run(tmp_path, turned)
 
 
+def test_times_in_milliseconds_are_an_error_not_samples_far_apart(tmp_path: Path) -> None:
+    markers.write_mot(tmp_path / "ms.mot", {"knee_angle_r": np.linspace(0, 60, 30)}, np.arange(30) * 33.3)
+    with pytest.raises(RecordingError, match=r"samples are 33\.3 s apart(.|\n)*are these milliseconds"):
+        read_reference(tmp_path / "ms.mot")
+
+
 def test_folder_without_angles_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"no such run folder: it has no results/angles.csv"):
         evaluate_run(tmp_path, DEMO / "truth" / "angles.csv")
