@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from mocapflow.errors import RecordingError, alternatives
 from mocapflow.io.atomic import atomic_write
@@ -25,7 +26,7 @@ def late_frames(folder: Path, names: Sequence[str]) -> tuple[int, ...]:
         return (0,) * len(names)
     content = read_json(path, FORM)
     try:
-        late = {name: round(float(frames)) for name, frames in content["late_frames"].items()}
+        late = {name: _rounded(frames) for name, frames in content["late_frames"].items()}
     except (ValueError, TypeError, KeyError, AttributeError, OverflowError) as error:
         raise RecordingError(f"does not say how late the cameras are: {error!r}", where=str(path), hint=FORM) from error
     if unknown := sorted(set(late) - set(names)):
@@ -33,6 +34,12 @@ def late_frames(folder: Path, names: Sequence[str]) -> tuple[int, ...]:
             f"there is no camera '{unknown[0]}'", where=place(path, unknown[0]), hint=alternatives(unknown[0], names)
         )
     return tuple(late.get(name, 0) for name in names)
+
+
+def _rounded(frames: Any) -> int:
+    if isinstance(frames, bool):
+        raise TypeError("true and false are no numbers of frames")
+    return round(float(frames))
 
 
 def timing_text(late: Mapping[str, float]) -> str:

@@ -116,6 +116,7 @@ def test_keypoints_tell_too(tmp_path):
         ("{", "recording.json:1:2  not JSON: "),
         ('{"late": {}}', "does not say how late the cameras are: KeyError"),
         ('{"late_frames": {"cam01": "much"}}', "does not say how late the cameras are: ValueError"),
+        ('{"late_frames": {"cam01": true}}', "does not say how late the cameras are: TypeError"),
         ('{"late_frames": {"cam1": 3}}', "there is no camera 'cam1'"),
     ],
 )
