@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, NonNegativeInt, PositiveInt
+from pydantic import Field, NonNegativeInt, PositiveInt, model_validator
 
 from mocapflow.components import BodyModel, Garment, Stage
 from mocapflow.config.documents import Document, Place, Steps, changed
@@ -24,11 +24,22 @@ LABEL = re.compile(r"[\w-]+")  # of a stage
 
 
 class Frames(Settings):
-    """The part of the recording to work on: `start` up to, without, `stop`."""
+    """The part of the recording to work on: `start` up to, without, `stop`; or A:B, as on the command line."""
 
     start: NonNegativeInt = 0  # the first frame
     stop: NonNegativeInt | None = None  # where it ends, without this frame; null: with the recording
     step: PositiveInt = 1  # takes every so many-th frame
+
+    @model_validator(mode="before")
+    @classmethod
+    def _as_on_the_command_line(cls, value: Any) -> Any:
+        if not isinstance(value, str):
+            return value
+        try:
+            part = frames_of(value, "")
+        except PipelineError as error:
+            raise ValueError(error.message) from None
+        return {end: given for end in ("start", "stop", "step") if (given := getattr(part, end)) is not None}
 
 
 def frames_of(text: str, where: str) -> slice:

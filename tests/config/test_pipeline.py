@@ -84,6 +84,10 @@ def test_frames(folder):
     pipeline = load("frames={start: 2, stop: 9}", frames=slice(None, 60, 2))
     assert (pipeline.start, pipeline.stop, pipeline.step) == (0, 60, 2)
     assert load("frames.stop=010").stop == 10
+    Path("skirt.yaml").write_text(TEXT + "frames: 1:30\n")
+    assert (load().start, load().stop, load().step) == (1, 30, 1)
+    with pytest.raises(MocapflowError, match=r"frames: frames are written A:B or A:B:STEP"):
+        load("frames=some")
 
 
 def test_frames_that_are_given_keep_the_step_of_the_file(folder):
