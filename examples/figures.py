@@ -29,7 +29,7 @@ from mocapflow.loop import settle
 from mocapflow.recordings.recording import open_recording
 from mocapflow.records import F64, U8
 from mocapflow.timing import Stopwatch
-from mocapflow.track import CoupledLoop
+from mocapflow.track import TIMED, CoupledLoop
 
 
 def clothed(clip: str) -> Scene:
@@ -70,7 +70,7 @@ def first_frame(changes: tuple[str, ...] = ()) -> tuple[ClothedModel, Frame, Fra
     scene = Scene(cameras=recording.cameras, body=body, garment=pipeline.garment.sew(body))
     model = ClothedModel(scene=scene.with_background(recording.background()), draper=loop.draper)
     frame, start = recording.frame(0), StartFromFile().run(recording, scene)
-    begun = loop.approach(frame, loop.begin(frame, Past(), start, model, Stopwatch()), Past(), model)
+    begun = loop.approach(frame, loop.begin(frame, Past(), start, model, Stopwatch(TIMED)), Past(), model)
     return model, frame, settle(frame, begun, Past(), loop.steps, model, lambda *_: None).state
 
 
