@@ -59,7 +59,7 @@ def home(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def atomic_write(home):
+def whole(home):
     """Run folders of both clips, all frames; the demo is the skirt, called from somewhere else."""
     call("demo", "--out", home / "skirt", cwd=home)
     call("run", PIPELINES / "shorts.yaml", "--out", home / "shorts", *NO_PICTURES, cwd=home)
