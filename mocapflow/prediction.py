@@ -1,4 +1,4 @@
-"""A frame as it is believed before anybody looks, or without: too few views show some."""
+"""What is said of a frame without a look at it: the state that is believed, and why nobody could look."""
 
 from __future__ import annotations
 

@@ -15,6 +15,7 @@ from mocapflow.config.resolve import Resolver
 from mocapflow.data import Past, Pose
 from mocapflow.errors import StoreError
 from mocapflow.help.shipped import shipped
+from mocapflow.io.paths import for_opencv
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64, U8
 from mocapflow.registry import Registry
@@ -41,7 +42,8 @@ def draw_garment(registry: Registry, name: str, recording: Path | None, draper: 
     loaded = body.load(recording)
     scene = Scene(cameras=(), body=loaded, garment=garment.sew(loaded))
     image = poster(scene, garment, resolver.component("draper", draper, ()))
-    if not (out.parent.is_dir() and cv2.haveImageWriter(str(out)) and cv2.imwrite(str(out), image)):
+    file = for_opencv(out)
+    if not (out.parent.is_dir() and cv2.haveImageWriter(file) and cv2.imwrite(file, image)):
         hint = "--out names a .png, in a folder that is there"
         raise StoreError("the picture can't be written", where=str(out), hint=hint)
     assert scene.garment is not None

@@ -15,8 +15,10 @@ def for_opencv(path: Path) -> str:
         MocapflowError: the path is not UTF-8, at which OpenCV kills the process.
     """
     text = os.path.abspath(path)
-    if text.isascii() or not any("\ud800" <= letter <= "\udfff" for letter in text):
-        return text
-    where = text.encode("utf-8", "backslashreplace").decode()
-    hint = "rename the file or folder, or set a UTF-8 locale (LC_ALL=C.UTF-8)"
-    raise MocapflowError("this path holds bytes that are no UTF-8", where=where, hint=hint)
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        where = text.encode("utf-8", "backslashreplace").decode()
+        hint = "rename the file or folder, or set a UTF-8 locale (LC_ALL=C.UTF-8)"
+        raise MocapflowError("this path holds bytes that are no UTF-8", where=where, hint=hint) from None
+    return text

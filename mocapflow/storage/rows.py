@@ -4,7 +4,7 @@ A write through zarr's own interface costs 1.1 ms of CPU however small it is, th
 (benchmarks/store_commit.py). The files are plain zarr v3: bytes, then zstd level 1 with its checksum.
 
 What a run goes on from is on the drive when the call returns: a machine may lose its power. For its four files of a
-frame that takes 2 ms of waiting, 15 where others write, and 1 ms of CPU (there).
+frame that takes 1.5 ms of waiting, 15 where others write (there).
 """
 
 from __future__ import annotations

@@ -25,8 +25,9 @@ def standing_out(strands: Strands, chain: F64) -> F64:
 
 def along_limbs(strands: Strands, chain: F64) -> F64:
     """Return the unit directions (B, N, 3) of strands that move with the limb under them, at joints (B, J, 4, 4)."""
-    along: F64 = np.einsum("bnij,nj->bni", chain[:, strands.limb, :3, :3], strands.way, order="C")  # as one alone is:
-    return along  # kernels are compiled anew for every layout
+    # in the order that one alone has: kernels are compiled anew for every layout
+    along: F64 = np.einsum("bnij,nj->bni", chain[:, strands.limb, :3, :3], strands.way, order="C")
+    return along
 
 
 def blown(facing: F64, out: F64, aside: F64) -> tuple[F64, F64, F64]:

@@ -108,10 +108,13 @@ class Video:
             StoreError: it can't.
         """
         self.close()
+        if self._writer is None:
+            return
         with open_capture(self._path) as video:
-            if self._writer is not None and not video.isOpened():
-                folder = str(self._path.parent)
-                raise StoreError("a video is not whole after it was written", where=folder, hint="is the drive full?")
+            whole = video.isOpened()
+        if not whole:
+            where = str(self._path.parent)
+            raise StoreError("a video is not whole after it was written", where=where, hint="is the drive full?")
 
 
 @contextmanager

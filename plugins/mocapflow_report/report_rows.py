@@ -75,7 +75,7 @@ def mishaps(track: Track, held: Mapping[str, int]) -> list[str]:
     if restless.any():
         said.append(f"{restless.sum()} of {len(restless)} frames did not come to rest: {_spans(track, restless)}")
     if track.oscillating.any():
-        said.append(f"frames that swing between two states, which damping calms: {_spans(track, track.oscillating)}")
+        said.append(f"frames that swing between two states: {_spans(track, track.oscillating)}")
     return said + [f"{title(name)}: held by the priors in {n} frames" for name, n in held.items()]
 
 
