@@ -186,8 +186,7 @@ def plie(body: Body, t: np.ndarray) -> dict[str, np.ndarray]:
             [[sign * 0.3, -0.55, -0.8], [-sign, -0.4, 0.1]],
         )
         ways = np.multiply.outer(1 - fold, at_side) + np.multiply.outer(fold, folded)
-        bent = [_bent(body, side, way / np.linalg.norm(way, axis=1, keepdims=True)) for way in ways]
-        turn["shoulder" + side], turn["elbow" + side] = np.moveaxis(np.array(bent), 1, 0)
+        turn["shoulder" + side], turn["elbow" + side] = _bent_over_time(body, side, ways)
     return turn
 
 
@@ -207,6 +206,38 @@ def grapevine(body: Body, t: np.ndarray) -> dict[str, np.ndarray]:
     return turn
 
 
+def sit(body: Body, t: np.ndarray) -> dict[str, np.ndarray]:
+    """Return rotation vectors (T,3) per joint of sitting down as on a chair and rising; the hands go to the knees."""
+    turn = {name: np.zeros((len(t), 3)) for name in body.names}
+    down = np.sin(np.pi * t / t[-1]) ** 2
+    lean = 0.04 + 0.5 * np.sin(2 * np.pi * t / t[-1]) ** 2 + 0.15 * down
+    turn["pelvis"], turn["spine"], turn["chest"] = (np.outer(lean * part, [1, 0, 0]) for part in (0.7, 0.15, 0.15))
+    for side, sign in (("_l", 1), ("_r", -1)):
+        knee = 0.15 + 1.5 * down
+        hip = -0.06 - 1.4 * down - 0.7 * lean
+        turn["hip" + side] = np.stack([hip, -sign * 0.08 * down, 0 * t], axis=1)
+        turn["knee" + side][:, 0], turn["ankle" + side][:, 0] = knee, -hip - knee - 0.7 * lean
+        ways = [[[sign * 0.2, -0.15 - 0.5 * d, -1], [0.05 * sign, -0.6 - 0.6 * d, -1 + 0.4 * d]] for d in down]
+        turn["shoulder" + side], turn["elbow" + side] = _bent_over_time(body, side, ways)
+    return turn
+
+
+def akimbo(body: Body, t: np.ndarray) -> dict[str, np.ndarray]:
+    """Return rotation vectors (T,3) per joint of hands on the hips while the weight circles and a foot taps ahead."""
+    turn = {name: np.zeros((len(t), 3)) for name in body.names}
+    side_to_side, to_and_fro = np.sin(2 * np.pi * t / 1.5), np.cos(2 * np.pi * t / 1.5)
+    turn["pelvis"] = np.stack([0.03 + 0.08 * to_and_fro, 0.08 * side_to_side, 0.15 * side_to_side], axis=1)
+    turn["spine"] = turn["chest"] = -0.5 * turn["pelvis"] + [0.02, 0, 0]
+    for side, sign in (("_l", 1), ("_r", -1)):
+        tap = np.clip(sign * np.sin(2 * np.pi * t / 1.1), 0, 1) ** 1.5
+        hip, knee = -0.1 - 0.08 * to_and_fro - 0.45 * tap, 0.15 + 0.25 * tap
+        turn["hip" + side] = np.stack([hip, -sign * 0.1 - 0.08 * side_to_side, sign * 0.1 * tap], axis=1)
+        turn["knee" + side][:, 0], turn["ankle" + side][:, 0] = knee, -0.05 - 0.2 * tap
+        ways = [[[sign * 0.75, 0.3 + 0.1 * s, -0.7], [-sign * 0.5, -0.35, -0.75]] for s in side_to_side]
+        turn["shoulder" + side], turn["elbow" + side] = _bent_over_time(body, side, ways)
+    return turn
+
+
 SCRIPTS = {
     "squat": squat,
     "dance": dance,
@@ -220,7 +251,16 @@ SCRIPTS = {
     "kneel": kneel,
     "plie": plie,
     "grapevine": grapevine,
+    "sit": sit,
+    "akimbo": akimbo,
 }
+
+
+def _bent_over_time(body: Body, side: str, ways: np.ndarray | list) -> tuple[np.ndarray, np.ndarray]:
+    """Return rotation vectors (T,3) of shoulder and elbow by which upper arm and forearm point these ways (T,2,3)."""
+    unit = np.array(ways) / np.linalg.norm(ways, axis=-1, keepdims=True)
+    shoulder, elbow = np.moveaxis(np.array([_bent(body, side, way) for way in unit]), 1, 0)
+    return shoulder, elbow
 
 
 def _bent(body: Body, side: str, ways: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -88,4 +88,7 @@ TAKES = {
     "kneel_A_skirt": Take("A", "skirt", "kneel", 85, GREY, frames=60),
     "plie_A_skirt": Take("A", "skirt", "plie", 91, PURPLE),
     "grapevine_B_skirt": Take("B", "skirt", "grapevine", 92, DARK, frames=60),
+    # made after that
+    "sit_A_skirt": Take("A", "skirt", "sit", 101, GREEN, frames=60),
+    "akimbo_B_shorts": Take("B", "shorts", "akimbo", 102, GREY),
 }
