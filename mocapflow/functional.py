@@ -13,7 +13,6 @@ from mocapflow.components import Prior
 from mocapflow.data import (
     Cloth,
     Estimate,
-    FrameResult,
     FrameState,
     Matches,
     Past,
@@ -92,13 +91,18 @@ class Functional:
         return [prior.weight * residual_of(prior, pose, self.past, self.model.scene).energy for prior in self.priors]
 
 
-def image_cost(result: FrameResult) -> float:
+def image_cost(energy: F64, terms: Sequence[str]) -> float:
     """Return what the silhouettes of a frame's last turn cost by the images, data and length: less is better.
 
     Not by the area between model and silhouette, most of which is that of cloth laid wrong, whatever the pose.
+
+    Args:
+        energy: (U, E) terms of the functional after each turn; NaN after the last.
+        terms: their E names.
     """
-    summed = [name.endswith((".data", ".length")) for name in result.energy_terms]
-    return float(np.nansum(result.energy[result.iterations - 1, summed]))
+    turns = np.flatnonzero(np.isfinite(energy).any(axis=1))
+    summed = [name.endswith((".data", ".length")) for name in terms]
+    return float(np.nansum(energy[turns[-1:], summed]))
 
 
 def area(surface: Surface, silhouette: Silhouette, camera: Camera) -> float:

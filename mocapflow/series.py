@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -69,6 +69,19 @@ def picked(series: Wide, rows: npt.NDArray[Any]) -> Wide:
         return np.asarray(series[rows])
     kept = np.arange(len(series))[rows]
     return Series((len(kept), *series.shape[1:]), lambda numbers: series[kept[numbers]])
+
+
+def overwritten(series: Wide, rows: Mapping[int, Values]) -> Wide:
+    """Return a series with other values in some rows, by their numbers."""
+
+    def change(values: npt.NDArray[Any], numbers: Numbers) -> npt.NDArray[Any]:
+        values = values.copy()
+        for place, number in enumerate(numbers.tolist()):
+            if number in rows:
+                values[place] = rows[number]
+        return values
+
+    return change(series, np.arange(len(series))) if isinstance(series, np.ndarray) else changed(series, change)
 
 
 def joined(first: Wide, second: Wide) -> Series:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -97,24 +98,24 @@ class CoupledLoop(Stage):
             raise PipelineError(f"the person wears a {scene.garment.name}, which the track does not drape", hint=hint)
         for said in idle_matchers(self.matchers, recording):
             LOG.warning(said)
-        able = self if background else self.without_scene()
-        scene = scene.with_background(background).simplified(self.body_faces)
-        model = ClothedModel(scene=scene, draper=self.draper)
+        able, model = self if background else self.without_scene(), self.model_of(scene, background)
         if self.keep == "trace":
             checkpoint.keep_turns(self.steady.cap)
         if self.looks_back:
             self._refuse(rest for rest in checkpoint.rests() if rest[0] in recording.indices)
         past, watch = checkpoint.past(), Stopwatch(TIMED)
         for raw in recording.frames(since=checkpoint.next_index):
-            # `frame` is what failures are told of: here it would still be the one before
-            picture = checks.passed(raw) if checks else raw
-            picture = replace(picture, flow=flow.into(picture.index)) if flow else picture
+            picture = prepared(raw, checks, flow)
             watch.lap("decode")
             result = able.fit(picture, past, start, model, checkpoint.observe, watch)
             past = checkpoint.commit(picture, past, result)
             self.complain(picture, result)
             watch = Stopwatch(TIMED)
         return checkpoint.track()
+
+    def model_of(self, scene: Scene, background: Background | None) -> ClothedModel:
+        """Return the person of a scene as they are tracked: with fewer faces, their clothes draped."""
+        return ClothedModel(scene=scene.with_background(background).simplified(self.body_faces), draper=self.draper)
 
     def without_scene(self) -> CoupledLoop:
         """Return the loop without those parts that need the empty scene, which nobody has made; they are told."""
@@ -190,7 +191,12 @@ class CoupledLoop(Stage):
         near = settle(frame, state, past, steps, model, unobserved).state
         begins = (state, believed(near.estimate.pose, near.cloth.parameters, near.cloth))
         once = replace(self.steps, steady=Steady(max_turns=1))
-        return min(begins, key=lambda begin: image_cost(settle(frame, begin, past, once, model, unobserved)))
+
+        def costs(begin: FrameState) -> float:
+            result = settle(frame, begin, past, once, model, unobserved)
+            return image_cost(result.energy, result.energy_terms)
+
+        return min(begins, key=costs)
 
     def recovered(
         self, frame: Frame, state: FrameState, result: FrameResult, past: Past, model: ClothedModel
@@ -199,13 +205,13 @@ class CoupledLoop(Stage):
         finder = self.recovery
         if finder is None:
             return result
-
-        def settle_from(pose: Pose, parameters: F64) -> FrameResult:
-            begun = believed(pose, parameters, model.drape(pose, parameters, past))
-            return settle(frame, begun, past, self.steps, model, unobserved)
-
-        found = finder.recover(frame, state, result, past, model, settle_from)
+        found = finder.recover(frame, state, result, past, model, partial(self.settled, frame, past, model))
         return result_of(finder, found, result, model.scene)
+
+    def settled(self, frame: Frame, past: Past, model: ClothedModel, pose: Pose, parameters: F64) -> FrameResult:
+        """Return the result of the loop from a pose and cloth parameters; nobody looks on."""
+        begun = believed(pose, parameters, model.drape(pose, parameters, past))
+        return settle(frame, begun, past, self.steps, model, unobserved)
 
     def complain(self, frame: Frame, result: FrameResult) -> None:
         """Stop at a frame that did not settle, if that is wanted."""
@@ -220,6 +226,12 @@ class CoupledLoop(Stage):
         for frame, turns, steady in rests:
             if turns and not steady:
                 raise ComponentFailed(f"frame {frame} did not come to rest in {turns} turns", hint=GO_ON)
+
+
+def prepared(frame: Frame, checks: ViewChecks | None, flow: ImageFlow | None) -> Frame:
+    """Return a frame as it is tracked: without wrong views, with the flow into it."""
+    passed = checks.passed(frame) if checks else frame
+    return replace(passed, flow=flow.into(frame.index)) if flow else passed
 
 
 def unobserved(frame: int, turn: Turn, state: FrameState) -> None:

@@ -227,7 +227,7 @@ def test_what_the_first_segmenter_finds_is_kept_where_images_fit_better_from_the
         return settle(frame, state, *rest)
 
     monkeypatch.setattr("mocapflow.track.settle", spy)
-    monkeypatch.setattr("mocapflow.track.image_cost", lambda result: next(costs))
+    monkeypatch.setattr("mocapflow.track.image_cost", lambda *energy: next(costs))
     stages = SHORT | {"track": SHORT["track"] | {"first_segmenter": "tiny_segmenter"}}
     run_tiny(write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=stages), tmp_path, frames=1)
     given, stayed, approached, kept = begins

@@ -24,7 +24,7 @@ from mocapflow.running.blame import LOG, blaming
 from mocapflow.running.progress import Progress
 from mocapflow.running.recipes import Step
 from mocapflow.running.warned import warnings_logged
-from mocapflow.running.wiring import Source, made_by
+from mocapflow.running.wiring import Itself, Source, made_by
 from mocapflow.scene import Scene
 from mocapflow.storage.checkpoint import Checkpoint
 from mocapflow.storage.locks import Lock
@@ -171,6 +171,8 @@ class Execution:
     def _input(self, step: Step, source: Source, checkpoint: Checkpoint | None) -> Any:
         if isinstance(source, tuple):
             return tuple(self._result(label) for label in source)
+        if isinstance(source, Itself):
+            return self._steps[source].named.stage
         silent = checkpoint is not None or step.passes_frames
         watch = unwatched if silent else Progress(step.label, self._report, brief=True).tell
         supplied: dict[str | None, Callable[[], Any]] = {

@@ -8,9 +8,15 @@ from dataclasses import is_dataclass
 from types import NoneType, UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
+from mocapflow.components import Stage
 from mocapflow.config.pipeline import NamedStage, Pipeline
 from mocapflow.errors import PipelineError, PluginError, alternatives
 from mocapflow.registry import Registry
+
+
+class Itself(str):
+    """The label of an earlier stage that is handed over itself, with its settings, instead of what it made."""
+
 
 SUPPLIED = {"Scene": "scene", "Recording": "recording", "Checkpoint": "checkpoint", "RunFolder": "run folder"}
 
@@ -21,7 +27,8 @@ Source = str | tuple[str, ...] | None
 def wire(pipeline: Pipeline) -> dict[str, dict[str, Source]]:
     """Return, for each stage, where each parameter of its `run` comes from.
 
-    A source is the label of an earlier stage (a tuple of all that make the type, where `run` takes a tuple), `scene`,
+    A source is the label of an earlier stage (a tuple of all that make the type, where `run` takes a tuple; `Itself`
+    where it takes a stage), `scene`,
     `recording`, `checkpoint` or `run folder` (supplied by the runner where no earlier stage makes one), or None for an
     optional input that nobody makes.
 
@@ -67,6 +74,8 @@ def _source(named: NamedStage, parameter: str, hint: Any, earlier: Sequence[Name
     wanted, optional = _without_none(hint)
     if parameter in named.wiring:
         return _chosen(named, parameter, wanted, shown)
+    if isinstance(wanted, type) and issubclass(wanted, Stage):
+        return _itself(named, wanted, earlier)
     supplied = SUPPLIED.get(wanted.__name__) if wanted.__module__.startswith("mocapflow.") else None
     source = latest(wanted, shown) or supplied
     if source is None and not optional:
@@ -74,6 +83,15 @@ def _source(named: NamedStage, parameter: str, hint: Any, earlier: Sequence[Name
         message = f"stage '{named.label}' needs {article} {wanted.__name__} but no earlier stage makes one"
         raise PipelineError(message, where=named.where, hint=alternatives("", _makers(wanted, registry)))
     return source
+
+
+def _itself(named: NamedStage, wanted: type[Stage], earlier: Sequence[NamedStage]) -> Itself:
+    """Return the last stage of a class; parts of a track are tracked alike, so any will do."""
+    labels = [other.label for other in earlier if isinstance(other.stage, wanted)]
+    if not labels:
+        hint = f"put it after a stage {wanted.name}"
+        raise PipelineError(f"stage '{named.label}' needs a {wanted.__name__} before it", where=named.where, hint=hint)
+    return Itself(labels[-1])
 
 
 def _several(named: NamedStage, parameter: str, wanted: type, earlier: Sequence[NamedStage]) -> tuple[str, ...]:

@@ -39,10 +39,10 @@ def columns_of(result: FrameResult, cameras: int) -> Columns:
     }  # fmt: skip
 
 
-def row_of(columns: Columns, frame: Frame, result: FrameResult, steps: Sequence[str]) -> F64:
-    """Return all numbers of a frame as one row (N,), column after column."""
-    estimate, rank = result.state.estimate, columns["covariance"][0]
-    values: dict[str, Any] = {
+def values_of(frame: Frame, result: FrameResult, steps: Sequence[str]) -> dict[str, Any]:
+    """Return all numbers of a frame by the names of their columns; the covariance is that of the pose."""
+    estimate, rank = result.state.estimate, 6 + len(result.state.estimate.pose.angles)
+    return {
         "frame": frame.index, "time": frame.time, "root": estimate.pose.root, "angles": estimate.pose.angles,
         "cloth_parameters": result.state.cloth.parameters, "iterations": result.iterations, "steady": result.steady,
         "oscillating": result.oscillating, "doubted": result.doubted, "body_change": result.change.body,
@@ -51,6 +51,11 @@ def row_of(columns: Columns, frame: Frame, result: FrameResult, steps: Sequence[
         "seconds": [result.seconds.get(step, 0.0) for step in steps], "match_count": len(result.state.matches.weight),
         "energy": result.energy, "observed": estimate.observed, "covariance": estimate.covariance[:rank, :rank],
     }  # fmt: skip
+
+
+def row_of(columns: Columns, frame: Frame, result: FrameResult, steps: Sequence[str]) -> F64:
+    """Return all numbers of a frame as one row (N,), column after column."""
+    values = values_of(frame, result, steps)
     parts = [np.asarray(values[name], float) for name in columns]
     for part, (name, shape) in zip(parts, columns.items(), strict=True):
         if part.shape != shape:

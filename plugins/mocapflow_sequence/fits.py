@@ -1,0 +1,118 @@
+"""A track while some of its frames are replaced by other fits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from mocapflow.assets import Body
+from mocapflow.data import REMEMBERED, Cloth, Frame, FrameResult, Moment, Past, Pose
+from mocapflow.geometry import kinematics
+from mocapflow.model import increment_between, moved
+from mocapflow.records import F64, array_fields
+from mocapflow.results import Track
+from mocapflow.series import overwritten
+from mocapflow.storage.packing import values_of
+
+KEPT = ("frame", "time", "usable", "doubted", "seconds")  # of the first fit
+
+
+class Fits:
+    """The poses of a track, and how far each leaps.
+
+    Args:
+        track: as it was made; T frames.
+        body: whose joints are looked at; J of them.
+    """
+
+    def __init__(self, track: Track, body: Body) -> None:
+        self.before, self._body = track, body
+        self._found: dict[int, tuple[Frame, FrameResult]] = {}
+        self._first = kinematics.joint_centres(body, track.root, track.angles)
+        self._centres = self._first.copy()
+
+    def pose(self, row: int) -> Pose:
+        """Return the pose of a row as it stands."""
+        return self._found[row][1].state.estimate.pose if row in self._found else self.before.pose(row)
+
+    def leaps(self) -> F64:
+        """Return how far (T,) m a joint of each frame is from between where it is before and after, at most.
+
+        0 where the frame or one of its neighbours is lost, and at the ends.
+        """
+        far, known = np.zeros(len(self._centres)), ~self.before.lost
+        sure = known[:-2] & known[1:-1] & known[2:]
+        far[1:-1] = sure * np.linalg.norm(self._centres[1:-1] - self._between(), axis=2).max(axis=1, initial=0)
+        return far
+
+    def leap(self, row: int, pose: Pose) -> float:
+        """Return how far (m) the joints of an inner row would be from between those before and after, RMS."""
+        off = self._joints(pose) - self._between()[row - 1]
+        return float(np.sqrt(np.mean(np.sum(off**2, axis=1))))
+
+    def apart(self, row: int, pose: Pose) -> float:
+        """Return how far (m) a pose moves the joint of a row that it moves most."""
+        return float(np.linalg.norm(self._joints(pose) - self._centres[row], axis=1).max())
+
+    def between(self, row: int) -> Pose:
+        """Return the pose between the frames before and after a row."""
+        before, after = self.pose(row - 1), self.pose(row + 1)
+        return moved(before, self._later()[row - 1] * increment_between(before, after))
+
+    def past(self, row: int, appearance: Mapping[str, F64]) -> Past:
+        """Return what a frame may know of those before it."""
+        moments = tuple(self._moment(earlier) for earlier in range(max(0, row - REMEMBERED), row))
+        return Past(moments=moments, appearance=appearance).believable()
+
+    def take(self, row: int, frame: Frame, result: FrameResult) -> None:
+        """Let a row stand with another fit."""
+        self._centres[row] = self._joints(result.state.estimate.pose)
+        self._found[row] = frame, result
+
+    def track(self) -> Track:
+        """Return the track as it stands, with a note on each frame that has another fit."""
+        if not self._found:
+            return self.before
+        track, found = self.before, sorted(self._found.items())
+        rows = {row: values_of(frame, result, track.step_names) for row, (frame, result) in found}
+        changes: dict[str, Any] = {
+            name: overwritten(getattr(track, name), {row: values[name] for row, values in rows.items()})
+            for name in array_fields(Track)
+            if name in rows[found[0][0]] and name not in KEPT
+        }
+        cloth = overwritten(track.cloth, {row: result.state.cloth.vertices for row, (_, result) in found})
+        notes = sorted([*track.notes, *(self._note(row) for row in rows)], key=_frame_of)
+        return replace(track, cloth=cloth, notes=tuple(notes), **changes)
+
+    def _note(self, row: int) -> str:
+        far = 1000 * np.linalg.norm(self._centres[row] - self._first[row], axis=1).max()
+        frame = self.before.frame[row]
+        return f"frame {frame}: fitted again from between its neighbours, {far:.0f} mm from the first fit"
+
+    def _later(self) -> F64:
+        """Return how far (T - 2,) on the way from the frame before to the one after each inner frame lies, 0 to 1."""
+        time = self.before.time
+        return np.asarray((time[1:-1] - time[:-2]) / (time[2:] - time[:-2]))
+
+    def _between(self) -> F64:
+        """Return where the joints of the inner frames (T - 2, J, 3) m are between those before and after."""
+        later = self._later()[:, None, None]
+        return np.asarray((1 - later) * self._centres[:-2] + later * self._centres[2:])
+
+    def _joints(self, pose: Pose) -> F64:
+        centres: F64 = kinematics.joint_centres(self._body, pose.root[None], pose.angles[None])[0]
+        return centres
+
+    def _moment(self, row: int) -> Moment:
+        track = self.before
+        cloth = Cloth(vertices=np.array(track.cloth[row]), parameters=track.cloth_parameters[row].copy())
+        observed, doubted = track.observed[row].copy(), bool(track.doubted[row])
+        time, pose = float(track.time[row]), track.pose(row)
+        return Moment(time=time, pose=pose, cloth=cloth, observed=observed, doubted=doubted)
+
+
+def _frame_of(note: str) -> int:
+    return int(note.removeprefix("frame ").partition(":")[0])
