@@ -100,9 +100,9 @@ def image_cost(energy: F64, terms: Sequence[str]) -> float:
         energy: (U, E) terms of the functional after each turn; NaN after the last.
         terms: their E names.
     """
-    turns = np.flatnonzero(np.isfinite(energy).any(axis=1))
     summed = [name.endswith((".data", ".length")) for name in terms]
-    return float(np.nansum(energy[turns[-1:], summed]))
+    turns = energy[np.isfinite(energy).any(axis=1)]
+    return float(np.nansum(turns[-1:, summed]))
 
 
 def area(surface: Surface, silhouette: Silhouette, camera: Camera) -> float:

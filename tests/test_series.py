@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mocapflow.series import BLOCK, Series, blocks, changed, joined, picked
+from mocapflow.series import BLOCK, Series, blocks, changed, joined, overwritten, picked
 
 VALUES = np.random.default_rng(0).normal(size=(150, 2, 3))
 
@@ -48,6 +48,14 @@ def test_two_end_to_end(series):
     assert both.shape == (8, 2, 3)
     np.testing.assert_array_equal(both[np.array([7, 0, 3, 2])], VALUES[[7, 0, 3, 2]])
     np.testing.assert_array_equal(np.asarray(both), VALUES[:8])
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_some_rows_are_overwritten(series, asked, whole):
+    new = overwritten(VALUES if whole else series, {3: np.ones((2, 3)), 140: np.zeros((2, 3))})
+    assert not asked
+    assert (new[3] == 1).all() and not new[140].any() and new[np.empty(0, int)].shape == (0, 2, 3)
+    np.testing.assert_array_equal(new[4:140], VALUES[4:140])
 
 
 def test_it_is_gone_through_block_by_block(series, asked):

@@ -72,10 +72,10 @@ def _source(named: NamedStage, parameter: str, hint: Any, earlier: Sequence[Name
     if get_origin(hint) is tuple:
         return named.joins or _several(named, parameter, get_args(hint)[0], shown)
     wanted, optional = _without_none(hint)
+    if isinstance(wanted, type) and issubclass(wanted, Stage):
+        return _itself(named, parameter, wanted, earlier)
     if parameter in named.wiring:
         return _chosen(named, parameter, wanted, shown)
-    if isinstance(wanted, type) and issubclass(wanted, Stage):
-        return _itself(named, wanted, earlier)
     supplied = SUPPLIED.get(wanted.__name__) if wanted.__module__.startswith("mocapflow.") else None
     source = latest(wanted, shown) or supplied
     if source is None and not optional:
@@ -85,13 +85,15 @@ def _source(named: NamedStage, parameter: str, hint: Any, earlier: Sequence[Name
     return source
 
 
-def _itself(named: NamedStage, wanted: type[Stage], earlier: Sequence[NamedStage]) -> Itself:
-    """Return the last stage of a class; parts of a track are tracked alike, so any will do."""
+def _itself(named: NamedStage, parameter: str, wanted: type[Stage], earlier: Sequence[NamedStage]) -> Itself:
+    """Return the last stage of a class, or the one that `from` names; all parts of a track have the same settings."""
     labels = [other.label for other in earlier if isinstance(other.stage, wanted)]
-    if not labels:
-        hint = f"put it after a stage {wanted.name}"
-        raise PipelineError(f"stage '{named.label}' needs a {wanted.__name__} before it", where=named.where, hint=hint)
-    return Itself(labels[-1])
+    chosen = [label for label in labels if label == named.wiring.get(parameter, label)]
+    if not chosen:
+        message = f"stage '{named.label}' needs a stage {wanted.name} before it"
+        place = named.wiring_places.get(parameter, named.where)
+        raise PipelineError(message, where=place, hint=alternatives(named.wiring.get(parameter, ""), labels))
+    return Itself(chosen[-1])
 
 
 def _several(named: NamedStage, parameter: str, wanted: type, earlier: Sequence[NamedStage]) -> tuple[str, ...]:

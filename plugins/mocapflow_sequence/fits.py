@@ -17,7 +17,8 @@ from mocapflow.results import Track
 from mocapflow.series import overwritten
 from mocapflow.storage.packing import values_of
 
-KEPT = ("frame", "time", "usable", "doubted", "seconds")  # of the first fit
+AGAIN = "fitted again from between its neighbours"
+KEPT = ("frame", "time", "usable", "doubted", "seconds", "raw_root", "raw_angles")  # of the first fit
 
 
 class Fits:
@@ -30,13 +31,13 @@ class Fits:
 
     def __init__(self, track: Track, body: Body) -> None:
         self.before, self._body = track, body
-        self._found: dict[int, tuple[Frame, FrameResult]] = {}
-        self._first = kinematics.joint_centres(body, track.root, track.angles)
-        self._centres = self._first.copy()
+        self._found: dict[int, dict[str, Any]] = {}  # numbers of other fits; pictures and silhouettes would not fit in
+        self._centres = kinematics.joint_centres(body, track.root, track.angles)
 
     def pose(self, row: int) -> Pose:
         """Return the pose of a row as it stands."""
-        return self._found[row][1].state.estimate.pose if row in self._found else self.before.pose(row)
+        other = self._found.get(row)
+        return Pose(root=other["root"], angles=other["angles"]) if other else self.before.pose(row)
 
     def leaps(self) -> F64:
         """Return how far (T,) m a joint of each frame is from between where it is before and after, at most.
@@ -70,27 +71,21 @@ class Fits:
     def take(self, row: int, frame: Frame, result: FrameResult) -> None:
         """Let a row stand with another fit."""
         self._centres[row] = self._joints(result.state.estimate.pose)
-        self._found[row] = frame, result
+        cloth = {"cloth": result.state.cloth.vertices}
+        self._found[row] = values_of(frame, result, self.before.step_names) | cloth
 
     def track(self) -> Track:
         """Return the track as it stands, with a note on each frame that has another fit."""
         if not self._found:
             return self.before
-        track, found = self.before, sorted(self._found.items())
-        rows = {row: values_of(frame, result, track.step_names) for row, (frame, result) in found}
+        track, found = self.before, self._found
         changes: dict[str, Any] = {
-            name: overwritten(getattr(track, name), {row: values[name] for row, values in rows.items()})
+            name: overwritten(getattr(track, name), {row: values[name] for row, values in found.items()})
             for name in array_fields(Track)
-            if name in rows[found[0][0]] and name not in KEPT
+            if name not in KEPT
         }
-        cloth = overwritten(track.cloth, {row: result.state.cloth.vertices for row, (_, result) in found})
-        notes = sorted([*track.notes, *(self._note(row) for row in rows)], key=_frame_of)
-        return replace(track, cloth=cloth, notes=tuple(notes), **changes)
-
-    def _note(self, row: int) -> str:
-        far = 1000 * np.linalg.norm(self._centres[row] - self._first[row], axis=1).max()
-        frame = self.before.frame[row]
-        return f"frame {frame}: fitted again from between its neighbours, {far:.0f} mm from the first fit"
+        notes = sorted([*track.notes, *(f"frame {track.frame[row]}: {AGAIN}" for row in found)], key=_frame_of)
+        return replace(track, notes=tuple(notes), **changes)
 
     def _later(self) -> F64:
         """Return how far (T - 2,) on the way from the frame before to the one after each inner frame lies, 0 to 1."""

@@ -11,7 +11,7 @@ from mocapflow.errors import MocapflowError, PluginError
 from mocapflow.help.shipped import shipped
 from mocapflow.hookspecs import hookimpl
 from mocapflow.registry import Origin, load_registry
-from mocapflow.running.wiring import latest, wire
+from mocapflow.running.wiring import Itself, latest, wire
 from tests.fixtures import small_plugins
 
 TEXT = """\
@@ -301,6 +301,18 @@ def test_from_overrides_the_nearest(folder):
     assert wire(load("stages.export.from={track: track}"))["export"]["track"] == "track"
 
 
+def test_a_stage_may_be_handed_another_one_itself(folder):
+    Path("skirt.yaml").write_text(
+        TEXT.replace("  track:\n", "  first: {use: coupled_loop, matchers: contour_icp}\n  track:\n").replace(
+            "  export:", "  again: again\n  export:"
+        )
+    )
+    again = wire(load())["again"]
+    assert again == {"track": "smooth", "loop": Itself("track")} and isinstance(again["loop"], Itself)
+    named = wire(load("stages.again.from={loop: first, track: track}"))["again"]
+    assert named == {"track": "track", "loop": Itself("first")}
+
+
 def test_a_stage_that_makes_a_body_replaces_it_for_later_stages(folder):
     Path("skirt.yaml").write_text(TEXT.replace("  start: start\n", "  start: start\n  fit: fit\n"))
     pipeline = load()
@@ -322,6 +334,13 @@ def test_a_stage_that_makes_a_body_replaces_it_for_later_stages(folder):
         ("stages.export.from={trak: track}",
          "--set stages.export.from={trak: track}  stage 'export' has no input 'trak'\n"
          "       available: folder, track — did you mean 'track'?"),
+        ("stages.start=again",
+         "--set stages.start=again  stage 'start' needs a stage coupled_loop before it\n"
+         "       available: none"),
+        ("stages.export={use: again, from: {loop: start}}",
+         "--set stages.export={use: again, from: {loop: start}}  "
+         "stage 'export' needs a stage coupled_loop before it\n"
+         "       available: track"),
         ("stages.export=untyped", "--set stages.export=untyped  stage 'export': untyped: run needs a type for track"),
         ("stages.export=unkept",
          "--set stages.export=unkept  "

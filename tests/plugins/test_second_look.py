@@ -1,0 +1,176 @@
+"""Frames that leap out from between their neighbours: which are looked at again, from where, and what is kept."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mocapflow_sequence.fits import Fits
+from mocapflow_sequence.second_look import HELD, LED, SecondLook, pictured, windows
+from results_scene import DEMO, demo_scene, stepping
+
+from mocapflow.config.pipeline import load_pipeline
+from mocapflow.data import NO_CLOTH, Change, FrameResult, Past, Pose
+from mocapflow.help.shipped import shipped
+from mocapflow.prediction import believed
+from mocapflow.recordings.recording import open_recording
+from mocapflow.results import Track
+from mocapflow.series import Series
+from mocapflow.track import CoupledLoop
+
+SCENE = demo_scene()
+TRUE = stepping(SCENE.body)  # 40 frames, both knees swing
+KNEE = SCENE.body.screw_names.index("knee_l.x")
+ROW = 12
+RECORDING = open_recording(DEMO, stop=len(TRUE.frame))
+STAGES = load_pipeline(shipped("pipelines", "bare.yaml"), recording=DEMO).stages
+LOOP = next(named.stage for named in STAGES if isinstance(named.stage, CoupledLoop))
+
+
+def astray(*rows: int, by: float = 0.8) -> Track:
+    """The track with a knee that is off in some rows."""
+    angles = TRUE.angles.copy()
+    angles[list(rows), KNEE] += by
+    return replace(TRUE, angles=angles, notes=("frame 3: cam01 black", "frame 30: lost"))
+
+
+def fitted(pose: Pose, cost: float = 0.5) -> FrameResult:
+    """A result of the loop that costs so much by the pictures; those of the track cost 0.5."""
+    return FrameResult(
+        state=believed(pose, np.zeros(0), NO_CLOTH), iterations=1, steady=True, oscillating=False,
+        change=Change(body=0.0, cloth=0.0, angles=0.0, sigmas=0.0), overlap=np.full(4, 0.8),
+        energy=np.array([[cost, 0.0], [np.nan, np.nan], [np.nan, np.nan]]),
+        energy_terms=("cam01.data", "rest_pose"),
+    )  # fmt: skip
+
+
+@pytest.fixture
+def looked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, Past, Pose]]:
+    """What the loop is asked for: frame, past and start. It answers with the true pose."""
+    asked = []
+
+    def settle(loop, frame, past, model, pose, parameters):
+        asked.append((frame.index, past, pose))
+        return fitted(TRUE.pose(frame.index))
+
+    monkeypatch.setattr(CoupledLoop, "settled", settle)
+    return asked
+
+
+def second_look(track: Track, **settings: float) -> Track:
+    return SecondLook(**settings).run(track, LOOP, RECORDING, SCENE)
+
+
+def test_a_frame_that_leaps_is_fitted_again_from_between_its_neighbours(looked):
+    again = second_look(astray(ROW))
+    np.testing.assert_array_equal(again.angles, TRUE.angles)
+    np.testing.assert_array_equal(again.root, TRUE.root)
+    colours, same, (index, past, start) = looked  # the frame after that wrong one leaps, too
+    assert (colours[0], same[0], index) == (ROW + 2, ROW + 1, ROW)
+    assert abs(start.angles[KNEE] - TRUE.angles[[ROW - 1, ROW + 1], KNEE].mean()) < 1e-12
+    assert [moment.time for moment in past.moments] == TRUE.time[ROW - 3 : ROW].tolist()
+    assert again.overlap[ROW].tolist() == [0.8] * 4 and again.overlap[ROW + 1].tolist() == [0.9] * 4
+    assert again.seconds is not None and (again.seconds == TRUE.seconds).all()
+    assert again.covariance.shape == TRUE.covariance.shape and again.covariance[ROW, 0, 0] > 1
+    first, note, last = again.notes
+    assert (first, last) == astray(ROW).notes
+    assert note == f"frame {ROW}: fitted again from between its neighbours"
+
+
+def test_a_limb_that_was_lost_for_some_frames_is_followed_back(looked):
+    rows = range(ROW, ROW + LED)
+    again = second_look(astray(*rows))
+    np.testing.assert_array_equal(again.angles, TRUE.angles)
+    assert [index for index, *_ in looked][2:] == list(rows)[::-1]
+
+
+def test_a_smooth_track_stays_as_it_is_and_no_picture_is_read(looked, monkeypatch):
+    monkeypatch.setattr(type(RECORDING), "frames", None)
+    assert second_look(TRUE) is TRUE
+    assert not looked
+
+
+@pytest.mark.parametrize(
+    ("cost", "kept"),
+    [(0.5, False), (0.4, False), (0.52, False), (1.5, True)],  # of the fit that leaps less, beside 0.5
+)
+def test_the_pictures_have_their_say(monkeypatch, cost, kept):
+    monkeypatch.setattr(CoupledLoop, "settled", lambda *given: fitted(TRUE.pose(given[1].index), cost))
+    track = astray(ROW)
+    assert (second_look(track) is track) is kept
+
+
+def test_where_the_person_leapt_both_fits_are_the_same(monkeypatch):
+    track = astray(ROW)
+    monkeypatch.setattr(CoupledLoop, "settled", lambda *given: fitted(track.pose(given[1].index), cost=0.1))
+    assert second_look(track) is track
+
+
+@pytest.mark.parametrize("lost", [ROW - 1, ROW, ROW + 1])
+def test_lost_frames_say_nothing_of_their_neighbours(looked, lost):
+    track = astray(ROW)
+    usable = track.usable.copy()
+    usable[lost] = False
+    assert ROW not in [index for index, *_ in looked]
+    assert second_look(replace(track, usable=usable)).angles[ROW, KNEE] == track.angles[ROW, KNEE]
+
+
+def test_times_say_where_between_a_frame_is():
+    fits = Fits(replace(TRUE, time=np.where(TRUE.frame < 13, TRUE.time, TRUE.time + 2 / 30)), SCENE.body)
+    quarter = fits.between(12).angles[KNEE]
+    assert abs(quarter - (0.75 * TRUE.angles[11, KNEE] + 0.25 * TRUE.angles[13, KNEE])) < 1e-12
+
+
+def test_leaps_are_what_joints_are_off_by(looked):
+    track = replace(TRUE, angles=np.tile(TRUE.angles[:1], (40, 1)))
+    root = track.root.copy()
+    root[20, :3, 3] += [0.03, 0.0, 0.04]
+    leaps = Fits(replace(track, root=root), SCENE.body).leaps()
+    np.testing.assert_allclose(leaps[[19, 20, 21]], [0.025, 0.05, 0.025], atol=1e-9)
+    assert leaps[:19].max() < 1e-12 and leaps[22:].max() < 1e-12
+
+
+def test_wide_arrays_stay_on_the_drive(looked):
+    track = astray(ROW)
+    read = []
+    covariance = Series(track.covariance.shape, lambda rows: read.append(rows) or np.asarray(track.covariance)[rows])
+    again = Fits(replace(track, covariance=covariance), SCENE.body)
+    read.clear()
+    again.take(ROW, next(RECORDING.frames(since=ROW)), fitted(TRUE.pose(ROW)))
+    made = again.track()
+    assert isinstance(made.covariance, Series) and not read
+    assert made.covariance[ROW][0, 0] > 1 > made.covariance[ROW + 1][0, 0]
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 9, 30])
+def test_windows_overlap_by_the_row_that_shows_colours(count):
+    suspect = np.zeros(60, bool)
+    suspect[20 : 20 + count] = True
+    rows = [window.tolist() for window in windows(suspect)]
+    assert rows[0][0] == 20 - LED and rows[-1][-1] == 20 + count
+    assert all(len(window) <= HELD for window in rows)
+    assert all(one[-1] == other[0] for one, other in zip(rows, rows[1:], strict=False))
+    assert {row for window in rows for row in window[:-1]} >= set(range(20, 20 + count))
+
+
+def test_windows_at_the_ends_and_of_nothing():
+    assert list(windows(np.zeros(5, bool))) == []
+    assert [window.tolist() for window in windows(np.array([False, True, False, False]))] == [[0, 1, 2]]
+
+
+def test_pictures_are_decoded_once(monkeypatch):
+    read = []
+    frames = RECORDING.frames
+
+    def told(self, since=None):
+        for frame in frames(since):
+            read.append(frame.index)
+            yield frame
+
+    monkeypatch.setattr(type(RECORDING), "frames", told)
+    number = np.arange(40, dtype=np.int32)
+    groups = [np.array([5, 6, 7], np.int32), np.array([7, 8], np.int32), np.array([20, 21], np.int32)]
+    found = [[frame.index for frame in held] for _, held in pictured(RECORDING, number, groups)]
+    assert found == [[5, 6, 7], [7, 8], [20, 21]]
+    assert read == list(range(5, 22))
