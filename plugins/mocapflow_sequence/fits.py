@@ -39,6 +39,10 @@ class Fits:
         other = self._found.get(row)
         return Pose(root=other["root"], angles=other["angles"]) if other else self.before.pose(row)
 
+    def other(self, row: int) -> bool:
+        """Return whether a row has another fit than the track had."""
+        return row in self._found
+
     def leaps(self) -> F64:
         """Return how far (T,) m a joint of each frame is from between where it is before and after, at most.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -52,22 +52,33 @@ class SecondLook(Stage):
         checks: ViewChecks | None = None,
     ) -> Track:
         """Return the track with better fits of some frames, each with a note."""
-        model, limit = loop.model_of(scene, background), self.leap_mm / 1000
+        model, looked = loop.model_of(scene, background), np.zeros(len(track.frame), bool)
         fits = Fits(track, model.scene.body)
-        for rows, pictures in pictured(recording, track.frame, windows(fits.leaps() > limit)):
-            frames = [prepared(picture, checks, flow) for picture in pictures]
-            colours: Mapping[str, F64] | None = None
-            for place in reversed(range(len(rows) - 1)):
-                row = rows[place]
-                if fits.leaps()[row] <= limit:
-                    continue
-                if colours is None:
-                    colours = self._colours(frames[place + 1], row + 1, fits, loop, model)
-                start, parameters = fits.between(row), track.cloth_parameters[row].copy()
-                result = loop.settled(frames[place], fits.past(row, colours), model, start, parameters)
-                if self._better(result, row, fits):
-                    fits.take(row, frames[place], result)
+        while (suspect := self._leaping(fits) & ~looked).any():
+            for rows, pictures in pictured(recording, track.frame, windows(suspect)):
+                frames = [prepared(picture, checks, flow) for picture in pictures]
+                self._look(rows, frames, fits, looked, loop, model)
         return fits.track()
+
+    def _look(
+        self, rows: I32, frames: Sequence[Frame], fits: Fits, looked: Bool, loop: CoupledLoop, model: ClothedModel
+    ) -> None:
+        """Look at those rows of a window that leap, but the last one; again where a neighbour has another fit now."""
+        colours: Mapping[str, F64] | None = None
+        for row, frame, after in reversed(list(zip(rows.tolist(), frames, frames[1:], strict=False))):
+            if looked[row] or not self._leaping(fits)[row]:
+                continue
+            if colours is None:
+                colours = self._colours(after, row + 1, fits, loop, model)
+            parameters = fits.before.cloth_parameters[row].copy()
+            result = loop.settled(frame, fits.past(row, colours), model, fits.between(row), parameters)
+            looked[row] = True
+            if self._better(result, row, fits):
+                fits.take(row, frame, result)
+                looked[[row - 1, row + 1]] = fits.other(row - 1), fits.other(row + 1)
+
+    def _leaping(self, fits: Fits) -> Bool:
+        return np.asarray(fits.leaps() > self.leap_mm / 1000)
 
     def _colours(self, frame: Frame, row: int, fits: Fits, loop: CoupledLoop, model: ClothedModel) -> Mapping[str, F64]:
         """Return what a frame shows of the person's colours; a track keeps only those of its end."""

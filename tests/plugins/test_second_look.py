@@ -47,12 +47,12 @@ def fitted(pose: Pose, cost: float = 0.5) -> FrameResult:
 
 @pytest.fixture
 def looked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, Past, Pose]]:
-    """What the loop is asked for: frame, past and start. It answers with the true pose."""
+    """What the loop is asked for: frame, past and start. It answers with the true pose, which pictures like."""
     asked = []
 
     def settle(loop, frame, past, model, pose, parameters):
         asked.append((frame.index, past, pose))
-        return fitted(TRUE.pose(frame.index))
+        return fitted(TRUE.pose(frame.index), cost=0.49)
 
     monkeypatch.setattr(CoupledLoop, "settled", settle)
     return asked
@@ -79,10 +79,11 @@ def test_a_frame_that_leaps_is_fitted_again_from_between_its_neighbours(looked):
 
 
 def test_a_limb_that_was_lost_for_some_frames_is_followed_back(looked):
-    rows = range(ROW, ROW + LED)
+    rows = range(ROW, ROW + HELD + LED)  # longer than a window
     again = second_look(astray(*rows))
     np.testing.assert_array_equal(again.angles, TRUE.angles)
-    assert [index for index, *_ in looked][2:] == list(rows)[::-1]
+    indices = [index for index, *_ in looked]
+    assert set(rows) <= set(indices) and len(indices) < 2 * len(rows)
 
 
 def test_a_smooth_track_stays_as_it_is_and_no_picture_is_read(looked, monkeypatch):
