@@ -112,3 +112,40 @@ def followed(scene, begin, frames):
         found = stage.fit(frame, past, start, model, lambda *_: None, Stopwatch(TIMED)).state.estimate
         past = past.after(Moment(time=frame.time, pose=found.pose, cloth=NO_CLOTH, observed=found.observed), {})
         yield found.pose
+
+
+SPOIL = """
+from dataclasses import replace
+
+from mocapflow.components import Stage
+from mocapflow.hookspecs import hookimpl
+from mocapflow.results import Track
+from mocapflow.scene import Scene
+
+
+class Spoil(Stage):
+    name = "spoil"
+
+    def run(self, track: Track, scene: Scene) -> Track:
+        angles = track.angles.copy()
+        for joint in ("elbow_l", "knee_r"):
+            angles[4, next(k for k, name in enumerate(scene.body.screw_names) if name.startswith(joint))] += 0.5
+        return replace(track, angles=angles)
+
+
+@hookimpl
+def mocapflow_stages():
+    return [Spoil]
+"""
+
+
+@pytest.mark.long
+def test_a_frame_in_which_limbs_lie_beside_their_place_is_fitted_again(tmp_path):
+    (tmp_path / "spoil.py").write_text(SPOIL)
+    pipeline = tmp_path / "spoiled.yaml"
+    base = shipped("pipelines", "skirt.yaml")
+    pipeline.write_text(f"extends: {base}\nchange:\n  plugins: [spoil.py]\n  stages.spoil before second_look: spoil\n")
+    errors, _, told = tracked(tmp_path / "run", pipeline, "--frames", "0:8", names=[*LEGS, *ELBOWS])
+    notes = {frame["frame"]: frame.get("notes", []) for frame in told["per_frame"]}
+    assert "fitted again from between its neighbours" in notes[4]
+    assert errors[4].max() < errors[[2, 6]].max() + 2

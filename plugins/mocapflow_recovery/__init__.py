@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mocapflow.components import Recovery
+from mocapflow.components import Recovery, Stage
 from mocapflow.hookspecs import hookimpl
 
 
@@ -12,3 +12,11 @@ def mocapflow_recoveries() -> list[type[Recovery]]:
     from mocapflow_recovery.limb_search import LimbSearch
 
     return [LimbSearch]
+
+
+@hookimpl
+def mocapflow_stages() -> list[type[Stage]]:
+    """Return the stage that looks at a finished track again."""
+    from mocapflow_recovery.second_look import SecondLook
+
+    return [SecondLook]

@@ -16,9 +16,10 @@ from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, Pos
 
 from mocapflow.assets import Body
 from mocapflow.components import Recovery
-from mocapflow.data import REMEMBERED, Frame, FrameResult, FrameState, Past, Pose
+from mocapflow.data import REMEMBERED, Frame, FrameResult, FrameState, Past, Pose, Surface
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
+from mocapflow.scene import Scene
 from mocapflow.settings import PositiveOrInf
 from mocapflow_recovery.certain import View, small_room, views
 from mocapflow_recovery.disagreement import FLIES, HANGS
@@ -96,15 +97,13 @@ class LimbSearch(Recovery):
         settle: Callable[[Pose, F64], FrameResult],
     ) -> FrameResult:
         """Return the result, or a better one; see the class."""
-        background = model.scene.background
-        assert background is not None
-        room, surface = small_room(background, model.scene.cameras, self.rows), surface_of(model, result)
-        seen = views(frame, surface, room, self.near_m, garment_told(past, model.scene))
+        surface = surface_of(model, result)
+        seen = self.views(frame, surface, past, model.scene)
         if not seen:
             return noted(result, UNSEEN, doubted=True)
         if np.mean([view.known for view in seen]) < self.least_known:
             return result if past.moments else noted(result, UNKNOWN, doubted=False)
-        stray = stray_of(surface, model.scene, seen, self._reach())
+        stray = stray_of(surface, model.scene, seen, self.reach)
         doubtful, fitted = self._doubtful(stray), result.state.estimate.pose
         why = f"fit doubted, {stray}" if doubtful else self._suspicion(stray, fitted, state, past, model.scene.body)
         if not why:
@@ -114,6 +113,12 @@ class LimbSearch(Recovery):
             return noted(result, unsearched, doubted=True) if doubtful else result
         judge = self._judge(state, result, seen, past, model)
         return self._searched(frame.index, state.estimate.pose, judge.of(result), judge, why, settle)
+
+    def views(self, frame: Frame, surface: Surface, past: Past, scene: Scene) -> list[View]:
+        """Return what the views of a frame surely show around a surface, in a scene whose empty room is known."""
+        assert scene.background is not None
+        room = small_room(scene.background, scene.cameras, self.rows)
+        return views(frame, surface, room, self.near_m, garment_told(past, scene))
 
     def _searched(
         self, index: int, believed: Pose, fit: Fit, judge: Judge, why: str, settle: Callable[[Pose, F64], FrameResult]
@@ -206,7 +211,7 @@ class LimbSearch(Recovery):
         given = None if past.moments or past.after_gap else Given(state.estimate.pose, np.radians(self.start_deg))
         coarse = model.scene.simplified(self.faces)
         cloth = HANGS if given else FLIES  # where all begins, the garment's colours are not known
-        return Judge(model, coarse, seen, result.state.cloth.parameters, past, self._reach(), given, cloth)
+        return Judge(model, coarse, seen, result.state.cloth.parameters, past, self.reach, given, cloth)
 
     def _plan(self, body: Body) -> Plan:
         spread = Spread(np.radians(self.spread_deg), np.radians(self.root_spread_deg), self.root_spread_m)
@@ -216,7 +221,9 @@ class LimbSearch(Recovery):
     def _density(self) -> Density:
         return read(self.poses)
 
-    def _reach(self) -> Reach:
+    @property
+    def reach(self) -> Reach:
+        """What counts as apart."""
         return Reach(self.reach_m, self.hint_m, self.cloth_m, self.cap_m)
 
 

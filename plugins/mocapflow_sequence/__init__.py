@@ -1,4 +1,4 @@
-"""What looks at a whole sequence: the empty scene, flow, the track, the join of parts, a second look, smoothing."""
+"""What looks at a whole sequence: the empty scene, flow, the track, the join of parts, smoothing."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ def mocapflow_stages() -> list[type[Stage]]:
     from mocapflow_sequence.background import EmptyScene
     from mocapflow_sequence.flow import FollowPoints
     from mocapflow_sequence.join import Join
-    from mocapflow_sequence.second_look import SecondLook
     from mocapflow_sequence.smooth import Smooth
 
-    return [EmptyScene, CoupledLoop, FollowPoints, Join, SecondLook, Smooth]
+    return [EmptyScene, CoupledLoop, FollowPoints, Join, Smooth]

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mocapflow_sequence.fits import Fits
-from mocapflow_sequence.second_look import HELD, LED, SecondLook, pictured, windows
+from mocapflow_recovery.fits import Fits
+from mocapflow_recovery.second_look import HELD, LED, Hindsight, SecondLook, pictured, windows
 from results_scene import DEMO, demo_scene, stepping
 
 from mocapflow.config.pipeline import load_pipeline
@@ -45,6 +45,14 @@ def fitted(pose: Pose, cost: float = 0.5) -> FrameResult:
     )  # fmt: skip
 
 
+@pytest.fixture(autouse=True)
+def stray(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """Of the person off the model, cm²: in the fit that stands, and in the other one."""
+    areas = [0.0, 0.0]
+    monkeypatch.setattr(Hindsight, "strays", lambda *given: tuple(areas))
+    return areas
+
+
 @pytest.fixture
 def looked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, Past, Pose]]:
     """What the loop is asked for: frame, past and start. It answers with the true pose, which pictures like."""
@@ -59,7 +67,7 @@ def looked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, Past, Pose]]:
 
 
 def second_look(track: Track, **settings: float) -> Track:
-    return SecondLook(**settings).run(track, LOOP, RECORDING, SCENE)
+    return SecondLook(**settings).run(track, LOOP, RECORDING, SCENE, RECORDING.background())
 
 
 def test_a_frame_that_leaps_is_fitted_again_from_between_its_neighbours(looked):
@@ -100,6 +108,21 @@ def test_the_pictures_have_their_say(monkeypatch, cost, kept):
     monkeypatch.setattr(CoupledLoop, "settled", lambda *given: fitted(TRUE.pose(given[1].index), cost))
     track = astray(ROW)
     assert (second_look(track) is track) is kept
+
+
+@pytest.mark.parametrize(("areas", "kept"), [((0.0, 400.0), True), ((100.0, 0.0), False)])
+def test_what_strays_has_its_say(monkeypatch, stray, areas, kept):
+    track = astray(ROW)
+    cost = 0.5 if kept else 0.6  # of silhouettes that like the other fit, or do not
+    monkeypatch.setattr(CoupledLoop, "settled", lambda *given: fitted(TRUE.pose(given[1].index), cost))
+    stray[:] = areas
+    assert (second_look(track) is track) is kept
+
+
+def test_without_the_empty_scene_no_frame_is_looked_at(looked, caplog):
+    track = astray(ROW)
+    assert SecondLook().run(track, LOOP, RECORDING, SCENE) is track
+    assert not looked and "second_look needs the empty scene" in caplog.text
 
 
 def test_where_the_person_leapt_both_fits_are_the_same(monkeypatch):

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
 
 from mocapflow.assets import Background
 from mocapflow.components import Stage
-from mocapflow.data import Frame, FrameResult
+from mocapflow.data import Frame, FrameResult, Past, Pose
 from mocapflow.functional import image_cost
 from mocapflow.model import ClothedModel
 from mocapflow.recordings.recording import Recording
@@ -18,8 +19,11 @@ from mocapflow.records import F64, I32, Bool
 from mocapflow.results import ImageFlow, Track, ViewChecks
 from mocapflow.scene import Scene
 from mocapflow.track import CoupledLoop, prepared
-from mocapflow_sequence.fits import Fits
+from mocapflow_recovery.fits import Fits
+from mocapflow_recovery.judge import stray_of, surface_of
+from mocapflow_recovery.limb_search import LimbSearch
 
+LOG = logging.getLogger("mocapflow")
 HELD = 8  # pictures of each camera in memory
 LED = 4  # frames before a leap that may have to be looked at again as well, one by one
 
@@ -29,17 +33,19 @@ class SecondLook(Stage):
 
     A track knows only what came before. Where a limb has moved too far from one frame to the next, the fit may end
     beside it, and a frame later, begun elsewhere, lie on it again. Both neighbours together say better where the limb
-    was: the frame begins between them and is settled like any other. Of the two fits that one is kept which costs less
-    by the pictures and leaps less; where the person has leapt, both are the same.
+    was: the frame begins between them and is settled like any other. Of the two fits that one is kept which the
+    pictures like better and which leaps less; where the person has leapt, both are the same.
 
     It goes from later frames to earlier ones: a limb that was lost for some frames is found in one leap, and from there
-    each frame leads to the one before.
+    each frame leads to the one before. What the pictures surely show is measured as in `limb_search`, by its settings
+    in the track: they need the empty scene.
     """
 
     name: ClassVar[str] = "second_look"
     leap_mm: PositiveFloat = 40.0  # of a joint, from between where it is before and after: more is looked at again
     other_mm: PositiveFloat = 10.0  # of a joint, between two fits: less, and they are the same
-    leap_weight: NonNegativeFloat = 0.15  # half the leap makes up for 0.69 times this share of what the pictures cost
+    leap_weight: NonNegativeFloat = 0.1  # half the leap may cost 0.69 times this share more by the silhouettes
+    stray_weight: NonNegativeFloat = 0.002  # per cm² of the person that is off the other fit, likewise
 
     def run(
         self,
@@ -52,49 +58,67 @@ class SecondLook(Stage):
         checks: ViewChecks | None = None,
     ) -> Track:
         """Return the track with better fits of some frames, each with a note."""
+        if background is None:
+            LOG.warning("second_look needs the empty scene, which no stage before makes: no frame is looked at again")
+            return track
         model, looked = loop.model_of(scene, background), np.zeros(len(track.frame), bool)
-        fits = Fits(track, model.scene.body)
-        while (suspect := self._leaping(fits) & ~looked).any():
+        sight = Hindsight(loop, model, Fits(track, model.scene.body))
+        while (suspect := self._leaping(sight.fits) & ~looked).any():
             for rows, pictures in pictured(recording, track.frame, windows(suspect)):
-                frames = [prepared(picture, checks, flow) for picture in pictures]
-                self._look(rows, frames, fits, looked, loop, model)
-        return fits.track()
+                self._look(rows, [prepared(picture, checks, flow) for picture in pictures], looked, sight)
+        return sight.fits.track()
 
-    def _look(
-        self, rows: I32, frames: Sequence[Frame], fits: Fits, looked: Bool, loop: CoupledLoop, model: ClothedModel
-    ) -> None:
+    def _look(self, rows: I32, frames: Sequence[Frame], looked: Bool, sight: Hindsight) -> None:
         """Look at those rows of a window that leap, but the last one; again where a neighbour has another fit now."""
-        colours: Mapping[str, F64] | None = None
+        fits, colours = sight.fits, None
         for row, frame, after in reversed(list(zip(rows.tolist(), frames, frames[1:], strict=False))):
             if looked[row] or not self._leaping(fits)[row]:
                 continue
-            if colours is None:
-                colours = self._colours(after, row + 1, fits, loop, model)
-            parameters = fits.before.cloth_parameters[row].copy()
-            result = loop.settled(frame, fits.past(row, colours), model, fits.between(row), parameters)
+            colours = sight.colours(after, row + 1) if colours is None else colours
+            past = fits.past(row, colours)
+            result = sight.settled(frame, row, past, fits.between(row))
             looked[row] = True
-            if self._better(result, row, fits):
+            if self._preferred(result, row, fits, sight.strays(frame, row, past, result)):
                 fits.take(row, frame, result)
                 looked[[row - 1, row + 1]] = fits.other(row - 1), fits.other(row + 1)
 
     def _leaping(self, fits: Fits) -> Bool:
         return np.asarray(fits.leaps() > self.leap_mm / 1000)
 
-    def _colours(self, frame: Frame, row: int, fits: Fits, loop: CoupledLoop, model: ClothedModel) -> Mapping[str, F64]:
-        """Return what a frame shows of the person's colours; a track keeps only those of its end."""
-        parameters = fits.before.cloth_parameters[row].copy()
-        result = loop.settled(frame, fits.past(row, {}), model, fits.pose(row), parameters)
-        return result.state.segmentation.appearance
-
-    def _better(self, result: FrameResult, row: int, fits: Fits) -> bool:
-        """Return whether another fit of a frame is to be preferred; see the class."""
-        pose, before = result.state.estimate.pose, fits.before
+    def _preferred(self, result: FrameResult, row: int, fits: Fits, stray: tuple[float, float]) -> bool:
+        """Return whether another fit of a frame is better, by silhouettes, leaps and what strays (cm², before, now)."""
+        pose, first = result.state.estimate.pose, fits.before
         if fits.apart(row, pose) < self.other_mm / 1000:
             return False
-        cost = image_cost(before.energy[row], before.energy_terms)
+        cost = image_cost(first.energy[row], first.energy_terms)
         dearer = (image_cost(result.energy, result.energy_terms) - cost) / max(abs(cost), 1.0)
-        smoother = np.log(fits.leap(row, fits.pose(row)) / max(fits.leap(row, pose), 1e-9))
-        return bool(dearer < self.leap_weight * smoother)
+        farther = np.log(max(fits.leap(row, pose), 1e-9) / fits.leap(row, fits.pose(row)))
+        return bool(dearer + self.leap_weight * farther + self.stray_weight * (stray[1] - stray[0]) < 0)
+
+
+class Hindsight(NamedTuple):
+    """The loop that has made a track, and its fits as they stand."""
+
+    loop: CoupledLoop
+    model: ClothedModel
+    fits: Fits
+
+    def settled(self, frame: Frame, row: int, past: Past, begin: Pose) -> FrameResult:
+        """Return what the loop makes of a frame from a pose."""
+        return self.loop.settled(frame, past, self.model, begin, self.fits.cloth(row).parameters)
+
+    def colours(self, frame: Frame, row: int) -> Mapping[str, F64]:
+        """Return what a frame shows of the person's colours; a track keeps only those of its end."""
+        result = self.settled(frame, row, self.fits.past(row, {}), self.fits.pose(row))
+        return result.state.segmentation.appearance
+
+    def strays(self, frame: Frame, row: int, past: Past, result: FrameResult) -> tuple[float, float]:
+        """Return how much (cm²) of person and model are apart in the fit that stands, and in another one."""
+        finder = self.loop.recovery if isinstance(self.loop.recovery, LimbSearch) else LimbSearch()
+        surfaces = self.model.surface(self.fits.pose(row), self.fits.cloth(row)), surface_of(self.model, result)
+        seen = finder.views(frame, surfaces[0], past, self.model.scene)
+        before, now = (stray_of(surface, self.model.scene, seen, finder.reach) for surface in surfaces)
+        return before.near + before.floating, now.near + now.floating
 
 
 def windows(suspect: Bool) -> Iterator[I32]:

@@ -39,6 +39,11 @@ class Fits:
         other = self._found.get(row)
         return Pose(root=other["root"], angles=other["angles"]) if other else self.before.pose(row)
 
+    def cloth(self, row: int) -> Cloth:
+        """Return the cloth of a row as the track had it."""
+        track = self.before
+        return Cloth(vertices=np.array(track.cloth[row]), parameters=track.cloth_parameters[row].copy())
+
     def other(self, row: int) -> bool:
         """Return whether a row has another fit than the track had."""
         return row in self._found
@@ -107,10 +112,9 @@ class Fits:
 
     def _moment(self, row: int) -> Moment:
         track = self.before
-        cloth = Cloth(vertices=np.array(track.cloth[row]), parameters=track.cloth_parameters[row].copy())
         observed, doubted = track.observed[row].copy(), bool(track.doubted[row])
         time, pose = float(track.time[row]), track.pose(row)
-        return Moment(time=time, pose=pose, cloth=cloth, observed=observed, doubted=doubted)
+        return Moment(time=time, pose=pose, cloth=self.cloth(row), observed=observed, doubted=doubted)
 
 
 def _frame_of(note: str) -> int:
