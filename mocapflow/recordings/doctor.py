@@ -10,6 +10,8 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from mocapflow.assets import Camera
 from mocapflow.components import Garment
 from mocapflow.config import measures
@@ -23,10 +25,14 @@ from mocapflow.io.lenses import View
 from mocapflow.io.plates import background
 from mocapflow.io.rigs import examine_rig, examine_view
 from mocapflow.io.subjects import examine_subject
-from mocapflow.io.video import Video, count_from_first, lost_frames, open_video
+from mocapflow.io.video import Video, count_from_first, lost_frames, open_video, read_frames
 from mocapflow.recordings.first_look import examine_first_frame
 from mocapflow.recordings.synchrony import measure
 from mocapflow.registry import Registry, load_registry
+
+LOOKS = 6  # pictures of each video that are compared
+STILL = 0.05  # share of the usual change below which a video repeats one picture, give or take what a codec adds
+MOVES = 0.5  # grey levels, mean over a picture: less is no motion
 
 
 def examine(folder: Path) -> list[Finding]:
@@ -161,8 +167,8 @@ def _trial(folder: Path, calibration: Path, rig: bool = True) -> list[Finding]:
     findings += [note(text, where=folder) for text in agreement.first_warnings(whole)]
     lenses = cameras if fitted is None else fitted[0]
     findings += examine_rig(lenses) if rig else []
-    findings += [*_copies(cameras, whole), *_lost(cameras, whole)]
     length = min(video.frames for video in whole) if agreed is None else agreed[0]
+    findings += [*_copies(cameras, whole), *_lost(cameras, whole), *_stuck(cameras, whole, length)]
     if late is not None:
         delayed = [replace(video, late=frames) for video, frames in zip(whole, late, strict=True)]
         attempt(lambda: agreement.check_lateness(cameras, delayed, length, folder), findings)
@@ -193,3 +199,19 @@ def _lost(cameras: Sequence[Camera], videos: Sequence[Video]) -> Iterator[Findin
                 "the view is not used in these frames; the others keep their places",
                 video.path,
             )
+
+
+def _stuck(cameras: Sequence[Camera], videos: Sequence[Video], length: int) -> Iterator[Finding]:
+    """Yield which cameras show one picture from first to last, while most show something move."""
+    changes = [_change(video, length) for video in videos]
+    usual = float(np.median(changes))
+    for camera, video, change in zip(cameras, videos, changes, strict=True):
+        if change < STILL * usual and usual > MOVES:
+            hint = "did the camera hang? the stage check_views goes without such a view"
+            yield warning(f"{camera.name} shows one picture from first to last, the others move", hint, video.path)
+
+
+def _change(video: Video, length: int) -> float:
+    """Return by how many grey levels, on the mean, pictures spread over a video differ from its first at most."""
+    pictures = [p for p, _ in read_frames(video, range(0, length, max(length // LOOKS, 1))) if p is not None]
+    return max((float(np.abs(picture - np.float32(pictures[0])).mean()) for picture in pictures), default=0.0)

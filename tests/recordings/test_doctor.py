@@ -417,6 +417,16 @@ def test_a_video_copied_twice(good):
     assert messages(good, "warning") == ["cam01 and cam03 have the same video"]
 
 
+def test_a_video_that_repeats_one_picture(tmp_path):
+    write_recording(tmp_path, frames=8)
+    path = tmp_path / "videos" / "cam02.mp4"
+    film = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 30, (64, 48))
+    for _ in range(8):
+        film.write(np.full((48, 64, 3), 90, np.uint8))
+    film.release()
+    assert messages(tmp_path, "warning") == ["cam02 shows one picture from first to last, the others move"]
+
+
 def test_a_first_pose_that_is_null(good):
     (good / "init.json").write_text("null")
     assert errors(good) == ["not a first pose"]
