@@ -15,7 +15,7 @@ import numpy as np
 from mocapflow.assets import Camera
 from mocapflow.components import Garment
 from mocapflow.config import measures
-from mocapflow.errors import MocapflowError, UnknownComponent
+from mocapflow.errors import MocapflowError, RecordingError, UnknownComponent
 from mocapflow.io import agreement, first_pose, folders
 from mocapflow.io.cameras import find_calibration, read_cameras
 from mocapflow.io.findings import Finding, attempt, error, note, warning
@@ -27,7 +27,8 @@ from mocapflow.io.rigs import examine_rig, examine_view
 from mocapflow.io.subjects import examine_subject
 from mocapflow.io.video import Video, count_from_first, lost_frames, open_video, read_frames
 from mocapflow.recordings.first_look import examine_first_frame
-from mocapflow.recordings.synchrony import measure
+from mocapflow.recordings.recording import open_recording
+from mocapflow.recordings.synchrony import Lateness, measure
 from mocapflow.registry import Registry, load_registry
 
 LOOKS = 6  # pictures of each video that are compared
@@ -72,7 +73,7 @@ def examine_timing(folder: Path, write: bool = False) -> list[Finding]:
         write: put it into recording.json, which every run then heeds.
     """
     findings: list[Finding] = []
-    measured = attempt(lambda: measure(folder), findings)
+    measured = attempt(lambda: _measured(folder), findings)
     if measured is None:
         return findings
     findings.append(note(", ".join(f"{m.camera} {m.frames:+.1f} ± {m.sd:.1f}" for m in measured) + " frames late"))
@@ -87,6 +88,18 @@ def examine_timing(folder: Path, write: bool = False) -> list[Finding]:
     said = ", ".join(f"{camera} is {frames:.1f} frames {which}" for camera, frames, which in found)
     hint = f"write {timing_text(late)} there, or let --write do so: each frame is then taken at the same moment"
     return [*findings, warning(said, hint, folder / TIMING)]
+
+
+def _measured(folder: Path) -> list[Lateness]:
+    """Return how late each camera is.
+
+    Raises:
+        RecordingError: two have the same video, in which any lag would be found, or too little is seen by two at once.
+    """
+    recording = open_recording(folder)
+    for same in _copies(recording.lenses, recording.videos):
+        raise RecordingError(f"no lateness is measured: {same.message}", where=same.where, hint=same.hint)
+    return measure(folder)
 
 
 def _garment(folder: Path, registry: Registry) -> list[Finding]:
@@ -172,8 +185,7 @@ def _trial(folder: Path, calibration: Path, rig: bool = True) -> list[Finding]:
     if late is not None:
         delayed = [replace(video, late=frames) for video, frames in zip(whole, late, strict=True)]
         attempt(lambda: agreement.check_lateness(cameras, delayed, length, folder), findings)
-    places = [folders.keypoint_folder(folder / folders.KEYPOINTS, camera.name) for camera in cameras]
-    odd = attempt(lambda: folders.keypoint_warnings(cameras, places, length, whole[0].first), findings)
+    odd = attempt(lambda: folders.keypoint_warnings(folder, cameras, length, whole[0].first), findings)
     unused = attempt(lambda: folders.plate_warnings(folder, cameras), findings)
     findings += [warning(text, where=folder) for text in (*(odd or ()), *(unused or ()))]
     if fitted is not None and unused is not None:
