@@ -332,6 +332,8 @@ def test_an_export_leaves_what_the_run_folder_remembers(call, tmp_path):
     assert "track: from the store" in exported.stderr and "note: " not in exported.stderr
     assert Path("out", FILE).read_text() == before
     assert "\nnote " in call("status", "out").stdout
+    nothing = call("export", "out", "--format", "")
+    assert nothing.exit_code == 2 and "stages.export.formats.0: input should be 'csv', 'mot'" in nothing.stderr
 
 
 def test_paths_of_changes_start_where_the_run_was_begun(call, tmp_path, monkeypatch):
