@@ -48,8 +48,8 @@ def open_video(path: Path) -> Video:
     """Open a video file or a folder of images; only the first picture is decoded.
 
     Raises:
-        RecordingError: it is not there, nothing in it can be decoded, two images are of one frame, or they are numbered by their time
-            or far too dark.
+        RecordingError: it is not there, nothing in it can be decoded, two images are of one frame, or they are numbered
+            by their time or far too dark.
     """
     if lost := led_nowhere(path):
         raise RecordingError("there is no such video", where=str(path), hint=lost)

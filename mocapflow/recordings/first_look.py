@@ -45,7 +45,7 @@ def examine_first_frame(folder: Path, registry: Registry) -> Iterator[Finding]:
             hint = "is it the pose of frame 0, in metres, in the world of the calibration?"
             yield warning("nobody stands where the first pose says", hint, folder / first_pose.FILE)
         elif odd:
-            hint = "are calibration and video its own, or were two cameras exchanged? the other views agree with the pose"
+            hint = "are calibration and video its own, or were two cameras exchanged? the other views agree"
             yield warning(f"nobody stands where the first pose says in {', '.join(odd)}", hint, folder)
 
 

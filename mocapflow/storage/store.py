@@ -274,8 +274,9 @@ def _open(path: Path) -> Artifact | None:
         attributes = read_json(path / "zarr.json").get("attributes")
     except StoreError:
         return None
-    whole = isinstance(attributes, dict) and "key" in attributes and _counts(attributes.get("frames_done", 0))
-    return Artifact(path, attributes) if whole else None
+    if not isinstance(attributes, dict) or "key" not in attributes or not _counts(attributes.get("frames_done", 0)):
+        return None
+    return Artifact(path, attributes)
 
 
 def _counts(done: Any) -> bool:

@@ -33,9 +33,10 @@ def misgivings(track: Track, cameras: Sequence[str]) -> list[str]:
     if middle(median) < POOR:
         said.append("model and person hardly overlap in most views: look at overlay/, at the calibration and the start")
     elif begins_badly(track.overlap[0]):
+        least, most = np.nanmin(track.overlap[0]), np.nanmax(track.overlap[0])
         said.append(
-            f"the first frame fits badly, overlap {np.nanmin(track.overlap[0]):.2f} to {np.nanmax(track.overlap[0]):.2f}: "
-            "is the first pose right? look at overlay/; the model may stand turned round, its back where the face is"
+            f"the first frame fits badly, overlap {least:.2f} to {most:.2f}: is the first pose right? "
+            "look at overlay/; does it look the other way, or are left and right exchanged?"
         )
     return said
 

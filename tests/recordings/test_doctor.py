@@ -302,8 +302,11 @@ def test_keypoints_of_no_camera(tmp_path):
     [
         (lambda g: g.update(type="gown"), "garment: no garment named 'gown'", "available: cylinder, shorts, skirt"),
         (lambda g: g.update(lengths=1), "garment.lengths: unknown setting of shorts", "did you mean 'length_m'"),
-        (lambda g: g.update(strands=16), "garment.strands: unknown setting of shorts",
-         "no measure: write it in the pipeline, garment: {use: from_recording, strands: …}"),
+        (
+            lambda g: g.update(strands=16),
+            "garment.strands: unknown setting of shorts",
+            "no measure: write it in the pipeline, garment: {use: from_recording, strands: …}",
+        ),
         (lambda g: g.pop("inseam"), "garment: shorts needs inseam_m", "measures, in metres, come from"),
         (lambda g: g.update(length=48), "garment.length: input should be less than 4, not 48", "measures, in metres"),
     ],
