@@ -180,7 +180,7 @@ def _is_cut_off(path: Path) -> bool:
         file.seek(C3D_BLOCK * (head[0] - 1) + 3)
         processor = file.read(1)
     words = np.frombuffer(head, ">u2" if processor == BIG_ENDIAN else "<u2")
-    points, first, last, begin = words[[1, 3, 4, 8]].tolist()
+    points, first, last, begin = map(int, words[[1, 3, 4, 8]])
     number = 4 if head[C3D_SIGN.get(processor, 15)] & 0x80 else 2  # bytes; a scale below zero tells of floats
     least = C3D_BLOCK * (begin - 1) + (last - first + 1) * points * 4 * number
     return path.stat().st_size < max(least, C3D_BLOCK * (begin - 1) + 1)
