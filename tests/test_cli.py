@@ -134,9 +134,14 @@ def test_the_store(call):
     assert "0 results" in call("cache", "prune", "--days", "1", *store).stdout
     damaged = Path("first/store.zarr/.state/damaged-start-0")
     damaged.mkdir()
+    cut = Path("first/store.zarr/smooth-0123456789ab")
+    cut.mkdir()
+    (cut / "zarr.json").write_text('{"attributes": {"key')
+    told = call("cache", "list", *store).stdout.splitlines()
+    assert [line.split()[:2] for line in told[-2:]] == [[cut.name, "damaged;"], [damaged.name, "damaged;"]]
     pruned = call("cache", "prune", "--all", *store).stdout
     assert f"removed {name}" in pruned and f"removed {damaged.name}" in pruned
-    assert not damaged.exists()
+    assert not damaged.exists() and not cut.exists()
     assert call("cache", "list", *store).stdout == ""
 
 
@@ -327,6 +332,8 @@ def test_an_export_leaves_what_the_run_folder_remembers(call, tmp_path):
     assert "track: from the store" in exported.stderr and "note: " not in exported.stderr
     assert Path("out", FILE).read_text() == before
     assert "\nnote " in call("status", "out").stdout
+    nothing = call("export", "out", "--format", "")
+    assert nothing.exit_code == 2 and "stages.export.formats.0: input should be 'csv', 'mot'" in nothing.stderr
 
 
 def test_paths_of_changes_start_where_the_run_was_begun(call, tmp_path, monkeypatch):

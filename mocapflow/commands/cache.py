@@ -22,13 +22,17 @@ DAY = 86400  # s
 
 @app.command("list")
 def list_(store: Where = DEFAULT) -> None:
-    """List what is in the store, oldest first."""
+    """List what is in the store, oldest first, then what is damaged."""
+    from mocapflow.storage.store import Store
+
     for artifact in _artifacts(store):
         done = "complete" if artifact.complete else "unfinished"
         frames = f"{artifact.frames} frames" if artifact.frames else ""
         size = f"{_size(artifact.path) / 1e6:.1f} MB"
         made = str(artifact.attributes.get("created", ""))
         typer.echo(f"{artifact.path.name:<32} {done:<11} {frames:<12} {size:>10}  {made}")
+    for path in [*Store(store).damaged(), *Store(store).aside()]:
+        typer.echo(f"{path.name:<32} damaged; made anew where a run needs it, removed by `cache prune`")
 
 
 @app.command()
@@ -55,19 +59,18 @@ def prune(
     everything: Annotated[bool, typer.Option("--all", help="Remove all.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would be removed.")] = False,
 ) -> None:
-    """Remove results; damaged ones that were set aside always go."""
+    """Remove results; damaged ones always go."""
     from mocapflow.storage.store import Store, remove
 
     if days is not None and not days >= 0:  # so says nan, too
         raise typer.BadParameter("a number of days, 0 or more", param_hint="--days")
     kept, paths = Store(store), list[Path]()
-    for artifact in _artifacts(store):
-        if not (everything or _goes(artifact, days, unfinished)):
-            continue
-        if kept.busy(artifact.key):
-            typer.echo(f"kept {artifact.path.name}: a run is writing it", err=True)
+    chosen = [artifact.path for artifact in _artifacts(store) if everything or _goes(artifact, days, unfinished)]
+    for path in [*chosen, *kept.damaged()]:
+        if kept.busy(path.name.rpartition("-")[2]):
+            typer.echo(f"kept {path.name}: a run is writing it", err=True)
         else:
-            paths.append(artifact.path)
+            paths.append(path)
     paths += kept.aside()
     freed = sum(map(_size, paths))
     for path in paths:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
@@ -98,7 +99,7 @@ def _only_formats(pipeline: Pipeline, formats: Sequence[str]) -> list[str]:
     from mocapflow.results import Evaluation, Files
     from mocapflow.running.wiring import makes
 
-    wanted = f"[{', '.join(formats)}]"
+    wanted = json.dumps(list(formats))
     writers = [named for named in pipeline.stages if makes(named, Files | Evaluation)]
     exports = [named.label for named in writers if isinstance(named.stage, Export)]
     changes = [f"stages.{named.label}=null" for named in writers if named.label not in exports]

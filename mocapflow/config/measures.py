@@ -8,7 +8,7 @@ from typing import Any
 from mocapflow.components import Garment
 from mocapflow.config.documents import Document, Place
 from mocapflow.config.resolve import Resolver
-from mocapflow.errors import MocapflowError, PluginError, RecordingError, UnknownComponent
+from mocapflow.errors import MocapflowError, PluginError, RecordingError, UnknownComponent, guess
 from mocapflow.io.typed import place, read_json
 from mocapflow.registry import Registry
 
@@ -57,7 +57,9 @@ def garment_of(value: Any, recording: Path, resolver: Resolver) -> Garment | Non
         key = written[wrong][0] if wrong else ""
         where = place(file, key) if wrong else str(file) if recorded else error.where
         message = error.message.replace(wrong, key, 1) if wrong else error.message
-        raise type(error)(message, where=where, hint="\n".join(filter(None, [error.hint, note]))) from None
+        own = f"no measure: write it in the pipeline, garment: {{use: {FROM_RECORDING}, {key}: …}}"
+        hint = own if key and error.hint == guess(key, [key]) else error.hint
+        raise type(error)(message, where=where, hint="\n".join(filter(None, [hint, note]))) from None
 
 
 def recorded_garment(recording: Path, registry: Registry) -> Garment | None:

@@ -17,6 +17,7 @@ from mocapflow.config.named_parts import folder_of
 from mocapflow.config.resolve import Resolver
 from mocapflow.config.yamlfile import read
 from mocapflow.errors import PipelineError, RecordingError
+from mocapflow.io.paths import led_nowhere
 from mocapflow.registry import Registry, load_registry
 from mocapflow.settings import Settings
 
@@ -153,7 +154,8 @@ def load_pipeline(
     recording = recording or _recording(said, Path(path).stem, resolver)
     if not recording.is_dir():
         what = f"there is no such folder{f': {recording}' if written else ''}"
-        raise RecordingError(what, where=written or str(recording), hint="--recording DIR names another")
+        hint = "\n".join(filter(None, [led_nowhere(recording), "--recording DIR names another"]))
+        raise RecordingError(what, where=written or str(recording), hint=hint)
     if all(value is None for value in said.stages.values()):
         raise PipelineError("a pipeline needs stages", where=resolver.place(("stages",)))
     part = said.frames

@@ -31,6 +31,7 @@ if TYPE_CHECKING:  # the model asks its draper through `cloth_answers`
 
 Answer = TypeVar("Answer")
 SQUARE = 1e-6  # by how much the columns of a rotation may fail to be orthonormal
+LARGEST = 1e100  # of a residual: the square is still a number
 UNIT = 1e-3  # likewise, the square of a unit vector to be one
 
 
@@ -136,8 +137,8 @@ def residual_of(prior: Prior, pose: Pose, past: Past, scene: Scene) -> Residual:
     if said.jacobian.shape[1] < least:
         message = f"a jacobian of {said.jacobian.shape[1]} columns; (omega, v, angles) are {least}"
         raise WrongAnswer(prior, message)
-    if not (finite(said.error) and finite(said.jacobian)):
-        raise WrongAnswer(prior, "an error or a jacobian that is not finite")
+    if not (_squares(said.error) and _squares(said.jacobian)):
+        raise WrongAnswer(prior, f"an error or a jacobian that is not finite, or above {LARGEST:g}")
     if not isinstance(said.energy, float | int | np.floating) or np.isnan(said.energy):
         raise WrongAnswer(prior, f"the energy {said.energy!r}")
     return said
@@ -224,3 +225,8 @@ def array_of(component: Component, values: F64, shape: tuple[int, ...], what: st
 def finite(values: F64 | F32) -> bool:
     """Return whether all values are finite."""
     return bool(np.isfinite(values).all())
+
+
+def _squares(values: F64) -> bool:
+    """Return whether all values are finite, with squares that can be summed."""
+    return bool(np.abs(values).max(initial=0.0) <= LARGEST)

@@ -19,6 +19,7 @@ from mocapflow.io.video import Video
 
 CUT = 0.02  # share of the width or height that a video may lack against its calibration
 USUAL_RATE = 30.0  # frames per second, where nothing says it
+SLOWEST, FASTEST = 1.0, 10_000.0  # frames per second; between, somebody who moves can be filmed
 
 
 def fit_sizes(
@@ -106,10 +107,10 @@ def common_rate(cameras: Sequence[Camera], videos: Sequence[Video], calibration:
     """
     rates = {c.name: v.frame_rate for c, v in zip(cameras, videos, strict=True) if v.frame_rate}
     stated = metadata(calibration).get("frame_rate")
-    if isinstance(stated, int | float) and not isinstance(stated, bool) and 0 < stated < np.inf:
+    if isinstance(stated, int | float) and not isinstance(stated, bool) and SLOWEST <= stated <= FASTEST:
         return float(stated), []
     if stated is not None:
-        hint = "write frames per second, or leave it out: then the videos say it"
+        hint = f"write frames per second, {SLOWEST:g} to {FASTEST:g}, or leave it out: then the videos say it"
         raise RecordingError(f"frame_rate is {stated!r}", where=place(calibration, "frame_rate"), hint=hint)
     toml = calibration.name if calibration.suffix == ".toml" else "a cameras.toml, which this calibration has to become"
     told = f"frame_rate under [metadata] in {toml}"

@@ -54,7 +54,7 @@ def gather(folder: Path, calibration: Path | None) -> Parts:
     gaps = [*agreement.first_warnings(videos), *agreement.gap_warnings(cameras, videos)]
     rate, assumed = agreement.common_rate(cameras, videos, calibration)
     keypoints = tuple(keypoint_folder(folder / KEYPOINTS, camera.name) for camera in cameras)
-    odd = keypoint_warnings(cameras, keypoints, length, videos[0].first)
+    odd = keypoint_warnings(folder, cameras, length, videos[0].first)
     return Parts(
         lenses=lenses,
         videos=videos,
@@ -134,17 +134,16 @@ def keypoint_folder(place: Path, camera: str) -> Path | None:
     return next((place for place in places if place.is_dir()), None)
 
 
-def keypoint_warnings(cameras: Sequence[Camera], places: Sequence[Path | None], length: int, first: int) -> list[str]:
-    """Say what is odd about the keypoints of all cameras, for images from a number on; nothing where none has any."""
-    if not any(places):
-        return []
-    rows = [
-        odd_keypoints(camera.name, place, length, first)
-        if place
-        else [f"{camera.name}: no keypoints, though others have them"]
-        for camera, place in zip(cameras, places, strict=True)
-    ]
-    return [text for row in rows for text in row]
+def keypoint_warnings(folder: Path, cameras: Sequence[Camera], length: int, first: int) -> list[str]:
+    """Say what is odd about the keypoints of all cameras, for images from a number on; nothing where there are none."""
+    places = [keypoint_folder(folder / KEYPOINTS, camera.name) for camera in cameras]
+    unused = [path.name for path in _entries(folder / KEYPOINTS) if path.is_dir() and path not in places]
+    names = f"folders are named after their cameras: {cameras[0].name}{KEYPOINT_ENDINGS[0]}"
+    said = [f"not used from {KEYPOINTS}/: {', '.join(unused)}; {names}"] if unused else []
+    for camera, place in zip(cameras, places, strict=True) if any(places) else ():
+        missing = [f"{camera.name}: no keypoints, though others have them"]
+        said += odd_keypoints(camera.name, place, length, first) if place else missing
+    return said
 
 
 def _entries(place: Path) -> list[Path]:

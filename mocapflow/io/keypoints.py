@@ -64,7 +64,7 @@ def people_at(files: Mapping[int, Path] | None, index: int) -> F64:
 def odd_keypoints(camera: str, folder: Path, length: int, first: int = 0) -> list[str]:
     """Say what is odd about the keypoints of a camera with `length` frames; every file is read (60 us each)."""
     files = keypoint_files(folder, first)
-    broken, gaps, counts = [], [], set()
+    broken, gaps, counts, farthest = [], [], set(), 0.0
     for index, path in files.items():
         try:
             people = read_keypoints(path)
@@ -73,6 +73,7 @@ def odd_keypoints(camera: str, folder: Path, length: int, first: int = 0) -> lis
             continue
         counts |= {people.shape[1]} if len(people) else set()
         gaps += [index] if not np.isfinite(people).all() else []
+        farthest = max(farthest, float(np.nanmax(np.abs(people[..., :2]), initial=0.0)))
     beyond, missing = [i for i in files if i >= length], [i for i in range(length) if i not in files]
     faults = (
         (broken, "can't be read: nobody is seen there"),
@@ -83,4 +84,6 @@ def odd_keypoints(camera: str, folder: Path, length: int, first: int = 0) -> lis
     odd = [f"{camera}: keypoints of {name_frames(indices)} {what}" for indices, what in faults if indices]
     if len(counts) > 1:
         odd.append(f"{camera}: people with {' and with '.join(map(str, sorted(counts)))} keypoints in one folder")
+    if 0 < farthest <= 1:
+        odd.append(f"{camera}: all keypoints lie within one pixel: are they shares of the picture? expected pixels")
     return odd

@@ -16,6 +16,9 @@ from mocapflow.io.atomic import atomic_write
 from mocapflow.records import F64
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+C3D_MARK, C3D_BLOCK = 0x50, 512  # second byte of a file; bytes of a block
+BIG_ENDIAN = b"\x56"  # processor that wrote a C3D file
+C3D_SIGN = {b"\x54": 15, b"\x55": 13, BIG_ENDIAN: 12}  # byte with the sign of the header's scale, by processor
 SHIFTS = ("_tx", "_ty", "_tz")  # OpenSim's names of coordinates that are lengths, not angles
 
 
@@ -144,13 +147,16 @@ def read_c3d(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
     Times count from the start of the measurement, of which a file may hold a part.
 
     Raises:
-        RecordingError: ezc3d is not installed, the file can't be read, or its unit is unknown.
+        RecordingError: ezc3d is not installed, the file can't be read or is cut off, or its unit is unknown.
     """
     try:
         import ezc3d
     except ImportError as error:
         raise RecordingError("C3D files need ezc3d", where=str(path), hint="pip install 'mocapflow[c3d]'") from error
     try:
+        if _is_cut_off(path):  # ezc3d returns what is there of the frames; within the parameters it reads on for ever
+            hint = "copy or export it again"
+            raise RecordingError("this C3D file is cut off", where=str(path), hint=hint)
         content = ezc3d.c3d(str(path))
     except (OSError, ValueError) as error:  # the latter of one that ends before its first frame
         raise RecordingError(f"this C3D file can't be read: {error}", where=str(path)) from error
@@ -163,6 +169,21 @@ def read_c3d(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
     positions = np.moveaxis(content["data"]["points"][:3], 0, -1).swapaxes(0, 1)[:, : len(names)] * METRES[unit]
     first = int(content["header"]["points"]["first_frame"])
     return names, _seen(positions), (first + np.arange(len(positions))) / rate, rate
+
+
+def _is_cut_off(path: Path) -> bool:
+    """Return whether a C3D file is shorter than its header says: parameters, then frames of four numbers a point."""
+    with path.open("rb") as file:
+        head = file.read(18)
+        if len(head) < 18 or head[1] != C3D_MARK:  # no C3D file
+            return False
+        file.seek(C3D_BLOCK * (head[0] - 1) + 3)
+        processor = file.read(1)
+    words = np.frombuffer(head, ">u2" if processor == BIG_ENDIAN else "<u2")
+    points, first, last, begin = map(int, words[[1, 3, 4, 8]])
+    number = 4 if head[C3D_SIGN.get(processor, 15)] & 0x80 else 2  # bytes; a scale below zero tells of floats
+    least = C3D_BLOCK * (begin - 1) + (last - first + 1) * points * 4 * number
+    return path.stat().st_size < max(least, C3D_BLOCK * (begin - 1) + 1)
 
 
 def _seen(positions: F64) -> F64:

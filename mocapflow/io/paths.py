@@ -1,4 +1,4 @@
-"""Paths as OpenCV takes them."""
+"""Paths as OpenCV takes them, and links that lead nowhere."""
 
 from __future__ import annotations
 
@@ -22,3 +22,8 @@ def for_opencv(path: Path) -> str:
         hint = "rename the file or folder, or set a UTF-8 locale (LC_ALL=C.UTF-8)"
         raise MocapflowError("this path holds bytes that are no UTF-8", where=where, hint=hint) from None
     return text
+
+
+def led_nowhere(path: Path) -> str:
+    """Return what to say of a link to something that is not there, "" of any other path."""
+    return f"it is a link to {path.readlink()}, where nothing is" if path.is_symlink() and not path.exists() else ""

@@ -17,6 +17,7 @@ import numpy as np
 
 from mocapflow.errors import RecordingError
 from mocapflow.io.images import IMAGES, check_depth, check_numbers, numbered, read_image
+from mocapflow.io.paths import led_nowhere
 from mocapflow.io.stamps import grabs, number_frames, open_capture, read_stamps
 from mocapflow.records import F64, I32, U8, array, record
 
@@ -47,9 +48,11 @@ def open_video(path: Path) -> Video:
     """Open a video file or a folder of images; only the first picture is decoded.
 
     Raises:
-        RecordingError: nothing in it can be decoded, two images are of one frame, or they are numbered by their time
-            or far too dark.
+        RecordingError: it is not there, nothing in it can be decoded, two images are of one frame, or they are numbered
+            by their time or far too dark.
     """
+    if lost := led_nowhere(path):
+        raise RecordingError("there is no such video", where=str(path), hint=lost)
     if path.is_dir():
         return _open_folder(path)
     declared, rate, stamps = read_stamps(path)

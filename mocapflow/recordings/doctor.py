@@ -10,10 +10,12 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from mocapflow.assets import Camera
 from mocapflow.components import Garment
 from mocapflow.config import measures
-from mocapflow.errors import MocapflowError, UnknownComponent
+from mocapflow.errors import MocapflowError, RecordingError, UnknownComponent
 from mocapflow.io import agreement, first_pose, folders
 from mocapflow.io.cameras import find_calibration, read_cameras
 from mocapflow.io.findings import Finding, attempt, error, note, warning
@@ -23,10 +25,15 @@ from mocapflow.io.lenses import View
 from mocapflow.io.plates import background
 from mocapflow.io.rigs import examine_rig, examine_view
 from mocapflow.io.subjects import examine_subject
-from mocapflow.io.video import Video, count_from_first, lost_frames, open_video
+from mocapflow.io.video import Video, count_from_first, lost_frames, open_video, read_frames
 from mocapflow.recordings.first_look import examine_first_frame
-from mocapflow.recordings.synchrony import measure
+from mocapflow.recordings.recording import open_recording
+from mocapflow.recordings.synchrony import Lateness, measure
 from mocapflow.registry import Registry, load_registry
+
+LOOKS = 6  # pictures of each video that are compared
+STILL = 0.05  # share of the usual change below which a video repeats one picture, give or take what a codec adds
+MOVES = 0.5  # grey levels, mean over a picture: less is no motion
 
 
 def examine(folder: Path) -> list[Finding]:
@@ -66,7 +73,7 @@ def examine_timing(folder: Path, write: bool = False) -> list[Finding]:
         write: put it into recording.json, which every run then heeds.
     """
     findings: list[Finding] = []
-    measured = attempt(lambda: measure(folder), findings)
+    measured = attempt(lambda: _measured(folder), findings)
     if measured is None:
         return findings
     findings.append(note(", ".join(f"{m.camera} {m.frames:+.1f} ± {m.sd:.1f}" for m in measured) + " frames late"))
@@ -81,6 +88,18 @@ def examine_timing(folder: Path, write: bool = False) -> list[Finding]:
     said = ", ".join(f"{camera} is {frames:.1f} frames {which}" for camera, frames, which in found)
     hint = f"write {timing_text(late)} there, or let --write do so: each frame is then taken at the same moment"
     return [*findings, warning(said, hint, folder / TIMING)]
+
+
+def _measured(folder: Path) -> list[Lateness]:
+    """Return how late each camera is.
+
+    Raises:
+        RecordingError: two have the same video, in which any lag would be found, or too little is seen by two at once.
+    """
+    recording = open_recording(folder)
+    for same in _copies(recording.lenses, recording.videos):
+        raise RecordingError(f"no lateness is measured: {same.message}", where=same.where, hint=same.hint)
+    return measure(folder)
 
 
 def _garment(folder: Path, registry: Registry) -> list[Finding]:
@@ -161,13 +180,12 @@ def _trial(folder: Path, calibration: Path, rig: bool = True) -> list[Finding]:
     findings += [note(text, where=folder) for text in agreement.first_warnings(whole)]
     lenses = cameras if fitted is None else fitted[0]
     findings += examine_rig(lenses) if rig else []
-    findings += [*_copies(cameras, whole), *_lost(cameras, whole)]
     length = min(video.frames for video in whole) if agreed is None else agreed[0]
+    findings += [*_copies(cameras, whole), *_lost(cameras, whole), *_stuck(cameras, whole, length)]
     if late is not None:
         delayed = [replace(video, late=frames) for video, frames in zip(whole, late, strict=True)]
         attempt(lambda: agreement.check_lateness(cameras, delayed, length, folder), findings)
-    places = [folders.keypoint_folder(folder / folders.KEYPOINTS, camera.name) for camera in cameras]
-    odd = attempt(lambda: folders.keypoint_warnings(cameras, places, length, whole[0].first), findings)
+    odd = attempt(lambda: folders.keypoint_warnings(folder, cameras, length, whole[0].first), findings)
     unused = attempt(lambda: folders.plate_warnings(folder, cameras), findings)
     findings += [warning(text, where=folder) for text in (*(odd or ()), *(unused or ()))]
     if fitted is not None and unused is not None:
@@ -193,3 +211,19 @@ def _lost(cameras: Sequence[Camera], videos: Sequence[Video]) -> Iterator[Findin
                 "the view is not used in these frames; the others keep their places",
                 video.path,
             )
+
+
+def _stuck(cameras: Sequence[Camera], videos: Sequence[Video], length: int) -> Iterator[Finding]:
+    """Yield which cameras show one picture from first to last, while most show something move."""
+    changes = [_change(video, length) for video in videos]
+    usual = float(np.median(changes))
+    for camera, video, change in zip(cameras, videos, changes, strict=True):
+        if change < STILL * usual and usual > MOVES:
+            hint = "did the camera hang? the stage check_views goes without such a view"
+            yield warning(f"{camera.name} shows one picture from first to last, the others move", hint, video.path)
+
+
+def _change(video: Video, length: int) -> float:
+    """Return by how many grey levels, on the mean, pictures spread over a video differ from its first at most."""
+    pictures = [p for p, _ in read_frames(video, range(0, length, max(length // LOOKS, 1))) if p is not None]
+    return max((float(np.abs(picture - np.float32(pictures[0])).mean()) for picture in pictures), default=0.0)

@@ -6,8 +6,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from mocapflow.data import NO_CLOTH
 from mocapflow.errors import MocapflowError
 from mocapflow.geometry.silhouettes import covered
@@ -43,11 +41,11 @@ def examine_first_frame(folder: Path, registry: Registry) -> Iterator[Finding]:
         triples = zip(names, bodies, somebody, strict=True)
         shares = {name: seen[body].mean() for name, body, seen in triples if seen is not None and body.any()}
         odd = [name for name, share in shares.items() if share < COVERED]
-        if shares and np.median(list(shares.values())) < COVERED:
+        if len(odd) > len(shares) / 2:
             hint = "is it the pose of frame 0, in metres, in the world of the calibration?"
             yield warning("nobody stands where the first pose says", hint, folder / first_pose.FILE)
         elif odd:
-            hint = "are its calibration and its video its own? the other views agree with the pose"
+            hint = "are calibration and video its own, or were two cameras exchanged? the other views agree"
             yield warning(f"nobody stands where the first pose says in {', '.join(odd)}", hint, folder)
 
 

@@ -103,8 +103,7 @@ class Execution:
             return self._chain(step, started, lock) if step.chain else self._whole(step)
 
     def _started(self, step: Step) -> Artifact | None:
-        damaged = self._store.damaged(step.key)
-        if damaged is not None:
+        for damaged in self._store.damaged(step.key):
             self._set_aside(damaged, Corrupted("its description can't be read"))
         started = self._store.find(step.key)
         if started is not None and self._fresh:

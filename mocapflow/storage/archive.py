@@ -147,9 +147,16 @@ def _load_item(group: Any, name: str) -> Any:
 def _array(group: Any, name: str, rows: int | None) -> Any:
     if name not in group:
         return None
+    _check_rows(group[name], rows)
     values = np.asarray(group[name][:rows] if rows is not None else group[name][...])
     _check_chunks(group[name], range(values.shape[0] if values.ndim else 0))
     return values
+
+
+def _check_rows(array: Any, wanted: int | None) -> None:
+    """Raise if an array has fewer rows than its group says that there are."""
+    if wanted is not None and array.shape[0] < wanted:
+        raise Corrupted(f"{array.path} has {array.shape[0]} rows of {wanted}")
 
 
 def _check_chunks(array: Any, rows: range) -> None:
@@ -165,6 +172,7 @@ def _check_chunks(array: Any, rows: range) -> None:
 def _series(group: Any, name: str, rows: int | None) -> Series:
     """Return an array whose rows stay in the store until they are asked for; all of them are looked at once."""
     kept = group[name]
+    _check_rows(kept, rows)
     wanted = range(kept.shape[0])[:rows]
 
     def block(number: int) -> F64:

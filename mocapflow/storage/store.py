@@ -59,7 +59,8 @@ class Artifact:
     @property
     def frames(self) -> int:
         """How many frames are committed; 0 for a result that is no chain of frames."""
-        return int(self.attributes.get("frames_done", 0))
+        done: int = self.attributes.get("frames_done", 0)
+        return done
 
     @property
     def warnings(self) -> list[str]:
@@ -196,9 +197,9 @@ class Store:
         """Remove an artifact that is to be made anew."""
         remove(artifact.path)
 
-    def damaged(self, key: str) -> Path | None:
-        """Return the group of a key if even its attributes can't be read."""
-        return next((p for p in self._groups(f"*-{key[:SHORT]}") if _open(p) is None), None)
+    def damaged(self, key: str = "") -> list[Path]:
+        """Return the groups of which not even the attributes can be read, all or those of a key."""
+        return [path for path in self._groups(f"*-{key[:SHORT] or '*'}") if _open(path) is None]
 
     def _lock(self, key: str) -> Path:
         return self.state / f"{key[:SHORT]}.lock"
@@ -273,4 +274,10 @@ def _open(path: Path) -> Artifact | None:
         attributes = read_json(path / "zarr.json").get("attributes")
     except StoreError:
         return None
-    return Artifact(path, attributes) if isinstance(attributes, dict) and "key" in attributes else None
+    if not isinstance(attributes, dict) or "key" not in attributes or not _counts(attributes.get("frames_done", 0)):
+        return None
+    return Artifact(path, attributes)
+
+
+def _counts(done: Any) -> bool:
+    return type(done) is int and done >= 0  # true is no number of frames

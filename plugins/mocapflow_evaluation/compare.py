@@ -27,6 +27,7 @@ def figures(ours: F64, truth: F64, sd: F64, frame: F64, rate: float) -> dict[str
         frame: (T,) frame numbers.
         rate: frames per second.
     """
+    late = lag(ours, truth, rate)
     both = np.isfinite(ours) & np.isfinite(truth)
     ours, truth, sd, frame = ours[both], truth[both], sd[both], frame[both]
     error = ours - truth
@@ -45,7 +46,7 @@ def figures(ours: F64, truth: F64, sd: F64, frame: F64, rate: float) -> dict[str
         "max_deg": float(np.max(size)),
         "worst_frame": int(frame[np.argmax(size)]),
         "correlation": correlation(ours, truth),
-        "lag_frames": lag(ours, truth, rate),
+        "lag_frames": late,
         "coverage_90": float(np.mean(size[known] <= NINETY * sd[known])) if known.any() else np.nan,
         **agreement(error),
         "rom_deg": float(np.ptp(ours)),
@@ -117,15 +118,21 @@ def correlation(ours: F64, truth: F64) -> float:
 def lag(ours: F64, truth: F64, rate: float) -> float:
     """Return by how many frames ours comes later than the truth, to a fraction of a frame; NaN where none fits best.
 
-    It minimises the mean square of the difference without its mean, over the frames that every shift has, and
-    places the minimum by a parabola through the best shift and its neighbours.
+    It minimises the mean square of the difference without its mean, over the frames (T,) that have both at every shift,
+    and places the minimum by a parabola through the best shift and its neighbours.
     """
-    reach = min(round(ANGLE_LAG_S * rate), (len(ours) - 1) // 3)
-    if reach < 1 or np.ptp(truth) == 0 or np.ptp(ours) == 0:
+    known = np.flatnonzero(np.isfinite(ours) & np.isfinite(truth))
+    if not len(known) or np.ptp(truth[known]) == 0 or np.ptp(ours[known]) == 0:
         return np.nan
-    middle = truth[reach : len(truth) - reach]
+    ours, truth = (curve[known[0] : known[-1] + 1] for curve in (ours, truth))
+    reach = min(round(ANGLE_LAG_S * rate), (len(ours) - 1) // 3)
     shifts = np.arange(-reach, reach + 1)
-    spread = np.array([np.var(ours[reach + s : len(ours) - reach + s] - middle) for s in shifts])
+    middle = truth[reach : len(truth) - reach]
+    off = np.stack([ours[reach + s : len(ours) - reach + s] - middle for s in shifts])  # (S, T)
+    shared = np.isfinite(off).all(axis=0)
+    if reach < 1 or 3 * shared.sum() < len(known):
+        return np.nan
+    spread = off[:, shared].var(axis=1)
     best = int(np.argmin(spread))
     if spread[best] == 0:
         return float(shifts[best])

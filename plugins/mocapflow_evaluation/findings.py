@@ -11,6 +11,7 @@ from mocapflow_evaluation.cycles import Cycle
 from mocapflow_evaluation.ours import Ours
 from mocapflow_evaluation.references import Reference
 
+MOST = 10  # names in a note
 BENT = 20.0  # deg that some angle of a person who moves exceeds
 
 
@@ -19,6 +20,9 @@ def said(
 ) -> list[str]:
     """Return how the reference came to our frames, its lag, the curves it counts the other way, and the strides."""
     notes = apart_in_time(own, reference)
+    if unknown := [name for name in reference.curves if name not in own.columns]:
+        more = f" and {len(unknown) - MOST} more" if len(unknown) > MOST else ""
+        notes.append(f"not compared, for the track has no such angles: {', '.join(unknown[:MOST])}{more}")
     if not reference.by_frame and len(reference.at) > 1:
         notes.append(f"reference at {1 / reference.step:.4g} per second, interpolated at our {own.frame_rate:.4g}")
     theirs, most = (

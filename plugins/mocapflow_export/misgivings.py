@@ -11,6 +11,9 @@ from mocapflow.results import Track
 
 APART, BEHIND = 0.6, 0.2  # overlap of a view below which, and below the others by which, it shows something else
 POOR = 0.7  # median overlap of all views below which the model is not where the person is
+# overlap in a first frame: all good fits had 0.83 in the worst view or 0.85 in the median one; turned round, somebody
+# has 0.76 and 0.85 at most
+WORST, USUAL = 0.8, 0.86
 
 
 def misgivings(track: Track, cameras: Sequence[str]) -> list[str]:
@@ -29,7 +32,19 @@ def misgivings(track: Track, cameras: Sequence[str]) -> list[str]:
             )
     if middle(median) < POOR:
         said.append("model and person hardly overlap in most views: look at overlay/, at the calibration and the start")
+    elif begins_badly(track.overlap[0]):
+        least, most = np.nanmin(track.overlap[0]), np.nanmax(track.overlap[0])
+        said.append(
+            f"the first frame fits badly, overlap {least:.2f} to {most:.2f}: is the first pose right? "
+            "look at overlay/; does it look the other way, or are left and right exchanged?"
+        )
     return said
+
+
+def begins_badly(overlap: F64) -> bool:
+    """Return whether the overlaps (C,) of a first frame, NaN where unseen, are unlike those of a good start."""
+    known = overlap[np.isfinite(overlap)]
+    return len(known) > 0 and bool(known.min() < WORST and np.median(known) < USUAL)
 
 
 def overlap_medians(track: Track) -> F64:

@@ -43,18 +43,17 @@ def fit(files: Sequence[Path], body: Body, wanted: Sequence[str] = FREE, percent
     Args:
         files: recorded motions.
         body: whose joints and rest pose the angles count from.
-        wanted: angles as `joint.angle` without the side, or whole joints.
+        wanted: angles as `joint.angle`, or whole joints; without a side, of both.
         percentile: of the distances between neighbours that the bandwidth is.
 
     Raises:
         RecordingError: a file cannot be read, or the files share no wanted angle.
     """
-    takes = [chosen(read_angles(path, body), wanted) for path in files]
+    found = [read_angles(path, body) for path in files]
+    takes = [chosen(take, wanted) for take in found]
     names = tuple(name for name in body.screw_names if all(name in take for take in takes))
     if not names:
-        hint = "\n".join(
-            f"{path.name}: {', '.join(take) or 'none of them'}" for path, take in zip(files, takes, strict=True)
-        )
+        hint = "\n".join(f"{path.name}: {', '.join(take) or 'none'}" for path, take in zip(files, found, strict=True))
         raise RecordingError(f"the files share none of the angles {', '.join(wanted)}", hint=hint)
     poses = np.concatenate([np.stack([take[name] for name in names], axis=1) for take in takes])
     poses = np.unique(poses[np.isfinite(poses).all(axis=1)], axis=0)
@@ -68,8 +67,7 @@ def chosen(take: Angles, wanted: Sequence[str]) -> Angles:
 
     def sought(name: str) -> bool:
         joint, _, angle = name.partition(".")
-        joint = unsided(joint)
-        return joint in wanted or f"{joint}.{angle}" in wanted
+        return any(each in wanted for side in (joint, unsided(joint)) for each in (side, f"{side}.{angle}"))
 
     return {name: values for name, values in take.items() if sought(name)}
 

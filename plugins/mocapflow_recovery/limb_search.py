@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
@@ -17,7 +18,8 @@ from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, Pos
 from mocapflow.assets import Body
 from mocapflow.components import Recovery
 from mocapflow.data import REMEMBERED, Frame, FrameResult, FrameState, Past, Pose, Surface
-from mocapflow.model import ClothedModel
+from mocapflow.geometry.kinematics import root_position
+from mocapflow.model import ClothedModel, moved
 from mocapflow.records import F64
 from mocapflow.scene import Scene
 from mocapflow.settings import PositiveOrInf
@@ -27,6 +29,7 @@ from mocapflow_recovery.judge import Fit, Given, Judge, Reach, Stray, stray_of, 
 from mocapflow_recovery.leaps import eased, leapt, overbent
 from mocapflow_recovery.sampling import Cost, Plan, Spread, put_back, search, seen_samples, without_idle_parts
 
+LOG = logging.getLogger("mocapflow")
 CURED = 2.0  # times as far apart may be what is doubted no more: a leg lay where a skirt flew
 CLEARED = 1.1  # the same, what leaves no hint: of a foot that was lost all other limbs and the cloth tell nothing
 UNKNOWN = "too little is known of the room behind the person: limbs that are lost are not looked for"
@@ -49,7 +52,8 @@ class LimbSearch(Recovery):
     where a limb has leapt into a pose that nobody was seen in. There a part moves only if that brings person and model
     together.
     The first frame starts from a pose that was given and is about right (`start_deg`). So it is searched near that one
-    first, and of two poses that fit alike the nearer one is taken: crossed legs look the same exchanged.
+    first, and of two poses that fit alike the nearer one is taken: crossed legs look the same exchanged. Where its fit
+    is doubted, the pose is also tried turned round: a standing person looks much the same from behind.
     What shows the garment's colours calls for a search where it strays, but moves no part and is no doubt: it may fly.
     So it is searched twice, once as if cloth lay where the body holds it, which tells of legs that nobody sees, once as
     if it flew, which leads none astray; the fit that agrees better by what is skin, and a little by cloth, is taken.
@@ -130,6 +134,8 @@ class LimbSearch(Recovery):
             found = look(rng, believed, fitted, judge)
             fits.append(judge.of(settle(found, judge.parameters)))
         best = self._better(min(fits, key=lambda other: (self._doubtful(other.stray), other.apart)), fit)
+        if judge.given and doubtful:
+            best = self._or_turned(best, np.random.default_rng([index, len(fits)]), believed, judge, settle)
         if best is not fit:
             return noted(best.result, f"{why}: found again by search; then {best.stray}", self._doubtful(best.stray))
         return noted(fit.result, f"{why}: search found nothing better", doubted=True) if doubtful else fit.result
@@ -140,6 +146,22 @@ class LimbSearch(Recovery):
         if judge.given:  # where all begins, chance shall not decide
             return [self._near, partial(far, cloth=HANGS)] * self.first_looks if doubtful else [self._near]
         return [partial(far, cloth=belief) for belief in ((HANGS, FLIES) if judge.model.clothed else (HANGS,))]
+
+    def _or_turned(
+        self,
+        best: Fit,
+        rng: np.random.Generator,
+        believed: Pose,
+        judge: Judge,
+        settle: Callable[[Pose, F64], FrameResult],
+    ) -> Fit:
+        """Return a fit, or a better one of somebody who looks the other way: a first pose may be turned round."""
+        turned = turned_round(believed, judge.model.scene.body)
+        found = self._far(rng, turned, turned, judge, astray=True, cloth=HANGS)
+        other = self._better(judge.of(settle(found, judge.parameters)), best)
+        if other is not best:
+            LOG.warning("the first pose looks the other way: the person was found turned round by half a turn")
+        return other
 
     def _better(self, other: Fit, fit: Fit) -> Fit:
         """Return another fit if it is clearly nearer to the person, or free of a doubt or hint and not much farther."""
@@ -225,6 +247,12 @@ class LimbSearch(Recovery):
     def reach(self) -> Reach:
         """What counts as apart."""
         return Reach(self.reach_m, self.hint_m, self.cloth_m, self.cap_m)
+
+
+def turned_round(pose: Pose, body: Body) -> Pose:
+    """Return a pose turned by half a turn about the vertical through the root joint."""
+    turn, middle = np.array([0.0, 0.0, np.pi]), root_position(body, pose.root)
+    return moved(pose, np.concatenate([turn, -np.cross(turn, middle), np.zeros(len(pose.angles))]))
 
 
 def nearest(cost: Cost, poses: Sequence[Pose]) -> Pose:

@@ -63,6 +63,7 @@ class CheckViews(Stage):
         foreign, like = doubts.lookalike(seen.grey, room)
         good = seen.there & ~(empty | foreign)
         old = doubts.repeated(np.where(empty | foreign, np.nan, seen.news)) & doubts.peopled(seen.grey, room, good)
+        old |= np.isfinite(seen.news) & doubts.stuck(seen.news)
         settled = doubts.bridged(seen.grey, good & ~old)
         torn = doubts.bursts(settled, self.longest(frame_rate), self.jump, self.joint_jump)
         said = np.full(empty.shape, "", "U64")

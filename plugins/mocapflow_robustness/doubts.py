@@ -37,11 +37,23 @@ def lookalike(grey: F32, room: F32) -> tuple[Bool, npt.NDArray[np.intp]]:
     return others.min(axis=-1) < NEARER * own, others.argmin(axis=-1)
 
 
+def stuck(news: F64) -> Bool:
+    """Return (C,) which cameras give one picture from first to last, while the others see things move."""
+    most = np.max(news, axis=0, where=np.isfinite(news), initial=0.0)
+    same: Bool = most < NO_NEWS * np.median(usual_news(news))
+    return same
+
+
+def usual_news(news: F64) -> F64:
+    """Return the median news (C,) of each camera over the frames (T, C); 1 where none is known."""
+    known = np.isfinite(news)
+    return np.array([np.median(news[rows, camera]) if rows.any() else 1.0 for camera, rows in enumerate(known.T)])
+
+
 def repeated(news: F64) -> Bool:
     """Return (T, C) which pictures repeat the one before though at least half of the cameras see things move."""
     known = np.isfinite(news)
-    usual = np.array([np.median(news[rows, camera]) if rows.any() else 1.0 for camera, rows in enumerate(known.T)])
-    share = news / np.maximum(usual, 1e-9)
+    share = news / np.maximum(usual_news(news), 1e-9)
     moving = (known & (share > SOME_NEWS)).sum(axis=1, keepdims=True) >= 0.5 * known.sum(axis=1, keepdims=True)
     old: Bool = known & (share < NO_NEWS) & moving
     return old

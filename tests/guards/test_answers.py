@@ -111,6 +111,7 @@ def test_pairs_that_are_some():
     [
         (dict(error=np.nan), "an error or a jacobian that is not finite"),
         (dict(jacobian=-np.inf), "an error or a jacobian that is not finite"),
+        (dict(error=1e300), r"an error or a jacobian that is not finite, or above 1e\+100"),
         (dict(energy=np.nan), "the energy nan"),
         (dict(energy="0"), "the energy '0'"),
         (dict(width=WIDTH - 6), rf"a jacobian of {WIDTH - 6} columns; \(omega, v, angles\) are {WIDTH}"),

@@ -81,3 +81,10 @@ def test_everything_odd_is_said(tmp_path):
     for frame in range(3):
         write(tmp_path / f"c.{frame}.json", person())
     assert odd_keypoints("cam02", tmp_path, 3) == []
+
+
+def test_shares_of_the_picture_are_no_pixels(tmp_path):
+    write(tmp_path / "c.0.json", person() / [64, 48, 1])
+    assert odd_keypoints("cam02", tmp_path, 1) == [
+        "cam02: all keypoints lie within one pixel: are they shares of the picture? expected pixels"
+    ]

@@ -147,9 +147,11 @@ def test_c3d(tmp_path):
     np.testing.assert_allclose(read, points, atol=1e-6)
     np.testing.assert_allclose(time, np.arange(5) / 100)
     whole = path.read_bytes()
-    for broken in (b"nothing", whole[:-512]):  # the last block is that of the frames
-        path.write_bytes(broken)
-        with pytest.raises(RecordingError, match="this C3D file can't be read"):
+    broken = {b"nothing": "can't be read", whole[:700]: "is cut off", whole[:520]: "is cut off"}
+    broken |= {whole[:-512]: "is cut off", whole[: -512 + 100]: "is cut off"}  # the last block is that of the frames
+    for content, said in broken.items():
+        path.write_bytes(content)
+        with pytest.raises(RecordingError, match=f"this C3D file {said}"):
             read_c3d(path)
     made["parameters"]["POINT"]["UNITS"]["value"] = []
     made.write(str(path))

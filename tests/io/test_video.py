@@ -73,6 +73,12 @@ def test_a_truncated_mp4_can_not_be_decoded(tmp_path):
         open_video(path)
 
 
+def test_a_link_that_leads_nowhere(tmp_path):
+    (tmp_path / "a.mp4").symlink_to(tmp_path / "gone.mp4")
+    with pytest.raises(RecordingError, match=r"no such video\n       it is a link to .*gone\.mp4, where nothing is"):
+        open_video(tmp_path / "a.mp4")
+
+
 def test_gaps_in_the_time_stamps_are_lost_frames():
     period = 1000 / 30
     stamps = np.delete(np.arange(30) * period, [10, 11, 20])

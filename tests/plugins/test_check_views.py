@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mocapflow_robustness.check_views import CheckViews
 from mocapflow_robustness.corrupt import Corrupt
-from mocapflow_robustness.doubts import bridged, bursts, repeated
+from mocapflow_robustness.doubts import bridged, bursts, repeated, stuck
 from mocapflow_robustness.events import Event
 
 from mocapflow.data import Frame
@@ -90,6 +90,15 @@ def test_a_frozen_view_is_found_beside_missing_pictures(clip):
     missing = dict(what="dropped", first=5, count=8, views=["cam02"])
     told = found(clip, dict(what="frozen", first=25, count=3, views=["cam02"]), missing)
     assert set(told) == {(index, 1) for index in (25, 26, 27)}
+
+
+def test_a_view_that_shows_one_picture_from_first_to_last(clip):
+    """Its first picture may be true. What a codec adds now and then is no news."""
+    told = found(clip, dict(what="frozen", first=0, views=["cam02"]))
+    assert told == {(index, 1): "the picture repeats the one before" for index in range(1, FRAMES)}
+    news = np.random.default_rng(0).uniform(0.8, 1.2, (20, 3))
+    news[:, 1], news[::6, 1], news[0] = 0.0, 0.05, np.nan
+    assert stuck(news).tolist() == [False, True, False]
 
 
 def test_a_view_that_the_person_leaves_does_not_repeat_itself(clip, tmp_path):

@@ -85,6 +85,17 @@ def test_lag_is_recovered_to_a_tenth_of_a_frame(delay: float, noise: float) -> N
     assert compare.lag(curve(FRAMES - delay) + wobble + 5, curve(FRAMES), 30.0) == pytest.approx(delay, abs=0.1)
 
 
+def test_a_gap_in_the_reference_makes_no_lag() -> None:
+    """With the rows on both sides of the gap put together, a shift would compare frames that are a gap apart."""
+    late, truth = np.sin((FRAMES - 4) / 5), np.sin(FRAMES / 5)
+    truth[55:65] = np.nan
+    assert row(late, truth)["lag_frames"] == pytest.approx(4, abs=0.01)
+    truth[::2] = np.nan  # of half our rate
+    assert row(late, truth)["lag_frames"] == pytest.approx(4, abs=0.01)
+    late[::5] = np.nan
+    assert np.isnan(row(late, truth)["lag_frames"])  # no frame has both at every shift
+
+
 def test_lag_of_a_curve_that_does_not_move_is_unknown() -> None:
     assert np.isnan(compare.lag(np.ones(60), np.arange(60.0), 30.0))
 
@@ -140,6 +151,14 @@ def test_frames_are_matched_by_number(tmp_path: Path) -> None:
     got = evaluate(columns_only(ours), tmp_path / "t.csv", tmp_path).rows[0]
     assert (got["frames"], got["rms_deg"]) == (2, 1.0)
     assert (tmp_path / layout.EVALUATION).read_text().startswith("angle,frames,rms_deg")
+
+
+@pytest.mark.usefixtures("unrendered")
+def test_columns_that_are_no_angles_of_ours_are_named(tmp_path: Path) -> None:
+    ours = {"frame": np.arange(10.0), "time": np.arange(10) / 30, "knee_flexion_l": 10 * np.arange(10.0)}
+    tables.write_columns(tmp_path / "t.csv", {**ours, "Knee_L": np.zeros(10), "knee_flexion_l_sd": np.ones(10)})
+    notes = evaluate(columns_only(ours), tmp_path / "t.csv", tmp_path).notes
+    assert "not compared, for the track has no such angles: Knee_L" in notes
 
 
 def run_folder(path: Path) -> RunFolder:

@@ -31,6 +31,16 @@ def test_a_model_that_is_not_there():
     assert said.startswith("model and person hardly overlap")
 
 
+def test_a_first_frame_that_fits_badly():
+    """Somebody who stands turned round overlaps so: knees, feet and elbows lie on the wrong side."""
+    later = np.tile([0.93, 0.9, 0.95, 0.92], (7, 1))
+    begun = replace(TRACK, overlap=np.vstack([[0.76, 0.88, np.nan, 0.82], later]))
+    (said,) = misgivings(begun, NAMES)
+    assert said.startswith("the first frame fits badly, overlap 0.76 to 0.88: is the first pose right?")
+    hidden = np.vstack([[0.61, 0.9, 0.86, 0.93], later])  # something stands before the person in one view
+    assert misgivings(replace(TRACK, overlap=hidden), NAMES) == []
+
+
 def test_lost_and_doubted_frames_are_counted():
     known = TRACK.iterations.copy()
     known[2] = 0

@@ -15,7 +15,7 @@ from mocapflow_recovery.certain import shrunk, small_room, views
 from mocapflow_recovery.disagreement import FLIES, HANGS, distance, floating_area, uncovered_areas
 from mocapflow_recovery.judge import Fit, Given, Stray
 from mocapflow_recovery.leaps import eased, leapt
-from mocapflow_recovery.limb_search import LimbSearch
+from mocapflow_recovery.limb_search import LimbSearch, turned_round
 from mocapflow_recovery.sampling import Plan, Spread, parts, put_back, samples, search, seen_samples, without_idle_parts
 
 from mocapflow.data import NO_CLOTH, Past, Pose
@@ -309,10 +309,10 @@ def test_limbs_are_looked_for_where_enough_of_the_room_is_known(columns, looked)
 
 @pytest.mark.parametrize(
     ("past", "end", "times"),
-    [(Past(), 0.9, 4), (Past(), 0.0, 1), (scenes.tiny_past(SCENE, POSE), 0.9, 1)],
+    [(Past(), 0.9, 5), (Past(), 0.0, 1), (scenes.tiny_past(SCENE, POSE), 0.9, 1)],
     ids=["doubted", "not doubted", "a later frame"],
 )
-def test_a_first_frame_that_is_doubted_is_searched_twice(past, end, times) -> None:
+def test_a_first_frame_that_is_doubted_is_searched_twice_and_turned_round(past, end, times) -> None:
     begun, lost = [], pictures.tiny_state(SCENE, astray(end), POSE)
 
     def settle(pose, parameters):
@@ -321,6 +321,21 @@ def test_a_first_frame_that_is_doubted_is_searched_twice(past, end, times) -> No
 
     LimbSearch().recover(FRAME, lost, settled(lost), past, scenes.tiny_model(SCENE), settle)
     assert len(begun) == times
+
+
+def test_a_first_pose_that_looks_the_other_way_is_turned_round(caplog) -> None:
+    change = np.zeros(len(POSE.angles))
+    change[SCENE.body.screw_names.index("knee_l.flexion")] = 1.2  # of no other pose: no knee bends forward
+    true = Pose(root=POSE.root, angles=POSE.angles + change)
+    start = pictures.tiny_state(SCENE, turned_round(true, SCENE.body), true)
+
+    def settle(pose, parameters):
+        return settled(pictures.tiny_state(SCENE, pose, true))
+
+    frame, model = pictures.tiny_frame(SCENE, true), scenes.tiny_model(SCENE)
+    found = LimbSearch().recover(frame, start, settled(start), Past(), model, settle).state.estimate.pose
+    assert "the first pose looks the other way" in caplog.text
+    np.testing.assert_allclose(found.root[:3, :3], true.root[:3, :3], atol=0.2)
 
 
 def test_a_doubt_that_is_cured_is_gain_enough(monkeypatch) -> None:

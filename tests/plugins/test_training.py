@@ -209,6 +209,12 @@ def test_what_is_learned_is_not_written_over_a_recording(tmp_path: Path, out: st
     assert isinstance(said.exception, PipelineError) or "a .npz that is none of FILES" in said.output
 
 
+@pytest.mark.parametrize("wanted", ["knee_l.flexion", "knee_l"])
+def test_an_angle_of_one_side(body: Body, tmp_path: Path, wanted: str) -> None:
+    (tmp_path / "knees.csv").write_text("frame,knee_flexion_l,knee_flexion_r\n0,10,9\n1,20,8\n")
+    assert training.fit([tmp_path / "knees.csv"], body, [wanted]).names == ("knee_l.flexion",)
+
+
 def test_errors(body: Body, tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"no kind of file with joint angles\n.*known: \.bvh, \.csv, \.mot, \.npz"):
         training.read_angles(tmp_path / "take.txt", body)
@@ -217,3 +223,6 @@ def test_errors(body: Body, tmp_path: Path) -> None:
     (tmp_path / "empty.csv").write_text("frame,time\n0,0\n")
     with pytest.raises(RecordingError, match=r"the files share none of the angles hip"):
         training.fit([tmp_path / "empty.csv"], body)
+    (tmp_path / "knee.csv").write_text("frame,knee_flexion_l\n0,10\n1,20\n")
+    with pytest.raises(RecordingError, match=r"none of the angles kne\n *knee\.csv: knee_l\.flexion"):
+        training.fit([tmp_path / "knee.csv"], body, ["kne"])

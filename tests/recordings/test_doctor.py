@@ -12,7 +12,7 @@ from mocapflow_garments.shorts import Shorts
 
 from mocapflow.geometry import twists
 from mocapflow.io.cameras import write_cameras
-from mocapflow.recordings.doctor import examine
+from mocapflow.recordings.doctor import examine, examine_timing
 from tests.fixtures.recordings import avi_frames, look_at, ring, write_recording, write_video
 
 DEMO = Path(__file__).parents[2] / "examples" / "data"
@@ -289,11 +289,24 @@ def test_keypoints_with_nan(tmp_path):
     ]
 
 
+def test_keypoints_of_no_camera(tmp_path):
+    write_recording(tmp_path, frames=2)
+    (tmp_path / "keypoints" / "camera1").mkdir(parents=True)
+    assert messages(tmp_path, "warning") == [
+        "not used from keypoints/: camera1; folders are named after their cameras: cam01_json"
+    ]
+
+
 @pytest.mark.parametrize(
     ("change", "message", "hint"),
     [
         (lambda g: g.update(type="gown"), "garment: no garment named 'gown'", "available: cylinder, shorts, skirt"),
         (lambda g: g.update(lengths=1), "garment.lengths: unknown setting of shorts", "did you mean 'length_m'"),
+        (
+            lambda g: g.update(strands=16),
+            "garment.strands: unknown setting of shorts",
+            "no measure: write it in the pipeline, garment: {use: from_recording, strands: …}",
+        ),
         (lambda g: g.pop("inseam"), "garment: shorts needs inseam_m", "measures, in metres, come from"),
         (lambda g: g.update(length=48), "garment.length: input should be less than 4, not 48", "measures, in metres"),
     ],
@@ -415,6 +428,19 @@ def test_a_first_pose_that_cameras_do_not_see(good):
 def test_a_video_copied_twice(good):
     shutil.copy(good / "videos" / "cam01.mp4", good / "videos" / "cam03.mp4")
     assert messages(good, "warning") == ["cam01 and cam03 have the same video"]
+    (finding,) = examine_timing(good, write=True)
+    assert finding.message == "no lateness is measured: cam01 and cam03 have the same video"
+    assert not (good / "recording.json").exists()
+
+
+def test_a_video_that_repeats_one_picture(tmp_path):
+    write_recording(tmp_path, frames=8)
+    path = tmp_path / "videos" / "cam02.mp4"
+    film = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 30, (64, 48))
+    for _ in range(8):
+        film.write(np.full((48, 64, 3), 90, np.uint8))
+    film.release()
+    assert messages(tmp_path, "warning") == ["cam02 shows one picture from first to last, the others move"]
 
 
 def test_a_first_pose_that_is_null(good):

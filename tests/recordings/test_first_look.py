@@ -29,12 +29,18 @@ def test_a_good_recording_has_nothing_odd_nor_one_without_plates_or_pose(clip):
     assert said(clip) == []
 
 
-def test_videos_of_two_cameras_that_are_exchanged(clip):
-    one, other, aside = (clip / "videos" / f"{name}.mp4" for name in ("cam01", "cam02", "aside"))
+def exchange(folder, ending):
+    one, other, aside = (folder / f"{name}.{ending}" for name in ("cam01", "cam02", "aside"))
     one.rename(aside)
     other.rename(one)
     aside.rename(other)
+
+
+def test_videos_of_two_cameras_that_are_exchanged(clip):
+    exchange(clip / "videos", "mp4")
     assert said(clip) == ["the first frame of cam01, cam02 is not of the room in its clean plate"]
+    exchange(clip / "background", "png")
+    assert said(clip) == ["nobody stands where the first pose says in cam01, cam02"]
 
 
 def test_a_first_pose_where_nobody_stands(clip):

@@ -277,7 +277,7 @@ def test_frame_0_is_the_first_image_that_any_camera_has(tmp_path, first):
     np.testing.assert_allclose([frame.keypoints[1][0, 0, 0] for frame in frames], [10, 11, 12, 13])
 
 
-@pytest.mark.parametrize("rate", ["'thirty'", "0", "-30.0", "nan", "true"])
+@pytest.mark.parametrize("rate", ["'thirty'", "0", "-30.0", "nan", "true", "1e9", "1e-3"])
 def test_a_frame_rate_that_is_none(tmp_path, rate):
     write_recording(tmp_path, frames=2)
     with (tmp_path / "cameras.toml").open("a") as file:

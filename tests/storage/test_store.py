@@ -408,6 +408,23 @@ def test_a_half_done_track_whose_files_are_missing_is_made_anew(tmp_path, path, 
     assert same(whole, the_track(tmp_path))
 
 
+@pytest.mark.parametrize(
+    ("done", "told"),
+    [
+        (8, "damaged and written anew from its frames: frame has 4 rows of 8"),
+        *((done, "damaged and made anew: its description can't be read") for done in ("x", -1, True, None)),
+    ],
+)
+def test_a_count_of_frames_that_is_not_true(tmp_path, path, done, told):
+    run_tiny(path, tmp_path, frames=4)
+    (group,) = (tmp_path / "store.zarr").glob("track-*")
+    meta = rows.read_json(group / "zarr.json")
+    rows.write_json(group / "zarr.json", meta | {"attributes": meta["attributes"] | {"frames_done": done}})
+    _, lines = run_tiny(path, tmp_path, frames=8)
+    assert any(told in line for line in lines), lines
+    assert len(the_track(tmp_path).frame) == 8
+
+
 @pytest.fixture
 def unsafe(monkeypatch):
     """The files of a track that a power loss would take: written, but not known to be on the drive."""
