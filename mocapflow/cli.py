@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import os
 import shlex
-import signal
 import sys
 import warnings
 from collections.abc import Callable
@@ -16,8 +15,10 @@ import typer
 import typer.core
 
 from mocapflow.commands import cache, comparing, looking, new, prior, results, running
-from mocapflow.errors import MocapflowError, interrupted, uncompilable, unwritable
+from mocapflow.errors import MocapflowError, uncompilable, unwritable
+from mocapflow.interrupts import Interrupts, interrupted
 
+INTERRUPTED = 130  # the exit status
 QUIET = {"OPENCV_LOG_LEVEL": "ERROR", "OPENCV_FFMPEG_LOGLEVEL": "-8"}  # what can't be decoded is told by mocapflow
 
 
@@ -33,7 +34,7 @@ class Commands(typer.core.TyperGroup):
                 words = [word for word in sys.argv[1:] if word != "--fresh"]  # it would remove what is saved
                 again = shlex.join(["mocapflow", *words])
                 typer.echo(f"\ninterrupted; finished frames are saved. To go on: {again}", err=True)
-                raise typer.Exit(130) from None
+                raise typer.Exit(INTERRUPTED) from None
             said = unwritable(error) if isinstance(error, OSError) else uncompilable(error) or error
             if not isinstance(said, MocapflowError):
                 raise
@@ -96,8 +97,15 @@ def main() -> None:
     warned = logging.StreamHandler(sys.stderr)
     warned.setLevel(logging.WARNING)  # of the handler: libraries lower that of their own loggers
     logging.basicConfig(format="warning: %(message)s", handlers=[warned])
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # a scheduler's way of saying Ctrl-C
-    app(prog_name="mocapflow")
+    Interrupts().install()
+    try:
+        app(prog_name="mocapflow")
+    except SystemExit as end:
+        if end.code == INTERRUPTED:
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(INTERRUPTED)  # libraries that were cut off in the middle may crash on their way out
+        raise
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:

@@ -84,15 +84,6 @@ def uncompilable(error: BaseException) -> MocapflowError | None:
     return MocapflowError("compiled code can be kept neither beside its source nor in a home folder", hint=hint)
 
 
-def interrupted(error: BaseException | None) -> bool:
-    """True where Ctrl-C is behind an error: compiled code that it falls into raises a SystemError of its own."""
-    while error is not None:
-        if isinstance(error, KeyboardInterrupt):
-            return True
-        error = error.__cause__ or error.__context__
-    return False
-
-
 class ComponentFailed(MocapflowError):
     """A component raised while a run was going on."""
 

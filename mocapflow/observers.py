@@ -8,7 +8,7 @@ from typing import Any
 import pluggy
 
 from mocapflow.data import FrameResult, FrameState
-from mocapflow.errors import interrupted
+from mocapflow.interrupts import interrupted
 
 LOG = logging.getLogger("mocapflow.observers")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mocapflow.data import Flow, Frame, Pose, blind
+from mocapflow.data import Flow, Frame, FrameResult, Pose, blind
 from mocapflow.records import F32, F64, I16, I32, Bool, Watch, array, record, unwatched
 from mocapflow.series import Wide
 
@@ -102,6 +102,20 @@ class Track:
     def pose(self, row: int) -> Pose:
         """Return the pose of one row."""
         return Pose(root=self.root[row].copy(), angles=self.angles[row].copy())
+
+
+def values_of(frame: Frame, result: FrameResult, steps: Sequence[str]) -> dict[str, Any]:
+    """Return all numbers of a frame by the names of their columns; the covariance is that of the pose."""
+    estimate, rank = result.state.estimate, 6 + len(result.state.estimate.pose.angles)
+    return {
+        "frame": frame.index, "time": frame.time, "root": estimate.pose.root, "angles": estimate.pose.angles,
+        "cloth_parameters": result.state.cloth.parameters, "iterations": result.iterations, "steady": result.steady,
+        "oscillating": result.oscillating, "doubted": result.doubted, "body_change": result.change.body,
+        "cloth_change": result.change.cloth, "angle_change": result.change.angles, "usable": frame.usable,
+        "overlap": result.overlap,
+        "seconds": [result.seconds.get(step, 0.0) for step in steps], "match_count": len(result.state.matches.weight),
+        "energy": result.energy, "observed": estimate.observed, "covariance": estimate.covariance[:rank, :rank],
+    }  # fmt: skip
 
 
 def frame_rate_of(time: F64) -> float:

@@ -18,6 +18,7 @@ ROOT = Path(mocapflow.__file__).parent
 PLUGINS = ROOT.parent / "plugins"
 LAYERS = (  # a module imports only from its own layer or an earlier one; in a folder there is no circle
     "errors",
+    "interrupts",
     "memo",
     "series",
     "records",

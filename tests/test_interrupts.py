@@ -1,15 +1,18 @@
 """The real command line while it runs: asked from elsewhere, stopped by Ctrl-C or a scheduler, and gone on with."""
 
+import contextlib
 import os
 import re
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
 from mocapflow.commands.progress import FILE, last_word
+from mocapflow.interrupts import Interrupts, check, interrupted
 from tests.fixtures.stores import run_tiny, same, the_track, write_pipeline, write_recording
 
 MOCAPFLOW = Path(sys.executable).with_name("mocapflow")
@@ -76,3 +79,29 @@ def test_no_run_no_last_word(tmp_path):
     assert last_word(tmp_path) == ""
     (tmp_path / FILE).write_text("{")
     assert last_word(tmp_path) == ""
+
+
+@pytest.fixture
+def listening(heard):
+    before = signal.getsignal(signal.SIGTERM)
+    Interrupts().install()
+    yield
+    signal.signal(signal.SIGTERM, before)
+
+
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM], ids=["ctrl_c", "terminated"])
+def test_an_interrupt_that_compiled_code_swallowed_is_heard_at_the_next_frame(listening, stop):
+    check()
+    assert not interrupted(RuntimeError())
+    with contextlib.suppress(KeyboardInterrupt):  # as a callback of a library does
+        os.kill(os.getpid(), stop)
+        time.sleep(1)
+    with pytest.raises(KeyboardInterrupt):
+        check()
+    assert interrupted(RuntimeError("no compiled object yet"))
+
+
+def test_what_ignores_ctrl_c_goes_on_to(listening):
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    Interrupts().install()
+    assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN

@@ -21,10 +21,10 @@ from mocapflow.errors import (
     PluginError,
     ShapeError,
     StoreError,
-    interrupted,
     unwritable,
 )
 from mocapflow.guards.answers import WrongAnswer
+from mocapflow.interrupts import interrupted
 from mocapflow.registry import Registry
 
 LOG = "failed.log"  # in the run folder, the traceback of the last failure

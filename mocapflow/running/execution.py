@@ -17,6 +17,7 @@ from mocapflow.data import FrameResult
 from mocapflow.errors import GarmentError
 from mocapflow.guards.answers import of_kind
 from mocapflow.guards.cloth_answers import body_of, mesh_of
+from mocapflow.interrupts import check
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import unwatched
 from mocapflow.results import RunFolder
@@ -54,6 +55,7 @@ class Execution:
         self._fresh, self._report = fresh, report
         self._results: dict[str, Any] = {}
         self._scenes: dict[tuple[str | None, str | None], Scene] = {}
+        self._other: dict[str, list[str]] = {}  # per stage, what other versions have made
         self.entries: dict[str, Mapping[str, Any]] = {}  # per finished stage
 
     def finish(self, step: Step) -> None:
@@ -157,6 +159,7 @@ class Execution:
     def _run(self, step: Step, checkpoint: Checkpoint | None = None) -> Any:
         inputs = {name: self._input(step, source, checkpoint) for name, source in step.sources.items()}
         self._report(f"{step.label}: running {step.named.stage.name}")
+        check()
         cpu, wall, stage = time.process_time(), time.perf_counter(), step.named.stage
         with warnings_logged() as said, self._blaming(stage, checkpoint):
             if checkpoint is not None:
@@ -226,7 +229,8 @@ class Execution:
             said = found.warnings
             for warning in said:
                 self._report(f"warning: {warning}")
-        entry = {"label": step.label, "key": step.key, "cached": found is not None, "warnings": list(said)}
+        warnings = [*said, *self._other.get(step.label, ())]
+        entry = {"label": step.label, "key": step.key, "cached": found is not None, "warnings": warnings}
         self.entries[step.label] = {**entry, "seconds": cpu, "wall_seconds": wall}
         self._pipeline.registry.observers.stage_done(step.label, step.key, found is not None)
 
@@ -243,13 +247,14 @@ class Execution:
         }
 
     def _warn_of_versions(self, step: Step, artifact: Artifact) -> None:
-        now, frames, first = versions(), step.recording.indices, 0
+        now, frames, first, said = versions(), step.recording.indices, 0, self._other.setdefault(step.label, [])
         for last, made in artifact.made_with:
             other = [f"{name} {was}, now {now.get(name)}" for name, was in made.items() if now.get(name) != was]
             if other:
                 begin, end = (frames.start + frames.step * count for count in (first, last - 1))
                 what = f"frames {begin}–{end} of {step.label}" if step.chain else step.label
-                self._report(f"warning: {what} were made with {'; '.join(other)}")
+                said.append(f"{what} were made with {'; '.join(other)}")
+                self._report(f"warning: {said[-1]}")
             first = last
 
     def _set_aside(self, path: Path, error: Corrupted) -> None:

@@ -25,6 +25,7 @@ from mocapflow.data import (
     Pose,
     Turn,
 )
+from mocapflow.interrupts import check
 from mocapflow.io.atomic import forget_parts
 from mocapflow.records import F64
 from mocapflow.results import Track
@@ -137,6 +138,7 @@ class Checkpoint:
             StoreError: the store is full or can't be written; the frames before this one are saved.
             RecordingError: what the frames are made from has changed since the run began.
         """
+        check()  # whether somebody wants to stop
         state, row = result.state, self.done
         appearance = _plain(state.segmentation.appearance or past.appearance)
         if self._lock is not None:

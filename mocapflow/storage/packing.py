@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import prod
-from typing import Any
 
 import numba
 import numpy as np
@@ -12,6 +11,7 @@ import numpy.typing as npt
 
 from mocapflow.data import Frame, FrameResult, Matches, Silhouette
 from mocapflow.records import F32, F64
+from mocapflow.results import values_of
 
 FINE = 8  # steps per px of a stored silhouette
 UNSEEN = -128  # stored where a view has no silhouette
@@ -36,20 +36,6 @@ def columns_of(result: FrameResult, cameras: int) -> Columns:
         "angle_change": (), "usable": (cameras,), "overlap": (cameras,), "seconds": (len(result.seconds),),
         "match_count": (), "energy": result.energy.shape,
         "observed": (angles,), "covariance": (6 + angles, 6 + angles),
-    }  # fmt: skip
-
-
-def values_of(frame: Frame, result: FrameResult, steps: Sequence[str]) -> dict[str, Any]:
-    """Return all numbers of a frame by the names of their columns; the covariance is that of the pose."""
-    estimate, rank = result.state.estimate, 6 + len(result.state.estimate.pose.angles)
-    return {
-        "frame": frame.index, "time": frame.time, "root": estimate.pose.root, "angles": estimate.pose.angles,
-        "cloth_parameters": result.state.cloth.parameters, "iterations": result.iterations, "steady": result.steady,
-        "oscillating": result.oscillating, "doubted": result.doubted, "body_change": result.change.body,
-        "cloth_change": result.change.cloth, "angle_change": result.change.angles, "usable": frame.usable,
-        "overlap": result.overlap,
-        "seconds": [result.seconds.get(step, 0.0) for step in steps], "match_count": len(result.state.matches.weight),
-        "energy": result.energy, "observed": estimate.observed, "covariance": estimate.covariance[:rank, :rank],
     }  # fmt: skip
 
 

@@ -13,9 +13,8 @@ from mocapflow.data import REMEMBERED, Cloth, Frame, FrameResult, Moment, Past, 
 from mocapflow.geometry import kinematics
 from mocapflow.model import increment_between, moved
 from mocapflow.records import F64, array_fields
-from mocapflow.results import Track
+from mocapflow.results import Track, values_of
 from mocapflow.series import overwritten
-from mocapflow.storage.packing import values_of
 
 AGAIN = "fitted again from between its neighbours"
 KEPT = ("frame", "time", "usable", "doubted", "seconds", "raw_root", "raw_angles")  # of the first fit

@@ -655,10 +655,12 @@ def test_other_versions_are_told(tmp_path, path, monkeypatch):
     run_tiny(path, tmp_path, frames=5)
     for module in (store, execution):
         monkeypatch.setattr(module, "versions", lambda: real | {"numpy": "9.9"})
-    _, lines = run_tiny(path, tmp_path)
-    assert f"warning: frames 0–4 of track were made with numpy {real['numpy']}, now 9.9" in lines
-    _, again = run_tiny(path, tmp_path)  # all done: the mixture is still told
-    assert f"warning: frames 0–4 of track were made with numpy {real['numpy']}, now 9.9" in again
+    said = f"frames 0–4 of track were made with numpy {real['numpy']}, now 9.9"
+    for _ in range(2):  # gone on with, then all done: the mixture is still told
+        summary, lines = run_tiny(path, tmp_path)
+        assert f"warning: {said}" in lines
+        (track,) = [stage for stage in summary.stages if stage["label"] == "track"]
+        assert track["warnings"] == [said]  # in run.json, too
     for module in (store, execution):
         monkeypatch.setattr(module, "versions", lambda: real | {"numpy": "10"})
     _, lines = run_tiny(path, tmp_path)
