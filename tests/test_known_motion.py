@@ -78,7 +78,7 @@ def test_scripted_motions_stand_on_the_floor():
         lowest = made.skin(body, motion, body.main("ankle", "toe"))[..., 2].min(1)
         assert np.abs(lowest).max() < 0.02
         knees = made.angles(body, made.chain(body, motion)[1])["knee_flexion_l"]
-        assert np.ptp(knees) > 15  # least in jumping jacks
+        assert np.ptp(knees) > 14  # least with the hands on the hips
 
 
 def test_start_is_disturbed_by_four_degrees_and_the_same_each_time():
