@@ -161,3 +161,8 @@ def test_a_file_that_is_no_text(folder):
     Path("picture.yaml").write_bytes(b"\xff\xd8\xff")
     with pytest.raises(PipelineError, match="picture.yaml  is not UTF-8 text"):
         read(Path("picture.yaml"))
+
+
+def test_a_folder_without_any_file_is_said_to_have_none(tmp_path):
+    with pytest.raises(PipelineError, match=rf"there is no such file\n +{tmp_path} has no YAML file at all"):
+        read(tmp_path / "skirt.yaml")
