@@ -5,6 +5,8 @@ from __future__ import annotations
 import signal
 from types import FrameType
 
+HEARD = (signal.SIGINT, signal.SIGTERM)
+
 
 class Interrupts:
     """What to do at a signal: raise as Python does, and remember it."""
@@ -19,7 +21,7 @@ class Interrupts:
 
     def install(self) -> None:
         """Listen to Ctrl-C, and to SIGTERM, a scheduler's way of saying it; in the background Ctrl-C stays ignored."""
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in HEARD:
             if signal.getsignal(number) is not signal.SIG_IGN:
                 signal.signal(number, self)
 
@@ -40,5 +42,5 @@ def interrupted(error: BaseException | None) -> bool:
 
 
 def _asked() -> bool:
-    handler = signal.getsignal(signal.SIGTERM)
-    return isinstance(handler, Interrupts) and handler.asked
+    handlers = (signal.getsignal(number) for number in HEARD)
+    return any(isinstance(handler, Interrupts) and handler.asked for handler in handlers)

@@ -105,6 +105,7 @@ class CoupledLoop(Stage):
             self._refuse(rest for rest in checkpoint.rests() if rest[0] in recording.indices)
         past, watch = checkpoint.past(), Stopwatch(TIMED)
         for raw in recording.frames(since=checkpoint.next_index):
+            # `frame` is what failures are told of: here it would still be the one before
             picture = prepared(raw, checks, flow)
             watch.lap("decode")
             result = able.fit(picture, past, start, model, checkpoint.observe, watch)

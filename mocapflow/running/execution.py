@@ -55,7 +55,6 @@ class Execution:
         self._fresh, self._report = fresh, report
         self._results: dict[str, Any] = {}
         self._scenes: dict[tuple[str | None, str | None], Scene] = {}
-        self._other: dict[str, list[str]] = {}  # per stage, what other versions have made
         self.entries: dict[str, Mapping[str, Any]] = {}  # per finished stage
 
     def finish(self, step: Step) -> None:
@@ -133,9 +132,9 @@ class Execution:
         if started is None or not started.frames:
             return self._run(step, self._checkpoint(step, self._store.begin(step.label, step.key, step.recipe), lock))
         self._report(f"{step.label}: going on after {started.frames} frames")
-        self._warn_of_versions(step, started)
+        mixed = self._warned_of_versions(step, started)
         try:
-            return self._run(step, self._checkpoint(step, with_versions(started), lock))
+            return self._run(step, self._checkpoint(step, with_versions(started), lock), mixed)
         except Corrupted as error:
             self._set_aside(started.path, error)
             return self._chain(step, None, lock)
@@ -156,7 +155,7 @@ class Execution:
             iteration_done=observers.iteration_done, frame_done=frame_done,
         )  # fmt: skip
 
-    def _run(self, step: Step, checkpoint: Checkpoint | None = None) -> Any:
+    def _run(self, step: Step, checkpoint: Checkpoint | None = None, mixed: Sequence[str] = ()) -> Any:
         inputs = {name: self._input(step, source, checkpoint) for name, source in step.sources.items()}
         self._report(f"{step.label}: running {step.named.stage.name}")
         check()
@@ -167,7 +166,7 @@ class Execution:
             value = of_kind(stage, stage.run(**inputs), made_by(step.named))
             self._store.digests.check_inputs()
         told = said if checkpoint is None else checkpoint.warnings
-        self._entered(step, None, time.process_time() - cpu, time.perf_counter() - wall, told)
+        self._entered(step, None, time.process_time() - cpu, time.perf_counter() - wall, [*told, *mixed])
         return value
 
     def _input(self, step: Step, source: Source, checkpoint: Checkpoint | None) -> Any:
@@ -225,12 +224,11 @@ class Execution:
             if step.label in self.entries:
                 return
             self._report(f"{step.label}: from the store")
-            self._warn_of_versions(step, found)
-            said = found.warnings
+            mixed, said = self._warned_of_versions(step, found), found.warnings
             for warning in said:
                 self._report(f"warning: {warning}")
-        warnings = [*said, *self._other.get(step.label, ())]
-        entry = {"label": step.label, "key": step.key, "cached": found is not None, "warnings": warnings}
+            said = [*said, *mixed]
+        entry = {"label": step.label, "key": step.key, "cached": found is not None, "warnings": list(said)}
         self.entries[step.label] = {**entry, "seconds": cpu, "wall_seconds": wall}
         self._pipeline.registry.observers.stage_done(step.label, step.key, found is not None)
 
@@ -246,8 +244,9 @@ class Execution:
             "stages": dict(self.entries),
         }
 
-    def _warn_of_versions(self, step: Step, artifact: Artifact) -> None:
-        now, frames, first, said = versions(), step.recording.indices, 0, self._other.setdefault(step.label, [])
+    def _warned_of_versions(self, step: Step, artifact: Artifact) -> list[str]:
+        """Return what is reported of results, or parts of them, that other versions have made."""
+        now, frames, first, said = versions(), step.recording.indices, 0, list[str]()
         for last, made in artifact.made_with:
             other = [f"{name} {was}, now {now.get(name)}" for name, was in made.items() if now.get(name) != was]
             if other:
@@ -256,6 +255,7 @@ class Execution:
                 said.append(f"{what} were made with {'; '.join(other)}")
                 self._report(f"warning: {said[-1]}")
             first = last
+        return said
 
     def _set_aside(self, path: Path, error: Corrupted) -> None:
         aside = self._store.set_aside(path)

@@ -45,7 +45,7 @@ class SecondLook(Stage):
     leap_mm: PositiveFloat = 40.0  # of a joint, from between where it is before and after: more is looked at again
     other_mm: PositiveFloat = 10.0  # of a joint, between two fits: less, and they are the same
     leap_weight: NonNegativeFloat = 0.1  # half the leap may cost 0.69 times this share more by the silhouettes
-    stray_weight: NonNegativeFloat = 0.002  # per cm² of the person that is off the other fit, likewise
+    stray_weight: NonNegativeFloat = 0.002  # share per cm² of person and skin that lie apart in the other fit
 
     def run(
         self,
@@ -78,7 +78,8 @@ class SecondLook(Stage):
             past = fits.past(row, colours)
             result = sight.settled(frame, row, past, fits.between(row))
             looked[row] = True
-            if self._preferred(result, row, fits, sight.strays(frame, row, past, result)):
+            same = fits.apart(row, result.state.estimate.pose) < self.other_mm / 1000
+            if not same and self._preferred(result, row, fits, sight.strays(frame, row, past, result)):
                 fits.take(row, frame, result)
                 looked[[row - 1, row + 1]] = fits.other(row - 1), fits.other(row + 1)
 
@@ -88,8 +89,6 @@ class SecondLook(Stage):
     def _preferred(self, result: FrameResult, row: int, fits: Fits, stray: tuple[float, float]) -> bool:
         """Return whether another fit of a frame is better, by silhouettes, leaps and what strays (cm², before, now)."""
         pose, first = result.state.estimate.pose, fits.before
-        if fits.apart(row, pose) < self.other_mm / 1000:
-            return False
         cost = image_cost(first.energy[row], first.energy_terms)
         dearer = (image_cost(result.energy, result.energy_terms) - cost) / max(abs(cost), 1.0)
         farther = np.log(max(fits.leap(row, pose), 1e-9) / fits.leap(row, fits.pose(row)))
@@ -136,12 +135,12 @@ def windows(suspect: Bool) -> Iterator[I32]:
             yield run[max(end - HELD, 0) : end]
 
 
-def pictured(recording: Recording, number: I32, groups: Iterable[I32]) -> Iterator[tuple[I32, list[Frame]]]:
+def pictured(recording: Recording, numbers: I32, groups: Iterable[I32]) -> Iterator[tuple[I32, list[Frame]]]:
     """Yield each group of rows with its frames, whose numbers (T,) are known by row; no picture is decoded twice."""
     held: list[Frame] = []
     coming: Iterator[Frame] | None = None
     for rows in groups:
-        first, last = int(number[rows[0]]), int(number[rows[-1]])
+        first, last = int(numbers[rows[0]]), int(numbers[rows[-1]])
         coming = coming or recording.frames(since=first)
         held = [frame for frame in held if frame.index >= first]
         while not held or held[-1].index < last:
