@@ -10,8 +10,8 @@ import numpy as np
 from figures import first_frame, write
 from mocapflow_report.overlay import Painter
 
+from mocapflow.functional import overlaps
 from mocapflow.geometry.cameras import project
-from mocapflow.loop import overlaps
 
 CHANGES = ("stages.track.pose_solver.cloth_unknowns=false", "stages.track.cloth_fitter={fitter}")
 FITTERS = {"without forces": "fixed", "with forces": "sampled_forces"}

@@ -28,7 +28,6 @@ from mocapflow.data import (
     Segmentation,
     Surface,
     Turn,
-    empty_matches,
 )
 from mocapflow.geometry.differences import drape_differences
 from mocapflow.records import F64, I32, Bool
@@ -244,22 +243,6 @@ class Stage(Component):
 
     def look_back(self, made: Any) -> None:
         """Raise what `run` would have raised of a result; settings outside its key may be others since it was made."""
-
-
-def pool(parts: Sequence[tuple[float, Matches]]) -> Matches:
-    """Return the matches of several matchers as one set, each weighted by its share; none of no matcher."""
-    if not parts:
-        return empty_matches()
-    if len(parts) == 1 and parts[0][0] == 1.0:
-        return parts[0][1]
-    matches = [m for _, m in parts]
-    return Matches(
-        camera=np.concatenate([m.camera for m in matches]),
-        pixel=np.concatenate([m.pixel for m in matches]),
-        direction=np.concatenate([m.direction for m in matches]),
-        vertex=np.concatenate([m.vertex for m in matches]),
-        weight=np.concatenate([share * m.weight for share, m in parts]),
-    )
 
 
 Observe = Callable[[int, Turn, FrameState], None]

@@ -126,6 +126,16 @@ def contours(surface: Surface, matches: Matches, cameras: Sequence[Camera]) -> F
     return np.bincount(matches.camera, 0.5 * matches.weight * squared, minlength=len(cameras)).astype(np.float64)
 
 
+def overlaps(surface: Surface, segmentation: Segmentation, cameras: Sequence[Camera]) -> F64:
+    """Return intersection over union (C,) of the model's silhouette and the person's in each view; NaN where unseen."""
+    overlap = np.full(len(cameras), np.nan)
+    for silhouette in segmentation.of("person"):
+        camera = cameras[silhouette.camera]
+        covered = silhouettes.mask(silhouettes.outline(surface, camera), camera)
+        overlap[silhouette.camera] = silhouettes.intersection_over_union(covered, silhouette.distance > 0)
+    return overlap
+
+
 def halfway(one: Pose, other: Pose) -> Pose:
     """Return the pose in the middle of two."""
     return moved(one, 0.5 * increment_between(one, other))

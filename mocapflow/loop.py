@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields, replace
 from functools import partial
 
 import numpy as np
 
-from mocapflow.assets import Camera
-from mocapflow.components import ClothFitter, Matcher, Observe, PoseSolver, Prior, Segmenter, pool
-from mocapflow.data import NO_CLOTH, Frame, FrameResult, FrameState, Matches, Past, Segmentation, Surface, Turn
-from mocapflow.functional import Functional
-from mocapflow.geometry import silhouettes
-from mocapflow.geometry.cameras import project
-from mocapflow.geometry.contours import at_nearest
-from mocapflow.guards.answers import estimate_of, matches_of, segmentation_of
+from mocapflow.components import ClothFitter, Matcher, Observe, PoseSolver, Prior, Segmenter
+from mocapflow.data import NO_CLOTH, Frame, FrameResult, FrameState, Past, Turn
+from mocapflow.functional import Functional, overlaps
+from mocapflow.guards.answers import estimate_of, segmentation_of
 from mocapflow.guards.cloth_answers import cloth_of
 from mocapflow.model import ClothedModel
-from mocapflow.records import F64, record
-from mocapflow.scene import Scene
+from mocapflow.pooling import pool_matches
+from mocapflow.records import record
 from mocapflow.steady import Shown, Steady, measure_change
 from mocapflow.timing import Stopwatch
 
@@ -96,42 +91,3 @@ def take_turn(
     watch.lap("cloth")
     matches = match(model.surface(estimate.pose, cloth)) if estimate.matches is None else estimate.matches
     return FrameState(segmentation=segmentation, matches=matches, estimate=estimate, cloth=cloth)
-
-
-def pool_matches(
-    matchers: Sequence[Matcher],
-    frame: Frame,
-    segmentation: Segmentation,
-    past: Past,
-    scene: Scene,
-    turn: Turn,
-    surface: Surface,
-) -> Matches:
-    """Return the matches of all matchers together, each with its share, where nothing hides the person."""
-    found = pool([(m.share, matches_of(m, frame, segmentation, surface, past, scene, turn)) for m in matchers])
-    return unhidden(found, frame, surface, scene.cameras)
-
-
-def unhidden(matches: Matches, frame: Frame, surface: Surface, cameras: Sequence[Camera]) -> Matches:
-    """Return the matches whose pixel and whose surface point both lie where the picture shows the scene.
-
-    The contour of a point that is hidden is hidden too: one that is seen and found for it belongs to something else.
-    """
-    seen = np.ones(len(matches.camera), bool)
-    for number, hidden in enumerate(frame.hidden):
-        rows = np.flatnonzero(matches.camera == number)
-        points = project(surface.vertices.take(matches.vertex[rows], axis=0), cameras[number])
-        seen[rows] = (at_nearest(hidden, matches.pixel[rows]) == 0) & (at_nearest(hidden, points) == 0)
-    if seen.all():
-        return matches
-    return replace(matches, **{each.name: getattr(matches, each.name)[seen] for each in fields(matches)})
-
-
-def overlaps(surface: Surface, segmentation: Segmentation, cameras: Sequence[Camera]) -> F64:
-    """Return intersection over union (C,) of the model's silhouette and the person's in each view; NaN where unseen."""
-    overlap = np.full(len(cameras), np.nan)
-    for silhouette in segmentation.of("person"):
-        camera = cameras[silhouette.camera]
-        covered = silhouettes.mask(silhouettes.outline(surface, camera), camera)
-        overlap[silhouette.camera] = silhouettes.intersection_over_union(covered, silhouette.distance > 0)
-    return overlap

@@ -36,6 +36,7 @@ LAYERS = (  # a module imports only from its own layer or an earlier one; in a f
     "timing",
     "functional",
     "steady",
+    "pooling",
     "loop",
     "prediction",
     "observers",

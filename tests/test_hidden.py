@@ -9,7 +9,7 @@ from mocapflow_levelset.levelset import LevelSet
 
 from mocapflow.data import NO_CLOTH, Matches, Past, Turn
 from mocapflow.geometry.cameras import project
-from mocapflow.loop import unhidden
+from mocapflow.pooling import unhidden
 from mocapflow.testing import pictures, scenes
 from mocapflow.testing.views import SIZE
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from mocapflow.components import Recovery
 from mocapflow.data import NO_CLOTH, Change, FrameResult, FrameState, Pose
-from mocapflow.loop import overlaps
+from mocapflow.functional import overlaps
 from mocapflow.records import F64
 from mocapflow.scene import Scene
 from mocapflow.testing import pictures, scenes

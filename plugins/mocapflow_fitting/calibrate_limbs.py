@@ -15,8 +15,8 @@ from mocapflow.assets import Background, Body
 from mocapflow.components import Draper, Matcher, Segmenter, Stage
 from mocapflow.data import Change, Frame, Matches, Past, Pose, Segmentation, Turn
 from mocapflow.guards.idle import idle_matchers
-from mocapflow.loop import pool_matches
 from mocapflow.model import ClothedModel
+from mocapflow.pooling import pool_matches
 from mocapflow.prediction import believed
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64

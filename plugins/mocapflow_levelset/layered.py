@@ -8,8 +8,8 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
-from mocapflow.components import pool
 from mocapflow.data import Frame, FrameState, Matches, Past, Segmentation, Surface, Turn
+from mocapflow.pooling import pool
 from mocapflow.records import F32
 from mocapflow.scene import Scene
 from mocapflow_levelset.inner import Search, inner_contours, told_apart

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from mocapflow.components import pool
 from mocapflow.data import Frame, Matches, Past, Surface, empty_matches
 from mocapflow.geometry.cameras import project_each
 from mocapflow.geometry.visibility import front_vertices
+from mocapflow.pooling import pool
 from mocapflow.records import F64, I32
 from mocapflow.scene import Scene
 

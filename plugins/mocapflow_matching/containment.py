@@ -9,10 +9,11 @@ import numpy as np
 from pydantic import PositiveFloat
 
 from mocapflow.assets import Camera
-from mocapflow.components import Matcher, pool
+from mocapflow.components import Matcher
 from mocapflow.data import Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn
 from mocapflow.geometry.contours import at_nearest, nearest_compatible
 from mocapflow.geometry.silhouettes import occluding_contour
+from mocapflow.pooling import pool
 from mocapflow.records import F64
 from mocapflow.scene import Scene
 from mocapflow_matching.robust import robust_weights

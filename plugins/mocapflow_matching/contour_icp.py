@@ -8,7 +8,7 @@ import numba
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from mocapflow.components import Matcher, pool
+from mocapflow.components import Matcher
 from mocapflow.data import (
     Contour,
     Frame,
@@ -22,6 +22,7 @@ from mocapflow.data import (
 from mocapflow.geometry.contours import pairs
 from mocapflow.geometry.silhouettes import occluding_contour
 from mocapflow.memo import memoised
+from mocapflow.pooling import pool
 from mocapflow.records import F64, I32, Bool
 from mocapflow.scene import Scene
 from mocapflow.settings import PositiveOrInf

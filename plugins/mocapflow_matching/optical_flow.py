@@ -8,9 +8,10 @@ from typing import Literal
 import numpy as np
 from pydantic import NonNegativeFloat, NonNegativeInt, PositiveFloat
 
-from mocapflow.components import Matcher, pool
+from mocapflow.components import Matcher
 from mocapflow.data import Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn, empty_matches
 from mocapflow.geometry import silhouettes
+from mocapflow.pooling import pool
 from mocapflow.records import F32, F64, Bool
 from mocapflow.scene import Scene
 from mocapflow_matching.carried import carried_points, distances

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import PositiveFloat, PositiveInt
 
 from mocapflow.assets import GarmentMesh
-from mocapflow.components import ClothFitter, pool
+from mocapflow.components import ClothFitter
 from mocapflow.data import (
     Cloth,
     Contour,
@@ -26,6 +26,7 @@ from mocapflow.geometry.differences import drape_differences
 from mocapflow.geometry.misfit import bilinear, dressed, misfit, outlines
 from mocapflow.geometry.sewing import TAKE_UP, THICKNESS
 from mocapflow.model import ClothedModel
+from mocapflow.pooling import pool
 from mocapflow.records import F64, Bool
 from mocapflow_twist import solve
 from mocapflow_twist.constraint import image_rows

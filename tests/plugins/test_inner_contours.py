@@ -14,11 +14,11 @@ from mocapflow_matching.inner_contours import InnerContours, slipped
 from mocapflow_matching.layered_icp import LayeredIcp, another_s
 from test_layers import CLOTHS, SCENE, SKIN, dressed, learned, painted
 
-from mocapflow.components import pool
 from mocapflow.data import CLOTH, Change, Matches, Past, Pose, Turn, empty_matches
 from mocapflow.geometry import twists
 from mocapflow.geometry.cameras import magnification, project
 from mocapflow.geometry.silhouettes import outline
+from mocapflow.pooling import pool
 from mocapflow.testing import tiny_cloth, tiny_pose, tiny_segmentation
 
 ONE, OTHER = SKIN, CLOTHS

@@ -14,10 +14,11 @@ from test_twist_solver import EXACT, TURN
 from twist_fixtures import exact_matches, make_pose, make_scene, make_state
 
 from mocapflow.assets import GarmentMesh
-from mocapflow.components import Draper, pool
+from mocapflow.components import Draper
 from mocapflow.data import Estimate, FrameState, Matches, Past, Pose, PoseBatch, Surface
 from mocapflow.geometry import cameras, twists
 from mocapflow.model import ClothedModel, moved
+from mocapflow.pooling import pool
 from mocapflow.records import F64, I32
 from mocapflow.scene import Scene
 

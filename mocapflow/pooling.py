@@ -1,0 +1,61 @@
+"""The matches of all matchers as one set, where nothing hides the person."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields, replace
+
+import numpy as np
+
+from mocapflow.assets import Camera
+from mocapflow.components import Matcher
+from mocapflow.data import Frame, Matches, Past, Segmentation, Surface, Turn, empty_matches
+from mocapflow.geometry.cameras import project
+from mocapflow.geometry.contours import at_nearest
+from mocapflow.guards.answers import matches_of
+from mocapflow.scene import Scene
+
+
+def pool_matches(
+    matchers: Sequence[Matcher],
+    frame: Frame,
+    segmentation: Segmentation,
+    past: Past,
+    scene: Scene,
+    turn: Turn,
+    surface: Surface,
+) -> Matches:
+    """Return the matches of all matchers together, each with its share, where nothing hides the person."""
+    found = pool([(m.share, matches_of(m, frame, segmentation, surface, past, scene, turn)) for m in matchers])
+    return unhidden(found, frame, surface, scene.cameras)
+
+
+def unhidden(matches: Matches, frame: Frame, surface: Surface, cameras: Sequence[Camera]) -> Matches:
+    """Return the matches whose pixel and whose surface point both lie where the picture shows the scene.
+
+    The contour of a point that is hidden is hidden too: one that is seen and found for it belongs to something else.
+    """
+    seen = np.ones(len(matches.camera), bool)
+    for number, hidden in enumerate(frame.hidden):
+        rows = np.flatnonzero(matches.camera == number)
+        points = project(surface.vertices.take(matches.vertex[rows], axis=0), cameras[number])
+        seen[rows] = (at_nearest(hidden, matches.pixel[rows]) == 0) & (at_nearest(hidden, points) == 0)
+    if seen.all():
+        return matches
+    return replace(matches, **{each.name: getattr(matches, each.name)[seen] for each in fields(matches)})
+
+
+def pool(parts: Sequence[tuple[float, Matches]]) -> Matches:
+    """Return the matches of several matchers as one set, each weighted by its share; none of no matcher."""
+    if not parts:
+        return empty_matches()
+    if len(parts) == 1 and parts[0][0] == 1.0:
+        return parts[0][1]
+    matches = [m for _, m in parts]
+    return Matches(
+        camera=np.concatenate([m.camera for m in matches]),
+        pixel=np.concatenate([m.pixel for m in matches]),
+        direction=np.concatenate([m.direction for m in matches]),
+        vertex=np.concatenate([m.vertex for m in matches]),
+        weight=np.concatenate([share * m.weight for share, m in parts]),
+    )
