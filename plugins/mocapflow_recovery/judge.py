@@ -15,6 +15,8 @@ from mocapflow.scene import Scene
 from mocapflow_recovery.certain import View
 from mocapflow_recovery.disagreement import distance, floating_area, uncovered_areas
 
+LEAST = 1.0  # cm², of what strays
+
 
 class Reach(NamedTuple):
     """What counts as apart, m."""
@@ -32,6 +34,11 @@ class Stray(NamedTuple):
     floating: float
     cloth: float  # uncovered as well; a limb may hold it there, or it flies
     near: float  # of the person, without cloth, off the model by little or more
+
+    @property
+    def nothing(self) -> bool:
+        """True where nothing strays."""
+        return self.uncovered + self.floating + self.cloth < LEAST
 
     def __str__(self) -> str:
         worn = f" ({self.cloth:.0f} of it cloth)" if self.cloth >= 0.5 else ""
@@ -116,5 +123,5 @@ def drapes(model: ClothedModel, poses: Sequence[Pose], parameters: F64, past: Pa
     told_apart = np.concatenate([root.reshape(len(poses), -1), angles[:, lays]], axis=1)
     _, first, same = np.unique(told_apart, axis=0, return_index=True, return_inverse=True)
     batch = PoseBatch(root=root[first], angles=angles[first])
-    vertices = drape_of(model.draper, batch, np.repeat(parameters[None], len(first), axis=0), past, model.scene)
+    vertices = drape_of(model.draper.rough(), batch, np.repeat(parameters[None], len(first), axis=0), past, model.scene)
     return [Cloth(vertices=vertices[row], parameters=parameters) for row in same.ravel()]

@@ -7,12 +7,12 @@ from mocapflow_priors.density import Density
 
 from mocapflow.assets import Body
 from mocapflow.data import Pose
-from mocapflow.records import F64, Bool
+from mocapflow.records import F64, I32, Bool
 from mocapflow_recovery.sampling import parts
 
 
-def leapt(fitted: Pose, believed: Pose, body: Body, density: Density, least: float) -> bool:
-    """Return whether a part of the body is far from where it was believed and as far from all that was seen of it.
+def leaping(fitted: Pose, believed: Pose, body: Body, density: Density, least: float) -> list[I32]:
+    """Return the parts of a body that are far from where they were believed and as far from all that was seen of them.
 
     Either alone is nothing to wonder at: fast legs leave what was believed, and nobody has seen everything.
 
@@ -25,15 +25,19 @@ def leapt(fitted: Pose, believed: Pose, body: Body, density: Density, least: flo
     """
     far = np.abs(fitted.angles - believed.angles) > least
     if not far.any():  # nearly always
-        return False
+        return []
     seen = density.on(body.screw_names)
-    leaping = (part for part in parts(body) if part is not None and far[part].any())
-    return any(_apart(fitted.angles[part], seen[:, part]) > least for part in leaping)
+    return [part for part in holding(far, body) if _apart(fitted.angles[part], seen[:, part]) > least]
 
 
-def overbent(pose: Pose, body: Body, least: float) -> bool:
-    """Return whether a joint is bent beyond its limits by more than `least` (rad)."""
-    return bool(_beyond(pose, body, least).any())
+def overbent(pose: Pose, body: Body, least: float) -> list[I32]:
+    """Return the parts of the body with a joint that is bent beyond its limits by more than `least` (rad)."""
+    return holding(_beyond(pose, body, least), body)
+
+
+def holding(screws: Bool, body: Body) -> list[I32]:
+    """Return the parts of the body that some of the screws (D,) belong to."""
+    return [part for part in parts(body) if part is not None and screws[part].any()]
 
 
 def eased(pose: Pose, other: Pose, body: Body) -> Pose:

@@ -17,24 +17,24 @@ from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, Pos
 
 from mocapflow.assets import Body
 from mocapflow.components import Recovery
-from mocapflow.data import REMEMBERED, Frame, FrameResult, FrameState, Past, Pose, Surface
-from mocapflow.geometry.kinematics import root_position
-from mocapflow.model import ClothedModel, moved
+from mocapflow.data import Frame, FrameResult, FrameState, Past, Pose, Surface
+from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow.scene import Scene
 from mocapflow.settings import PositiveOrInf
 from mocapflow_recovery.certain import View, small_room, views
 from mocapflow_recovery.disagreement import FLIES, HANGS
-from mocapflow_recovery.judge import Fit, Given, Judge, Reach, Stray, stray_of, surface_of
-from mocapflow_recovery.leaps import eased, leapt, overbent
-from mocapflow_recovery.sampling import Cost, Plan, Spread, put_back, search, seen_samples, without_idle_parts
+from mocapflow_recovery.judge import Fit, Given, Judge, Reach, stray_of, surface_of
+from mocapflow_recovery.looks import Looks
+from mocapflow_recovery.sampling import Plan, Spread
+from mocapflow_recovery.suspicion import Signs, Suspicion, suspicion
 
 LOG = logging.getLogger("mocapflow")
 CURED = 2.0  # times as far apart may be what is doubted no more: a leg lay where a skirt flew
 CLEARED = 1.1  # the same, what leaves no hint: of a foot that was lost all other limbs and the cloth tell nothing
 UNKNOWN = "too little is known of the room behind the person: limbs that are lost are not looked for"
 UNSEEN = "fit doubted: no picture tells person from room where it lies"
-Look = Callable[[np.random.Generator, Pose, Pose, Judge], Pose]  # samples, pose believed, pose fitted, judge
+Settle = Callable[[Pose, F64], FrameResult]  # from a pose, with cloth parameters
 
 
 class LimbSearch(Recovery):
@@ -57,6 +57,8 @@ class LimbSearch(Recovery):
     What shows the garment's colours calls for a search where it strays, but moves no part and is no doubt: it may fly.
     So it is searched twice, once as if cloth lay where the body holds it, which tells of legs that nobody sees, once as
     if it flew, which leads none astray; the fit that agrees better by what is skin, and a little by cloth, is taken.
+    Where nothing strays any more after the first search, there is no second one. A joint bent too far, and a limb that
+    leapt, are looked for alone: nothing is known against the others.
     A doubt that lasts is mostly one about the room, and a joint that stays beyond its limits can be bent so far: such
     frames are searched now and then only (`vain_every`).
     It needs the empty scene; where little of it is known behind the person every fit is taken as it is.
@@ -98,7 +100,7 @@ class LimbSearch(Recovery):
         result: FrameResult,
         past: Past,
         model: ClothedModel,
-        settle: Callable[[Pose, F64], FrameResult],
+        settle: Settle,
     ) -> FrameResult:
         """Return the result, or a better one; see the class."""
         surface = surface_of(model, result)
@@ -108,15 +110,16 @@ class LimbSearch(Recovery):
         if np.mean([view.known for view in seen]) < self.least_known:
             return result if past.moments else noted(result, UNKNOWN, doubted=False)
         stray = stray_of(surface, model.scene, seen, self.reach)
-        doubtful, fitted = self._doubtful(stray), result.state.estimate.pose
-        why = f"fit doubted, {stray}" if doubtful else self._suspicion(stray, fitted, state, past, model.scene.body)
-        if not why:
+        fitted, believed, body = result.state.estimate.pose, state.estimate.pose, model.scene.body
+        suspected = suspicion(self.signs, stray, fitted, believed, past, body, self._density)
+        if suspected is None:
             return result
-        if self._lasts(doubtful, past, model.scene.body) and frame.index % self.vain_every:
-            unsearched = f"{why}: not searched, as the frames before are doubted, too"
-            return noted(result, unsearched, doubted=True) if doubtful else result
-        judge = self._judge(state, result, seen, past, model)
-        return self._searched(frame.index, state.estimate.pose, judge.of(result), judge, why, settle)
+        if self.signs.last(suspected.doubtful, past, body) and frame.index % self.vain_every:
+            unsearched = f"{suspected.why}: not searched, as the frames before are doubted, too"
+            return noted(result, unsearched, doubted=True) if suspected.doubtful else result
+        judge = self._judge(believed, result, seen, past, model)
+        looks = Looks(judge, self._plan(body), believed, fitted, self.gain, self.tolerance)
+        return self._searched(frame.index, judge.of(result), looks, suspected, settle)
 
     def views(self, frame: Frame, surface: Surface, past: Past, scene: Scene) -> list[View]:
         """Return what the views of a frame surely show around a surface, in a scene whose empty room is known."""
@@ -124,113 +127,49 @@ class LimbSearch(Recovery):
         room = small_room(scene.background, scene.cameras, self.rows)
         return views(frame, surface, room, self.near_m, garment_told(past, scene))
 
-    def _searched(
-        self, index: int, believed: Pose, fit: Fit, judge: Judge, why: str, settle: Callable[[Pose, F64], FrameResult]
-    ) -> FrameResult:
+    def _searched(self, index: int, fit: Fit, looks: Looks, suspected: Suspicion, settle: Settle) -> FrameResult:
         """Return the result of the best pose that is found, or that of the fit where none is better."""
-        doubtful, fitted, fits = self._doubtful(fit.stray), fit.result.state.estimate.pose, []
-        for number, look in enumerate(self._looks(judge, doubtful)):
-            rng = np.random.default_rng([index, number])
-            found = look(rng, believed, fitted, judge)
+        (why, doubtful, _), doubted, judge = suspected, self.signs.doubtful, looks.judge
+        fits: list[Fit] = []
+        for number, look in enumerate(self._ways(looks, suspected)):
+            found = look(np.random.default_rng([index, number]))
             fits.append(judge.of(settle(found, judge.parameters)))
-        best = self._better(min(fits, key=lambda other: (self._doubtful(other.stray), other.apart)), fit)
+            if fits[-1].stray.nothing and not judge.given:
+                break
+        best = self._better(min(fits, key=lambda other: (doubted(other.stray), other.apart)), fit)
         if judge.given and doubtful:
-            best = self._or_turned(best, np.random.default_rng([index, len(fits)]), believed, judge, settle)
+            found = looks.turned(np.random.default_rng([index, len(fits)]))
+            if (turned := self._better(judge.of(settle(found, judge.parameters)), best)) is not best:
+                LOG.warning("the first pose looks the other way: the person was found turned round by half a turn")
+                best = turned
         if best is not fit:
-            return noted(best.result, f"{why}: found again by search; then {best.stray}", self._doubtful(best.stray))
+            return noted(best.result, f"{why}: found again by search; then {best.stray}", doubted(best.stray))
         return noted(fit.result, f"{why}: search found nothing better", doubted=True) if doubtful else fit.result
 
-    def _looks(self, judge: Judge, doubtful: bool) -> list[Look]:
+    def _ways(self, looks: Looks, suspected: Suspicion) -> list[Callable[[np.random.Generator], Pose]]:
         """Return the ways to look for the pose, each from its own samples."""
-        far = partial(self._far, astray=doubtful)
-        if judge.given:  # where all begins, chance shall not decide
-            return [self._near, partial(far, cloth=HANGS)] * self.first_looks if doubtful else [self._near]
-        return [partial(far, cloth=belief) for belief in ((HANGS, FLIES) if judge.model.clothed else (HANGS,))]
-
-    def _or_turned(
-        self,
-        best: Fit,
-        rng: np.random.Generator,
-        believed: Pose,
-        judge: Judge,
-        settle: Callable[[Pose, F64], FrameResult],
-    ) -> Fit:
-        """Return a fit, or a better one of somebody who looks the other way: a first pose may be turned round."""
-        turned = turned_round(believed, judge.model.scene.body)
-        found = self._far(rng, turned, turned, judge, astray=True, cloth=HANGS)
-        other = self._better(judge.of(settle(found, judge.parameters)), best)
-        if other is not best:
-            LOG.warning("the first pose looks the other way: the person was found turned round by half a turn")
-        return other
+        if suspected.limbs:
+            return [partial(looks.alone, limbs=suspected.limbs)]
+        far = partial(looks.far, astray=suspected.doubtful)
+        if looks.judge.given:  # where all begins, chance shall not decide
+            near = partial(looks.near, spread=2 * np.radians(self.start_deg))
+            return [near, partial(far, cloth=HANGS)] * self.first_looks if suspected.doubtful else [near]
+        return [partial(far, cloth=belief) for belief in ((HANGS, FLIES) if looks.judge.model.clothed else (HANGS,))]
 
     def _better(self, other: Fit, fit: Fit) -> Fit:
         """Return another fit if it is clearly nearer to the person, or free of a doubt or hint and not much farther."""
         most = 1 - self.gain
-        if not self._doubtful(other.stray):
-            if self._doubtful(fit.stray):
+        if not self.signs.doubtful(other.stray):
+            if self.signs.doubtful(fit.stray):
                 most = CURED
             elif fit.stray.near > self.hint_cm2 >= other.stray.near:
                 most = CLEARED
         return other if other.apart < most * fit.apart else fit
 
-    def _suspicion(self, stray: Stray, fitted: Pose, believed: FrameState, past: Past, body: Body) -> str:
-        """Return why limbs are looked for that images do not contradict, or nothing.
-
-        Cloth that strays is no contradiction, for it may fly; but a raised knee may hold it there.
-        """
-        if stray.uncovered + stray.cloth > self.uncovered_cm2:
-            return f"cloth off the model, {stray}"
-        if stray.near > self.hint_cm2:
-            return f"{stray.near:.0f} cm² of the person a little off the model"
-        if self.beginnings and not past.moments:
-            return f"looked for the limbs {'after a gap' if past.after_gap else 'of a first frame'}"
-        if overbent(fitted, body, np.radians(self.overbent_deg)):
-            return "a joint is bent beyond its limits"
-        leap = leapt(fitted, believed.estimate.pose, body, self._density, np.radians(self.leap_deg))
-        return "a limb leapt into a pose that nobody was seen in" if leap else ""
-
-    def _lasts(self, doubtful: bool, past: Past, body: Body) -> bool:
-        """Return whether all frames that are remembered are doubted, or have a joint beyond its limits."""
-        limit = np.radians(self.overbent_deg)
-        alike = [moment.doubted if doubtful else overbent(moment.pose, body, limit) for moment in past.moments]
-        return len(alike) == REMEMBERED and all(alike)
-
-    def _doubtful(self, stray: Stray) -> bool:
-        return stray.uncovered > self.uncovered_cm2 or stray.floating > self.floating_cm2
-
-    def _near(self, rng: np.random.Generator, believed: Pose, fitted: Pose, judge: Judge) -> Pose:
-        """Return the pose that agrees best with the views near the one that was given."""
-        body = judge.model.scene.body
-        spread = Spread(2 * np.radians(self.start_deg), np.radians(self.root_spread_deg), self.root_spread_m)
-        plan = self._plan(body)._replace(spread=spread, seen_samples=0)
-        found = search(judge.apart, Pose(root=fitted.root, angles=believed.angles), body, plan, rng)
-        return self._tidied(found, fitted, believed, judge, judge.apart)
-
-    def _far(
-        self, rng: np.random.Generator, believed: Pose, fitted: Pose, judge: Judge, astray: bool, cloth: float
-    ) -> Pose:
-        """Return the pose that agrees best with the views, sampled around those at hand and as people were seen."""
-        body = judge.model.scene.body
-        judge = judge._replace(given=None, cloth=cloth)  # it may have been far off
-        plan, before = self._plan(body), [moment.pose for moment in judge.past.moments[-1:]]
-        at_rest, every = np.zeros(len(body.twists)), np.arange(len(body.twists), dtype=np.int32)
-        seen_poses = seen_samples(Pose(root=believed.root, angles=at_rest), every, body, plan, rng)
-        possible = eased(fitted, believed, body)
-        begins = [nearest(judge.apart, [possible, believed, *before, *seen_poses]), *before]
-        found = nearest(judge.apart, [search(judge.apart, begin, body, plan, rng) for begin in dict.fromkeys(begins)])
-        # by what strays a fit that is not astray has only idle parts
-        return self._tidied(found, fitted, believed, judge, judge.stray if astray else judge.apart)
-
-    def _tidied(self, found: Pose, fitted: Pose, believed: Pose, judge: Judge, measure: Cost) -> Pose:
-        """Return a pose that was found with those parts as they were that need not have moved."""
-        body = judge.model.scene.body
-        found = without_idle_parts(measure, found, fitted, body, self.gain)
-        return put_back(judge.apart, found, [fitted, believed], body, self.tolerance)
-
     def _judge(
-        self, state: FrameState, result: FrameResult, seen: Sequence[View], past: Past, model: ClothedModel
+        self, believed: Pose, result: FrameResult, seen: Sequence[View], past: Past, model: ClothedModel
     ) -> Judge:
-        given = None if past.moments or past.after_gap else Given(state.estimate.pose, np.radians(self.start_deg))
+        given = None if past.moments or past.after_gap else Given(believed, np.radians(self.start_deg))
         coarse = model.scene.simplified(self.faces)
         cloth = HANGS if given else FLIES  # where all begins, the garment's colours are not known
         return Judge(model, coarse, seen, result.state.cloth.parameters, past, self.reach, given, cloth)
@@ -244,20 +183,15 @@ class LimbSearch(Recovery):
         return read(self.poses)
 
     @property
+    def signs(self) -> Signs:
+        """What calls for a search."""
+        overbent, leap = np.radians(self.overbent_deg), np.radians(self.leap_deg)
+        return Signs(self.uncovered_cm2, self.floating_cm2, self.hint_cm2, self.beginnings, overbent, leap)
+
+    @property
     def reach(self) -> Reach:
         """What counts as apart."""
         return Reach(self.reach_m, self.hint_m, self.cloth_m, self.cap_m)
-
-
-def turned_round(pose: Pose, body: Body) -> Pose:
-    """Return a pose turned by half a turn about the vertical through the root joint."""
-    turn, middle = np.array([0.0, 0.0, np.pi]), root_position(body, pose.root)
-    return moved(pose, np.concatenate([turn, -np.cross(turn, middle), np.zeros(len(pose.angles))]))
-
-
-def nearest(cost: Cost, poses: Sequence[Pose]) -> Pose:
-    """Return the pose of least cost."""
-    return poses[int(cost(poses).argmin())]
 
 
 def noted(result: FrameResult, note: str, doubted: bool) -> FrameResult:

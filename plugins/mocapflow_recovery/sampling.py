@@ -37,6 +37,7 @@ class Plan(NamedTuple):
     samples: int  # of each part in a round
     seen: F64  # (N, D) rad, poses that people were seen in, NaN where an angle is not known; N may be 0
     seen_samples: int  # of each limb among those, in the first round
+    only: Sequence[I32] = ()  # parts that are tried; none: all
 
 
 def search(cost: Cost, pose: Pose, body: Body, plan: Plan, rng: np.random.Generator) -> Pose:
@@ -55,7 +56,7 @@ def search(cost: Cost, pose: Pose, body: Body, plan: Plan, rng: np.random.Genera
     best, least = pose, float(cost([pose])[0])
     for turn, share in enumerate(plan.shares):
         moves = []
-        for part in parts(body):
+        for part in plan.only or parts(body):
             tries = list(samples(best, part, body, plan.spread, share, plan.samples, rng))
             if turn == 0 and part is not None:
                 tries += seen_samples(best, part, body, plan, rng)

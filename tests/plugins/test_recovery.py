@@ -14,9 +14,11 @@ from mocapflow_priors.density import Density, write
 from mocapflow_recovery.certain import shrunk, small_room, views
 from mocapflow_recovery.disagreement import FLIES, HANGS, distance, floating_area, uncovered_areas
 from mocapflow_recovery.judge import Fit, Given, Stray
-from mocapflow_recovery.leaps import eased, leapt
-from mocapflow_recovery.limb_search import LimbSearch, turned_round
+from mocapflow_recovery.leaps import eased, leaping
+from mocapflow_recovery.limb_search import LimbSearch
+from mocapflow_recovery.looks import Looks, turned_round
 from mocapflow_recovery.sampling import Plan, Spread, parts, put_back, samples, search, seen_samples, without_idle_parts
+from mocapflow_recovery.suspicion import Suspicion
 
 from mocapflow.data import NO_CLOTH, Past, Pose
 from mocapflow.geometry.cameras import project
@@ -154,9 +156,38 @@ def test_a_skirt_that_flies_where_the_model_hangs_leads_no_limb_astray() -> None
 ])  # fmt: skip
 def test_it_is_searched_as_if_cloth_hung_and_as_if_it_flew(clothed, given, doubtful, near, far) -> None:
     judge = SimpleNamespace(given=given, model=SimpleNamespace(clothed=clothed))
-    looks = LimbSearch()._looks(judge, doubtful)
-    beliefs = [look.keywords["cloth"] for look in looks if isinstance(look, partial)]
-    assert (len(looks) - len(beliefs), beliefs) == (near, far)
+    looks = Looks(judge, PLAN, POSE, POSE, 0.1, 0.03)
+    ways = LimbSearch()._ways(looks, Suspicion("lost", doubtful, ()))
+    beliefs = [way.keywords["cloth"] for way in ways if "cloth" in way.keywords]
+    assert (len(ways) - len(beliefs), beliefs) == (near, far)
+
+
+@pytest.mark.parametrize(("end", "begun"), [(0.0, 1), (0.9, 2)], ids=["found", "still astray"])
+def test_there_is_no_second_search_where_nothing_strays_after_the_first(monkeypatch, end, begun) -> None:
+    found = []
+
+    def settle(pose, parameters):
+        found.append(pose)
+        return settled(pictures.tiny_state(SCENE, astray(end), POSE))
+
+    monkeypatch.setattr(LimbSearch, "_ways", lambda *_: [lambda rng: POSE] * 2)
+    lost = pictures.tiny_state(SCENE, astray(0.9), POSE)
+    model, past = scenes.tiny_model(SCENE), scenes.tiny_past(SCENE, POSE)
+    LimbSearch().recover(FRAME, lost, settled(lost), past, model, settle)
+    assert len(found) == begun
+
+
+def test_a_limb_that_is_odd_is_looked_for_alone() -> None:
+    def apart_from_truth(poses):
+        return np.array([np.abs(pose.angles - POSE.angles).sum() for pose in poses])
+
+    fitted, leg = Pose(root=POSE.root, angles=POSE.angles + 0.3), parts(SCENE.body)[1]
+    judge = SimpleNamespace(given=None, apart=apart_from_truth, model=SimpleNamespace(scene=SCENE))
+    looks = Looks(judge, PLAN, fitted, fitted, 0.01, 0.0)
+    (way,) = LimbSearch()._ways(looks, Suspicion("a joint is bent beyond its limits", False, (leg,)))
+    change = np.abs(way(np.random.default_rng(0)).angles - POSE.angles)
+    assert change[leg].mean() < 0.25
+    np.testing.assert_allclose(np.delete(change, leg), 0.3)
 
 
 def test_parts_of_a_person() -> None:
@@ -442,7 +473,8 @@ def test_a_first_frame_that_is_right_says_nothing_of_the_search() -> None:
 def test_a_leap_ends_far_from_what_was_believed_and_from_what_was_seen(believed, seen_at, leap) -> None:
     names = ("hip_l.abduction",) if np.isfinite(seen_at) else ("elbow_l.flexion",)
     density = Density(names=names, poses=np.array([[astray(seen_at).angles[1]]]), bandwidth=0.1)
-    assert leapt(astray(0.6), astray(believed), SCENE.body, density, 0.4) == leap
+    found = leaping(astray(0.6), astray(believed), SCENE.body, density, 0.4)
+    assert [part.tolist() for part in found] == ([parts(SCENE.body)[1].tolist()] if leap else [])
 
 
 @pytest.mark.parametrize("found", [True, False])
