@@ -41,6 +41,24 @@ def test_error_with_noise_is_what_theory_predicts() -> None:
     assert np.sqrt(np.mean(outside)) > np.sqrt(3) * sd  # a point that was left out shows its own noise and the fit's
 
 
+def test_how_far_a_noisy_motion_carries_points_astray_is_what_theory_predicts() -> None:
+    """T-CAL: at the points' middle sd² 3/N, elsewhere more: target registration error (Fitzpatrick et al. 1998)."""
+    count, sd, draws = 20, 0.001, 400
+    random = np.random.default_rng(7)
+    points = random.uniform(-1, 1, (count, 3))
+    targets = np.concatenate([points.mean(axis=0)[None], random.uniform(-3, 3, (8, 3))])
+    squares = []
+    for seed in range(draws):
+        rotation, shift = rig(seed)
+        found = register(points, points @ rotation.T + shift + random.normal(scale=sd, size=points.shape))
+        squares.append(np.sum((found.apply(targets) - (targets @ rotation.T + shift)) ** 2, axis=1))
+    spread, axes = np.linalg.eigh(np.cov(points.T, bias=True))
+    along = (targets - points.mean(axis=0)) @ axes  # off the middle, along the principal axes of the points
+    others = [[1, 2], [2, 0], [0, 1]]
+    off_axis = sum((along[:, axis] ** 2).sum(axis=1) / spread[axis].sum() for axis in others)
+    assert np.sqrt(np.mean(squares, axis=0)) == pytest.approx(sd * np.sqrt((3 + off_axis) / count), rel=0.1)
+
+
 def test_scale_is_reported_and_not_applied() -> None:
     points = np.random.default_rng(1).uniform(-1, 1, (10, 3))
     found = register(points, 1.02 * points)

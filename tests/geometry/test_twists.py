@@ -1,4 +1,4 @@
-"""T-GEO2: the exponential against the matrix exponential; logarithm, inverse, screws."""
+"""T-GEO2: the exponential against the matrix exponential; logarithm, inverse, the group, screws."""
 
 import numpy as np
 import pytest
@@ -29,10 +29,32 @@ def test_log_inverts_exp(size):
     np.testing.assert_allclose(twists.log(twists.exp(twist)), twist, atol=1e-8)
 
 
-def test_log_of_half_a_turn_keeps_the_rotation():
-    axis = np.array([0.6, -0.8, 0.0])
-    motion = twists.exp(np.append(np.pi * axis, [0.1, 0.2, 0.3]))
-    np.testing.assert_allclose(twists.exp(twists.log(motion)), motion, atol=1e-12)
+@pytest.mark.parametrize("size", [0.0, 1e-9, 1e-6, 9.9e-5, 1.01e-4, 1e-2, 1.0, 3.0, 3.14159, np.pi])
+def test_exp_inverts_log(size):
+    """T-GEO2: at half a turn, too, where the axis may come back reversed."""
+    rng = np.random.default_rng(5)
+    twist = rng.normal(size=(30, 6))
+    twist[:, :3] *= size / np.linalg.norm(twist[:, :3], axis=1, keepdims=True)
+    motion = expm(np.array([wedge(one) for one in twist]))
+    np.testing.assert_allclose(twists.exp(twists.log(motion)), motion, atol=1e-12, rtol=0)
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-9, 1e-6, 9.9e-5, 1.01e-4, 1e-2, 1.0, 3.14159])
+def test_motions_are_a_group(size):
+    """T-GEO2: about one screw angles add up; back is the inverse; what follows each other is rigid, however grouped."""
+    rng = np.random.default_rng(6)
+    turn, shift = rng.normal(size=(2, 3, 20, 3))
+    unit = [part / np.linalg.norm(part, axis=-1, keepdims=True) for part in (turn, shift)]
+    twist = np.concatenate([size * unit[0], unit[1]], axis=-1)
+    a, b, c = motion = twists.exp(twist)
+    close = dict(atol=1e-12, rtol=0)
+    np.testing.assert_allclose(twists.exp(0.3 * twist) @ twists.exp(0.7 * twist), motion, **close)
+    np.testing.assert_allclose(twists.exp(-twist), twists.inverse(motion), **close)
+    both = twists.exp(twists.log(a @ b))
+    np.testing.assert_allclose(both @ c, twists.exp(twists.log(a @ twists.exp(twists.log(b @ c)))), **close)
+    rotation = both[:, :3, :3]
+    np.testing.assert_allclose(rotation @ rotation.swapaxes(1, 2), np.broadcast_to(np.eye(3), (20, 3, 3)), **close)
+    np.testing.assert_allclose(np.linalg.det(rotation), 1, **close)
 
 
 def test_inverse():

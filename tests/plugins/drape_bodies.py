@@ -144,6 +144,12 @@ def leg_poses():
     return PoseBatch(root=np.tile(np.eye(4), (4, 1, 1)), angles=angles)
 
 
+def deep_poses():
+    """Return one knee pulled up, one far up, and two squats."""
+    angles = np.radians([[75, 60, 0, 0], [90, 90, 0, 0], [110, 110, 0, 0], [75, 90, 75, 90], [95, 110, 95, 110]])
+    return PoseBatch(root=np.tile(np.eye(4), (len(angles), 1, 1)), angles=angles)
+
+
 def prepared(body, chain=EYE, voxel=VOXEL):
     """Return the voxels of a body and its parts."""
     known = FIELDS.setdefault(body, {})
