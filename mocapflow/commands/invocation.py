@@ -36,7 +36,8 @@ class Invocation:
 
     def load(self) -> Pipeline:
         """Return the pipeline."""
-        from mocapflow.config.pipeline import frames_of, load_pipeline
+        from mocapflow.config.frames import frames_of
+        from mocapflow.config.pipeline import load_pipeline
 
         return load_pipeline(
             Path(self.pipeline),

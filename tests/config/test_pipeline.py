@@ -88,6 +88,8 @@ def test_frames(folder):
     assert (load().start, load().stop, load().step) == (1, 30, 1)
     with pytest.raises(MocapflowError, match=r"frames: frames are written A:B or A:B:STEP"):
         load("frames=some")
+    with pytest.raises(MocapflowError, match=r"frames: frames are written A:B or A:B:STEP"):
+        load("frames=20")
 
 
 def test_frames_that_are_given_keep_the_step_of_the_file(folder):
