@@ -105,6 +105,18 @@ def test_a_plan_tells_what_is_missing_as_a_run_does_before_it_begins(call, tmp_p
     assert not Path("runs/store.zarr").exists()
 
 
+@pytest.mark.parametrize("file", ["init.json", "subject/skeleton.json"])
+def test_a_plan_refuses_a_file_that_a_run_would_refuse(call, tmp_path, file):
+    shutil.copytree(CLIP, tmp_path / "clip")
+    Path("start.yaml").write_text("recording: clip\nstages: {start: start_from_file}\n")
+    (tmp_path / "clip" / file).write_text("{")
+    planned, done = call("plan", "start.yaml"), call("run", "start.yaml")
+    assert planned.exit_code == done.exit_code == 2, planned.output + done.output
+    assert planned.stderr == done.stderr
+    assert planned.stderr.startswith(f"error: clip/{file}:1:2  not JSON: ")
+    assert planned.stdout == ""
+
+
 def test_a_reference_that_is_missing_is_told_before_anything_is_tracked(call):
     bare, change = str(shipped("pipelines", "bare.yaml")), "stages.evaluate.reference=truth/no.csv"
     planned = call("plan", bare, "--recording", str(CLIP), "--set", change)
@@ -332,8 +344,11 @@ def test_an_export_leaves_what_the_run_folder_remembers(call, tmp_path):
     assert "track: from the store" in exported.stderr and "note: " not in exported.stderr
     assert Path("out", FILE).read_text() == before
     assert "\nnote " in call("status", "out").stdout
-    nothing = call("export", "out", "--format", "")
-    assert nothing.exit_code == 2 and "stages.export.formats.0: input should be 'csv', 'mot'" in nothing.stderr
+    unknown = call("export", "out", "--format", "trc", "--format", "gtlf")
+    assert unknown.exit_code == 2 and unknown.stderr == (
+        "error: --format gtlf  there is no such format\n"
+        "       available: bvh, c3d, csv, gltf, mot, movement, parquet, rrd, trc, usd — did you mean 'gltf'?\n"
+    )
 
 
 def test_paths_of_changes_start_where_the_run_was_begun(call, tmp_path, monkeypatch):
