@@ -68,7 +68,7 @@ def load_experiment(path: Path, recordings: Sequence[Path] = (), frames: str | N
     resolver = Resolver(document, Registry())
     said = resolver.build(ExperimentFile, document.values, ())
     assert isinstance(said, ExperimentFile)
-    part = frames or (said.frames and said.frames.text)
+    part = frames or (said.frames.text if said.frames else None)
     folders = tuple(recordings) or tuple(
         resolver.file(name, ("recordings", index)) for index, name in enumerate(said.recordings)
     )

@@ -106,9 +106,7 @@ def test_a_date_in_a_change_is_text(tmp_path: Path) -> None:
         ("null", None),
     ],
 )
-def test_frames_are_said_as_in_a_pipeline_or_on_the_command_line(
-    tmp_path: Path, said: str, frames: str | None
-) -> None:
+def test_frames_are_said_as_in_a_pipeline_or_on_the_command_line(tmp_path: Path, said: str, frames: str | None) -> None:
     cells = load_experiment(written(tmp_path, GRID.replace("frames: 0:20", f"frames: {said}")))
     assert cells[0].frames == frames
 
