@@ -157,6 +157,21 @@ def test_the_store(call):
     assert call("cache", "list", *store).stdout == ""
 
 
+def test_a_result_that_was_cut_off_is_found_when_it_is_read(call, tmp_path):
+    path = write_pipeline(tmp_path, write_recording(tmp_path / "clip", 3))
+    assert call("run", path.name, "--store", "store.zarr").exit_code == 0
+    (chunk,) = Path("store.zarr").glob("track-*/angles/c.0.0")
+    chunk.write_bytes(chunk.read_bytes()[:-5])
+    listed = ("cache", "list", "--store", "store.zarr")
+    assert "damaged" not in call(*listed).stdout
+    (told,) = [line for line in call(*listed, "--check").stdout.splitlines() if "damaged" in line]
+    assert told.startswith("track-") and "can't be read back" in told
+    shutil.rmtree(next(Path("store.zarr").glob("smooth-*")))  # so that somebody reads the track
+    mended = call("run", path.name, "--store", "store.zarr")
+    assert mended.exit_code == 0 and "is damaged and written anew from its frames" in mended.stderr
+    assert "damaged" not in call(*listed, "--check").stdout
+
+
 def test_what_a_run_is_writing_is_not_pruned(call):
     call("run", "start.yaml", "--store", "store.zarr")
     name = call("cache", "list", "--store", "store.zarr").stdout.split()[0]
