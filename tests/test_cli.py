@@ -245,8 +245,17 @@ def test_a_prior_that_can_not_be_written(call):
 
 def test_a_store_that_is_not_there_ends_with_2(call):
     result = call("cache", "list")
-    assert result.stderr == "error: runs/store.zarr  there is no store here\n       --store names another\n"
+    assert result.stderr.startswith("error: runs/store.zarr  there is no store here\n       a store is what ")
     assert result.exit_code == 2
+
+
+@pytest.mark.parametrize("more", [[], ["--all"]])
+def test_a_folder_that_is_no_store_is_not_pruned(call, more):
+    mine = Path("runs/my-run/results")
+    mine.mkdir(parents=True)
+    refused = call("cache", "prune", "--store", "runs", *more)
+    assert refused.exit_code == 2 and "runs  there is no store here" in refused.stderr
+    assert mine.is_dir()
 
 
 def test_the_version_is_that_of_the_package(call):

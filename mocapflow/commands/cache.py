@@ -98,9 +98,11 @@ def _goes(artifact: Artifact, days: float | None, unfinished: bool) -> bool:
 def _artifacts(store: Path) -> list[Artifact]:
     from mocapflow.storage.store import Store
 
-    if not store.is_dir():
-        raise MocapflowError("there is no store here", where=str(store), hint="--store names another")
-    return Store(store).artifacts()
+    kept = Store(store)
+    if not kept.state.is_dir():  # in another folder all would be taken for damaged results, and pruned
+        hint = "a store is what `mocapflow run` keeps beside its run folders, as store.zarr; --store names it"
+        raise MocapflowError("there is no store here", where=str(store), hint=hint)
+    return kept.artifacts()
 
 
 def _odd(artifact: Artifact, store: Path) -> str:
