@@ -205,6 +205,8 @@ def test_what_a_run_is_writing_is_not_pruned(call):
          "       a run folder is what `mocapflow run` writes; it holds command.json\n"),
         (("status", "start.yaml"), "error: start.yaml  this is no run folder\n"
          "       a run folder is what `mocapflow run` writes; it holds command.json\n"),
+        (("compare", "start.yaml"), "error: start.yaml  this is a pipeline, no experiment\n"
+         "       `mocapflow run` runs one; an experiment names it, as `pipeline: FILE`\n"),
     ],
 )  # fmt: skip
 def test_what_the_user_can_mend_ends_with_2(call, words, message):
@@ -212,6 +214,16 @@ def test_what_the_user_can_mend_ends_with_2(call, words, message):
     assert result.stderr == message
     assert result.exit_code == 2
     assert result.stdout == ""
+
+
+@pytest.mark.parametrize("damage", [lambda path: path.mkdir(), lambda path: path.write_text("[]")])
+@pytest.mark.parametrize("words", [("status",), ("evaluate",), ("export", "--format", "csv")])
+def test_a_run_folder_whose_command_is_damaged(call, words, damage):
+    Path("out").mkdir()
+    damage(Path("out/command.json"))
+    told = call(words[0], "out", *words[1:])
+    assert told.exit_code == 2
+    assert told.stderr == "error: out/command.json  this file is damaged\n       run the pipeline again\n"
 
 
 @pytest.mark.parametrize("days", ["nan", "-1"])

@@ -109,7 +109,7 @@ def recall(out: Path) -> Invocation:
     except (FileNotFoundError, NotADirectoryError):
         hint = f"a run folder is what `mocapflow run` writes; it holds {FILE}"
         raise PipelineError("this is no run folder", where=str(out), hint=hint) from None
-    except (ValueError, TypeError, KeyError, AttributeError):
+    except (ValueError, TypeError, KeyError, AttributeError, IsADirectoryError):
         raise PipelineError("this file is damaged", where=str(out / FILE), hint="run the pipeline again") from None
 
 

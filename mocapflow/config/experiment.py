@@ -66,6 +66,9 @@ def load_experiment(path: Path, recordings: Sequence[Path] = (), frames: str | N
     """
     document = read(path)
     resolver = Resolver(document, Registry())
+    if "stages" in document.values:
+        hint = "`mocapflow run` runs one; an experiment names it, as `pipeline: FILE`"
+        raise PipelineError("this is a pipeline, no experiment", where=str(path), hint=hint)
     said = resolver.build(ExperimentFile, document.values, ())
     assert isinstance(said, ExperimentFile)
     part = frames or (said.frames.text if said.frames else None)

@@ -117,6 +117,9 @@ def load_pipeline(
     if frames is not None:
         document = _with_frames(document, frames)
     plain = Resolver(document, Registry())
+    if "factors" in document.values:
+        hint = "`mocapflow compare` runs one"
+        raise PipelineError("this is an experiment, no pipeline", where=plain.place(("factors",)), hint=hint)
     said = plain.build(PipelineFile, document.values, ())
     assert isinstance(said, PipelineFile)
     resolver = Resolver(document, registry or _registry_with(said.plugins, plain))

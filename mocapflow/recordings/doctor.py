@@ -32,7 +32,8 @@ def examine(folder: Path) -> list[Finding]:
     folder, registry = Path(folder), load_registry()
     findings: list[Finding] = []
     if not folder.is_dir():
-        return [error("no such recording folder", where=folder)]
+        what = "this is a file; a recording is a folder" if folder.exists() else "no such recording folder"
+        return [error(what, where=folder)]
     calibration = attempt(lambda: find_calibration(folder), findings)
     if calibration is not None:
         findings += examine_trial(folder, calibration)

@@ -195,6 +195,12 @@ def test_a_plugin_file_named_by_the_pipeline(folder):
          "       its name is that of files: letters, digits, _ and -"),
         ("recording: clip", "recording: clip\nframes: {start: 9, stop: 2}",
          "skirt.yaml:2:1  frames: 9:2 holds no frame"),
+        ("recording: clip", "recording: clip\nparts: 3",
+         "skirt.yaml:2:1  parts: input should be `name: value` lines, not 3"),
+        ("recording: clip", "recording: clip\nplugins: mine.py",
+         "skirt.yaml:2:1  plugins: input should be a list, not 'mine.py'"),
+        ("recording: clip", "recording: clip\nfactors: {}",
+         "skirt.yaml:2:1  this is an experiment, no pipeline\n       `mocapflow compare` runs one"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_told_with_its_line(folder, written, instead, message):
@@ -203,6 +209,13 @@ def test_what_is_wrong_is_told_with_its_line(folder, written, instead, message):
         load()
     assert str(caught.value) == message
     assert caught.value.exit_status == 2
+
+
+def test_a_change_of_what_is_not_there_is_told_as_such(folder):
+    with pytest.raises(
+        MocapflowError, match=r"^--set stages.track.nope.x=3  stages.track.nope: unknown setting of cou"
+    ):
+        load("stages.track.nope.x=3")
 
 
 def test_a_recording_without_measures(folder):

@@ -110,6 +110,7 @@ def test_several_faults_are_found_at_once_errors_first(good):
 
 def test_nothing_there(tmp_path):
     assert errors(tmp_path / "nowhere") == ["no such recording folder"]
+    assert errors(Path(__file__)) == ["this is a file; a recording is a folder"]
     assert errors(tmp_path) == ["no calibration file"]
 
 
