@@ -33,7 +33,7 @@ class ExperimentFile(Settings):
     mocapflow: Literal[1] = 1  # version of the format
     pipeline: str  # a pipeline file
     recordings: Annotated[tuple[str, ...], Field(min_length=1)]  # folders
-    frames: Frames | None = None  # as --frames
+    frames: Frames | None = None  # instead of those of the pipeline; said likewise
     change: Changes = {}  # in every variant
     factors: Factors  # factor: level: what it changes; `pipeline` in a level names another pipeline file
 
