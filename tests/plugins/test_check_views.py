@@ -6,10 +6,12 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from mocapflow_robustness import check_views
 from mocapflow_robustness.check_views import CheckViews
 from mocapflow_robustness.corrupt import Corrupt
 from mocapflow_robustness.doubts import bridged, bursts
 from mocapflow_robustness.events import Event
+from mocapflow_robustness.thumbnails import thumbnails
 
 from mocapflow.data import Frame
 from mocapflow.recordings.recording import open_recording
@@ -103,6 +105,16 @@ def test_a_view_that_hangs_for_good(clip, first):
     """After more than half of the frames its picture is what a median over time takes for the empty room."""
     told = found(clip, dict(what="frozen", first=first, views=["cam02"]))
     assert told == {(index, 1): "the picture repeats the one before" for index in range(first, FRAMES)}
+
+
+def test_what_a_codec_draws_anew_is_no_news_of_a_view_that_hangs(clip):
+    hung = Corrupt(events=(Event(what="frozen", first=25, views=("cam02",)),)).run(open_recording(clip))
+    seen = thumbnails(hung)
+    news = seen.news.copy()
+    news[40, 1] = news[40, 0]
+    seen = replace(seen, news=news)
+    said = CheckViews().doubt(seen, check_views.rooms(seen, None), 30.0, ["cam01", "cam02", "cam03"])
+    assert np.argwhere(said != "").tolist() == [[row, 1] for row in range(25, FRAMES)]
 
 
 def test_a_view_that_the_person_leaves_does_not_repeat_itself(clip, tmp_path):
