@@ -32,7 +32,7 @@ def repeated(news: F64) -> Bool:
 def frozen_from(news: F64) -> npt.NDArray[np.intp]:
     """Return (C,) from which frame on each camera repeats one picture to the end while others see motion; T: none.
 
-    A pause of the others does not count for it: what it shows is the pose of an earlier moment then, too.
+    That the others pause in between does not end it: its picture shows the pose of an earlier moment then, too.
     """
     if len(news) < LONG:
         return np.full(news.shape[1], len(news))
