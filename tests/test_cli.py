@@ -105,6 +105,18 @@ def test_a_plan_tells_what_is_missing_as_a_run_does_before_it_begins(call, tmp_p
     assert not Path("runs/store.zarr").exists()
 
 
+@pytest.mark.parametrize("file", ["init.json", "subject/skeleton.json"])
+def test_a_plan_refuses_a_file_that_a_run_would_refuse(call, tmp_path, file):
+    shutil.copytree(CLIP, tmp_path / "clip")
+    Path("start.yaml").write_text("recording: clip\nstages: {start: start_from_file}\n")
+    (tmp_path / "clip" / file).write_text("{")
+    planned, done = call("plan", "start.yaml"), call("run", "start.yaml")
+    assert planned.exit_code == done.exit_code == 2, planned.output + done.output
+    assert planned.stderr == done.stderr
+    assert planned.stderr.startswith(f"error: clip/{file}:1:2  not JSON: ")
+    assert planned.stdout == ""
+
+
 def test_a_reference_that_is_missing_is_told_before_anything_is_tracked(call):
     bare, change = str(shipped("pipelines", "bare.yaml")), "stages.evaluate.reference=truth/no.csv"
     planned = call("plan", bare, "--recording", str(CLIP), "--set", change)
@@ -145,6 +157,21 @@ def test_the_store(call):
     assert call("cache", "list", *store).stdout == ""
 
 
+def test_a_result_that_was_cut_off_is_found_when_it_is_read(call, tmp_path):
+    path = write_pipeline(tmp_path, write_recording(tmp_path / "clip", 3))
+    assert call("run", path.name, "--store", "store.zarr").exit_code == 0
+    (chunk,) = Path("store.zarr").glob("track-*/angles/c.0.0")
+    chunk.write_bytes(chunk.read_bytes()[:-5])
+    listed = ("cache", "list", "--store", "store.zarr")
+    assert "damaged" not in call(*listed).stdout
+    (told,) = [line for line in call(*listed, "--check").stdout.splitlines() if "damaged" in line]
+    assert told.startswith("track-") and "can't be read back" in told
+    shutil.rmtree(next(Path("store.zarr").glob("smooth-*")))  # so that somebody reads the track
+    mended = call("run", path.name, "--store", "store.zarr")
+    assert mended.exit_code == 0 and "is damaged and written anew from its frames" in mended.stderr
+    assert "damaged" not in call(*listed, "--check").stdout
+
+
 def test_what_a_run_is_writing_is_not_pruned(call):
     call("run", "start.yaml", "--store", "store.zarr")
     name = call("cache", "list", "--store", "store.zarr").stdout.split()[0]
@@ -178,6 +205,8 @@ def test_what_a_run_is_writing_is_not_pruned(call):
          "       a run folder is what `mocapflow run` writes; it holds command.json\n"),
         (("status", "start.yaml"), "error: start.yaml  this is no run folder\n"
          "       a run folder is what `mocapflow run` writes; it holds command.json\n"),
+        (("compare", "start.yaml"), "error: start.yaml  this is a pipeline, no experiment\n"
+         "       `mocapflow run` runs one; an experiment names it, as `pipeline: FILE`\n"),
     ],
 )  # fmt: skip
 def test_what_the_user_can_mend_ends_with_2(call, words, message):
@@ -185,6 +214,16 @@ def test_what_the_user_can_mend_ends_with_2(call, words, message):
     assert result.stderr == message
     assert result.exit_code == 2
     assert result.stdout == ""
+
+
+@pytest.mark.parametrize("damage", [lambda path: path.mkdir(), lambda path: path.write_text("[]")])
+@pytest.mark.parametrize("words", [("status",), ("evaluate",), ("export", "--format", "csv")])
+def test_a_run_folder_whose_command_is_damaged(call, words, damage):
+    Path("out").mkdir()
+    damage(Path("out/command.json"))
+    told = call(words[0], "out", *words[1:])
+    assert told.exit_code == 2
+    assert told.stderr == "error: out/command.json  this file is damaged\n       run the pipeline again\n"
 
 
 @pytest.mark.parametrize("days", ["nan", "-1"])
@@ -218,8 +257,17 @@ def test_a_prior_that_can_not_be_written(call):
 
 def test_a_store_that_is_not_there_ends_with_2(call):
     result = call("cache", "list")
-    assert result.stderr == "error: runs/store.zarr  there is no store here\n       --store names another\n"
+    assert result.stderr.startswith("error: runs/store.zarr  there is no store here\n       a store is what ")
     assert result.exit_code == 2
+
+
+@pytest.mark.parametrize("more", [[], ["--all"]])
+def test_a_folder_that_is_no_store_is_not_pruned(call, more):
+    mine = Path("runs/my-run/results")
+    mine.mkdir(parents=True)
+    refused = call("cache", "prune", "--store", "runs", *more)
+    assert refused.exit_code == 2 and "runs  there is no store here" in refused.stderr
+    assert mine.is_dir()
 
 
 def test_the_version_is_that_of_the_package(call):
@@ -332,8 +380,11 @@ def test_an_export_leaves_what_the_run_folder_remembers(call, tmp_path):
     assert "track: from the store" in exported.stderr and "note: " not in exported.stderr
     assert Path("out", FILE).read_text() == before
     assert "\nnote " in call("status", "out").stdout
-    nothing = call("export", "out", "--format", "")
-    assert nothing.exit_code == 2 and "stages.export.formats.0: input should be 'csv', 'mot'" in nothing.stderr
+    unknown = call("export", "out", "--format", "trc", "--format", "gtlf")
+    assert unknown.exit_code == 2 and unknown.stderr == (
+        "error: --format gtlf  there is no such format\n"
+        "       available: bvh, c3d, csv, gltf, mot, movement, parquet, rrd, trc, usd — did you mean 'gltf'?\n"
+    )
 
 
 def test_paths_of_changes_start_where_the_run_was_begun(call, tmp_path, monkeypatch):

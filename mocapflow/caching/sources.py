@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 INSTALLED = {"site-packages", "dist-packages"}  # folders of what does not change but with its version
-SHARED = ("io", "recordings.recording")  # counted where a component imports them
+SHARED = ("io", "recordings.freezing", "recordings.recording")  # counted where a component imports them
 
 
 def meaning(tree: ast.Module) -> str:

@@ -21,11 +21,17 @@ DAY = 86400  # s
 
 
 @app.command("list")
-def list_(store: Where = DEFAULT) -> None:
+def list_(
+    store: Where = DEFAULT,
+    check: Annotated[bool, typer.Option("--check", help="Read all that is complete: is any of it cut off?")] = False,
+) -> None:
     """List what is in the store, oldest first, then what is damaged."""
     from mocapflow.storage.store import Store
 
     for artifact in _artifacts(store):
+        if check and artifact.complete and (odd := _odd(artifact, store)):
+            typer.echo(f"{artifact.path.name:<32} damaged; made anew where a run needs it: {odd}")
+            continue
         done = "complete" if artifact.complete else "unfinished"
         frames = f"{artifact.frames} frames" if artifact.frames else ""
         size = f"{_size(artifact.path) / 1e6:.1f} MB"
@@ -92,9 +98,23 @@ def _goes(artifact: Artifact, days: float | None, unfinished: bool) -> bool:
 def _artifacts(store: Path) -> list[Artifact]:
     from mocapflow.storage.store import Store
 
-    if not store.is_dir():
-        raise MocapflowError("there is no store here", where=str(store), hint="--store names another")
-    return Store(store).artifacts()
+    kept = Store(store)
+    if not kept.state.is_dir():  # in another folder all would be taken for damaged results, and pruned
+        hint = "a store is what `mocapflow run` keeps beside its run folders, as store.zarr; --store names it"
+        raise MocapflowError("there is no store here", where=str(store), hint=hint)
+    return kept.artifacts()
+
+
+def _odd(artifact: Artifact, store: Path) -> str:
+    """Return why a result can't be read back, "" where it can."""
+    from mocapflow.storage.rows import Corrupted
+    from mocapflow.storage.store import Store
+
+    try:
+        Store(store).load(artifact)
+    except Corrupted as error:
+        return error.message
+    return ""
 
 
 def _find(name: str, store: Path) -> Artifact:

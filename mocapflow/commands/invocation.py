@@ -36,7 +36,8 @@ class Invocation:
 
     def load(self) -> Pipeline:
         """Return the pipeline."""
-        from mocapflow.config.pipeline import frames_of, load_pipeline
+        from mocapflow.config.frames import frames_of
+        from mocapflow.config.pipeline import load_pipeline
 
         return load_pipeline(
             Path(self.pipeline),
@@ -108,7 +109,7 @@ def recall(out: Path) -> Invocation:
     except (FileNotFoundError, NotADirectoryError):
         hint = f"a run folder is what `mocapflow run` writes; it holds {FILE}"
         raise PipelineError("this is no run folder", where=str(out), hint=hint) from None
-    except (ValueError, TypeError, KeyError, AttributeError):
+    except (ValueError, TypeError, KeyError, AttributeError, IsADirectoryError):
         raise PipelineError("this file is damaged", where=str(out / FILE), hint="run the pipeline again") from None
 
 

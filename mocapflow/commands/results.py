@@ -7,13 +7,13 @@ import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
 from mocapflow.commands.former import differing
 from mocapflow.commands.invocation import alone, recall, recalled_keys
-from mocapflow.errors import MocapflowError, PipelineError, RecordingError
+from mocapflow.errors import MocapflowError, PipelineError, RecordingError, alternatives
 
 if TYPE_CHECKING:
     from mocapflow.config.pipeline import Pipeline
@@ -76,6 +76,7 @@ def export(run: Run, format_: Format) -> None:
     from mocapflow.commands.running import carry_out
     from mocapflow.running import runner
 
+    _check_formats(format_)
     invocation = recall(run)
     pipeline = invocation.load()
     with alone(run):
@@ -90,6 +91,15 @@ def export(run: Run, format_: Format) -> None:
             raise PipelineError(what, where=str(run), hint=hint)
         exporting = invocation.changed(*_only_formats(pipeline, format_))
         typer.echo(carry_out(exporting.load(), exporting, run, made=keys if changed else None))
+
+
+def _check_formats(formats: Sequence[str]) -> None:
+    from mocapflow_export.export import Format as Known
+
+    known = get_args(Known)
+    for name in formats:
+        if name not in known:
+            raise PipelineError("there is no such format", where=f"--format {name}", hint=alternatives(name, known))
 
 
 def _only_formats(pipeline: Pipeline, formats: Sequence[str]) -> list[str]:

@@ -32,7 +32,7 @@ Store = Annotated[
     ),
 ]
 Set = Annotated[list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Change a value; repeatable.")]
-Frames = Annotated[str | None, typer.Option(metavar="A:B", help="Only frames A up to, without, B.")]
+Frames = Annotated[str | None, typer.Option(metavar="A:B[:STEP]", help="Only frames A up to, without, B.")]
 Parts = Annotated[int | None, typer.Option(min=1, metavar="N", help="Track in N parts, and join them.")]
 Fresh = Annotated[bool, typer.Option("--fresh", help="Compute everything anew.")]
 

@@ -31,7 +31,10 @@ class Document:
     places: Mapping[Steps, Place]
 
     def place(self, steps: Steps) -> Place:
-        """Return where a value stands, or the nearest one that contains it."""
+        """Return where a value stands, or what a change has put in it, or the nearest one that contains it."""
+        inside = (place for at, place in self.places.items() if at[: len(steps)] == steps)
+        if steps not in self.places and (found := next(inside, None)):
+            return found
         while steps not in self.places:
             steps = steps[:-1]
         return self.places[steps]

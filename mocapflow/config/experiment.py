@@ -12,8 +12,8 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
+from mocapflow.config.frames import Frames
 from mocapflow.config.levels import changes_at, levels_at, variant_of
-from mocapflow.config.pipeline import frames_of
 from mocapflow.config.resolve import Resolver
 from mocapflow.config.yamlfile import read
 from mocapflow.errors import PipelineError
@@ -33,7 +33,7 @@ class ExperimentFile(Settings):
     mocapflow: Literal[1] = 1  # version of the format
     pipeline: str  # a pipeline file
     recordings: Annotated[tuple[str, ...], Field(min_length=1)]  # folders
-    frames: str | None = None  # as --frames
+    frames: Frames | None = None  # instead of those of the pipeline; said likewise
     change: Changes = {}  # in every variant
     factors: Factors  # factor: level: what it changes; `pipeline` in a level names another pipeline file
 
@@ -66,10 +66,12 @@ def load_experiment(path: Path, recordings: Sequence[Path] = (), frames: str | N
     """
     document = read(path)
     resolver = Resolver(document, Registry())
+    if "stages" in document.values:
+        hint = "`mocapflow run` runs one; an experiment names it, as `pipeline: FILE`"
+        raise PipelineError("this is a pipeline, no experiment", where=str(path), hint=hint)
     said = resolver.build(ExperimentFile, document.values, ())
     assert isinstance(said, ExperimentFile)
-    if said.frames is not None:
-        frames_of(said.frames, resolver.place(("frames",)))  # told once, by its line, not by every run
+    part = frames or (said.frames.text if said.frames else None)
     folders = tuple(recordings) or tuple(
         resolver.file(name, ("recordings", index)) for index, name in enumerate(said.recordings)
     )
@@ -86,7 +88,7 @@ def load_experiment(path: Path, recordings: Sequence[Path] = (), frames: str | N
         written = tuple(f"{target}={json.dumps(change.value)}" for target, change in changes.items())
         places = tuple(change.where for change in changes.values())
         cells += [
-            Cell(variant, name, file, recording, written, places, path.parent, frames or said.frames)
+            Cell(variant, name, file, recording, written, places, path.parent, part)
             for name, recording in zip(names, folders, strict=True)
         ]
     return tuple(cells)

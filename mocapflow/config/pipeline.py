@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, NonNegativeInt, PositiveInt, model_validator
+from pydantic import Field, PositiveInt
 
 from mocapflow.components import BodyModel, Garment, Stage
 from mocapflow.config.documents import Document, Place, Steps, changed
+from mocapflow.config.frames import Frames
 from mocapflow.config.measures import garment_of, place_of
 from mocapflow.config.named_parts import folder_of
 from mocapflow.config.resolve import Resolver
@@ -22,37 +23,6 @@ from mocapflow.registry import Registry, load_registry
 from mocapflow.settings import Settings
 
 LABEL = re.compile(r"[\w-]+")  # of a stage
-
-
-class Frames(Settings):
-    """The part of the recording to work on: `start` up to, without, `stop`; or A:B, as on the command line."""
-
-    start: NonNegativeInt = 0  # the first frame
-    stop: NonNegativeInt | None = None  # where it ends, without this frame; null: with the recording
-    step: PositiveInt = 1  # takes every so many-th frame
-
-    @model_validator(mode="before")
-    @classmethod
-    def _as_on_the_command_line(cls, value: Any) -> Any:
-        if not isinstance(value, str):
-            return value
-        try:
-            part = frames_of(value, "")
-        except PipelineError as error:
-            raise ValueError(error.message) from None
-        return {end: given for end in ("start", "stop", "step") if (given := getattr(part, end)) is not None}
-
-
-def frames_of(text: str, where: str) -> slice:
-    """Return the frames of `A:B` or `A:B:STEP`, as people write them on the command line.
-
-    Raises:
-        PipelineError: it is written otherwise.
-    """
-    parts = text.split(":")
-    if len(parts) not in {2, 3} or not all(part.isdecimal() or not part for part in parts):
-        raise PipelineError("frames are written A:B or A:B:STEP; either end may be left out", where=where)
-    return slice(*(int(part) if part else None for part in parts))
 
 
 class PartsFile(Settings):
@@ -147,6 +117,9 @@ def load_pipeline(
     if frames is not None:
         document = _with_frames(document, frames)
     plain = Resolver(document, Registry())
+    if "factors" in document.values:
+        hint = "`mocapflow compare` runs one"
+        raise PipelineError("this is an experiment, no pipeline", where=plain.place(("factors",)), hint=hint)
     said = plain.build(PipelineFile, document.values, ())
     assert isinstance(said, PipelineFile)
     resolver = Resolver(document, registry or _registry_with(said.plugins, plain))
@@ -159,8 +132,6 @@ def load_pipeline(
     if all(value is None for value in said.stages.values()):
         raise PipelineError("a pipeline needs stages", where=resolver.place(("stages",)))
     part = said.frames
-    if part.stop is not None and part.stop <= part.start:
-        raise resolver.located(PipelineError(f"{part.start}:{part.stop} holds no frame"), ("frames",))
     return Pipeline(
         name=Path(path).stem,
         path=Path(path),

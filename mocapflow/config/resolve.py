@@ -16,6 +16,9 @@ from mocapflow.errors import MocapflowError, PipelineError, guess
 from mocapflow.registry import Registry
 from mocapflow.settings import plain_parts
 
+LINES = "input should be `name: value` lines"
+EXPECTED = {"dict_type": LINES, "model_type": LINES, "tuple_type": "input should be a list"}  # as YAML has it
+
 
 class Resolver:
     """Builds the components a document names."""
@@ -112,7 +115,7 @@ class Resolver:
             least = first["ctx"]["min_length"]
             message = f"needs at least {least} entr{'y' if least == 1 else 'ies'}"
             return self.located(PipelineError(message), (*steps, *location))
-        reason = first["msg"].removeprefix("Value error, ")
+        reason = EXPECTED.get(first["type"], first["msg"].removeprefix("Value error, "))
         got = "" if isinstance(first["input"], dict | BaseModel) else f", not {first['input']!r}"
         message = reason if first["type"] == "value_error" else reason[:1].lower() + reason[1:] + got
         return self.located(PipelineError(message), (*steps, *location))

@@ -30,7 +30,7 @@ def read(path: Path, changes: Iterable[str] = (), folder: Path = Path()) -> Docu
     for change in changes:
         target, equals, text = change.partition("=")
         place = Place(f"--set {change}", folder)
-        if not equals:
+        if not (target and equals):
             raise PipelineError("a change is written PATH=VALUE", where=place.text)
         value = _parse(text, place.text, None)
         document = changed(document, target, Document(value.values, dict.fromkeys(value.places, place)))

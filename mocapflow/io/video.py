@@ -106,16 +106,6 @@ def read_frames(video: Video, indices: range) -> Iterator[tuple[U8 | None, str]]
             yield image, reason
 
 
-def lost_frames(video: Video) -> list[int]:
-    """Return the numbers of the frames that there should be and that can't be used; decodes all of them."""
-    wanted = range(video.declared)
-    if video.path.is_dir():
-        punctual = replace(video, late=0)
-        return [index for index, (image, _) in zip(wanted, read_frames(punctual, wanted), strict=True) if image is None]
-    with open_capture(video.path) as capture:
-        return sorted(set(wanted) - set(_decoded(capture, video)))
-
-
 def _file_pictures(video: Video, indices: range) -> Iterator[tuple[U8 | None, str]]:
     with open_capture(video.path) as capture:
         decoded = _decoded(capture, video)

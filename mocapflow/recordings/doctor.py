@@ -2,38 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
-from filecmp import cmp
-from functools import partial
-from itertools import combinations
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from mocapflow.assets import Camera
 from mocapflow.components import Garment
 from mocapflow.config import measures
 from mocapflow.errors import MocapflowError, RecordingError, UnknownComponent
-from mocapflow.io import agreement, first_pose, folders
+from mocapflow.io import first_pose
 from mocapflow.io.cameras import find_calibration, read_cameras
 from mocapflow.io.findings import Finding, attempt, error, note, warning
-from mocapflow.io.images import name_frames
 from mocapflow.io.lateness import TIMING, late_frames, timing_text, write_late_frames
-from mocapflow.io.lenses import View
-from mocapflow.io.plates import background
-from mocapflow.io.rigs import examine_rig, examine_view
+from mocapflow.io.rigs import examine_view
 from mocapflow.io.subjects import examine_subject
-from mocapflow.io.video import Video, count_from_first, lost_frames, open_video, read_frames
 from mocapflow.recordings.first_look import examine_first_frame
 from mocapflow.recordings.recording import open_recording
 from mocapflow.recordings.synchrony import Lateness, measure
+from mocapflow.recordings.trial import copies, examine_trial
 from mocapflow.registry import Registry, load_registry
-
-LOOKS = 6  # pictures of each video that are compared
-STILL = 0.05  # share of the usual change below which a video repeats one picture, give or take what a codec adds
-MOVES = 0.5  # grey levels, mean over a picture: less is no motion
 
 
 def examine(folder: Path) -> list[Finding]:
@@ -45,16 +32,17 @@ def examine(folder: Path) -> list[Finding]:
     folder, registry = Path(folder), load_registry()
     findings: list[Finding] = []
     if not folder.is_dir():
-        return [error("no such recording folder", where=folder)]
+        what = "this is a file; a recording is a folder" if folder.exists() else "no such recording folder"
+        return [error(what, where=folder)]
     calibration = attempt(lambda: find_calibration(folder), findings)
     if calibration is not None:
-        findings += _trial(folder, calibration)
+        findings += examine_trial(folder, calibration)
         if (folder / "static" / "videos").is_dir():
             static = folder / "static"
             own = static / "cameras.toml"
             findings += [
                 replace(f, message=f"static trial: {f.message}")
-                for f in _trial(static, own if own.exists() else calibration, rig=False)
+                for f in examine_trial(static, own if own.exists() else calibration, rig=False)
             ]
     findings += examine_subject(folder)
     findings += [] if calibration is None else _start(folder, calibration)
@@ -97,9 +85,9 @@ def _measured(folder: Path) -> list[Lateness]:
         RecordingError: two have the same video, in which any lag would be found, or too little is seen by two at once.
     """
     recording = open_recording(folder)
-    for same in _copies(recording.lenses, recording.videos):
+    for same in copies(recording.lenses, recording.videos):
         raise RecordingError(f"no lateness is measured: {same.message}", where=same.where, hint=same.hint)
-    return measure(folder)
+    return measure(recording)
 
 
 def _garment(folder: Path, registry: Registry) -> list[Finding]:
@@ -159,71 +147,3 @@ def _missing(folder: Path) -> Iterator[Finding]:
             "there is neither init.json nor keypoints/: nothing tells the pose of the first frame",
             "a run needs one of them: the stage start_from_file or start_from_keypoints",
         )
-
-
-def _trial(folder: Path, calibration: Path, rig: bool = True) -> list[Finding]:
-    """Return what is odd about cameras, their delays, videos, keypoints and clean plates of one folder."""
-    findings: list[Finding] = []
-    cameras = attempt(lambda: read_cameras(calibration), findings)
-    if cameras is None:
-        return findings
-    late = attempt(lambda: late_frames(folder, [c.name for c in cameras]), findings)
-    paths = attempt(lambda: folders.match_videos(folder, [c.name for c in cameras], calibration), findings)
-    videos = None if paths is None else [attempt(partial(open_video, path), findings) for path in paths]
-    if videos is None or any(video is None for video in videos):
-        return findings + (list(examine_rig(cameras)) if rig and all(c.size.all() for c in cameras) else [])
-    whole = count_from_first([video for video in videos if video is not None])
-    fitted = attempt(lambda: agreement.fit_sizes(cameras, whole, calibration), findings)
-    agreed = attempt(lambda: agreement.agree_on_length(cameras, whole, folder), findings)
-    rate = attempt(lambda: agreement.common_rate(cameras, whole, calibration), findings)
-    findings += [warning(text, where=folder) for part in (fitted, agreed, rate) if part is not None for text in part[1]]
-    findings += [note(text, where=folder) for text in agreement.first_warnings(whole)]
-    lenses = cameras if fitted is None else fitted[0]
-    findings += examine_rig(lenses) if rig else []
-    length = min(video.frames for video in whole) if agreed is None else agreed[0]
-    findings += [*_copies(cameras, whole), *_lost(cameras, whole), *_stuck(cameras, whole, length)]
-    if late is not None:
-        delayed = [replace(video, late=frames) for video, frames in zip(whole, late, strict=True)]
-        attempt(lambda: agreement.check_lateness(cameras, delayed, length, folder), findings)
-    odd = attempt(lambda: folders.keypoint_warnings(folder, cameras, length, whole[0].first), findings)
-    unused = attempt(lambda: folders.plate_warnings(folder, cameras), findings)
-    findings += [warning(text, where=folder) for text in (*(odd or ()), *(unused or ()))]
-    if fitted is not None and unused is not None:
-        attempt(lambda: background(folder, [View(lens=lens) for lens in lenses], whole), findings)
-    return findings
-
-
-def _copies(cameras: Sequence[Camera], videos: Sequence[Video]) -> Iterator[Finding]:
-    """Yield which cameras have one and the same file."""
-    for (a, one), (b, other) in combinations(zip([c.name for c in cameras], videos, strict=True), 2):
-        if one.path.is_file() and other.path.is_file() and cmp(one.path, other.path, shallow=False):
-            hint = "one of them is a copy by mistake: copy it again from its own camera"
-            yield warning(f"{a} and {b} have the same video", hint, other.path)
-
-
-def _lost(cameras: Sequence[Camera], videos: Sequence[Video]) -> Iterator[Finding]:
-    for camera, video in zip(cameras, videos, strict=True):
-        lost = [index for index in lost_frames(video) if index < video.frames]
-        if lost:
-            why = "missing, damaged or of another size" if video.path.is_dir() else "can't be decoded"
-            yield warning(
-                f"{camera.name}: {name_frames(lost)} {why}",
-                "the view is not used in these frames; the others keep their places",
-                video.path,
-            )
-
-
-def _stuck(cameras: Sequence[Camera], videos: Sequence[Video], length: int) -> Iterator[Finding]:
-    """Yield which cameras show one picture from first to last, while most show something move."""
-    changes = [_change(video, length) for video in videos]
-    usual = float(np.median(changes))
-    for camera, video, change in zip(cameras, videos, changes, strict=True):
-        if change < STILL * usual and usual > MOVES:
-            hint = "did the camera hang? the stage check_views goes without such a view"
-            yield warning(f"{camera.name} shows one picture from first to last, the others move", hint, video.path)
-
-
-def _change(video: Video, length: int) -> float:
-    """Return by how many grey levels, on the mean, pictures spread over a video differ from its first at most."""
-    pictures = [p for p, _ in read_frames(video, range(0, length, max(length // LOOKS, 1))) if p is not None]
-    return max((float(np.abs(picture - np.float32(pictures[0])).mean()) for picture in pictures), default=0.0)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
-from pathlib import Path
 
 import numpy as np
 
 from mocapflow.errors import RecordingError
+from mocapflow.io.lenses import View
 from mocapflow.recordings.paired_views import Signals, keypoint_signals, outline_signals
-from mocapflow.recordings.recording import open_recording
+from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64, record
 
 FRAMES = 600  # at most, that are looked at
@@ -38,17 +38,17 @@ class Lateness:
         return abs(self.frames) > max(LEAST, SURE * self.sd)
 
 
-def measure(folder: Path) -> list[Lateness]:
+def measure(whole: Recording) -> list[Lateness]:
     """Return how late each camera of a recording is, on top of what its recording.json says.
 
     Keypoints tell where there are any, else the person's outlines.
 
     Raises:
-        RecordingError: the recording can't be opened, or too little is seen by two cameras at once.
+        RecordingError: too little is seen by two cameras at once.
     """
-    whole = open_recording(folder)
     scale = min(1.0, WIDTH / max(int(lens.size[0]) for lens in whole.lenses))
-    recording = replace(open_recording(folder, scale=scale), indices=whole.indices[:FRAMES])
+    views = tuple(View(lens=lens, scale=scale) for lens in whole.lenses)
+    recording = replace(whole, views=views, indices=whole.indices[:FRAMES])
     signals = keypoint_signals if sum(place is not None for place in whole.keypoint_folders) > 1 else outline_signals
     reach = max(min(round(SECONDS * whole.frame_rate), len(recording.indices) // 3), 2)
     return lateness([camera.name for camera in recording.cameras], signals(recording), reach)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
@@ -53,13 +53,12 @@ class Scanned(BodyModel):
         return [*files, recording / self.morph.mesh] if self.morph else files
 
     def need(self, recording: Path) -> None:
-        """Raise if mesh or skeleton is missing."""
+        """Raise if the mesh is missing, or no skeleton can be read."""
         subject = recording / "subject"
-        meshes = [subject / "body.obj", *([recording / self.morph.mesh] if self.morph else [])]
-        readers: dict[Path, Callable[[Path], object]] = dict.fromkeys(meshes, read_mesh)
-        for path, read in {**readers, subject / "skeleton.json": read_skeleton}.items():
+        for path in [subject / "body.obj", *([recording / self.morph.mesh] if self.morph else [])]:
             if not path.is_file():
-                read(path)  # says what to do
+                read_mesh(path)  # says what to do
+        read_skeleton(subject / "skeleton.json")
 
     def load(self, recording: Path) -> Body:
         """Return the body at rest.

@@ -50,7 +50,8 @@ def of_folder(folder: Path) -> Ours:
     """
     path = folder / layout.ANGLES
     if not path.is_file():
-        raise RecordingError("no such run folder: it has no results/angles.csv", where=str(folder))
+        hint = "a run folder is what `mocapflow run` writes; the stage `export` writes this file"
+        raise RecordingError("there are no angles to compare", where=str(path), hint=hint)
     columns = read_columns(path)
     raw = folder / layout.RAW_ANGLES
     motion = markers.read_mot(folder / layout.MOTION)[0] if (folder / layout.MOTION).is_file() else {}

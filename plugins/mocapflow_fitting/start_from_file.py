@@ -14,7 +14,7 @@ from mocapflow.components import Stage
 from mocapflow.data import NO_CLOTH, Pose, Start
 from mocapflow.errors import RecordingError
 from mocapflow.geometry.cameras import project
-from mocapflow.io.first_pose import FILE, read_pose
+from mocapflow.io.first_pose import FILE, read_first_pose, read_pose
 from mocapflow.io.rigs import PLACE
 from mocapflow.recordings.recording import Recording
 from mocapflow.scene import Scene
@@ -38,8 +38,8 @@ class StartFromFile(Stage):
         return [path, *sorted(path.parent.glob(f"{path.stem}_*{path.suffix}"))]
 
     def need(self, recording: Recording) -> None:
-        """Raise if there is no file with the first pose."""
-        self._found(recording)
+        """Raise if there is no file with the first pose, or none can be read from it."""
+        read_first_pose(self._found(recording), joints=())
 
     def run(self, recording: Recording, scene: Scene) -> Start:
         """Return the pose in the file; the cloth starts without forces.

@@ -11,8 +11,9 @@ from pydantic import Field, PositiveFloat
 
 from mocapflow.assets import Background
 from mocapflow.components import Stage
+from mocapflow.recordings.freezing import frozen_from, repeated
 from mocapflow.recordings.recording import Recording
-from mocapflow.records import F32
+from mocapflow.records import F32, Bool
 from mocapflow.results import ViewChecks
 from mocapflow_robustness import doubts
 from mocapflow_robustness.thumbnails import Thumbnails, thumbnail, thumbnails
@@ -62,8 +63,8 @@ class CheckViews(Stage):
         empty = doubts.blank(seen.grey, room)
         foreign, like = doubts.lookalike(seen.grey, room)
         good = seen.there & ~(empty | foreign)
-        old = doubts.repeated(np.where(empty | foreign, np.nan, seen.news)) & doubts.peopled(seen.grey, room, good)
-        old |= np.isfinite(seen.news) & doubts.stuck(seen.news)
+        old = repeated(np.where(empty | foreign, np.nan, seen.news)) | frozen(seen)
+        old &= doubts.peopled(seen.grey, room, good) | (frozen_from(seen.news) == 0)  # then it is its own empty room
         settled = doubts.bridged(seen.grey, good & ~old)
         torn = doubts.bursts(settled, self.longest(frame_rate), self.jump, self.joint_jump)
         said = np.full(empty.shape, "", "U64")
@@ -78,8 +79,15 @@ class CheckViews(Stage):
 def rooms(seen: Thumbnails, background: Background | None) -> F32:
     """Return (C, S, S) thumbnails of the empty scene; without one known, the median over the recording."""
     if background is None:
-        return np.stack([median(seen.grey[seen.there[:, c], c]) for c in range(seen.grey.shape[1])])
+        shown = seen.there & ~frozen(seen)
+        return np.stack([median(seen.grey[shown[:, c], c]) for c in range(seen.grey.shape[1])])
     return np.stack([thumbnail(np.clip(np.rint(mean), 0, 255).astype(np.uint8)) for mean in background.mean])
+
+
+def frozen(seen: Thumbnails) -> Bool:
+    """Return (T, C) which pictures repeat one that a camera shows to the end."""
+    late: Bool = np.arange(len(seen.news))[:, None] >= frozen_from(seen.news)
+    return late & np.isfinite(seen.news)
 
 
 def median(grey: F32) -> F32:

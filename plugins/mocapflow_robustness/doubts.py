@@ -1,4 +1,4 @@
-"""What gives a wrong picture away: no contrast, another camera's room, nothing new, a moment that does not fit in."""
+"""What gives a wrong picture away: no contrast, another camera's room, a moment that does not fit in."""
 
 from __future__ import annotations
 
@@ -10,8 +10,6 @@ from mocapflow.records import F32, F64, Bool
 LEAST_CONTRAST = 1.5  # grey levels, standard deviation of a thumbnail that shows something
 FAINT = 0.1  # share of the usual contrast below which nothing is shown
 NEARER = 0.5  # a picture is of another camera if it differs from that one's room by less than this share
-NO_NEWS = 0.1  # share of the usual news in a picture that repeats the one before
-SOME_NEWS = 0.5  # share that half of the cameras then have at least, or the person just stands still
 NOBODY = 0.1  # share of the contrast to its room that a camera's pictures with most in them have; below, nobody is seen
 FAST = 4  # times the usual step: no body moves much faster than that, from frame to frame
 NEIGHBOURS = 4  # steps before and after a burst that say how fast things move
@@ -35,28 +33,6 @@ def lookalike(grey: F32, room: F32) -> tuple[Bool, npt.NDArray[np.intp]]:
     own = np.diagonal(off, axis1=1, axis2=2)
     others = np.where(np.eye(len(room), dtype=bool), np.inf, off)
     return others.min(axis=-1) < NEARER * own, others.argmin(axis=-1)
-
-
-def stuck(news: F64) -> Bool:
-    """Return (C,) which cameras give one picture from first to last, while the others see things move."""
-    most = np.max(news, axis=0, where=np.isfinite(news), initial=0.0)
-    same: Bool = most < NO_NEWS * np.median(usual_news(news))
-    return same
-
-
-def usual_news(news: F64) -> F64:
-    """Return the median news (C,) of each camera over the frames (T, C); 1 where none is known."""
-    known = np.isfinite(news)
-    return np.array([np.median(news[rows, camera]) if rows.any() else 1.0 for camera, rows in enumerate(known.T)])
-
-
-def repeated(news: F64) -> Bool:
-    """Return (T, C) which pictures repeat the one before though at least half of the cameras see things move."""
-    known = np.isfinite(news)
-    share = news / np.maximum(usual_news(news), 1e-9)
-    moving = (known & (share > SOME_NEWS)).sum(axis=1, keepdims=True) >= 0.5 * known.sum(axis=1, keepdims=True)
-    old: Bool = known & (share < NO_NEWS) & moving
-    return old
 
 
 def peopled(grey: F32, room: F32, good: Bool) -> Bool:

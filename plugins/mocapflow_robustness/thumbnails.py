@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from mocapflow.recordings.freezing import difference
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F32, F64, U8, Bool, array, record
 
 SIDE = 20  # px of a thumbnail; blurred like this, pictures differ in proportion to how far things have moved
 BLUR = 1.5  # px of a thumbnail
-STRIDE = 4  # px of a picture, where it is compared with the one before it
 
 
 @record
@@ -33,11 +33,10 @@ def thumbnails(recording: Recording) -> Thumbnails:
         there[row] = frame.usable
         for camera in np.flatnonzero(frame.usable):
             image, last = frame.images[camera], before[camera]
-            now = image[::STRIDE, ::STRIDE]
             grey[row, camera] = thumbnail(image)
             if last is not None:
-                news[row, camera] = np.abs(now.astype(np.int16) - last).mean()
-            before[camera] = now.copy()
+                news[row, camera] = difference(image, last)
+            before[camera] = image
     return Thumbnails(grey=grey, news=news, there=there)
 
 

@@ -94,9 +94,21 @@ def test_a_date_in_a_change_is_text(tmp_path: Path) -> None:
     assert load_experiment(written(tmp_path, text))[0].changes == ('stages.track.file="2024-02-03"',)
 
 
-def test_frames_are_text_without_quotes(tmp_path: Path) -> None:
-    cells = load_experiment(written(tmp_path, GRID.replace("frames: 0:20", "frames: 10:20")))
-    assert cells[0].frames == "10:20"
+@pytest.mark.parametrize(
+    ("said", "frames"),
+    [
+        ("10:20", "10:20"),  # without quotes
+        ("10:20:2", "10:20:2"),
+        (":20", "0:20"),
+        ("{start: 5}", "5:"),
+        ("{stop: 20, step: 2}", "0:20:2"),
+        ("{step: 1}", "0::1"),
+        ("null", None),
+    ],
+)
+def test_frames_are_said_as_in_a_pipeline_or_on_the_command_line(tmp_path: Path, said: str, frames: str | None) -> None:
+    cells = load_experiment(written(tmp_path, GRID.replace("frames: 0:20", f"frames: {said}")))
+    assert cells[0].frames == frames
 
 
 def test_recordings_of_one_name_are_told_apart(tmp_path: Path) -> None:
@@ -127,7 +139,12 @@ def test_recordings_that_cannot_be_told_apart_are_refused(tmp_path: Path, folder
         ("recordings: [takes/a, b]", "recordings: []", r"grid\.yaml:3:13?.*recordings"),
         ("frames:", "frame:", r"grid\.yaml:4:1  frame: unknown setting of an experiment"),
         ("change: {stages", "change: {recording: c, stages", r"grid\.yaml:5:10  a variant can't change 'recording'"),
-        ("frames: 0:20", "frames: 0-20", r"grid\.yaml:4:1  frames are written A:B or A:B:STEP"),
+        ("frames: 0:20", "stages: {}", r"grid\.yaml  this is a pipeline, no experiment\n +`mocapflow run` runs one"),
+        ("recordings: [takes/a, b]", "recordings: b", r"grid\.yaml:3:1  recordings: input should be a list, not 'b'"),
+        ("    rings:", "    rings: 3", r"grid\.yaml:8:5  factors\.draper\.rings: input should be `name: value` lines"),
+        ("frames: 0:20", "frames: 0-20", r"grid\.yaml:4:1  frames: frames are written A:B or A:B:STEP"),
+        ("frames: 0:20", "frames: 9:2", r"grid\.yaml:4:1  frames: 9:2 holds no frame"),
+        ("frames: 0:20", "frames: {stp: 2}", r"grid\.yaml:4:10  frames\.stp: unknown setting of frames"),
         ("    rings:", "    rings: {recording: c}", r"grid\.yaml:8:13  a variant can't change 'recording'"),
         ("    rings:", "    a/b:", r"grid\.yaml:8:5  a level can't be called 'a/b'"),
         ("    rings:", "    ..:", r"grid\.yaml:8:5  a level can't be called '\.\.'"),

@@ -88,6 +88,8 @@ def test_frames(folder):
     assert (load().start, load().stop, load().step) == (1, 30, 1)
     with pytest.raises(MocapflowError, match=r"frames: frames are written A:B or A:B:STEP"):
         load("frames=some")
+    with pytest.raises(MocapflowError, match=r"frames: frames are written A:B or A:B:STEP"):
+        load("frames=20")
 
 
 def test_frames_that_are_given_keep_the_step_of_the_file(folder):
@@ -193,6 +195,12 @@ def test_a_plugin_file_named_by_the_pipeline(folder):
          "       its name is that of files: letters, digits, _ and -"),
         ("recording: clip", "recording: clip\nframes: {start: 9, stop: 2}",
          "skirt.yaml:2:1  frames: 9:2 holds no frame"),
+        ("recording: clip", "recording: clip\nparts: 3",
+         "skirt.yaml:2:1  parts: input should be `name: value` lines, not 3"),
+        ("recording: clip", "recording: clip\nplugins: mine.py",
+         "skirt.yaml:2:1  plugins: input should be a list, not 'mine.py'"),
+        ("recording: clip", "recording: clip\nfactors: {}",
+         "skirt.yaml:2:1  this is an experiment, no pipeline\n       `mocapflow compare` runs one"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_told_with_its_line(folder, written, instead, message):
@@ -201,6 +209,13 @@ def test_what_is_wrong_is_told_with_its_line(folder, written, instead, message):
         load()
     assert str(caught.value) == message
     assert caught.value.exit_status == 2
+
+
+def test_a_change_of_what_is_not_there_is_told_as_such(folder):
+    with pytest.raises(
+        MocapflowError, match=r"^--set stages.track.nope.x=3  stages.track.nope: unknown setting of cou"
+    ):
+        load("stages.track.nope.x=3")
 
 
 def test_a_recording_without_measures(folder):

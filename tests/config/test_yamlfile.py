@@ -139,6 +139,7 @@ def test_what_is_wrong_is_told_with_line_and_column(folder, text, message):
     ("change", "message"),
     [
         ("draper", "--set draper  a change is written PATH=VALUE"),
+        ("=3", "--set =3  a change is written PATH=VALUE"),
         ("a=[1", "--set a=[1  not YAML: expected ',' or ']', but got '<stream end>' (while parsing a flow sequence)"),
         ("stages.track.matchers.7=x", "--set stages.track.matchers.7=x  there is no 'stages.track.matchers.7'\n"
          "       available: 0, 1"),

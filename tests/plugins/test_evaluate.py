@@ -247,7 +247,9 @@ def test_times_in_milliseconds_are_an_error_not_samples_far_apart(tmp_path: Path
 
 
 def test_folder_without_angles_is_an_error(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match=r"no such run folder: it has no results/angles.csv"):
+    with pytest.raises(
+        RecordingError, match=r"results/angles\.csv  there are no angles to compare\n .*`mocapflow run`"
+    ):
         evaluate_run(tmp_path, DEMO / "truth" / "angles.csv")
 
 

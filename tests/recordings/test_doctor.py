@@ -110,6 +110,7 @@ def test_several_faults_are_found_at_once_errors_first(good):
 
 def test_nothing_there(tmp_path):
     assert errors(tmp_path / "nowhere") == ["no such recording folder"]
+    assert errors(Path(__file__)) == ["this is a file; a recording is a folder"]
     assert errors(tmp_path) == ["no calibration file"]
 
 
@@ -433,14 +434,19 @@ def test_a_video_copied_twice(good):
     assert not (good / "recording.json").exists()
 
 
-def test_a_video_that_repeats_one_picture(tmp_path):
-    write_recording(tmp_path, frames=8)
-    path = tmp_path / "videos" / "cam02.mp4"
-    film = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 30, (64, 48))
-    for _ in range(8):
-        film.write(np.full((48, 64, 3), 90, np.uint8))
-    film.release()
-    assert messages(tmp_path, "warning") == ["cam02 shows one picture from first to last, the others move"]
+@pytest.mark.parametrize(
+    ("first", "message"),
+    [
+        (0, "cam02 shows one picture from first to last, the others move"),
+        (7, "cam02 repeats one picture from frame 7 on, the others move"),
+    ],
+)
+def test_a_camera_that_hangs(tmp_path, first, message):
+    write_recording(tmp_path, frames=20)
+    write_video(tmp_path / "videos" / "cam02.mp4", 20, last=max(first - 1, 0))
+    (finding,) = [finding for finding in examine(tmp_path) if finding.severity == "warning"]
+    assert finding.message == message and finding.where.endswith("cam02.mp4")
+    assert ("come into its view" in finding.hint) == (first > 0)
 
 
 def test_a_first_pose_that_is_null(good):

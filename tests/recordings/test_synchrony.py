@@ -77,7 +77,7 @@ def test_a_lag_between_signals_is_found_between_frames(lag):
 
 def test_a_late_camera_is_measured_and_heeded(tmp_path):
     folder = write(tmp_path / "clip", {"cam02": 3})
-    measured = {m.camera: m for m in synchrony.measure(folder)}
+    measured = {m.camera: m for m in synchrony.measure(open_recording(folder))}
     assert measured["cam02"].frames == pytest.approx(3, abs=0.3)
     assert [measured[name].sure for name in NAMES] == [False, True, False]
     told = examine_timing(folder)
@@ -85,7 +85,7 @@ def test_a_late_camera_is_measured_and_heeded(tmp_path):
     assert 'write {"late_frames": {"cam02": 3.0}}' in told[-1].hint
     examine_timing(folder, write=True)
     assert json.loads((folder / "recording.json").read_text()) == {"late_frames": {"cam02": 3.0}}
-    assert not any(m.sure for m in synchrony.measure(folder))
+    assert not any(m.sure for m in synchrony.measure(open_recording(folder)))
     recording = open_recording(folder)
     assert "recording.json" in recording.content
     first, last = recording.frame(0), recording.frame(FRAMES - 1)
@@ -106,7 +106,7 @@ def test_keypoints_tell_too(tmp_path):
             (place / f"{index:06}.json").write_text(json.dumps(people))
     signals = paired_views.keypoint_signals(open_recording(folder))
     assert signals(0, 1)[0].shape == (FRAMES, 3)
-    late = {m.camera: m.frames for m in synchrony.measure(folder)}
+    late = {m.camera: m.frames for m in synchrony.measure(open_recording(folder))}
     assert late == pytest.approx({"cam01": 0, "cam02": 0, "cam03": 3}, abs=0.1)
 
 

@@ -1,0 +1,105 @@
+"""What is odd about the cameras and videos of one folder; each video is decoded once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from filecmp import cmp
+from functools import partial
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+
+from mocapflow.assets import Camera
+from mocapflow.io import agreement, folders
+from mocapflow.io.cameras import read_cameras
+from mocapflow.io.findings import Finding, attempt, note, warning
+from mocapflow.io.images import name_frames
+from mocapflow.io.lateness import late_frames
+from mocapflow.io.lenses import View
+from mocapflow.io.plates import background
+from mocapflow.io.rigs import examine_rig
+from mocapflow.io.video import Video, count_from_first, open_video, read_frames
+from mocapflow.recordings.freezing import difference, frozen_from
+from mocapflow.records import F64
+
+
+def examine_trial(folder: Path, calibration: Path, rig: bool = True) -> list[Finding]:
+    """Return what is odd about cameras, their delays, videos, keypoints and clean plates of one folder.
+
+    Args:
+        folder: the recording, or the standing trial in it.
+        calibration: its calibration file.
+        rig: examine how the cameras stand, too.
+    """
+    findings: list[Finding] = []
+    cameras = attempt(lambda: read_cameras(calibration), findings)
+    if cameras is None:
+        return findings
+    late = attempt(lambda: late_frames(folder, [c.name for c in cameras]), findings)
+    paths = attempt(lambda: folders.match_videos(folder, [c.name for c in cameras], calibration), findings)
+    videos = None if paths is None else [attempt(partial(open_video, path), findings) for path in paths]
+    if videos is None or any(video is None for video in videos):
+        return findings + (list(examine_rig(cameras)) if rig and all(c.size.all() for c in cameras) else [])
+    whole = count_from_first([video for video in videos if video is not None])
+    fitted = attempt(lambda: agreement.fit_sizes(cameras, whole, calibration), findings)
+    agreed = attempt(lambda: agreement.agree_on_length(cameras, whole, folder), findings)
+    rate = attempt(lambda: agreement.common_rate(cameras, whole, calibration), findings)
+    findings += [warning(text, where=folder) for part in (fitted, agreed, rate) if part is not None for text in part[1]]
+    findings += [note(text, where=folder) for text in agreement.first_warnings(whole)]
+    lenses = cameras if fitted is None else fitted[0]
+    findings += examine_rig(lenses) if rig else []
+    length = min(video.frames for video in whole) if agreed is None else agreed[0]
+    findings += [*copies(cameras, whole), *_looked_through(cameras, whole, length)]
+    if late is not None:
+        delayed = [replace(video, late=frames) for video, frames in zip(whole, late, strict=True)]
+        attempt(lambda: agreement.check_lateness(cameras, delayed, length, folder), findings)
+    odd = attempt(lambda: folders.keypoint_warnings(folder, cameras, length, whole[0].first), findings)
+    unused = attempt(lambda: folders.plate_warnings(folder, cameras), findings)
+    findings += [warning(text, where=folder) for text in (*(odd or ()), *(unused or ()))]
+    if fitted is not None and unused is not None:
+        attempt(lambda: background(folder, [View(lens=lens) for lens in lenses], whole), findings)
+    return findings
+
+
+def copies(cameras: Sequence[Camera], videos: Sequence[Video]) -> Iterator[Finding]:
+    """Yield which cameras have one and the same file."""
+    for (a, one), (b, other) in combinations(zip([c.name for c in cameras], videos, strict=True), 2):
+        if one.path.is_file() and other.path.is_file() and cmp(one.path, other.path, shallow=False):
+            hint = "one of them is a copy by mistake: copy it again from its own camera"
+            yield warning(f"{a} and {b} have the same video", hint, other.path)
+
+
+def _looked_through(cameras: Sequence[Camera], videos: Sequence[Video], length: int) -> Iterator[Finding]:
+    """Yield which frames of the videos can't be used, and which cameras hang."""
+    news = np.full((length, len(videos)), np.nan)
+    for column, camera, video in zip(news.T, cameras, videos, strict=True):
+        lost, found = look_through(video)
+        column[:] = found[:length]
+        if lost := [index for index in lost if index < video.frames]:
+            why = "missing, damaged or of another size" if video.path.is_dir() else "can't be decoded"
+            hint = "the view is not used in these frames; the others keep their places"
+            yield warning(f"{camera.name}: {name_frames(lost)} {why}", hint, video.path)
+    for since, camera, video in zip(frozen_from(news), cameras, videos, strict=True):
+        if since < length:
+            when = f"repeats one picture from frame {since} on" if since else "shows one picture from first to last"
+            left = ", or does nobody come into its view any more" if since else ""
+            hint = f"did the camera hang{left}? the stage check_views goes without such pictures"
+            yield warning(f"{camera.name} {when}, the others move", hint, video.path)
+
+
+def look_through(video: Video) -> tuple[list[int], F64]:
+    """Return which of the frames that there should be are lost, and by how much each of all differs from the last one.
+
+    The latter (N,) is in grey levels, NaN without a picture or one before it.
+    """
+    lost, news, before = [], np.full(video.declared, np.nan), None
+    for index, (image, _) in enumerate(read_frames(video, range(video.declared))):
+        if image is None:
+            lost.append(index)
+            continue
+        if before is not None:
+            news[index] = difference(image, before)
+        before = image
+    return lost, news
