@@ -44,8 +44,8 @@ class LimbSearch(Recovery):
     Where large parts of person and model lie far apart, the best is taken of the fitted pose, the one that was believed
     before, that of the frame before, and poses that people were seen in. Around it poses are sampled part by part, and
     limbs as people were seen to hold them; then around that of the frame before, where trunk and legs have not yet gone
-    astray together. A part moves only if that brings what strays together: a leg must not take
-    a new place under the skirt because an arm was lost. The loop settles again from there.
+    astray together. A part moves only if that brings what strays together: a leg must not take a new place under the
+    skirt because an arm was lost. The loop settles again from there.
     It also looks where images need not contradict a limb that is elsewhere: in the first frame and after frames that
     did not show the person, where a leg may rest on the contour of the other one and a foot lie turned in its own;
     where a joint is bent beyond its limits; where a little of the person is off the model, if `hint_cm2` says so; and
@@ -57,8 +57,8 @@ class LimbSearch(Recovery):
     What shows the garment's colours calls for a search where it strays, but moves no part and is no doubt: it may fly.
     So it is searched twice, once as if cloth lay where the body holds it, which tells of legs that nobody sees, once as
     if it flew, which leads none astray; the fit that agrees better by what is skin, and a little by cloth, is taken.
-    Where nothing strays any more after the first search, there is no second one. A joint bent too far, and a limb that
-    leapt, are looked for alone: nothing is known against the others.
+    Where a doubt leaves nothing astray after the first search, there is no second one. A joint bent too far, and a limb
+    that leapt, are looked for alone: nothing is known against the others.
     A doubt that lasts is mostly one about the room, and a joint that stays beyond its limits can be bent so far: such
     frames are searched now and then only (`vain_every`).
     It needs the empty scene; where little of it is known behind the person every fit is taken as it is.
@@ -134,7 +134,7 @@ class LimbSearch(Recovery):
         for number, look in enumerate(self._ways(looks, suspected)):
             found = look(np.random.default_rng([index, number]))
             fits.append(judge.of(settle(found, judge.parameters)))
-            if fits[-1].stray.nothing and not judge.given:
+            if doubtful and fits[-1].stray.nothing and not judge.given:
                 break
         best = self._better(min(fits, key=lambda other: (doubted(other.stray), other.apart)), fit)
         if judge.given and doubtful:
