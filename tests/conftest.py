@@ -4,6 +4,7 @@ from pathlib import Path
 
 import mocapflow_levelset
 import pytest
+from threadpoolctl import threadpool_limits
 
 from mocapflow.caching.digests import Digests
 
@@ -28,6 +29,13 @@ def code_is_known():
     real = Digests.__init__
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Digests, "__init__", begin)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_thread():
+    """Compute in one thread, as a run does: the threads of several workers wait for each other."""
+    with threadpool_limits(limits=1):
         yield
 
 
