@@ -13,7 +13,7 @@ from mocapflow.geometry.kinematics import root_position
 from mocapflow.model import moved
 from mocapflow.records import I32
 from mocapflow_recovery.disagreement import HANGS
-from mocapflow_recovery.judge import LEAST, Judge
+from mocapflow_recovery.judge import Judge
 from mocapflow_recovery.leaps import eased
 from mocapflow_recovery.sampling import Cost, Plan, put_back, search, seen_samples, without_idle_parts
 
@@ -54,11 +54,7 @@ class Looks(NamedTuple):
         seen_poses = seen_samples(resting, every, self.body, self.plan, rng)
         possible = eased(self.fitted, self.believed, self.body)
         begins = [nearest(judge.apart, [possible, self.believed, *before, *seen_poses]), *before]
-        ends: list[Pose] = []
-        for begin in dict.fromkeys(begins):
-            ends.append(search(judge.apart, begin, self.body, self.plan, rng))
-            if astray and judge.stray(ends[-1:])[0] < LEAST:
-                break
+        ends = [search(judge.apart, begin, self.body, self.plan, rng) for begin in dict.fromkeys(begins)]
         # by what strays a fit that is not astray has only idle parts
         looks = self._replace(judge=judge)
         return looks._tidied(nearest(judge.apart, ends), judge.stray if astray else judge.apart)
