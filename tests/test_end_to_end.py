@@ -83,6 +83,7 @@ def few(home):
     return home / "few"
 
 
+@pytest.mark.long
 def test_two_frames_without_cloth(tmp_path):
     said = call(
         *("run", PIPELINES / "bare.yaml", "--recording", CLIPS["shorts"], "--frames", "0:2", "--out", "out"),

@@ -43,6 +43,7 @@ def status(folder):
     return done.stdout
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM], ids=["ctrl_c", "terminated"])
 def test_a_run_is_asked_after_interrupted_and_gone_on_with(tmp_path, path, stop):
     words = ["run", path.name, "--out", "out", "--store", "store.zarr"]

@@ -89,6 +89,7 @@ def test_start_is_disturbed_by_four_degrees_and_the_same_each_time():
     assert 2 < np.degrees(np.std(list(one["joint_rotations"].values()))) < 6
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("wearer", [SKIRT, SHORTS], ids=["hers", "his"])
 def test_garments_have_their_measures(wearer):
     body = made.read_body(wearer / "subject")

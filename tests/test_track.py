@@ -46,6 +46,7 @@ def test_a_track_has_every_frame_and_says_how_it_went(tmp_path, path):
     assert track.notes == ()
 
 
+@pytest.mark.long
 def test_twenty_deaths_in_the_middle_of_writes_change_nothing(tmp_path):
     path = write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=SHORT)
     run_tiny(path, tmp_path / "whole")

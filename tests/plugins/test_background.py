@@ -256,6 +256,7 @@ def test_a_room_without_plates_is_no_secret(tmp_path, caplog):
     assert [line.split(":")[0] for line in caplog.messages] == [f"no clean plates in {tmp_path / 'background'}"]
 
 
+@pytest.mark.long
 def test_the_stage_prefers_plates_and_can_do_without():
     """On the demo clip, whose person never leaves their place: what is known of the room is right."""
     clip = shipped("examples", "data", "skirt_steps")

@@ -71,6 +71,7 @@ def length(body, a, b):
     return np.linalg.norm(body.positions[body.joint(a)] - body.positions[body.joint(b)])
 
 
+@pytest.mark.long
 def test_exact_silhouettes_give_the_lengths_back(body, poses, tmp_path):
     folder = copy_demo(tmp_path / "recording")
     cameras = open_recording(folder).cameras

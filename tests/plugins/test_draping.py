@@ -276,6 +276,7 @@ def test_joints_that_it_can_not_touch_do_not_move_the_cloth():
     np.testing.assert_array_equal(still, moved)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("length", "inseam"), [(0.80, 0.46), (0.98, 0.64)], ids=["below the knee", "to the ankle"])
 def test_legs_of_shorts_stay_around_the_shank(length, inseam):
     body, poses = drape_bodies.legs(), leg_poses()

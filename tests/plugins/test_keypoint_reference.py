@@ -61,6 +61,7 @@ def apart(evaluation: Evaluation, track: Track) -> float:
     return float(np.abs(markers.world_from_opensim(places)[:FRAMES, columns] - known).max())
 
 
+@pytest.mark.long
 def test_right_cameras_give_the_very_points(track: Track, recording: Recording, tmp_path: Path) -> None:
     evaluation = evaluated(track, recording, seen_by(recording), tmp_path)
     assert apart(evaluation, track) < 1e-4
@@ -70,6 +71,7 @@ def test_right_cameras_give_the_very_points(track: Track, recording: Recording, 
         assert rows[f"knee_flexion_{side}"]["rms_without_offset_deg"] < 1.0
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("unrendered")
 def test_a_turned_camera_gives_others(track: Track, recording: Recording, tmp_path: Path) -> None:
     assert apart(evaluated(track, recording, recording.cameras, tmp_path), track) > 0.005

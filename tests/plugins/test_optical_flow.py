@@ -135,6 +135,7 @@ def test_hanging_cloth_counts_less():
     assert np.median(matches.weight[cloth]) < 0.1 * np.median(matches.weight[~cloth])
 
 
+@pytest.mark.long
 def test_both_matchers_reach_further_than_nearest_neighbours():
     """T-FLOW1: 10 degrees off, right more often with both than without."""
     alone, both = (

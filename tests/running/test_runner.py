@@ -289,6 +289,7 @@ def test_a_file_that_changes_while_a_run_goes_on_ends_it(tmp_path, monkeypatch, 
     assert same(the_track(tmp_path), the_track(tmp_path / "before"))
 
 
+@pytest.mark.long
 def test_two_processes_on_one_store(tmp_path, path, monkeypatch):
     monkeypatch.setenv("TINY_SLOW", "0.02")
     command = [sys.executable, str(ROOT / "tests" / "fixtures" / "stores.py"), str(path), str(tmp_path)]
