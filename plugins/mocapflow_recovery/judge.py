@@ -15,8 +15,6 @@ from mocapflow.scene import Scene
 from mocapflow_recovery.certain import View
 from mocapflow_recovery.disagreement import distance, floating_area, uncovered_areas
 
-LEAST = 1.0  # cm², of what strays
-
 
 class Reach(NamedTuple):
     """What counts as apart, m."""
@@ -34,11 +32,6 @@ class Stray(NamedTuple):
     floating: float
     cloth: float  # uncovered as well; a limb may hold it there, or it flies
     near: float  # of the person, without cloth, off the model by little or more
-
-    @property
-    def nothing(self) -> bool:
-        """True where nothing strays."""
-        return self.uncovered + self.floating + self.cloth < LEAST
 
     def __str__(self) -> str:
         worn = f" ({self.cloth:.0f} of it cloth)" if self.cloth >= 0.5 else ""

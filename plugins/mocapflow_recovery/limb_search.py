@@ -57,8 +57,7 @@ class LimbSearch(Recovery):
     What shows the garment's colours calls for a search where it strays, but moves no part and is no doubt: it may fly.
     So it is searched twice, once as if cloth lay where the body holds it, which tells of legs that nobody sees, once as
     if it flew, which leads none astray; the fit that agrees better by what is skin, and a little by cloth, is taken.
-    Where nothing is left astray after the first search, there is no second one. A joint bent too far, and a limb
-    that leapt, are looked for alone: nothing is known against the others.
+    A joint bent too far, and a limb that leapt, are looked for alone: nothing is known against the others.
     A doubt that lasts is mostly one about the room, and a joint that stays beyond its limits can be bent so far: such
     frames are searched now and then only (`vain_every`).
     It needs the empty scene; where little of it is known behind the person every fit is taken as it is.
@@ -134,8 +133,6 @@ class LimbSearch(Recovery):
         for number, look in enumerate(self._ways(looks, suspected)):
             found = look(np.random.default_rng([index, number]))
             fits.append(judge.of(settle(found, judge.parameters)))
-            if not judge.given and self.signs.visible(fit.stray) and self.signs.gone(fits[-1].stray):
-                break
         best = self._better(min(fits, key=lambda other: (doubted(other.stray), other.apart)), fit)
         if judge.given and doubtful:
             found = looks.turned(np.random.default_rng([index, len(fits)]))

@@ -28,14 +28,6 @@ class Signs(NamedTuple):
         """Return whether the images contradict a fit."""
         return stray.uncovered > self.uncovered or stray.floating > self.floating
 
-    def visible(self, stray: Stray) -> bool:
-        """Return whether something of the person is off the model, or of its skin off the person."""
-        return self.doubtful(stray) or stray.near > self.hint
-
-    def gone(self, stray: Stray) -> bool:
-        """Return whether nothing is astray, cloth or skin."""
-        return stray.nothing and stray.near <= self.hint
-
     def last(self, doubtful: bool, past: Past, body: Body) -> bool:
         """Return whether all frames that are remembered are doubted, or else have a joint beyond its limits."""
         alike = [m.doubted if doubtful else bool(overbent(m.pose, body, self.overbent)) for m in past.moments]

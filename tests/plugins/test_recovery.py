@@ -162,21 +162,6 @@ def test_it_is_searched_as_if_cloth_hung_and_as_if_it_flew(clothed, given, doubt
     assert (len(ways) - len(beliefs), beliefs) == (near, far)
 
 
-@pytest.mark.parametrize(("end", "begun"), [(0.0, 1), (0.9, 2)], ids=["found", "still astray"])
-def test_there_is_no_second_search_where_nothing_strays_after_the_first(monkeypatch, end, begun) -> None:
-    found = []
-
-    def settle(pose, parameters):
-        found.append(pose)
-        return settled(pictures.tiny_state(SCENE, astray(end), POSE))
-
-    monkeypatch.setattr(LimbSearch, "_ways", lambda *_: [lambda rng: POSE] * 2)
-    lost = pictures.tiny_state(SCENE, astray(0.9), POSE)
-    model, past = scenes.tiny_model(SCENE), scenes.tiny_past(SCENE, POSE)
-    LimbSearch().recover(FRAME, lost, settled(lost), past, model, settle)
-    assert len(found) == begun
-
-
 def test_a_limb_that_is_odd_is_looked_for_alone() -> None:
     def apart_from_truth(poses):
         return np.array([np.abs(pose.angles - POSE.angles).sum() for pose in poses])
