@@ -11,7 +11,7 @@ from mocapflow.assets import GarmentMesh
 from mocapflow.records import F64, I32, Bool
 
 GRAVITY = 9.81  # m/s^2
-SHEAR = 0.05  # stiffness of a link across the threads
+SHEAR = 0.0125  # stiffness of a link across the threads, of theirs
 
 
 def links_of(garment: GarmentMesh) -> tuple[I32, F64, F64]:

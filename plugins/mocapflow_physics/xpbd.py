@@ -22,7 +22,7 @@ from mocapflow_physics.cloth import drawn_in, links_of, pinned_of, pins_at, pull
 from mocapflow_physics.motion import beginning, between, centred
 from mocapflow_physics.simulation import Simulation
 
-EVERY = 4  # steps of the solver between two looks for contacts
+EVERY = 2  # steps of the solver between two looks for contacts
 
 
 class Xpbd(Draper):
@@ -33,7 +33,7 @@ class Xpbd(Draper):
 
     name: ClassVar[str] = "xpbd"
     skin_m: NonNegativeFloat = 0.005  # room between skin and cloth of no thickness
-    rate_hz: Annotated[float, Field(ge=60)] = 960.0  # steps of the solver per second
+    rate_hz: Annotated[float, Field(ge=60)] = 1920.0  # steps of the solver per second
     move_s: PositiveFloat = 0.3  # in which the body comes from its last pose, or from rest
     rest_s: NonNegativeFloat = 0.3  # in which the cloth comes to rest
     moves_like: Kinematic = Kinematic(sweeps=4)  # whose strands, distance fields and velocities it has
