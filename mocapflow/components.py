@@ -125,10 +125,6 @@ class Draper(Component):
         bounds = scene.garment.parameter_bounds
         return drape_differences(drape, scene.body, self.touchable(scene), bounds, pose, parameters)
 
-    def rough(self) -> Draper:
-        """Return one that lays a garment about alike for less, where many poses are only compared: here itself."""
-        return self
-
     def touchable(self, scene: Scene) -> Bool:
         """Return which joints (J,) move what the garment hangs from or can touch; the rest never moves the cloth."""
         return np.ones(len(scene.body.parents), bool)

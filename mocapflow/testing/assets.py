@@ -114,15 +114,6 @@ class DraperConformance(Conformance):
         there = self.draper.drape(PoseBatch(root=root, angles=poses.angles), parameters, Past(), scene)
         np.testing.assert_allclose(there, here + shift, atol=1e-6)
 
-    def test_a_rough_drape(self) -> None:
-        """The draper for many poses lays the same vertices, and goes where the person goes."""
-        scene = self.make_scene()
-        poses, parameters = _batch(scene)
-        exact = self.draper.drape(poses, parameters, Past(), scene)
-        rough = assert_pure(self.draper.rough().drape, poses, parameters, Past(), scene)
-        assert rough.shape == exact.shape
-        assert np.linalg.norm(rough - exact, axis=-1).mean() < 0.10, "it lies 10 cm from the exact one in the mean"
-
     def test_velocities(self) -> None:
         """Velocities are (M, 3, 6 + D + Q); a shift of the root moves every vertex along."""
         scene = self.make_scene()

@@ -57,7 +57,6 @@ class Kinematic(Draper):
     limited: bool = False  # literal: stop at straight down instead of swinging about it
     pivot: Literal["strand", "space"] = "strand"  # literal: where the nearest fixed point is looked for
     sweeps: NonNegativeInt = 40  # of the rings, at most, per row; 0 leaves them as they fell
-    rough_sweeps: NonNegativeInt = 6  # the same, where many poses are only compared
     longest: Annotated[float, Field(ge=1)] = 1.0  # of a ring link, over its rest length
     stiff: Annotated[float, Field(ge=0, le=1)] = 0.3  # how much a ring resists being shortened
     bending_m: NonNegativeFloat = 0.06  # hanging: along which a strand takes up a new direction
@@ -136,10 +135,6 @@ class Kinematic(Draper):
             else:
                 touched[strands.carrier] = True
         return touched
-
-    def rough(self) -> Kinematic:
-        """Return the same with fewer sweeps of the rings."""
-        return self.model_copy(update={"sweeps": min(self.sweeps, self.rough_sweeps)})
 
     def fitting(self, garment: GarmentMesh, body: Body) -> Fitting:
         """Return what is measured once per garment and body; forgotten with the garment."""

@@ -116,5 +116,5 @@ def drapes(model: ClothedModel, poses: Sequence[Pose], parameters: F64, past: Pa
     told_apart = np.concatenate([root.reshape(len(poses), -1), angles[:, lays]], axis=1)
     _, first, same = np.unique(told_apart, axis=0, return_index=True, return_inverse=True)
     batch = PoseBatch(root=root[first], angles=angles[first])
-    vertices = drape_of(model.draper.rough(), batch, np.repeat(parameters[None], len(first), axis=0), past, model.scene)
+    vertices = drape_of(model.draper, batch, np.repeat(parameters[None], len(first), axis=0), past, model.scene)
     return [Cloth(vertices=vertices[row], parameters=parameters) for row in same.ravel()]

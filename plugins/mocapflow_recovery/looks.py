@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from mocapflow.records import I32
 from mocapflow_recovery.disagreement import HANGS
 from mocapflow_recovery.judge import Judge
 from mocapflow_recovery.leaps import eased
-from mocapflow_recovery.sampling import Cost, Plan, put_back, search, seen_samples, without_idle_parts
+from mocapflow_recovery.sampling import Cost, Plan, put_back, search, seen_samples, with_part, without_idle_parts
 
 
 class Looks(NamedTuple):
@@ -48,27 +49,36 @@ class Looks(NamedTuple):
             cloth: what a pixel of cloth counts.
         """
         judge = self.judge._replace(given=None, cloth=cloth)  # it may have been far off
-        before = [moment.pose for moment in judge.past.moments[-1:]]
         at_rest, every = np.zeros(len(self.body.twists)), np.arange(len(self.body.twists), dtype=np.int32)
         resting = Pose(root=self.believed.root, angles=at_rest)
         seen_poses = seen_samples(resting, every, self.body, self.plan, rng)
         possible = eased(self.fitted, self.believed, self.body)
-        begins = [nearest(judge.apart, [possible, self.believed, *before, *seen_poses]), *before]
+        begins = [nearest(judge.apart, [possible, self.believed, *self._before, *seen_poses]), *self._before]
         ends = [search(judge.apart, begin, self.body, self.plan, rng) for begin in dict.fromkeys(begins)]
         # by what strays a fit that is not astray has only idle parts
         looks = self._replace(judge=judge)
         return looks._tidied(nearest(judge.apart, ends), judge.stray if astray else judge.apart)
 
     def alone(self, rng: np.random.Generator, limbs: Sequence[I32]) -> Pose:
-        """Return the pose that agrees best with the views, sampled in some limbs while the others stay."""
-        begin = eased(self.fitted, self.believed, self.body)
-        found = search(self.judge.apart, begin, self.body, self.plan._replace(only=limbs), rng)
-        return self._tidied(found, self.judge.apart)
+        """Return the pose that agrees best with the views, sampled in some limbs while the others stay.
+
+        They are sampled around where they are fitted, believed, and were in the frame before.
+        """
+        fitted, plan = eased(self.fitted, self.believed, self.body), self.plan._replace(only=limbs)
+        others = [self.believed, *self._before]
+        begins = [fitted, *(reduce(lambda pose, limb: with_part(pose, limb, other), limbs, fitted) for other in others)]
+        ends = [search(self.judge.apart, begin, self.body, plan, rng) for begin in begins]
+        return self._tidied(nearest(self.judge.apart, ends), self.judge.apart)
 
     def turned(self, rng: np.random.Generator) -> Pose:
         """Return the best pose of somebody who looks the other way."""
         other = turned_round(self.believed, self.body)
         return self._replace(believed=other, fitted=other).far(rng, astray=True, cloth=HANGS)
+
+    @property
+    def _before(self) -> list[Pose]:
+        """The pose of the frame before, if there is one."""
+        return [moment.pose for moment in self.judge.past.moments[-1:]]
 
     def _tidied(self, found: Pose, measure: Cost) -> Pose:
         """Return a pose that was found with those parts as they were that need not have moved."""
