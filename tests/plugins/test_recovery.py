@@ -167,7 +167,8 @@ def test_a_limb_that_is_odd_is_looked_for_alone() -> None:
         return np.array([np.abs(pose.angles - POSE.angles).sum() for pose in poses])
 
     fitted, leg = Pose(root=POSE.root, angles=POSE.angles + 0.3), parts(SCENE.body)[1]
-    judge = SimpleNamespace(given=None, apart=apart_from_truth, model=SimpleNamespace(scene=SCENE))
+    model, past = SimpleNamespace(scene=SCENE), scenes.tiny_past(SCENE, fitted)
+    judge = SimpleNamespace(given=None, apart=apart_from_truth, model=model, past=past)
     looks = Looks(judge, PLAN, fitted, fitted, 0.01, 0.0)
     (way,) = LimbSearch()._ways(looks, Suspicion("a joint is bent beyond its limits", False, (leg,)))
     change = np.abs(way(np.random.default_rng(0)).angles - POSE.angles)
