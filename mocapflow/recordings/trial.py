@@ -1,4 +1,4 @@
-"""What is odd about the cameras and videos of one folder; each video is decoded once."""
+"""What is odd about the cameras and videos of one folder, all pictures of which are looked through."""
 
 from __future__ import annotations
 

@@ -23,20 +23,22 @@ def leaping(fitted: Pose, believed: Pose, body: Body, density: Density, least: f
         density: its training poses are what people were seen in; the angles it does not know count as seen.
         least: rad, what counts as far: for the angle that changed most, and for all angles of a part together.
     """
-    far = np.abs(fitted.angles - believed.angles) > least
-    if not far.any():  # nearly always
+    moved = parts_with(np.abs(fitted.angles - believed.angles) > least, body)
+    if not moved:  # nearly always
         return []
     seen = density.on(body.screw_names)
-    return [part for part in holding(far, body) if _apart(fitted.angles[part], seen[:, part]) > least]
+    return [part for part in moved if _apart(fitted.angles[part], seen[:, part]) > least]
 
 
 def overbent(pose: Pose, body: Body, least: float) -> list[I32]:
     """Return the parts of the body with a joint that is bent beyond its limits by more than `least` (rad)."""
-    return holding(_beyond(pose, body, least), body)
+    return parts_with(_beyond(pose, body, least), body)
 
 
-def holding(screws: Bool, body: Body) -> list[I32]:
+def parts_with(screws: Bool, body: Body) -> list[I32]:
     """Return the parts of the body that some of the screws (D,) belong to."""
+    if not screws.any():  # of most poses: no need to look for the parts
+        return []
     return [part for part in parts(body) if part is not None and screws[part].any()]
 
 

@@ -35,6 +35,7 @@ CLEARED = 1.1  # the same, what leaves no hint: of a foot that was lost all othe
 UNKNOWN = "too little is known of the room behind the person: limbs that are lost are not looked for"
 UNSEEN = "fit doubted: no picture tells person from room where it lies"
 Settle = Callable[[Pose, F64], FrameResult]  # from a pose, with cloth parameters
+Look = Callable[[np.random.Generator], Pose]  # finds a pose by samples
 
 
 class LimbSearch(Recovery):
@@ -113,7 +114,7 @@ class LimbSearch(Recovery):
         suspected = suspicion(self.signs, stray, fitted, believed, past, body, self._density)
         if suspected is None:
             return result
-        if self.signs.last(suspected.doubtful, past, body) and frame.index % self.vain_every:
+        if self.signs.persist(suspected.doubtful, past, body) and frame.index % self.vain_every:
             unsearched = f"{suspected.why}: not searched, as the frames before are doubted, too"
             return noted(result, unsearched, doubted=True) if suspected.doubtful else result
         judge = self._judge(believed, result, seen, past, model)
@@ -128,22 +129,25 @@ class LimbSearch(Recovery):
 
     def _searched(self, index: int, fit: Fit, looks: Looks, suspected: Suspicion, settle: Settle) -> FrameResult:
         """Return the result of the best pose that is found, or that of the fit where none is better."""
-        (why, doubtful, _), doubted, judge = suspected, self.signs.doubtful, looks.judge
-        fits: list[Fit] = []
-        for number, look in enumerate(self._ways(looks, suspected)):
-            found = look(np.random.default_rng([index, number]))
-            fits.append(judge.of(settle(found, judge.parameters)))
-        best = self._better(min(fits, key=lambda other: (doubted(other.stray), other.apart)), fit)
-        if judge.given and doubtful:
-            found = looks.turned(np.random.default_rng([index, len(fits)]))
-            if (turned := self._better(judge.of(settle(found, judge.parameters)), best)) is not best:
-                LOG.warning("the first pose looks the other way: the person was found turned round by half a turn")
-                best = turned
-        if best is not fit:
-            return noted(best.result, f"{why}: found again by search; then {best.stray}", doubted(best.stray))
-        return noted(fit.result, f"{why}: search found nothing better", doubted=True) if doubtful else fit.result
+        odd, judge, ways = self.signs.doubtful, looks.judge, self._ways(looks, suspected)
 
-    def _ways(self, looks: Looks, suspected: Suspicion) -> list[Callable[[np.random.Generator], Pose]]:
+        def settled(number: int, look: Look) -> Fit:
+            return judge.of(settle(look(np.random.default_rng([index, number])), judge.parameters))
+
+        fits = [settled(number, look) for number, look in enumerate(ways)]
+        best = self._better(min(fits, key=lambda other: (odd(other.stray), other.apart)), fit)
+        if judge.given and suspected.doubtful:
+            turned = self._better(settled(len(ways), looks.turned), best)
+            if turned is not best:
+                LOG.warning("the first pose looks the other way: the person was found turned round by half a turn")
+            best = turned
+        if best is not fit:
+            return noted(best.result, f"{suspected.why}: found again by search; then {best.stray}", odd(best.stray))
+        if suspected.doubtful:
+            return noted(fit.result, f"{suspected.why}: search found nothing better", doubted=True)
+        return fit.result
+
+    def _ways(self, looks: Looks, suspected: Suspicion) -> list[Look]:
         """Return the ways to look for the pose, each from its own samples."""
         if suspected.limbs:
             return [partial(looks.alone, limbs=suspected.limbs)]

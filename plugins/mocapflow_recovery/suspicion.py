@@ -15,7 +15,7 @@ from mocapflow_recovery.leaps import leaping, overbent
 
 
 class Signs(NamedTuple):
-    """From when on a fit is odd."""
+    """What of a fit is odd: more than this."""
 
     uncovered: float  # cm² of the person off the model
     floating: float  # cm² of skin in empty space
@@ -28,7 +28,7 @@ class Signs(NamedTuple):
         """Return whether the images contradict a fit."""
         return stray.uncovered > self.uncovered or stray.floating > self.floating
 
-    def last(self, doubtful: bool, past: Past, body: Body) -> bool:
+    def persist(self, doubtful: bool, past: Past, body: Body) -> bool:
         """Return whether all frames that are remembered are doubted, or else have a joint beyond its limits."""
         alike = [m.doubted if doubtful else bool(overbent(m.pose, body, self.overbent)) for m in past.moments]
         return len(alike) == REMEMBERED and all(alike)
@@ -59,8 +59,8 @@ def suspicion(
         body: of both poses.
         density: its training poses are what people were seen in.
     """
-    why, limbs = "", list[I32]()
-    if signs.doubtful(stray):
+    why, limbs, doubtful = "", list[I32](), signs.doubtful(stray)
+    if doubtful:
         why = f"fit doubted, {stray}"
     elif stray.uncovered + stray.cloth > signs.uncovered:
         why = f"cloth off the model, {stray}"
@@ -72,4 +72,4 @@ def suspicion(
         why = "a joint is bent beyond its limits"
     elif limbs := leaping(fitted, believed, body, density, signs.leap):
         why = "a limb leapt into a pose that nobody was seen in"
-    return Suspicion(why, signs.doubtful(stray), limbs) if why else None
+    return Suspicion(why, doubtful, limbs) if why else None
