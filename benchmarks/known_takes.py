@@ -91,4 +91,7 @@ TAKES = {
     # made after that
     "sit_A_skirt": Take("A", "skirt", "sit", 101, GREEN, frames=60),
     "akimbo_B_shorts": Take("B", "shorts", "akimbo", 102, GREY),
+    # made after that: motions of one person, by the other
+    "kneel_B_skirt": Take("B", "skirt", "kneel", 111, GREEN, frames=60),
+    "jack_A_skirt": Take("A", "skirt", "jack", 112, GREY),
 }
