@@ -8,7 +8,6 @@ import shlex
 import sys
 import warnings
 from collections.abc import Callable
-from importlib import metadata
 from typing import Annotated, Any
 
 import typer
@@ -54,6 +53,8 @@ app = typer.Typer(
 def tell_version(asked: bool) -> None:
     """Print the version and end, if asked."""
     if asked:
+        from importlib import metadata
+
         typer.echo(f"mocapflow {metadata.version('mocapflow')}")
         raise typer.Exit
 
