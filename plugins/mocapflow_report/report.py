@@ -63,7 +63,7 @@ class Report(Stage):
             ("Overlay", "\n".join(page.picture(jpeg, "jpeg", said) for said, jpeg in stills(track, scene, recording))),
             ("Overlap of model and image", _shown([overlap])),
             ("What happened", page.listing(happened)),
-            ("CPU time", page.table(report_rows.times(track))),
+            ("CPU time; the totals of a first run hold the compiling of kernels", page.table(report_rows.times(track))),
             ("Versions", page.listing([f"{name} {version}" for name, version in recipe.get("versions", {}).items()])),
             ("Settings and recipe", page.code(json.dumps(recipe, indent=1, ensure_ascii=False))),
         ]
