@@ -16,7 +16,6 @@ from dataclasses import replace
 import numpy as np
 from mocapflow_bodies.scanned import Scanned
 from mocapflow_draping.fixed import Fixed
-from mocapflow_fitting.start_from_file import read_pose
 from mocapflow_matching.contour_icp import ContourIcp
 from mocapflow_matching.fourier_icp import FourierIcp
 from mocapflow_matching.optical_flow import OpticalFlow
@@ -32,6 +31,7 @@ from mocapflow.data import NO_CLOTH, Frame, FrameResult, FrameState, Past, Pose,
 from mocapflow.geometry import silhouettes, twists
 from mocapflow.help.shipped import shipped
 from mocapflow.io.cameras import read_cameras
+from mocapflow.io.first_pose import read_pose
 from mocapflow.loop import Steps, settle
 from mocapflow.model import ClothedModel
 from mocapflow.prediction import believed

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
-from mocapflow_fitting.start_from_file import read_pose
 
 from mocapflow.assets import Camera
 from mocapflow.components import Prior, Segmenter
@@ -38,6 +37,7 @@ from mocapflow.data import (
 from mocapflow.geometry import kinematics, meshes, twists
 from mocapflow.geometry.cameras import project
 from mocapflow.geometry.silhouettes import model_distance
+from mocapflow.io.first_pose import read_pose
 from mocapflow.loop import settle
 from mocapflow.model import ClothedModel, moved
 from mocapflow.prediction import believed

@@ -47,7 +47,8 @@ def make_task(rigid: bool) -> Task:
     truth = Pose(root=root, angles=rng.normal(size=ANGLES) * 0.2)
     per_view = ROWS // len(views)
     vertex = np.concatenate([np.sort(rng.choice(len(body.vertices), per_view, replace=False)) for _ in views])
-    points = kinematics.skin(body, kinematics.chain(body, truth)[0])[vertex].reshape(len(views), per_view, 3)
+    posed = kinematics.skin(body, kinematics.chain(body, truth)[0], truth.angles)
+    points = posed[vertex].reshape(len(views), per_view, 3)
     pixel = np.concatenate([cameras.project(p, c) for p, c in zip(points, views, strict=True)])
     direction = rng.normal(size=pixel.shape)
     matches = Matches(
@@ -80,7 +81,8 @@ def apply(pose: Pose, increment: F64) -> Pose:
 
 def errors(task: Task, pose: Pose) -> F64:
     joints, _ = kinematics.chain(task.body, pose)
-    return normal_equations.point_errors(task.rows, kinematics.skin(task.body, joints)[task.rows.vertex])[0]
+    posed = kinematics.skin(task.body, joints, pose.angles)
+    return normal_equations.point_errors(task.rows, posed[task.rows.vertex])[0]
 
 
 def jacobian(task: Task, pose: Pose) -> tuple[F64, F64]:

@@ -15,7 +15,6 @@ from inspect import unwrap
 import cv2
 import numpy as np
 from mocapflow_bodies.scanned import Scanned
-from mocapflow_fitting.start_from_file import read_pose
 
 from mocapflow.assets import Camera
 from mocapflow.data import CLOTH, NO_CLOTH, Surface
@@ -24,6 +23,7 @@ from mocapflow.geometry import silhouette_kernels as kernels
 from mocapflow.geometry.cameras import projection
 from mocapflow.help.shipped import shipped
 from mocapflow.io.cameras import read_cameras
+from mocapflow.io.first_pose import read_pose
 from mocapflow.scene import Scene
 
 CLIP = shipped("examples", "data", "skirt_steps")

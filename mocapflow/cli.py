@@ -30,9 +30,7 @@ class Commands(typer.core.TyperGroup):
             return super().invoke(ctx)
         except (Exception, KeyboardInterrupt) as error:
             if interrupted(error):
-                words = [word for word in sys.argv[1:] if word != "--fresh"]  # it would remove what is saved
-                again = shlex.join(["mocapflow", *words])
-                typer.echo(f"\ninterrupted; finished frames are saved. To go on: {again}", err=True)
+                typer.echo(f"\ninterrupted{_to_go_on(ctx.invoked_subcommand)}", err=True)
                 raise typer.Exit(INTERRUPTED) from None
             said = unwritable(error) if isinstance(error, OSError) else uncompilable(error) or error
             if not isinstance(said, MocapflowError):
@@ -40,6 +38,14 @@ class Commands(typer.core.TyperGroup):
             shown = str(said).encode("utf-8", "backslashreplace").decode()  # it may quote what nobody can print
             typer.echo(f"error: {shown}", err=True)
             raise typer.Exit(said.exit_status) from None
+
+
+def _to_go_on(command: str | None) -> str:
+    """Return how to resume a command that was interrupted; "" where it saves no frames."""
+    if command not in ("run", "demo", "compare"):
+        return ""
+    words = [word for word in sys.argv[1:] if word != "--fresh"]  # it would remove what is saved
+    return f"; finished frames are saved. To go on: {shlex.join(['mocapflow', *words])}"
 
 
 app = typer.Typer(

@@ -47,7 +47,7 @@ class Frame:
     keypoints: tuple[F64, ...] | None = None  # C x (N people, K, 3) px, px, confidence; undistorted
 
     def hidden_in(self, camera: int) -> Bool | None:
-        """Return where a view (H, W) shows nothing of the scene; None: it does everywhere."""
+        """Return the mask (H, W) of where a view shows nothing of the scene; None: nothing is hidden."""
         return self.hidden[camera] if self.hidden else None
 
 

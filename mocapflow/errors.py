@@ -68,7 +68,7 @@ def no_run_folder(out: Path, error: OSError) -> StoreError:
 
 
 def unwritable(error: OSError) -> StoreError | None:
-    """Return what is said where a file can't be written: the drive is full, or it may not be; None for other errors."""
+    """Return what is said of a full drive, or of a file that may not be written or read; None for other errors."""
     if error.errno not in {*FULL, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM} or not error.strerror:
         return None
     hint = "free some space, then run the same command" if error.errno in FULL else ""

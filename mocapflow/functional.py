@@ -75,7 +75,7 @@ class Functional:
     def step(
         self, state: FrameState, segmentation: Segmentation, estimate: Estimate, cloth: Cloth, halvings: int
     ) -> tuple[Estimate, Cloth]:
-        """Return a new estimate and cloth, halfway back to the state's as often as they cost more than it does."""
+        """Return the new estimate and cloth; while they cost more than the state's, the step to them is halved."""
         if not halvings:
             return estimate, cloth
         most = (1 + SLACK) * self.pull(segmentation, state.estimate.pose, state.cloth)

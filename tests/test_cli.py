@@ -22,6 +22,7 @@ from mocapflow.commands.invocation import FILE, Invocation, remember
 from mocapflow.commands.progress import reporter
 from mocapflow.help.shipped import shipped
 from mocapflow.io.columns import read_columns
+from mocapflow.recordings import doctor
 from mocapflow.running import runner
 from mocapflow.storage.locks import myself
 from tests.fixtures.stores import STAGES, write_pipeline, write_recording
@@ -301,6 +302,15 @@ def test_an_interrupt_ends_with_130_and_says_how_to_go_on(call, monkeypatch):
         "\ninterrupted; finished frames are saved. To go on: mocapflow run start.yaml --set 'frames={start: 1}'\n"
     )
     assert call("run", "start.yaml", "--fresh").stderr.endswith("To go on: mocapflow run start.yaml\n")
+
+
+def test_an_interrupted_command_that_saves_no_frames_does_not_say_so(call, monkeypatch):
+    def stopped(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(doctor, "examine", stopped)
+    result = call("doctor", ".")
+    assert (result.exit_code, result.stderr) == (130, "\ninterrupted\n")
 
 
 def test_no_place_for_compiled_code_is_told(call, monkeypatch):

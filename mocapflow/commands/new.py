@@ -27,4 +27,4 @@ def plugin(
     folder = out or Path(f"mocapflow-{name}")
     for path in scaffold.write_plugin(name, role, folder):
         typer.echo(path)
-    typer.echo(f"to go on: pip install -e {folder} && pytest {folder}")
+    typer.echo(f"to go on: pip install -e '{folder}[test]' && pytest {folder}")

@@ -27,8 +27,11 @@ def late_frames(folder: Path, names: Sequence[str]) -> tuple[int, ...]:
     content = read_json(path, FORM)
     try:
         late = {name: _rounded(frames) for name, frames in content["late_frames"].items()}
+        strange = sorted(set(content) - {"late_frames"})
     except (ValueError, TypeError, KeyError, AttributeError, OverflowError) as error:
         raise RecordingError(f"does not say how late the cameras are: {error!r}", where=str(path), hint=FORM) from error
+    if strange:
+        raise RecordingError(f"there is no '{strange[0]}'", where=place(path, strange[0]), hint=FORM)
     if unknown := sorted(set(late) - set(names)):
         raise RecordingError(
             f"there is no camera '{unknown[0]}'", where=place(path, unknown[0]), hint=alternatives(unknown[0], names)

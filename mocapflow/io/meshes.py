@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from mocapflow.errors import RecordingError
+from mocapflow.geometry.simplify import load_open3d
 from mocapflow.records import F64, I32
 
 OPPOSED = 0.01  # of the edges of a mesh, that two triangles go along the same way; a scan has a few
@@ -23,7 +24,8 @@ def read_mesh(path: Path) -> tuple[F64, I32]:
 
     Raises:
         RecordingError: the file is missing or of a format not known, holds no mesh, a face names a vertex that is not
-            there, or Open3D is needed and can't be loaded.
+            there.
+        MocapflowError: Open3D is needed and can't be loaded.
     """
     if path.suffix.lower() not in (".obj", *OPEN3D_FORMATS):
         hint = f"meshes are read from .obj, {', '.join(OPEN3D_FORMATS)}; .obj keeps the order of the vertices"
@@ -50,17 +52,7 @@ def _read_obj(path: Path) -> tuple[list[Sequence[str]], list[tuple[int, int, int
 
 
 def _read_by_open3d(path: Path) -> tuple[F64, I32]:
-    try:
-        import open3d
-    except (ImportError, OSError) as error:
-        hint = (
-            "it needs libusb-1.0 and libGL (Debian, Ubuntu: apt install libusb-1.0-0 libgl1 libgomp1); "
-            "or export the mesh as Wavefront OBJ, which needs none of them"
-        )
-        raise RecordingError(
-            f"Open3D, which reads this format, can't be loaded: {error}", where=str(path), hint=hint
-        ) from None
-    mesh = open3d.io.read_triangle_mesh(path)
+    mesh = load_open3d(str(path)).io.read_triangle_mesh(path)
     return np.asarray(mesh.vertices, np.float64), np.asarray(mesh.triangles, np.int32)
 
 

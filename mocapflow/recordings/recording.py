@@ -61,6 +61,11 @@ class Recording:
         """The cameras as calibrated, of the videos' real size."""
         return tuple(view.lens for view in self.views)
 
+    @property
+    def run_rate(self) -> float:
+        """Frames per second among those of `indices`."""
+        return self.frame_rate / self.indices.step
+
     def frames(self, since: int | None = None) -> Iterator[Frame]:
         """Yield the frames in order, from the first one whose number is at least `since`."""
         done = 0 if since is None else len(range(self.indices.start, since, self.indices.step))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -13,15 +14,16 @@ class _Keeper(logging.Handler):
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
         self.said: list[str] = []
+        self._thread = threading.get_ident()  # another run, in another thread, warns of what is its own
 
     def emit(self, record: logging.LogRecord) -> None:
-        if record.name != LOG.name:  # what becomes of them is no matter of the result
+        if record.name != LOG.name and record.thread == self._thread:  # what becomes of them is no matter of the result
             self.said.append(record.getMessage())
 
 
 @contextmanager
 def warnings_logged() -> Iterator[list[str]]:
-    """Give a list that fills with what is logged to `mocapflow` as a warning, or worse, meanwhile."""
+    """Give a list that fills with what is logged to `mocapflow` as a warning, or worse, meanwhile, by this thread."""
     keeper, logger = _Keeper(), logging.getLogger("mocapflow")
     logger.addHandler(keeper)
     try:

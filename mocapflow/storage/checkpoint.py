@@ -71,7 +71,7 @@ class Checkpoint:
         frame_done: Callable[[int, FrameResult], None] = silent,
     ) -> None:
         self._store, self._path, self._lock = store, artifact.path, lock
-        self._indices, self._camera_count = indices, len(cameras)
+        self._indices = indices
         self._attributes: dict[str, Any] = dict(artifact.attributes)
         self._wanted, self._fresh, self._cap = wanted, fresh, 0
         self._turns: list[Pose] | None = None  # of the frame at hand
@@ -146,7 +146,7 @@ class Checkpoint:
         self._store.digests.check_inputs()
         with writing(self._store.path, self.kept):
             if not row:
-                self._lay_out(result)
+                self._lay_out(frame, result)
             numbers = packing.row_of(self._columns, frame, result, self._attributes["step_names"])
             self._growing.write_numbers(row, numbers)
             if len(state.cloth.vertices):
@@ -186,8 +186,8 @@ class Checkpoint:
     def _columns(self) -> packing.Columns:
         return {name: tuple(shape) for name, shape in self._attributes["columns"]}
 
-    def _lay_out(self, result: FrameResult) -> None:
-        columns = packing.columns_of(result, self._camera_count)
+    def _lay_out(self, frame: Frame, result: FrameResult) -> None:
+        columns = packing.columns_of(frame, result)
         self._attributes["columns"] = [[name, list(shape)] for name, shape in columns.items()]
         self._attributes["step_names"] = list(result.seconds)
         self._attributes["energy_terms"] = list(result.energy_terms)

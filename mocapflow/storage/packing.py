@@ -26,17 +26,9 @@ UNITS = {  # of the columns that `Track` does not have
 Columns = Mapping[str, tuple[int, ...]]  # name -> shape, in the order of the row
 
 
-def columns_of(result: FrameResult, cameras: int) -> Columns:
-    """Return the layout of a row for results of this size."""
-    estimate = result.state.estimate
-    angles = len(estimate.pose.angles)
-    return {
-        "frame": (), "time": (), "root": (4, 4), "angles": (angles,), "cloth_parameters": (len(estimate.parameters),),
-        "iterations": (), "steady": (), "oscillating": (), "doubted": (), "body_change": (), "cloth_change": (),
-        "angle_change": (), "usable": (cameras,), "overlap": (cameras,), "seconds": (len(result.seconds),),
-        "match_count": (), "energy": result.energy.shape,
-        "observed": (angles,), "covariance": (6 + angles, 6 + angles),
-    }  # fmt: skip
+def columns_of(frame: Frame, result: FrameResult) -> Columns:
+    """Return the layout of a row for frames and results of this size."""
+    return {name: np.shape(value) for name, value in values_of(frame, result, list(result.seconds)).items()}
 
 
 def row_of(columns: Columns, frame: Frame, result: FrameResult, steps: Sequence[str]) -> F64:

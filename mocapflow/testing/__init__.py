@@ -5,7 +5,7 @@
     class TestCape(GarmentConformance):
         garment = Cape()
 
-Needs pytest for the conformance classes.
+Needs pytest.
 """
 
 from __future__ import annotations

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from typing import Annotated, ClassVar, Literal
-from weakref import WeakKeyDictionary
 
 import numpy as np
-from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt, PrivateAttr
+from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
 from mocapflow.assets import Body, GarmentMesh
 from mocapflow.components import Draper
@@ -15,6 +14,7 @@ from mocapflow.data import Past, Pose, PoseBatch
 from mocapflow.errors import PluginError
 from mocapflow.geometry.differences import all_columns, neighbours, tried_columns
 from mocapflow.geometry.kinematics import chain_batch
+from mocapflow.memo import memoised
 from mocapflow.records import F64, I32, Bool, record
 from mocapflow.scene import Scene
 from mocapflow_draping.fields import BodyFields, build_fields, touchable_joints
@@ -34,7 +34,6 @@ Motion = tuple[F64, F64, F64, F64, F64]  # what `rings.close` needs to bring rat
 class Fitting:
     """A garment on a body, measured once for draping."""
 
-    body: Body
     strands: Strands
     fields: BodyFields
 
@@ -62,7 +61,6 @@ class Kinematic(Draper):
     bending_m: NonNegativeFloat = 0.06  # hanging: along which a strand takes up a new direction
     hold_deg: Annotated[float, Field(gt=0, le=180)] = 45.0  # hanging: off the limb under it, before cloth sinks
     slips: Annotated[float, Field(gt=0, le=1)] = 0.3  # hanging: how much it gives way to what hangs beside it
-    _fittings: WeakKeyDictionary[GarmentMesh, Fitting] = PrivateAttr(default_factory=WeakKeyDictionary)
 
     def drape(self, poses: PoseBatch, parameters: F64, past: Past, scene: Scene) -> F64:
         """Return cloth vertices (B, W, 3) m in the world for B poses and parameters (B, Q)."""
@@ -137,13 +135,8 @@ class Kinematic(Draper):
         return touched
 
     def fitting(self, garment: GarmentMesh, body: Body) -> Fitting:
-        """Return what is measured once per garment and body; forgotten with the garment."""
-        known = self._fittings.get(garment)
-        if known is None or known.body is not body:
-            fields = build_fields(body, touchable_joints(body, garment), self.voxel_m)
-            known = Fitting(body=body, strands=strands_of(garment, body), fields=fields)
-            self._fittings[garment] = known
-        return known
+        """Return what is measured once per garment and body."""
+        return _measured(body, garment, self.voxel_m)
 
     def _step(
         self,
@@ -191,3 +184,10 @@ class Kinematic(Draper):
             grid, links, np.array(first, order="C"), strands.last, across, length, skin, self.longest, self.stiff,
             bend, along_limbs(strands, chain), hold, slips, self.sweeps, parts, fitting.fields.values, motion,
         )  # fmt: skip
+
+
+@memoised
+def _measured(body: Body, garment: GarmentMesh, voxel_m: float) -> Fitting:
+    """Return a garment measured on a body, whose distance fields have voxels of an edge of `voxel_m`."""
+    fields = build_fields(body, touchable_joints(body, garment), voxel_m)
+    return Fitting(strands=strands_of(garment, body), fields=fields)

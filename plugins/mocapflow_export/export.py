@@ -82,6 +82,6 @@ def write_motion(result: Result, folder: Path) -> list[Path]:
 def write_joints(result: Result, folder: Path) -> list[Path]:
     """Write joints.trc into a run folder."""
     path, track = layout.place(folder, layout.JOINTS), result.track
-    places = markers.opensim_from_world(result.places)
-    markers.write_trc(path, result.scene.body.joint_names, places, track.frame_rate, start=float(track.time[0]))
+    places, rate = markers.opensim_from_world(result.places), result.recording.run_rate
+    markers.write_trc(path, result.scene.body.joint_names, places, rate, start=float(track.time[0]))
     return [path]

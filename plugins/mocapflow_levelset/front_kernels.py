@@ -39,7 +39,7 @@ def find_runs(level, reach, block, first):  # type: ignore[no-untyped-def]
 @numba.njit(cache=True, error_model="numpy")
 def log_ratio(runs, values, weight, outside, known, gaussians, cell, first, clip, any_colour, out):  # type: ignore[no-untyped-def]
     """Add the log densities channel by channel along stretches between two cell centres."""
-    rows, columns, _, entries = gaussians.shape
+    rows, columns = gaussians.shape[:2]
     zero, scale = np.float32(0), np.float32(1 / cell)
     inside, beyond = np.empty(weight.shape[1], np.float32), np.empty(weight.shape[1], np.float32)
     n = 0

@@ -80,7 +80,7 @@ class Method(NamedTuple):
 
 
 class Found(NamedTuple):
-    """The silhouette of one view, and what it costs; where but a part is new, what that costs more than the start."""
+    """The silhouette of one view and its costs; where only a part was found anew, by how much that costs more."""
 
     level: F32  # (H, W) px, signed distance clipped to the band
     costs: Costs

@@ -89,8 +89,8 @@ class ContourIcp(Matcher):
         cosine = float(np.cos(np.radians(self.normal_angle_deg)))
         one = self.described(*image)
         other = self.described(model.pixel, model.normal, curvature)
-        asked, asking = self.direction != "backward", self.direction != "forward"  # the model, by the image; by it
-        seen, shown = pairs(one, image.normal, other, model.normal, reach, cosine, asked, asking)
+        forward, backward = self.direction != "backward", self.direction != "forward"  # image to model; model to image
+        seen, shown = pairs(one, image.normal, other, model.normal, reach, cosine, forward, backward)
         if reach > self.cloth_reach_px:
             kept = self.reached(image.pixel.take(seen, axis=0), model, shown, surface)
             seen, shown = seen[kept], shown[kept]

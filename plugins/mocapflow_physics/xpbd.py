@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 from typing import Annotated, ClassVar
-from weakref import WeakKeyDictionary
 
 from mocapflow_draping.forces import remaining_length, thickness
 from mocapflow_draping.kinematic import Fitting, Kinematic
 from mocapflow_draping.parts import posed_parts
-from pydantic import Field, NonNegativeFloat, PositiveFloat, PrivateAttr, model_validator
+from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from mocapflow.assets import GarmentMesh
 from mocapflow.components import Draper
 from mocapflow.data import Past, Pose, PoseBatch
 from mocapflow.errors import PluginError
 from mocapflow.geometry.kinematics import chain_batch
+from mocapflow.memo import memoised
 from mocapflow.records import F64, I32, Bool
 from mocapflow.scene import Scene
 from mocapflow_physics.cloth import drawn_in, links_of, pinned_of, pins_at, pull_of
@@ -37,7 +37,6 @@ class Xpbd(Draper):
     move_s: PositiveFloat = 0.3  # in which the body comes from its last pose, or from rest
     rest_s: NonNegativeFloat = 0.3  # in which the cloth comes to rest
     moves_like: Kinematic = Kinematic(sweeps=4)  # whose strands, distance fields and velocities it has
-    _simulations: WeakKeyDictionary[Fitting, dict[int, Simulation]] = PrivateAttr(default_factory=WeakKeyDictionary)
 
     @model_validator(mode="after")
     def _simulator_is_there(self) -> Xpbd:
@@ -59,7 +58,7 @@ class Xpbd(Draper):
         chains = [chain_batch(scene.body, moment) for moment in between(start, end, moving)]
         resting = 1 + round(self.rest_s * self.rate_hz / EVERY)
         parts = [posed_parts(fitting.fields, chain) for chain in chains]
-        settled = self._simulation(fitting, garment, len(cloth)).settle(
+        settled = _simulation(fitting, garment, len(cloth), 1 / self.rate_hz).settle(
             cloth,
             [pins_at(strands, chain) for chain in chains] + [pins_at(strands, chains[-1])] * resting,
             parts + [parts[-1]] * resting,
@@ -79,9 +78,8 @@ class Xpbd(Draper):
         """Return which joints (J,) move what the garment hangs from or can touch."""
         return self.moves_like.touchable(scene)
 
-    def _simulation(self, fitting: Fitting, garment: GarmentMesh, copies: int) -> Simulation:
-        """Return the simulation of so many copies that step together; forgotten with the fitting."""
-        known = self._simulations.setdefault(fitting, {})
-        if copies not in known:
-            known[copies] = Simulation(links_of(garment), pinned_of(fitting.strands, garment), copies, 1 / self.rate_hz)
-        return known[copies]
+
+@memoised
+def _simulation(fitting: Fitting, garment: GarmentMesh, copies: int, step: float) -> Simulation:
+    """Return the simulation of so many copies of a garment that step together, `step` (s) at a time."""
+    return Simulation(links_of(garment), pinned_of(fitting.strands, garment), copies, step)

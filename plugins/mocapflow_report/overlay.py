@@ -35,7 +35,7 @@ class Overlay(Stage):
         paths = [layout.place(run_folder.path, layout.overlay(camera.name)) for camera in scene.cameras]
         rows = {int(index): row for row, index in enumerate(track.frame)}
         painter = Painter(scene)
-        with drawing.videos(paths, track.frame_rate, self.codec) as opened:
+        with drawing.videos(paths, recording.run_rate, self.codec) as opened:
             for frame in recording.frames():
                 if frame.index in rows:
                     for view, video in enumerate(opened):

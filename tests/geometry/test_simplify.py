@@ -1,11 +1,13 @@
 """A body of fewer faces: it has the same shape, and moves alike."""
 
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from mocapflow.data import Pose
+from mocapflow.errors import MocapflowError
 from mocapflow.geometry import kinematics
 from mocapflow.geometry.simplify import simplified
 from mocapflow.scene import Scene
@@ -57,3 +59,9 @@ def test_a_garment_stays_pinned_where_it_was(body):
 def test_a_body_of_few_faces_stays_as_it_is(body):
     scene = Scene(cameras=(), body=body)
     assert scene.simplified(len(body.faces)) is scene
+
+
+def test_without_open3d_the_error_says_what_to_install(body, monkeypatch):
+    monkeypatch.setitem(sys.modules, "open3d", None)  # makes its import fail
+    with pytest.raises(MocapflowError, match=r"^Open3D can't be loaded: .*open3d.*\n.*apt install libusb-1.0-0"):
+        simplified(body, 11_000)

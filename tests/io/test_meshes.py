@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mocapflow.errors import RecordingError
+from mocapflow.errors import MocapflowError, RecordingError
 from mocapflow.io.meshes import read_mesh
 
 DEMO = Path(__file__).parents[2] / "examples" / "data"
@@ -84,7 +84,5 @@ def test_other_formats_go_through_open3d(tmp_path, monkeypatch, suffix):
 def test_without_open3d_the_error_says_what_to_install(tmp_path, monkeypatch):
     (tmp_path / "a.ply").touch()
     monkeypatch.setitem(sys.modules, "open3d", None)  # makes its import fail
-    with pytest.raises(
-        RecordingError, match=r"a\.ply  Open3D.*can't be loaded: .*open3d.*\n.*apt install libusb-1.0-0"
-    ):
+    with pytest.raises(MocapflowError, match=r"a\.ply  Open3D can't be loaded: .*open3d.*\n.*install libusb-1.0-0"):
         read_mesh(tmp_path / "a.ply")

@@ -1,5 +1,6 @@
 """The drape on analytic bodies (T-CL1 to T-CL3), and the distance fields under it."""
 
+import pickle
 from dataclasses import replace
 
 import drape_bodies
@@ -229,6 +230,14 @@ def test_a_batch_is_its_drapes_one_by_one(skirted):
     for row in range(4):
         one = type(poses)(root=poses.root[row : row + 1].copy(), angles=poses.angles[row : row + 1].copy())
         np.testing.assert_array_equal(draper().drape(one, parameters[row : row + 1], Past(), scene)[0], together[row])
+
+
+def test_a_draper_that_has_draped_can_be_sent_to_another_process(skirted):
+    (scene, poses), draper = skirted, Kinematic()
+    parameters = calm(scene, len(poses.root))
+    draped = draper.drape(poses, parameters, Past(), scene)
+    sent = pickle.loads(pickle.dumps(draper))
+    assert np.array_equal(sent.drape(poses, parameters, Past(), scene), draped)
 
 
 def test_a_draper_without_a_garment_says_so(skirted):

@@ -65,6 +65,13 @@ def test_joint_centres_come_back(name: str, result: Result, tmp_path: Path) -> N
     np.testing.assert_allclose(places[:, order], result.places, atol=NEAR)
 
 
+def test_one_frame_has_the_rate_of_its_recording(result: Result, tmp_path: Path) -> None:
+    from bvh import Bvh
+
+    alone = replace(result, track=stepping(result.scene.body, 1), recording=replace(result.recording, frame_rate=59.94))
+    assert 1 / Bvh(write("bvh", alone, tmp_path).read_text()).frame_time == pytest.approx(59.94, abs=1e-3)
+
+
 def test_bvh_by_another_reader(result: Result, tmp_path: Path) -> None:
     from bvh import Bvh
 

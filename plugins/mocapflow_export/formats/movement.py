@@ -28,7 +28,7 @@ def write(result: Result, path: Path) -> None:
         },
         attrs={
             "ds_type": "poses",
-            "fps": result.track.frame_rate,
+            "fps": result.recording.run_rate,
             "time_unit": "seconds",
             "source_software": "mocapflow",
         },
