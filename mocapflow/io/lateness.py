@@ -19,7 +19,7 @@ def late_frames(folder: Path, names: Sequence[str]) -> tuple[int, ...]:
     """Return by how many whole frames each camera is late; 0 where nothing is said.
 
     Raises:
-        RecordingError: the file is not in its form, or names a camera that is not there.
+        RecordingError: the file is not in its form, or names a camera that is not there, or moves all of them.
     """
     path = folder / TIMING
     if not path.exists():
@@ -36,7 +36,11 @@ def late_frames(folder: Path, names: Sequence[str]) -> tuple[int, ...]:
         raise RecordingError(
             f"there is no camera '{unknown[0]}'", where=place(path, unknown[0]), hint=alternatives(unknown[0], names)
         )
-    return tuple(late.get(name, 0) for name in names)
+    counts = [late.get(name, 0) for name in names]
+    if names and (common := min(counts, key=abs)) and (min(counts) > 0 or max(counts) < 0):
+        hint = f"cameras are late after others: take {common} off each"
+        raise RecordingError("every camera is said to be late, or every one early", where=str(path), hint=hint)
+    return tuple(counts)
 
 
 def _rounded(frames: Any) -> int:

@@ -8,6 +8,7 @@ the same pixels.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -55,6 +56,8 @@ def open_video(path: Path) -> Video:
         raise RecordingError("there is no such video", where=str(path), hint=lost)
     if path.is_dir():
         return _open_folder(path)
+    if not os.access(path, os.R_OK):  # ffmpeg would only say that it can't be decoded
+        raise RecordingError("this video may not be read: permission denied", where=str(path))
     declared, rate, stamps = read_stamps(path)
     with open_capture(path) as capture:
         first = next((image for _ in grabs(capture) if (image := capture.retrieve()[1]) is not None), None)

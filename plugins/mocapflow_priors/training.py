@@ -9,7 +9,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from mocapflow.assets import Body
-from mocapflow.errors import RecordingError
+from mocapflow.errors import PipelineError, RecordingError, alternatives
 from mocapflow.geometry import angles
 from mocapflow.geometry.joints import angles_from_rotations
 from mocapflow.geometry.skeleton import unsided
@@ -49,6 +49,7 @@ def fit(files: Sequence[Path], body: Body, wanted: Sequence[str] = FREE, percent
     Raises:
         RecordingError: a file cannot be read, or the files share no wanted angle.
     """
+    check_wanted(wanted, body)
     found = [read_angles(path, body) for path in files]
     takes = [chosen(take, wanted) for take in found]
     names = tuple(name for name in body.screw_names if all(name in take for take in takes))
@@ -64,12 +65,24 @@ def fit(files: Sequence[Path], body: Body, wanted: Sequence[str] = FREE, percent
 
 def chosen(take: Angles, wanted: Sequence[str]) -> Angles:
     """Return the wanted angles of a take."""
+    return {name: values for name, values in take.items() if not calls(name).isdisjoint(wanted)}
 
-    def sought(name: str) -> bool:
-        joint, _, angle = name.partition(".")
-        return any(each in wanted for side in (joint, unsided(joint)) for each in (side, f"{side}.{angle}"))
 
-    return {name: values for name, values in take.items() if sought(name)}
+def check_wanted(wanted: Sequence[str], body: Body) -> None:
+    """Check that each wanted name calls an angle of a body.
+
+    Raises:
+        PipelineError: one calls none.
+    """
+    known = set[str]().union(*map(calls, body.screw_names))
+    if strange := [name for name in wanted if name not in known]:
+        raise PipelineError(f"no angle is called '{strange[0]}'", hint=alternatives(strange[0], known))
+
+
+def calls(angle: str) -> set[str]:
+    """Return what calls an angle, knee_l.flexion: its name, that of the joint, and both without the side."""
+    joint, _, kind = angle.partition(".")
+    return {name for side in (joint, unsided(joint)) for name in (side, f"{side}.{kind}")}
 
 
 def read_angles(path: Path, body: Body) -> Angles:

@@ -120,7 +120,8 @@ def test_a_stage_can_be_put_before_another(folder):
         ("extends: base.yaml\nrecording: x", "bad.yaml:2:1  'recording' has no place in a file that extends another: "
          "only `extends` and `change` do\n       write it as change: {recording: ...}"),
         ("extends: middle.yaml",
-         "bad.yaml:1:1  middle.yaml itself extends another file; `extends` goes one level deep"),
+         "bad.yaml:1:1  middle.yaml itself extends another file; `extends` goes one level deep\n"
+         "       extend base.yaml and copy what is under `change` in middle.yaml"),
         ("extends: base.yaml\nchange: 3", "bad.yaml:2:1  change: write `path.to.value: new value` lines"),
         ("extends: base.yaml\nchange:\n  stages.trak.draper: x",
          "bad.yaml:3:3  there is no 'stages.trak'\n       available: track — did you mean 'track'?"),

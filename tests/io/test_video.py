@@ -1,5 +1,7 @@
 """Frames in order, and gaps that stay gaps."""
 
+import os
+
 import cv2
 import numpy as np
 import pytest
@@ -74,6 +76,14 @@ def test_a_link_that_leads_nowhere(tmp_path):
     (tmp_path / "a.mp4").symlink_to(tmp_path / "gone.mp4")
     with pytest.raises(RecordingError, match=r"no such video\n       it is a link to .*gone\.mp4, where nothing is"):
         open_video(tmp_path / "a.mp4")
+
+
+def test_a_video_that_may_not_be_read(tmp_path, monkeypatch):
+    path = tmp_path / "a.mp4"
+    path.touch()
+    monkeypatch.setattr(os, "access", lambda *_: False)  # who runs the tests may be allowed everything
+    with pytest.raises(RecordingError, match=r"a\.mp4  this video may not be read: permission denied"):
+        open_video(path)
 
 
 def test_gaps_in_the_time_stamps_are_lost_frames():

@@ -224,5 +224,7 @@ def test_errors(body: Body, tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"the files share none of the angles hip"):
         training.fit([tmp_path / "empty.csv"], body)
     (tmp_path / "knee.csv").write_text("frame,knee_flexion_l\n0,10\n1,20\n")
-    with pytest.raises(RecordingError, match=r"none of the angles kne\n *knee\.csv: knee_l\.flexion"):
-        training.fit([tmp_path / "knee.csv"], body, ["kne"])
+    with pytest.raises(RecordingError, match=r"none of the angles elbow\n *knee\.csv: knee_l\.flexion"):
+        training.fit([tmp_path / "knee.csv"], body, ["elbow"])
+    with pytest.raises(PipelineError, match=r"no angle is called 'kne'\n.*did you mean 'knee'\?"):
+        training.fit([tmp_path / "knee.csv"], body, ["knee_l", "kne"])

@@ -119,6 +119,7 @@ def test_keypoints_tell_too(tmp_path):
         ('{"late_frames": {"cam01": true}}', "does not say how late the cameras are: TypeError"),
         ('{"late_frames": {"cam1": 3}}', "there is no camera 'cam1'"),
         ('{"late_frames": {}, "late_frame": {"cam01": 3}}', "there is no 'late_frame'"),
+        ('{"late_frames": {"cam01": 4, "cam02": 5, "cam03": 6}}', "every camera is said to be late"),
     ],
 )
 def test_a_wrong_recording_json_is_explained(tmp_path, text, said):
