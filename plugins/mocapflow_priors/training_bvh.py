@@ -30,17 +30,18 @@ def columns(path: Path) -> dict[str, F64]:
     Raises:
         RecordingError: the reader of BVH files is not installed, or the file is not whole.
     """
-    places = joint_places(path)
+    rest, places = joint_places(path)
     found = between_centres(places)
-    for side in ("l", "r"):
-        if {"hip_l", "hip_r", "spine", f"knee_{side}"} <= set(places):
+    if {"hip_l", "hip_r", "spine", "knee_l", "knee_r"} <= set(places):
+        pelvis = pelvis_axes(places, rest)
+        for side in ("l", "r"):
             thigh = places[f"knee_{side}"] - places[f"hip_{side}"]
-            found[f"hip_flexion_{side}"] = hip_flexion(thigh, pelvis_axes(places))
+            found[f"hip_flexion_{side}"] = hip_flexion(thigh, pelvis)
     return found
 
 
-def joint_places(path: Path) -> dict[str, F64]:
-    """Return where each joint we have a name for is in every frame: (T, 3), in the unit of the file."""
+def joint_places(path: Path) -> tuple[dict[str, F64], dict[str, F64]]:
+    """Return where each joint we have a name for is at rest (3,) and in every frame (T, 3), in the unit of the file."""
     try:
         import bvhio
     except ImportError as error:
@@ -51,12 +52,14 @@ def joint_places(path: Path) -> dict[str, F64]:
     joints = [joint for joint, _, _ in root.layout()]
     ours = our_names([joint.Name for joint in joints])
     first, last = root.getKeyframeRange()
+    root.loadRestPose(recursive=True)
+    rest = {name: np.array(tuple(joints[index].PositionWorld)) for name, index in ours.items()}
     places: dict[str, list[tuple[float, float, float]]] = {name: [] for name in ours}
     for frame in range(first, last + 1):
         root.loadPose(frame)
         for name, index in ours.items():
             places[name].append(tuple(joints[index].PositionWorld))
-    return {name: np.array(way) for name, way in places.items()}
+    return rest, {name: np.array(way) for name, way in places.items()}
 
 
 def _check_whole(path: Path) -> None:
@@ -95,10 +98,25 @@ def mirrored(name: str) -> str:
     return name.replace("left", "right") if name.startswith("left") else "r" + name[1:]
 
 
-def pelvis_axes(places: Mapping[str, F64]) -> F64:
-    """Return the axes of the pelvis as rows: forward and up (T, 2, 3)."""
+def pelvis_axes(places: Mapping[str, F64], rest: Mapping[str, F64]) -> F64:
+    """Return the axes of the pelvis as rows: forward and up (T, 2, 3).
+
+    Where a skeleton has the first joint of its spine says little of what is up: it is the axis of the file that runs
+    along the thighs at rest, as people stand there, and turns with the pelvis.
+    """
+    middle = 0.5 * (rest["hip_l"] + rest["hip_r"])
+    along = middle - 0.5 * (rest["knee_l"] + rest["knee_r"])
+    up = np.where(np.arange(3) == np.abs(along).argmax(), np.sign(along), 0.0)
+    forward = np.cross(rest["hip_l"] - rest["hip_r"], up)
+    axes = np.stack([forward / np.linalg.norm(forward), up])
+    turned: F64 = axes @ pelvis_frame(rest).T @ pelvis_frame(places)
+    return turned
+
+
+def pelvis_frame(places: Mapping[str, F64]) -> F64:
+    """Return a frame (..., 3, 3) that is fixed to hips and spine, its axes as rows."""
     left = places["hip_l"] - places["hip_r"]
-    forward = np.cross(left, places["spine"] - 0.5 * (places["hip_l"] + places["hip_r"]))
-    axes: F64 = np.stack([forward, np.cross(forward, left)], axis=1)
-    axes /= np.linalg.norm(axes, axis=2, keepdims=True)
-    return axes
+    ahead = np.cross(left, places["spine"] - 0.5 * (places["hip_l"] + places["hip_r"]))
+    frame: F64 = np.stack([left, ahead, np.cross(ahead, left)], axis=-2)
+    frame /= np.linalg.norm(frame, axis=-1, keepdims=True)
+    return frame

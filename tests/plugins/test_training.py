@@ -162,7 +162,8 @@ def test_our_own_bvh(tmp_path: Path) -> None:
     track = stepping(scene.body, 12)
     path = write("bvh", Result(track=track, scene=scene, recording=open_recording(DEMO)), tmp_path)
     found, series = training_bvh.columns(path), angles.measure(scene.body, track.root, track.angles)
-    for name in ("knee_flexion_l", "knee_flexion_r", "ankle_l", "ankle_r", "elbow_l", "elbow_r"):
+    joints = ("hip_flexion", "knee_flexion", "ankle", "elbow")
+    for name in (f"{joint}_{side}" for joint in joints for side in ("l", "r")):
         np.testing.assert_allclose(found[name], series.value[:, series.names.index(name)], atol=1e-3, err_msg=name)
 
 
