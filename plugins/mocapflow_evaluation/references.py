@@ -108,6 +108,8 @@ def _motion(path: Path) -> Reference:
     curves = {ours: columns[theirs] for theirs, ours in named.items() if theirs in columns}
     curves |= {name: columns[name] for name in SIGNED if name in columns}
     start, notes = counted_from(time)
+    if offset := [name for name in curves if not name.startswith(("knee", "elbow"))]:
+        notes = (*notes, f"OpenSim has zeros of its own, so these may be off by a constant: {', '.join(offset)}")
     return Reference(curves=curves, at=time, by_frame=False, notes=notes, counted_from=start)
 
 

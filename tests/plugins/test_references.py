@@ -302,7 +302,10 @@ def test_another_run_is_a_reference_by_its_angles_alone(tmp_path: Path) -> None:
 
 def test_a_knee_of_opensim_is_compared_as_signed_too(tmp_path: Path) -> None:
     bend = np.array([-4.0, 0.0, 30.0])
+    markers.write_mot(tmp_path / "m.mot", {"knee_angle_l": bend, "ankle_angle_l": bend}, np.arange(3) / 30)
+    assert read_reference(tmp_path / "m.mot").notes[-1].endswith("may be off by a constant: ankle_l")
     markers.write_mot(tmp_path / "m.mot", {"knee_angle_l": bend}, np.arange(3) / 30)
     curves = read_reference(tmp_path / "m.mot").curves
+    assert not any("constant" in note for note in read_reference(tmp_path / "m.mot").notes)
     np.testing.assert_allclose(curves["knee_angle_l"], bend)
     assert set(curves) == {"knee_angle_l", "knee_flexion_l"}
