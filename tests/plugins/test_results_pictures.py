@@ -73,7 +73,7 @@ def test_overlay_of_a_lost_view_says_so(scene: Scene, track: Track, recording: R
         return [replace(f, usable=lost, reasons=("", "black", "", "")) for f in recording.frames()]
 
     run_folder = RunFolder(path=tmp_path, recipe={})
-    fake = SimpleNamespace(frames=frames)
+    fake = SimpleNamespace(frames=frames, run_rate=recording.run_rate)
     shown = [
         read_back(Overlay().run(track=track, scene=scene, recording=source, run_folder=run_folder).paths[1])[0][:80]
         for source in (recording, fake)
