@@ -145,7 +145,8 @@ def _extended(child: Document, path: Path) -> Document:
         raise PipelineError(message, where=child.place(("extends",)).text, hint=error.hint) from None
     if "extends" in base.values:
         message = f"{child.values['extends']} itself extends another file; `extends` goes one level deep"
-        hint = f"extend {base.values['extends']} and copy what is under `change` in {extended.name}"
+        root = os.path.normpath(Path(child.values["extends"]).parent / base.values["extends"])
+        hint = f"extend {root} and copy what is under `change` in {extended.name}"
         raise PipelineError(message, where=child.place(("extends",)).text, hint=hint)
     if "mocapflow" in child.values:
         base = changed(base, "mocapflow", Document(child.values["mocapflow"], _places(child, ("mocapflow",))))

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import ModuleType
 
 import numpy as np
 
 from mocapflow.assets import Body
-from mocapflow.errors import MocapflowError
 from mocapflow.geometry.kinematics import part_of
+from mocapflow.geometry.libraries import load_open3d
 from mocapflow.memo import memoised
 
 
@@ -27,20 +26,3 @@ def simplified(body: Body, faces: int) -> Body:
     vertices = np.array(mesh.vertices, np.float64)
     nearest = np.asarray(cKDTree(body.vertices).query(vertices)[1], np.int32)
     return replace(part_of(body, nearest), vertices=vertices, faces=np.array(mesh.triangles, np.int32))
-
-
-def load_open3d(where: str = "") -> ModuleType:
-    """Return the package open3d, which is slow to import and asks for libraries of the system.
-
-    Args:
-        where: what it is needed for, a file.
-
-    Raises:
-        MocapflowError: one of them is not there.
-    """
-    try:
-        import open3d
-    except (ImportError, OSError) as error:
-        hint = "it needs libusb-1.0 and libGL (Debian, Ubuntu: apt install libusb-1.0-0 libgl1 libgomp1)"
-        raise MocapflowError(f"Open3D can't be loaded: {error}", where=where, hint=hint) from error
-    return open3d

@@ -19,26 +19,25 @@ def late_frames(folder: Path, names: Sequence[str]) -> tuple[int, ...]:
     """Return by how many whole frames each camera is late; 0 where nothing is said.
 
     Raises:
-        RecordingError: the file is not in its form, or names a camera that is not there, or moves all of them.
+        RecordingError: the file is not in its form, names a camera that is not there, or moves all cameras one way.
     """
     path = folder / TIMING
     if not path.exists():
         return (0,) * len(names)
     content = read_json(path, FORM)
+    if isinstance(content, dict) and (strange := sorted(content.keys() - {"late_frames"})):
+        raise RecordingError(f"there is no '{strange[0]}'", where=place(path, strange[0]), hint=FORM)
     try:
         late = {name: _rounded(frames) for name, frames in content["late_frames"].items()}
-        strange = sorted(set(content) - {"late_frames"})
     except (ValueError, TypeError, KeyError, AttributeError, OverflowError) as error:
         raise RecordingError(f"does not say how late the cameras are: {error!r}", where=str(path), hint=FORM) from error
-    if strange:
-        raise RecordingError(f"there is no '{strange[0]}'", where=place(path, strange[0]), hint=FORM)
     if unknown := sorted(set(late) - set(names)):
         raise RecordingError(
             f"there is no camera '{unknown[0]}'", where=place(path, unknown[0]), hint=alternatives(unknown[0], names)
         )
     counts = [late.get(name, 0) for name in names]
-    if names and (common := min(counts, key=abs)) and (min(counts) > 0 or max(counts) < 0):
-        hint = f"cameras are late after others: take {common} off each"
+    if min(counts) > 0 or max(counts) < 0:
+        hint = f"cameras are late after others: take {min(counts, key=abs)} off each"
         raise RecordingError("every camera is said to be late, or every one early", where=str(path), hint=hint)
     return tuple(counts)
 

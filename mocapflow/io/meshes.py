@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from mocapflow.errors import RecordingError
-from mocapflow.geometry.simplify import load_open3d
+from mocapflow.geometry.libraries import load_open3d
 from mocapflow.records import F64, I32
 
 OPPOSED = 0.01  # of the edges of a mesh, that two triangles go along the same way; a scan has a few

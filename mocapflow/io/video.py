@@ -57,7 +57,8 @@ def open_video(path: Path) -> Video:
     if path.is_dir():
         return _open_folder(path)
     if not os.access(path, os.R_OK):  # ffmpeg would only say that it can't be decoded
-        raise RecordingError("this video may not be read: permission denied", where=str(path))
+        hint = "let yourself read it, or copy it to a place of yours"
+        raise RecordingError("this video may not be read: permission denied", where=str(path), hint=hint)
     declared, rate, stamps = read_stamps(path)
     with open_capture(path) as capture:
         first = next((image for _ in grabs(capture) if (image := capture.retrieve()[1]) is not None), None)

@@ -47,6 +47,7 @@ def fit(files: Sequence[Path], body: Body, wanted: Sequence[str] = FREE, percent
         percentile: of the distances between neighbours that the bandwidth is.
 
     Raises:
+        PipelineError: a wanted angle is none of the body.
         RecordingError: a file cannot be read, or the files share no wanted angle.
     """
     check_wanted(wanted, body)

@@ -65,6 +65,14 @@ def test_joint_centres_come_back(name: str, result: Result, tmp_path: Path) -> N
     np.testing.assert_allclose(places[:, order], result.places, atol=NEAR)
 
 
+def test_files_of_every_second_frame_have_half_the_rate(result: Result, tmp_path: Path) -> None:
+    from bvh import Bvh
+
+    sparse = replace(result.recording, indices=range(0, 10, 2), frame_rate=60.0)
+    text = Bvh(write("bvh", replace(result, recording=sparse), tmp_path).read_text())
+    assert text.frame_time == pytest.approx(1 / 30, abs=1e-6)
+
+
 def test_one_frame_has_the_rate_of_its_recording(result: Result, tmp_path: Path) -> None:
     from bvh import Bvh
 

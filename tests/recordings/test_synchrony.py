@@ -114,12 +114,17 @@ def test_keypoints_tell_too(tmp_path):
     ("text", "said"),
     [
         ("{", "recording.json:1:2  not JSON: "),
-        ('{"late": {}}', "does not say how late the cameras are: KeyError"),
+        ("{}", "does not say how late the cameras are: KeyError"),
+        ('{"late": {}}', "recording.json:1:3  there is no 'late'"),
         ('{"late_frames": {"cam01": "much"}}', "does not say how late the cameras are: ValueError"),
         ('{"late_frames": {"cam01": true}}', "does not say how late the cameras are: TypeError"),
         ('{"late_frames": {"cam1": 3}}', "there is no camera 'cam1'"),
         ('{"late_frames": {}, "late_frame": {"cam01": 3}}', "there is no 'late_frame'"),
-        ('{"late_frames": {"cam01": 4, "cam02": 5, "cam03": 6}}', "every camera is said to be late"),
+        (
+            '{"late_frames": {"cam01": 4, "cam02": 5, "cam03": 6}}',
+            "every camera is said to be late.*\n *cameras.* 4 off",
+        ),
+        ('{"late_frames": {"cam01": -4, "cam02": -5, "cam03": -2}}', "or every one early\n.*take -2 off each"),
     ],
 )
 def test_a_wrong_recording_json_is_explained(tmp_path, text, said):
