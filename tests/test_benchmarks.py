@@ -12,7 +12,9 @@ BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["draping", "flow", "pose_solve", "segmentation", "silhouettes", "store_commit"])
+@pytest.mark.parametrize(
+    "name", ["draping", "flow", "help_time", "pose_solve", "segmentation", "silhouettes", "store_commit"]
+)
 def test_a_benchmark_runs(name):
     script = BENCHMARKS / f"{name}.py"
     done = subprocess.run([sys.executable, script], check=False, capture_output=True, text=True)
