@@ -35,6 +35,7 @@ class Corrupt(Stage):
     seed: NonNegativeInt = 0  # of the noise and of where rectangles lie
     noise: Share = 0.0  # share of the pixels that get a random colour
     noise_kind: Literal["replaced", "added"] = "replaced"  # added: noise up to that share of the range, on every pixel
+    noise_over: bool = False  # whether noise lies over rectangles and stripe, as a bad sensor's would, or under them
     rectangles: tuple[NonNegativeInt, NonNegativeInt] = (0, 0)  # grey ones, at least and at most, on each picture
     stripe: Share = 0.0  # height of a black stripe, share of the picture
     stripe_centre: Share = 0.5  # share of the picture from its top
@@ -105,10 +106,18 @@ class Corruption:
         return next((event for event in reversed(self.settings.events) if event.holds(index, view)), None)
 
     def _spoiled(self, image: U8, rng: np.random.Generator) -> U8:
-        """Return a picture with what covers every picture."""
+        """Return a picture with what spoils every picture."""
+        steps = (self._covered, self._noisy) if self.settings.noise_over else (self._noisy, self._covered)
+        for spoil in steps:
+            image = spoil(image, rng)
+        return image
+
+    def _noisy(self, image: U8, rng: np.random.Generator) -> U8:
         chosen = self.settings
-        if chosen.noise:
-            image = pixels.noisy(image, chosen.noise, chosen.noise_kind, rng)
+        return pixels.noisy(image, chosen.noise, chosen.noise_kind, rng) if chosen.noise else image
+
+    def _covered(self, image: U8, rng: np.random.Generator) -> U8:
+        chosen = self.settings
         if chosen.rectangles[1]:
             image = pixels.with_rectangles(image, chosen.rectangles, rng)
         return pixels.with_stripe(image, chosen.stripe, chosen.stripe_centre) if chosen.stripe else image

@@ -26,14 +26,16 @@ class Denoise(Stage):
 
     Random colours do not agree, so an intact pixel is known by its company however few are left: of 60 % noise, ten in
     a neighbourhood of 25 agree. Nothing is averaged over time or over colours that are right, so thin limbs stay sharp
-    however fast they move. Where a picture full of noise has none, it does not show the scene: what has been put
-    before it (rectangles, stripes, a logo) is hidden and counts neither way. A picture without noise stays as it is.
+    however fast they move. Where a picture full of noise has none, it does not show the scene, nor where all that noise
+    left in a large square has one colour to the last grey level, which cameras don't give. What has so been put before
+    the scene (rectangles, stripes, a logo) is hidden and counts neither way. A picture without noise stays as it is.
     """
 
     name: ClassVar[str] = "denoise"
     radius_px: PositiveInt = 2  # of the square of neighbours that are asked
     alike: PositiveInt = 16  # grey levels: neighbours agree that are so near in every colour
     company: PositiveInt = 2  # neighbours that have to agree with a pixel
+    flat_px: PositiveInt = 13  # side of a square of one colour that is no part of the scene; compression makes small ones
     fill_px: PositiveFloat = 1.0  # standard deviation of the window a lonely pixel is filled from
 
     def run(self, recording: Recording) -> Recording:
@@ -46,7 +48,7 @@ class Denoise(Stage):
         share = noise_share(kept)
         if share < LEAST_NOISE:
             return image, np.zeros(kept.shape, bool)
-        hidden = spared(kept, share)
+        hidden = spared(kept, share) | flat(image, kept, max(self.flat_px, least_side(share)))
         return filled(image, kept & ~hidden, ~kept, self.fill_px), hidden
 
 
@@ -76,8 +78,23 @@ def spared(kept: Bool, share: float) -> Bool:
     """Return the pixels (H, W) in squares without a lonely pixel that are larger than noise of this share leaves."""
     import cv2
 
-    side = int(np.ceil(np.sqrt(np.log(CHANCE) / np.log(max(1 - share, CHANCE))))) | 1  # odd, so that it has a middle
-    return np.asarray(cv2.morphologyEx(kept.astype(np.uint8), cv2.MORPH_OPEN, np.ones((side, side), np.uint8)), bool)
+    square = np.ones((least_side(1 - share),) * 2, np.uint8)
+    return np.asarray(cv2.morphologyEx(kept.astype(np.uint8), cv2.MORPH_OPEN, square), bool)
+
+
+def flat(image: U8, kept: Bool, side: int) -> Bool:
+    """Return the pixels (H, W) of an image (H, W, 3) in squares whose `kept` ones all have the very same colour."""
+    import cv2
+
+    square = np.ones((side | 1,) * 2, np.uint8)  # odd, so that it has a middle
+    most = cv2.dilate(np.where(kept[..., None], image, 0).astype(np.uint8), square)
+    least = cv2.erode(np.where(kept[..., None], image, 255).astype(np.uint8), square)
+    return np.asarray(cv2.dilate(np.all(most <= least, axis=2).astype(np.uint8), square), bool)
+
+
+def least_side(share: float) -> int:
+    """Return the side of the smallest square that pixels of this share fill by chance as good as never; it is odd."""
+    return int(np.ceil(np.sqrt(np.log(CHANCE) / np.log(np.clip(share, CHANCE, 1 - CHANCE))))) | 1
 
 
 def filled(image: U8, known: Bool, wanted: Bool, sigma_px: float) -> U8:

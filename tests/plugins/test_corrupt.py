@@ -70,6 +70,13 @@ def test_rectangles_and_stripe():
     assert rows.tolist() == list(range(45, 55))
 
 
+def test_noise_lies_under_a_stripe_or_over_it(clip):
+    under, over = (images(disturbed(clip, noise=0.6, stripe=0.2, noise_over=over))[0][0] for over in (False, True))
+    rows = slice(int(0.42 * len(under)), int(0.58 * len(under)))
+    assert not under[rows].any()
+    assert over[rows].any(axis=2).mean() == pytest.approx(0.6, abs=0.1)
+
+
 def test_rectangles_are_as_many_and_as_large_as_asked():
     white, rng = np.full((100, 200, 3), 255, np.uint8), np.random.default_rng(3)
     sides = []

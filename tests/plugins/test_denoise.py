@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mocapflow_robustness import pixels
 from mocapflow_robustness.corrupt import Corrupt
-from mocapflow_robustness.denoise import Denoise, filled, in_company, noise_share
+from mocapflow_robustness.denoise import CHANCE, Denoise, filled, flat, in_company, least_side, noise_share
 
 from mocapflow.help.shipped import shipped
 from mocapflow.recordings.recording import open_recording
@@ -60,6 +60,36 @@ def test_what_noise_does_not_reach_is_hidden():
     assert hidden[20:44, 30:60].all() and hidden[60:70].all()
     hidden[19:45, 29:61] = hidden[59:71] = False
     assert not hidden.any()
+
+
+def test_what_has_one_colour_under_the_noise_is_hidden():
+    covered, painted = scene(), np.zeros(SHAPE, bool)
+    covered[20:44, 30:60] = 77  # over the limb
+    covered[60:74] = 0
+    painted[20:44, 30:60] = painted[60:74] = True
+    _, hidden = Denoise().restore(pixels.noisy(covered, 0.6, "replaced", np.random.default_rng(0)))
+    assert hidden[painted].mean() > 0.95
+    assert not hidden[~cv2.dilate(painted.astype(np.uint8), np.ones((5, 5), np.uint8)).astype(bool)].any()
+
+
+def test_flat_is_a_square_whose_kept_pixels_are_equal():
+    image = np.random.default_rng(0).integers(0, 256, (20, 20, 3), np.uint8)
+    image[4:11, 4:11] = 50
+    whole = np.ones((20, 20), bool)
+    expected = np.zeros((20, 20), bool)
+    expected[4:11, 4:11] = True
+    assert (flat(image, whole, 7) == expected).all()
+    image[7, 7] = 51
+    assert not flat(image, whole, 7).any()
+    whole[7, 7] = False  # what noise took does not tell
+    assert (flat(image, whole, 7) == expected).all()
+
+
+@pytest.mark.parametrize("share", [0.02, 0.4, 0.6, 0.98])
+def test_chance_does_not_fill_the_least_side(share):
+    side = least_side(share)
+    assert side % 2 == 1
+    assert share ** (side**2) <= CHANCE < share ** (max(side - 3, 0) ** 2)
 
 
 def test_pictures_without_noise_stay_as_they_are():
