@@ -9,8 +9,9 @@ from mocapflow.hookspecs import hookimpl
 @hookimpl
 def mocapflow_stages() -> list[type[Stage]]:
     """Return the stages of this package."""
+    from mocapflow_robustness.bilateral import Bilateral
     from mocapflow_robustness.check_views import CheckViews
     from mocapflow_robustness.corrupt import Corrupt
     from mocapflow_robustness.denoise import Denoise
 
-    return [CheckViews, Corrupt, Denoise]
+    return [Bilateral, CheckViews, Corrupt, Denoise]
