@@ -11,8 +11,8 @@ LANES = 8  # pixels in a vector
 
 
 @numba.njit(cache=True)
-def sample(ends, edges, vertices, images, points, normals, cloth, matrix, size, spacing):  # type: ignore[no-untyped-def]
-    """Return points every `spacing` px of the total length of segments, where they lie in the image.
+def sample(ends, edges, vertices, images, points, normals, cloth, matrix, size, border, spacing):  # type: ignore[no-untyped-def]
+    """Return points every `spacing` px of the total length of segments, where they lie in the image, but for its border.
 
     Args:
         ends: (B, 2, 2) px, directed segments, the covered side on the same hand as in `occluding_edges`.
@@ -24,6 +24,7 @@ def sample(ends, edges, vertices, images, points, normals, cloth, matrix, size, 
         cloth: (N,) bool.
         matrix: (3, 4), px from m.
         size: (2,) px, width and height of the image.
+        border: px, its width: there a silhouette is cut, not occluding.
         spacing: px.
 
     Returns:
@@ -44,7 +45,7 @@ def sample(ends, edges, vertices, images, points, normals, cloth, matrix, size, 
             share = ((passed + 0.5) * spacing - total) / length
             passed += 1
             x, y = ends[s, 0, 0] + share * dx, ends[s, 0, 1] + share * dy
-            if not (0 <= x <= size[0] - 1 and 0 <= y <= size[1] - 1):
+            if not (border <= x <= size[0] - 1 - border and border <= y <= size[1] - 1 - border):
                 continue
             first = (images[e, 0, 0] - x) ** 2 + (images[e, 0, 1] - y) ** 2
             near = 1 if (images[e, 1, 0] - x) ** 2 + (images[e, 1, 1] - y) ** 2 < first else 0

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from mocapflow.assets import Camera
-from mocapflow.data import CLOTH, Contour, Surface
+from mocapflow.data import BORDER, CLOTH, Contour, Surface
 from mocapflow.geometry import boundary_kernels, span_kernels
 from mocapflow.geometry import silhouette_kernels as kernels
 from mocapflow.geometry.cameras import projection
@@ -157,6 +157,8 @@ def occluding_contour(surface: Surface, camera: Camera, spacing_px: float, skin:
 def samples(boundary: Outline, surface: Surface, camera: Camera, spacing_px: float) -> Contour:
     """Return points on the boundary of a silhouette within the image, evenly spaced along it, sorted by row.
 
+    Those at the image border are left out, as in images of the silhouette: there it is cut, not occluding.
+
     Their normals are the projected surface normals, which look along the image plane at an occluding contour and
     are smoother than the short edges; at cloth, which has a rim, they are those of the edges.
     """
@@ -171,6 +173,7 @@ def samples(boundary: Outline, surface: Surface, camera: Camera, spacing_px: flo
         cloth,
         matrix,
         camera.size,
+        BORDER,
         spacing_px,
     )
     vertex, anchor, pixel, normal = boundary_kernels.in_rows(*points)

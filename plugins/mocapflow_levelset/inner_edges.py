@@ -31,7 +31,7 @@ def inner_edges(surface: Surface, camera: Camera, spacing_px: float, of: Bool) -
     edge = np.flatnonzero(wanted).astype(np.int32)
     vertex, anchor, pixel, normal = boundary_kernels.sample(
         occluding.image.take(edge, axis=0), edge, occluding.vertex, occluding.image,
-        surface.vertices, surface.normals, surface.cloth, projection(camera), camera.size, spacing_px,
+        surface.vertices, surface.normals, surface.cloth, projection(camera), camera.size, 0, spacing_px,
     )  # fmt: skip
     return Contour(vertex=vertex, anchor=anchor, pixel=pixel, normal=normal)
 

@@ -227,6 +227,20 @@ def test_what_a_garment_covers_ends_at_its_borders():
     assert (body[covered, 2] < high).all() and (body[covered, 2] > low).all()
 
 
+@pytest.mark.parametrize("shift_px", [(110, 0), (0, -80)])
+def test_a_contour_that_leaves_the_image_finds_no_pair_there(truth, shift_px):
+    """At the true pose; near the border the image has no contour, and the nearest one is elsewhere."""
+    moved = np.zeros((3, 3))
+    moved[:2, 2] = shift_px
+    cameras = tuple(replace(camera, intrinsics=camera.intrinsics + moved) for camera in SCENE.cameras)
+    scene, surface = replace(SCENE, cameras=cameras), surface_at(truth)
+    matches = match(ContourIcp(first_loss="none"), surface, seen(surface, scene), scene=scene)
+    place = np.array([project(surface.vertices, camera) for camera in cameras])[matches.camera, matches.vertex]
+    near = np.any((place < 12) | (place > np.array(cameras[0].size) - 13), axis=1)
+    assert near.sum() > 10
+    assert np.abs(along(surface, matches, scene))[near].max() < 1.0
+
+
 def test_where_a_partial_body_was_cut_off_nothing_is_matched(truth):
     """The image shows the whole person, and their contour passes the cut: what is paired there would hold the body."""
     whole = surface_at(truth)
