@@ -12,7 +12,7 @@ LANES = 8  # pixels in a vector
 
 @numba.njit(cache=True)
 def sample(ends, edges, vertices, images, points, normals, cloth, matrix, size, border, spacing):  # type: ignore[no-untyped-def]
-    """Return points every `spacing` px of the total length of segments, where they lie in the image, but for its border.
+    """Return points every `spacing` px of the total length of segments that lie in the image, not at its border.
 
     Args:
         ends: (B, 2, 2) px, directed segments, the covered side on the same hand as in `occluding_edges`.

@@ -73,8 +73,14 @@ class ContourIcp(Matcher):
 
     @property
     def stride(self) -> int:
-        """How many zero crossings to go on for the spacing: there are 4/pi of them per pixel of contour."""
-        return max(round(self.spacing_px * 4 / np.pi), 1)
+        """How many zero crossings to go on for the spacing: there are 4/pi of them per pixel of contour.
+
+        They come row by row. A step that shares a factor with the number of contours in a row, two for a limb, would
+        take some of them again and again and the others never; so it has neither 2 nor 3 for a factor.
+        """
+        wanted = self.spacing_px * 4 / np.pi
+        steps = (step for step in range(1, int(2 * wanted) + 6) if step % 2 and step % 3)
+        return min(steps, key=lambda step: abs(step - wanted))
 
     def match(
         self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn

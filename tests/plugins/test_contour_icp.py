@@ -227,6 +227,15 @@ def test_what_a_garment_covers_ends_at_its_borders():
     assert (body[covered, 2] < high).all() and (body[covered, 2] > low).all()
 
 
+@pytest.mark.parametrize("spacing_px", [1.0, 3.0, 4.0, 5.0, 6.0, 10.0, 40.0])
+def test_points_are_taken_alike_from_all_contours_of_a_row(spacing_px):
+    """Three limbs abreast: six contours."""
+    matcher, contour = ContourIcp(spacing_px=spacing_px), np.tile(np.arange(6), 300)
+    taken = np.bincount(contour[:: matcher.stride], minlength=6)
+    assert taken.max() - taken.min() <= 1
+    assert matcher.stride == pytest.approx(4 / np.pi * spacing_px, abs=2.0)
+
+
 @pytest.mark.parametrize("shift_px", [(110, 0), (0, -80)])
 def test_a_contour_that_leaves_the_image_finds_no_pair_there(truth, shift_px):
     """At the true pose; near the border the image has no contour, and the nearest one is elsewhere."""
