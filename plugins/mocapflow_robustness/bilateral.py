@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 from pydantic import PositiveFloat, PositiveInt
 
-from mocapflow.components import Stage
-from mocapflow.data import Frame
-from mocapflow.recordings.recording import Recording
 from mocapflow.records import F32, F64, U8, Bool
-from mocapflow_robustness.hiding import together
+from mocapflow_robustness.restoring import Restorer, mean_around
 
 MASK = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)  # blind to planes and to straight edges
 MAGNITUDE = np.sqrt(2 / np.pi)  # the mean of a normal variable's, in standard deviations
@@ -21,7 +16,7 @@ FREE = 0.1  # share of the picture's noise below which a place has none
 SIDE = 7  # px, of such a place
 
 
-class Bilateral(Stage):
+class Bilateral(Restorer):
     """Blurs as much as the noise of each picture asks for, then smooths colours that are alike.
 
     Values that noise has pushed out of the range were cut off, which takes contrast: it is given back. Where a picture
@@ -38,10 +33,6 @@ class Bilateral(Stage):
     space_px: PositiveFloat = 4.0  # standard deviation of the filter in the picture
     passes: PositiveInt = 3
 
-    def run(self, recording: Recording) -> Recording:
-        """Return the recording as it looks without noise."""
-        return replace(recording, changes=(*recording.changes, Smoothed(self)))
-
     def restore(self, image: U8) -> tuple[U8, Bool]:
         """Return an image (H, W, 3) without its noise, and where (H, W) it does not show the scene."""
         import cv2
@@ -52,23 +43,10 @@ class Bilateral(Stage):
             return image, np.zeros(rough.shape, bool)
         calm = (rough < FREE * noise).astype(np.uint8)
         hidden = np.asarray(cv2.dilate(calm, np.ones((SIDE, SIDE), np.uint8)), bool)
-        smooth = blurred(image, ~hidden, noise / (2 * np.sqrt(np.pi) * self.left))
+        smooth, _ = mean_around(image, ~hidden, noise / (2 * np.sqrt(np.pi) * self.left))
         for _ in range(self.passes):
             smooth = np.asarray(cv2.bilateralFilter(smooth, -1, self.alike, self.space_px), np.float32)
         return unclipped(smooth, noise), hidden
-
-
-@dataclass(frozen=True)
-class Smoothed:
-    """Frames smoothed by the settings of a stage."""
-
-    settings: Bilateral
-
-    def frames(self, source: Recording, indices: range) -> Iterator[Frame]:
-        """Yield the smoothed frames."""
-        for frame in replace(source, indices=indices).frames():
-            images, hidden = zip(*(self.settings.restore(image) for image in frame.images), strict=True)
-            yield replace(frame, images=images, hidden=together(frame.hidden, hidden))
 
 
 def roughness(image: U8) -> F32:
@@ -82,16 +60,6 @@ def roughness(image: U8) -> F32:
 def noise_of(rough: F32) -> float:
     """Return the standard deviation of the noise in most of a picture, in grey levels, from how rough (H, W) it is."""
     return float(np.median(rough) / MAGNITUDE)
-
-
-def blurred(image: U8, known: Bool, sigma_px: float) -> F32:
-    """Return an image (H, W, 3) as the Gaussian mean of its `known` pixels (H, W); as it is where none are near."""
-    import cv2
-
-    weight = known.astype(np.float32)
-    total = cv2.GaussianBlur(weight, (0, 0), sigma_px)[..., None]
-    mean = cv2.GaussianBlur(image * weight[..., None], (0, 0), sigma_px) / np.maximum(total, 1e-6)
-    return np.asarray(np.where(total > 1e-3, mean, image), np.float32)
 
 
 def unclipped(image: F32, noise: float) -> U8:

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numba
 import numpy as np
 from pydantic import PositiveFloat, PositiveInt
 
-from mocapflow.components import Stage
-from mocapflow.data import Frame
-from mocapflow.recordings.recording import Recording
 from mocapflow.records import U8, Bool
-from mocapflow_robustness.hiding import together
+from mocapflow_robustness.restoring import Restorer, mean_around
 
 BLOCK_PX = 16  # noise is everywhere alike: its share is the median over blocks of the picture
 LEAST_NOISE = 0.02  # share of lonely pixels; fine texture makes 0.004 at most on the recordings that we have
 CHANCE = 1e-9  # that noise spares a whole neighbourhood
 
 
-class Denoise(Stage):
+class Denoise(Restorer):
     """Fills pixels whose colour no neighbours share from those around them that have company.
 
     Random colours do not agree, so an intact pixel is known by its company however few are left: of 60 % noise, ten in
@@ -38,10 +33,6 @@ class Denoise(Stage):
     flat_px: PositiveInt = 13  # side of a square of one colour that is not the scene's; compression makes small ones
     fill_px: PositiveFloat = 1.0  # standard deviation of the window a lonely pixel is filled from
 
-    def run(self, recording: Recording) -> Recording:
-        """Return the recording as it looks without noise."""
-        return replace(recording, changes=(*recording.changes, Denoised(self)))
-
     def restore(self, image: U8) -> tuple[U8, Bool]:
         """Return an image (H, W, 3) without its noise, and where (H, W) it does not show the scene."""
         kept = in_company(image, self.radius_px, self.alike, self.company)
@@ -50,20 +41,6 @@ class Denoise(Stage):
             return image, np.zeros(kept.shape, bool)
         hidden = spared(kept, share) | flat(image, kept, max(self.flat_px, least_side(share)))
         return filled(image, kept & ~hidden, ~kept, self.fill_px), hidden
-
-
-@dataclass(frozen=True)
-class Denoised:
-    """Frames restored by the settings of a stage."""
-
-    settings: Denoise
-
-    def frames(self, source: Recording, indices: range) -> Iterator[Frame]:
-        """Yield the restored frames."""
-        for frame in replace(source, indices=indices).frames():
-            found = [self.settings.restore(image) for image in frame.images]
-            images, hidden = zip(*found, strict=True)
-            yield replace(frame, images=images, hidden=together(frame.hidden, hidden))
 
 
 def noise_share(kept: Bool) -> float:
@@ -99,12 +76,8 @@ def least_side(share: float) -> int:
 
 def filled(image: U8, known: Bool, wanted: Bool, sigma_px: float) -> U8:
     """Return an image (H, W, 3) with its `wanted` pixels (H, W) the Gaussian mean of the `known` ones around."""
-    import cv2
-
-    weight = known.astype(np.float32)
-    total = cv2.GaussianBlur(weight, (0, 0), sigma_px)
-    mean = cv2.GaussianBlur(image * weight[..., None], (0, 0), sigma_px) / np.maximum(total, 1e-12)[..., None]
-    near = wanted & (total > 0)
+    mean, share = mean_around(image, known, sigma_px)
+    near = wanted & (share > 0)
     return np.where(near[..., None], np.rint(mean), image).astype(np.uint8)
 
 
