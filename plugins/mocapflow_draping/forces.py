@@ -77,7 +77,7 @@ def wind(garment: GarmentMesh, parameters: F64, turn: F64) -> tuple[F64, F64]:
 
 
 def thickness(garment: GarmentMesh, parameters: F64) -> F64:
-    """Return the thickness (B,) m, from the face that touches to the one that is seen; zero without the parameter."""
+    """Return the cloth's thickness (B,) m; zero where the garment has no such parameter."""
     if THICKNESS not in garment.parameter_names:
         return np.zeros(len(parameters))
     column: F64 = np.maximum(parameters[:, garment.parameter_names.index(THICKNESS)], 0.0)

@@ -36,11 +36,7 @@ def parameters(model, **values):
 
 def seen(model, truth):
     """Return the silhouettes of the person whose garment hangs by the true parameters."""
-    return drawn(model, model.surface(STANDING, model.drape(STANDING, truth, Past())))
-
-
-def drawn(model, surface):
-    """Return the silhouettes of a surface."""
+    surface = model.surface(STANDING, model.drape(STANDING, truth, Past()))
     found = [
         Silhouette(camera=index, layer="person", distance=model_distance(surface, camera, 12.0))
         for index, camera in enumerate(model.scene.cameras)
@@ -49,14 +45,10 @@ def drawn(model, surface):
 
 
 def fitted(fitter, model, truth, start, past=None, time=0.0):
-    return fitted_to(seen(model, truth), fitter, model, start, past, time)
-
-
-def fitted_to(silhouettes, fitter, model, start, past=None, time=0.0):
     blank = np.zeros((SIZE[1], SIZE[0], 3), np.uint8)
     frame = Frame(index=0, time=time, images=(blank,) * 4, usable=np.ones(4, bool))
     estimate = Estimate(pose=STANDING, parameters=start, covariance=np.eye(10 + len(start)), observed=np.ones(4))
-    return fitter.fit(frame, silhouettes, estimate, model, past or Past(), TURN)
+    return fitter.fit(frame, seen(model, truth), estimate, model, past or Past(), TURN)
 
 
 def later(model):
@@ -98,17 +90,6 @@ def test_thickness_is_measured_in_the_first_frame_and_kept(model):
     thickness = model.scene.garment.parameter_names.index("thickness_m")
     assert abs(fitted(SampledForces(), model, truth, nothing).parameters[thickness] - 0.006) <= 0.002
     assert fitted(SampledForces(), model, truth, nothing, later(model)).parameters[thickness] == 0
-
-
-@pytest.mark.parametrize("thickness_m", [0.002, 0.004, 0.006, 0.008])
-def test_the_thickness_of_cloth_drawn_around_its_middle_is_found(model, thickness_m):
-    """T-CL7, the truth drawn otherwise: the middle of the cloth is laid, and moved by half the thickness outwards."""
-    middle = replace(model, draper=Kinematic(sweeps=0, skin_m=model.draper.skin_m + thickness_m / 2))
-    surface = middle.surface(STANDING, middle.drape(STANDING, parameters(model), Past()))
-    grown = surface.vertices + np.where(surface.cloth[:, None], surface.normals * thickness_m / 2, 0)
-    truth = drawn(model, replace(surface, vertices=grown))
-    found = fitted_to(truth, SampledForces(), model, parameters(model)).parameters
-    assert abs(found[model.scene.garment.parameter_names.index(THICKNESS)] - thickness_m) <= 0.002
 
 
 def test_later_frames_follow_a_force_step_by_step(fitter, model):
