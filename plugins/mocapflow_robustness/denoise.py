@@ -30,7 +30,7 @@ class Denoise(Restorer):
     radius_px: PositiveInt = 2  # of the square of neighbours that are asked
     alike: PositiveInt = 16  # grey levels: neighbours agree that are so near in every colour
     company: PositiveInt = 2  # neighbours that have to agree with a pixel
-    flat_px: PositiveInt = 13  # side of a square of one colour that is no part of the scene; compression makes small ones
+    flat_px: PositiveInt = 13  # side of a square of one colour that is not the scene's; compression makes small ones
     fill_px: PositiveFloat = 1.0  # standard deviation of the window a lonely pixel is filled from
 
     def restore(self, image: U8) -> tuple[U8, Bool]:
