@@ -1,17 +1,10 @@
 """Noise added to every pixel is measured and smoothed, edges stay, what it does not reach is hidden."""
 
-from dataclasses import replace
-
 import cv2
 import numpy as np
 import pytest
 from mocapflow_robustness import pixels
 from mocapflow_robustness.bilateral import Bilateral, mean_clipped, noise_of, roughness, unclipped
-from mocapflow_robustness.corrupt import Corrupt
-
-from mocapflow.help.shipped import shipped
-from mocapflow.recordings.recording import open_recording
-from tests.fixtures.stores import write_recording
 
 SHAPE = (192, 256)
 
@@ -68,19 +61,3 @@ def test_what_noise_does_not_reach_is_hidden():
     assert hidden[40:88, 60:120].mean() > 0.9 and hidden[120:140].mean() > 0.85
     hidden[39:89, 59:121] = hidden[119:141] = False
     assert not hidden.any()
-
-
-def test_pictures_of_cameras_stay_as_they_are():
-    recording = open_recording(shipped("examples", "data", "skirt_steps"))
-    first = replace(recording, indices=range(1))
-    clean, same = first.frame(0), Bilateral().run(first).frame(0)
-    assert all((one == other).all() for one, other in zip(clean.images, same.images, strict=True))
-    assert not any(hidden.any() for hidden in same.hidden)
-
-
-def test_what_was_hidden_stays_hidden(tmp_path):
-    recording = open_recording(write_recording(tmp_path / "clip", frames=2))
-    covered = Corrupt(events=({"what": "covered", "first": 1, "count": 1},)).run(recording)
-    before, after = (list(each.frames()) for each in (covered, Bilateral().run(covered)))
-    assert all((after[1].hidden[c] | ~before[1].hidden[c]).all() for c in range(2))
-    assert [frame.index for frame in after] == [0, 1]

@@ -1,17 +1,10 @@
 """Lonely pixels are filled, thin things stay, what no noise reaches is hidden, and clean pictures are left alone."""
 
-from dataclasses import replace
-
 import cv2
 import numpy as np
 import pytest
 from mocapflow_robustness import pixels
-from mocapflow_robustness.corrupt import Corrupt
 from mocapflow_robustness.denoise import CHANCE, Denoise, filled, flat, in_company, least_side, noise_share
-
-from mocapflow.help.shipped import shipped
-from mocapflow.recordings.recording import open_recording
-from tests.fixtures.stores import write_recording
 
 SHAPE = (96, 128)
 
@@ -92,14 +85,6 @@ def test_chance_does_not_fill_the_least_side(share):
     assert share ** (side**2) <= CHANCE < share ** (max(side - 3, 0) ** 2)
 
 
-def test_pictures_without_noise_stay_as_they_are():
-    recording = open_recording(shipped("examples", "data", "skirt_steps"))
-    first = replace(recording, indices=range(1))
-    clean, same = first.frame(0), Denoise().run(first).frame(0)
-    assert all((one == other).all() for one, other in zip(clean.images, same.images, strict=True))
-    assert not any(hidden.any() for hidden in same.hidden)
-
-
 def test_a_pixel_is_filled_from_those_that_are_known():
     image = np.zeros((9, 9, 3), np.uint8)
     image[:, :4], image[4, 4] = 100, 255
@@ -109,12 +94,3 @@ def test_a_pixel_is_filled_from_those_that_are_known():
     assert 30 < mean[4, 4, 0] < 50
     assert (mean[known] == image[known]).all()
     assert (filled(image, ~known & False, ~known, 1.0) == image).all()  # nothing is known
-
-
-def test_what_was_hidden_stays_hidden(tmp_path):
-    recording = open_recording(write_recording(tmp_path / "clip", frames=3))
-    covered = Corrupt(events=({"what": "covered", "first": 1, "count": 1},)).run(recording)
-    before, after = (list(each.frames()) for each in (covered, Denoise().run(covered)))
-    assert all((after[1].hidden[c] | ~before[1].hidden[c]).all() for c in range(2))
-    assert before[1].hidden[0].any()
-    assert [frame.index for frame in after] == [0, 1, 2]
