@@ -22,8 +22,9 @@ class Denoise(Restorer):
     Random colours do not agree, so an intact pixel is known by its company however few are left: of 60 % noise, ten in
     a neighbourhood of 25 agree. Nothing is averaged over time or over colours that are right, so thin limbs stay sharp
     however fast they move. Where a picture full of noise has none, it does not show the scene, nor where all that noise
-    left in a large square has one colour to the last grey level, which cameras don't give. What has so been put before
-    the scene (rectangles, stripes, a logo) is hidden and counts neither way. A picture without noise stays as it is.
+    left in a large square has one colour to the last grey level, as little but a blank wall has. What so has been
+    put before the scene (rectangles, stripes, a logo) is hidden and counts neither way. A picture without noise stays
+    as it is.
     """
 
     name: ClassVar[str] = "denoise"
@@ -60,13 +61,13 @@ def spared(kept: Bool, share: float) -> Bool:
 
 
 def flat(image: U8, kept: Bool, side: int) -> Bool:
-    """Return the pixels (H, W) of an image (H, W, 3) in squares whose `kept` ones all have the very same colour."""
+    """Return the pixels (H, W) of an image (H, W, 3) in squares with `kept` ones, all of the very same colour."""
     import cv2
 
     square = np.ones((side | 1,) * 2, np.uint8)  # odd, so that it has a middle
     most = cv2.dilate(np.where(kept[..., None], image, 0).astype(np.uint8), square)
     least = cv2.erode(np.where(kept[..., None], image, 255).astype(np.uint8), square)
-    return np.asarray(cv2.dilate(np.all(most <= least, axis=2).astype(np.uint8), square), bool)
+    return np.asarray(cv2.dilate(np.all(most == least, axis=2).astype(np.uint8), square), bool)
 
 
 def least_side(share: float) -> int:

@@ -41,7 +41,7 @@ class Restored:
 
 
 def mean_around(image: U8, known: Bool, sigma_px: float) -> tuple[F32, F32]:
-    """Return the Gaussian mean (H, W, 3) of the `known` pixels (H, W) of an image, and their share (H, W) of it."""
+    """Return the mean (H, W, 3) of `known` pixels (H, W) under a Gaussian window, and their share (H, W) of that."""
     import cv2
 
     weight = known.astype(np.float32)

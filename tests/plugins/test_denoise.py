@@ -76,6 +76,7 @@ def test_flat_is_a_square_whose_kept_pixels_are_equal():
     assert not flat(image, whole, 7).any()
     whole[7, 7] = False  # what noise took does not tell
     assert (flat(image, whole, 7) == expected).all()
+    assert not flat(image, np.zeros((20, 20), bool), 7).any()  # nor does a place of which nothing is left
 
 
 @pytest.mark.parametrize("share", [0.02, 0.4, 0.6, 0.98])
