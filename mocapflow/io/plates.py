@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from mocapflow.assets import Background
+from mocapflow.data import Frame
 from mocapflow.errors import RecordingError
 from mocapflow.io.folders import plates
 from mocapflow.io.images import check_depth, read_image
 from mocapflow.io.lenses import View
-from mocapflow.io.video import Video, read_frames
-from mocapflow.records import F32, U8
+from mocapflow.records import F32, U8, Bool
 
 LEAST_SPREAD = 1.0  # grey levels; the rounding of 8-bit pictures alone makes 0.3
 USUAL_SPREAD = 4.0  # grey levels; where no frame can be compared with the plate
@@ -27,13 +27,18 @@ GREY, COLOURED = 6.0, 20.0  # grey levels between the channels of a block, excee
 SAME_ROOM = 10.0  # grey levels, median difference of a frame and its toned plate: above, it shows something else
 
 
-def background(folder: Path, views: Sequence[View], videos: Sequence[Video]) -> Background | None:
+def background(folder: Path, views: Sequence[View], first: Frame) -> Background | None:
     """Return the empty scene from background/<camera>.png or background/<camera>/*.png, None without plates.
 
     Plates take the brightness and contrast of the first frame: cameras drift, and a person dims a room. With one plate
     per camera the spread is one number per channel: the robust spread (1.4826 times the median absolute difference) of
     the first frame against it, which people in the picture hardly change. With several it is the larger of that of
     each pixel and its median over the picture.
+
+    Args:
+        folder: the recording.
+        views: its cameras.
+        first: what they show in the first frame; what is hidden in it does not tell.
 
     Raises:
         RecordingError: a camera has no plate though others do, or a plate has another size than the video,
@@ -42,7 +47,7 @@ def background(folder: Path, views: Sequence[View], videos: Sequence[Video]) -> 
     found = plate_files(folder, views)
     if not found:
         return None
-    rows = [_one(files, view, video) for files, view, video in zip(found, views, videos, strict=True)]
+    rows = [_one(files, view, first, camera) for camera, (files, view) in enumerate(zip(found, views, strict=True))]
     return Background(mean=tuple(mean for mean, _ in rows), spread=tuple(spread for _, spread in rows))
 
 
@@ -63,29 +68,31 @@ def plate_files(folder: Path, views: Sequence[View]) -> list[tuple[Path, ...]]:
     return found if any(found) else []
 
 
-def _one(files: Sequence[Path], view: View, video: Video) -> tuple[F32, F32]:
+def _one(files: Sequence[Path], view: View, first: Frame, camera: int) -> tuple[F32, F32]:
     pictures = np.stack([view.image(_read(path, view)) for path in files]).astype(np.float32)
-    first, _ = next(read_frames(video, range(1)))
-    frame = None if first is None else view.image(first).astype(np.float32)
-    mean = pictures.mean(axis=0)
-    if frame is not None:
+    mean, off = pictures.mean(axis=0), np.full((1, 3), USUAL_SPREAD / NORMAL, np.float32)
+    if first.usable[camera]:
+        frame, hidden = first.images[camera].astype(np.float32), first.hidden_in(camera)
+        shown = np.ones(frame.shape[:2], bool) if hidden is None or hidden.all() else ~hidden
         _check_colours(mean, frame, files[0])
-        mean = toned(mean, frame)
+        mean = toned(mean, frame, shown)
+        off = np.abs(frame - mean)[shown]
     if len(files) > 1:
         each = pictures.std(axis=0, ddof=1)
         spread = np.maximum(each, np.median(each, axis=(0, 1)))
     else:
-        difference = np.full((1, 1, 3), USUAL_SPREAD / NORMAL) if frame is None else np.abs(frame - mean)
-        spread = np.broadcast_to(NORMAL * np.median(difference, axis=(0, 1)), mean.shape)
+        spread = np.broadcast_to(NORMAL * np.median(off, axis=0), mean.shape)
     return mean, np.maximum(spread, LEAST_SPREAD).astype(np.float32)
 
 
-def toned(plate: F32, frame: F32) -> F32:
+def toned(plate: F32, frame: F32, shown: Bool) -> F32:
     """Return a plate (H, W, 3) with each channel as bright and as rich in contrast as in a frame (H, W, 3).
 
-    A frame that is another picture altogether leaves the plate as it is.
+    It goes by the pixels shown (H, W). A frame that is another picture altogether leaves the plate as it is.
     """
-    lines = [_line(plate[::THIN, ::THIN, c].ravel(), frame[::THIN, ::THIN, c].ravel()) for c in range(plate.shape[2])]
+    thin = np.zeros_like(shown)
+    thin[::THIN, ::THIN] = shown[::THIN, ::THIN]
+    lines = [_line(here, there) for here, there in zip(plate[thin].T, frame[thin].T, strict=True)]
     if any(line is None for line in lines):
         return plate
     gain, offset = np.array(lines, np.float32).T

@@ -94,8 +94,8 @@ class Recording:
         return replace(self, views=self.views[one], videos=self.videos[one], keypoint_folders=(None,))
 
     def background(self) -> Background | None:
-        """Return the empty scene from the clean plates, or None where there are none."""
-        return background(self.folder, self.views, self.videos)
+        """Return the empty scene from the clean plates, in the tone of the first frame, or None where there are none."""
+        return background(self.folder, self.views, self.frame(0))
 
     def static(self) -> Recording | None:
         """Return the standing trial, seen by the same cameras, or None where there is none."""

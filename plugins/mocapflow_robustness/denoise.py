@@ -13,6 +13,7 @@ from mocapflow_robustness.restoring import Restorer, mean_around
 
 BLOCK_PX = 16  # noise is everywhere alike: its share is the median over blocks of the picture
 LEAST_NOISE = 0.02  # share of lonely pixels; fine texture makes 0.004 at most on the recordings that we have
+STRIP_PX = 3  # width of the strips that are left between things before the scene
 CHANCE = 1e-9  # that noise spares a whole neighbourhood
 
 
@@ -40,7 +41,7 @@ class Denoise(Restorer):
         share = noise_share(kept)
         if share < LEAST_NOISE:
             return image, np.zeros(kept.shape, bool)
-        hidden = spared(kept, share) | flat(image, kept, max(self.flat_px, least_side(share)))
+        hidden = spared(kept, share) | flat(image, kept, self.flat_px, least_side(share))
         return filled(image, kept & ~hidden, ~kept, self.fill_px), hidden
 
 
@@ -56,18 +57,43 @@ def spared(kept: Bool, share: float) -> Bool:
     """Return the pixels (H, W) in squares without a lonely pixel that are larger than noise of this share leaves."""
     import cv2
 
-    square = np.ones((least_side(1 - share),) * 2, np.uint8)
+    square = ones((least_side(1 - share),) * 2)
     return np.asarray(cv2.morphologyEx(kept.astype(np.uint8), cv2.MORPH_OPEN, square), bool)
 
 
-def flat(image: U8, kept: Bool, side: int) -> Bool:
-    """Return the pixels (H, W) of an image (H, W, 3) in squares with `kept` ones, all of the very same colour."""
+def flat(image: U8, kept: Bool, side_px: int, least_px: int) -> Bool:
+    """Return the pixels (H, W) of an image (H, W, 3) in squares whose `kept` ones all have the very same colour.
+
+    Squares have a side of `side_px`, at least `least_px`. Near one of these a strip as long as that will do, and as
+    large as the least square: strips are what is left of a rectangle by the next one.
+    """
+    sure = of_one_colour(image, kept, (max(side_px, least_px),) * 2)
+    strip = (STRIP_PX, max(side_px, least_px**2 // STRIP_PX))
+    strips = of_one_colour(image, kept, strip) | of_one_colour(image, kept, strip[::-1])
+    strips &= spread(sure, 2 * side_px)
+    return sure | (strips & spread(strips & kept, STRIP_PX))  # a strip ends beside the last pixel kept of it
+
+
+def spread(chosen: Bool, size_px: int) -> Bool:
+    """Return the pixels (H, W) in squares of this size round the chosen ones (H, W)."""
     import cv2
 
-    square = np.ones((side | 1,) * 2, np.uint8)  # odd, so that it has a middle
-    most = cv2.dilate(np.where(kept[..., None], image, 0).astype(np.uint8), square)
-    least = cv2.erode(np.where(kept[..., None], image, 255).astype(np.uint8), square)
-    return np.asarray(cv2.dilate(np.all(most == least, axis=2).astype(np.uint8), square), bool)
+    return np.asarray(cv2.dilate(chosen.astype(np.uint8), ones((size_px,) * 2)), bool)
+
+
+def of_one_colour(image: U8, kept: Bool, size_px: tuple[int, int]) -> Bool:
+    """Return the pixels (H, W) of an image (H, W, 3) in boxes of this size, all whose `kept` ones have one colour."""
+    import cv2
+
+    box = ones(size_px)
+    most = cv2.dilate(np.where(kept[..., None], image, 0).astype(np.uint8), box)
+    least = cv2.erode(np.where(kept[..., None], image, 255).astype(np.uint8), box)
+    return np.asarray(cv2.dilate(np.all(most == least, axis=2).astype(np.uint8), box), bool)
+
+
+def ones(size_px: tuple[int, int]) -> U8:
+    """Return a box of ones of this height and width, or the next odd ones, so that it has a middle."""
+    return np.ones([length | 1 for length in size_px], np.uint8)
 
 
 def least_side(share: float) -> int:

@@ -1,5 +1,7 @@
 """Clean plates: mean and spread of the empty scene."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ import pytest
 from mocapflow.errors import RecordingError
 from mocapflow.io.plates import toned
 from mocapflow.recordings.recording import open_recording
+from mocapflow.records import record
 from tests.fixtures.recordings import NAMES, SIZE, write_recording
 
 
@@ -68,10 +71,13 @@ def room(noise=0.0, seed=0):
     return (grey + np.random.default_rng(seed).normal(0, noise, (60, 80, 3))).astype(np.float32)
 
 
+EVERYWHERE = np.ones((60, 80), bool)
+
+
 def test_a_plate_takes_the_tone_of_a_frame_whoever_stands_before_it():
     frame = 0.95 * room(1.0, seed=1) - np.array([4.0, 5.0, 6.0], np.float32)
     frame[10:55, 30:45] = 90.0  # a person
-    found = toned(room(1.0, seed=2), frame)
+    found = toned(room(1.0, seed=2), frame, EVERYWHERE)
     expected = 0.95 * room() - np.array([4.0, 5.0, 6.0], np.float32)
     assert np.abs(np.median(found - expected, axis=(0, 1))).max() < 0.2
     assert np.abs(np.mean((found - expected)[:, :10], axis=(0, 1))).max() < 0.6  # the dark end too
@@ -80,12 +86,43 @@ def test_a_plate_takes_the_tone_of_a_frame_whoever_stands_before_it():
 
 def test_an_even_room_may_be_darker_too():
     flat = np.full((60, 80, 3), 120, np.float32)
-    np.testing.assert_allclose(toned(flat, flat - 7), flat - 7)
+    np.testing.assert_allclose(toned(flat, flat - 7, EVERYWHERE), flat - 7)
 
 
 @pytest.mark.parametrize("other", [room()[:, ::-1], np.zeros((60, 80, 3), np.float32), 0.4 * room()])
 def test_another_picture_leaves_the_plate_as_it_is(other):
-    np.testing.assert_array_equal(toned(room(), other), room())
+    np.testing.assert_array_equal(toned(room(), other, EVERYWHERE), room())
+
+
+def test_what_hides_the_room_does_not_tell_its_tone():
+    frame = room(1.0, seed=1) - 5
+    frame[:, 15:] = 0  # more than is seen
+    shown = EVERYWHERE.copy()
+    shown[:, 15:] = False
+    assert np.abs(np.mean(toned(room(), frame, shown)[:, :15] - room()[:, :15] + 5, axis=(0, 1))).max() < 0.6
+    assert np.abs(np.mean(toned(room(), frame, EVERYWHERE)[:, :15] - room()[:, :15] + 5, axis=(0, 1))).max() > 4
+
+
+@record
+class Noisier:
+    """Frames with noise, of which a band is hidden."""
+
+    def frames(self, source, indices):
+        for frame in replace(source, indices=indices).frames():
+            noise = np.random.default_rng(0).normal(0, 10, frame.images[0].shape)
+            hidden = np.zeros(frame.images[0].shape[:2], bool)
+            hidden[:30] = True
+            noisy = np.where(hidden[..., None], 255, np.clip(frame.images[0] + noise, 0, 255)).astype(np.uint8)
+            yield replace(frame, images=(noisy,) * len(frame.images), hidden=(hidden,) * len(frame.images))
+
+
+def test_plates_are_compared_with_the_frame_as_later_stages_see_it(tmp_path):
+    write_recording(tmp_path, frames=2)
+    for name in NAMES:
+        plate(tmp_path / "background" / f"{name}.png")
+    scene = replace(open_recording(tmp_path), changes=(Noisier(),)).background()
+    assert scene.spread[0][0, 0] == pytest.approx([10, 10, 10], rel=0.15)
+    assert scene.mean[0].mean() == pytest.approx(27, abs=1)  # as the video is; the band would make it 170
 
 
 def test_plates_are_scaled_with_the_frames(tmp_path):

@@ -71,12 +71,28 @@ def test_flat_is_a_square_whose_kept_pixels_are_equal():
     whole = np.ones((20, 20), bool)
     expected = np.zeros((20, 20), bool)
     expected[4:11, 4:11] = True
-    assert (flat(image, whole, 7) == expected).all()
+    assert (flat(image, whole, 7, 5) == expected).all()
     image[7, 7] = 51
-    assert not flat(image, whole, 7).any()
+    assert not flat(image, whole, 7, 5).any()
     whole[7, 7] = False  # what noise took does not tell
-    assert (flat(image, whole, 7) == expected).all()
-    assert not flat(image, np.zeros((20, 20), bool), 7).any()  # nor does a place of which nothing is left
+    assert (flat(image, whole, 7, 5) == expected).all()
+    assert not flat(image, whole, 7, 9).any()  # chance would leave as much
+    assert not flat(image, np.zeros((20, 20), bool), 7, 5).any()  # nor does a place of which nothing is left
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_strip_is_flat_near_a_square(turned):
+    image = np.random.default_rng(0).integers(0, 256, (60, 60, 3), np.uint8)
+    expected = np.zeros((60, 60), bool)
+    expected[4:11, 4:11] = expected[14:17, 6:18] = True
+    image[expected] = 50
+    image[14:17, 6:18] = 90
+    image[50:53, 40:60] = 50  # far from any
+    image[22:25, 4:10] = 50  # shorter than the square
+    image[4:13, 18:20] = 50  # narrower than the strip
+    if turned:
+        image, expected = image.transpose(1, 0, 2).copy(), expected.T
+    assert (flat(image, np.ones((60, 60), bool), 7, 5) == expected).all()
 
 
 @pytest.mark.parametrize("share", [0.02, 0.4, 0.6, 0.98])
