@@ -94,7 +94,7 @@ class Recording:
         return replace(self, views=self.views[one], videos=self.videos[one], keypoint_folders=(None,))
 
     def background(self) -> Background | None:
-        """Return the empty scene from the clean plates, in the tone of the first frame, or None where there are none."""
+        """Return the empty scene from clean plates, in the tone of the first frame, or None where there are none."""
         return background(self.folder, self.views, self.frame(0))
 
     def static(self) -> Recording | None:
