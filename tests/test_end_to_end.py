@@ -260,7 +260,7 @@ def test_a_killed_run_goes_on_to_the_same_result(few, tmp_path, after):
 
 
 @long
-@pytest.mark.parametrize("pipeline", ["paper", "bare", "large_motion", "disturbed", "corrupted"])
+@pytest.mark.parametrize("pipeline", ["paper", "bare", "large_motion", "disturbed", "disturbed_added", "corrupted"])
 def test_the_other_pipelines_run(tmp_path, pipeline):
     said = call("run", PIPELINES / f"{pipeline}.yaml", "--frames", "0:2", "--out", "out", *NO_PICTURES, cwd=tmp_path)
     assert "track: 2 of 2 frames" in said
@@ -271,7 +271,7 @@ def test_every_pipeline_is_run_here_but_those_whose_recording_is_not_shipped(tmp
     files = {path.stem for path in PIPELINES.glob("*.yaml") if "\nfactors:" not in path.read_text()}
     elsewhere = {"demo", "large_motion", "skirt_xpbd"}  # the last needs an extra
     unshipped = {"balancing", "disturbed_balancing"}
-    assert files == {*CLIPS, "paper", "bare", "disturbed", "corrupted", *unshipped, *elsewhere}
+    assert files == {*CLIPS, "paper", "bare", "disturbed", "disturbed_added", "corrupted", *unshipped, *elsewhere}
     for pipeline in unshipped:
         assert "--recording" in call("plan", PIPELINES / f"{pipeline}.yaml", cwd=tmp_path, status=2)
 

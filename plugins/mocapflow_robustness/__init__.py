@@ -13,5 +13,6 @@ def mocapflow_stages() -> list[type[Stage]]:
     from mocapflow_robustness.check_views import CheckViews
     from mocapflow_robustness.corrupt import Corrupt
     from mocapflow_robustness.denoise import Denoise
+    from mocapflow_robustness.hysteresis import Hysteresis
 
-    return [Bilateral, CheckViews, Corrupt, Denoise]
+    return [Bilateral, CheckViews, Corrupt, Denoise, Hysteresis]

@@ -14,6 +14,7 @@ MASK = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)  # blind to p
 MAGNITUDE = np.sqrt(2 / np.pi)  # the mean of a normal variable's, in standard deviations
 FREE = 0.1  # share of the picture's noise below which a place has none
 SIDE = 7  # px, of such a place
+ENOUGH = 0.9  # share of a blur's window that has to show the scene: beside what hides it, noise is left
 
 
 class Bilateral(Restorer):
@@ -43,7 +44,8 @@ class Bilateral(Restorer):
             return image, np.zeros(rough.shape, bool)
         calm = (rough < FREE * noise).astype(np.uint8)
         hidden = np.asarray(cv2.dilate(calm, np.ones((SIDE, SIDE), np.uint8)), bool)
-        smooth, _ = mean_around(image, ~hidden, noise / (2 * np.sqrt(np.pi) * self.left))
+        smooth, share = mean_around(image, ~hidden, noise / (2 * np.sqrt(np.pi) * self.left))
+        hidden |= share < ENOUGH
         for _ in range(self.passes):
             smooth = np.asarray(cv2.bilateralFilter(smooth, -1, self.alike, self.space_px), np.float32)
         return unclipped(smooth, noise), hidden

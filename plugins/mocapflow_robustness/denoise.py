@@ -65,8 +65,11 @@ def flat(image: U8, kept: Bool, side_px: int, least_px: int) -> Bool:
     """Return the pixels (H, W) of an image (H, W, 3) in squares whose `kept` ones all have the very same colour.
 
     Squares have a side of `side_px`, at least `least_px`. Near one of these a strip as long as that will do, and as
-    large as the least square: strips are what is left of a rectangle by the next one.
+    large as the least square: strips are what is left of a rectangle by the next one. Of a picture of which too little
+    is kept for any square to tell, nothing is flat.
     """
+    if least_px > min(kept.shape):
+        return np.zeros(kept.shape, bool)
     sure = of_one_colour(image, kept, (max(side_px, least_px),) * 2)
     strip = (STRIP_PX, max(side_px, least_px**2 // STRIP_PX))
     strips = of_one_colour(image, kept, strip) | of_one_colour(image, kept, strip[::-1])

@@ -78,6 +78,7 @@ def test_flat_is_a_square_whose_kept_pixels_are_equal():
     assert (flat(image, whole, 7, 5) == expected).all()
     assert not flat(image, whole, 7, 9).any()  # chance would leave as much
     assert not flat(image, np.zeros((20, 20), bool), 7, 5).any()  # nor does a place of which nothing is left
+    assert not flat(image, ~whole, 7, least_side(1.0)).any()
 
 
 @pytest.mark.parametrize("turned", [False, True])
