@@ -33,22 +33,32 @@ def read_mesh(path: Path) -> tuple[F64, I32]:
     if not path.is_file():
         hint = "a person without a scan: `body: template` with the stage fit_subject"
         raise RecordingError("no such mesh", where=str(path), hint=hint)
-    points, triangles = _read_obj(path) if path.suffix.lower() == ".obj" else _read_by_open3d(path)
-    return _checked(points, triangles, path)
+    vertices, triangles = _read_obj(path) if path.suffix.lower() == ".obj" else _read_by_open3d(path)
+    return _checked(vertices, triangles, path)
 
 
-def _read_obj(path: Path) -> tuple[list[Sequence[str]], list[tuple[int, int, int]]]:
-    """Return vertices as written and triangles; larger polygons are cut into fans."""
-    points: list[Sequence[str]] = []
+def _read_obj(path: Path) -> tuple[F64, list[tuple[int, int, int]]]:
+    """Return vertices and triangles; larger polygons are cut into fans."""
+    points: list[tuple[float, ...]] = []
     triangles: list[tuple[int, int, int]] = []
     with path.open(encoding="utf-8", errors="replace") as lines:
         for number, line in enumerate(lines, 1):
             kind, *fields = line.split() or [""]
             if kind == "v":
-                points.append(fields[:3])
+                points.append(_point(fields, f"{path}:{number}"))
             elif kind == "f":
                 triangles += _fan(fields, len(points), f"{path}:{number}")
-    return points, triangles
+    return np.array(points, np.float64).reshape(-1, 3), triangles
+
+
+def _point(fields: Sequence[str], where: str) -> tuple[float, ...]:
+    """Return a vertex; colours may follow its three numbers."""
+    try:
+        x, y, z = map(float, fields[:3])
+    except ValueError:
+        hint = "was the file cut off? copy it again"
+        raise RecordingError(f"a vertex with '{' '.join(fields)}', not three numbers", where=where, hint=hint) from None
+    return x, y, z
 
 
 def _read_by_open3d(path: Path) -> tuple[F64, I32]:
@@ -66,15 +76,7 @@ def _fan(fields: Sequence[str], known: int, where: str) -> list[tuple[int, int, 
     return [(corners[0], corners[i], corners[i + 1]) for i in range(1, len(corners) - 1)]
 
 
-def _checked(
-    points: Sequence[Sequence[str]] | F64, triangles: Sequence[tuple[int, int, int]] | I32, path: Path
-) -> tuple[F64, I32]:
-    try:
-        vertices = np.array(points, np.float64)
-    except ValueError as error:
-        raise RecordingError(f"a vertex that is not three numbers: {error}", where=str(path)) from None
-    if len(vertices) and vertices.shape[1:] != (3,):
-        raise RecordingError(f"vertices of {vertices.shape[1]} numbers, not three", where=str(path))
+def _checked(vertices: F64, triangles: Sequence[tuple[int, int, int]] | I32, path: Path) -> tuple[F64, I32]:
     faces = np.array(triangles, np.int64).reshape(-1, 3)
     if not len(vertices) or not len(faces):
         raise RecordingError(f"{len(vertices)} vertices and {len(faces)} faces: no mesh", where=str(path))

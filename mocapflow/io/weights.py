@@ -42,6 +42,9 @@ def read_weights(path: Path, skeleton: Skeleton, vertices: F64) -> F64:
         if name not in skeleton.names:
             what = f"weights for '{name}', which is no joint of the skeleton"
             raise RecordingError(what, where=str(path), hint=alternatives(name, skeleton.names))
+    if missing := [name for name in skeleton.names if name not in names]:
+        hint = "add them to `names` and `weights`; a joint that moves no skin has a column of zeros"
+        raise RecordingError(f"no weights for {', '.join(missing)}", where=str(path), hint=hint)
     ordered = np.zeros((len(vertices), len(skeleton.names)))
     ordered[:, [skeleton.names.index(name) for name in names]] = weights
     _check_places(vertices, ordered, skeleton, path)

@@ -40,8 +40,11 @@ def test_seams_groups_polygons_and_unused_vertices(tmp_path):
     [
         ("v 0 0 0\n", r"a\.obj  1 vertices and 0 faces: no mesh"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", r"a\.obj  a face names a vertex that is not there; the file has 3"),
-        ("v 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", r"a\.obj  a vertex that is not three numbers"),
-        ("v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", r"a\.obj  vertices of 2 numbers, not three"),
+        ("v 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", r"a\.obj:1  a vertex with '0 0', not three numbers\n"),
+        (
+            "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 -",
+            r"a\.obj:4  a vertex with '1 -', not three numbers\n       was the file cut",
+        ),
         ("v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", r"a\.obj  a vertex is not a number"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 x\n", r"a\.obj:4  a face with '1 2 x', not vertex numbers"),
     ],

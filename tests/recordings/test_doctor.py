@@ -389,6 +389,8 @@ def test_weights_of_another_mesh(good):
     )
     np.savez(path, weights=weights, names=[*names[:-1], "tail"])
     assert errors(good) == ["weights for 'tail', which is no joint of the skeleton"]
+    np.savez(path, weights=weights[:, 2:], names=names[2:])
+    assert errors(good) == [f"no weights for {names[0]}, {names[1]}"]
     path.write_bytes(b"nothing")
     assert errors(good) == ["this is no .npz file of numbers and names"]
     np.savez(path, weights=weights)  # without names: in the order of the skeleton
