@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from figures import write
 from mocapflow_draping.fields import build_fields
-from mocapflow_draping.literal import settle_batch
+from mocapflow_draping.literal import settle_in_steps
 from mocapflow_draping.parts import posed_parts
 from mocapflow_report.portrait import portrait
 
@@ -50,7 +50,7 @@ def fallen(body: Body, sheet: GarmentMesh, steps: int) -> F64:
     grid = sheet.vertices[sheet.strands][None].copy()
     first, last = np.zeros(COUNT, np.int32), np.full(COUNT, COUNT - 1, np.int32)
     fixed, skin = np.zeros(grid.shape[:3], bool), np.array([SKIN])
-    settle_batch(grid, fixed, first, last, skin, np.radians(2), steps, True, True, 0.002, parts, fields.values)
+    settle_in_steps(grid, fixed, first, last, skin, np.radians(2), steps, True, True, 0.002, parts, fields.values)
     vertices: F64 = grid.reshape(-1, 3)
     return vertices
 

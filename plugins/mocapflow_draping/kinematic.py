@@ -150,21 +150,21 @@ class Kinematic(Draper):
         parts: F64,
     ) -> tuple[F64, I32]:
         """Return the particles (B, N, L, 3) m, and the rows (B, N) that the free ends of the strands hang from."""
-        from mocapflow_draping.literal import blow_batch, settle_batch
+        from mocapflow_draping.literal import blow_in_steps, settle_in_steps
 
         strands, values = fitting.strands, fitting.fields.values
         grid = standing(strands, chain, links)
         fixed = np.zeros(grid.shape[:3], bool)
         fixed[:, np.arange(len(strands.first)), strands.first] = True
         step, in_space = math.radians(self.step_deg), self.pivot == "space"
-        settle_batch(
+        settle_in_steps(
             grid, fixed, strands.first, strands.last, skin, step, self.iterations, self.limited, in_space,
             LOWER, parts, values,
         )  # fmt: skip
         grid, fixed = grid[source], fixed[source]
         force, amount = wind(garment, parameters, chain[source, strands.carrier[0], :3, :3])
         blown = strands.first, strands.last, skin[source], force, amount, parts[source], values
-        return grid, blow_batch(grid, fixed, *blown)
+        return grid, blow_in_steps(grid, fixed, *blown)
 
     def _close(
         self, fitting: Fitting, grid: F64, first: I32, links: F64, chain: F64, skin: F64, parts: F64,

@@ -18,7 +18,7 @@ HALVINGS = 8  # of a step that would touch, before the tail is left where it is
 
 
 @numba.njit(cache=True)
-def settle_batch(grid, fixed, first, last, skin, step, iterations, limited, in_space, lower, parts, values):  # type: ignore[no-untyped-def]
+def settle_in_steps(grid, fixed, first, last, skin, step, iterations, limited, in_space, lower, parts, values):  # type: ignore[no-untyped-def]
     """Lay B grids of particles on posed bodies, in place.
 
     What lies between two fixed particles of a strand is taut, and stays.
@@ -108,7 +108,7 @@ def _nearest(grid, fixed, p, first, last):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def blow_batch(grid, fixed, first, last, skin, force, amount, parts, values):  # type: ignore[no-untyped-def]
+def blow_in_steps(grid, fixed, first, last, skin, force, amount, parts, values):  # type: ignore[no-untyped-def]
     """Turn the free tails of B draped grids towards forces (B, 3) by `amount` (B,) rad, until they touch, in place.
 
     Returns:

@@ -21,7 +21,7 @@ from drape_bodies import (
 )
 from mocapflow_draping.distance import outwards
 from mocapflow_draping.kinematic import Kinematic
-from mocapflow_draping.literal import settle_batch
+from mocapflow_draping.literal import settle_in_steps
 from mocapflow_draping.strands import strands_of
 from mocapflow_draping.voxels import signed_distance
 from mocapflow_garments.shorts import Shorts
@@ -39,7 +39,7 @@ def literal(body, grid, fixed, step=2.0, iterations=50, limited=True, in_space=F
     values, parts = prepared(body)
     grid, fixed = grid[None].copy(), fixed[None].copy()
     first, last = np.zeros(grid.shape[1], np.int32), np.full(grid.shape[1], grid.shape[2] - 1, np.int32)
-    settle_batch(grid, fixed, first, last, np.array([SKIN]), np.radians(step), iterations, limited, in_space, 0.002,
+    settle_in_steps(grid, fixed, first, last, np.array([SKIN]), np.radians(step), iterations, limited, in_space, 0.002,
                  parts, values)  # fmt: skip
     return grid[0], fixed[0]
 

@@ -9,7 +9,7 @@ from drape_bodies import SKIN, box, check_whole_and_outside, distances, leg_pose
 from mocapflow_draping import kinematic
 from mocapflow_draping.forces import thickness, tilts
 from mocapflow_draping.frames import tilted
-from mocapflow_draping.literal import blow_batch
+from mocapflow_draping.literal import blow_in_steps
 
 from mocapflow.data import Past, PoseBatch
 from mocapflow.errors import PluginError
@@ -43,7 +43,7 @@ def blown(body, grid, force, degrees, fixed=(0,)):
     pinned[..., list(fixed)] = True
     out = grid[None].copy()
     rows = np.zeros(len(grid), np.int32), np.full(len(grid), grid.shape[1] - 1, np.int32)
-    blow_batch(out, pinned, *rows, np.array([SKIN]), np.array([force], float), np.radians([degrees]), parts, values)
+    blow_in_steps(out, pinned, *rows, np.array([SKIN]), np.array([force], float), np.radians([degrees]), parts, values)
     return out[0]
 
 
