@@ -71,9 +71,9 @@ def plate_files(folder: Path, views: Sequence[View]) -> list[tuple[Path, ...]]:
 def _one(files: Sequence[Path], view: View, first: Frame, camera: int) -> tuple[F32, F32]:
     pictures = np.stack([view.image(_read(path, view)) for path in files]).astype(np.float32)
     mean, off = pictures.mean(axis=0), np.full((1, 3), USUAL_SPREAD / NORMAL, np.float32)
-    if first.usable[camera]:
-        frame, hidden = first.images[camera].astype(np.float32), first.hidden_in(camera)
-        shown = np.ones(frame.shape[:2], bool) if hidden is None or hidden.all() else ~hidden
+    frame, hidden = first.images[camera].astype(np.float32), first.hidden_in(camera)
+    shown = np.full(frame.shape[:2], first.usable[camera]) if hidden is None else ~hidden & first.usable[camera]
+    if shown[::THIN, ::THIN].any():
         _check_colours(mean, frame, files[0])
         mean = toned(mean, frame, shown)
         off = np.abs(frame - mean)[shown]

@@ -73,11 +73,11 @@ def flat(image: U8, kept: Bool, side_px: int, least_px: int) -> Bool:
     sure = of_one_colour(image, kept, (max(side_px, least_px),) * 2)
     strip = (STRIP_PX, max(side_px, least_px**2 // STRIP_PX))
     strips = of_one_colour(image, kept, strip) | of_one_colour(image, kept, strip[::-1])
-    strips &= spread(sure, 2 * side_px)
-    return sure | (strips & spread(strips & kept, STRIP_PX))  # a strip ends beside the last pixel kept of it
+    strips &= around(sure, 2 * side_px)
+    return sure | (strips & around(strips & kept, STRIP_PX))  # a strip ends beside the last pixel kept of it
 
 
-def spread(chosen: Bool, size_px: int) -> Bool:
+def around(chosen: Bool, size_px: int) -> Bool:
     """Return the pixels (H, W) in squares of this size round the chosen ones (H, W)."""
     import cv2
 

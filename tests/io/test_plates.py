@@ -107,11 +107,13 @@ def test_what_hides_the_room_does_not_tell_its_tone():
 class Noisier:
     """Frames with noise, of which a band is hidden."""
 
+    rows: int = 30
+
     def frames(self, source, indices):
         for frame in replace(source, indices=indices).frames():
             noise = np.random.default_rng(0).normal(0, 10, frame.images[0].shape)
             hidden = np.zeros(frame.images[0].shape[:2], bool)
-            hidden[:30] = True
+            hidden[: self.rows] = True
             noisy = np.where(hidden[..., None], 255, np.clip(frame.images[0] + noise, 0, 255)).astype(np.uint8)
             yield replace(frame, images=(noisy,) * len(frame.images), hidden=(hidden,) * len(frame.images))
 
@@ -123,6 +125,9 @@ def test_plates_are_compared_with_the_frame_as_later_stages_see_it(tmp_path):
     scene = replace(open_recording(tmp_path), changes=(Noisier(),)).background()
     assert scene.spread[0][0, 0] == pytest.approx([10, 10, 10], rel=0.15)
     assert scene.mean[0].mean() == pytest.approx(27, abs=1)  # as the video is; the band would make it 170
+    blind = replace(open_recording(tmp_path), changes=(Noisier(rows=48),)).background()
+    assert (blind.mean[0] == 30).all()  # as the plate is
+    assert blind.spread[0][0, 0] == pytest.approx([4, 4, 4])
 
 
 def test_plates_are_scaled_with_the_frames(tmp_path):
