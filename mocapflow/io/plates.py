@@ -23,7 +23,8 @@ FITS = 8  # of a line to the pixels that agree with the last one
 FARTHEST = 2.5  # standard deviations within which a pixel agrees
 MOST_GAIN = 1.5  # between a plate and a frame of one recording
 BLOCK = 8  # px, a side of the squares whose mean colours are looked at: noise has colours too
-GREY, COLOURED = 6.0, 20.0  # grey levels between the channels of a block, exceeded by one in a hundred; codecs make 3
+GREY, COLOURED = 6.0, 20.0  # grey levels between the channels of a block, exceeded by one in a hundred, or between
+# blocks: up to which there is no colour or contrast, codecs make 3; and from which on there surely is
 SAME_ROOM = 10.0  # grey levels, median difference of a frame and its toned plate: above, it shows something else
 
 
@@ -70,19 +71,27 @@ def plate_files(folder: Path, views: Sequence[View]) -> list[tuple[Path, ...]]:
 
 def _one(files: Sequence[Path], view: View, first: Frame, camera: int) -> tuple[F32, F32]:
     pictures = np.stack([view.image(_read(path, view)) for path in files]).astype(np.float32)
-    mean, off = pictures.mean(axis=0), np.full((1, 3), USUAL_SPREAD / NORMAL, np.float32)
-    frame, hidden = first.images[camera].astype(np.float32), first.hidden_in(camera)
-    shown = np.full(frame.shape[:2], first.usable[camera]) if hidden is None else ~hidden & first.usable[camera]
-    if shown[::THIN, ::THIN].any():
-        _check_colours(mean, frame, files[0])
-        mean = toned(mean, frame, shown)
-        off = np.abs(frame - mean)[shown]
+    mean, off = _compared(pictures.mean(axis=0), first, camera, files[0])
     if len(files) > 1:
         each = pictures.std(axis=0, ddof=1)
         spread = np.maximum(each, np.median(each, axis=(0, 1)))
     else:
         spread = np.broadcast_to(NORMAL * np.median(off, axis=0), mean.shape)
     return mean, np.maximum(spread, LEAST_SPREAD).astype(np.float32)
+
+
+def _compared(plate: F32, first: Frame, camera: int, path: Path) -> tuple[F32, F32]:
+    """Return a plate (H, W, 3) in the tone of the first frame, and how far pixels of that (N, 3) are off it."""
+    frame, hidden = first.images[camera].astype(np.float32), first.hidden_in(camera)
+    shown = np.full(frame.shape[:2], first.usable[camera]) if hidden is None else ~hidden & first.usable[camera]
+    usual = np.full((1, 3), USUAL_SPREAD / NORMAL, np.float32)
+    if not shown[::THIN, ::THIN].any():
+        return plate, usual
+    if _blank(plate, frame):
+        return toned(plate, frame, shown), usual
+    _check_colours(plate, frame, path)
+    matched = toned(plate, frame, shown)
+    return matched, np.abs(frame - matched)[shown]
 
 
 def toned(plate: F32, frame: F32, shown: Bool) -> F32:
@@ -116,16 +125,26 @@ def _line(here: F32, there: F32) -> tuple[float, float] | None:
     return (gain, offset) if 1 / MOST_GAIN < gain < MOST_GAIN and np.median(off) < SAME_ROOM else None
 
 
+def _blank(plate: F32, frame: F32) -> bool:
+    """Return whether a frame (H, W, 3) is of one grey though the room (H, W, 3) is not: many a camera begins so."""
+    room, seen = (float(np.ptp(_blocks(picture).mean(axis=2))) for picture in (plate, frame))
+    return seen < GREY and room > COLOURED
+
+
 def _check_colours(plate: F32, frame: F32, path: Path) -> None:
     """Refuse a plate in colour beside a grey video: nothing in it would look like the room."""
-    import cv2
-
-    size = (max(plate.shape[1] // BLOCK, 1), max(plate.shape[0] // BLOCK, 1))
-    blocks = (cv2.resize(picture, size, interpolation=cv2.INTER_AREA) for picture in (plate, frame))
-    room, seen = (float(np.percentile(np.ptp(block, axis=2), 99)) for block in blocks)
+    room, seen = (float(np.percentile(np.ptp(_blocks(picture), axis=2), 99)) for picture in (plate, frame))
     if seen < GREY and room > COLOURED:
         hint = "film with the camera that took the plate, in colour; or give it a grey plate"
         raise RecordingError("this clean plate is in colour, the video is grey", where=str(path), hint=hint)
+
+
+def _blocks(picture: F32) -> F32:
+    """Return the mean colours (h, w, 3) of the blocks of a picture (H, W, 3)."""
+    import cv2
+
+    size = (max(picture.shape[1] // BLOCK, 1), max(picture.shape[0] // BLOCK, 1))
+    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA))
 
 
 def _read(path: Path, view: View) -> U8:

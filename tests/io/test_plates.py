@@ -130,6 +130,30 @@ def test_plates_are_compared_with_the_frame_as_later_stages_see_it(tmp_path):
     assert blind.spread[0][0, 0] == pytest.approx([4, 4, 4])
 
 
+@record
+class BlankAtFirst:
+    """A first frame of one grey, as many a camera begins."""
+
+    level: int = 0
+
+    def frames(self, source, indices):
+        for frame in replace(source, indices=indices).frames():
+            yield replace(frame, images=tuple(np.full_like(image, self.level) for image in frame.images))
+
+
+@pytest.mark.parametrize("level", [0, 128])
+def test_a_blank_first_frame_tells_nothing(tmp_path, level):
+    write_recording(tmp_path, frames=2)
+    colours = np.full((48, 64, 3), (30, 60, 90), np.uint8)
+    colours[:, 32:] = 200
+    (tmp_path / "background").mkdir()
+    for name in NAMES:
+        cv2.imwrite(str(tmp_path / "background" / f"{name}.png"), colours)
+    scene = replace(open_recording(tmp_path), changes=(BlankAtFirst(level=level),)).background()
+    assert (scene.mean[0] == colours).all()
+    assert scene.spread[0][0, 0] == pytest.approx([4, 4, 4])
+
+
 def test_plates_are_scaled_with_the_frames(tmp_path):
     write_recording(tmp_path, frames=2)
     for name in NAMES:
