@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -23,12 +23,11 @@ FITS = 8  # of a line to the pixels that agree with the last one
 FARTHEST = 2.5  # standard deviations within which a pixel agrees
 MOST_GAIN = 1.5  # between a plate and a frame of one recording
 BLOCK = 8  # px, a side of the squares whose mean colours are looked at: noise has colours too
-GREY, COLOURED = 6.0, 20.0  # grey levels between the channels of a block, exceeded by one in a hundred, or between
-# blocks: up to which there is no colour or contrast, codecs make 3; and from which on there surely is
+GREY, COLOURED = 6.0, 20.0  # grey levels between channels or blocks: no colour or contrast, codecs make 3; surely some
 SAME_ROOM = 10.0  # grey levels, median difference of a frame and its toned plate: above, it shows something else
 
 
-def background(folder: Path, views: Sequence[View], first: Frame) -> Background | None:
+def background(folder: Path, views: Sequence[View], first: Callable[[], Frame]) -> Background | None:
     """Return the empty scene from background/<camera>.png or background/<camera>/*.png, None without plates.
 
     Plates take the brightness and contrast of the first frame: cameras drift, and a person dims a room. With one plate
@@ -39,7 +38,7 @@ def background(folder: Path, views: Sequence[View], first: Frame) -> Background 
     Args:
         folder: the recording.
         views: its cameras.
-        first: what they show in the first frame; what is hidden in it does not tell.
+        first: reads the first frame, where there are plates; what is hidden in it does not tell.
 
     Raises:
         RecordingError: a camera has no plate though others do, or a plate has another size than the video,
@@ -48,7 +47,8 @@ def background(folder: Path, views: Sequence[View], first: Frame) -> Background 
     found = plate_files(folder, views)
     if not found:
         return None
-    rows = [_one(files, view, first, camera) for camera, (files, view) in enumerate(zip(found, views, strict=True))]
+    frame = first()
+    rows = [_one(files, view, frame, camera) for camera, (files, view) in enumerate(zip(found, views, strict=True))]
     return Background(mean=tuple(mean for mean, _ in rows), spread=tuple(spread for _, spread in rows))
 
 
@@ -87,10 +87,10 @@ def _compared(plate: F32, first: Frame, camera: int, path: Path) -> tuple[F32, F
     usual = np.full((1, 3), USUAL_SPREAD / NORMAL, np.float32)
     if not shown[::THIN, ::THIN].any():
         return plate, usual
-    if _blank(plate, frame):
-        return toned(plate, frame, shown), usual
-    _check_colours(plate, frame, path)
-    matched = toned(plate, frame, shown)
+    matched, room, seen = toned(plate, frame, shown), _blocks(plate), _blocks(frame)
+    if _blank(room, seen):
+        return matched, usual
+    _check_colours(room, seen, path)
     return matched, np.abs(frame - matched)[shown]
 
 
@@ -99,9 +99,9 @@ def toned(plate: F32, frame: F32, shown: Bool) -> F32:
 
     It goes by the pixels shown (H, W). A frame that is another picture altogether leaves the plate as it is.
     """
-    thin = np.zeros_like(shown)
-    thin[::THIN, ::THIN] = shown[::THIN, ::THIN]
-    lines = [_line(here, there) for here, there in zip(plate[thin].T, frame[thin].T, strict=True)]
+    thin = shown[::THIN, ::THIN]
+    colours = (picture[::THIN, ::THIN][thin].T for picture in (plate, frame))
+    lines = [_line(here, there) for here, there in zip(*colours, strict=True)]
     if any(line is None for line in lines):
         return plate
     gain, offset = np.array(lines, np.float32).T
@@ -125,16 +125,15 @@ def _line(here: F32, there: F32) -> tuple[float, float] | None:
     return (gain, offset) if 1 / MOST_GAIN < gain < MOST_GAIN and np.median(off) < SAME_ROOM else None
 
 
-def _blank(plate: F32, frame: F32) -> bool:
-    """Return whether a frame (H, W, 3) is of one grey though the room (H, W, 3) is not: many a camera begins so."""
-    room, seen = (float(np.ptp(_blocks(picture).mean(axis=2))) for picture in (plate, frame))
-    return seen < GREY and room > COLOURED
+def _blank(room: F32, seen: F32) -> bool:
+    """Return whether a frame is of one grey though the room, both in blocks, is not: many a camera begins so."""
+    return bool(np.ptp(seen.mean(axis=2)) < GREY and np.ptp(room.mean(axis=2)) > COLOURED)
 
 
-def _check_colours(plate: F32, frame: F32, path: Path) -> None:
-    """Refuse a plate in colour beside a grey video: nothing in it would look like the room."""
-    room, seen = (float(np.percentile(np.ptp(_blocks(picture), axis=2), 99)) for picture in (plate, frame))
-    if seen < GREY and room > COLOURED:
+def _check_colours(room: F32, seen: F32, path: Path) -> None:
+    """Refuse a plate in colour beside a grey video, both in blocks: nothing in it would look like the room."""
+    coloured, grey = (float(np.percentile(np.ptp(blocks, axis=2), 99)) for blocks in (room, seen))
+    if grey < GREY and coloured > COLOURED:
         hint = "film with the camera that took the plate, in colour; or give it a grey plate"
         raise RecordingError("this clean plate is in colour, the video is grey", where=str(path), hint=hint)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -95,7 +95,7 @@ class Recording:
 
     def background(self) -> Background | None:
         """Return the empty scene from clean plates, in the tone of the first frame, or None where there are none."""
-        return background(self.folder, self.views, self.frame(0))
+        return background(self.folder, self.views, lambda: self.frame(0))
 
     def static(self) -> Recording | None:
         """Return the standing trial, seen by the same cameras, or None where there is none."""
@@ -135,17 +135,22 @@ class Recording:
             self.watch(done, len(indices))
 
     def _decode(self, indices: range) -> Iterator[Frame]:
-        pictures = zip(*(read_frames(video, indices) for video in self.videos), strict=True)
-        for index, row in zip(indices, pictures, strict=True):
-            usable = np.array([image is not None for image, _ in row])
-            yield Frame(
-                index=index,
-                time=index / self.frame_rate,
-                images=tuple(view.image(image) for view, (image, _) in zip(self.views, row, strict=True)),
-                usable=usable,
-                reasons=() if usable.all() else tuple(reason for _, reason in row),
-                keypoints=self.people(index) if any(self.keypoint_folders) else None,
-            )
+        for frame in decoded(self.views, self.videos, indices, self.frame_rate):
+            yield replace(frame, keypoints=self.people(frame.index)) if any(self.keypoint_folders) else frame
+
+
+def decoded(views: Sequence[View], videos: Sequence[Video], indices: range, frame_rate: float) -> Iterator[Frame]:
+    """Yield what videos show in frames of these numbers, as their cameras' views have it."""
+    pictures = zip(*(read_frames(video, indices) for video in videos), strict=True)
+    for index, row in zip(indices, pictures, strict=True):
+        usable = np.array([image is not None for image, _ in row])
+        yield Frame(
+            index=index,
+            time=index / frame_rate,
+            images=tuple(view.image(image) for view, (image, _) in zip(views, row, strict=True)),
+            usable=usable,
+            reasons=() if usable.all() else tuple(reason for _, reason in row),
+        )
 
 
 def open_recording(

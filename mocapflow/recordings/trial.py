@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 
 from mocapflow.assets import Camera
-from mocapflow.data import Frame
 from mocapflow.io import agreement, folders
 from mocapflow.io.cameras import read_cameras
 from mocapflow.io.findings import Finding, attempt, note, warning
@@ -23,6 +22,7 @@ from mocapflow.io.plates import background
 from mocapflow.io.rigs import examine_rig
 from mocapflow.io.video import Video, count_from_first, open_video, read_frames
 from mocapflow.recordings.freezing import difference, frozen_from
+from mocapflow.recordings.recording import decoded
 from mocapflow.records import F64
 
 
@@ -61,7 +61,7 @@ def examine_trial(folder: Path, calibration: Path, rig: bool = True) -> list[Fin
     findings += [warning(text, where=folder) for text in (*(odd or ()), *(unused or ()))]
     if fitted is not None and unused is not None:
         views = [View(lens=lens) for lens in lenses]
-        attempt(lambda: background(folder, views, _first_frame(views, whole)), findings)
+        attempt(lambda: background(folder, views, lambda: next(decoded(views, whole, range(1), 1.0))), findings)
     return findings
 
 
@@ -71,12 +71,6 @@ def copies(cameras: Sequence[Camera], videos: Sequence[Video]) -> Iterator[Findi
         if one.path.is_file() and other.path.is_file() and cmp(one.path, other.path, shallow=False):
             hint = "one of them is a copy by mistake: copy it again from its own camera"
             yield warning(f"{a} and {b} have the same video", hint, other.path)
-
-
-def _first_frame(views: Sequence[View], videos: Sequence[Video]) -> Frame:
-    pictures = [next(read_frames(video, range(1)))[0] for video in videos]
-    images = tuple(view.image(picture) for view, picture in zip(views, pictures, strict=True))
-    return Frame(index=0, time=0.0, images=images, usable=np.array([picture is not None for picture in pictures]))
 
 
 def _looked_through(cameras: Sequence[Camera], videos: Sequence[Video], length: int) -> Iterator[Finding]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 import numba
@@ -70,10 +71,9 @@ def flat(image: U8, kept: Bool, side_px: int, least_px: int) -> Bool:
     """
     if least_px > min(kept.shape):
         return np.zeros(kept.shape, bool)
-    sure = of_one_colour(image, kept, (max(side_px, least_px),) * 2)
     strip = (STRIP_PX, max(side_px, least_px**2 // STRIP_PX))
-    strips = of_one_colour(image, kept, strip) | of_one_colour(image, kept, strip[::-1])
-    strips &= around(sure, 2 * side_px)
+    sure, upright, level = of_one_colour(image, kept, [(max(side_px, least_px),) * 2, strip[::-1], strip])
+    strips = (upright | level) & around(sure, 2 * side_px)
     return sure | (strips & around(strips & kept, STRIP_PX))  # a strip ends beside the last pixel kept of it
 
 
@@ -84,14 +84,14 @@ def around(chosen: Bool, size_px: int) -> Bool:
     return np.asarray(cv2.dilate(chosen.astype(np.uint8), ones((size_px,) * 2)), bool)
 
 
-def of_one_colour(image: U8, kept: Bool, size_px: tuple[int, int]) -> Bool:
-    """Return the pixels (H, W) of an image (H, W, 3) in boxes of this size, all whose `kept` ones have one colour."""
+def of_one_colour(image: U8, kept: Bool, sizes_px: Sequence[tuple[int, int]]) -> list[Bool]:
+    """Return the pixels (H, W) of an image (H, W, 3) in boxes whose `kept` ones have one colour, for each box size."""
     import cv2
 
-    box = ones(size_px)
-    most = cv2.dilate(np.where(kept[..., None], image, 0).astype(np.uint8), box)
-    least = cv2.erode(np.where(kept[..., None], image, 255).astype(np.uint8), box)
-    return np.asarray(cv2.dilate(np.all(most == least, axis=2).astype(np.uint8), box), bool)
+    light, dark = (np.where(kept[..., None], image, lost).astype(np.uint8) for lost in (0, 255))
+    boxes = [ones(size) for size in sizes_px]
+    same = [np.all(cv2.dilate(light, box) == cv2.erode(dark, box), axis=2).astype(np.uint8) for box in boxes]
+    return [np.asarray(cv2.dilate(middles, box), bool) for middles, box in zip(same, boxes, strict=True)]
 
 
 def ones(size_px: tuple[int, int]) -> U8:

@@ -382,13 +382,15 @@ def test_arrays_count_by_dtype_shape_and_content():
     assert len({digests.digest_array(v) for v in (values, values.reshape(2, 3), values.astype("f4"), values + 1)}) == 4
 
 
-def test_code_that_has_not_changed_is_parsed_once(tmp_path, monkeypatch):
-    """A plan must not wait for it."""
+def test_code_that_has_not_changed_is_read_once(tmp_path, monkeypatch):
+    """A plan must not wait for it. The code is new here: that of mocapflow is known to all tests that remember."""
+    (tmp_path / "mocapflow_upper.py").write_text("import numpy")
+    monkeypatch.syspath_prepend(tmp_path)
     first = Digests(tmp_path / "memory.json")
-    core = first.core()
+    code = first.package("mocapflow_upper")
     first.save()
-    monkeypatch.setattr(ast, "parse", lambda source: pytest.fail("parsed again"))
-    assert Digests(tmp_path / "memory.json").core() == core
+    monkeypatch.setattr(digests.sources, "meaning", lambda tree: pytest.fail("read again"))
+    assert Digests(tmp_path / "memory.json").package("mocapflow_upper") == code
 
 
 def test_a_causal_input_of_a_track_need_not_read_the_recording():
