@@ -14,6 +14,7 @@ MINI = {"length": 0.42, "hem_circumference": 1.25}
 WIDE = {"length": 0.60, "hem_circumference": 2.4}
 CULOTTES = {"length": 0.68, "inseam": 0.44, "leg_opening_circumference": 0.66}
 TROUSERS = {"length": 0.90, "inseam": 0.66, "leg_opening_circumference": 0.48}
+SLACKS = {**TROUSERS, "length": 0.84, "inseam": 0.60}  # above a shorter wearer's ankles
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ TAKES = {
     "walk_A_culottes": Take("A", "shorts", "walk_A", 65, GREEN, start=120, cut=CULOTTES),
     "kneeup_B_culottes": Take("B", "shorts", "kneeup_B", 66, GREY, start=60, cut=CULOTTES),
     "walk_B_trousers": Take("B", "shorts", "walk_B", 67, PURPLE, start=60, cut=TROUSERS),
-    "squat_A_trousers": Take("A", "shorts", "kneebend_A", 68, DARK, start=60, cut=TROUSERS),
+    "squat_A_trousers": Take("A", "shorts", "kneebend_A", 68, DARK, start=60, cut=SLACKS),
     # made when all had been chosen; the kick has had a say since
     "swing_A_skirt": Take("A", "skirt", "swing", 71, GREY, frames=60),
     "swing_B_shorts": Take("B", "shorts", "swing", 72, PURPLE, frames=60),
