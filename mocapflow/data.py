@@ -156,7 +156,7 @@ class Segmentation:
 
     silhouettes: tuple[Silhouette, ...]
     inner: Matches | None = None  # contours of parts before others, with the vertices whose edges they are
-    energies: Mapping[str, float] = field(default_factory=dict)
+    energies: Mapping[str, float] = field(default_factory=dict)  # "cam01.data": by view and term of `functional`
     appearance: Mapping[str, F64] = field(default_factory=dict)  # region statistics for the next frame
 
     def of(self, layer: str) -> list[Silhouette]:
@@ -181,7 +181,6 @@ class Estimate:
     parameters: F64 = array("Q", unit="by name")
     covariance: F64 = array("S", "S", unit="of (omega, v, angles, parameters)")
     observed: F64 = array("D", unit="1, share of the priors' variance of each angle that the images took away")
-    energies: Mapping[str, float] = field(default_factory=dict)
     matches: Matches | None = None  # what its last step explains; None: the solver does not say
 
 

@@ -31,6 +31,7 @@ SHAPE_WEIGHT = 0.05  # lambda, px^-2; a segmenter may descend with another one
 BAND_PX = 12.0  # around both contours, at most; beyond, the area term does not grow
 SLACK = 0.01  # share that area and priors may rise by in a step: what a step lowers is the error of contours
 IN_VIEW = ("data", "length", "shape", "contour")  # contour: what the pose solver lowers; not part of the sum
+SHAPE, CONTOUR = IN_VIEW.index("shape"), IN_VIEW.index("contour")  # the columns that hold for any segmenter
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ class Functional:
         matched = contours(surface, state.matches, cameras)
         for silhouette in state.segmentation.of("person"):
             c = silhouette.camera
-            views[c, 2], views[c, 3] = area(surface, silhouette, cameras[c]), matched[c]
+            views[c, SHAPE], views[c, CONTOUR] = area(surface, silhouette, cameras[c]), matched[c]
         return np.concatenate([views.ravel(), self._priors(state.estimate.pose)])
 
     def total(self, values: F64) -> float:

@@ -145,7 +145,6 @@ class TwistGaussNewton(PoseSolver):
             parameters=np.array(guess.cloth.parameters),
             covariance=to_origin @ about_root @ to_origin.T,
             observed=observed(about_root, prior.hessian)[6 : 6 + len(guess.pose.angles)],
-            energies=problem.energies(guess),
             matches=matches,
         )
 
