@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import errno
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -88,6 +89,25 @@ class ComponentFailed(MocapflowError):
     """A component raised while a run was going on."""
 
     exit_status = 1
+
+
+class Noted(str):
+    """A note on an error: when in a run it was raised."""
+
+
+@contextmanager
+def noting(moment: str) -> Iterator[None]:
+    """Note on whatever is raised in here when it was; of several notes the first is the nearest."""
+    try:
+        yield
+    except BaseException as error:
+        error.add_note(Noted(moment))
+        raise
+
+
+def moment_of(error: BaseException) -> str:
+    """Return when in a run an error was raised, "" where nobody has noted it."""
+    return next((note for note in getattr(error, "__notes__", ()) if isinstance(note, Noted)), "")
 
 
 def alternatives(wanted: str, available: Iterable[str]) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 
 from mocapflow.components import ClothFitter, Matcher, Observe, PoseSolver, Prior, Segmenter
 from mocapflow.data import NO_CLOTH, Frame, FrameResult, FrameState, Past, Turn
+from mocapflow.errors import noting
 from mocapflow.functional import Functional, overlaps
 from mocapflow.guards.answers import estimate_of, segmentation_of
 from mocapflow.guards.cloth_answers import cloth_of
@@ -48,9 +49,10 @@ def settle(
     energy, cost = np.full((steady.cap, len(functional.terms)), np.nan), np.nan
     for index in range(steady.cap):
         turn = Turn(index=index, change=change, far=far)
-        state = take_turn(frame, state, past, steps, functional, turn, watch)
-        now = Shown(state.estimate.pose, model.surface(state.estimate.pose, state.cloth))
-        energy[index] = functional.values(state, now.surface)
+        with noting(f"frame {frame.index}, iteration {index + 1}"):
+            state = take_turn(frame, state, past, steps, functional, turn, watch)
+            now = Shown(state.estimate.pose, model.surface(state.estimate.pose, state.cloth))
+            energy[index] = functional.values(state, now.surface)
         last_cost, cost = cost, functional.total(energy[index])
         change, swing = (measure_change(old, now, state.estimate.covariance) for old in (last, before_last))
         before_last, last = last, now

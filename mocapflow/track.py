@@ -26,7 +26,7 @@ from mocapflow.components import (
     Stage,
 )
 from mocapflow.data import Frame, FrameResult, FrameState, Past, Pose, Start, Turn
-from mocapflow.errors import ComponentFailed, PipelineError
+from mocapflow.errors import ComponentFailed, PipelineError, noting
 from mocapflow.functional import image_cost
 from mocapflow.guards.answers import pose_of, result_of
 from mocapflow.guards.idle import idle_matchers
@@ -105,12 +105,12 @@ class CoupledLoop(Stage):
             self._refuse(rest for rest in checkpoint.rests() if rest[0] in recording.indices)
         past, watch = checkpoint.past(), Stopwatch(TIMED)
         for raw in recording.frames(since=checkpoint.next_index):
-            # `frame` is what failures are told of: here it would still be the one before
-            picture = prepared(raw, checks, flow)
-            watch.lap("decode")
-            result = able.fit(picture, past, start, model, checkpoint.observe, watch)
-            past = checkpoint.commit(picture, past, result)
-            self.complain(picture, result)
+            with noting(f"frame {raw.index}"):
+                frame = prepared(raw, checks, flow)
+                watch.lap("decode")
+                result = able.fit(frame, past, start, model, checkpoint.observe, watch)
+            past = checkpoint.commit(frame, past, result)
+            self.complain(frame, result)
             watch = Stopwatch(TIMED)
         return checkpoint.track()
 
@@ -211,8 +211,9 @@ class CoupledLoop(Stage):
 
     def settled(self, frame: Frame, past: Past, model: ClothedModel, pose: Pose, parameters: F64) -> FrameResult:
         """Return the result of the loop from a pose and cloth parameters; nobody looks on."""
-        begun = believed(pose, parameters, model.drape(pose, parameters, past))
-        return settle(frame, begun, past, self.steps, model, unobserved)
+        with noting(f"frame {frame.index}"):
+            begun = believed(pose, parameters, model.drape(pose, parameters, past))
+            return settle(frame, begun, past, self.steps, model, unobserved)
 
     def complain(self, frame: Frame, result: FrameResult) -> None:
         """Stop at a frame that did not settle, if that is wanted."""

@@ -8,12 +8,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType, TracebackType
-from typing import Any
 
 from pydantic import ValidationError
 
 from mocapflow.components import Component
-from mocapflow.data import Frame, Turn
 from mocapflow.errors import (
     FULL,
     ComponentFailed,
@@ -21,6 +19,7 @@ from mocapflow.errors import (
     PluginError,
     ShapeError,
     StoreError,
+    moment_of,
     unwritable,
 )
 from mocapflow.guards.answers import WrongAnswer
@@ -60,7 +59,8 @@ def _failure(error: BaseException, stage: Component, registry: Registry, saved: 
     """Return the error for people: the innermost frame of the traceback in a plugin names the culprit."""
     calls = list(_calls(error.__traceback__))
     component = error.component if isinstance(error, WrongAnswer) else _culprit(calls, registry) or stage
-    message = f"{_named(component)} ({registry.origin(type(component))}) failed{_moment(calls)}: {_said(error)}"
+    moment = f" at {when}" if (when := moment_of(error)) else ""
+    message = f"{_named(component)} ({registry.origin(type(component))}) failed{moment}: {_said(error)}"
     hints = [saved, _keep(error, log)]
     return ComponentFailed(message, hint="\n".join(filter(None, hints)))
 
@@ -94,19 +94,6 @@ def _is_known(call: FrameType, registry: Registry) -> bool:
     except KeyError:
         return False
     return True
-
-
-def _moment(calls: list[FrameType]) -> str:
-    """Return at which frame and iteration it happened, as the loop's own variables say."""
-    found: dict[str, Any] = {}
-    for call in calls:
-        if call.f_globals.get("__name__") in {"mocapflow.loop", "mocapflow.track"}:
-            found |= call.f_locals
-    frame, turn = found.get("frame"), found.get("turn")
-    if not isinstance(frame, Frame):
-        return ""
-    iteration = f", iteration {turn.index + 1}" if isinstance(turn, Turn) else ""
-    return f" at frame {frame.index}{iteration}"
 
 
 def _said(error: BaseException) -> str:

@@ -166,6 +166,17 @@ class Leaves(Prior):
         raise SystemExit(0)
 
 
+class Explains(Prior):
+    \"\"\"Says more than what is wrong.\"\"\"
+
+    name = "explains"
+
+    def residual(self, pose, past, scene):
+        error = ValueError("torn")
+        error.add_note("mend it")
+        raise error
+
+
 class Interrupted(Prior):
     \"\"\"Ctrl-C arrives in compiled code.\"\"\"
 
@@ -198,7 +209,7 @@ class Asks(Prior):
 
 @hookimpl
 def mocapflow_priors():
-    return [Nan, Leaves, Interrupted, Keeps, Asks]
+    return [Nan, Leaves, Explains, Interrupted, Keeps, Asks]
 """
 
 
@@ -207,6 +218,7 @@ def mocapflow_priors():
     [
         ("nan", r"prior 'nan' \(.*\) failed at frame 0, iteration 1: it returned an error or a jacobian"),
         ("leaves", r"prior 'leaves' \(.*\) failed at frame 0, iteration 1: SystemExit: 0"),
+        ("explains", r"prior 'explains' \(.*\) failed at frame 0, iteration 1: ValueError: torn\n"),
         ("keeps", r"prior 'keeps' \(.*\) failed .*: it sets 'last', but a component .* keeps nothing between calls"),
         ("asks", r"^prior 'asks'  the body has no joint 'left_hip'\n +available: root, top"),
     ],
