@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from mocapflow.assets import Body, GarmentMesh
 from mocapflow.components import Component, Garment
@@ -44,6 +44,15 @@ def find_hit(step: Step, store: Store) -> Artifact | None:
     return found if found is not None and is_hit(step, found) else None
 
 
+class Made(NamedTuple):
+    """What a stage has made, and what that took."""
+
+    value: Any
+    warnings: Sequence[str]
+    cpu_s: float
+    wall_s: float
+
+
 class Execution:
     """Finishes the stages of a pipeline, each at most once."""
 
@@ -63,7 +72,7 @@ class Execution:
             return
         found = self._find(step)
         if found and not step.named.stage.looks_back:
-            self._entered(step, found)
+            self._enter_found(step, found)
         else:
             self._result(step.label)
 
@@ -86,14 +95,14 @@ class Execution:
 
     def _read(self, step: Step, found: Artifact) -> Any:
         result = self._store.load(found, step.frames if step.chain else None)
-        self._entered(step, found)
+        self._enter_found(step, found)
         if step.named.stage.looks_back:
             step.named.stage.look_back(result)
         return result
 
     def _made(self, step: Step) -> Any:
         if not step.stored:
-            return self._run(step)
+            return self._enter_made(step, self._run(step))
         with self._store.writer(step.key, f"{step.label}-{step.key[:6]}", self._report) as lock:
             started = self._started(step)
             if started is not None and is_hit(step, started):  # another run has made it while this one waited
@@ -101,7 +110,7 @@ class Execution:
                     return self._read(step, started)
                 except Corrupted as error:
                     started = self._mended(step, started, error)
-            return self._chain(step, started, lock) if step.chain else self._whole(step)
+            return self._enter_made(step, self._chain(step, started, lock) if step.chain else self._whole(step))
 
     def _started(self, step: Step) -> Artifact | None:
         for damaged in self._store.damaged(step.key):
@@ -121,14 +130,14 @@ class Execution:
         kept = {name: value for name, value in made.attributes.items() if name != "sealed"}
         return Artifact(made.path, {**kept, "complete": False})
 
-    def _whole(self, step: Step) -> Any:
-        value = self._run(step)
+    def _whole(self, step: Step) -> Made:
+        made = self._run(step)
         begun = self._store.begin(step.label, step.key, step.recipe)
         with self._blaming(step.named.stage):
-            self._store.save(begun, value, warnings=self.entries[step.label]["warnings"])
-        return value
+            self._store.save(begun, made.value, warnings=made.warnings)
+        return made
 
-    def _chain(self, step: Step, started: Artifact | None, lock: Lock) -> Any:
+    def _chain(self, step: Step, started: Artifact | None, lock: Lock) -> Made:
         if started is None or not started.frames:
             return self._run(step, self._checkpoint(step, self._store.begin(step.label, step.key, step.recipe), lock))
         self._report(f"{step.label}: going on after {started.frames} frames")
@@ -155,7 +164,7 @@ class Execution:
             iteration_done=observers.iteration_done, frame_done=frame_done,
         )  # fmt: skip
 
-    def _run(self, step: Step, checkpoint: Checkpoint | None = None, mixed: Sequence[str] = ()) -> Any:
+    def _run(self, step: Step, checkpoint: Checkpoint | None = None, mixed: Sequence[str] = ()) -> Made:
         inputs = {name: self._input(step, source, checkpoint) for name, source in step.sources.items()}
         self._report(f"{step.label}: running {step.named.stage.name}")
         check()
@@ -166,27 +175,28 @@ class Execution:
             value = of_kind(stage, stage.run(**inputs), made_by(step.named))
             self._store.digests.check_inputs()
         told = said if checkpoint is None else checkpoint.warnings
-        self._entered(step, None, time.process_time() - cpu, time.perf_counter() - wall, [*told, *mixed])
-        return value
+        return Made(value, [*told, *mixed], time.process_time() - cpu, time.perf_counter() - wall)
 
     def _input(self, step: Step, source: Source, checkpoint: Checkpoint | None) -> Any:
-        if isinstance(source, tuple):
-            return tuple(self._result(label) for label in source)
-        if isinstance(source, Itself):
-            return self._steps[source].named.stage
         silent = checkpoint is not None or step.passes_frames
         watch = unwatched if silent else Progress(step.label, self._report, brief=True).tell
-        supplied: dict[str | None, Callable[[], Any]] = {
-            None: lambda: None,
-            "scene": lambda: self._scene(step),
-            "recording": lambda: replace(step.recording, watch=watch),
-            "checkpoint": lambda: checkpoint,
-            "run folder": lambda: RunFolder(path=self._out, recipe=self._recipe(), watch=watch),
-        }
-        if source in supplied:
-            return supplied[source]()
-        made = self._result(str(source))
-        return replace(made, indices=step.recording.indices, watch=watch) if isinstance(made, Recording) else made
+        given: Any = None
+        match source:
+            case tuple():
+                given = tuple(self._result(label) for label in source)
+            case Itself():
+                given = self._steps[source].named.stage
+            case "scene":
+                given = self._scene(step)
+            case "recording":
+                given = step.recording
+            case "checkpoint":
+                given = checkpoint
+            case "run folder":
+                given = RunFolder(path=self._out, recipe=self._recipe(), watch=watch)
+            case str():
+                given = self._result(source)
+        return replace(given, indices=step.recording.indices, watch=watch) if isinstance(given, Recording) else given
 
     def _scene(self, step: Step) -> Scene:
         """Return the cameras and the body that hold at this place in the pipeline, and the garment sewn to it."""
@@ -217,20 +227,25 @@ class Execution:
             component, self._pipeline.registry, lambda: checkpoint.kept if checkpoint else "", self._out / LOG
         )
 
-    def _entered(
-        self, step: Step, found: Artifact | None, cpu: float = 0.0, wall: float = 0.0, said: Sequence[str] = ()
-    ) -> None:
-        if found is not None:
-            if step.label in self.entries:
-                return
-            self._report(f"{step.label}: from the store")
-            mixed, said = self._warned_of_versions(step, found), found.warnings
-            for warning in said:
-                self._report(f"warning: {warning}")
-            said = [*said, *mixed]
-        entry = {"label": step.label, "key": step.key, "cached": found is not None, "warnings": list(said)}
-        self.entries[step.label] = {**entry, "seconds": cpu, "wall_seconds": wall}
-        self._pipeline.registry.observers.stage_done(step.label, step.key, found is not None)
+    def _enter_found(self, step: Step, found: Artifact) -> None:
+        if step.label in self.entries:
+            return
+        self._report(f"{step.label}: from the store")
+        mixed = self._warned_of_versions(step, found)
+        for warning in found.warnings:
+            self._report(f"warning: {warning}")
+        self._enter(step, Made(None, [*found.warnings, *mixed], 0.0, 0.0), cached=True)
+
+    def _enter_made(self, step: Step, made: Made) -> Any:
+        self._enter(step, made, cached=False)
+        return made.value
+
+    def _enter(self, step: Step, made: Made, cached: bool) -> None:
+        self.entries[step.label] = {
+            "label": step.label, "key": step.key, "cached": cached, "warnings": list(made.warnings),
+            "seconds": made.cpu_s, "wall_seconds": made.wall_s,
+        }  # fmt: skip
+        self._pipeline.registry.observers.stage_done(step.label, step.key, cached)
 
     def _recipe(self) -> dict[str, Any]:
         pipeline = self._pipeline

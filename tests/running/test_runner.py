@@ -1,5 +1,6 @@
 """Runs and plans: what is taken from the store, what goes on, what is made, and why."""
 
+import errno
 import json
 import os
 import subprocess
@@ -224,6 +225,23 @@ def test_a_result_that_can_not_be_kept_names_its_stage(tmp_path, path, monkeypat
     monkeypatch.setattr(Store, "save", save)
     with pytest.raises(ComponentFailed, match=r"^stage 'tiny_background' .* failed: TypeError: Object of type set"):
         run_tiny(path, tmp_path)
+
+
+def test_a_result_that_can_not_be_kept_is_not_told_as_done(tmp_path, path, monkeypatch):
+    def save(self, artifact, value, warnings):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    class Onlooker:
+        @hookimpl
+        def mocapflow_stage_done(self, stage):
+            told.append(stage)
+
+    told, pipeline = [], load(path)
+    pipeline.registry._manager.register(Onlooker())
+    monkeypatch.setattr(Store, "save", save)
+    with pytest.raises(StoreError, match="No space left"):
+        run(pipeline, store=tmp_path / "store.zarr", out=tmp_path / "out")
+    assert told == []
 
 
 def test_inputs_that_are_no_paths_name_the_body(tmp_path, path, monkeypatch):
