@@ -295,7 +295,7 @@ def test_an_interrupt_ends_with_130_and_says_how_to_go_on(call, monkeypatch):
     def stopped(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(runner, "run", stopped)
+    monkeypatch.setattr(runner.Prepared, "run", stopped)
     result = call("run", "start.yaml", "--set", "frames={start: 1}")
     assert result.exit_code == 130
     assert result.stderr == (
@@ -317,7 +317,7 @@ def test_no_place_for_compiled_code_is_told(call, monkeypatch):
     def broken(*_, **__):
         raise RuntimeError("cannot cache function '_chain': no locator available for file '/usr/kinematics.py'")
 
-    monkeypatch.setattr(runner, "run", broken)
+    monkeypatch.setattr(runner.Prepared, "run", broken)
     result = call("run", "start.yaml")
     assert result.exit_code == 2
     assert result.stderr.endswith("NUMBA_CACHE_DIR names a folder of yours for it\n")
@@ -327,27 +327,27 @@ def test_a_bug_shows_its_traceback(call, monkeypatch):
     def broken(*_, **__):
         raise ZeroDivisionError("ours")
 
-    monkeypatch.setattr(runner, "run", broken)
+    monkeypatch.setattr(runner.Prepared, "run", broken)
     assert isinstance(call("run", "start.yaml").exception, ZeroDivisionError)
 
 
 def test_the_demo_runs_what_is_shipped_from_any_folder(call, monkeypatch):
     ran = []
-    monkeypatch.setattr(runner, "run", lambda pipeline, **options: ran.append((pipeline, options)))
+    monkeypatch.setattr(runner.Prepared, "run", lambda prepared, out, **options: ran.append((prepared, out)))
     result = call("demo")
     assert result.stdout == "overlay videos  runs/demo/overlay\njoint angles    runs/demo/results/angles.csv\n"
-    pipeline, options = ran[0]
-    assert pipeline.recording == CLIP
-    assert options["out"] == Path("runs/demo")
-    assert options["store"] == Path("runs/store.zarr")
-    assert {"export", "overlay"} <= {named.label for named in pipeline.stages}
+    prepared, out = ran[0]
+    assert prepared.pipeline.recording == CLIP
+    assert out == Path("runs/demo")
+    assert prepared.store.path == Path("runs/store.zarr")
+    assert {"export", "overlay"} <= {named.label for named in prepared.pipeline.stages}
 
 
 def test_a_full_drive_is_told_and_a_bug_shows_itself(call, monkeypatch):
     def fails(*_, **__):
         raise OSError(number, os.strerror(number), "run.json")
 
-    monkeypatch.setattr(runner, "run", fails)
+    monkeypatch.setattr(runner.Prepared, "run", fails)
     number = errno.ENOSPC
     full = call("run", "start.yaml")
     assert full.exit_code == 1

@@ -13,6 +13,7 @@ import typer
 
 from mocapflow.commands.former import differing
 from mocapflow.commands.invocation import alone, recall, recalled_keys
+from mocapflow.commands.progress import reporter
 from mocapflow.errors import MocapflowError, PipelineError, RecordingError, alternatives
 
 if TYPE_CHECKING:
@@ -73,14 +74,14 @@ def export(run: Run, format_: Format) -> None:
 
     Code may have changed since; pipeline and recording may not.
     """
-    from mocapflow.commands.running import carry_out
-    from mocapflow.running import runner
+    from mocapflow.commands.running import carry_out, prepare
+    from mocapflow.running.former_code import as_made
 
     _check_formats(format_)
     invocation = recall(run)
     pipeline = invocation.load()
     with alone(run):
-        steps = runner.steps(pipeline, store=Path(invocation.store), url=invocation.url)
+        steps = prepare(pipeline, invocation).steps
         keys = recalled_keys(run) or {}
         changed = differing(keys, {step.label: step.key for step in steps})
         contents = recalled_keys(run, "contents")
@@ -90,7 +91,12 @@ def export(run: Run, format_: Format) -> None:
             hint = "run it again, then export: else its files would show two tracks"
             raise PipelineError(what, where=str(run), hint=hint)
         exporting = invocation.changed(*_only_formats(pipeline, format_))
-        typer.echo(carry_out(exporting.load(), exporting, run, made=keys if changed else None))
+        prepared = prepare(exporting.load(), exporting)
+        if changed:
+            with reporter() as report:
+                prepared = as_made(prepared, keys, report)
+        prepared.check(run)
+        typer.echo(carry_out(prepared, run))
 
 
 def _check_formats(formats: Sequence[str]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -18,7 +18,7 @@ from mocapflow.errors import PipelineError
 if TYPE_CHECKING:
     from mocapflow.config.pipeline import Pipeline
     from mocapflow.running.recipes import Step
-    from mocapflow.running.runner import RunSummary
+    from mocapflow.running.runner import Prepared, RunSummary
 
 File = Annotated[Path, typer.Argument(metavar="PIPELINE", help="A pipeline file (.yaml).")]
 Recording = Annotated[Path | None, typer.Option(help="Use this recording folder instead of the file's.")]
@@ -56,18 +56,9 @@ def run(
     folder = _out(pipeline, out)
     split = [f"parts.count={parts}"] if parts else []
     invocation = _invocation(pipeline, recording, folder, store, [*(changes or []), *split], frames)
-    if scheduler is None and workers == 1:
-        typer.echo(execute(invocation, folder, fresh))
-        return
-    if fresh:
+    if fresh and (workers > 1 or scheduler is not None):
         raise PipelineError("--fresh does not go with several workers", hint="name a new store with --store")
-
-    def begin_with_parts(invocation: Invocation, out: Path, steps: Sequence[Step]) -> None:
-        labels = parts_of(steps)
-        begin(invocation, out, steps)
-        make_parts(labels, invocation, out, workers, scheduler)
-
-    typer.echo(execute(invocation, folder, begin=begin_with_parts))
+    typer.echo(execute(invocation, folder, fresh, workers, scheduler))
 
 
 def plan(
@@ -141,31 +132,31 @@ def begin(invocation: Invocation, out: Path, steps: Sequence[Step]) -> None:
 
 
 def execute(
-    invocation: Invocation,
-    out: Path,
-    fresh: bool = False,
-    begin: Callable[[Invocation, Path, Sequence[Step]], None] = begin,
+    invocation: Invocation, out: Path, fresh: bool = False, workers: int = 1, scheduler: str | None = None
 ) -> RunSummary:
     """Run what an invocation says, have the run folder remember it, and return the summary."""
     pipeline = _loaded(invocation, out)
     with alone(out):
-        return carry_out(pipeline, invocation, out, fresh, partial(begin, invocation, out))
+        prepared = prepare(pipeline, invocation)
+        prepared.check(out, fresh)
+        parts = parts_of(prepared.steps) if workers > 1 or scheduler is not None else []
+        begin(invocation, out, prepared.steps)
+        if parts:
+            make_parts(parts, invocation, out, workers, scheduler)
+        return carry_out(prepared, out, fresh)
 
 
-def carry_out(
-    pipeline: Pipeline,
-    invocation: Invocation,
-    out: Path,
-    fresh: bool = False,
-    begin: Callable[[Sequence[Step]], None] = lambda steps: None,
-    made: Mapping[str, str] | None = None,
-) -> RunSummary:
-    """Run the pipeline of an invocation and return the summary; see `runner.run`."""
+def prepare(pipeline: Pipeline, invocation: Invocation) -> Prepared:
+    """Return the pipeline of an invocation with what it would make, and the store."""
     from mocapflow.running import runner
 
-    store, url = Path(invocation.store), invocation.url
+    return runner.prepare(pipeline, store=Path(invocation.store), url=invocation.url)
+
+
+def carry_out(prepared: Prepared, out: Path, fresh: bool = False) -> RunSummary:
+    """Run what is prepared, tell of its progress, and return the summary."""
     with reporter() as shown, noted(shown, out) as report:
-        return runner.run(pipeline, store=store, url=url, out=out, fresh=fresh, report=report, begin=begin, made=made)
+        return prepared.run(out, fresh=fresh, report=report)
 
 
 def _loaded(invocation: Invocation, out: Path) -> Pipeline:
@@ -179,10 +170,7 @@ def _loaded(invocation: Invocation, out: Path) -> Pipeline:
 
 
 def _print_plan(invocation: Invocation) -> None:
-    pipeline = invocation.load()
-    from mocapflow.running import runner
-
-    for line in runner.plan(pipeline, store=Path(invocation.store), url=invocation.url):
+    for line in prepare(invocation.load(), invocation).plan():
         typer.echo(line)
 
 

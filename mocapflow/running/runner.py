@@ -15,7 +15,6 @@ from mocapflow.config.pipeline import Pipeline
 from mocapflow.errors import MocapflowError, PipelineError, no_run_folder
 from mocapflow.io.paths import for_opencv
 from mocapflow.running.execution import Execution, find_hit, is_hit
-from mocapflow.running.former_code import as_made
 from mocapflow.running.recipes import Step, steps_of
 from mocapflow.running.wiring import SUPPLIED, Source
 from mocapflow.storage.shared import open_store
@@ -60,22 +59,110 @@ class RunSummary:
         return "\n".join([*lines, f"results: {self.out}"])
 
 
+@dataclass(frozen=True)
+class Prepared:
+    """A pipeline with its stages, their recipes and keys, and the store where results are found and kept."""
+
+    pipeline: Pipeline
+    store: Store
+    steps: Sequence[Step]
+
+    def plan(self) -> list[PlanLine]:
+        """Return for each stage whether its result is there, can be continued, or has to be made, and why."""
+        self._check_inputs(fresh=False)
+        return [_plan_line(step, self.store) for step in self.steps]
+
+    def check(self, out: Path, fresh: bool = False) -> None:
+        """Check that a run can begin: inputs are there, the run folder can be named, the store written or made.
+
+        Raises:
+            MocapflowError: it can't.
+        """
+        for_opencv(out)  # of a path that it can't take people hear now, not when videos are drawn
+        self._check_inputs(fresh)
+        self.store.create()
+        self.store.digests.save()
+
+    def run(
+        self, out: Path, *, fresh: bool = False, only: str | None = None, report: Report = lambda line: None
+    ) -> RunSummary:
+        """Make what is not in the store yet and return what was done; see `run`."""
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise no_run_folder(out, error) from error
+        execution = Execution(self.pipeline, self.store, out, self.steps, fresh=fresh, report=report)
+        with threadpool_limits(limits=1, user_api="blas"):  # a frame's matrices are small: threads wait for each other
+            for warning in dict.fromkeys(said for step in self.steps for said in step.recording.warnings):
+                report(f"warning: {warning}")
+            for step in self.steps:
+                if only is None or step.label == only:
+                    execution.finish(step)
+        return RunSummary(out=out, store=self.store.path, stages=tuple(execution.entries.values()))
+
+    def _check_inputs(self, fresh: bool) -> None:
+        """Check that everything is there that has to be read; what comes from the store needs nothing.
+
+        Raises:
+            MocapflowError: what is missing, as the stage or body would tell it in the midst of a run.
+        """
+
+        def asked(need: Callable[[], None], readers: Sequence[Step]) -> None:
+            try:
+                need()
+            except MocapflowError:
+                if any(fresh or find_hit(step, self.store) is None for step in readers):
+                    raise
+
+        for step in self.steps:
+            asked(partial(step.named.stage.need, step.recording), [step])
+        dressed = [step for step in self.steps if "scene" in step.sources.values() and step.body is None]
+        asked(partial(self.pipeline.body.need, self.pipeline.recording), dressed)
+
+
+def prepare(pipeline: Pipeline, *, store: Path, url: str | None = None) -> Prepared:
+    """Return a pipeline with what it would make, and the store; see `run`. Nothing is written but digests."""
+    kept = open_store(store, url)
+    prepared = Prepared(pipeline, kept, steps_of(pipeline, kept.digests))
+    kept.digests.save()
+    return prepared
+
+
 def plan(pipeline: Pipeline, *, store: Path, url: str | None = None) -> list[PlanLine]:
     """Return for each stage whether its result is there, can be continued, or has to be made, and why."""
-    kept = open_store(store, url)
-    steps = steps_of(pipeline, kept.digests)
-    check_inputs(pipeline, steps, kept)
-    lines = [_plan_line(step, kept) for step in steps]
-    kept.digests.save()
-    return lines
+    return prepare(pipeline, store=store, url=url).plan()
 
 
-def steps(pipeline: Pipeline, *, store: Path, url: str | None = None) -> list[Step]:
-    """Return the stages of a pipeline with their recipes and keys."""
-    kept = open_store(store, url)
-    found = steps_of(pipeline, kept.digests)
-    kept.digests.save()
-    return found
+def run(
+    pipeline: Pipeline,
+    *,
+    store: Path,
+    out: Path,
+    url: str | None = None,
+    fresh: bool = False,
+    only: str | None = None,
+    report: Report = lambda line: None,
+) -> RunSummary:
+    """Run a pipeline and return what was done.
+
+    Args:
+        pipeline: what to run.
+        store: the folder of cached results.
+        out: the run folder.
+        url: where the results in that folder are shared with others.
+        fresh: compute everything anew.
+        only: the label of one stage: make that and what it needs.
+        report: told lines of progress.
+
+    Raises:
+        ComponentFailed: a component raised; committed frames are kept.
+        StoreError: the store is full or can't be written; committed frames are kept.
+        MocapflowError: the pipeline or an input is wrong.
+    """
+    check_apart(out, store, pipeline.recording)
+    prepared = prepare(pipeline, store=store, url=url)
+    prepared.check(out, fresh)
+    return prepared.run(out, fresh=fresh, only=only, report=report)
 
 
 def check_apart(out: Path, store: Path, recording: Path) -> None:
@@ -90,80 +177,6 @@ def check_apart(out: Path, store: Path, recording: Path) -> None:
         if path.resolve() == folder or any(path.resolve().is_relative_to(place) for place in inside):
             hint = f"give {what} a folder of their own: {option} {Path('runs') / folder.name}"
             raise PipelineError(f"the {what} would lie among the files of the recording", where=str(path), hint=hint)
-
-
-def check_inputs(pipeline: Pipeline, steps: Sequence[Step], store: Store, fresh: bool = False) -> None:
-    """Check that everything is there that has to be read; what comes from the store needs nothing.
-
-    Raises:
-        MocapflowError: what is missing, as the stage or body would tell it in the midst of a run.
-    """
-
-    def asked(need: Callable[[], None], readers: Sequence[Step]) -> None:
-        try:
-            need()
-        except MocapflowError:
-            if any(fresh or find_hit(step, store) is None for step in readers):
-                raise
-
-    for step in steps:
-        asked(partial(step.named.stage.need, step.recording), [step])
-    dressed = [step for step in steps if "scene" in step.sources.values() and step.body is None]
-    asked(partial(pipeline.body.need, pipeline.recording), dressed)
-
-
-def run(
-    pipeline: Pipeline,
-    *,
-    store: Path,
-    out: Path,
-    url: str | None = None,
-    fresh: bool = False,
-    only: str | None = None,
-    report: Report = lambda line: None,
-    begin: Callable[[Sequence[Step]], None] = lambda steps: None,
-    made: Mapping[str, str] | None = None,
-) -> RunSummary:
-    """Run a pipeline and return what was done.
-
-    Args:
-        pipeline: what to run.
-        store: the folder of cached results.
-        out: the run folder.
-        url: where the results in that folder are shared with others.
-        fresh: compute everything anew.
-        only: the label of one stage: make that and what it needs.
-        report: told lines of progress.
-        begin: told the steps, one for each stage, before any is made.
-        made: keys by label of what older code has made of the same: that is taken from the store.
-
-    Raises:
-        ComponentFailed: a component raised; committed frames are kept.
-        StoreError: the store is full or can't be written; committed frames are kept.
-        MocapflowError: the pipeline or an input is wrong.
-    """
-    check_apart(out, store, pipeline.recording)
-    for_opencv(out)  # of a path that it can't take people hear now, not when videos are drawn
-    kept = open_store(store, url)
-    steps = steps_of(pipeline, kept.digests)
-    if made is not None:
-        steps = as_made(steps, made, kept, report)
-    check_inputs(pipeline, steps, kept, fresh)
-    kept.create()
-    kept.digests.save()
-    begin(steps)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise no_run_folder(out, error) from error
-    execution = Execution(pipeline, kept, out, steps, fresh=fresh, report=report)
-    with threadpool_limits(limits=1, user_api="blas"):  # a frame's matrices are small: threads wait for each other
-        for warning in dict.fromkeys(said for step in steps for said in step.recording.warnings):
-            report(f"warning: {warning}")
-        for step in steps:
-            if only is None or step.label == only:
-                execution.finish(step)
-    return RunSummary(out=out, store=store, stages=tuple(execution.entries.values()))
 
 
 def _plan_line(step: Step, store: Store) -> PlanLine:

@@ -11,7 +11,7 @@ from mocapflow.config.resolve import Resolver
 from mocapflow.config.yamlfile import read
 from mocapflow.errors import MocapflowError, PipelineError
 from mocapflow.registry import Registry
-from mocapflow.running.runner import run, steps
+from mocapflow.running.runner import prepare, run
 from tests.fixtures.stores import actions, load, write_pipeline, write_recording
 
 PARTS = {"cameras": "lab/rig.toml", "videos": {"cam01": "a.mp4", "cam02": "b.mp4"}}
@@ -58,7 +58,7 @@ def refused(folder, **parts):
 
 
 def keys(pipeline, store):
-    return {step.label: step.key for step in steps(pipeline, store=store)}
+    return {step.label: step.key for step in prepare(pipeline, store=store).steps}
 
 
 def test_named_parts_run_with_the_keys_of_a_folder(tmp_path, spread):

@@ -5,7 +5,7 @@ import pytest
 
 from mocapflow.errors import PipelineError
 from mocapflow.running.parts import in_parts, split
-from mocapflow.running.runner import plan, run
+from mocapflow.running.runner import plan, prepare, run
 from mocapflow.running.wiring import wire
 from tests.fixtures.stores import STAGES, actions, load, run_tiny, write_pipeline, write_recording
 
@@ -80,9 +80,9 @@ def test_parts_are_made_resumed_and_joined(tmp_path, path):
     whole, _ = run_tiny(path, tmp_path, frames=13)  # the first part of the whole: its frames serve both
     pipeline = load(path, *IN_TWO)
     assert {line.label: line.action for line in plan(pipeline, store=store)}["track_1"] == "hit"
-    planned = []
-    only = run(pipeline, store=store, out=tmp_path / "out", only="track_2", begin=planned.extend)
-    assert [step.label for step in planned if step.chain] == ["track_1", "track_2"]
+    chains = [step.label for step in prepare(pipeline, store=store).steps if step.chain]
+    assert chains == ["track_1", "track_2"]
+    only = run(pipeline, store=store, out=tmp_path / "out", only="track_2")
     assert actions(only) == {"background": "hit", "start_2": "run", "track_2": "run"}
     summary, _ = run_tiny(path, tmp_path, *IN_TWO)
     assert actions(summary) == {
