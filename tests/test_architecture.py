@@ -102,13 +102,12 @@ def test_no_circle_of_imports_in_a_folder(folder):
 
 def test_public_names():
     static = {
-        alias.name
+        alias.asname: node.module
         for node in ast.walk(ast.parse((ROOT / "__init__.py").read_text()))
         if isinstance(node, ast.ImportFrom) and str(node.module).startswith("mocapflow.")
         for alias in node.names
     }
-    homes = {name for names in mocapflow._HOMES.values() for name in names.split()}
-    assert static == homes == set(mocapflow.__all__)
+    assert static == {name: f"mocapflow.{home}" for name, home in mocapflow._HOMES.items()}
     for name in mocapflow.__all__:
         assert getattr(mocapflow, name) is not None
     with pytest.raises(AttributeError, match="module 'mocapflow' has no attribute 'Drapper'"):
