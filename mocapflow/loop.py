@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 from functools import partial
 
@@ -45,7 +46,7 @@ def settle(
     far = not past.moments
     steady = steps.steady.beginning if far else steps.steady
     calm, change = 0, None
-    last = before_last = Shown(state.estimate.pose, model.surface(state.estimate.pose, state.cloth))
+    shown = deque([Shown(state.estimate.pose, model.surface(state.estimate.pose, state.cloth))], maxlen=3)
     energy, cost = np.full((steady.cap, len(functional.terms)), np.nan), np.nan
     for index in range(steady.cap):
         turn = Turn(index=index, change=change, far=far)
@@ -54,8 +55,8 @@ def settle(
             now = Shown(state.estimate.pose, model.surface(state.estimate.pose, state.cloth))
             energy[index] = functional.values(state, now.surface)
         last_cost, cost = cost, functional.total(energy[index])
-        change, swing = (measure_change(old, now, state.estimate.covariance) for old in (last, before_last))
-        before_last, last = last, now
+        change = measure_change(shown[-1], now, state.estimate.covariance)
+        shown.append(now)
         if index == 0 and steady.far(change):
             far, steady = True, steady.beginning
         watch.lap("match")
@@ -64,13 +65,14 @@ def settle(
         if calm >= steady.turns or index + 1 >= steady.max_turns:
             break
     assert change is not None
+    swing = measure_change(shown[0], now, state.estimate.covariance)  # over the last two turns
     return FrameResult(
         state=state,
         iterations=index + 1,
         steady=calm >= steady.turns,
         oscillating=calm == 0 and index > 1 and steady.holds(swing, index + 1),
         change=change,
-        overlap=overlaps(last.surface, state.segmentation, model.scene.cameras),
+        overlap=overlaps(now.surface, state.segmentation, model.scene.cameras),
         energy=energy,
         energy_terms=functional.terms,
         seconds=watch.seconds,
