@@ -198,14 +198,14 @@ class BodyModel(Component):
     role: ClassVar[str] = "body"
 
     @abstractmethod
-    def load(self, recording: Path) -> Body:
-        """Return the body at rest; `recording` is the folder of the recording."""
+    def load(self, folder: Path) -> Body:
+        """Return the body at rest; `folder` is that of the recording."""
 
-    def inputs(self, recording: Path) -> Sequence[Path]:
+    def inputs(self, folder: Path) -> Sequence[Path]:
         """Return the files `load` reads: their content is part of the cache key."""
         return ()
 
-    def need(self, recording: Path) -> None:
+    def need(self, folder: Path) -> None:
         """Raise what `load` would for want of a file: asked by `plan`, and before a run computes anything."""
 
 
@@ -229,7 +229,7 @@ class Stage(Component):
     causal: ClassVar[bool] = False
     run: ClassVar[Callable[..., Any]]
 
-    def inputs(self, recording: Path) -> Sequence[Path]:
+    def inputs(self, folder: Path) -> Sequence[Path]:
         """Return files that `run` reads besides the frames: their content is part of the cache key."""
         return ()
 

@@ -44,30 +44,30 @@ class Scanned(BodyModel):
     part: Part = "full"  # what is used of it; the rest is cut off
     morph: Morph | None = None  # a second shape, for a knee or elbow that bends far
 
-    def inputs(self, recording: Path) -> Sequence[Path]:
+    def inputs(self, folder: Path) -> Sequence[Path]:
         """Return the files that are read."""
-        subject = recording / "subject"
+        subject = folder / "subject"
         files = [subject / "body.obj", subject / "skeleton.json"]
         if (subject / "weights.npz").exists():
             files.append(subject / "weights.npz")
-        return [*files, recording / self.morph.mesh] if self.morph else files
+        return [*files, folder / self.morph.mesh] if self.morph else files
 
-    def need(self, recording: Path) -> None:
+    def need(self, folder: Path) -> None:
         """Raise if the mesh is missing, or no skeleton can be read."""
-        subject = recording / "subject"
-        for path in [subject / "body.obj", *([recording / self.morph.mesh] if self.morph else [])]:
+        subject = folder / "subject"
+        for path in [subject / "body.obj", *([folder / self.morph.mesh] if self.morph else [])]:
             if not path.is_file():
                 read_mesh(path)  # says what to do
         read_skeleton(subject / "skeleton.json")
 
-    def load(self, recording: Path) -> Body:
+    def load(self, folder: Path) -> Body:
         """Return the body at rest.
 
         Raises:
             RecordingError: a file is missing, malformed, not in metres, inside out in part, or contradicts another.
             PipelineError: the morph names an angle the body lacks.
         """
-        subject = recording / "subject"
+        subject = folder / "subject"
         vertices, faces = read_mesh(subject / "body.obj")
         check_winding(faces, str(subject / "body.obj"))
         skeleton = read_skeleton(subject / "skeleton.json")
@@ -78,7 +78,7 @@ class Scanned(BodyModel):
             weights = heat_weights(vertices, faces, skeleton)
         if self.morph is None:
             return assemble(vertices, faces, skeleton, weights, self.part)
-        offset = self._second_shape(recording, vertices, self.morph) - vertices
+        offset = self._second_shape(folder, vertices, self.morph) - vertices
         body = assemble(vertices, faces, skeleton, weights, self.part, offset)
         if self.morph.angle not in body.screw_names:
             hint = alternatives(self.morph.angle, body.screw_names)
@@ -87,8 +87,8 @@ class Scanned(BodyModel):
         return replace(body, morph_screw=body.screw_names.index(self.morph.angle), morph_range=between)
 
     @staticmethod
-    def _second_shape(recording: Path, vertices: F64, morph: Morph) -> F64:
-        path = recording / morph.mesh
+    def _second_shape(folder: Path, vertices: F64, morph: Morph) -> F64:
+        path = folder / morph.mesh
         shape, _ = read_mesh(path)
         if shape.shape != vertices.shape:
             hint = "both shapes must be the same mesh, vertex by vertex"

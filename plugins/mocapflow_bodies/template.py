@@ -27,11 +27,11 @@ class Template(BodyModel):
     height_m: Annotated[float, Field(gt=0.5, lt=2.6)] | None = None  # null: as blended
     part: Part = "full"  # what is used of it; the rest is cut off
 
-    def inputs(self, recording: Path) -> Sequence[Path]:
+    def inputs(self, folder: Path) -> Sequence[Path]:
         """Return the files that are read."""
         return [FILE]
 
-    def load(self, recording: Path) -> Body:
+    def load(self, folder: Path) -> Body:
         """Return the body at rest; nothing of the recording is read."""
         blend = np.array([1 - self.shape, self.shape]) * UNIT
         with np.load(FILE) as content:

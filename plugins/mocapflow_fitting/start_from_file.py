@@ -32,9 +32,9 @@ class StartFromFile(Stage):
     name: ClassVar[str] = "start_from_file"
     file: str = FILE  # from the folder of the recording
 
-    def inputs(self, recording: Path) -> Sequence[Path]:
+    def inputs(self, folder: Path) -> Sequence[Path]:
         """Return the files that are read: their content is part of the cache key."""
-        path = recording / self.file
+        path = folder / self.file
         return [path, *sorted(path.parent.glob(f"{path.stem}_*{path.suffix}"))]
 
     def need(self, recording: Recording) -> None:

@@ -298,7 +298,7 @@ class Dressing(Draper, ClothFitter, Garment, Segmenter, BodyModel):
     def sew(self, body):
         return self.answer
 
-    def load(self, recording):
+    def load(self, folder):
         return self.answer
 
     def segment(self, frame, state, past, scene, turn):

@@ -246,7 +246,7 @@ def test_a_result_that_can_not_be_kept_is_not_told_as_done(tmp_path, path, monke
 
 def test_inputs_that_are_no_paths_name_the_body(tmp_path, path, monkeypatch):
     pipeline = load(path)
-    monkeypatch.setattr(type(pipeline.body), "inputs", lambda self, recording: "subject.txt")
+    monkeypatch.setattr(type(pipeline.body), "inputs", lambda self, folder: "subject.txt")
     with pytest.raises(PluginError, match="'tiny_body' returned the inputs 'subject.txt', which are no list of Path"):
         plan(pipeline, store=tmp_path / "store.zarr")
 
