@@ -95,4 +95,6 @@ TAKES = {
     # made after that: motions of one person, by the other
     "kneel_B_skirt": Take("B", "skirt", "kneel", 111, GREEN, frames=60),
     "jack_A_skirt": Take("A", "skirt", "jack", 112, GREY),
+    # made after that: trousers again, by the other
+    "walk_A_trousers": Take("A", "shorts", "walk_A", 113, GREY, start=20, cut=SLACKS),
 }
