@@ -27,7 +27,8 @@ def without_islands(level: F32, evidence: Evidence) -> F32:
     area = np.bincount(label.ravel(), minlength=count)
     islands = (label > 0) & (label != 1 + area[1:].argmax())
     runs = runs_of(islands)
-    explained = np.bincount(label[islands], evidence.outside(runs, evidence.along(runs)), minlength=count) > 0
+    density = np.nan_to_num(evidence.outside(runs, evidence.along(runs)))  # nobody knows the room: for neither
+    explained = np.bincount(label[islands], density, minlength=count) > 0
     return np.where(explained[label], -np.abs(level), level)
 
 

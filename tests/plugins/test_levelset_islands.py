@@ -10,11 +10,13 @@ from mocapflow_levelset.plates import Shadow, plate_of
 SHADOW = Shadow()
 
 
-def evidence(image, known=True):
+def evidence(image, known=True, unknown=np.s_[:0]):
     shape = image.shape[:2]
     seen = from_image(image, np.ones(shape, np.float32), ("lab",), 1)
     grey = np.full((*shape, 3), 120, np.float32)
-    room = Room(plate_of(grey, np.full_like(grey, 3), ("lab",)), np.ones(shape, bool), SHADOW)
+    spread = np.full_like(grey, 3)
+    spread[unknown] = np.inf
+    room = Room(plate_of(grey, spread, ("lab",)), np.ones(shape, bool), SHADOW)
     return in_room(seen, image, ("lab",), room) if known else seen
 
 
@@ -32,6 +34,13 @@ def test_only_the_island_in_the_empty_room_goes():
     found = without_islands(level, evidence(image))
     np.testing.assert_array_equal(found > 0, (person > 0) | (hand > 0))
     np.testing.assert_array_equal(found[stray <= 0], level[stray <= 0])
+
+
+def test_a_few_pixels_where_nobody_knows_the_room_keep_no_island():
+    image, person, hand, stray = scene()
+    level = np.maximum(np.maximum(person, hand), stray)
+    found = without_islands(level, evidence(image, unknown=np.s_[118:120, 119:123]))
+    np.testing.assert_array_equal(found > 0, (person > 0) | (hand > 0))
 
 
 def test_all_stay_where_the_room_is_not_known_or_there_is_one_part():
