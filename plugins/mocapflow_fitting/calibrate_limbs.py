@@ -20,8 +20,9 @@ from mocapflow.pooling import pool_matches
 from mocapflow.prediction import believed
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
-from mocapflow.results import Track
+from mocapflow.results import Track, ViewChecks
 from mocapflow.scene import Scene
+from mocapflow.track import prepared
 from mocapflow_fitting.detections import frames_seen, spread
 from mocapflow_fitting.keypoint_fit import fit
 from mocapflow_fitting.landmarks import landmarks
@@ -60,7 +61,12 @@ class CalibrateLimbs(Stage):
         idle_matchers(self.matchers, recording)
 
     def run(
-        self, recording: Recording, scene: Scene, background: Background | None = None, track: Track | None = None
+        self,
+        recording: Recording,
+        scene: Scene,
+        background: Background | None = None,
+        track: Track | None = None,
+        checks: ViewChecks | None = None,
     ) -> Body:
         """Return the scene's body with fitted proportions.
 
@@ -75,7 +81,7 @@ class CalibrateLimbs(Stage):
         solution = Solution(np.zeros(len(spreads)), tuple(poses))
         for done in range(self.passes):
             model = self._model(scene, scaled(body, solution.factors(spreads)))
-            views = self._segmented(recording, model, indices, solution.poses, clothes)
+            views = self._segmented(recording, checks, model, indices, solution.poses, clothes)
             turn = Turn(index=done, change=AT_REST if done else None)
             matchers = [partial(self._match, scene, *view, turn) for view in views]
             solution = refine(body, matchers, solution, scene.cameras, spreads, share, self.rounds)
@@ -100,8 +106,8 @@ class CalibrateLimbs(Stage):
         return ClothedModel(scene=replace(scene, body=body), draper=self.draper)
 
     def _segmented(
-        self, recording: Recording, model: ClothedModel, indices: Sequence[int], poses: Sequence[Pose],
-        clothes: Sequence[F64],
+        self, recording: Recording, checks: ViewChecks | None, model: ClothedModel, indices: Sequence[int],
+        poses: Sequence[Pose], clothes: Sequence[F64],
     ) -> list[tuple[Frame, Segmentation, F64]]:  # fmt: skip
         """Return the silhouettes of the chosen frames; the images are let go at once."""
         views, past = [], Past()
@@ -110,8 +116,9 @@ class CalibrateLimbs(Stage):
             if frame.index in wanted:
                 pose, cloth = wanted[frame.index]
                 state = believed(pose, cloth, model.drape(pose, cloth, past))
-                found = self.segmenter.segment(frame, state, past, model.scene, Turn(index=0))
-                views.append((replace(frame, images=(), flow=None), found, cloth))
+                passed = prepared(frame, checks, flow=None)
+                found = self.segmenter.segment(passed, state, past, model.scene, Turn(index=0))
+                views.append((replace(passed, images=()), found, cloth))
         return views
 
     def _match(

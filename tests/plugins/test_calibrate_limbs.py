@@ -24,6 +24,7 @@ from mocapflow.errors import RecordingError
 from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.model import ClothedModel, moved
 from mocapflow.recordings.recording import open_recording
+from mocapflow.results import ViewChecks
 from mocapflow.scene import Scene
 
 WRONG = {"thigh": 1.03, "shank": 0.97}  # 12 mm each
@@ -102,6 +103,25 @@ def test_clothes_are_laid_on_every_pose_that_is_tried(body, poses, tmp_path):
     fitted = stage.run(open_recording(folder), wrong, None, track)
     for ends in (("hip_l", "knee_l"), ("knee_r", "ankle_r")):
         assert abs(length(fitted, *ends) - length(body, *ends)) < 0.006  # m: half a pixel, half of what was wrong
+
+
+def test_views_that_were_found_wrong_do_not_count(body, poses):
+    seen = []
+
+    class Watched(Segmenter):
+        name: ClassVar[str] = "watched"
+
+        def segment(self, frame, state, past, scene, turn):
+            seen.append(frame.usable)
+            return Segmentation(silhouettes=())
+
+    stage = CalibrateLimbs(segmenter=Watched(), matchers=(ContourIcp(),), frames=2, passes=1, rounds=1)
+    recording = open_recording(DEMO, stop=2)
+    scene = Scene(cameras=recording.cameras, body=body)
+    track = make_track(np.stack([p.root for p in poses[:2]]), np.stack([p.angles for p in poses[:2]]))
+    checks = ViewChecks(frame=np.int32([1]), camera=np.int16([2]), reasons=("the picture shows nothing",))
+    stage.run(recording, scene, None, track, checks)
+    np.testing.assert_array_equal(seen, [[True] * 4, [True, True, False, True]])
 
 
 def test_velocities_of_skin(body, poses):
