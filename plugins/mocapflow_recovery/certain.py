@@ -33,6 +33,7 @@ class Room(NamedTuple):
     """The empty room as small cameras see it."""
 
     cameras: tuple[Camera, ...]
+    factors: tuple[int, ...]  # by which they are smaller than the recording's
     plates: tuple[Plate, ...]
 
 
@@ -51,10 +52,9 @@ class View(NamedTuple):
 @memoised
 def small_room(background: Background, cameras: tuple[Camera, ...], rows: int) -> Room:
     """Return the empty room in images of about so many rows; made once, forgotten with the background."""
-    factors = [max(round(camera.size[1] / rows), 1) for camera in cameras]
-    small = tuple(map(shrunk, cameras, factors))
+    factors = tuple(max(round(camera.size[1] / rows), 1) for camera in cameras)
     plates = (plate_in(background, number, CHANNELS, factor) for number, factor in enumerate(factors))
-    return Room(small, tuple(plates))
+    return Room(tuple(map(shrunk, cameras, factors)), factors, tuple(plates))
 
 
 def shrunk(camera: Camera, factor: int) -> Camera:
@@ -76,10 +76,9 @@ def views(frame: Frame, surface: Surface, room: Room, near_m: float, garment: F6
     """
     found, middle = [], surface.vertices.mean(axis=0)
     for number in np.flatnonzero(frame.usable):
-        camera, plate = room.cameras[number], room.plates[number]
+        camera, factor, plate = room.cameras[number], room.factors[number], room.plates[number]
         model, size = mask(outline(surface, camera), camera), 1 / magnification(camera, middle)
         image, hidden = frame.images[number], frame.hidden_in(int(number))
-        factor = image.shape[1] // int(camera.size[0])
         small = crops.shrink(image, factor)
         changed, same = _compared(small, plate, floor_around(surface, camera))
         told = True if hidden is None else crops.shrink(hidden.astype(np.float32), factor) == 0
@@ -87,7 +86,7 @@ def views(frame: Frame, surface: Surface, room: Room, near_m: float, garment: F6
         seen, expected = np.count_nonzero(person), np.count_nonzero(model)
         if seen < MOST * expected:
             cloth = np.zeros(person.shape, bool) if garment is None else person & (garment[bins_of(small)] > SURELY)
-            known = float(np.isfinite(plate.spread)[model].mean()) if model.any() else 0.0
+            known = float(np.isfinite(plate.spread)[model].mean())
             found.append(
                 View(camera, person, cloth, bool(seen > LEAST * expected), _away(same & told, person), size, known)
             )
