@@ -51,7 +51,7 @@ class CheckViews(Stage):
         """Return of how many frames a burst may be."""
         return max(round(self.longest_s * frame_rate), 1)
 
-    def doubt(self, seen: Thumbnails, room: F32, frame_rate: float, names: Sequence[str]) -> npt.NDArray[np.str_]:
+    def doubt(self, seen: Thumbnails, room: F32, frame_rate: float, names: Sequence[str]) -> npt.NDArray[np.object_]:
         """Return (T, C) why a picture is not to be trusted, "" where it is.
 
         Args:
@@ -67,7 +67,7 @@ class CheckViews(Stage):
         old &= doubts.peopled(seen.grey, room, good) | (frozen_from(seen.news) == 0)  # then it is its own empty room
         settled = doubts.bridged(seen.grey, good & ~old)
         torn = doubts.bursts(settled, self.longest(frame_rate), self.jump, self.joint_jump)
-        said = np.full(empty.shape, "", "U64")
+        said = np.full(empty.shape, "", object)
         said[torn] = "the picture does not fit the ones before and after"
         said[old] = "the picture repeats the one before"
         said[foreign] = [f"the picture looks like one of {names[camera]}" for camera in like[foreign]]

@@ -87,6 +87,13 @@ def test_several_things_at_once(clip):
     assert not any(camera == 1 for _, camera in told)
 
 
+def test_a_reason_ends_where_the_name_of_its_camera_does(clip):
+    recording = Corrupt(events=(Event(what="other_camera", first=40, views=("cam03",)),)).run(open_recording(clip))
+    names = ["the camera behind the door on the left side", "b", "c"]
+    said = CheckViews().doubt(thumbnails(recording), check_views.rooms(thumbnails(recording), None), 30.0, names)
+    assert said[45, 2] == f"the picture looks like one of {names[0]}"
+
+
 def test_a_frozen_view_is_found_beside_missing_pictures(clip):
     """A missing picture is black: nothing differs more from the room, and it says nothing of what is usual."""
     missing = dict(what="dropped", first=5, count=8, views=["cam02"])
