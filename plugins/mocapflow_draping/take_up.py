@@ -15,7 +15,6 @@ from mocapflow.records import F64
 from mocapflow_draping import samples
 from mocapflow_draping.outline import OutlineFitter
 
-EARLY = 1e-6  # share of the time between two steps by which a frame may come too early: rounding
 FARTHEST = 2.0  # steps from the middle of three values that their parabola is trusted
 
 
@@ -39,8 +38,8 @@ class TakeUp(OutlineFitter):
         cloth, garment = model.drape(estimate.pose, estimate.parameters, past), model.scene.garment
         if garment is None or not segmentation.silhouettes or TAKE_UP not in garment.parameter_names:
             return cloth
-        if turn.index > 0 or not self._due(frame.time, past):
-            return cloth
+        if turn.index > 0 or not past.moments or not past.falls_due(frame.time, self.every_s):
+            return cloth  # in the first frame the person is only being found
         column = garment.parameter_names.index(TAKE_UP)
         low, high = garment.parameter_bounds[column]
         last = past.moments[-1]
@@ -54,13 +53,6 @@ class TakeUp(OutlineFitter):
         best = lowest(tried, off + ((tried - before) / spread) ** 2)
         parameters = samples.replaced(garment, estimate.parameters, [column], np.array([[best]]))[0]
         return model.drape(estimate.pose, parameters, past)
-
-    def _due(self, time: float, past: Past) -> bool:
-        """Return whether a step falls between the last frame and this; in the first the person is only being found."""
-        if not past.moments:
-            return False
-        last, now = (math.floor(each / self.every_s + EARLY) for each in (past.moments[-1].time, time))
-        return now > last
 
 
 def lowest(places: F64, values: F64) -> float:

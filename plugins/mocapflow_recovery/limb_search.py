@@ -114,7 +114,7 @@ class LimbSearch(Recovery):
         suspected = suspicion(self.signs, stray, fitted, believed, past, body, self._density)
         if suspected is None:
             return result
-        if self.signs.persist(suspected.doubtful, past, body) and frame.index % self.vain_every:
+        if self.signs.persist(suspected.doubtful, past, body) and not self._in_turn(frame.time, past):
             unsearched = f"{suspected.why}: not searched, as the frames before are doubted, too"
             return noted(result, unsearched, doubted=True) if suspected.doubtful else result
         judge = self._judge(believed, result, seen, past, model)
@@ -146,6 +146,10 @@ class LimbSearch(Recovery):
         if suspected.doubtful:
             return noted(fit.result, f"{suspected.why}: search found nothing better", doubted=True)
         return fit.result
+
+    def _in_turn(self, time: float, past: Past) -> bool:
+        """Return whether this is the one of `vain_every` frames; counted by time, as frames may be left out."""
+        return past.falls_due(time, self.vain_every * (time - past.moments[-1].time))
 
     def _ways(self, looks: Looks, suspected: Suspicion) -> list[Look]:
         """Return the ways to look for the pose, each from its own samples."""

@@ -20,7 +20,7 @@ from mocapflow_recovery.looks import Looks, turned_round
 from mocapflow_recovery.sampling import Plan, Spread, parts, put_back, samples, search, seen_samples, without_idle_parts
 from mocapflow_recovery.suspicion import Suspicion
 
-from mocapflow.data import NO_CLOTH, Past, Pose
+from mocapflow.data import NO_CLOTH, Frame, Past, Pose
 from mocapflow.geometry.cameras import project
 from mocapflow.geometry.silhouettes import mask, outline
 from mocapflow.testing import pictures, recovery, scenes, template_body
@@ -39,6 +39,13 @@ def astray(angle: float) -> Pose:
     change = np.zeros(len(POSE.angles))
     change[SCENE.body.screw_names.index("hip_l.abduction")] = angle
     return Pose(root=POSE.root, angles=POSE.angles + change)
+
+
+def at(index: int, past: Past, every: int = 1) -> tuple[Frame, Past]:
+    """Return the frame as if it were another one of a recording of 30 a second, after every so many of its frames."""
+    count = len(past.moments)
+    moments = [replace(m, time=(index - every * (count - k)) / 30) for k, m in enumerate(past.moments)]
+    return replace(FRAME, index=index, time=index / 30), replace(past, moments=tuple(moments))
 
 
 def surface(pose: Pose):
@@ -91,6 +98,14 @@ def test_where_nobody_knows_the_room_it_is_neither() -> None:
         assert not view.person[:, :80].any()
         assert not view.away[:, :80].any()
         assert view.person[:, 80:].any()
+
+
+def test_a_room_shrunk_by_more_than_it_is_wide_then_is_compared() -> None:
+    """An image 320 wide is 11 wide if shrunk by 27, but 11 goes 29 times into 320."""
+    room = small_room(SCENE.background, SCENE.cameras, 9)
+    assert room.factors == (27,) * len(SCENE.cameras)
+    for view in views(FRAME, surface(POSE), room, 0.35):
+        assert view.person.shape == tuple(view.camera.size[::-1])
 
 
 def test_what_hides_the_person_is_neither() -> None:
@@ -273,9 +288,11 @@ def test_a_foot_does_not_turn_because_its_leg_was_found() -> None:
 
 
 @pytest.mark.parametrize(
-    ("index", "doubts", "looked"), [(8, 3, True), (9, 3, False), (9, 2, True)], ids=["in turn", "not in turn", "new"]
+    ("index", "every", "doubts", "looked"),
+    [(8, 1, 3, True), (9, 1, 3, False), (9, 1, 2, True), (32, 4, 3, True), (36, 4, 3, False)],
+    ids=["in turn", "not in turn", "new", "in turn, one frame of four", "not in turn, one frame of four"],
 )
-def test_doubts_that_last_are_looked_into_now_and_then(index, doubts, looked) -> None:
+def test_doubts_that_last_are_looked_into_now_and_then(index, every, doubts, looked) -> None:
     """As where the room behind the person is not known rightly: the search takes as long as tens of frames."""
     calls = []
 
@@ -285,8 +302,9 @@ def test_doubts_that_last_are_looked_into_now_and_then(index, doubts, looked) ->
 
     moments = scenes.tiny_past(SCENE, POSE, POSE, POSE).moments
     past = Past(moments=tuple(replace(moment, doubted=k < doubts) for k, moment in enumerate(moments)))
+    frame, past = at(index, past, every)
     lost, model = pictures.tiny_state(SCENE, astray(0.9), POSE), scenes.tiny_model(SCENE)
-    found = LimbSearch(vain_every=4).recover(replace(FRAME, index=index), lost, settled(lost), past, model, settle)
+    found = LimbSearch(vain_every=4).recover(frame, lost, settled(lost), past, model, settle)
     assert bool(calls) == looked
     assert found.doubted != looked and ("not searched" in found.notes[-1]) != looked
 
@@ -492,7 +510,8 @@ def test_a_joint_beyond_its_limits_is_looked_for_though_nothing_strays(beyond, i
     limits[1] = POSE.angles[1] - 1, POSE.angles[1] + 0.06 - beyond
     body, near = replace(SCENE.body, limits=limits), pictures.tiny_state(SCENE, astray(0.06), POSE)
     past, model = scenes.tiny_past(SCENE, *[astray(0.06)] * before), scenes.tiny_model(replace(SCENE, body=body))
-    found = LimbSearch().recover(replace(FRAME, index=index), near, settled(near), past, model, settle)
+    frame, past = at(index, past)
+    found = LimbSearch().recover(frame, near, settled(near), past, model, settle)
     assert (found.state.estimate.pose.angles == POSE.angles).all() == looked
     assert bool(found.notes) == looked
 
