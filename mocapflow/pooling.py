@@ -26,8 +26,8 @@ def pool_matches(
     surface: Surface,
 ) -> Matches:
     """Return the matches of all matchers together, each with its share, where nothing hides the person."""
-    found = pool([(m.share, matches_of(m, frame, segmentation, surface, past, scene, turn)) for m in matchers])
-    return unhidden(found, frame, surface, scene.cameras)
+    found = [weighted(matches_of(m, frame, segmentation, surface, past, scene, turn), m.share) for m in matchers]
+    return unhidden(pool(found), frame, surface, scene.cameras)
 
 
 def unhidden(matches: Matches, frame: Frame, surface: Surface, cameras: Sequence[Camera]) -> Matches:
@@ -45,17 +45,15 @@ def unhidden(matches: Matches, frame: Frame, surface: Surface, cameras: Sequence
     return replace(matches, **{each.name: getattr(matches, each.name)[seen] for each in fields(matches)})
 
 
-def pool(parts: Sequence[tuple[float, Matches]]) -> Matches:
-    """Return the matches of several matchers as one set, each weighted by its share; none of no matcher."""
-    if not parts:
-        return empty_matches()
-    if len(parts) == 1 and parts[0][0] == 1.0:
-        return parts[0][1]
-    matches = [m for _, m in parts]
+def weighted(matches: Matches, share: float) -> Matches:
+    """Return matches that count so many times as much."""
+    return matches if share == 1.0 else replace(matches, weight=share * matches.weight)
+
+
+def pool(parts: Sequence[Matches]) -> Matches:
+    """Return several sets of matches as one; none of none."""
+    if len(parts) < 2:
+        return parts[0] if parts else empty_matches()
     return Matches(
-        camera=np.concatenate([m.camera for m in matches]),
-        pixel=np.concatenate([m.pixel for m in matches]),
-        direction=np.concatenate([m.direction for m in matches]),
-        vertex=np.concatenate([m.vertex for m in matches]),
-        weight=np.concatenate([share * m.weight for share, m in parts]),
+        **{each.name: np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Matches)}
     )

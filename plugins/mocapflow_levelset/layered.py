@@ -70,7 +70,7 @@ class Layered(LevelSet):
             inner_contours(frame.images[s.camera], s, surface, scene.cameras[s.camera], layers, findable, known, search)
             for s in found.of(PERSON)
         ]
-        return pool([(1.0, part) for part in parts]) if parts else None
+        return pool(parts) if parts else None
 
     def _colours(self, past: Past, camera: int) -> F32 | None:
         if not self.colour_weight or ROOM not in past.appearance:

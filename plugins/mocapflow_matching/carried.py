@@ -27,7 +27,7 @@ def carried_points(frame: Frame, past: Past, scene: Scene) -> Matches:
             vertex, image = front_vertices(surface, scene.cameras[index], flow.pixel.astype(np.float64))
             on = vertex >= 0
             parts.append(_pairs(index, image[vertex[on]] + flow.displacement[on], vertex[on]))
-    return pool([(1.0, part) for part in parts])
+    return pool(parts)
 
 
 def _pairs(camera: int, pixel: F64, vertex: I32) -> Matches:

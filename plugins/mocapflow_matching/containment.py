@@ -38,7 +38,7 @@ class Containment(Matcher):
         self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn
     ) -> Matches:
         """Return the pairs of every view; see the class."""
-        return pool([(1.0, self.match_view(scene.cameras[s.camera], s, surface)) for s in segmentation.of("person")])
+        return pool([self.match_view(scene.cameras[s.camera], s, surface) for s in segmentation.of("person")])
 
     def match_view(self, camera: Camera, silhouette: Silhouette, surface: Surface) -> Matches:
         """Return the pairs of one view."""

@@ -86,7 +86,7 @@ class ContourIcp(Matcher):
         self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn
     ) -> Matches:
         """Return pairs of contour points; see the class."""
-        return pool([(1.0, self.match_view(s, surface, scene, turn)) for s in segmentation.of("person")])
+        return pool([self.match_view(s, surface, scene, turn) for s in segmentation.of("person")])
 
     def match_view(self, silhouette: Silhouette, surface: Surface, scene: Scene, turn: Turn) -> Matches:
         """Return the pairs of one view."""

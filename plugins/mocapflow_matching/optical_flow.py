@@ -11,7 +11,7 @@ from pydantic import NonNegativeFloat, NonNegativeInt, PositiveFloat
 from mocapflow.components import Matcher
 from mocapflow.data import Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn, empty_matches
 from mocapflow.geometry import silhouettes
-from mocapflow.pooling import pool
+from mocapflow.pooling import pool, weighted
 from mocapflow.records import F32, F64, Bool
 from mocapflow.scene import Scene
 from mocapflow_matching.carried import carried_points, distances
@@ -59,8 +59,7 @@ class OpticalFlow(Matcher):
             parts.append(self.carried(frame, surface, past, scene))
         if self.between != "frames" and first:
             parts += [self.registered(silhouette, surface, scene) for silhouette in segmentation.of("person")]
-        share = self.first_share if first else self.later_share
-        return pool([(share, part) for part in parts])
+        return weighted(pool(parts), self.first_share if first else self.later_share)
 
     def carried(self, frame: Frame, surface: Surface, past: Past, scene: Scene) -> Matches:
         """Return the pairs by flow between frames."""

@@ -148,7 +148,7 @@ class Task(NamedTuple):
     def _matches(self, surface: Surface) -> Matches:
         """Return the points of the outline, each with where the distance field says the silhouette is."""
         views = outlines(surface, self.segmentation, self.model.scene.cameras, self.fitter.spacing_px)
-        return pool([(1.0, self._matches_in(silhouette, contour)) for silhouette, contour in views])
+        return pool([self._matches_in(silhouette, contour) for silhouette, contour in views])
 
     def _matches_in(self, silhouette: Silhouette, contour: Contour) -> Matches:
         slope = np.stack([bilinear(axis, contour.pixel) for axis in np.gradient(silhouette.distance)[::-1]], axis=1)

@@ -104,7 +104,7 @@ def match(colour_of, believed, true=None, slipped_m=0.0):
     layers, known = layer_of(SCENE), shown(past)
     told = told_apart(SCENE, layers, known)
     parts = [
-        (1.0, inner_contours(image, silhouette, surface, camera, layers, told, known, search))
+        inner_contours(image, silhouette, surface, camera, layers, told, known, search)
         for image, silhouette, camera in zip(frame.images, segmentation.silhouettes, SCENE.cameras, strict=True)
     ]
     return InnerContours().match(frame, replace(segmentation, inner=pool(parts)), surface, past, SCENE, FIRST)

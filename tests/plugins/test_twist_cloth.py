@@ -70,7 +70,7 @@ def make_matches(pose: Pose, parameters: F64, vertices: np.ndarray) -> Matches:
         vertex=np.tile(vertices + 300, 4).astype(np.int32),
         weight=np.ones(count),
     )
-    return pool([(1.0, on_cloth), (1.0 + 1e-12, exact_matches(MODEL.scene, pose, np.arange(0, 300, 30), False))])
+    return pool([on_cloth, exact_matches(MODEL.scene, pose, np.arange(0, 300, 30), False)])
 
 
 def clothed_state(pose: Pose, parameters: F64) -> FrameState:
