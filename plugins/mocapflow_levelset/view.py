@@ -87,7 +87,14 @@ class Found(NamedTuple):
 
 
 def find(view: View, levels: Sequence[Level], method: Method, band_px: float) -> Found:
-    """Return the silhouette of one view (H, W) and its costs; everything outside without a start contour."""
+    """Return the silhouette of one view (H, W) and its costs; everything outside without a start contour.
+
+    Args:
+        view: what is given of it.
+        levels: coarse to fine; the last is of the image as it is.
+        method: the constants.
+        band_px: where the silhouette's distances are clipped.
+    """
     part, multiple = view.start if view.moved is None else view.moved, max(level.factor for level in levels)
     crop = crops.around(part, method.margin_px, multiple)
     whole = np.full(view.start.shape, -band_px, np.float32) if view.moved is None else view.start.copy()
@@ -108,7 +115,7 @@ def find(view: View, levels: Sequence[Level], method: Method, band_px: float) ->
         front = redistance(front, NEAR_PX)
         movable = crop.of(view.matte.known) & _movable(view, crop)
         front = sharpened(front, image, crop.of(view.matte.room), movable, view.matte.reach_px)
-    new = np.clip(_brought(front, factor, 1, band_px), -band_px, band_px)
+    new = redistance(front, band_px)
     # near the rim of a part its statistics lack a side
     kept = crop if view.moved is None else crops.around(view.moved, method.margin_px // 2, multiple)
     assert kept is not None
@@ -171,6 +178,5 @@ def _evidence(small: U8, view: View, crop: Crop, level: Level, method: Method) -
     evidence = from_image(small, weight, method.channels, max(method.stride // factor, 1), turned)
     if empty is not None:
         plate, floor = empty.plates[factor].of(crop.at(factor)), crops.shrink_mask(crop.of(empty.floor), factor)
-        calm_px = method.calm_px if factor == 1 else 0.0  # the mean over pixels is calm
-        evidence = in_room(evidence, small, method.channels, Room(plate, floor, method.shadow, calm_px))
+        evidence = in_room(evidence, small, method.channels, Room(plate, floor, method.shadow, method.calm_px))
     return evidence if view.colours is None else evidence._replace(told=evidence.weight * view.colours[bins_of(small)])
