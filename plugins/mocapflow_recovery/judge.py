@@ -15,14 +15,10 @@ from mocapflow.scene import Scene
 from mocapflow_recovery.certain import View
 from mocapflow_recovery.disagreement import distance, floating_area, uncovered_areas
 
-
-class Reach(NamedTuple):
-    """What counts as apart, m."""
-
-    reach_m: float  # what lies nearer to the other is no stray
-    hint_m: float  # the same, of what is but a hint
-    cloth_m: float  # nor is what lies so near to the garment
-    cap_m: float  # beyond, it does not matter how far
+REACH_M = 0.06  # what lies nearer to the other does not stray
+HINT_M = 0.03  # the same, of what is but a hint
+CLOTH_M = 0.2  # what lies so near to the garment may be the garment, wherever it swings
+CAP_M = 0.2  # beyond, it does not matter how far
 
 
 class Stray(NamedTuple):
@@ -31,7 +27,7 @@ class Stray(NamedTuple):
     uncovered: float
     floating: float
     cloth: float  # uncovered as well; a limb may hold it there, or it flies
-    near: float  # of the person, without cloth, off the model by little or more
+    near: float  # of the person, without cloth, off the model by `HINT_M` or more
 
     def __str__(self) -> str:
         worn = f" ({self.cloth:.0f} of it cloth)" if self.cloth >= 0.5 else ""
@@ -39,10 +35,10 @@ class Stray(NamedTuple):
         return f"{area:.0f} cm² of the person uncovered{worn}, {self.floating:.0f} cm² of skin in empty space"
 
 
-def stray_of(surface: Surface, scene: Scene, seen: Sequence[View], reach: Reach) -> Stray:
+def stray_of(surface: Surface, scene: Scene, seen: Sequence[View]) -> Stray:
     """Return how much of the person lies off a surface of the scene, and of its skin off the person."""
-    (skin, cloth), (near, _) = 1e4 * uncovered_areas(surface, seen, (reach.reach_m, reach.hint_m), reach.cloth_m)
-    floating = 1e4 * floating_area(scene.bare(surface), seen, reach.reach_m)
+    (skin, cloth), (near, _) = 1e4 * uncovered_areas(surface, seen, (REACH_M, HINT_M), CLOTH_M)
+    floating = 1e4 * floating_area(scene.bare(surface), seen, REACH_M)
     return Stray(uncovered=skin, floating=floating, cloth=cloth, near=near)
 
 
@@ -73,14 +69,13 @@ class Judge(NamedTuple):
     seen: Sequence[View]
     parameters: F64  # of the cloth
     past: Past
-    reach: Reach
     given: Given | None  # None: nothing was
     cloth: float  # what a pixel of cloth counts, on either side
 
     def of(self, result: FrameResult) -> Fit:
         """Return a result judged by its full surface."""
         pose, surface = result.state.estimate.pose, surface_of(self.model, result)
-        stray = stray_of(surface, self.model.scene, self.seen, self.reach)
+        stray = stray_of(surface, self.model.scene, self.seen)
         return Fit(result, stray, self._apart(pose, surface, self.model.scene))
 
     def apart(self, poses: Sequence[Pose]) -> F64:
@@ -90,12 +85,12 @@ class Judge(NamedTuple):
 
     def stray(self, poses: Sequence[Pose]) -> F64:
         """Return for each pose (B,) how much of surface and person strays, without cloth, cm²."""
-        strays = [stray_of(surface, self.coarse, self.seen, self.reach) for surface in self._surfaces(poses)]
+        strays = [stray_of(surface, self.coarse, self.seen) for surface in self._surfaces(poses)]
         return np.array([stray.uncovered + stray.floating for stray in strays])
 
     def _apart(self, pose: Pose, surface: Surface, scene: Scene) -> float:
         strain = self.given.strain(pose) if self.given else 1.0
-        return strain * distance(surface, scene.bare(surface), self.seen, self.reach.cap_m, self.cloth)
+        return strain * distance(surface, scene.bare(surface), self.seen, CAP_M, self.cloth)
 
     def _surfaces(self, poses: Sequence[Pose]) -> list[Surface]:
         clothes = drapes(self.model, poses, self.parameters, self.past)

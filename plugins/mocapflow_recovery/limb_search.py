@@ -24,7 +24,7 @@ from mocapflow.scene import Scene
 from mocapflow.settings import PositiveOrInf
 from mocapflow_recovery.certain import View, small_room, views
 from mocapflow_recovery.disagreement import FLIES, HANGS
-from mocapflow_recovery.judge import Fit, Given, Judge, Reach, stray_of, surface_of
+from mocapflow_recovery.judge import Fit, Given, Judge, stray_of, surface_of
 from mocapflow_recovery.looks import Looks
 from mocapflow_recovery.sampling import Plan, Spread
 from mocapflow_recovery.suspicion import Signs, Suspicion, suspicion
@@ -68,20 +68,16 @@ class LimbSearch(Recovery):
     needs_background: ClassVar[bool] = True
     uncovered_cm2: PositiveFloat = 30.0  # of the person off the model, in all views: more, and the fit is doubted
     floating_cm2: PositiveFloat = 30.0  # likewise, of skin in empty space
-    hint_cm2: PositiveOrInf = inf  # of the person off it by `hint_m`: more, and limbs are looked for; noise has it, too
+    hint_cm2: PositiveOrInf = inf  # of the person off it by 3 cm: more, and limbs are looked for; noise has it, too
     beginnings: bool = True  # limbs are looked for in the first frame, and in the first one after a gap
     leap_deg: PositiveOrInf = 20.0  # from what was believed and from all `poses`: a limb so far from both is looked for
     overbent_deg: PositiveOrInf = 5.0  # of a joint, beyond its limits: they are soft, and what is lost goes there
     least_known: Annotated[float, Field(ge=0, le=1)] = 0.4  # of the room behind the model, mean of the views
-    reach_m: PositiveFloat = 0.06  # what lies nearer to the other does not count
-    hint_m: PositiveFloat = 0.03  # nor, as a hint, what lies nearer than this
-    cloth_m: PositiveFloat = 0.2  # what lies so near to the garment may be the garment, wherever it swings
     gain: Annotated[float, Field(ge=0, lt=1)] = 0.1  # share that each part mends, and a fit that cures no doubt
     tolerance: NonNegativeFloat = 0.03  # by which share a part may be farther that stays as it was fitted
     rows: Annotated[int, Field(ge=50)] = 160  # images are shrunk to about this height
     faces: Annotated[int, Field(ge=200)] = 2600  # of the body that is searched with
     near_m: PositiveFloat = 0.35  # changes further than this from the model are somebody else
-    cap_m: PositiveFloat = 0.2  # beyond, it does not matter how far
     samples: PositiveInt = 40  # of each part in a round
     poses: Poses = SHIPPED  # that people were seen in, made by `mocapflow prior fit`: limbs are tried as they are there
     seen_samples: NonNegativeInt = 100  # of each limb in the first round, from `poses`
@@ -109,7 +105,7 @@ class LimbSearch(Recovery):
             return noted(result, UNSEEN, doubted=True)
         if np.mean([view.known for view in seen]) < self.least_known:
             return result if past.moments else noted(result, UNKNOWN, doubted=False)
-        stray = stray_of(surface, model.scene, seen, self.reach)
+        stray = stray_of(surface, model.scene, seen)
         fitted, believed, body = result.state.estimate.pose, state.estimate.pose, model.scene.body
         suspected = suspicion(self.signs, stray, fitted, believed, past, body, self._density)
         if suspected is None:
@@ -177,7 +173,7 @@ class LimbSearch(Recovery):
         given = None if past.moments or past.after_gap else Given(believed, np.radians(self.start_deg))
         coarse = model.scene.simplified(self.faces)
         cloth = HANGS if given else FLIES  # where all begins, the garment's colours are not known
-        return Judge(model, coarse, seen, result.state.cloth.parameters, past, self.reach, given, cloth)
+        return Judge(model, coarse, seen, result.state.cloth.parameters, past, given, cloth)
 
     def _plan(self, body: Body) -> Plan:
         spread = Spread(np.radians(self.spread_deg), np.radians(self.root_spread_deg), self.root_spread_m)
@@ -192,11 +188,6 @@ class LimbSearch(Recovery):
         """What calls for a search."""
         overbent, leap = np.radians(self.overbent_deg), np.radians(self.leap_deg)
         return Signs(self.uncovered_cm2, self.floating_cm2, self.hint_cm2, self.beginnings, overbent, leap)
-
-    @property
-    def reach(self) -> Reach:
-        """What counts as apart."""
-        return Reach(self.reach_m, self.hint_m, self.cloth_m, self.cap_m)
 
 
 def noted(result: FrameResult, note: str, doubted: bool) -> FrameResult:

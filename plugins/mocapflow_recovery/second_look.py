@@ -116,7 +116,7 @@ class Hindsight(NamedTuple):
         finder = self.loop.recovery if isinstance(self.loop.recovery, LimbSearch) else LimbSearch()
         surfaces = self.model.surface(self.fits.pose(row), self.fits.cloth(row)), surface_of(self.model, result)
         seen = finder.views(frame, surfaces[0], past, self.model.scene)
-        before, now = (stray_of(surface, self.model.scene, seen, finder.reach) for surface in surfaces)
+        before, now = (stray_of(surface, self.model.scene, seen) for surface in surfaces)
         return before.near + before.floating, now.near + now.floating
 
 
