@@ -12,7 +12,8 @@ from mocapflow.geometry.cameras import project
 from mocapflow.records import F64, array, record
 from mocapflow_fitting.triangulate import USUAL_PX, Points, triangulate
 
-ALIKE_PX_SHARE = 0.05  # of the height of a detection: keypoints of one person reproject within about this
+HALVING_SHARE = 1 / 60  # of the diagonal of a person's box: so far off, a keypoint counts half
+LEAST_HALVING_PX = 2.0
 
 
 @record
@@ -72,14 +73,14 @@ def _joined(detections: Sequence[F64], cameras: Sequence[Camera], pair: dict[int
 def _agreement(position: F64, points: F64, camera: Camera) -> float:
     """Return the share of a detection's confidence that lies near the projected points."""
     error = np.linalg.norm(project(position, camera) - points[:, :2], axis=1)
-    near = 1 / (1 + (error / scale_of(points)) ** 2)
+    near = 1 / (1 + (error / halving_px(points)) ** 2)
     return float(np.nansum(points[:, 2] * near) / max(points[:, 2].sum(), 1e-9))
 
 
 def _person(detections: Sequence[F64], cameras: Sequence[Camera], chosen: tuple[int, ...]) -> Person:
     count = max((d.shape[1] for d in detections if len(d)), default=0)
     rows = np.stack([detections[c][row] if row >= 0 else np.zeros((count, 3)) for c, row in enumerate(chosen)])
-    sizes = [scale_of(points) for points in rows if points[:, 2].any()]
+    sizes = [halving_px(points) for points in rows if points[:, 2].any()]
     scale = float(np.median(sizes)) if sizes else USUAL_PX  # estimators list people of whom they see no point
     points = triangulate(rows[..., :2], rows[..., 2], cameras, scale)
     found = np.isfinite(points.position).all(axis=1)
@@ -89,8 +90,8 @@ def _person(detections: Sequence[F64], cameras: Sequence[Camera], chosen: tuple[
     )
 
 
-def scale_of(points: F64) -> float:
-    """Return the error (px) at which a keypoint no longer counts as the same person's."""
+def halving_px(points: F64) -> float:
+    """Return the error (px) that halves the weight of a keypoint among those of a person (K, 3)."""
     seen = points[points[:, 2] > 0, :2]
-    height = float(np.linalg.norm(np.ptp(seen, axis=0))) if len(seen) else 0.0
-    return max(ALIKE_PX_SHARE * height / 3, 2.0)
+    diagonal = float(np.linalg.norm(np.ptp(seen, axis=0))) if len(seen) else 0.0
+    return max(HALVING_SHARE * diagonal, LEAST_HALVING_PX)

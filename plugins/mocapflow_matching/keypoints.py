@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from mocapflow_fitting.keypoint_layouts import LAYOUTS, Layout, layout_of, rows_of
 from mocapflow_fitting.landmarks import landmarks
-from mocapflow_fitting.person import scale_of
+from mocapflow_fitting.person import halving_px
 from mocapflow_fitting.triangulate import USUAL_PX, triangulate
 from pydantic import PositiveFloat
 
@@ -25,7 +25,7 @@ from mocapflow_matching.robust import robust_weights
 NEIGHBOURS = 60  # vertices that a landmark may be a mean of
 MEDIAN_RADIUS = 1.177  # median length of a normal 2D error, in standard deviations of its components
 OUTLYING = 4.0  # standard deviations from which on an error is none of the noise
-SAME_PERSON = 3.0  # times the scale of a person's keypoints: the median of their errors, at most
+SAME_PERSON = 3.0  # times the error that halves a keypoint's weight: the median of a person's errors, at most
 
 
 class Keypoints(Matcher):
@@ -79,7 +79,7 @@ class Keypoints(Matcher):
             if frame.usable[index] and ordered:
                 off = [_median_error(points, projected) for points in ordered]
                 best = int(np.argmin(off))
-                if off[best] < SAME_PERSON * scale_of(view[best]):
+                if off[best] < SAME_PERSON * halving_px(view[best]):
                     seen[index] = np.clip(ordered[best], [-np.inf, -np.inf, 0], [np.inf, np.inf, 1])
         return seen
 
