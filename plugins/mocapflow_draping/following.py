@@ -7,14 +7,26 @@ touches a part of the body goes along its normal as that part does, and is free 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numba
 import numpy as np
 
+from mocapflow.records import F64
 from mocapflow_draping.distance import outwards
 
 FASTEST = 2.0  # m per rad, or per m of thickness: more than a reach; a ring about to buckle would move without bounds
 GRAZING = 0.2  # least slope at which a bar is said to meet the skin: below, its turn would be without bounds
+
+
+class Motion(NamedTuple):
+    """The rates that are brought along, in place, while the rings of one drape are closed."""
+
+    rate: F64  # (N, L, 3, S) of the particles
+    bar_rate: F64  # (N, L, 3, S) room for those of the bars, in lengths of theirs
+    carry: F64  # (P, 3, 4, S) of the points of the body's parts, affine in their place in the world
+    swell: F64  # (S,) of the contact distance
+    grow: F64  # (S,) of the logarithm of the bars' length
 
 
 @numba.njit(cache=True, error_model="numpy")

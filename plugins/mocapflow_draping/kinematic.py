@@ -18,6 +18,7 @@ from mocapflow.memo import memoised
 from mocapflow.records import F64, I32, Bool, record
 from mocapflow.scene import Scene
 from mocapflow_draping.fields import BodyFields, build_fields, touchable_joints
+from mocapflow_draping.following import Motion
 from mocapflow_draping.forces import remaining_length, thickness, tilts, wind
 from mocapflow_draping.frames import along_limbs, riding, standing, standing_out
 from mocapflow_draping.laying import distinct, follow, lay, moving
@@ -26,8 +27,6 @@ from mocapflow_draping.strands import Strands, roots, strands_of
 
 LOWER = 0.002  # m, step of a cloth that nothing holds
 TINY = 1e-6  # rad, and share of a parameter's range: what the drape starts from is differentiated by steps
-
-Motion = tuple[F64, F64, F64, F64, F64]  # what `rings.close` needs to bring rates along
 
 
 @record
@@ -115,7 +114,7 @@ class Kinematic(Draper):
             laid = lay(strands, fitting.fields, here, still, alone, skin[-1:], parts, start)
             grid, rate = laid.grid, follow(strands, fitting.fields, near, winds, laid, parts, moved)
         if self.sweeps:
-            motion = rate, np.zeros_like(rate), moved.carry, moved.swell, moved.grow
+            motion = Motion(rate, np.zeros_like(rate), moved.carry, moved.swell, moved.grow)
             self._close(fitting, grid, strands.first[None], links[-1:], chain[-1:], skin[-1:], parts, motion)
         row, unknowns = strands.place[vertices], 6 + len(pose.angles) + len(parameters)
         return all_columns(grid.reshape(-1, 3)[row], rate.reshape(-1, 3, len(steps))[row], tried, pose, unknowns)

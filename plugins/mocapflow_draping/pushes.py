@@ -33,8 +33,8 @@ def push_out(grid, n, row, link, skin, seen, room, near, parts, values, motion):
         p = place(grid, n, row)
         out = outwards(p[0], p[1], p[2], near[n], parts, values)
         if motion is not None:
-            rate, _, carry, swell, _ = motion
-            follow_move(rate, n, row, lack(out, p, rate[n, row], carry[near[n]], swell), out)
+            amount = lack(out, p, motion.rate[n, row], motion.carry[near[n]], motion.swell)
+            follow_move(motion.rate, n, row, amount, out)
         move(grid, n, row, CLEAR - room[n], out)
         to_length(grid, n, row, link, motion)
     _stand_off(grid, n, row, link, skin, seen, room, near, parts, values, motion)
@@ -79,12 +79,12 @@ def lift(grid, first, last, beside, row, seen, room, near, between, clear, parts
         if d < 0.0:
             out = outwards(middle[0], middle[1], middle[2], part, parts, values)
             if motion is not None:
-                rate, _, carry, swell, _ = motion
-                amount = lack(out, middle, 0.5 * (rate[n, row] + rate[m, row]), carry[part], 0.0 * swell)
+                between_them = 0.5 * (motion.rate[n, row] + motion.rate[m, row])
+                amount = lack(out, middle, between_them, motion.carry[part], 0.0 * motion.swell)
                 if row > first[n]:
-                    follow_move(rate, n, row, amount, out)
+                    follow_move(motion.rate, n, row, amount, out)
                 if row > first[m]:
-                    follow_move(rate, m, row, amount, out)
+                    follow_move(motion.rate, m, row, amount, out)
             if row > first[n]:
                 move(grid, n, row, CLEAR - d, out)
             if row > first[m]:
@@ -106,7 +106,7 @@ def to_length(grid, n, row, link, motion):  # type: ignore[no-untyped-def]
     x, y, z = place(grid, n, row - 1)
     dx, dy, dz = grid[n, row, 0] - x, grid[n, row, 1] - y, grid[n, row, 2] - z
     if motion is not None:
-        follow_length(motion[0], n, row, (dx, dy, dz), link, motion[4])
+        follow_length(motion.rate, n, row, (dx, dy, dz), link, motion.grow)
     scale = link / max(math.sqrt(dx * dx + dy * dy + dz * dz), 1e-9)
     grid[n, row, 0], grid[n, row, 1], grid[n, row, 2] = x + scale * dx, y + scale * dy, z + scale * dz
 

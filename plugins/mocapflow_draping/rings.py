@@ -50,9 +50,7 @@ def close_batch(  # type: ignore[no-untyped-def]
         sweeps: passes over each row, at most.
         parts: (B, P, COLUMNS), the bodies, see `parts`.
         values: their voxels.
-        motion: None or, for one drape, what is brought along in place: rates (N, L, 3, S) of the particles, as much
-            room for those of the bars, those of the body's parts (P, 3, 4, S), of the contact distance (S,) and of
-            the logarithm of the bars' length (S,).
+        motion: None or, for one drape, the `Motion` that is brought along.
     """
     for b in range(len(grid)):
         _close(
@@ -75,7 +73,7 @@ def _close(  # type: ignore[no-untyped-def]
     may_hold = turns > 0 and hold_rad < math.pi
     _bars(grid, links, first, last, bars)
     if motion is not None:
-        _bars(motion[0], links, first, last, motion[1])
+        _bars(motion.rate, links, first, last, motion.bar_rate)
     for row in range(1, rows):
         _place(grid, bars, links, first, last, row, bend, motion)
         held = may_hold and hold(grid, limb, links, first, last, row, hold_rad, target, left)
@@ -117,8 +115,8 @@ def _place(grid, bars, links, first, last, row, bend, motion):  # type: ignore[n
                 kept = (above - grid[n, row - 2, a]) / links[n, row - 2] if share > 0.0 else 0.0
                 grid[n, row, a] = above + link * (share * kept + (1.0 - share) * bars[n, row, a])
             if motion is not None:
-                rate = motion[0][n]
-                turn = (1.0 - share) * motion[1][n, row]
+                rate = motion.rate[n]
+                turn = (1.0 - share) * motion.bar_rate[n, row]
                 if share > 0.0:
                     turn += share / links[n, row - 2] * (rate[row - 1] - rate[row - 2])
                 rate[row] = rate[row - 1] + link * turn
@@ -160,7 +158,7 @@ def _pull(grid, first, last, across, length, row, longest, stiff, gives, backwar
         else:
             continue
         if motion is not None:
-            follow_draw(motion[0], n, m, row, (dx, dy, dz), share, limit, here, there)
+            follow_draw(motion.rate, n, m, row, (dx, dy, dz), share, limit, here, there)
         move(grid, n, row, here * share, (dx, dy, dz))
         move(grid, m, row, -there * share, (dx, dy, dz))
     return worst
