@@ -25,14 +25,14 @@ class Steady(Settings):
     energy_share: PositiveOrInf = float("inf")  # largest change of the functional from turn to turn
     turns: PositiveInt = 2  # in a row within the tolerances, then the frame is at rest
     max_turns: PositiveInt = 8  # then the frame is left as it is
-    first_turns: NonNegativeInt = 0  # the same, if more, of a frame that begins far off, as first ones may
+    far_turns: NonNegativeInt = 0  # the same, if more, of a frame that begins far off, as first ones may
     far_mm: PositiveOrInf = float("inf")  # move of the body in a first turn beyond which the frame began far off
     halvings: NonNegativeInt = 0  # at most, of a step that raises the functional; 0: it is taken whole
 
     @property
     def cap(self) -> int:
         """How many turns any frame takes at most."""
-        return max(self.max_turns, self.first_turns)
+        return max(self.max_turns, self.far_turns)
 
     @property
     def beginning(self) -> Steady:

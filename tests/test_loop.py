@@ -37,7 +37,7 @@ def frame():
     return Frame(index=5, time=0.1, images=(image, image), usable=np.ones(2, bool))
 
 
-def go(frame, share, observe=lambda *_: None, max_turns=8, sigmas=(), past=None, first_turns=0, steady=None):
+def go(frame, share, observe=lambda *_: None, max_turns=8, sigmas=(), past=None, far_turns=0, steady=None):
     camera = Camera(
         name="cam01", size=np.array([24, 16], np.int32), intrinsics=np.eye(3), distortion=np.zeros(5),
         camera_from_world=np.eye(4),
@@ -46,7 +46,7 @@ def go(frame, share, observe=lambda *_: None, max_turns=8, sigmas=(), past=None,
     steps = Steps(
         segmenter=TinySegmenter(), matchers=(TinyMatcher(),), pose_solver=Towards(share=share),
         cloth_fitter=None, priors=(),
-        steady=Steady(sigmas=sigmas, max_turns=max_turns, first_turns=first_turns, **(steady or {})),
+        steady=Steady(sigmas=sigmas, max_turns=max_turns, far_turns=far_turns, **(steady or {})),
     )  # fmt: skip
     pose = Pose(root=np.eye(4), angles=np.array([0.3, -0.4]))
     start = believed(pose, np.empty(0), model.drape(pose, np.empty(0), Past()))
@@ -106,10 +106,10 @@ def test_the_cap_holds(frame):
 
 def test_a_frame_that_begins_like_a_first_may_take_more_turns(frame):
     before = Past(moments=(Moment(time=0.0, pose=Pose(root=np.eye(4), angles=np.zeros(2)), cloth=NO_CLOTH),))
-    first, later = (go(frame, 0.05, max_turns=3, first_turns=6, past=past) for past in (Past(), before))
+    first, later = (go(frame, 0.05, max_turns=3, far_turns=6, past=past) for past in (Past(), before))
     assert (first.iterations, later.iterations) == (6, 3)
     assert len(first.energy) == len(later.energy) == 6  # as long in every frame: the rows of one array
-    assert go(frame, 0.05, max_turns=3, first_turns=2).iterations == 3
+    assert go(frame, 0.05, max_turns=3, far_turns=2).iterations == 3
 
 
 @pytest.mark.parametrize(("far_mm", "turns"), [(1, 6), (1000, 3)])
@@ -118,7 +118,7 @@ def test_a_frame_whose_first_turn_moves_the_body_far_is_one_that_began_far_off(f
     before = Past(moments=(Moment(time=0.0, pose=Pose(root=np.eye(4), angles=np.zeros(2)), cloth=NO_CLOTH),))
     seen = []
     steady = dict(far_mm=far_mm)
-    result = go(frame, 0.05, lambda *args: seen.append(args[1].far), 3, (0, 0.01), before, first_turns=6, steady=steady)
+    result = go(frame, 0.05, lambda *args: seen.append(args[1].far), 3, (0, 0.01), before, far_turns=6, steady=steady)
     assert result.iterations == turns
     assert seen == ([False, *[True] * 5] if far_mm == 1 else [False] * 3)
     assert len(result.energy) == 6

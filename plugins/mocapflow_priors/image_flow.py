@@ -32,7 +32,7 @@ class ImageFlowPredictor(Predictor):
     name = "image_flow"
 
     otherwise: Predictor = ConstantVelocity()  # guesses what no point shows
-    pose_solver: PoseSolver = TwistGaussNewton(iterations=8, angle_damping_deg=20.0)  # of the pose that the points show
+    pose_solver: PoseSolver = TwistGaussNewton(iterations=8, angle_sd_deg=20.0)  # of the pose that the points show
     priors: tuple[Prior, ...] = (JointLimits(), RestPose())  # points on one side of a limb do not tell how it is turned
     sigma_px: PositiveFloat = 1.0  # standard deviation of a tracked point
     scale: PositiveFloat = 2.0  # standard deviations beyond which a point pulls no harder (Huber)

@@ -34,7 +34,7 @@ class TwistGaussNewton(PoseSolver):
     name = "twist_gauss_newton"
 
     iterations: PositiveInt = 10  # times that it matches anew, at most
-    first_iterations: NonNegativeInt = 0  # the same, if it is more, in a frame that begins far off
+    far_iterations: NonNegativeInt = 0  # the same, if it is more, in a frame that begins far off
     steps_per_match: PositiveInt = 1  # steps with the same pairs
     residual: Literal["image", "line"] = "image"  # pixels, or distance to projection rays in space
     line_sigma_mm: PositiveFloat = 3.0  # standard deviation of every distance to a ray
@@ -47,9 +47,9 @@ class TwistGaussNewton(PoseSolver):
     correlation_px: NonNegativeFloat = 15.0  # length over which contour errors agree; 0: independent
     balance_views: bool = False  # every view counts the same
     cloth_unknowns: bool = False  # also solves for the cloth parameters
-    root_damping_m: PositiveFloat = 0.1  # standard deviation about the pose that a turn of the loop begins from
-    root_damping_deg: PositiveFloat = 11.5  # likewise
-    angle_damping_deg: PositiveFloat = 60.0  # likewise, of every joint angle
+    root_sd_m: PositiveFloat = 0.1  # standard deviation about the pose that a turn of the loop begins from
+    root_sd_deg: PositiveFloat = 11.5  # likewise
+    angle_sd_deg: PositiveFloat = 60.0  # likewise, of every joint angle
     cloth_sd: PositiveFloat = 0.06  # standard deviation of cloth parameters about a calm garment, share of their range
     stop_sigmas: NonNegativeFloat = 0.02  # standard deviations, in the mean: no smaller step is taken
 
@@ -69,7 +69,7 @@ class TwistGaussNewton(PoseSolver):
         surface, damping = model.surface(guess.pose, guess.cloth), self._least_damping(past, turn)
         tried: dict[Pose, Sequence[Residual]] = {}
         found: Quadratic | None = None  # the last quadratic models, for the covariance
-        for _ in range(max(self.iterations, self.first_iterations) if turn.far else self.iterations):
+        for _ in range(max(self.iterations, self.far_iterations) if turn.far else self.iterations):
             matches, found = match(surface), None
             problem = Problem(model, self._data(matches, model), priors, past, anchor, tried)
             if problem.data.measurements == 0:
@@ -109,8 +109,8 @@ class TwistGaussNewton(PoseSolver):
 
     def _precision(self, model: ClothedModel, guess: Guess) -> F64:
         """Return one over the variance of the damping of every unknown."""
-        turn, bend = np.radians(self.root_damping_deg), np.radians(self.angle_damping_deg)
-        spread = [np.full(3, turn), np.full(3, self.root_damping_m), np.full(len(guess.pose.angles), bend)]
+        turn, bend = np.radians(self.root_sd_deg), np.radians(self.angle_sd_deg)
+        spread = [np.full(3, turn), np.full(3, self.root_sd_m), np.full(len(guess.pose.angles), bend)]
         if self.cloth_unknowns and model.clothed:
             spread.append(np.maximum(self.cloth_sd * parameter_ranges(model), 1e-12))
         precision: F64 = np.concatenate(spread) ** -2.0

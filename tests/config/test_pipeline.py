@@ -425,7 +425,7 @@ CHAPTER = {  # what the chapter, or the specification of it where it is silent, 
         longest=1.1, stiff=0.0, bending_m=0.0,
     ),
     "cloth_fitter": dict(name="sampled_forces", directions=8, amounts_deg=(5.0, 10.0, 20.0), least_gain=0.01),
-    "steady": dict(surface_mm=0.5, angle_deg=0.1, energy_share=0.001, turns=2, max_turns=8, sigmas=(), first_turns=0),
+    "steady": dict(surface_mm=0.5, angle_deg=0.1, energy_share=0.001, turns=2, max_turns=8, sigmas=(), far_turns=0),
 }  # fmt: skip
 
 

@@ -101,7 +101,7 @@ def test_an_unseen_leg_comes_to_rest_in_a_training_pose(tmp_path: Path) -> None:
     write(tmp_path / "poses.npz", Density(names=LEG, poses=poses, bandwidth=0.1))
     leg = np.isin(scene.body.skin_joint, (1, 2, 3)) & (scene.body.skin_weight > 0)
     seen = np.flatnonzero(~leg.any(axis=1))
-    solver = TwistGaussNewton(angle_damping_deg=1e4)
+    solver = TwistGaussNewton(angle_sd_deg=1e4)
     matches = exact_matches(scene, truth, seen, directed=False)
 
     def solved(*priors: Parzen) -> Estimate:

@@ -22,7 +22,7 @@ from mocapflow.geometry import kinematics, twists
 from mocapflow.model import ClothedModel
 from mocapflow.scene import Scene
 
-FREE = {"root_damping_m": 1e6, "root_damping_deg": 1e8, "angle_damping_deg": 1e8, "damping": 1e-12}
+FREE = {"root_sd_m": 1e6, "root_sd_deg": 1e8, "angle_sd_deg": 1e8, "damping": 1e-12}
 EXACT = {**FREE, "stop_sigmas": 0.0, "cap_deg": 60.0, "cap_mm": 500.0, "correlation_px": 0.0}
 TURN = Turn(index=0)
 DEMO = Path(__file__).parents[2] / "examples" / "data" / "skirt_steps"
@@ -105,7 +105,7 @@ def test_only_the_first_frame_starts_gently() -> None:
 def test_only_a_frame_that_began_far_off_looks_for_matches_more_often() -> None:
     scene, truth = make_scene(), make_pose(1)
     matches, start = exact_matches(scene, truth, np.arange(0, 300, 9), directed=False), start_from(truth, 1)
-    solver = TwistGaussNewton(**{**EXACT, "iterations": 1}, first_iterations=3)
+    solver = TwistGaussNewton(**{**EXACT, "iterations": 1}, far_iterations=3)
     later = Past(moments=(Moment(time=0.0, pose=start, cloth=NO_CLOTH),))
     for far, wanted in ((True, 3), (False, 1)):
         looked, turn = Mock(return_value=matches), replace(TURN, far=far)

@@ -90,7 +90,7 @@ def test_priors_on_the_root_pull_about_the_root_as_their_energy_says() -> None:
 
 
 def test_the_damping_pulls_about_the_root_as_its_energy_says() -> None:
-    solver = TwistGaussNewton(root_damping_deg=20.0, root_damping_m=0.05, angle_damping_deg=30.0)
+    solver = TwistGaussNewton(root_sd_deg=20.0, root_sd_m=0.05, angle_sd_deg=30.0)
     problem, guess = problem_of(solver, Guess(start_from(TRUTH, 2), NO_CLOTH)), Guess(TRUTH, NO_CLOTH)
     columns = solve.about_origin(problem.centre(guess), UNKNOWNS).T
 
