@@ -18,7 +18,7 @@ from mocapflow_levelset.evidence import calmed
 from mocapflow_levelset.evolve import Rhythm, Weights
 from mocapflow_levelset.levelset import INNER_BAND_PX, PERSON
 from mocapflow_levelset.masks import counted
-from mocapflow_levelset.plates import Plate, density_of, plate_in
+from mocapflow_levelset.plates import Plate, density_image, plate_in
 from mocapflow_levelset.shadows import ShadowAware, floor_around
 from mocapflow_levelset.statistics import Window
 from mocapflow_levelset.view import Empty, Level, Method, View, find
@@ -91,10 +91,8 @@ class BackgroundDifference(ShadowAware):
         import cv2
 
         calm = features(calmed(image, self.smooth_px), CHANNELS)
-        values, expected = calm.reshape(len(calm), -1), plate.planes.reshape(len(calm), -1)
-        density = density_of(values, expected, plate.spread.ravel(), floor.ravel(), CHANNELS, self.shadow())
-        unknown = np.isnan(density).reshape(model.shape)
-        bounded = np.nan_to_num(np.clip(-density.reshape(model.shape), -6, 6))
+        density = density_image(calm, plate, floor, CHANNELS, self.shadow())
+        unknown, bounded = np.isnan(density), np.nan_to_num(np.clip(-density, -6, 6))
         change = cv2.GaussianBlur(bounded, (0, 0), self.smooth_px)
         untold = unknown if hidden is None else unknown | hidden
         change[untold] = np.clip(model[untold], -1, 1)  # nothing else tells

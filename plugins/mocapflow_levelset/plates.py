@@ -78,6 +78,12 @@ def density_of(
     return out
 
 
+def density_image(values: F32, plate: Plate, floor: Bool, channels: Sequence[ChannelName], shadow: Shadow) -> F32:
+    """Return `density_of` all pixels (H, W) of an image with these features (C, H, W)."""
+    flat, expected = values.reshape(len(values), -1), plate.planes.reshape(len(values), -1)
+    return density_of(flat, expected, plate.spread.ravel(), floor.ravel(), channels, shadow).reshape(floor.shape)
+
+
 def first_lab(channels: Sequence[ChannelName]) -> int:
     """Return the index of the first lab plane among the feature planes, -1 without: then no shadow is known."""
     return sum(PLANES[name] for name in channels[: list(channels).index("lab")]) if "lab" in channels else -1

@@ -9,7 +9,7 @@ import numpy as np
 from mocapflow_levelset import crops
 from mocapflow_levelset.channels import ChannelName, features
 from mocapflow_levelset.colours import bins_of
-from mocapflow_levelset.plates import Plate, Shadow, density_of, plate_in
+from mocapflow_levelset.plates import Plate, Shadow, density_image, plate_in
 from mocapflow_levelset.shadows import floor_around
 
 from mocapflow.assets import Background, Camera
@@ -99,10 +99,9 @@ def _compared(image: U8, plate: Plate, floor: Bool) -> tuple[Bool, Bool]:
     Where nobody knows the room, it is neither.
     """
     values = features(image, CHANNELS)
-    flat, expected, spread = values.reshape(len(values), -1), plate.planes.reshape(len(values), -1), plate.spread
-    density = density_of(flat, expected, spread.ravel(), floor.ravel(), CHANNELS, SHADOW).reshape(floor.shape)
-    off = np.sum((values - plate.planes) ** 2, axis=0) / np.maximum(spread, SHADOW.floor) ** 2
-    return density < 0, (off < EMPTY**2) & np.isfinite(spread)
+    off = np.sum((values - plate.planes) ** 2, axis=0) / np.maximum(plate.spread, SHADOW.floor) ** 2
+    changed = density_image(values, plate, floor, CHANNELS, SHADOW) < 0
+    return changed, (off < EMPTY**2) & np.isfinite(plate.spread)
 
 
 def _away(empty: Bool, person: Bool) -> F32:

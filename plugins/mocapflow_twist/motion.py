@@ -20,7 +20,7 @@ class ClothMotion:
     """Moves pose and cloth together; lives as long as one call of the solver.
 
     The cloth is draped anew at every pose. Measuring how it moves takes many drapes, so that is done once, only when a
-    match needs it, of the guess at hand.
+    match needs it, at the guess of that moment.
     """
 
     model: ClothedModel
