@@ -6,6 +6,7 @@ import ast
 import importlib.util
 import sys
 from collections.abc import Iterable, Iterator
+from importlib.machinery import ModuleSpec
 from pathlib import Path
 
 INSTALLED = {"site-packages", "dist-packages"}  # folders of what does not change but with its version
@@ -66,12 +67,21 @@ def visible(folder: Path) -> Iterator[Path]:
 
 def data_files(unit: str) -> Iterable[tuple[str, Path]]:
     """Yield the files of a plugin package that are no code, such as a template body."""
-    origin = _origin(unit)
-    if origin is None or origin.name != "__init__.py" or unit.startswith("mocapflow."):
+    if unit.startswith("mocapflow."):
         return
-    for path in visible(origin.parent):
+    for inner, path in _inside(unit):
         if path.suffix != ".py" and "__pycache__" not in path.parts:
-            yield path.relative_to(origin.parent).as_posix(), path
+            yield inner.as_posix(), path
+
+
+def python_files(unit: str) -> Iterable[tuple[str, Path]]:
+    """Yield dotted name and path of every Python file of a module or package."""
+    for inner, path in _inside(unit):
+        if path.suffix == ".py":
+            yield ".".join((unit, *(part for part in inner.with_suffix("").parts if part != "__init__"))), path
+    if (file := _file(unit)) is not None:
+        placeless = unit if "." in unit else file.stem  # a plugin file's name says where it lies
+        yield placeless, file
 
 
 def _uninstalled(name: str) -> bool:
@@ -79,26 +89,32 @@ def _uninstalled(name: str) -> bool:
     top = name.partition(".")[0]
     if top == "mocapflow" or top in sys.stdlib_module_names:
         return False
-    origin = _origin(top)
-    return origin is not None and origin.suffix == ".py" and not INSTALLED & set(origin.parts)
+    file = _file(top)
+    places = _folders(top) if file is None else [file] if file.suffix == ".py" else []
+    return any(not INSTALLED & set(place.parts) for place in places)
 
 
-def _origin(unit: str) -> Path | None:
+def _inside(unit: str) -> Iterator[tuple[Path, Path]]:
+    """Yield the files of a package, within it and in full."""
+    for folder in reversed(_folders(unit)):  # who keeps one of each name keeps that of the first folder, as imports do
+        yield from ((path.relative_to(folder), path) for path in visible(folder))
+
+
+def _file(unit: str) -> Path | None:
+    """Return the file of a module that is no package."""
+    spec = _spec(unit)
+    if spec is None or spec.origin is None or spec.submodule_search_locations is not None:
+        return None
+    return Path(spec.origin)
+
+
+def _folders(unit: str) -> list[Path]:
+    """Return the folders of a package: without an `__init__.py` it may have several."""
+    spec = _spec(unit)
+    found = None if spec is None else spec.submodule_search_locations
+    return [folder for folder in map(Path, found or ()) if folder.is_dir()]  # setuptools adds a name that is no folder
+
+
+def _spec(unit: str) -> ModuleSpec | None:
     loaded = sys.modules.get(unit)
-    spec = loaded.__spec__ if loaded is not None else importlib.util.find_spec(unit)
-    return None if spec is None or spec.origin is None else Path(spec.origin)
-
-
-def python_files(unit: str) -> Iterable[tuple[str, Path]]:
-    """Yield dotted name and path of every Python file of a module or package."""
-    origin = _origin(unit)
-    if origin is None:
-        return
-    if origin.name != "__init__.py":
-        placeless = unit if "." in unit else origin.stem  # a plugin file's name says where it lies
-        yield placeless, origin
-        return
-    for path in visible(origin.parent):
-        if path.suffix == ".py":
-            parts = path.relative_to(origin.parent).with_suffix("").parts
-            yield ".".join((unit, *(part for part in parts if part != "__init__"))), path
+    return loaded.__spec__ if loaded is not None else importlib.util.find_spec(unit)

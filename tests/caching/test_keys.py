@@ -244,6 +244,28 @@ def test_the_reader_of_recordings_counts_however_it_is_imported(line):
     assert {sources.unit_of(name) for name in counted} == {"mocapflow.recordings.recording"}
 
 
+def test_packages_without_an_init_count_like_others(tmp_path, monkeypatch):
+    """The plugin imports a helper, and the plugin itself is in two folders of the path."""
+    for folder in ("one/mocapflow_open", "two/mocapflow_open", "one/my_open_helper"):
+        (tmp_path / folder).mkdir(parents=True)
+    (tmp_path / "one/mocapflow_open/garment.py").write_text("import my_open_helper.flat")
+    for folder in ("two", "one"):
+        monkeypatch.syspath_prepend(tmp_path / folder)
+    found = [Digests().package("mocapflow_open.garment")]
+    for name, text in {
+        "one/mocapflow_open/garment.py": "import my_open_helper.flat\nX = 1",
+        "one/my_open_helper/flat.py": "X = 1",
+        "two/mocapflow_open/inner.py": "X = 1",
+        "two/mocapflow_open/body.obj": "v 0",
+        "one/mocapflow_open/inner.py": "X = 2",
+    }.items():
+        (tmp_path / name).write_text(text)
+        found.append(Digests().package("mocapflow_open.garment"))
+    assert len(set(found)) == len(found)
+    (tmp_path / "two/mocapflow_open/inner.py").write_text("X = 3")  # hidden by the first of its name
+    assert Digests().package("mocapflow_open.garment") == found[-1]
+
+
 def test_package_data_counts(tmp_path, monkeypatch):
     folder = tmp_path / "mocapflow_withdata"
     (folder / "__pycache__").mkdir(parents=True)
