@@ -1,6 +1,7 @@
 """Records in zarr groups: arrays with dimension names and units, everything else as attributes.
 
-Any `@record` goes in and comes back: fields are arrays, records, tuples and mappings of these, strings, numbers.
+What goes in comes back: fields are arrays, records, tuples and mappings of these; or text, numbers, paths, tuples and
+mappings of those. Only lists come back as tuples, and in a field whose type names paths, text as paths.
 """
 
 from __future__ import annotations
@@ -30,21 +31,20 @@ def save_record(group: zarr.Group, value: Any) -> None:
     """Write a record into an empty group.
 
     Raises:
-        ShapeError: a tuple or mapping holds numbers or text beside arrays or records.
+        ShapeError: a field holds what can't be kept, or numbers or text beside arrays or records.
     """
     cls: type = type(value)
     declared = array_fields(cls)
     plain: dict[str, Any] = {}
     for field in fields(value):
         inner = getattr(value, field.name)
-        if isinstance(inner, np.ndarray | Series):
-            axes = declared[field.name].axes if field.name in declared else ()
-            unit = declared[field.name].unit if field.name in declared else ""
+        if isinstance(inner, np.ndarray | Series) and field.name in declared:
+            axes, unit, *_ = declared[field.name]
             save_array(group, field.name, inner, axis_names(field.name, axes, len(inner.shape)), unit)
         elif _is_nested(inner):
             _save_nested(group.create_group(field.name), inner, *field.metadata.get("each", ((), "")))
         else:
-            plain[field.name] = str(inner) if isinstance(inner, Path) else inner
+            plain[field.name] = _plain(inner, f"{cls.__name__}.{field.name}")
     group.update_attributes({"record": f"{cls.__module__}:{cls.__qualname__}", PLAIN: plain})
 
 
@@ -62,11 +62,13 @@ def load_record(group: zarr.Group, rows: int | None = None) -> Any:
         for field in fields(cls):
             if field.name in plain:
                 values[field.name] = _untyped(plain[field.name], str(field.type))
+            elif field.name not in group:
+                continue  # its default holds; without one it is missed
             elif field.name in array_fields(cls):
                 declared = array_fields(cls)[field.name]
                 read = _series if declared.wide else _array
                 values[field.name] = read(group, field.name, rows if declared.axes[:1] == ("T",) else None)
-            elif field.name in group:
+            else:
                 values[field.name] = _load_nested(group[field.name])
         if rows is not None and "notes" in values:
             values["notes"] = notes_of(values["frame"], values["notes"])
@@ -119,6 +121,7 @@ def _save_nested(group: zarr.Group, value: Any, axes: tuple[str, ...] = (), unit
     items = value.items() if isinstance(value, Mapping) else ((str(i), v) for i, v in enumerate(value))
     order = []
     for name, inner in items:
+        _check_key(name, group)
         order.append(name)
         if isinstance(inner, np.ndarray):  # its axes are its own: equal names would have to have equal lengths
             save_array(group.create_group(name), "values", inner, axis_names("axis", axes, inner.ndim), unit)
@@ -128,6 +131,13 @@ def _save_nested(group: zarr.Group, value: Any, axes: tuple[str, ...] = (), unit
             what = f"{group.path}: {name!r} is {type(inner).__name__}, beside arrays or records"
             raise ShapeError(what, hint="give it a field of its own")
     group.update_attributes({"kind": "mapping" if isinstance(value, Mapping) else "tuple", "order": order})
+
+
+def _check_key(name: Any, group: zarr.Group) -> None:
+    """Raise if a group can't be called like a key of a mapping, or one is already."""
+    if not isinstance(name, str) or {"", ".", ".."} & set(name.split("/")) or name in group:
+        what = f"{group.path}: nothing can be kept under the key {name!r}"
+        raise ShapeError(what, hint="keys are text that can name a folder, no two the same one")
 
 
 def _load_nested(group: Any) -> Any:
@@ -141,12 +151,10 @@ def _load_item(group: Any, name: str) -> Any:
     if name not in group:
         return None
     inner = group[name]
-    return _array(inner, "values", None) if "values" in inner else _load_nested(inner)
+    return _load_nested(inner) if {"record", "order"} & set(inner.attrs) else _array(inner, "values", None)
 
 
 def _array(group: Any, name: str, rows: int | None) -> Any:
-    if name not in group:
-        return None
     _check_rows(group[name], rows)
     values = np.asarray(group[name][:rows] if rows is not None else group[name][...])
     _check_chunks(group[name], range(values.shape[0] if values.ndim else 0))
@@ -207,8 +215,27 @@ def _record_class(name: str) -> type:
     return cls  # type: ignore[return-value]
 
 
+def _plain(value: Any, where: str) -> Any:
+    """Return a value as json has it."""
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, tuple | list):
+        return [_plain(inner, where) for inner in value]
+    if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
+        return {key: _plain(inner, where) for key, inner in value.items()}
+    hint = (
+        "what can: arrays declared with `array(...)`, records, text, Python's numbers, paths; "
+        "tuples of these, mappings of them whose keys are text"
+    )
+    raise ShapeError(f"{where} holds {type(value).__name__}, which can't be kept", hint=hint)
+
+
 def _untyped(value: Any, declared: str) -> Any:
     """Return a value as it was before json: tuples for lists, paths for strings."""
     if isinstance(value, list):
-        return tuple(_untyped(v, "") for v in value)
-    return Path(value) if "Path" in declared and value is not None else value
+        return tuple(_untyped(inner, declared) for inner in value)
+    if isinstance(value, dict):
+        return {key: _untyped(inner, declared) for key, inner in value.items()}
+    return Path(value) if "Path" in declared and isinstance(value, str) else value

@@ -78,6 +78,21 @@ class Noted:
 
     where: Path
     twin: Path | None = None
+    more: tuple[Path, ...] = ()
+
+
+@record
+class Curve:
+    """A record with a field called as the store calls the array of a group."""
+
+    values: "F64" = records.array("T", unit="rad")
+
+
+@dataclass
+class Held:
+    """Anything, within anything."""
+
+    what: object
 
 
 VALUES = {
@@ -86,7 +101,10 @@ VALUES = {
         mean=(np.ones((2, 3, 3), "f4"), np.zeros((4, 5, 3), "f4")), spread=(np.ones((1, 1, 3), "f4"),)
     ),
     "body": tiny_body(1.0),
-    "paths": Noted(where=Path("a"), twin=Path("b")),
+    "paths": Noted(where=Path("a"), twin=Path("b"), more=(Path("c"),)),
+    "records with values": Held((Curve(values=np.arange(3.0)), Curve(values=np.arange(2.0)))),
+    "values in a mapping": Held({"knee": {"values": np.arange(3.0)}}),
+    "tuples in a mapping": Held({"range": (1, 2.5, ("a", None, True))}),
     "mapping": Past(moments=(), appearance={"a/b": np.ones(3), "c": np.ones((2, 2))}),
 }
 
@@ -104,6 +122,30 @@ def test_numbers_and_text_do_not_go_beside_arrays(store, other, kind):
     mixed = Past(appearance={"mean": np.ones(3), "count": other})
     with pytest.raises(ShapeError, match=f"appearance: 'count' is {kind}, beside arrays or records\n.*its own"):
         put(store, mixed)
+
+
+@pytest.mark.parametrize(
+    ("what", "told"),
+    [
+        (np.int64(3), "Held.what holds int64, which can't be kept\n.*Python's numbers"),
+        (np.ones(2), "Held.what holds ndarray, which .*\n.*arrays declared with"),
+        ({"seen": {1, 2}}, "Held.what holds set"),
+        ({1: "one"}, "Held.what holds dict"),
+        ({"": np.ones(2)}, "what: nothing can be kept under the key ''\n.*no two"),
+        ({1: np.ones(2)}, "under the key 1"),
+        ({"a": np.ones(2), "a/values": np.ones(2)}, "under the key 'a/values'"),
+    ],
+)
+def test_what_cannot_be_kept_is_told(store, what, told):
+    with pytest.raises(ShapeError, match=told):
+        put(store, Held(what))
+
+
+def test_a_bare_array_that_is_missing_is_damage(store):
+    made = put(store, VALUES["background"])
+    shutil.rmtree(made.path / "mean" / "0" / "values")
+    with pytest.raises(Corrupted):
+        store.load(made)
 
 
 def test_a_record_says_how_its_types_are_to_be_written():
