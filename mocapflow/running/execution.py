@@ -105,7 +105,7 @@ class Execution:
             return self._enter_made(step, self._run(step))
         with self._store.writer(step.key, f"{step.label}-{step.key[:6]}", self._report) as lock:
             started = self._started(step)
-            if started is not None and is_hit(step, started):  # another run has made it while this one waited
+            while started is not None and is_hit(step, started):  # made by another run, or elsewhere, meanwhile
                 try:
                     return self._read(step, started)
                 except Corrupted as error:
@@ -114,7 +114,7 @@ class Execution:
 
     def _started(self, step: Step) -> Artifact | None:
         for damaged in self._store.damaged(step.key):
-            self._set_aside(damaged, Corrupted("its description can't be read"))
+            self._set_aside(step, damaged, Corrupted("its description can't be read"))
         started = self._store.find(step.key)
         if started is not None and self._fresh:
             self._store.discard(started)
@@ -124,8 +124,7 @@ class Execution:
     def _mended(self, step: Step, made: Artifact, error: Corrupted) -> Artifact | None:
         """Return what is left of a result that can't be read: of a track its frames, its arrays are made of them."""
         if not step.chain:
-            self._set_aside(made.path, error)
-            return None
+            return self._set_aside(step, made.path, error)
         self._report(f"warning: {made.path.name} is damaged and written anew from its frames: {error.message}")
         kept = {name: value for name, value in made.attributes.items() if name != "sealed"}
         return Artifact(made.path, {**kept, "complete": False})
@@ -145,8 +144,7 @@ class Execution:
         try:
             return self._run(step, self._checkpoint(step, with_versions(started), lock), mixed)
         except Corrupted as error:
-            self._set_aside(started.path, error)
-            return self._chain(step, None, lock)
+            return self._chain(step, self._set_aside(step, started.path, error), lock)
 
     def _checkpoint(self, step: Step, artifact: Artifact, lock: Lock) -> Checkpoint:
         indices, observers = step.recording.indices, self._pipeline.registry.observers
@@ -272,8 +270,10 @@ class Execution:
             first = last
         return said
 
-    def _set_aside(self, path: Path, error: Corrupted) -> None:
-        aside = self._store.set_aside(path)
-        self._report(
-            f"warning: {path.name} is damaged and made anew: {error.message} (kept as {aside.relative_to(path.parent)})"
-        )
+    def _set_aside(self, step: Step, path: Path, error: Corrupted) -> Artifact | None:
+        """Return what takes the place of what is damaged: its copy, from a store that is shared."""
+        kept = self._store.set_aside(path).relative_to(path.parent)
+        copy = self._store.find(step.key)
+        what = "made anew" if copy is None else "replaced by its copy"
+        self._report(f"warning: {path.name} is damaged and {what}: {error.message} (kept as {kept})")
+        return copy

@@ -19,7 +19,7 @@ from mocapflow.errors import StoreError
 from mocapflow.storage.copies import META, Copies, Copy, further
 from mocapflow.storage.locks import Lock
 from mocapflow.storage.rows import Corrupted, flush_all
-from mocapflow.storage.store import Artifact, Report, Store, writing
+from mocapflow.storage.store import SHORT, Artifact, Report, Store, writing
 
 
 def open_store(path: Path, url: str | None) -> Store:
@@ -33,6 +33,7 @@ class SharedStore(Store):
     def __init__(self, path: Path, copies: Copies) -> None:
         super().__init__(path)
         self._copies = copies
+        self._fetched: set[str] = set()  # the beginnings of keys of which what is here, or was, is a copy
         self._writing: set[str] = set()  # keys this process has the right to write: what is here counts, and is fetched
 
     def find(self, key: str) -> Artifact | None:
@@ -75,9 +76,14 @@ class SharedStore(Store):
             self._send(key)
 
     def set_aside(self, path: Path) -> Path:
-        """Move a damaged group out of the way; its copies go, too."""
-        self._copies.remove(path.name.rpartition("-")[2])
-        return super().set_aside(path)
+        """Move a damaged group out of the way; its copy takes its place, unless the group was one: then copies go."""
+        aside, key = super().set_aside(path), path.name.rpartition("-")[2]
+        if key in self._fetched:
+            self._copies.remove(key)
+            self._fetched.discard(key)
+        else:
+            self._fetch(key)
+        return aside
 
     def discard(self, artifact: Artifact) -> None:
         """Remove an artifact that is to be made anew, with its copies: they would be taken for further than the new."""
@@ -104,6 +110,7 @@ class SharedStore(Store):
                 flush_all(part)
                 self.clear(key)
                 part.rename(self.path / there.group)
+                self._fetched.add(key[:SHORT])
         finally:
             shutil.rmtree(part, ignore_errors=True)
 

@@ -176,6 +176,31 @@ def test_a_copy_takes_the_place_of_what_is_damaged_here(tmp_path, path, url):
     assert same(the_track(tmp_path / "one"), the_track(tmp_path / "two"))
 
 
+def test_a_copy_takes_the_place_of_a_result_that_is_damaged_here(tmp_path, path, url):
+    shared(path, tmp_path / "one", url)
+    before = copies(url)
+    (group,) = (tmp_path / "one" / "store.zarr").glob("smooth-*")
+    for chunk in (group / "angles" / "c").rglob("*"):
+        _ = chunk.is_dir() or chunk.write_bytes(b"nonsense")
+    summary, lines = shared(path, tmp_path / "one", url)
+    assert actions(summary) == MADE and copies(url) == before
+    assert any(f"{group.name} is damaged and replaced by its copy" in line for line in lines)
+    assert not any("is damaged" in line for line in shared(path, tmp_path / "one", url)[1])
+
+
+def test_a_copy_takes_the_place_of_frames_that_are_damaged_here(tmp_path, path, url, monkeypatch):
+    monkeypatch.setenv("TINY_RAISE_AT", "7")
+    with pytest.raises(ComponentFailed, match="failed at frame 7"):
+        shared(path, tmp_path / "one", url)
+    monkeypatch.delenv("TINY_RAISE_AT")
+    (rows,) = (tmp_path / "one" / "store.zarr").glob("track-*/live/rows")
+    for row in rows.glob("c.*"):
+        row.write_bytes(b"nonsense")
+    _, lines = shared(path, tmp_path / "one", url)
+    assert lines.count("track: going on after 7 frames") == 2  # its own, then the copy's
+    assert not any("made anew" in line for line in lines)
+
+
 def the_track_key(folder):
     return next(a.key for a in Store(folder / "store.zarr").artifacts() if a.path.name.startswith("track-"))
 
