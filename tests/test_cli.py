@@ -17,7 +17,7 @@ from mocapflow_export import layout, tables
 from typer.testing import CliRunner
 
 from mocapflow import cli, load_registry, registry
-from mocapflow.commands import pictures, results
+from mocapflow.commands import cache, pictures, results
 from mocapflow.commands.invocation import FILE, Invocation, remember
 from mocapflow.commands.progress import reporter
 from mocapflow.help.shipped import shipped
@@ -173,7 +173,7 @@ def test_a_result_that_was_cut_off_is_found_when_it_is_read(call, tmp_path):
     assert "damaged" not in call(*listed, "--check").stdout
 
 
-def test_what_a_run_is_writing_is_not_pruned(call):
+def test_what_a_run_is_writing_is_not_pruned(call, monkeypatch):
     call("run", "start.yaml", "--store", "store.zarr")
     name = call("cache", "list", "--store", "store.zarr").stdout.split()[0]
     lock = Path("store.zarr/.state", f"{name.partition('-')[2]}.lock")
@@ -181,6 +181,11 @@ def test_what_a_run_is_writing_is_not_pruned(call):
     lock.write_text(json.dumps(myself()))
     assert f"kept {name}: a run is writing it" in call(*prune).output
     lock.write_text(json.dumps({**myself(), "pid": 2**22 + 1}))  # it was killed
+    with monkeypatch.context() as patch:  # sizes take long, and meanwhile a run begins
+        patch.setattr(cache, "_size", lambda path: lock.write_text(json.dumps(myself())))
+        assert f"kept {name}: a run is writing it" in call(*prune).output
+    lock.unlink()
+    assert "kept" not in call(*prune, "--dry-run").output
     assert f"removed {name}" in call(*prune).stdout
 
 

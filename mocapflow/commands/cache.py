@@ -66,24 +66,20 @@ def prune(
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would be removed.")] = False,
 ) -> None:
     """Remove results; damaged ones always go."""
-    from mocapflow.storage.store import Store, remove
+    from mocapflow.storage.store import Store
 
     if days is not None and not days >= 0:  # so says nan, too
         raise typer.BadParameter("a number of days, 0 or more", param_hint="--days")
-    kept, paths = Store(store), list[Path]()
+    kept, freed = Store(store), list[int]()
     chosen = [artifact.path for artifact in _artifacts(store) if everything or _goes(artifact, days, unfinished)]
-    for path in [*chosen, *kept.damaged()]:
-        if kept.busy(path.name.rpartition("-")[2]):
+    for path in [*chosen, *kept.damaged(), *kept.aside()]:
+        size = _size(path)
+        if kept.busy(path.name.rpartition("-")[2]) if dry_run else not kept.drop(path):
             typer.echo(f"kept {path.name}: a run is writing it", err=True)
-        else:
-            paths.append(path)
-    paths += kept.aside()
-    freed = sum(map(_size, paths))
-    for path in paths:
-        if not dry_run:
-            remove(path)
+            continue
+        freed.append(size)
         typer.echo(f"{'would remove' if dry_run else 'removed'} {path.name}")
-    typer.echo(f"{len(paths)} results, {freed / 1e6:.1f} MB")
+    typer.echo(f"{len(freed)} results, {sum(freed) / 1e6:.1f} MB")
 
 
 def _goes(artifact: Artifact, days: float | None, unfinished: bool) -> bool:

@@ -89,13 +89,15 @@ def acquire(path: Path, name: str, report: Callable[[str], None]) -> Lock:
         time.sleep(POLL)
 
 
-def held(path: Path) -> bool:
-    """Return whether somebody holds a lock; one that ended without giving it back does not."""
-    if not path.exists():
-        return False
+@contextmanager
+def looking(path: Path) -> Iterator[bool]:
+    """Give whether somebody holds a lock; as long as it is looked at, nobody new does.
+
+    Who ended without giving it back does not hold it.
+    """
     with _guard(path.parent):
         holder = _holder(path)
-        return holder is not None and not _stale(path, holder)
+        yield holder is not None and not _stale(path, holder)
 
 
 @contextmanager

@@ -26,7 +26,7 @@ import numpy as np
 from mocapflow.caching.digests import Digests
 from mocapflow.caching.keys import Recipe
 from mocapflow.errors import FULL, StoreError
-from mocapflow.storage.locks import Lock, acquire, held
+from mocapflow.storage.locks import Lock, acquire, looking
 from mocapflow.storage.rows import Corrupted, array_meta, flush_all, read_json, write_json
 
 SHORT = 12  # digits of the key in a group's name
@@ -129,8 +129,8 @@ class Store:
 
     def busy(self, key: str) -> bool:
         """Return whether a run is writing the artifact of a key."""
-        with writing(self.path):
-            return held(self._lock(key))
+        with writing(self.path), looking(self._lock(key)) as busy:
+            return busy
 
     def begin(self, label: str, key: str, recipe: Recipe) -> Artifact:
         """Return a new, unfinished artifact; what stood in its place is removed."""
@@ -188,6 +188,14 @@ class Store:
         with writing(self.path):
             path.rename(aside)
         return aside
+
+    def drop(self, path: Path) -> bool:
+        """Remove a group, if no run is writing it, and return whether it is gone."""
+        with writing(self.path), looking(self._lock(path.name.rpartition("-")[2])) as busy:
+            aside = None if busy else self.set_aside(path)  # removing may take long, and others wait
+        if aside is not None:
+            remove(aside)
+        return not busy
 
     def aside(self) -> list[Path]:
         """Return the groups that were damaged and set aside."""

@@ -646,6 +646,24 @@ def test_a_lock_is_held_as_long_as_its_run_is_alive(store):
     assert not store.busy(key)
 
 
+def test_nobody_begins_to_write_what_is_being_removed(store, monkeypatch):
+    made = put(store, VALUES["start"])
+    aside, written = Store.set_aside, threading.Event()
+
+    def slow(self, path):
+        threading.Thread(target=write, daemon=True).start()
+        assert not written.wait(0.3)
+        return aside(self, path)
+
+    def write():
+        with store.writer(made.key, "some", print):
+            written.set()
+
+    monkeypatch.setattr(Store, "set_aside", slow)
+    assert store.drop(made.path) and store.find(made.key) is None
+    assert written.wait(5) and not store.aside()
+
+
 def test_a_lock_is_as_old_as_the_drive_says_whatever_the_time_is_here(tmp_path, monkeypatch):
     path, lines = tmp_path / "x.lock", []
     path.write_text(json.dumps({"pid": 1, "host": "elsewhere"}))
