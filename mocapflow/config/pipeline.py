@@ -12,7 +12,7 @@ from pydantic import Field, PositiveInt
 
 from mocapflow.components import BodyModel, Garment, Stage
 from mocapflow.config.documents import Document, Place, Steps, changed
-from mocapflow.config.frames import Frames
+from mocapflow.config.frames import Frames, frames_of
 from mocapflow.config.measures import garment_of, place_of
 from mocapflow.config.named_parts import folder_of
 from mocapflow.config.resolve import Resolver
@@ -175,7 +175,9 @@ def _with_frames(document: Document, part: slice) -> Document:
     parts = (part.start, part.stop, part.step)
     written = ":".join("" if value is None else str(value) for value in parts)
     said = {"start": part.start or 0, "stop": part.stop} | ({} if part.step is None else {"step": part.step})
-    before = document.values.get("frames")
+    before, place = document.values.get("frames"), document.place(("frames",))
+    if isinstance(before, str) and (step := frames_of(before, place.text).step) is not None:
+        before = {"step": step}
     places: dict[Steps, Place] = {(): Place(f"--frames {written.removesuffix(':')}", Path())}
     if part.step is None and isinstance(before, dict) and "step" in before:
         said["step"], places["step",] = before["step"], document.place(("frames", "step"))

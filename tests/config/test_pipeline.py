@@ -92,8 +92,9 @@ def test_frames(folder):
         load("frames=20")
 
 
-def test_frames_that_are_given_keep_the_step_of_the_file(folder):
-    Path("skirt.yaml").write_text(TEXT + "frames: {start: 2, step: 3}\n")
+@pytest.mark.parametrize("frames", ["{start: 2, step: 3}", "2::3"])
+def test_frames_that_are_given_keep_the_step_of_the_file(folder, frames):
+    Path("skirt.yaml").write_text(TEXT + f"frames: {frames}\n")
     kept, given = load(frames=slice(0, 6)), load(frames=slice(None, 6, 1))
     assert (kept.start, kept.stop, kept.step) == (0, 6, 3)
     assert (given.start, given.stop, given.step) == (0, 6, 1)
