@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -23,10 +24,13 @@ class _Keeper(logging.Handler):
 
 @contextmanager
 def warnings_logged() -> Iterator[list[str]]:
-    """Give a list that fills with what is logged to `mocapflow` as a warning, or worse, meanwhile, by this thread."""
-    keeper, logger = _Keeper(), logging.getLogger("mocapflow")
-    logger.addHandler(keeper)
+    """Give a list that fills with what mocapflow and plugins log as a warning, or worse, meanwhile, by this thread."""
+    tops = {name.partition(".")[0] for name in list(sys.modules) if name.startswith("mocapflow")}
+    keeper, loggers = _Keeper(), [logging.getLogger(top) for top in tops]  # of which those of modules are children
+    for logger in loggers:
+        logger.addHandler(keeper)
     try:
         yield keeper.said
     finally:
-        logger.removeHandler(keeper)
+        for logger in loggers:
+            logger.removeHandler(keeper)
