@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
@@ -13,7 +14,9 @@ import cv2
 import mocapflow_draping
 import numpy as np
 import pytest
+from mocapflow_bodies.scanned import Scanned
 from mocapflow_export import layout, tables
+from mocapflow_garments.skirt import Skirt
 from typer.testing import CliRunner
 
 from mocapflow import cli, load_registry, registry
@@ -549,6 +552,19 @@ def test_a_garment_is_drawn_without_being_asked_to(call, monkeypatch):
         .stdout.splitlines()[-2]
         .startswith("no picture: show garment skirt  no draper named 'kinematik'")
     )
+
+
+def test_a_garment_or_a_body_that_a_run_would_refuse_is_not_drawn(call, monkeypatch):
+    sew, load_body = Skirt.sew, Scanned.load
+    with monkeypatch.context() as patch:
+        patch.setattr(Skirt, "sew", lambda self, body: replace(m := sew(self, body), vertices=m.vertices + 5))
+        refused = call("show", "garment", "skirt", "--out", "garment.png")
+        assert refused.exit_code == 2 and "garment 'skirt' returned a pin 8" in refused.stderr
+    monkeypatch.setattr(
+        Scanned, "load", lambda self, folder: replace(b := load_body(self, folder), vertices=b.vertices * np.nan)
+    )
+    refused = call("show", "garment", "skirt", "--out", "garment.png")
+    assert refused.exit_code == 2 and "body 'scanned' returned vertices that are not finite" in refused.stderr
 
 
 @pytest.mark.parametrize("out", ["nowhere/skirt.png", "skirt.doc"])

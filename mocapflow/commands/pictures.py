@@ -14,6 +14,7 @@ from mocapflow.config.measures import garment_of
 from mocapflow.config.resolve import Resolver
 from mocapflow.data import Past, Pose
 from mocapflow.errors import StoreError
+from mocapflow.guards.cloth_answers import body_of, mesh_of
 from mocapflow.help.shipped import shipped
 from mocapflow.io.paths import for_opencv
 from mocapflow.model import ClothedModel
@@ -38,9 +39,9 @@ def draw_garment(registry: Registry, name: str, recording: Path | None, draper: 
     recording = recording or _example(name)
     resolver = Resolver(Document({}, {(): Place(f"show garment {name}", Path())}), registry)
     garment: Any = garment_of(name, recording, resolver)
-    body: Any = registry.get("body", "scanned")()
-    loaded = body.load(recording)
-    scene = Scene(cameras=(), body=loaded, garment=garment.sew(loaded))
+    scanned: Any = registry.get("body", "scanned")
+    body = body_of(scanned(), recording)
+    scene = Scene(cameras=(), body=body, garment=mesh_of(garment, body))
     image = poster(scene, garment, resolver.component("draper", draper, ()))
     file = for_opencv(out)
     if not (out.parent.is_dir() and cv2.haveImageWriter(file) and cv2.imwrite(file, image)):

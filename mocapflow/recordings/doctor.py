@@ -10,6 +10,7 @@ from typing import Any
 from mocapflow.components import Garment
 from mocapflow.config import measures
 from mocapflow.errors import MocapflowError, RecordingError, UnknownComponent
+from mocapflow.guards.cloth_answers import body_of, mesh_of
 from mocapflow.io import first_pose
 from mocapflow.io.cameras import find_calibration, read_cameras
 from mocapflow.io.findings import Finding, attempt, error, note, warning
@@ -106,14 +107,15 @@ def _sewn(garment: Garment, folder: Path, registry: Registry) -> list[Finding]:
 
     Raises:
         GarmentError: it can't be sewn.
+        WrongAnswer: what is sewn is no garment of this body.
     """
     scanned: Any = registry.get("body", "scanned")
     try:
-        body = scanned().load(folder)
+        body = body_of(scanned(), folder)
     except MocapflowError:  # told of with the subject
         return []
     try:
-        mesh = garment.sew(body)
+        mesh = mesh_of(garment, body)
     except MocapflowError:
         raise
     except Exception as problem:  # a garment of somebody else's may raise anything

@@ -9,6 +9,7 @@ from typing import Any
 from mocapflow.data import NO_CLOTH
 from mocapflow.errors import MocapflowError
 from mocapflow.geometry.silhouettes import covered
+from mocapflow.guards.cloth_answers import body_of
 from mocapflow.io import first_pose
 from mocapflow.io.findings import Finding, warning
 from mocapflow.recordings.paired_views import away
@@ -55,7 +56,7 @@ def _bodies(recording: Recording, registry: Registry) -> list[Bool] | None:
         return None
     try:
         scanned: Any = registry.get("body", "scanned")
-        scene = Scene(cameras=recording.cameras, body=scanned().load(recording.folder))
+        scene = Scene(cameras=recording.cameras, body=body_of(scanned(), recording.folder))
         surface = scene.surface(first_pose.read_pose(recording.folder / first_pose.FILE, scene.body), NO_CLOTH)
     except MocapflowError:
         return None

@@ -337,6 +337,15 @@ def test_a_garment_that_raises_what_nobody_expects(good, monkeypatch):
     assert (finding.severity, finding.message) == ("error", "shorts can't be sewn: ZeroDivisionError: no strands")
 
 
+def test_a_garment_that_a_run_would_refuse(good, monkeypatch):
+    sew = Shorts.sew
+    away = np.array([0, 0, 5.0])
+    monkeypatch.setattr(Shorts, "sew", lambda self, body: replace(m := sew(self, body), vertices=m.vertices + away))
+    (finding,) = examine(good)
+    assert finding.severity == "error" and "garment.json" in finding.where
+    assert finding.message.startswith("garment 'shorts' returned a pin 5")
+
+
 def test_a_garment_that_is_mended(good):
     edit(good / "subject" / "garment.json", lambda g: g.update(leg_opening_circumference=0.45))
     (finding,) = examine(good)
