@@ -42,6 +42,10 @@ class WrongAnswer(PluginError):
         self.component, self.what = component, message
         super().__init__(f"{component.role} '{component.name}' returned {message}")
 
+    def __reduce__(self) -> tuple[type[WrongAnswer], tuple[Component, str]]:
+        """Pickle by the arguments: those of exceptions are their text."""
+        return type(self), (self.component, self.what)
+
 
 def pose_of(predictor: Predictor, frame: Frame, past: Past, scene: Scene) -> Pose:
     """Return the pose that a predictor begins a frame with.
@@ -78,6 +82,10 @@ def _sound(component: Component, found: Estimate, before: Estimate, scene: Scene
     array_of(component, found.covariance, (size, size), "a covariance")
     if np.diag(found.covariance).min() <= 0:
         raise WrongAnswer(component, "a variance that is not above zero")
+    try:
+        np.linalg.cholesky(found.covariance)  # which units its rows have is no matter to it
+    except np.linalg.LinAlgError:
+        raise WrongAnswer(component, "a covariance that is not positive definite") from None
     return found
 
 

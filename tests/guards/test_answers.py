@@ -1,5 +1,6 @@
 """What components answer is looked at: a wrong answer names who gave it, and nothing wrong goes on."""
 
+import pickle
 from dataclasses import replace
 from pathlib import Path
 
@@ -64,6 +65,11 @@ class Saying(Matcher, PoseSolver, Predictor, Prior):
 
     def solve(self, match, state, model, priors, past, turn):
         return self.answer
+
+
+def test_a_wrong_answer_reaches_another_process() -> None:
+    there = pickle.loads(pickle.dumps(WrongAnswer(Saying(answer=1), "nonsense")))
+    assert str(there) == "matcher 'saying' returned nonsense" and there.what == "nonsense"
 
 
 def matches(answer):
@@ -258,6 +264,8 @@ def with_prior(tmp_path, prior):
         ({"parameters": np.ones(3)}, "parameters of shape"),
         ({"covariance": np.eye(4)}, "a covariance of shape"),
         ({"covariance": np.zeros((WIDTH, WIDTH))}, "a variance that is not above zero"),
+        ({"covariance": np.ones((WIDTH, WIDTH))}, "a covariance that is not positive definite"),
+        ({"covariance": np.eye(WIDTH) + 5 * np.eye(WIDTH)[::-1]}, "a covariance that is not positive definite"),
     ],
 )
 def test_an_estimate_that_is_none_names_the_solver(change, said) -> None:
