@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from drape_bodies import EYE, SKIN, SKIRT, leg_poses, legs, lying_cylinder, prepared
-from mocapflow_draping.following import FASTEST
+from mocapflow_draping.following import FASTEST, Motion
 from mocapflow_draping.kinematic import Kinematic
 from mocapflow_draping.pushes import CLEAR, lift
 from mocapflow_garments.cylinder import Cylinder
@@ -79,7 +79,7 @@ def lifted(grid, rate):
     still = np.zeros(rate.shape[-1])
     lift(
         grid, np.zeros(strands, np.int32), np.ones(strands, np.int32), np.array([[-1, 1], [-1, -1]], np.int32), 1,
-        seen, room, near, seen.copy(), room.copy(), parts, values, (rate, rate, own, still, still),
+        seen, room, near, seen.copy(), room.copy(), parts, values, Motion(rate, rate, own, still, still),
     )  # fmt: skip
     return grid, rate
 
