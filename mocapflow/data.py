@@ -11,7 +11,6 @@ parameters, M matches, T frames, S = 6 + D + Q unknowns of a frame.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import field
 from functools import cached_property
@@ -23,7 +22,6 @@ from mocapflow.records import F32, F64, I16, I32, U8, Bool, array, record
 BODY, CLOTH = 0, 1  # values of Surface.layer
 REMEMBERED = 3  # frames that later ones may know: a pose, its velocity, its acceleration
 LAYERS = ("person", "garment", "skin")  # values of Silhouette.layer
-EARLY = 1e-6  # share of the time between two steps by which a frame may come too early: rounding
 BORDER = 3  # px along the image border where a silhouette is cut, not occluding
 
 
@@ -274,14 +272,6 @@ class Past:
     def after(self, moment: Moment, appearance: Mapping[str, F64]) -> Past:
         """Return the past one frame later."""
         return Past(moments=(*self.moments, moment)[-REMEMBERED:], appearance=appearance)
-
-    def falls_due(self, time: float, every_s: float) -> bool:
-        """Return whether what is done every so many seconds is due in a frame at `time` (s): once since the last one.
-
-        It depends on times alone, so that a run that is resumed does it in the same frames.
-        """
-        last, now = (math.floor(each / every_s + EARLY) for each in (self.moments[-1].time, time))
-        return now > last
 
     def believable(self) -> Past:
         """Return the past, without moments where the last two do not show the person: the next begins like a first."""

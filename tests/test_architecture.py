@@ -19,6 +19,7 @@ LAYERS = (  # a module imports only from its own layer or an earlier one; in a f
     "errors",
     "interrupts",
     "memo",
+    "periodic",
     "series",
     "records",
     "settings",

@@ -32,6 +32,7 @@ CORE = (
     "guards.cloth_answers",
     "loop",
     "model",
+    "periodic",
     "pooling",
     "prediction",
     "records",

@@ -192,7 +192,8 @@ class Store:
     def drop(self, path: Path) -> bool:
         """Remove a group, if no run is writing it, and return whether it is gone."""
         with writing(self.path), looking(self._lock(path.name.rpartition("-")[2])) as busy:
-            aside = None if busy else self.set_aside(path)  # removing may take long, and others wait
+            kept = busy or not path.exists()  # somebody else may have removed it
+            aside = None if kept else self.set_aside(path)  # removing may take long, and others wait
         if aside is not None:
             remove(aside)
         return not busy

@@ -11,6 +11,7 @@ from pydantic import PositiveFloat
 from mocapflow.data import Cloth, Estimate, Frame, Past, Segmentation, Turn
 from mocapflow.geometry.sewing import TAKE_UP
 from mocapflow.model import ClothedModel
+from mocapflow.periodic import falls_due
 from mocapflow.records import F64
 from mocapflow_draping import samples
 from mocapflow_draping.outline import OutlineFitter
@@ -38,11 +39,13 @@ class TakeUp(OutlineFitter):
         cloth, garment = model.drape(estimate.pose, estimate.parameters, past), model.scene.garment
         if garment is None or not segmentation.silhouettes or TAKE_UP not in garment.parameter_names:
             return cloth
-        if turn.index > 0 or not past.moments or not past.falls_due(frame.time, self.every_s):
-            return cloth  # in the first frame the person is only being found
+        if turn.index > 0 or not past.moments:  # in the first frame the person is only being found
+            return cloth
+        last = past.moments[-1]
+        if not falls_due(last.time, frame.time, self.every_s):
+            return cloth
         column = garment.parameter_names.index(TAKE_UP)
         low, high = garment.parameter_bounds[column]
-        last = past.moments[-1]
         before = last.cloth.parameters[column]
         spread = self.take_up_sd * math.sqrt(max(frame.time - last.time, self.every_s))
         middle = np.clip(estimate.parameters[column], low + self.step, high - self.step)

@@ -19,6 +19,7 @@ from mocapflow.assets import Body
 from mocapflow.components import Recovery
 from mocapflow.data import Frame, FrameResult, FrameState, Past, Pose, Surface
 from mocapflow.model import ClothedModel
+from mocapflow.periodic import falls_due
 from mocapflow.records import F64
 from mocapflow.scene import Scene
 from mocapflow.settings import PositiveOrInf
@@ -145,7 +146,8 @@ class LimbSearch(Recovery):
 
     def _in_turn(self, time: float, past: Past) -> bool:
         """Return whether this is the one of `vain_every` frames; counted by time, as frames may be left out."""
-        return past.falls_due(time, self.vain_every * (time - past.moments[-1].time))
+        last = past.moments[-1].time
+        return falls_due(last, time, self.vain_every * (time - last))
 
     def _ways(self, looks: Looks, suspected: Suspicion) -> list[Look]:
         """Return the ways to look for the pose, each from its own samples."""

@@ -662,6 +662,7 @@ def test_nobody_begins_to_write_what_is_being_removed(store, monkeypatch):
     monkeypatch.setattr(Store, "set_aside", slow)
     assert store.drop(made.path) and store.find(made.key) is None
     assert written.wait(5) and not store.aside()
+    assert store.drop(made.path)  # gone already
 
 
 def test_a_lock_is_as_old_as_the_drive_says_whatever_the_time_is_here(tmp_path, monkeypatch):
