@@ -19,8 +19,8 @@ from mocapflow_draping.kinematic import Kinematic
 from mocapflow_draping.samples import in_all_directions
 from mocapflow_garments.skirt import Skirt
 
-from mocapflow.components import Draper
 from mocapflow.data import Past, Pose, PoseBatch
+from mocapflow.dressing.roles import Draper
 from mocapflow.scene import Scene
 
 ROUNDS = 7

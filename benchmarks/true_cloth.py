@@ -21,8 +21,8 @@ from limits import true_poses
 from mocapflow_draping.kinematic import Kinematic
 
 from mocapflow.assets import GarmentMesh
-from mocapflow.components import Draper
 from mocapflow.data import Past, PoseBatch
+from mocapflow.dressing.roles import Draper
 from mocapflow.geometry.sewing import TAKE_UP
 from mocapflow.records import F64, I32
 

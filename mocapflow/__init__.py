@@ -13,11 +13,7 @@ if TYPE_CHECKING:  # renamed to themselves: what type checkers take for exported
     from mocapflow.assets import Body as Body
     from mocapflow.assets import Camera as Camera
     from mocapflow.assets import GarmentMesh as GarmentMesh
-    from mocapflow.components import BodyModel as BodyModel
     from mocapflow.components import ClothFitter as ClothFitter
-    from mocapflow.components import Component as Component
-    from mocapflow.components import Draper as Draper
-    from mocapflow.components import Garment as Garment
     from mocapflow.components import Matcher as Matcher
     from mocapflow.components import PoseSolver as PoseSolver
     from mocapflow.components import Predictor as Predictor
@@ -42,6 +38,9 @@ if TYPE_CHECKING:  # renamed to themselves: what type checkers take for exported
     from mocapflow.data import Start as Start
     from mocapflow.data import Surface as Surface
     from mocapflow.data import Turn as Turn
+    from mocapflow.dressing.roles import BodyModel as BodyModel
+    from mocapflow.dressing.roles import Draper as Draper
+    from mocapflow.dressing.roles import Garment as Garment
     from mocapflow.errors import GarmentError as GarmentError
     from mocapflow.errors import MocapflowError as MocapflowError
     from mocapflow.errors import PipelineError as PipelineError
@@ -57,14 +56,15 @@ if TYPE_CHECKING:  # renamed to themselves: what type checkers take for exported
     from mocapflow.running.runner import plan as plan
     from mocapflow.running.runner import run as run
     from mocapflow.scene import Scene as Scene
+    from mocapflow.settings import Component as Component
 
 _NAMES = {
     "assets": "Background Body Camera GarmentMesh",
-    "components": "BodyModel ClothFitter Component Draper Garment Matcher PoseSolver Predictor Prior "
-    "Recovery Segmenter Stage",
+    "components": "ClothFitter Matcher PoseSolver Predictor Prior Recovery Segmenter Stage",
     "config.pipeline": "Pipeline load_pipeline",
     "data": "Cloth Estimate Frame FrameResult FrameState Matches Past Pose PoseBatch Residual Segmentation Silhouette "
     "Start Surface Turn",
+    "dressing.roles": "BodyModel Draper Garment",
     "errors": "GarmentError MocapflowError PipelineError PluginError",
     "hookspecs": "hookimpl",
     "model": "ClothedModel",
@@ -73,6 +73,7 @@ _NAMES = {
     "results": "Files RunFolder Track",
     "running.runner": "plan run",
     "scene": "Scene",
+    "settings": "Component",
 }
 _HOMES = {name: module for module, names in _NAMES.items() for name in names.split()}
 __all__ = list(_HOMES)

@@ -1,4 +1,4 @@
-"""The roles a plugin can play: one base class, one verb each.
+"""The roles a plugin can play in a run: one base class, one verb each. Those that make its model are `dressing`'s.
 
 A component is a frozen pydantic model, so its fields are its settings: validated, printable, part of the cache
 key. Steps are pure functions of their arguments and keep no state between calls; that makes resuming exact.
@@ -6,14 +6,12 @@ key. Steps are pure functions of their arguments and keep no state between calls
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
-import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
 
-from mocapflow.assets import Body, GarmentMesh
 from mocapflow.data import (
     Cloth,
     Estimate,
@@ -23,15 +21,13 @@ from mocapflow.data import (
     Matches,
     Past,
     Pose,
-    PoseBatch,
     Residual,
     Segmentation,
     Surface,
     Turn,
 )
-from mocapflow.geometry.differences import drape_differences
-from mocapflow.records import F64, I32, Bool
-from mocapflow.settings import Settings
+from mocapflow.records import F64
+from mocapflow.settings import Component
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -39,13 +35,6 @@ if TYPE_CHECKING:
     from mocapflow.model import ClothedModel
     from mocapflow.recordings.recording import Recording
     from mocapflow.scene import Scene
-
-
-class Component(Settings, ABC):
-    """Anything a pipeline can name; `role` is set by the role base, `name` by the component."""
-
-    role: ClassVar[str]
-    name: ClassVar[str]
 
 
 class Predictor(Component):
@@ -103,33 +92,6 @@ class PoseSolver(Component):
         """Return the pose that explains the matches; it may pose, drape and match again as it goes."""
 
 
-class Draper(Component):
-    """Lays a garment on posed bodies: the forward model."""
-
-    role: ClassVar[str] = "draper"
-
-    @abstractmethod
-    def drape(self, poses: PoseBatch, parameters: F64, past: Past, scene: Scene) -> F64:
-        """Return cloth vertices (B, W, 3) m in the world for B poses and parameters (B, Q); pure."""
-
-    def velocity(self, pose: Pose, parameters: F64, vertices: I32, past: Past, scene: Scene) -> F64:
-        """Return the velocities (M, 3, 6 + D + Q) of cloth vertices (M,) for unit changes of pose and parameters.
-
-        The default takes differences of one batch of drapes.
-        """
-        assert scene.garment is not None
-
-        def drape(poses: PoseBatch, values: F64) -> F64:
-            return self.drape(poses, values, past, scene)[:, vertices]
-
-        bounds = scene.garment.parameter_bounds
-        return drape_differences(drape, scene.body, self.touchable(scene), bounds, pose, parameters)
-
-    def touchable(self, scene: Scene) -> Bool:
-        """Return which joints (J,) move what the garment hangs from or can touch; the rest never moves the cloth."""
-        return np.ones(len(scene.body.parents), bool)
-
-
 class ClothFitter(Component):
     """Chooses the cloth parameters and forces that explain the images."""
 
@@ -180,33 +142,6 @@ class Recovery(Component):
         `settle` takes a pose and cloth parameters; `state` is what was believed before looking. What was found
         wrong, and what became of it, goes into `notes`.
         """
-
-
-class Garment(Component):
-    """Sews a garment from tape measures."""
-
-    role: ClassVar[str] = "garment"
-
-    @abstractmethod
-    def sew(self, body: Body) -> GarmentMesh:
-        """Return the garment at rest on the rest body."""
-
-
-class BodyModel(Component):
-    """Loads a body."""
-
-    role: ClassVar[str] = "body"
-
-    @abstractmethod
-    def load(self, folder: Path) -> Body:
-        """Return the body at rest; `folder` is that of the recording."""
-
-    def inputs(self, folder: Path) -> Sequence[Path]:
-        """Return the files `load` reads: their content is part of the cache key."""
-        return ()
-
-    def need(self, folder: Path) -> None:
-        """Raise what `load` would for want of a file: asked by `plan`, and before a run computes anything."""
 
 
 class Stage(Component):

@@ -6,20 +6,9 @@ from collections.abc import Iterable
 
 import pluggy
 
-from mocapflow.components import (
-    BodyModel,
-    ClothFitter,
-    Draper,
-    Garment,
-    Matcher,
-    PoseSolver,
-    Predictor,
-    Prior,
-    Recovery,
-    Segmenter,
-    Stage,
-)
+from mocapflow.components import ClothFitter, Matcher, PoseSolver, Predictor, Prior, Recovery, Segmenter, Stage
 from mocapflow.data import FrameResult, FrameState
+from mocapflow.dressing.roles import BodyModel, Draper, Garment
 
 hookspec = pluggy.HookspecMarker("mocapflow")
 hookimpl = pluggy.HookimplMarker("mocapflow")

@@ -12,8 +12,7 @@ from mocapflow.components import ClothFitter, Matcher, Observe, PoseSolver, Prio
 from mocapflow.data import NO_CLOTH, Frame, FrameResult, FrameState, Past, Turn
 from mocapflow.errors import noting
 from mocapflow.functional import Functional, overlaps
-from mocapflow.guards.answers import estimate_of, segmentation_of
-from mocapflow.guards.cloth_answers import cloth_of
+from mocapflow.guards.answers import cloth_of, estimate_of, segmentation_of
 from mocapflow.model import ClothedModel
 from mocapflow.pooling import pool_matches
 from mocapflow.records import record

@@ -6,10 +6,10 @@ from weakref import ref
 
 import numpy as np
 
-from mocapflow.components import Draper
 from mocapflow.data import NO_CLOTH, Cloth, Past, Pose, PoseBatch, Surface
+from mocapflow.dressing.guards import drape_of, velocity_of
+from mocapflow.dressing.roles import Draper
 from mocapflow.geometry import twists
-from mocapflow.guards.cloth_answers import drape_of, velocity_of
 from mocapflow.memo import memoised
 from mocapflow.records import F64, I32, record
 from mocapflow.scene import Scene

@@ -16,10 +16,11 @@ from typing import Any
 import pluggy
 
 from mocapflow import components, hookspecs
-from mocapflow.components import Component
+from mocapflow.dressing import roles
 from mocapflow.errors import MocapflowError, PluginError, UnknownComponent, alternatives
 from mocapflow.guards.vetting import check_hooks, import_file, provided
 from mocapflow.observers import Observers
+from mocapflow.settings import Component
 
 GROUP = "mocapflow"  # entry point group, and the distribution of the built-in plugins
 PROVIDERS: Mapping[str, tuple[str, type[Component]]] = {
@@ -27,12 +28,12 @@ PROVIDERS: Mapping[str, tuple[str, type[Component]]] = {
     "segmenter": ("mocapflow_segmenters", components.Segmenter),
     "matcher": ("mocapflow_matchers", components.Matcher),
     "pose_solver": ("mocapflow_pose_solvers", components.PoseSolver),
-    "draper": ("mocapflow_drapers", components.Draper),
+    "draper": ("mocapflow_drapers", roles.Draper),
     "cloth_fitter": ("mocapflow_cloth_fitters", components.ClothFitter),
     "recovery": ("mocapflow_recoveries", components.Recovery),
     "prior": ("mocapflow_priors", components.Prior),
-    "garment": ("mocapflow_garments", components.Garment),
-    "body": ("mocapflow_bodies", components.BodyModel),
+    "garment": ("mocapflow_garments", roles.Garment),
+    "body": ("mocapflow_bodies", roles.BodyModel),
     "stage": ("mocapflow_stages", components.Stage),
 }
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, get_args, get_origin
+from abc import ABC
+from typing import Annotated, Any, ClassVar, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, ValidationInfo, field_validator
 
@@ -25,6 +26,13 @@ class Settings(BaseModel):
         if numbers and not takes and any(isinstance(each, bool) for each in said):
             raise ValueError("input should be a number, not true or false")
         return value
+
+
+class Component(Settings, ABC):
+    """Anything a pipeline can name; `role` is set by the role base, `name` by the component."""
+
+    role: ClassVar[str]
+    name: ClassVar[str]
 
 
 def plain_parts(annotation: Any) -> set[Any]:

@@ -13,19 +13,9 @@ from pydantic import Field, model_validator
 
 from mocapflow.assets import Background
 from mocapflow.caching.keys import FREE
-from mocapflow.components import (
-    ClothFitter,
-    Draper,
-    Matcher,
-    Observe,
-    PoseSolver,
-    Predictor,
-    Prior,
-    Recovery,
-    Segmenter,
-    Stage,
-)
+from mocapflow.components import ClothFitter, Matcher, Observe, PoseSolver, Predictor, Prior, Recovery, Segmenter, Stage
 from mocapflow.data import Frame, FrameResult, FrameState, Past, Pose, Start, Turn
+from mocapflow.dressing.roles import Draper
 from mocapflow.errors import ComponentFailed, PipelineError, noting
 from mocapflow.functional import image_cost
 from mocapflow.guards.answers import pose_of, result_of

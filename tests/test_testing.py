@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mocapflow.components import Garment, Prior, Recovery, Stage
+from mocapflow.components import Prior, Recovery, Stage
 from mocapflow.data import Pose, Residual, Start, Turn
+from mocapflow.dressing.roles import Garment
 from mocapflow.errors import ShapeError
 from mocapflow.geometry.meshes import edges
 from mocapflow.testing import (

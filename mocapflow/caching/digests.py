@@ -26,10 +26,11 @@ CORE = (
     "assets",
     "components",
     "data",
+    "dressing.guards",
+    "dressing.roles",
     "functional",
     "geometry",
     "guards.answers",
-    "guards.cloth_answers",
     "loop",
     "model",
     "periodic",
@@ -41,6 +42,7 @@ CORE = (
     "series",
     "steady",
     "track",
+    "wrong_answer",
 )
 PYTHON = f" {sys.version_info.major}.{sys.version_info.minor}"  # another minor version writes syntax trees otherwise
 

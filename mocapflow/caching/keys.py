@@ -19,9 +19,9 @@ import numpy as np
 from pydantic import BaseModel
 
 from mocapflow.caching.digests import MARK, Digests, digest_array
-from mocapflow.components import Component
 from mocapflow.errors import PluginError
 from mocapflow.registry import Registry
+from mocapflow.settings import Component
 
 FORMAT = 3  # of recipes and groups: another number makes everything anew
 CODE = frozenset({"format", "core", "code", "reader", "key"})  # what is of code in a recipe

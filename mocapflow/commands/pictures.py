@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from mocapflow.components import Draper, Garment
 from mocapflow.config.documents import Document, Place
 from mocapflow.config.measures import garment_of
 from mocapflow.config.resolve import Resolver
 from mocapflow.data import Past, Pose
+from mocapflow.dressing.guards import body_of, mesh_of
+from mocapflow.dressing.roles import Draper, Garment
 from mocapflow.errors import StoreError
-from mocapflow.guards.cloth_answers import body_of, mesh_of
 from mocapflow.help.shipped import shipped
 from mocapflow.io.paths import for_opencv
 from mocapflow.model import ClothedModel

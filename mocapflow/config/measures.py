@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from mocapflow.components import Garment
 from mocapflow.config.documents import Document, Place
 from mocapflow.config.resolve import Resolver
+from mocapflow.dressing.roles import Garment
 from mocapflow.errors import MocapflowError, PluginError, RecordingError, UnknownComponent, guess
 from mocapflow.io.typed import place, read_json
 from mocapflow.registry import Registry

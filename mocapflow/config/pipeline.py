@@ -10,13 +10,14 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, PositiveInt
 
-from mocapflow.components import BodyModel, Garment, Stage
+from mocapflow.components import Stage
 from mocapflow.config.documents import Document, Place, Steps, changed
 from mocapflow.config.frames import Frames, frames_of
 from mocapflow.config.measures import garment_of, place_of
 from mocapflow.config.named_parts import folder_of
 from mocapflow.config.resolve import Resolver
 from mocapflow.config.yamlfile import read
+from mocapflow.dressing.roles import BodyModel, Garment
 from mocapflow.errors import PipelineError, RecordingError
 from mocapflow.io.paths import led_nowhere
 from mocapflow.registry import Registry, load_registry

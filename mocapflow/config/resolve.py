@@ -10,11 +10,10 @@ from typing import Any, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic.errors import PydanticUserError
 
-from mocapflow.components import Component
 from mocapflow.config.documents import Document, Steps, dotted
 from mocapflow.errors import MocapflowError, PipelineError, guess
 from mocapflow.registry import Registry
-from mocapflow.settings import plain_parts
+from mocapflow.settings import Component, plain_parts
 
 LINES = "input should be `name: value` lines"
 EXPECTED = {"dict_type": LINES, "model_type": LINES, "tuple_type": "input should be a list"}  # as YAML has it

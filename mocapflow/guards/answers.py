@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mocapflow.components import Component, Matcher, PoseSolver, Predictor, Prior, Recovery, Segmenter
+from mocapflow.components import ClothFitter, Matcher, PoseSolver, Predictor, Prior, Recovery, Segmenter
 from mocapflow.data import (
     LAYERS,
+    Cloth,
     Estimate,
     Frame,
     FrameResult,
@@ -22,29 +23,17 @@ from mocapflow.data import (
     Surface,
     Turn,
 )
-from mocapflow.errors import PluginError
-from mocapflow.records import F32, F64
+from mocapflow.records import F64
 from mocapflow.scene import Scene
+from mocapflow.settings import Component
+from mocapflow.wrong_answer import UNIT, WrongAnswer, array_of, finite, of_kind
 
-if TYPE_CHECKING:  # the model asks its draper through `cloth_answers`
+if TYPE_CHECKING:
     from mocapflow.model import ClothedModel
 
-Answer = TypeVar("Answer")
 SQUARE = 1e-6  # by how much the columns of a rotation may fail to be orthonormal
 LARGEST = 1e100  # of a residual: the square is still a number
-UNIT = 1e-3  # likewise, the square of a unit vector to be one
-
-
-class WrongAnswer(PluginError):
-    """A component returned what its role can't."""
-
-    def __init__(self, component: Component, message: str) -> None:
-        self.component, self.what = component, message
-        super().__init__(f"{component.role} '{component.name}' returned {message}")
-
-    def __reduce__(self) -> tuple[type[WrongAnswer], tuple[Component, str]]:
-        """Pickle by the arguments: those of exceptions are their text."""
-        return type(self), (self.component, self.what)
+SLACK = 1e-9  # beyond the bounds of a parameter: rounding
 
 
 def pose_of(predictor: Predictor, frame: Frame, past: Past, scene: Scene) -> Pose:
@@ -182,6 +171,33 @@ def segmentation_of(
     return found
 
 
+def cloth_of(
+    fitter: ClothFitter,
+    frame: Frame,
+    segmentation: Segmentation,
+    estimate: Estimate,
+    model: ClothedModel,
+    past: Past,
+    turn: Turn,
+) -> Cloth:
+    """Return the cloth that a fitter chooses.
+
+    Raises:
+        WrongAnswer: it is not that of the garment, not finite, or a parameter is out of its bounds.
+    """
+    cloth = of_kind(fitter, fitter.fit(frame, segmentation, estimate, model, past, turn), Cloth)
+    garment = model.scene.garment
+    vertices, parameters = (0, 0) if garment is None else (len(garment.vertices), len(garment.parameter_names))
+    array_of(fitter, cloth.vertices, (vertices, 3), "cloth")
+    array_of(fitter, cloth.parameters, (parameters,), "cloth parameters")
+    if garment is not None:
+        ranges = zip(garment.parameter_names, cloth.parameters, garment.parameter_bounds, strict=True)
+        for name, value, (low, high) in ranges:
+            if not low - SLACK <= value <= high + SLACK:
+                raise WrongAnswer(fitter, f"{value:g} for parameter '{name}', which goes from {low:g} to {high:g}")
+    return cloth
+
+
 def result_of(recovery: Recovery, found: Any, looped: FrameResult, scene: Scene) -> FrameResult:
     """Return what a recovery answered to what the loop had found.
 
@@ -202,37 +218,6 @@ def result_of(recovery: Recovery, found: Any, looped: FrameResult, scene: Scene)
     if not isinstance(result.notes, tuple):
         raise WrongAnswer(recovery, f"notes as a {type(result.notes).__name__}, not a tuple of them")
     return result
-
-
-def of_kind(component: Component, value: Any, kind: type[Answer]) -> Answer:
-    """Return what a component answered.
-
-    Raises:
-        WrongAnswer: it is something else than its role returns.
-    """
-    if not isinstance(value, kind):
-        raise WrongAnswer(component, f"{type(value).__name__}, not {getattr(kind, '__name__', kind)}")
-    return value
-
-
-def array_of(component: Component, values: F64, shape: tuple[int, ...], what: str) -> F64:
-    """Return an array that a component answered.
-
-    Raises:
-        WrongAnswer: it has another shape or type, or is not finite.
-    """
-    if values.dtype != np.float64:
-        raise WrongAnswer(component, f"{what} of {values.dtype}, not float64")
-    if values.shape != shape:
-        raise WrongAnswer(component, f"{what} of shape {values.shape}, not {shape}")
-    if not finite(values):
-        raise WrongAnswer(component, f"{what} that {'are' if what.endswith('s') else 'is'} not finite")
-    return values
-
-
-def finite(values: F64 | F32) -> bool:
-    """Return whether all values are finite."""
-    return bool(np.isfinite(values).all())
 
 
 def _squares(values: F64) -> bool:

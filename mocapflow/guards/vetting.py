@@ -12,8 +12,9 @@ from types import ModuleType
 from typing import Any
 
 from mocapflow import hookspecs
-from mocapflow.components import Component, Stage
+from mocapflow.components import Stage
 from mocapflow.errors import PluginError, guess
+from mocapflow.settings import Component
 
 
 def import_file(path: Path) -> ModuleType:

@@ -20,7 +20,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from mocapflow.components import Component
+from mocapflow.settings import Component
 
 UNITS = {"m": "m", "mm": "mm", "px": "px", "px2": "px²", "deg": "°", "rad": "rad", "s": "s", "hz": "Hz",
          "m_s2": "m/s²", "deg_s2": "°/s²", "px_per_m": "px/m"}  # fmt: skip

@@ -7,10 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from mocapflow.components import Garment
 from mocapflow.config import measures
+from mocapflow.dressing.guards import body_of, mesh_of
+from mocapflow.dressing.roles import Garment
 from mocapflow.errors import MocapflowError, RecordingError, UnknownComponent
-from mocapflow.guards.cloth_answers import body_of, mesh_of
 from mocapflow.io import first_pose
 from mocapflow.io.cameras import find_calibration, read_cameras
 from mocapflow.io.findings import Finding, attempt, error, note, warning

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from mocapflow.data import NO_CLOTH
+from mocapflow.dressing.guards import body_of
 from mocapflow.errors import MocapflowError
 from mocapflow.geometry.silhouettes import covered
-from mocapflow.guards.cloth_answers import body_of
 from mocapflow.io import first_pose
 from mocapflow.io.findings import Finding, warning
 from mocapflow.recordings.paired_views import away

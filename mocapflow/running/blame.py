@@ -11,7 +11,6 @@ from types import FrameType, TracebackType
 
 from pydantic import ValidationError
 
-from mocapflow.components import Component
 from mocapflow.errors import (
     FULL,
     ComponentFailed,
@@ -22,9 +21,10 @@ from mocapflow.errors import (
     moment_of,
     unwritable,
 )
-from mocapflow.guards.answers import WrongAnswer
 from mocapflow.interrupts import interrupted
 from mocapflow.registry import Registry
+from mocapflow.settings import Component
+from mocapflow.wrong_answer import WrongAnswer
 
 LOG = "failed.log"  # in the run folder, the traceback of the last failure
 

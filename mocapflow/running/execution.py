@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from mocapflow.assets import Body, GarmentMesh
-from mocapflow.components import Component, Garment
 from mocapflow.config.named_parts import whereabouts
 from mocapflow.config.pipeline import Pipeline
 from mocapflow.data import FrameResult
+from mocapflow.dressing.guards import body_of, mesh_of
+from mocapflow.dressing.roles import Garment
 from mocapflow.errors import GarmentError
-from mocapflow.guards.answers import of_kind
-from mocapflow.guards.cloth_answers import body_of, mesh_of
 from mocapflow.interrupts import check
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import unwatched
@@ -27,10 +26,12 @@ from mocapflow.running.recipes import Step
 from mocapflow.running.warned import warnings_logged
 from mocapflow.running.wiring import Itself, Source, made_by
 from mocapflow.scene import Scene
+from mocapflow.settings import Component
 from mocapflow.storage.checkpoint import Checkpoint
 from mocapflow.storage.locks import Lock
 from mocapflow.storage.rows import Corrupted
 from mocapflow.storage.store import Artifact, Report, Store, versions, with_versions
+from mocapflow.wrong_answer import of_kind
 
 
 def is_hit(step: Step, artifact: Artifact) -> bool:

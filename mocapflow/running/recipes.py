@@ -10,15 +10,16 @@ from typing import Any
 from mocapflow.assets import Background, Body, Camera, Rig
 from mocapflow.caching.digests import Digests, digest_array
 from mocapflow.caching.keys import FORMAT, Recipe, component_recipe, key_of, without_code
-from mocapflow.components import BodyModel, Stage
+from mocapflow.components import Stage
 from mocapflow.config.pipeline import NamedStage, Pipeline
 from mocapflow.data import Start
+from mocapflow.dressing.roles import BodyModel
 from mocapflow.errors import PluginError, alternatives
-from mocapflow.guards.answers import WrongAnswer
 from mocapflow.recordings.recording import Recording, open_recording
 from mocapflow.results import Evaluation, Files
 from mocapflow.running.parts import in_parts
 from mocapflow.running.wiring import Source, latest, makes, wire
+from mocapflow.wrong_answer import WrongAnswer
 
 BEGINNING = 10  # frames
 SEEN = {Start: "first", Background: "all", Rig: "all", Body: "all", Recording: "all"}  # of a stage that says none

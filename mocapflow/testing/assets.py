@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from mocapflow.assets import Body, GarmentMesh
-from mocapflow.components import BodyModel, Draper, Garment
 from mocapflow.data import NO_CLOTH, Past, Pose, PoseBatch
+from mocapflow.dressing.roles import BodyModel, Draper, Garment
 from mocapflow.geometry import kinematics
 from mocapflow.records import F64
 from mocapflow.scene import Scene

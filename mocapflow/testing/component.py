@@ -7,8 +7,8 @@ import json
 import pytest
 from pydantic import ValidationError
 
-from mocapflow.components import Component
 from mocapflow.data import Turn
+from mocapflow.settings import Component
 
 TURN = Turn(index=0)  # the first of a frame
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from mocapflow.assets import Background
-from mocapflow.components import Draper
 from mocapflow.data import NO_CLOTH, Cloth, Matches, Moment, Past, Pose, PoseBatch
+from mocapflow.dressing.roles import Draper
 from mocapflow.geometry import twists
 from mocapflow.geometry.cameras import project
 from mocapflow.model import ClothedModel

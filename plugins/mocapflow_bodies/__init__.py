@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mocapflow.components import BodyModel
+from mocapflow.dressing.roles import BodyModel
 from mocapflow.hookspecs import hookimpl
 
 

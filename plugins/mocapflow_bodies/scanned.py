@@ -11,7 +11,7 @@ from typing import ClassVar
 from pydantic import model_validator
 
 from mocapflow.assets import Body
-from mocapflow.components import BodyModel
+from mocapflow.dressing.roles import BodyModel
 from mocapflow.errors import PipelineError, RecordingError, alternatives
 from mocapflow.io.meshes import check_winding, read_mesh
 from mocapflow.io.scans import check_size, read_skeleton

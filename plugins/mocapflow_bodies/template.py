@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from mocapflow.assets import Body
-from mocapflow.components import BodyModel
+from mocapflow.dressing.roles import BodyModel
 from mocapflow.geometry.skeleton import Skeleton
 from mocapflow.records import I32
 from mocapflow_bodies.assemble import Part, assemble

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from mocapflow.components import ClothFitter, Draper
+from mocapflow.components import ClothFitter
+from mocapflow.dressing.roles import Draper
 from mocapflow.hookspecs import hookimpl
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
 from mocapflow.assets import Body, GarmentMesh
-from mocapflow.components import Draper
 from mocapflow.data import Past, Pose, PoseBatch
+from mocapflow.dressing.roles import Draper
 from mocapflow.errors import PluginError
 from mocapflow.geometry.differences import all_columns, neighbours, tried_columns
 from mocapflow.geometry.kinematics import chain_batch

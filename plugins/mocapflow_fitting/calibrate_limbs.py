@@ -12,8 +12,9 @@ import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt
 
 from mocapflow.assets import Background, Body
-from mocapflow.components import Draper, Matcher, Segmenter, Stage
+from mocapflow.components import Matcher, Segmenter, Stage
 from mocapflow.data import Change, Frame, Matches, Past, Pose, Segmentation, Turn
+from mocapflow.dressing.roles import Draper
 from mocapflow.guards.idle import idle_matchers
 from mocapflow.model import ClothedModel
 from mocapflow.pooling import pool_matches

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mocapflow.components import Garment
+from mocapflow.dressing.roles import Garment
 from mocapflow.hookspecs import hookimpl
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from mocapflow.assets import Body, GarmentMesh
-from mocapflow.components import Garment
+from mocapflow.dressing.roles import Garment
 from mocapflow.errors import GarmentError
 from mocapflow.geometry import sewing
 from mocapflow.records import F64

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mocapflow.components import Draper
+from mocapflow.dressing.roles import Draper
 from mocapflow.hookspecs import hookimpl
 
 

@@ -11,8 +11,8 @@ from mocapflow_draping.parts import posed_parts
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from mocapflow.assets import GarmentMesh
-from mocapflow.components import Draper
 from mocapflow.data import Past, Pose, PoseBatch
+from mocapflow.dressing.roles import Draper
 from mocapflow.errors import PluginError
 from mocapflow.geometry.kinematics import chain_batch
 from mocapflow.memo import memoised

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mocapflow.data import NO_CLOTH, Cloth, FrameResult, Past, Pose, PoseBatch, Surface
-from mocapflow.guards.cloth_answers import drape_of
+from mocapflow.dressing.guards import drape_of
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow.scene import Scene

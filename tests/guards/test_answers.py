@@ -9,33 +9,15 @@ import pytest
 from typer.testing import CliRunner
 
 from mocapflow.cli import app
-from mocapflow.components import (
-    BodyModel,
-    ClothFitter,
-    Draper,
-    Garment,
-    Matcher,
-    PoseSolver,
-    Predictor,
-    Prior,
-    Recovery,
-    Segmenter,
-)
+from mocapflow.components import ClothFitter, Matcher, PoseSolver, Predictor, Prior, Recovery, Segmenter
 from mocapflow.data import NO_CLOTH, Matches, Past, Pose, Residual, Turn
+from mocapflow.dressing.guards import body_of, mesh_of
+from mocapflow.dressing.roles import BodyModel, Draper, Garment
 from mocapflow.errors import MocapflowError
-from mocapflow.guards.answers import (
-    WrongAnswer,
-    estimate_of,
-    matches_of,
-    of_kind,
-    pose_of,
-    residual_of,
-    result_of,
-    segmentation_of,
-)
-from mocapflow.guards.cloth_answers import body_of, cloth_of, mesh_of
+from mocapflow.guards.answers import cloth_of, estimate_of, matches_of, pose_of, residual_of, result_of, segmentation_of
 from mocapflow.testing import pictures, scenes
 from mocapflow.testing.recovery import settled
+from mocapflow.wrong_answer import WrongAnswer, of_kind
 from tests.fixtures.stores import STAGES, load, run_tiny, write_pipeline, write_recording
 
 SCENE = scenes.tiny_scene()

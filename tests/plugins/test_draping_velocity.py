@@ -9,8 +9,8 @@ from mocapflow_draping.pushes import CLEAR, lift
 from mocapflow_garments.cylinder import Cylinder
 from mocapflow_garments.skirt import Skirt
 
-from mocapflow.components import Draper
 from mocapflow.data import Past, Pose, PoseBatch
+from mocapflow.dressing.roles import Draper
 from mocapflow.geometry import differences, twists
 from mocapflow.scene import Scene
 

@@ -14,8 +14,8 @@ from test_twist_solver import EXACT, TURN, energies_of
 from twist_fixtures import exact_matches, make_pose, make_scene, make_state
 
 from mocapflow.assets import GarmentMesh
-from mocapflow.components import Draper
 from mocapflow.data import Estimate, FrameState, Matches, Past, Pose, PoseBatch, Surface
+from mocapflow.dressing.roles import Draper
 from mocapflow.geometry import cameras, twists
 from mocapflow.model import ClothedModel, moved
 from mocapflow.pooling import pool

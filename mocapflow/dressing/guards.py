@@ -1,24 +1,19 @@
-"""What bodies, garments, drapers and cloth fitters answer, looked at where it comes in: see `answers`."""
+"""What bodies, garments and drapers answer, looked at where it comes in: who answers wrongly is named."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mocapflow.assets import Body, GarmentMesh
-from mocapflow.components import BodyModel, ClothFitter, Draper, Garment
-from mocapflow.data import Cloth, Estimate, Frame, Past, Pose, PoseBatch, Segmentation, Turn
-from mocapflow.guards.answers import UNIT, WrongAnswer, array_of, of_kind
+from mocapflow.data import Past, Pose, PoseBatch
+from mocapflow.dressing.roles import BodyModel, Draper, Garment
 from mocapflow.records import F64, I32
 from mocapflow.scene import Scene
-
-if TYPE_CHECKING:  # the model asks its draper through this module
-    from mocapflow.model import ClothedModel
+from mocapflow.wrong_answer import UNIT, WrongAnswer, array_of, of_kind
 
 REACH = 1.0  # m from the skin that holds it: a pin farther off is surely wrong
-SLACK = 1e-9  # beyond the bounds of a parameter: rounding
 
 
 def body_of(model: BodyModel, recording: Path) -> Body:
@@ -85,30 +80,3 @@ def velocity_of(draper: Draper, pose: Pose, parameters: F64, vertices: I32, past
     """
     told = of_kind(draper, draper.velocity(pose, parameters, vertices, past, scene), np.ndarray)
     return array_of(draper, told, (len(vertices), 3, 6 + len(pose.angles) + len(parameters)), "velocities")
-
-
-def cloth_of(
-    fitter: ClothFitter,
-    frame: Frame,
-    segmentation: Segmentation,
-    estimate: Estimate,
-    model: ClothedModel,
-    past: Past,
-    turn: Turn,
-) -> Cloth:
-    """Return the cloth that a fitter chooses.
-
-    Raises:
-        WrongAnswer: it is not that of the garment, not finite, or a parameter is out of its bounds.
-    """
-    cloth = of_kind(fitter, fitter.fit(frame, segmentation, estimate, model, past, turn), Cloth)
-    garment = model.scene.garment
-    vertices, parameters = (0, 0) if garment is None else (len(garment.vertices), len(garment.parameter_names))
-    array_of(fitter, cloth.vertices, (vertices, 3), "cloth")
-    array_of(fitter, cloth.parameters, (parameters,), "cloth parameters")
-    if garment is not None:
-        ranges = zip(garment.parameter_names, cloth.parameters, garment.parameter_bounds, strict=True)
-        for name, value, (low, high) in ranges:
-            if not low - SLACK <= value <= high + SLACK:
-                raise WrongAnswer(fitter, f"{value:g} for parameter '{name}', which goes from {low:g} to {high:g}")
-    return cloth
