@@ -72,7 +72,7 @@ def peaks(command: list[str]) -> dict[str, float]:
     running = ["start"]
 
     def listen(lines: object) -> None:
-        for line in lines:  # type: ignore[attr-defined]
+        for line in lines:
             if found := re.match(r"(\S+): running", line):
                 running.append(found[1])
 

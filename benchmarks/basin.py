@@ -50,7 +50,7 @@ VARIANTS: dict[str, tuple[Sequence[Matcher], Recovery | None]] = {
     "fourier_icp + optical_flow": ([FourierIcp(), FLOW], None),
     "contour_icp + limb_search": ([ContourIcp()], LimbSearch()),
     "contour_icp + flow + search": ([ContourIcp(), FLOW], LimbSearch()),
-    "all": ([FourierIcp(), FLOW], LimbSearch()),
+    "fourier_icp + flow + search": ([FourierIcp(), FLOW], LimbSearch()),
 }
 WALL, CLOTHES = 90, 200  # grey levels
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import sys
-import time
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
@@ -18,9 +17,11 @@ from mocapflow_bodies.scanned import Scanned
 from mocapflow_draping.kinematic import Kinematic
 from mocapflow_draping.samples import in_all_directions
 from mocapflow_garments.skirt import Skirt
+from rounds import cpu_ms
 
 from mocapflow.data import Past, Pose, PoseBatch
 from mocapflow.dressing.roles import Draper
+from mocapflow.help.shipped import shipped
 from mocapflow.scene import Scene
 
 ROUNDS = 7
@@ -28,7 +29,7 @@ POSES = 40
 
 
 def main() -> None:
-    recording = Path(sys.argv[1]) if len(sys.argv) > 1 else Path("examples/data/skirt_steps")
+    recording = Path(sys.argv[1]) if len(sys.argv) > 1 else shipped("examples", "data", "skirt_steps")
     body = Scanned().load(recording)
     tapes = json.loads((recording / "subject" / "garment.json").read_text())
     measures = {f"{key}_m": value for key, value in tapes.items() if key != "type"}
@@ -47,7 +48,7 @@ def report(scene: Scene, title: str) -> None:
     fall, closed = Kinematic(sweeps=0), Kinematic()
     steps = Kinematic(rule="literal", sweeps=0)
     asked = Pose(root=one.root[0], angles=one.angles[0]), free[0], np.arange(len(scene.garment.vertices)), Past(), scene
-    jobs: dict[str, tuple[Callable[[], object], int]] = {
+    jobs: dict[str, tuple[Callable[[], object], int]] = {  # and how many drapes each is
         "event-driven, strands alone": (lambda: fall.drape(poses, free, Past(), scene), POSES),
         "event-driven, with rings": (lambda: closed.drape(poses, free, Past(), scene), POSES),
         "literal, 50 x 2 degrees": (lambda: steps.drape(poses, free, Past(), scene), POSES),
@@ -64,21 +65,8 @@ def report(scene: Scene, title: str) -> None:
         jobs["newton XPBD, 0.6 s from rest, one alone"] = (lambda: simulated.drape(one, free[:1], Past(), scene), 1)
         jobs["newton XPBD, eight together"] = (lambda: simulated.drape(few, free[:8], Past(), scene), 8)
     print(f"\n{title}")
-    for name, milliseconds in timed(jobs).items():
-        print(f"  {name:42s} {milliseconds:8.3f} ms")
-
-
-def timed(jobs: dict[str, tuple[Callable[[], object], int]]) -> dict[str, float]:
-    """Return the median CPU ms of each job per drape, taken in turn."""
-    for job, _ in jobs.values():
-        job()
-    spent: dict[str, list[float]] = {name: [] for name in jobs}
-    for _ in range(ROUNDS):
-        for name, (job, share) in jobs.items():
-            start = time.process_time()
-            job()
-            spent[name].append(1e3 * (time.process_time() - start) / share)
-    return {name: float(np.median(values)) for name, values in spent.items()}
+    for name, ms in cpu_ms({name: job for name, (job, _) in jobs.items()}, ROUNDS).items():
+        print(f"  {name:42s} {ms / jobs[name][1]:8.3f} ms")
 
 
 def walking(scene: Scene, count: int) -> PoseBatch:

@@ -8,7 +8,6 @@ silhouettes are 5 degrees a joint apart; keypoints are the body's landmarks.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import islice
@@ -23,6 +22,7 @@ from mocapflow_matching.optical_flow import OpticalFlow
 from mocapflow_priors.constant_velocity import ConstantVelocity
 from mocapflow_priors.image_flow import ImageFlowPredictor
 from mocapflow_sequence.flow import FollowPoints
+from rounds import cpu_ms
 
 from mocapflow.components import Matcher
 from mocapflow.data import NO_CLOTH, Change, Frame, Moment, Past, Pose, Turn
@@ -51,17 +51,6 @@ def detections(scene: Scene, pose: Pose) -> tuple[np.ndarray, ...]:
     return tuple(views)
 
 
-def cpu_ms(actions: dict[str, Callable[[], object]]) -> dict[str, float]:
-    """Median CPU ms of each action, in rounds of all of them."""
-    samples: dict[str, list[float]] = {name: [] for name in actions}
-    for number in range(ROUNDS + 2):  # the first two compile and warm up
-        for name, action in actions.items():
-            begin = time.process_time()
-            action()
-            samples[name] += [1e3 * (time.process_time() - begin)] if number > 1 else []
-    return {name: float(np.median(values)) for name, values in samples.items()}
-
-
 def main() -> None:
     scene, pose = scene_of(CLIP)
     recording = open_recording(shipped("examples", "data", CLIP))
@@ -70,7 +59,7 @@ def main() -> None:
     old, new = islice(recording.frames(), 2)
     follow = FollowPoints()
 
-    def flow_of_frame() -> tuple:  # type: ignore[type-arg]
+    def flow_of_frame() -> tuple:
         pairs = enumerate(zip(old.images, new.images, strict=True))
         return tuple(follow.follow(a, b, follow.differs(a, background, camera)) for camera, (a, b) in pairs)
 
@@ -97,7 +86,7 @@ def main() -> None:
     points = np.mean([len(view.pixel) for view in frame.flow or ()])
     print(f"{points:.0f} points a view are followed")
     print(f"{'':30}{'ms a call':>10}{'ratio':>8}{'calls':>7}{'ms a frame':>12}")
-    spent = cpu_ms(actions)
+    spent = cpu_ms(actions, ROUNDS)
     for name, ms in spent.items():
         calls = matchers[name][2] if name in matchers else 1
         print(f"{name:30}{ms:10.2f}{ms / spent['contour_icp']:8.2f}{calls:7}{calls * ms:12.1f}")

@@ -1,9 +1,10 @@
 """Do forces fitted on three cameras explain the fourth? Share of frames where they lower its silhouette error.
 
 `OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python benchmarks/held_out_camera.py [RECORDING [FRAMES]]`. The person is
-tracked by skirt.yaml; at these poses each cloth fitter sees all silhouettes but one. The error in that view is the
-number of pixels in which the silhouettes of model and person differ. Calm cloth, without forces, has to be beaten:
-as thick and as short as the fitted one, for these are no forces, and, printed second, of no thickness and as sewn.
+tracked by skirt.yaml or shorts.yaml; at these poses each cloth fitter, `sampled_forces` and `gauss_newton`, sees all
+silhouettes but one. The error in that view is the number of pixels in which the silhouettes of model and person differ.
+Calm cloth, without forces, has to be beaten: as thick and as short as the fitted one, for these are no forces, and,
+printed second, of no thickness and as sewn.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from clothed import pipeline_for
 from mocapflow_draping.sampled_forces import SampledForces
 from mocapflow_draping.take_up import TakeUp
 from mocapflow_twist.gauss_newton import GaussNewton
@@ -25,13 +27,14 @@ from mocapflow.config.pipeline import load_pipeline
 from mocapflow.data import Cloth, Frame, FrameState, Moment, Past, Segmentation, Turn
 from mocapflow.geometry import silhouettes
 from mocapflow.geometry.sewing import TAKE_UP, THICKNESS
+from mocapflow.help.shipped import shipped
 from mocapflow.model import ClothedModel
 from mocapflow.recordings.recording import open_recording
 from mocapflow.records import F64
 from mocapflow.running.runner import run
 from mocapflow.scene import Scene
 
-RECORDING = Path("examples/data/skirt_steps")
+RECORDING = shipped("examples", "data", "skirt_steps")
 TRACK_ONLY = tuple(f"stages.{stage}=null" for stage in ("smooth", "export", "evaluate", "overlay", "virtual", "report"))
 TURN = Turn(index=0)
 
@@ -48,10 +51,7 @@ def main() -> None:
 
 def tracked(recording: Path, frames: int) -> tuple[list[FrameState], ClothedModel]:
     """Return what is known of each frame, and the model."""
-    name = "shorts" if "shorts" in recording.name else "skirt"
-    pipeline = load_pipeline(
-        Path(f"pipelines/{name}.yaml"), recording=recording, changes=TRACK_ONLY, frames=slice(0, frames)
-    )
+    pipeline = load_pipeline(pipeline_for(recording), recording=recording, changes=TRACK_ONLY, frames=slice(0, frames))
     states: list[FrameState] = []
     observers: Any = pipeline.registry.observers
     observers.frame_done = lambda index, result: states.append(result.state)
@@ -60,7 +60,7 @@ def tracked(recording: Path, frames: int) -> tuple[list[FrameState], ClothedMode
     assert pipeline.garment is not None
     body, loop = pipeline.body.load(recording), next(s.stage for s in pipeline.stages if s.label == "track")
     scene = Scene(cameras=open_recording(recording).cameras, body=body, garment=pipeline.garment.sew(body))
-    return states, ClothedModel(scene=scene, draper=loop.draper)  # type: ignore[attr-defined]
+    return states, ClothedModel(scene=scene, draper=loop.draper)
 
 
 def errors(fitter: ClothFitter, states: Sequence[FrameState], model: ClothedModel, view: int) -> F64:

@@ -14,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from clothed import pipeline_for
 from limits import true_poses
 from mocapflow_fitting.calibrate_limbs import CalibrateLimbs
 from mocapflow_fitting.proportions import scaled
@@ -34,9 +35,7 @@ LIMBS = {"thigh": ("hip", "knee"), "shank": ("knee", "ankle")}
 def main() -> None:
     folder = Path(sys.argv[1])
     frames = int(sys.argv[2]) if len(sys.argv) > 2 else CalibrateLimbs.model_fields["frames"].default
-    pipeline = load_pipeline(
-        Path(f"pipelines/{'shorts' if 'shorts' in folder.name else 'skirt'}.yaml"), recording=folder
-    )
+    pipeline = load_pipeline(pipeline_for(folder), recording=folder)
     stages = {stage.label: stage.stage for stage in pipeline.stages}
     loop, recording, body = stages["track"], open_recording(folder), pipeline.body.load(folder)
     assert isinstance(loop, CoupledLoop) and pipeline.garment is not None

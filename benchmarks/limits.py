@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
+from clothed import pipeline_for
 
 from mocapflow.assets import Camera
 from mocapflow.components import Prior, Segmenter
@@ -63,8 +64,7 @@ class Errors(NamedTuple):
 
 def main() -> None:
     folder, frames = Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 25
-    name = "shorts" if "shorts" in folder.name else "skirt"
-    pipeline = load_pipeline(Path(f"pipelines/{name}.yaml"), recording=folder, frames=slice(0, frames))
+    pipeline = load_pipeline(pipeline_for(folder), recording=folder, frames=slice(0, frames))
     recording = open_recording(folder, start=0, stop=frames)
     stages = {stage.label: stage.stage for stage in pipeline.stages}
     loop, body, garment = stages["track"], pipeline.body.load(folder), pipeline.garment

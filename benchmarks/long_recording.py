@@ -35,7 +35,7 @@ SAME = ("root", "angles", "covariance", "cloth", "cloth_parameters", "iterations
 
 
 def build(clip: Path, folder: Path, frames: int) -> int:
-    """Write a clip to and fro into a recording folder; return the period in frames."""
+    """Write a clip, forwards and backwards, into a recording folder; return the period in frames."""
     shutil.copytree(clip, folder, ignore=shutil.ignore_patterns("videos", "truth"))
     (folder / "videos").mkdir()
     period = 0

@@ -1,4 +1,7 @@
-"""Packs two subjects with one mesh into the template body: `python benchmarks/make_template.py A B`."""
+"""Packs two subjects with one mesh into the template body.
+
+`python benchmarks/make_template.py A B`; each is the folder `subject` of a recording.
+"""
 
 from __future__ import annotations
 

@@ -105,10 +105,10 @@ class Parts:
         packing.match_row = self._watch("pack", packing.match_row)
         packing.row_of = self._watch("pack", packing.row_of)
         write = Rows.write
-        Rows.write = lambda rows, *a, **k: self._watch(f"write {rows._path.parent.name}", write)(rows, *a, **k)  # type: ignore[method-assign]
+        Rows.write = lambda rows, *a, **k: self._watch(f"write {rows._path.parent.name}", write)(rows, *a, **k)
 
     def __exit__(self, *_: object) -> None:
-        packing.quantised, packing.match_row, packing.row_of, Rows.write, rows.flush = self._real  # type: ignore[method-assign]
+        packing.quantised, packing.match_row, packing.row_of, Rows.write, rows.flush = self._real
         for name, ms in self._now.items():
             kind = (
                 "write silhouettes"
@@ -122,8 +122,8 @@ class Parts:
         self._real[-1](path)
         self.waited[-1] += 1000 * (time.perf_counter() - start)
 
-    def _watch(self, name: str, call: Callable) -> Callable:  # type: ignore[type-arg]
-        def watched(*args, **named):  # type: ignore[no-untyped-def]
+    def _watch(self, name: str, call: Callable) -> Callable:
+        def watched(*args, **named):
             start = time.process_time()
             value = call(*args, **named)
             self._now[name] = self._now.get(name, 0.0) + 1000 * (time.process_time() - start)
@@ -132,7 +132,7 @@ class Parts:
         return watched
 
 
-def scenes(count: int):  # type: ignore[no-untyped-def]
+def scenes(count: int):
     """Yield frames with results like those of a real run."""
     recording, dice = open_recording(CLIP), np.random.default_rng(0)
     plates = [cv2.imread(str(CLIP / "background" / f"{camera.name}.png")) for camera in recording.cameras]
@@ -146,7 +146,7 @@ def scenes(count: int):  # type: ignore[no-untyped-def]
         yield Frame(index=index, time=index / 30, images=(), usable=np.ones(4, bool)), result_of(silhouettes, dice)
 
 
-def outline(image, plate):  # type: ignore[no-untyped-def]
+def outline(image, plate):
     """Return the signed distance (H, W) px to the outline of what differs from the clean plate."""
     plate = cv2.resize(plate, image.shape[1::-1])
     away = cv2.GaussianBlur(np.abs(image.astype(np.float32) - plate).max(axis=2), (0, 0), 1.5) > 18
@@ -155,7 +155,7 @@ def outline(image, plate):  # type: ignore[no-untyped-def]
     return np.clip(cv2.GaussianBlur(mask_distance(mask > 0), (0, 0), 1), -BAND, BAND)  # sub-pixel, as a level set is
 
 
-def result_of(silhouettes, dice):  # type: ignore[no-untyped-def]
+def result_of(silhouettes, dice):
     """Return a frame result with random numbers of the real sizes."""
     unknowns = 6 + ANGLES + 2
     spread = dice.normal(size=(unknowns, unknowns))

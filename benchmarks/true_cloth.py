@@ -40,8 +40,9 @@ def main() -> None:
     folder = Path(sys.argv[1])
     frames, every = (int(word) for word in (*sys.argv[2:], *("48", "8")[len(sys.argv) - 2 :]))
     rows = range(0, frames, every)
+    archive = np.load(folder / "truth" / "cloth.npz")
     states, model = tracked(folder, frames)
-    poses, archive = true_poses(folder, model.scene, rows), np.load(folder / "truth" / "cloth.npz")
+    poses = true_poses(folder, model.scene, rows)
     true = [Sheet(archive["vertices"][row].astype(float), archive["faces"].astype(np.int32)) for row in rows]
     found = np.array([states[row].cloth.parameters for row in rows])
     batch = PoseBatch(root=np.stack([pose.root for pose in poses]), angles=np.stack([pose.angles for pose in poses]))

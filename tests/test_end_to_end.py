@@ -22,6 +22,8 @@ PIPELINES = shipped("pipelines")
 CLIPS = {name: shipped("examples", "data", f"{name}_steps") for name in ("skirt", "shorts")}
 NO_PICTURES = [part for stage in ("overlay", "virtual", "report") for part in ("--set", f"stages.{stage}=null")]
 FEW = ("--frames", "0:5", *NO_PICTURES)
+OTHERS = ("paper", "bare", "large_motion", "disturbed", "disturbed_added", "corrupted")  # pipelines, on the clips too
+UNSHIPPED = ("balancing", "disturbed_balancing")  # whose recording does not come with mocapflow
 long = pytest.mark.long
 
 
@@ -83,7 +85,7 @@ def few(home):
     return home / "few"
 
 
-@pytest.mark.long
+@long
 def test_two_frames_without_cloth(tmp_path):
     said = call(
         *("run", PIPELINES / "bare.yaml", "--recording", CLIPS["shorts"], "--frames", "0:2", "--out", "out"),
@@ -260,19 +262,17 @@ def test_a_killed_run_goes_on_to_the_same_result(few, tmp_path, after):
 
 
 @long
-@pytest.mark.parametrize("pipeline", ["paper", "bare", "large_motion", "disturbed", "disturbed_added", "corrupted"])
+@pytest.mark.parametrize("pipeline", OTHERS)
 def test_the_other_pipelines_run(tmp_path, pipeline):
     said = call("run", PIPELINES / f"{pipeline}.yaml", "--frames", "0:2", "--out", "out", *NO_PICTURES, cwd=tmp_path)
     assert "track: 2 of 2 frames" in said
     assert len(table(tmp_path / "out/results/angles.csv")["frame"]) == 2
 
 
-def test_every_pipeline_is_run_here_but_those_whose_recording_is_not_shipped(tmp_path):
+def test_every_pipeline_is_run_here_that_needs_no_extra_and_has_a_recording(tmp_path):
     files = {path.stem for path in PIPELINES.glob("*.yaml") if "\nfactors:" not in path.read_text()}
-    elsewhere = {"demo", "large_motion", "skirt_xpbd"}  # the last needs an extra
-    unshipped = {"balancing", "disturbed_balancing"}
-    assert files == {*CLIPS, "paper", "bare", "disturbed", "disturbed_added", "corrupted", *unshipped, *elsewhere}
-    for pipeline in unshipped:
+    assert files == {*CLIPS, "demo", *OTHERS, *UNSHIPPED, "skirt_xpbd"}
+    for pipeline in UNSHIPPED:
         assert "--recording" in call("plan", PIPELINES / f"{pipeline}.yaml", cwd=tmp_path, status=2)
 
 
