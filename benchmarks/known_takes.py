@@ -74,14 +74,12 @@ TAKES = {
     "kneeup_B_culottes": Take("B", "shorts", "kneeup_B", 66, GREY, start=60, cut=CULOTTES),
     "walk_B_trousers": Take("B", "shorts", "walk_B", 67, PURPLE, start=60, cut=TROUSERS),
     "squat_A_trousers": Take("A", "shorts", "kneebend_A", 68, DARK, start=60, cut=SLACKS),
-    # made when all had been chosen; the kick has had a say since
     "swing_A_skirt": Take("A", "skirt", "swing", 71, GREY, frames=60),
     "swing_B_shorts": Take("B", "shorts", "swing", 72, PURPLE, frames=60),
     "bow_B_skirt": Take("B", "skirt", "bow", 73, GREEN, frames=60),
     "bow_A_shorts": Take("A", "shorts", "bow", 74, GREY, frames=60),
     "kick_A_skirt": Take("A", "skirt", "kick_B", 75, GREEN, start=20, frames=50),
     "walk_B_skirt2": Take("B", "skirt", "walk_B", 76, PURPLE, start=20, frames=60),
-    # made after that
     "run_A_skirt": Take("A", "skirt", "run", 81, GREEN),
     "run_B_skirt": Take("B", "skirt", "run", 82, GREY),
     "run_A_shorts": Take("A", "shorts", "run", 84, PURPLE),
@@ -89,12 +87,9 @@ TAKES = {
     "kneel_A_skirt": Take("A", "skirt", "kneel", 85, GREY, frames=60),
     "plie_A_skirt": Take("A", "skirt", "plie", 91, PURPLE),
     "grapevine_B_skirt": Take("B", "skirt", "grapevine", 92, DARK, frames=60),
-    # made after that
     "sit_A_skirt": Take("A", "skirt", "sit", 101, GREEN, frames=60),
     "akimbo_B_shorts": Take("B", "shorts", "akimbo", 102, GREY),
-    # made after that: motions of one person, by the other
     "kneel_B_skirt": Take("B", "skirt", "kneel", 111, GREEN, frames=60),
     "jack_A_skirt": Take("A", "skirt", "jack", 112, GREY),
-    # made after that: trousers again, by the other
     "walk_A_trousers": Take("A", "shorts", "walk_A", 113, GREY, start=20, cut=SLACKS),
 }
