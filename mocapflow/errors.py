@@ -62,10 +62,15 @@ class StoreError(MocapflowError):
     exit_status = 1
 
 
-def no_run_folder(out: Path, error: OSError) -> StoreError:
+def folder_error(error: OSError) -> type[MocapflowError]:
+    """Return as what it counts that a folder can't be made or written: where there is a file, its name is wrong."""
+    return MocapflowError if isinstance(error, FileExistsError | NotADirectoryError) else StoreError
+
+
+def no_run_folder(out: Path, error: OSError) -> MocapflowError:
     """Return what is said where a run folder can't be made or written."""
     hint = "name another folder, or make it writable"
-    return StoreError(f"can't write the run folder: {error.strerror}", where=str(out), hint=hint)
+    return folder_error(error)(f"can't write the run folder: {error.strerror}", where=str(out), hint=hint)
 
 
 def unwritable(error: OSError) -> StoreError | None:

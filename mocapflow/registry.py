@@ -105,7 +105,9 @@ class Registry:
             first, second = (self._origins[cls] for cls in found[:2])
             message = f"two plugins provide a {role} named '{name}': {first} and {second}"
             raise PluginError(message, hint="uninstall one of them, or give its component another name")
-        notes = [f"note: {failure}" for failure in self._failures if failure.role in {"", role}]
+        for other in PROVIDERS:  # a plugin may give its component under another role's hook
+            self.provided(other)
+        notes = [f"note: {failure}" for failure in self._failures]
         hint = "\n".join([alternatives(name, self.names(role)), *notes])
         raise UnknownComponent(f"no {role} named '{name}'", hint=hint)
 

@@ -145,6 +145,7 @@ def test_the_store(call):
     assert "complete" in listed
     explained = json.loads(call("cache", "explain", name, *store).stdout)
     assert explained["component"]["name"] == "start_from_file"
+    assert json.loads(call("cache", "explain", name[:-6], *store).stdout) == explained
     assert call("cache", "explain", name, name, *store).stdout == "made from the same\n"
     assert f"would remove {name}" in call("cache", "prune", "--all", "--dry-run", *store).stdout
     assert "0 results" in call("cache", "prune", "--days", "1", *store).stdout

@@ -86,6 +86,15 @@ def test_a_provider_that_returns_something_wrong(plugin, role, said):
     assert caught.value.hint == f"available: none\n{note}"
 
 
+def test_a_component_under_the_hook_of_another_role_is_told_to_who_asks_for_it():
+    """Whoever takes a garment for a draper asks for the draper, or for the garment."""
+    registry = registry_of((OURS, broken_plugins.wrong_base))
+    for role in ("draper", "prior"):
+        with pytest.raises(UnknownComponent) as caught:
+            registry.get(role, "gown")
+        assert "mocapflow_drapers returned Cape, which is not a Draper" in caught.value.hint
+
+
 def test_what_pydantic_says_of_a_setting_is_told_in_one_line():
     (failure,) = registry_of((OURS, broken_plugins.without_a_type)).failures
     assert "did not load: PydanticUserError: A non-annotated attribute was detected: `length_m = 1.1`" in str(failure)

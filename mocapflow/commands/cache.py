@@ -43,7 +43,7 @@ def list_(
 
 @app.command()
 def explain(
-    name: Annotated[str, typer.Argument(help="A result as `cache list` shows it, or the beginning of its key.")],
+    name: Annotated[str, typer.Argument(help="A result of `cache list`, or the beginning of its name or its key.")],
     other: Annotated[str | None, typer.Argument(help="Say how this one was made differently.")] = None,
     store: Where = DEFAULT,
 ) -> None:
@@ -115,7 +115,7 @@ def _odd(artifact: Artifact, store: Path) -> str:
 
 def _find(name: str, store: Path) -> Artifact:
     artifacts = _artifacts(store)
-    found = [artifact for artifact in artifacts if artifact.path.name == name or artifact.key.startswith(name)]
+    found = [a for a in artifacts if a.path.name.startswith(name) or a.key.startswith(name)]
     if len(found) != 1:
         message = f"'{name}' is {'more than one result' if found else 'no result'} of this store"
         hint = alternatives(name, [artifact.path.name for artifact in found or artifacts])

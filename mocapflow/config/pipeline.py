@@ -93,12 +93,12 @@ class Pipeline:
 
 
 def load_pipeline(
-    path: Path,
+    path: Path | str,
     registry: Registry | None = None,
     *,
-    recording: Path | None = None,
+    recording: Path | str | None = None,
     changes: Iterable[str] = (),
-    folder: Path = Path(),
+    folder: Path | str = Path(),
     frames: slice | None = None,
 ) -> Pipeline:
     """Read a pipeline file and resolve every name in it.
@@ -114,7 +114,7 @@ def load_pipeline(
     Raises:
         MocapflowError: what is wrong, at which line, and what exists instead.
     """
-    document = read(Path(path), changes, folder)
+    document = read(Path(path), changes, Path(folder))
     if frames is not None:
         document = _with_frames(document, frames)
     plain = Resolver(document, Registry())
@@ -125,7 +125,7 @@ def load_pipeline(
     assert isinstance(said, PipelineFile)
     resolver = Resolver(document, registry or _registry_with(said.plugins, plain))
     written = "" if recording else resolver.place(("recording",))
-    recording = recording or _recording(said, Path(path).stem, resolver)
+    recording = Path(recording) if recording else _recording(said, Path(path).stem, resolver)
     if not recording.is_dir():
         what = f"there is no such folder{f': {recording}' if written else ''}"
         hint = "\n".join(filter(None, [led_nowhere(recording), "--recording DIR names another"]))

@@ -98,7 +98,8 @@ class Resolver:
         return tuple(self.component(base.role, item, (*steps, index)) for index, item in enumerate(value))
 
     def _wrong_setting(self, cls: type[BaseModel], error: ValidationError, steps: Steps) -> MocapflowError:
-        first = error.errors(include_url=False)[0]
+        errors = error.errors(include_url=False)
+        first = next((wrong for wrong in errors if wrong["type"] == "extra_forbidden"), errors[0])  # a typo, maybe
         location = first["loc"]
         if first["type"] == "missing":
             described = ", ".join(dotted(wrong["loc"]) for wrong in error.errors() if wrong["type"] == "missing")

@@ -120,15 +120,15 @@ class Prepared:
         asked(partial(self.pipeline.body.need, self.pipeline.recording), dressed)
 
 
-def prepare(pipeline: Pipeline, *, store: Path, url: str | None = None) -> Prepared:
+def prepare(pipeline: Pipeline, *, store: Path | str, url: str | None = None) -> Prepared:
     """Return a pipeline with what it would make, and the store; see `run`. Nothing is written but digests."""
-    kept = open_store(store, url)
+    kept = open_store(Path(store), url)
     prepared = Prepared(pipeline, kept, steps_of(pipeline, kept.digests))
     kept.digests.save()
     return prepared
 
 
-def plan(pipeline: Pipeline, *, store: Path, url: str | None = None) -> list[PlanLine]:
+def plan(pipeline: Pipeline, *, store: Path | str, url: str | None = None) -> list[PlanLine]:
     """Return for each stage whether its result is there, can be continued, or has to be made, and why."""
     return prepare(pipeline, store=store, url=url).plan()
 
@@ -136,8 +136,8 @@ def plan(pipeline: Pipeline, *, store: Path, url: str | None = None) -> list[Pla
 def run(
     pipeline: Pipeline,
     *,
-    store: Path,
-    out: Path,
+    store: Path | str,
+    out: Path | str,
     url: str | None = None,
     fresh: bool = False,
     only: str | None = None,
@@ -159,6 +159,7 @@ def run(
         StoreError: the store is full or can't be written; committed frames are kept.
         MocapflowError: the pipeline or an input is wrong.
     """
+    store, out = Path(store), Path(out)
     check_apart(out, store, pipeline.recording)
     prepared = prepare(pipeline, store=store, url=url)
     prepared.check(out, fresh)

@@ -113,6 +113,8 @@ class Copies:
         except ImportError as error:
             hint = "pip install 'mocapflow[remote]', and what fsspec names for this kind of URL"
             raise StoreError(f"a store at {self.url} needs a package: {error}", hint=hint) from error
+        except ValueError as error:  # no such protocol
+            raise MocapflowError(f"no store can be at {self.url}: {error}") from error
         except Exception as error:  # every kind of store has its own
             hint = "without --store the results are kept in a folder beside the run"
             message = f"can't reach the store at {self.url}: {type(error).__name__}: {error}"

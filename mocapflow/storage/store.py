@@ -25,7 +25,7 @@ import numpy as np
 
 from mocapflow.caching.digests import Digests
 from mocapflow.caching.keys import Recipe
-from mocapflow.errors import FULL, StoreError
+from mocapflow.errors import FULL, MocapflowError, StoreError, folder_error
 from mocapflow.storage.locks import Lock, acquire, looking
 from mocapflow.storage.rows import Corrupted, array_meta, flush_all, read_json, write_json
 
@@ -79,9 +79,8 @@ class Store:
 
     def __init__(self, path: Path) -> None:
         if "://" in str(path) or ":/" in str(path):
-            raise StoreError(
-                f"the store has to be a folder, not {path}", hint="a URL is for --store of run, plan and compare"
-            )
+            hint = "a URL is for --store of run, plan and compare"
+            raise MocapflowError(f"the store has to be a folder, not {path}", hint=hint)
         self.path = path
         self.state = path / ".state"  # what is no result
         self.digests = Digests(self.state / "digests.json")
@@ -267,7 +266,7 @@ def writing(where: Path, saved: str = "") -> Iterator[None]:
         )
         todo = "free some space" if full else "make it writable"
         hint = "\n".join(filter(None, [f"{todo}, or name another store", saved]))
-        raise StoreError(message, hint=hint) from error
+        raise folder_error(error)(message, hint=hint) from error
 
 
 def _kind(folder: Path) -> str | None:

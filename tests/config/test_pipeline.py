@@ -190,6 +190,9 @@ def test_a_plugin_file_named_by_the_pipeline(folder):
         ("recording: clip", "recording: clip\nspeed: 3",
          "skirt.yaml:2:1  speed: unknown setting of a pipeline (body, frames, garment, mocapflow, parts, plugins, "
          "recording, scale, stages)"),
+        ("stages:", "stagess:",
+         "skirt.yaml:3:1  stagess: unknown setting of a pipeline (body, frames, garment, mocapflow, parts, plugins, "
+         "recording, scale, stages)\n       did you mean 'stages'?"),
         ("smooth: smooth", "a/b: smooth", "skirt.yaml:10:3  no stage can be called 'a/b'\n"
          "       its name is that of files: letters, digits, _ and -"),
         ("smooth: smooth", "../x: smooth", "skirt.yaml:10:3  no stage can be called '../x'\n"
@@ -270,6 +273,12 @@ def test_measures_may_carry_their_unit_and_are_told_as_they_are_written(folder):
     file.write_text(json.dumps({key: value for key, value in MEASURES.items() if key != "length"}))
     with pytest.raises(MocapflowError, match=r"^clip/subject/garment.json  garment: skirt needs length_m\n"):
         load("garment=from_recording")
+    file.write_text(file.read_text().replace("waist_height", "waist_hieght"))
+    with pytest.raises(
+        MocapflowError, match=r"^clip/subject/garment.json:1:\d+  garment.waist_hieght: .*\n.*height_m'"
+    ):
+        load("garment=from_recording")
+    file.write_text(json.dumps({key: value for key, value in MEASURES.items() if key != "length"}))
     with pytest.raises(MocapflowError, match=r"^--set .*  garment: skirt needs length_m\n"):  # it has a say, too
         load("garment={use: from_recording, waist_height_m: 1.1}")
 

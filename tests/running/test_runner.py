@@ -11,7 +11,16 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from mocapflow.errors import ComponentFailed, GarmentError, PipelineError, PluginError, RecordingError, StoreError
+from mocapflow.config.pipeline import load_pipeline
+from mocapflow.errors import (
+    ComponentFailed,
+    GarmentError,
+    MocapflowError,
+    PipelineError,
+    PluginError,
+    RecordingError,
+    StoreError,
+)
 from mocapflow.hookspecs import hookimpl
 from mocapflow.running.runner import plan, run
 from mocapflow.storage.store import Store
@@ -271,8 +280,15 @@ def test_measures_that_can_not_be_sewn_are_told_where_they_are_written(tmp_path,
 
 def test_a_run_folder_that_cannot_be_made(tmp_path, path):
     (tmp_path / "out").write_text("")
-    with pytest.raises(StoreError, match="can't write the run folder"):
+    with pytest.raises(MocapflowError, match="can't write the run folder") as caught:
         run_tiny(path, tmp_path)
+    assert caught.value.exit_status == 2  # a wrong name
+
+
+def test_folders_may_be_named_by_text(tmp_path, path):
+    pipeline = load_pipeline(str(path), recording=str(load_pipeline(path).recording), folder=str(tmp_path))
+    assert run(pipeline, store=str(tmp_path / "store.zarr"), out=str(tmp_path / "out")).out == tmp_path / "out"
+    assert "hit" in {line.action for line in plan(pipeline, store=str(tmp_path / "store.zarr"))}
 
 
 def test_results_do_not_depend_on_truth_and_reference(tmp_path, path):

@@ -19,7 +19,7 @@ import zarr
 from mocapflow import records
 from mocapflow.assets import Background
 from mocapflow.data import Frame, Past, Pose, Silhouette, Start
-from mocapflow.errors import ComponentFailed, ShapeError, StoreError
+from mocapflow.errors import ComponentFailed, MocapflowError, ShapeError, StoreError
 from mocapflow.io.atomic import PART
 from mocapflow.records import F64, record
 from mocapflow.running.execution import Execution
@@ -303,8 +303,9 @@ def test_an_unfinished_result_is_none(store):
 
 
 def test_a_store_elsewhere_on_the_net_is_refused():
-    with pytest.raises(StoreError, match="has to be a folder"):
+    with pytest.raises(MocapflowError, match="has to be a folder") as caught:
         Store(Path("s3://bucket/store"))
+    assert caught.value.exit_status == 2
 
 
 # ---- damage
@@ -559,8 +560,9 @@ def test_an_unwritable_store_says_so(tmp_path, path, monkeypatch):
 
 def test_a_file_in_the_place_of_the_store(tmp_path, path):
     (tmp_path / "store.zarr").write_text("")
-    with pytest.raises(StoreError, match="can't write to the store"):
+    with pytest.raises(MocapflowError, match="can't write to the store") as caught:
         run_tiny(path, tmp_path)
+    assert caught.value.exit_status == 2
 
 
 # ---- locks
