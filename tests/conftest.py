@@ -1,5 +1,6 @@
 """What holds in all tests."""
 
+import os
 from pathlib import Path
 
 import mocapflow_levelset
@@ -36,6 +37,17 @@ def code_is_known():
 def one_thread():
     """Compute in one thread, as a run does: the threads of several workers wait for each other."""
     with threadpool_limits(limits=1):
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def no_waiting_for_the_drive():
+    """Don't wait until files are on the drive: no test cuts the power, and what is killed is a process of its own.
+
+    Who counts what is flushed wraps this, and sees every call.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", lambda number: None)
         yield
 
 
