@@ -62,6 +62,14 @@ def unrendered(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
+def undrawn(unrendered: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Don't even compose the stick models, which have a dozen panels: for who compares rigs, not pictures of them."""
+    from mocapflow_evaluation import comparison_plots
+
+    monkeypatch.setattr(comparison_plots, "draw_sticks", lambda path, *_: path)
+
+
+@pytest.fixture
 def path(tmp_path: Path) -> Path:
     """The tiny pipeline, not run yet."""
     return write_pipeline(tmp_path, write_recording(tmp_path / "clip"))
