@@ -1,5 +1,7 @@
 """What holds in all tests."""
 
+import os
+import shutil
 from pathlib import Path
 
 import mocapflow_levelset
@@ -7,6 +9,7 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from mocapflow.caching.digests import Digests
+from tests.fixtures.stores import run_tiny, write_pipeline, write_recording
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -39,9 +42,50 @@ def one_thread():
         yield
 
 
+@pytest.fixture(scope="session", autouse=True)
+def no_waiting_for_the_drive():
+    """Don't wait until files are on the drive: no test cuts the power, and what is killed is a process of its own.
+
+    Who counts what is flushed wraps this, and sees every call.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", lambda number: None)
+        yield
+
+
 @pytest.fixture
 def unrendered(monkeypatch: pytest.MonkeyPatch) -> None:
     """Compose pictures of a comparison but don't render them, which takes a second each: for who reads its figures."""
     from mocapflow_evaluation import comparison_plots
 
     monkeypatch.setattr(comparison_plots, "save", lambda figure, path: path)
+
+
+@pytest.fixture
+def undrawn(unrendered: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Don't even compose the stick models, which have a dozen panels: for who compares rigs, not pictures of them."""
+    from mocapflow_evaluation import comparison_plots
+
+    monkeypatch.setattr(comparison_plots, "draw_sticks", lambda path, *_: path)
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """The tiny pipeline, not run yet."""
+    return write_pipeline(tmp_path, write_recording(tmp_path / "clip"))
+
+
+@pytest.fixture(scope="session")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a run of the tiny pipeline without a break: to compare with, not to write to."""
+    folder = tmp_path_factory.mktemp("whole")
+    run_tiny(write_pipeline(folder, write_recording(folder / "clip")), folder)
+    return folder
+
+
+@pytest.fixture
+def ran(tmp_path: Path, path: Path, whole: Path) -> Path:
+    """The tiny pipeline after a run, whose store and results are a copy: it takes a quarter of the time."""
+    for name in ("store.zarr", "out"):
+        shutil.copytree(whole / name, tmp_path / name)
+    return path

@@ -590,12 +590,7 @@ def test_only_a_garment_has_a_picture(call):
     assert "only a garment has a picture" in call("show", "matcher", "contour_icp", "--out", "it.png").output
 
 
-def test_the_module_runs_as_the_command_does():
-    done = subprocess.run([sys.executable, "-m", "mocapflow", "plugins"], capture_output=True, text=True, check=True)
-    assert "levelset" in done.stdout
-
-
-def test_decoders_do_not_talk_besides(tmp_path):
+def test_the_module_runs_as_the_command_does_and_decoders_do_not_talk_besides(tmp_path):
     shutil.copytree(CLIP, tmp_path / "clip")
     video = tmp_path / "clip" / "videos" / "cam02.mp4"
     video.write_bytes(video.read_bytes()[:20000])

@@ -27,13 +27,8 @@ SHORT = {name: STAGES[name] for name in ("start", "track")}
 KILLS = Path(__file__).parent / "fixtures" / "kills.py"
 
 
-@pytest.fixture
-def path(tmp_path):
-    return write_pipeline(tmp_path, write_recording(tmp_path / "clip"))
-
-
-def test_a_track_has_every_frame_and_says_how_it_went(tmp_path, path):
-    run_tiny(path, tmp_path)
+@pytest.mark.usefixtures("ran")
+def test_a_track_has_every_frame_and_says_how_it_went(tmp_path):
     track = the_track(tmp_path)
     assert track.frame.tolist() == list(range(12))
     assert track.cloth.shape == (12, 4, 3)
@@ -88,18 +83,16 @@ def count(store):
     return max((a.frames for a in store.artifacts() if a.path.name.startswith("track-")), default=0)
 
 
-def test_growing_stop_continues(tmp_path, path):
-    run_tiny(path, tmp_path / "whole")
+def test_growing_stop_continues(tmp_path, path, whole):
     for frames in (1, 2, 5, 12):
         _, lines = run_tiny(path, tmp_path / "grown", frames=frames)
         assert len(the_track(tmp_path / "grown").frame) == frames
     assert "track: going on after 5 frames" in lines
-    assert same(the_track(tmp_path / "whole"), the_track(tmp_path / "grown"))
+    assert same(the_track(whole), the_track(tmp_path / "grown"))
 
 
-def test_a_smaller_stop_reads_the_first_frames(tmp_path, path):
-    run_tiny(path, tmp_path)
-    summary, _ = run_tiny(path, tmp_path, frames=5)
+def test_a_smaller_stop_reads_the_first_frames(tmp_path, ran):
+    summary, _ = run_tiny(ran, tmp_path, frames=5)
     assert next(s for s in summary.stages if s["label"] == "track")["cached"]
     assert len(json.loads((tmp_path / "out" / "results.json").read_text())["angles"]) == 5
 
@@ -115,7 +108,7 @@ def test_a_smaller_stop_has_the_notes_of_its_frames_only(tmp_path, path):
     assert short == tuple(note for note in longer if note.startswith("frame 1:"))
 
 
-def test_a_smaller_stop_than_what_is_half_done(tmp_path, path, monkeypatch):
+def test_a_smaller_stop_than_what_is_half_done(tmp_path, path, monkeypatch, whole):
     monkeypatch.setenv("TINY_RAISE_AT", "8")
     with pytest.raises(ComponentFailed):
         run_tiny(path, tmp_path)
@@ -123,11 +116,10 @@ def test_a_smaller_stop_than_what_is_half_done(tmp_path, path, monkeypatch):
     assert len(json.loads((tmp_path / "out" / "results.json").read_text())["angles"]) == 5
     monkeypatch.delenv("TINY_RAISE_AT")
     run_tiny(path, tmp_path)
-    run_tiny(path, tmp_path / "whole")
-    assert same(the_track(tmp_path / "whole"), the_track(tmp_path))
+    assert same(the_track(whole), the_track(tmp_path))
 
 
-def test_a_component_that_raises_is_named_and_the_run_goes_on_there(tmp_path, path, monkeypatch):
+def test_a_component_that_raises_is_named_and_the_run_goes_on_there(tmp_path, path, monkeypatch, whole):
     monkeypatch.setenv("TINY_RAISE_AT", "7")
     with pytest.raises(ComponentFailed) as raised:
         run_tiny(path, tmp_path)
@@ -143,8 +135,7 @@ def test_a_component_that_raises_is_named_and_the_run_goes_on_there(tmp_path, pa
     monkeypatch.delenv("TINY_RAISE_AT")
     _, lines = run_tiny(path, tmp_path)
     assert "track: going on after 7 frames" in lines
-    run_tiny(path, tmp_path / "whole")
-    assert same(the_track(tmp_path / "whole"), the_track(tmp_path))
+    assert same(the_track(whole), the_track(tmp_path))
 
 
 def test_a_frame_that_cannot_be_read_is_not_told_as_the_one_before(tmp_path, path, monkeypatch):
@@ -332,7 +323,7 @@ def test_on_unsteady_stop_also_holds_for_frames_of_the_store(tmp_path, path, fra
     assert actions(summary)["track"] == "hit"
 
 
-def test_keep_trace_keeps_every_turn(tmp_path, path):
+def test_keep_trace_keeps_every_turn(tmp_path, path, whole):
     import zarr
 
     run_tiny(path, tmp_path, "stages.track.keep=trace")
@@ -343,7 +334,7 @@ def test_keep_trace_keeps_every_turn(tmp_path, path):
     assert (np.isfinite(turns).all(axis=2).sum(axis=1) == track.iterations).all()
     last = turns[np.arange(12), track.iterations - 1]
     assert np.array_equal(last[:, 16:], track.angles)
-    assert same(track, the_track(tmp_path))
+    assert same(track, the_track(whole))  # which kept none
 
 
 @pytest.mark.long

@@ -77,7 +77,7 @@ def test_a_turned_camera_gives_others(track: Track, recording: Recording, tmp_pa
     assert apart(evaluated(track, recording, recording.cameras, tmp_path), track) > 0.005
 
 
-@pytest.mark.usefixtures("unrendered")
+@pytest.mark.usefixtures("undrawn")
 def test_a_point_that_one_camera_mistakes_is_where_the_others_see_it(
     track: Track, recording: Recording, tmp_path: Path
 ) -> None:

@@ -129,7 +129,7 @@ def measure_wand(folder: Path, scale: float = 1.0) -> None:
     np.savetxt(folder / "registration.csv", np.hstack([wand, noisy]), delimiter=",", header=names, comments="")
 
 
-@pytest.mark.usefixtures("unrendered")
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize(("scale", "told"), [(0.997, True), (0.999, False), (1.001, False), (1.003, True)])
 def test_rigs_whose_metres_differ_by_more_than_a_fifth_of_a_percent_are_told(
     own: Ours, tmp_path: Path, scale: float, told: bool
@@ -141,7 +141,7 @@ def test_rigs_whose_metres_differ_by_more_than_a_fifth_of_a_percent_are_told(
     assert ("the scale is not applied: check units and calibrations of both" in notes) == told
 
 
-@pytest.mark.usefixtures("unrendered")
+@pytest.mark.usefixtures("undrawn")
 def test_two_rigs_are_brought_together_by_common_points(own: Ours, tmp_path: Path) -> None:
     read(tmp_path, moved(PLACES)[0])
     measure_wand(tmp_path)
@@ -154,6 +154,7 @@ def test_two_rigs_are_brought_together_by_common_points(own: Ours, tmp_path: Pat
     )
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_without_common_points_joint_centres_do(own: Ours, tmp_path: Path) -> None:
     read(tmp_path, moved(PLACES)[0])
     got = evaluate(own, tmp_path / "markers.c3d", tmp_path)
@@ -173,7 +174,7 @@ def test_rigs_without_common_joint_centres_are_not_compared_and_that_is_told(own
     assert "no joint distances: too few joint centres that both systems have" in got.notes
 
 
-@pytest.mark.usefixtures("unrendered")
+@pytest.mark.usefixtures("undrawn")
 def test_the_stick_model_has_the_times_of_the_track(own: Ours, tmp_path: Path) -> None:
     read(tmp_path, moved(PLACES)[0])
     columns, raw = ({name: values[10:] for name, values in part.items()} for part in (own.columns, own.raw))
@@ -182,7 +183,7 @@ def test_the_stick_model_has_the_times_of_the_track(own: Ours, tmp_path: Path) -
     np.testing.assert_allclose(markers.read_trc(tmp_path / layout.STICK)[2], columns["time"], atol=1e-6)
 
 
-@pytest.mark.usefixtures("unrendered")
+@pytest.mark.usefixtures("undrawn")
 def test_the_stick_model_keeps_its_lengths(own: Ours, tmp_path: Path) -> None:
     """T-OUT1."""
     loose = PLACES + np.random.default_rng(0).normal(scale=0.005, size=PLACES.shape)

@@ -29,11 +29,6 @@ from tests.fixtures.stores import STAGES, actions, load, run_tiny, same, the_tra
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.fixture
-def path(tmp_path):
-    return write_pipeline(tmp_path, write_recording(tmp_path / "clip"))
-
-
 def outlook(path, folder, *changes, frames=None):
     lines = plan(load(path, *changes, frames=frames), store=folder / "store.zarr")
     return {line.label: (line.action, line.why) for line in lines}
@@ -76,11 +71,10 @@ def test_a_plan_line_for_people(tmp_path, path):
     assert lines[4].endswith("(track ← smooth)")
 
 
-def test_a_plan_explains_edited_files(tmp_path, path):
-    run_tiny(path, tmp_path)
+def test_a_plan_explains_edited_files(tmp_path, ran):
     (tmp_path / "clip" / "subject.txt").write_text("another")
-    assert outlook(path, tmp_path)["start"] == ("run", "new: subject.txt changed")
-    assert outlook(path, tmp_path)["background"] == ("hit", "")
+    assert outlook(ran, tmp_path)["start"] == ("run", "new: subject.txt changed")
+    assert outlook(ran, tmp_path)["background"] == ("hit", "")
 
 
 def test_variants_share_what_comes_before(tmp_path, path):
@@ -93,9 +87,8 @@ def test_variants_share_what_comes_before(tmp_path, path):
     assert actions(third) == {"background": "hit", "start": "hit", "track": "hit", "smooth": "hit", "export": "run"}
 
 
-def test_fresh_makes_everything_anew(tmp_path, path):
-    run_tiny(path, tmp_path)
-    again, _ = run_tiny(path, tmp_path, fresh=True)
+def test_fresh_makes_everything_anew(tmp_path, ran):
+    again, _ = run_tiny(ran, tmp_path, fresh=True)
     assert set(actions(again).values()) == {"run"}
     assert len([p for p in (tmp_path / "store.zarr").iterdir() if p.name.startswith("track")]) == 1
 
@@ -115,9 +108,8 @@ def test_a_run_computes_in_one_thread_and_leaves_the_others_to_the_caller(tmp_pa
     assert during == {1}
 
 
-def test_later_stages_know_how_the_earlier_ones_were_made(tmp_path, path):
-    run_tiny(path, tmp_path)
-    run_tiny(path, tmp_path)
+def test_later_stages_know_how_the_earlier_ones_were_made(tmp_path, ran):
+    run_tiny(ran, tmp_path)
     recipe = json.loads((tmp_path / "out" / "results.json").read_text())["recipe"]
     assert list(recipe["stages"]) == ["background", "start", "track", "smooth"]
     assert recipe["stages"]["track"]["cached"] is True
@@ -291,12 +283,11 @@ def test_folders_may_be_named_by_text(tmp_path, path):
     assert "hit" in {line.action for line in plan(pipeline, store=str(tmp_path / "store.zarr"))}
 
 
-def test_results_do_not_depend_on_truth_and_reference(tmp_path, path):
-    run_tiny(path, tmp_path)
+def test_results_do_not_depend_on_truth_and_reference(tmp_path, ran):
     for name in ("truth", "reference"):
         (tmp_path / "clip" / name).mkdir()
         (tmp_path / "clip" / name / "angles.csv").write_text("frame\n")
-    summary, _ = run_tiny(path, tmp_path)
+    summary, _ = run_tiny(ran, tmp_path)
     assert actions(summary)["track"] == "hit"
 
 

@@ -19,11 +19,15 @@ from tests.fixtures.stores import actions, load, run_tiny, same, the_track, writ
 MADE = {"background": "hit", "start": "hit", "track": "hit", "smooth": "hit", "export": "run"}
 
 
-@pytest.fixture(params=["memory", "file"])
+@pytest.fixture
 def url(request, tmp_path):
-    if request.param == "file":
+    """Where copies go: in memory, unless a test asks for `file` because the kind of filesystem matters to it."""
+    if getattr(request, "param", "memory") == "file":
         return (tmp_path / "far").as_uri()
     return f"memory://{tmp_path.name}/store"  # of the whole process
+
+
+everywhere = pytest.mark.parametrize("url", ["memory", "file"], indirect=True)
 
 
 @pytest.fixture
@@ -44,6 +48,7 @@ def copies(url):
     return sorted(Path(p).name for p in files.ls(root, detail=False) if not p.endswith("zarr.json"))
 
 
+@everywhere
 def test_what_one_has_made_another_finds(tmp_path, path, url):
     shared(path, tmp_path / "one", url)
     actions_of_plan = {line.label: line.action for line in plan(load(path), store=tmp_path / "two/store.zarr", url=url)}
@@ -57,6 +62,7 @@ def test_what_one_has_made_another_finds(tmp_path, path, url):
     assert same(the_track(tmp_path / "one"), the_track(tmp_path / "two"))
 
 
+@everywhere
 def test_a_copy_is_plain_zarr(tmp_path, path, url):
     shared(path, tmp_path / "one", url)
     group = zarr.open_group(url, mode="r")
@@ -103,6 +109,7 @@ def test_what_is_made_anew_takes_the_place_of_the_copy(tmp_path, path, url, monk
     assert "track: going on after 5 frames" in lines
 
 
+@everywhere
 def test_a_copy_that_never_arrived_is_not_seen(tmp_path, path, url, monkeypatch):
     def broken(self, path, value, **options):
         if path.endswith("zarr.json") and "track-" in path:
@@ -135,6 +142,7 @@ def cut_line(monkeypatch, url):
     monkeypatch.setattr(type(files), "get", get)
 
 
+@everywhere
 def test_a_copy_that_breaks_off_leaves_what_is_here(tmp_path, path, url, monkeypatch):
     shared(path, tmp_path / "one", url)
     run_tiny(path, tmp_path / "two", frames=5)

@@ -29,7 +29,7 @@ from mocapflow.storage.growing import SEEN
 from mocapflow.storage.packing import FINE, match_row, quantised
 from mocapflow.storage.rows import Corrupted, Rows
 from mocapflow.storage.store import Store, remove
-from tests.fixtures.stores import actions, run_tiny, same, the_track, write_pipeline, write_recording
+from tests.fixtures.stores import actions, run_tiny, same, the_track
 from tests.fixtures.tiny_plugin import TinyMatcher, tiny_body
 
 RECIPE = {"component": {"name": "some"}}
@@ -40,11 +40,6 @@ def store(tmp_path):
     made = Store(tmp_path / "store.zarr")
     made.create()
     return made
-
-
-@pytest.fixture
-def path(tmp_path):
-    return write_pipeline(tmp_path, write_recording(tmp_path / "clip"))
 
 
 def put(store, value, key="1" * 32):
@@ -177,9 +172,9 @@ def test_every_array_of_a_store_says_its_axes_and_unit(tmp_path, path):
         assert array.attrs.get("unit"), name
 
 
-def test_a_track_is_read_by_xarray(tmp_path, path):
+@pytest.mark.usefixtures("ran")
+def test_a_track_is_read_by_xarray(tmp_path):
     xarray = pytest.importorskip("xarray")
-    run_tiny(path, tmp_path)
     (folder,) = (tmp_path / "store.zarr").glob("track-*")
     data = xarray.open_zarr(str(folder), consolidated=False, zarr_format=3)
     assert dict(data.sizes) | {"T": 12, "D": 2, "W": 4, "Q": 1, "C": 2, "K": 8} == dict(data.sizes)
@@ -283,8 +278,8 @@ def test_matches_come_back(tmp_path):
     assert not packed[len(matches.weight) :].any()
 
 
-def test_what_was_seen_can_be_read_back(tmp_path, path):
-    run_tiny(path, tmp_path)
+@pytest.mark.usefixtures("ran")
+def test_what_was_seen_can_be_read_back(tmp_path):
     store = Store(tmp_path / "store.zarr")
     (found,) = [a for a in store.artifacts() if a.path.name.startswith("track-")]
     group = zarr.open_group(str(found.path), mode="r")
@@ -347,11 +342,10 @@ def remove_rows(group):
 
 
 @pytest.mark.parametrize("damage", [damage_zarr_json, remove_rows])
-def test_a_damaged_group_is_set_aside_and_made_anew(tmp_path, path, damage):
-    run_tiny(path, tmp_path)
+def test_a_damaged_group_is_set_aside_and_made_anew(tmp_path, ran, damage):
     whole, group = the_track(tmp_path), without_smooth(tmp_path)
     damage(group)
-    _, lines = run_tiny(path, tmp_path)
+    _, lines = run_tiny(ran, tmp_path)
     (warning,) = [line for line in lines if "damaged and made" in line]
     assert warning.startswith(f"warning: {group.name} is damaged and made anew: ")
     (aside,) = Store(tmp_path / "store.zarr").aside()
@@ -361,11 +355,10 @@ def test_a_damaged_group_is_set_aside_and_made_anew(tmp_path, path, damage):
 
 
 @pytest.mark.parametrize("damage", [damage_array_json, damage_chunk, remove_chunk, remove_array])
-def test_damaged_arrays_of_a_track_are_written_anew_from_its_frames(tmp_path, path, damage):
-    run_tiny(path, tmp_path)
+def test_damaged_arrays_of_a_track_are_written_anew_from_its_frames(tmp_path, ran, damage):
     whole, group = the_track(tmp_path), without_smooth(tmp_path)
     damage(group)
-    _, lines = run_tiny(path, tmp_path)
+    _, lines = run_tiny(ran, tmp_path)
     assert any(line.startswith(f"warning: {group.name} is damaged and written anew from its frames") for line in lines)
     assert not any(line.startswith("track: 1") for line in lines)  # no frame is tracked again
     assert not Store(tmp_path / "store.zarr").aside()
@@ -373,19 +366,17 @@ def test_damaged_arrays_of_a_track_are_written_anew_from_its_frames(tmp_path, pa
 
 
 @pytest.mark.parametrize("name", ["angles", "doubted"])  # doubted: zeros, which zarr by itself does not write
-def test_a_chunk_that_is_missing_is_no_zeros(tmp_path, path, name):
-    run_tiny(path, tmp_path)
+def test_a_chunk_that_is_missing_is_no_zeros(tmp_path, ran, name):
     made = json.loads((tmp_path / "out" / "results.json").read_text())["angles"]
     (smooth,) = (tmp_path / "store.zarr").glob("smooth-*")
     (chunk,) = (path for path in (smooth / name / "c").rglob("*") if path.is_file())
     chunk.unlink()
-    _, lines = run_tiny(path, tmp_path)
+    _, lines = run_tiny(ran, tmp_path)
     assert any(re.search(f"{smooth.name} is damaged and made anew: .* chunk 0 of {name} is missing", x) for x in lines)
     assert json.loads((tmp_path / "out" / "results.json").read_text())["angles"] == made
 
 
-def test_a_damaged_result_that_another_run_makes_anew_is_left_alone(tmp_path, path, monkeypatch):
-    run_tiny(path, tmp_path)
+def test_a_damaged_result_that_another_run_makes_anew_is_left_alone(tmp_path, ran, monkeypatch):
     real = Store.load
 
     def load(self, artifact, frames=None):
@@ -393,25 +384,24 @@ def test_a_damaged_result_that_another_run_makes_anew_is_left_alone(tmp_path, pa
         raise Corrupted("damaged")
 
     monkeypatch.setattr(Store, "load", load)
-    summary, lines = run_tiny(path, tmp_path)  # `export` reads it
+    summary, lines = run_tiny(ran, tmp_path)  # `export` reads it
     assert actions(summary)["smooth"] == "hit"
     assert not [line for line in lines if "damaged" in line]
     assert not Store(tmp_path / "store.zarr").aside()
 
 
-def test_a_result_that_another_run_left_damaged_is_made_anew(tmp_path, path, monkeypatch):
-    run_tiny(path, tmp_path)
+def test_a_result_that_another_run_left_damaged_is_made_anew(tmp_path, ran, monkeypatch):
     (group,) = (tmp_path / "store.zarr").glob("smooth-*")
     damage_chunk(group)
     real = Execution._find
     monkeypatch.setattr(Execution, "_find", lambda self, step: None if step.label == "smooth" else real(self, step))
-    summary, lines = run_tiny(path, tmp_path)  # the other is done when this one may write
+    summary, lines = run_tiny(ran, tmp_path)  # the other is done when this one may write
     assert actions(summary)["smooth"] == "run"
     assert sum("is damaged and made anew" in line for line in lines) == 1
 
 
-def test_what_is_wide_stays_in_the_store_and_is_missed_when_it_is_removed(tmp_path, path):
-    run_tiny(path, tmp_path)
+@pytest.mark.usefixtures("ran")
+def test_what_is_wide_stays_in_the_store_and_is_missed_when_it_is_removed(tmp_path):
     kept = Store(tmp_path / "store.zarr")
     (found,) = [a for a in kept.artifacts() if a.path.name.startswith("track-")]
     track = kept.load(found, 5)
@@ -439,14 +429,13 @@ def cut_back(group, frames):
         (None, "the appearance of frame 5 is missing in .*"),  # those of frames 10 and 11 are there
     ],
 )
-def test_a_half_done_track_whose_files_are_missing_is_made_anew(tmp_path, path, lost, told):
-    run_tiny(path, tmp_path)
+def test_a_half_done_track_whose_files_are_missing_is_made_anew(tmp_path, ran, lost, told):
     whole = the_track(tmp_path)
     (group,) = (tmp_path / "store.zarr").glob("track-*")
     cut_back(group, 6)
     for file in group.glob(lost) if lost else ():
         file.unlink()
-    _, lines = run_tiny(path, tmp_path)
+    _, lines = run_tiny(ran, tmp_path)
     assert any(re.search(f"is damaged and made anew: {told}", line) for line in lines), lines
     assert same(whole, the_track(tmp_path))
 
@@ -520,7 +509,7 @@ def test_a_result_is_on_the_drive_before_it_is_complete(store, monkeypatch):
 # ---- a store that can't be written
 
 
-def test_a_full_store_says_so_and_keeps_the_frames(tmp_path, path, monkeypatch):
+def test_a_full_store_says_so_and_keeps_the_frames(tmp_path, path, monkeypatch, whole):
     real, left = Rows.write, [23]
 
     def write(self, row, values, **how):
@@ -541,8 +530,7 @@ def test_a_full_store_says_so_and_keeps_the_frames(tmp_path, path, monkeypatch):
     monkeypatch.undo()
     _, lines = run_tiny(path, tmp_path)
     assert "track: going on after 3 frames" in lines
-    run_tiny(path, tmp_path / "whole")
-    assert same(the_track(tmp_path / "whole"), the_track(tmp_path))
+    assert same(the_track(whole), the_track(tmp_path))
 
 
 def test_an_unwritable_store_says_so(tmp_path, path, monkeypatch):
