@@ -38,6 +38,7 @@ class Copies:
 
     Raises:
         StoreError: here and in all methods: the URL can't be reached.
+        MocapflowError: there is no such kind of URL.
     """
 
     def __init__(self, url: str) -> None:
@@ -45,10 +46,12 @@ class Copies:
         with self._reaching():
             from fsspec.core import url_to_fs
 
-            local = (
-                {"auto_mkdir": True} if url.startswith(("file:", "local:")) else {}
-            )  # elsewhere there are no folders
-            self._files, root = url_to_fs(url, **local)
+            # elsewhere there are no folders
+            local = {"auto_mkdir": True} if url.startswith(("file:", "local:")) else {}
+            try:
+                self._files, root = url_to_fs(url, **local)
+            except ValueError as error:  # no such protocol
+                raise MocapflowError(f"no store can be at {url}: {error}") from error
         self._root = root.rstrip("/")
 
     def find(self, key: str) -> Copy | None:
@@ -113,8 +116,6 @@ class Copies:
         except ImportError as error:
             hint = "pip install 'mocapflow[remote]', and what fsspec names for this kind of URL"
             raise StoreError(f"a store at {self.url} needs a package: {error}", hint=hint) from error
-        except ValueError as error:  # no such protocol
-            raise MocapflowError(f"no store can be at {self.url}: {error}") from error
         except Exception as error:  # every kind of store has its own
             hint = "without --store the results are kept in a folder beside the run"
             message = f"can't reach the store at {self.url}: {type(error).__name__}: {error}"
