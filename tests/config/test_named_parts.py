@@ -149,7 +149,7 @@ def test_a_run_among_the_named_parts_is_refused(tmp_path, spread):
         run(pipeline, store=tmp_path / "store.zarr", out=tmp_path / "clip/videos/out")
 
 
-def test_a_cache_that_cant_be_written_is_told(tmp_path, spread):
+def test_a_cache_that_cant_be_written_is_told(spread):
     home().parent.mkdir(parents=True)
     home().touch()
     with pytest.raises(MocapflowError, match="XDG_CACHE_HOME names another place"):

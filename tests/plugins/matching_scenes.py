@@ -27,7 +27,7 @@ from mocapflow.loop import Steady, Steps, settle
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64, array, record
 from mocapflow.scene import Scene
-from mocapflow.testing import tiny_pose, tiny_state
+from mocapflow.testing import tiny_cloth, tiny_pose, tiny_state
 from mocapflow.testing.scenes import tiny_past
 
 BAND = 12.0  # px
@@ -58,6 +58,11 @@ class Given(Segmenter):
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
         return state.segmentation
+
+
+def surface_at(pose: Pose, scene: Scene) -> Surface:
+    """The surface at a pose, in the garment of the scene if it has one."""
+    return scene.surface(pose, tiny_cloth(scene, pose))
 
 
 def seen(surface: Surface, scene: Scene) -> Segmentation:

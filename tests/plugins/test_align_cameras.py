@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from keypoint_recording import DEMO, copy_demo, write
-from mocapflow_bodies.template import Template
 from mocapflow_fitting.align_cameras import AlignCameras, shift_px, turn
 from mocapflow_fitting.start_from_file import read_pose
 
@@ -22,11 +21,6 @@ def walking(body, count):
     shifts = np.column_stack([rng.uniform(-0.3, 0.3, (count, 2)), np.zeros(count)])
     turns = [twists.exp(np.append(np.zeros(3), shift)) for shift in shifts]
     return [Pose(root=motion @ first.root, angles=first.angles * rng.uniform(-1, 1)) for motion in turns]
-
-
-@pytest.fixture(scope="module")
-def body():
-    return Template().load(DEMO)
 
 
 def aligned(folder, body, cameras, least_px, frames=8):
@@ -76,7 +70,7 @@ def test_the_first_frame_alone_can_do(body, tmp_path):
     assert shift_px(found[1], truth[1]) < 0.5 * shift_px(cameras[1], truth[1])
 
 
-def test_shift_is_that_of_the_image(body):
+def test_shift_is_that_of_the_image():
     camera = open_recording(DEMO).cameras[0]
     angle = np.radians(0.5)
     (other,) = turn([camera], np.array([[0.0, angle, 0.0]]))

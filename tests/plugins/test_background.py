@@ -202,7 +202,7 @@ def test_a_view_that_the_person_is_not_in_is_all_room():
     """Beside the picture, and behind the camera, where nothing is so many pixels away."""
     camera = taken([0])[-1]
     for away_m in (20.0 * camera.camera_from_world[0, :3], -20.0 * camera.camera_from_world[2, :3]):
-        known, off, _ = learnt([80] * 20, move=away_m)
+        known, _, _ = learnt([80] * 20, move=away_m)
         assert known.mean() > 0.97
 
 

@@ -6,8 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from keypoint_recording import DEMO, copy_demo, write
-from mocapflow_bodies.template import Template
+from keypoint_recording import DEMO, copy_demo, length, write
 from mocapflow_draping.kinematic import Kinematic
 from mocapflow_fitting.calibrate_limbs import CalibrateLimbs
 from mocapflow_fitting.pose_fit import velocities
@@ -28,11 +27,6 @@ from mocapflow.results import ViewChecks
 from mocapflow.scene import Scene
 
 WRONG = {"thigh": 1.03, "shank": 0.97}  # 12 mm each
-
-
-@pytest.fixture(scope="module")
-def body():
-    return Template().load(DEMO)
 
 
 @pytest.fixture(scope="module")
@@ -66,10 +60,6 @@ def from_tape(body):
     return Skirt(**{f"{name}_m": value for name, value in tapes.items() if name != "type"}, strands=24, rings=8).sew(
         body
     )
-
-
-def length(body, a, b):
-    return np.linalg.norm(body.positions[body.joint(a)] - body.positions[body.joint(b)])
 
 
 @pytest.mark.long

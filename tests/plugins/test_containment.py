@@ -1,5 +1,8 @@
 """The body has to stay inside the silhouette, and is left alone there."""
 
+from functools import partial
+
+import matching_scenes
 import numpy as np
 import pytest
 from matching_scenes import FIRST, FRAME, seen
@@ -9,19 +12,16 @@ from mocapflow_matching.robust import robust_weights
 from mocapflow.data import CLOTH, NO_CLOTH, Past, Pose
 from mocapflow.geometry.cameras import project
 from mocapflow.geometry.silhouettes import occluding_contour
-from mocapflow.testing import tiny_cloth, tiny_pose, tiny_scene
+from mocapflow.testing import tiny_pose, tiny_scene
 
 SCENE = tiny_scene(clothed=True)
 BARE = tiny_scene()
+surface_at = partial(matching_scenes.surface_at, scene=SCENE)
 
 
 @pytest.fixture(scope="module")
 def truth():
     return tiny_pose(SCENE)
-
-
-def surface_at(pose):
-    return SCENE.surface(pose, tiny_cloth(SCENE, pose))
 
 
 def bent(pose, degrees):

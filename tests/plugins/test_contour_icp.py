@@ -1,7 +1,9 @@
 """Contour pairs on exact silhouettes of the tiny body, alone and through the loop with the real solver."""
 
 from dataclasses import replace
+from functools import partial
 
+import matching_scenes
 import numpy as np
 import pytest
 from matching_scenes import CALM, FIRST, FRAME, Cluttered, cluttered, knee_error_deg, seen
@@ -11,20 +13,17 @@ from mocapflow_matching.robust import robust_weights
 from mocapflow.data import CLOTH, NO_CLOTH, Past, Pose, Segmentation
 from mocapflow.geometry.cameras import project
 from mocapflow.geometry.silhouettes import occluding_contour
-from mocapflow.testing import tiny_cloth, tiny_pose, tiny_scene
+from mocapflow.testing import tiny_pose, tiny_scene
 
 SCENE = tiny_scene()
 DRESSED = tiny_scene(clothed=True)
 STARTS = range(6)
+surface_at = partial(matching_scenes.surface_at, scene=SCENE)
 
 
 @pytest.fixture(scope="module")
 def truth():
     return tiny_pose(SCENE)
-
-
-def surface_at(pose, scene=SCENE):
-    return scene.surface(pose, tiny_cloth(scene, pose))
 
 
 def match(matcher, surface, segmentation, turn=FIRST, scene=SCENE):
@@ -122,7 +121,7 @@ def test_pairs_whose_normals_disagree_are_none(truth):
 
 def test_hanging_cloth_counts_less(truth):
     """The sigma of a pair grows with the length from which its cloth hangs."""
-    surface = surface_at(truth, DRESSED)
+    surface = surface_at(truth, scene=DRESSED)
     matches = match(
         ContourIcp(first_loss="none", hem_guard_px=0, cloth_sigma_px_per_m=30),
         surface,
@@ -138,7 +137,7 @@ def test_hanging_cloth_counts_less(truth):
 
 def test_pairs_on_cloth_reach_less_far(truth):
     """Of the same pairs those on cloth that are farther apart are left out, those on skin stay."""
-    surface, aside = surface_at(truth, DRESSED), np.array([0.03, 0.02, 0.0])
+    surface, aside = surface_at(truth, scene=DRESSED), np.array([0.03, 0.02, 0.0])
     moved = replace(surface, vertices=surface.vertices + aside)
     every, few = (
         match(ContourIcp(cloth_reach_px=reach), moved, seen(surface, DRESSED), scene=DRESSED)
@@ -158,7 +157,7 @@ def test_pairs_on_cloth_reach_less_far(truth):
 
 def test_skin_beside_a_hem_counts_as_the_cloth_there(truth):
     """Skin within 12 px of a cloth contour and near the garment at rest has the sigma of the nearest cloth."""
-    surface = surface_at(truth, DRESSED)
+    surface = surface_at(truth, scene=DRESSED)
     matches = match(
         ContourIcp(first_loss="none", hem_guard_px=12, cloth_sigma_px_per_m=30),
         surface,

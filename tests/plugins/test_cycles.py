@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from mocapflow_evaluation import compare, cycles
@@ -95,6 +93,6 @@ def test_limits_of_agreement_hold_95_per_cent() -> None:
     assert np.mean((error > low) & (error < high)) == pytest.approx(0.95, abs=0.01)
 
 
-def test_shared_angles_are_those_that_both_have(tmp_path: Path) -> None:
+def test_shared_angles_are_those_that_both_have() -> None:
     curve, nothing = np.ones(3), np.full(3, np.nan)
     assert list(cycles.shared({"frame": curve, "a": curve, "b": curve}, {"a": nothing, "b": curve})) == ["b"]

@@ -3,7 +3,6 @@
 import pickle
 from dataclasses import replace
 
-import drape_bodies
 import numpy as np
 import pytest
 from drape_bodies import (
@@ -14,8 +13,10 @@ from drape_bodies import (
     distances,
     draper,
     leg_poses,
+    legs,
     lying_cylinder,
     prepared,
+    skirted,
     swing,
     together,
 )
@@ -50,12 +51,6 @@ def strand(count, link, height):
     return np.stack([x, 0 * x, np.full(count, height)], axis=1)[None]
 
 
-@pytest.fixture(scope="module")
-def skirted():
-    """A skirt on legs of capsules, and four poses."""
-    return drape_bodies.skirted(), leg_poses()
-
-
 def test_distances_of_a_box_are_exact():
     body = box([-0.1, -0.2, -0.3], [0.1, 0.2, 0.3])
     origin = np.full(3, -0.5)
@@ -66,11 +61,13 @@ def test_distances_of_a_box_are_exact():
     np.testing.assert_allclose(distance, exact, atol=1e-12)
 
 
-def test_fields_follow_the_joints(skirted):
-    scene, poses = skirted
-    shins = scene.body.vertices[(scene.body.vertices[:, 2] > 0.15) & (scene.body.vertices[:, 2] < 0.4)]
-    rest = distances(scene.body, np.tile(shins, (4, 1, 1)), leg_poses())[0]
-    assert np.abs(rest).max() < 1.5e-3  # coarse facets of the capsule and coarse voxels
+def test_fields_follow_the_joints():
+    scene, poses = skirted(), leg_poses()
+    shins = (scene.body.vertices[:, 2] > 0.15) & (scene.body.vertices[:, 2] < 0.4)
+    chains = kinematics.chain_batch(scene.body, poses)
+    skins = [kinematics.skin(scene.body, *posed) for posed in zip(chains, poses.angles, strict=True)]
+    off = distances(scene.body, np.stack(skins)[:, shins], poses)
+    assert np.abs(off).max() < 1.5e-3  # coarse facets of the capsule and coarse voxels
 
 
 def test_out_of_a_cylinder_is_away_from_its_axis():
@@ -80,8 +77,8 @@ def test_out_of_a_cylinder_is_away_from_its_axis():
         np.testing.assert_allclose(outwards(*(0.097 * away), 0, parts[0], values), away, atol=0.03)
 
 
-def test_a_raised_thigh_does_not_come_out_behind_the_body(skirted):
-    scene, _ = skirted
+def test_a_raised_thigh_does_not_come_out_behind_the_body():
+    scene = skirted()
     raised = PoseBatch(root=np.eye(4)[None], angles=np.radians([[90.0, 90.0, 0, 0]]))
     behind = np.array([[[0.05, 0.15, 0.92]]])  # the pelvis ends at 0.12
     assert distances(scene.body, behind, raised)[0, 0] > 0.02
@@ -197,32 +194,32 @@ def calm(scene, count):
     return np.zeros((count, len(scene.garment.parameter_names)))
 
 
-def test_a_skirt_keeps_its_strands_and_stays_outside(skirted):
+def test_a_skirt_keeps_its_strands_and_stays_outside():
     """T-CL3."""
-    scene, poses = skirted
+    scene, poses = skirted(), leg_poses()
     draped = draper(sweeps=0).drape(poses, calm(scene, 4), Past(), scene)
     check_whole_and_outside(scene, draped, poses)
 
 
-def test_the_chapters_steps_end_near_the_taut_drape(skirted):
-    scene, poses = skirted
+def test_the_chapters_steps_end_near_the_taut_drape():
+    scene, poses = skirted(), leg_poses()
     taut = draper(sweeps=0).drape(poses, calm(scene, 4), Past(), scene)
     steps = draper(sweeps=0, rule="literal", limited=True).drape(poses, calm(scene, 4), Past(), scene)
     assert np.linalg.norm(taut - steps, axis=-1)[0].mean() < 0.01
 
 
 @pytest.mark.parametrize("settings", [dict(), dict(limited=True), dict(iterations=100)], ids=str)
-def test_the_chapters_steps_keep_the_strands_lengths(skirted, settings):
+def test_the_chapters_steps_keep_the_strands_lengths(settings):
     """T-CL3: what lies between two fixed particles is taut, and is not swung."""
-    scene, poses = skirted
+    scene, poses = skirted(), leg_poses()
     draped = draper(sweeps=0, rule="literal", **settings).drape(poses, calm(scene, 4), Past(), scene)
     strands = strands_of(scene.garment, scene.body)
     lengths = np.linalg.norm(np.diff(draped[:, strands.vertex], axis=2), axis=-1)
     assert np.abs(lengths / strands.links - 1).max() < 1e-9
 
 
-def test_a_batch_is_its_drapes_one_by_one(skirted):
-    scene, poses = skirted
+def test_a_batch_is_its_drapes_one_by_one():
+    scene, poses = skirted(), leg_poses()
     parameters = calm(scene, 4)
     parameters[:, :6] = np.random.default_rng(0).uniform(-0.1, 0.1, (4, 6))
     parameters[:, 6] = [0.0, 0.02, 0.05, 0.1]
@@ -232,16 +229,16 @@ def test_a_batch_is_its_drapes_one_by_one(skirted):
         np.testing.assert_array_equal(draper().drape(one, parameters[row : row + 1], Past(), scene)[0], together[row])
 
 
-def test_a_draper_that_has_draped_can_be_sent_to_another_process(skirted):
-    (scene, poses), draper = skirted, Kinematic()
+def test_a_draper_that_has_draped_can_be_sent_to_another_process():
+    scene, poses, draper = skirted(), leg_poses(), Kinematic()
     parameters = calm(scene, len(poses.root))
     draped = draper.drape(poses, parameters, Past(), scene)
     sent = pickle.loads(pickle.dumps(draper))
     assert np.array_equal(sent.drape(poses, parameters, Past(), scene), draped)
 
 
-def test_a_draper_without_a_garment_says_so(skirted):
-    scene, poses = skirted
+def test_a_draper_without_a_garment_says_so():
+    scene, poses = skirted(), leg_poses()
     with pytest.raises(PluginError, match="no garment to drape"):
         draper().drape(poses, calm(scene, 4), Past(), Scene(cameras=(), body=scene.body))
 
@@ -255,8 +252,8 @@ def test_a_draper_without_a_garment_says_so(skirted):
         (lambda g: dict(rings=g.rings + np.eye(len(g.rings), 2, 1, dtype=np.int32)), "ring link .* of two rows"),
     ],
 )
-def test_a_garment_that_no_strands_make_up_says_so(skirted, spoil, said):
-    scene, _ = skirted
+def test_a_garment_that_no_strands_make_up_says_so(spoil, said):
+    scene = skirted()
     with pytest.raises(PluginError, match=said):
         strands_of(replace(scene.garment, **spoil(scene.garment)), scene.body)
 
@@ -288,7 +285,7 @@ def test_joints_that_it_can_not_touch_do_not_move_the_cloth():
 @pytest.mark.long
 @pytest.mark.parametrize(("length", "inseam"), [(0.80, 0.46), (0.98, 0.64)], ids=["below the knee", "to the ankle"])
 def test_legs_of_shorts_stay_around_the_shank(length, inseam):
-    body, poses = drape_bodies.legs(), leg_poses()
+    body, poses = legs(), leg_poses()
     garment = Shorts(
         waist_height_m=1.08, waist_circumference_m=0.92, hip_circumference_m=1.1, leg_opening_circumference_m=0.5,
         inseam_m=inseam, length_m=length,

@@ -5,7 +5,17 @@ from unittest.mock import Mock
 import drape_bodies
 import numpy as np
 import pytest
-from drape_bodies import SKIN, box, check_whole_and_outside, distances, leg_poses, lying_cylinder, prepared, swing
+from drape_bodies import (
+    SKIN,
+    box,
+    check_whole_and_outside,
+    distances,
+    leg_poses,
+    lying_cylinder,
+    prepared,
+    skirted,
+    swing,
+)
 from mocapflow_draping import kinematic
 from mocapflow_draping.forces import thickness, tilts
 from mocapflow_draping.frames import tilted
@@ -15,12 +25,6 @@ from mocapflow.data import Past, PoseBatch
 from mocapflow.errors import PluginError
 
 DOWN = np.array([0.0, 0.0, -1.0])
-
-
-@pytest.fixture(scope="module")
-def skirted():
-    """A skirt on legs of capsules."""
-    return drape_bodies.skirted()
 
 
 @pytest.fixture(scope="module")
@@ -70,30 +74,33 @@ def test_wind_against_a_wall_moves_nothing_into_it():
     np.testing.assert_allclose(blown(wall, touching, [1, 0, 0], 30.0), touching, atol=1e-3)
 
 
-def test_forces_together_lift_no_tail_above_its_support(skirted):
-    names = [name for name in skirted.garment.parameter_names if name.endswith("_rad")]
-    out, aside = tilts(skirted.garment, parameters(skirted.garment, **dict.fromkeys(names, 0.7)), np.linspace(0, 6, 99))
+def test_forces_together_lift_no_tail_above_its_support():
+    scene = skirted()
+    names = [name for name in scene.garment.parameter_names if name.endswith("_rad")]
+    out, aside = tilts(scene.garment, parameters(scene.garment, **dict.fromkeys(names, 0.7)), np.linspace(0, 6, 99))
     amount = np.degrees(np.hypot(out, aside))
     assert amount.max() == pytest.approx(80)
     assert np.abs(np.degrees(aside)).max() > 30  # both parts count
 
 
 @pytest.mark.parametrize("towards", [0.0, 1.0, 2.5])
-def test_order_one_is_a_wind_that_turns_every_strand_alike(skirted, towards):
+def test_order_one_is_a_wind_that_turns_every_strand_alike(towards):
+    scene = skirted()
     azimuth = np.linspace(0, 2 * np.pi, 12, endpoint=False)
-    wind = parameters(skirted.garment, wind_cos_rad=0.3 * np.cos(towards), wind_sin_rad=0.3 * np.sin(towards))
-    out, aside = tilts(skirted.garment, wind, azimuth)
+    wind = parameters(scene.garment, wind_cos_rad=0.3 * np.cos(towards), wind_sin_rad=0.3 * np.sin(towards))
+    out, aside = tilts(scene.garment, wind, azimuth)
     facing = np.stack([np.cos(azimuth), np.sin(azimuth), 0 * azimuth], -1)
     down = tilted(np.broadcast_to(DOWN, facing.shape), facing, out[0], aside[0])
     force = np.array([np.cos(towards), np.sin(towards), 0])
     np.testing.assert_allclose(down, np.broadcast_to(np.cos(0.3) * DOWN + np.sin(0.3) * force, down.shape), atol=1e-12)
 
 
-def test_a_bulge_does_not_stretch_its_ring(skirted):
+def test_a_bulge_does_not_stretch_its_ring():
+    scene = skirted()
     azimuth = np.linspace(0, 2 * np.pi, 720, endpoint=False)
     for name in ("wind_cos_rad", "two_sin_rad", "two_cos_rad"):
         small = 1e-3
-        out, aside = tilts(skirted.garment, parameters(skirted.garment, **{name: small}), azimuth)
+        out, aside = tilts(scene.garment, parameters(scene.garment, **{name: small}), azimuth)
         radius = 1 + out[0]
         ring = np.stack([radius * np.cos(azimuth) - aside[0] * np.sin(azimuth),
                          radius * np.sin(azimuth) + aside[0] * np.cos(azimuth)], -1)  # fmt: skip
@@ -111,42 +118,46 @@ def test_a_hanging_strand_reaches_the_tilt_it_is_given():
 
 
 @pytest.mark.parametrize("name", ["flare_rad", "wind_cos_rad", "wind_sin_rad", "two_cos_rad", "two_sin_rad"])
-def test_no_force_presses_cloth_into_the_body(skirted, draper, name):
+def test_no_force_presses_cloth_into_the_body(draper, name):
+    scene = skirted()
     for amount in (-0.4, 0.4):
-        force = np.repeat(parameters(skirted.garment, **{name: amount}), 4, axis=0)
-        draped = draper.drape(leg_poses(), force, Past(), skirted)
-        free = np.setdiff1d(np.arange(draped.shape[1]), skirted.garment.pinned)
-        assert distances(skirted.body, draped[:, free], leg_poses()).min() > SKIN - 1e-4
+        force = np.repeat(parameters(scene.garment, **{name: amount}), 4, axis=0)
+        draped = draper.drape(leg_poses(), force, Past(), scene)
+        free = np.setdiff1d(np.arange(draped.shape[1]), scene.garment.pinned)
+        assert distances(scene.body, draped[:, free], leg_poses()).min() > SKIN - 1e-4
 
 
-def test_wind_turns_with_the_person(skirted):
+def test_wind_turns_with_the_person():
+    scene = skirted()
     turn = np.eye(4)
     turn[:2, :2] = [[0, -1], [1, 0]]
-    wind = parameters(skirted.garment, wind_cos_rad=0.2)
+    wind = parameters(scene.garment, wind_cos_rad=0.2)
     draper = drape_bodies.draper()
-    ahead = draper.drape(standing(), wind, Past(), skirted)[0]
-    turned = draper.drape(PoseBatch(root=turn[None], angles=np.zeros((1, 4))), wind, Past(), skirted)[0]
+    ahead = draper.drape(standing(), wind, Past(), scene)[0]
+    turned = draper.drape(PoseBatch(root=turn[None], angles=np.zeros((1, 4))), wind, Past(), scene)[0]
     np.testing.assert_allclose(turned, ahead @ turn[:3, :3].T, atol=1e-6)
 
 
-def test_25_winds_share_one_drape(skirted, draper, monkeypatch):  # what they cost: benchmarks/draping.py
+def test_25_winds_share_one_drape(draper, monkeypatch):  # what they cost: benchmarks/draping.py
+    scene = skirted()
     laid = Mock(side_effect=kinematic.lay)
     monkeypatch.setattr(kinematic, "lay", laid)
-    poses, winds = leg_poses(), np.zeros((35, len(skirted.garment.parameter_names)))
+    poses, winds = leg_poses(), np.zeros((35, len(scene.garment.parameter_names)))
     winds[:, 2:4] = np.random.default_rng(0).uniform(-0.3, 0.3, (35, 2))
     rows = np.repeat([0, 3], [25, 10])  # and ten of another pose
-    draper.drape(PoseBatch(root=poses.root[rows], angles=poses.angles[rows]), winds, Past(), skirted)
+    draper.drape(PoseBatch(root=poses.root[rows], angles=poses.angles[rows]), winds, Past(), scene)
     assert [len(call.args[2][0]) for call in laid.call_args_list] == [2]  # where strands begin, at each pose laid
 
 
-def test_winds_of_one_drape_are_its_winds_one_by_one(skirted, draper):
-    winds = np.zeros((9, len(skirted.garment.parameter_names)))
+def test_winds_of_one_drape_are_its_winds_one_by_one(draper):
+    scene = skirted()
+    winds = np.zeros((9, len(scene.garment.parameter_names)))
     winds[:6, 1:6] = np.random.default_rng(1).uniform(-0.3, 0.3, (6, 5))
     winds[6:] = winds[5] * [[0.5], [0.9], [1.1]]  # harder and harder: each goes on where the one before has ended
     pose = PoseBatch(root=leg_poses().root[1:2].copy(), angles=leg_poses().angles[1:2].copy())
     same = PoseBatch(root=np.repeat(pose.root, 9, axis=0), angles=np.repeat(pose.angles, 9, axis=0))
-    together = draper.drape(same, winds, Past(), skirted)
-    alone = np.concatenate([draper.drape(pose, wind[None], Past(), skirted) for wind in winds])
+    together = draper.drape(same, winds, Past(), scene)
+    alone = np.concatenate([draper.drape(pose, wind[None], Past(), scene) for wind in winds])
     np.testing.assert_array_equal(together[:7], alone[:7])
     assert np.linalg.norm(together - alone, axis=-1).max() < 1e-3
 
@@ -168,55 +179,60 @@ def test_thickness_is_found_again():
     assert (np.diff(errors[best:]) > 0).all()
 
 
-def test_thick_cloth_keeps_farther_from_the_skin(skirted, draper):
-    thick = draper.drape(standing(), parameters(skirted.garment, thickness_m=0.010), Past(), skirted)
-    free = np.setdiff1d(np.arange(thick.shape[1]), skirted.garment.pinned)
-    nearest = distances(skirted.body, thick[:, free], standing()).min()
+def test_thick_cloth_keeps_farther_from_the_skin(draper):
+    scene = skirted()
+    thick = draper.drape(standing(), parameters(scene.garment, thickness_m=0.010), Past(), scene)
+    free = np.setdiff1d(np.arange(thick.shape[1]), scene.garment.pinned)
+    nearest = distances(scene.body, thick[:, free], standing()).min()
     assert nearest == pytest.approx(draper.skin_m + 0.010 / 2, abs=4e-4)  # half of it lies on either side
-    two = np.repeat(parameters(skirted.garment, thickness_m=0.003), 2, axis=0)
-    np.testing.assert_array_equal(thickness(skirted.garment, two), [0.003, 0.003])
+    two = np.repeat(parameters(scene.garment, thickness_m=0.003), 2, axis=0)
+    np.testing.assert_array_equal(thickness(scene.garment, two), [0.003, 0.003])
 
 
 @pytest.mark.parametrize("settings", [dict(sweeps=0), dict(sweeps=20), dict(sweeps=0, rule="literal", limited=True)])
-def test_cloth_hangs_as_much_shorter_as_folds_take_up(skirted, settings):
+def test_cloth_hangs_as_much_shorter_as_folds_take_up(settings):
+    scene = skirted()
     poses, draper = leg_poses(), drape_bodies.draper(**settings)
-    folded = np.repeat(parameters(skirted.garment, take_up=0.1), 4, axis=0)
-    draped = draper.drape(poses, folded, Past(), skirted)
-    whole = draper.drape(poses, 0 * folded, Past(), skirted)
+    folded = np.repeat(parameters(scene.garment, take_up=0.1), 4, axis=0)
+    draped = draper.drape(poses, folded, Past(), scene)
+    whole = draper.drape(poses, 0 * folded, Past(), scene)
     if "rule" not in settings:
-        check_whole_and_outside(skirted, draped, poses, take_up=0.1)
-    hem = skirted.garment.strands[:, -1]
+        check_whole_and_outside(scene, draped, poses, take_up=0.1)
+    hem = scene.garment.strands[:, -1]
     assert (draped[0, hem, 2] - whole[0, hem, 2]).mean() == pytest.approx(
         0.1 * drape_bodies.SKIRT["length_m"], abs=0.01
     )
 
 
-def test_drapes_of_one_pose_have_their_own_take_up(skirted):
+def test_drapes_of_one_pose_have_their_own_take_up():
+    scene = skirted()
     draper, pose = drape_bodies.draper(), leg_poses()
     same = PoseBatch(root=np.repeat(pose.root[1:2], 3, axis=0), angles=np.repeat(pose.angles[1:2], 3, axis=0))
-    amounts = np.concatenate([parameters(skirted.garment, take_up=u, flare_rad=0.1) for u in (0.0, 0.05, 0.1)])
-    together = draper.drape(same, amounts, Past(), skirted)
+    amounts = np.concatenate([parameters(scene.garment, take_up=u, flare_rad=0.1) for u in (0.0, 0.05, 0.1)])
+    together = draper.drape(same, amounts, Past(), scene)
     for row in range(3):
         alone = PoseBatch(root=same.root[:1].copy(), angles=same.angles[:1].copy())
-        np.testing.assert_array_equal(draper.drape(alone, amounts[row : row + 1], Past(), skirted)[0], together[row])
+        np.testing.assert_array_equal(draper.drape(alone, amounts[row : row + 1], Past(), scene)[0], together[row])
 
 
-def test_a_parameter_without_a_meaning_is_refused(skirted):
-    names = ("thickness_m", "flair_rad", *skirted.garment.parameter_names[2:])
-    odd = type(skirted.garment)(**{**vars(skirted.garment), "parameter_names": names})
+def test_a_parameter_without_a_meaning_is_refused():
+    scene = skirted()
+    names = ("thickness_m", "flair_rad", *scene.garment.parameter_names[2:])
+    odd = type(scene.garment)(**{**vars(scene.garment), "parameter_names": names})
     with pytest.raises(PluginError, match=r"'flair_rad'(.|\n)*did you mean 'flare_rad'"):
         tilts(odd, np.zeros((1, len(names))), np.zeros(3))
 
 
 @pytest.mark.parametrize("rule", ["contact", "literal"])
 @pytest.mark.parametrize("yaw", [0.0, 1.1])
-def test_a_wind_blows_where_it_says(skirted, yaw, rule):
-    garment, turn, way = skirted.garment, np.eye(4), np.array([0.6, 0.8])
+def test_a_wind_blows_where_it_says(yaw, rule):
+    scene = skirted()
+    garment, turn, way = scene.garment, np.eye(4), np.array([0.6, 0.8])
     turn[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
     poses = PoseBatch(root=np.stack([turn, turn]), angles=np.zeros((2, 4)))
     wind = parameters(garment, wind_cos_rad=0.2 * way[0], wind_sin_rad=0.2 * way[1])
     draper = drape_bodies.draper(rule=rule, limited=True, sweeps=0)
-    calm, blown = draper.drape(poses, np.concatenate([0 * wind, wind]), Past(), skirted)
+    calm, blown = draper.drape(poses, np.concatenate([0 * wind, wind]), Past(), scene)
     moved = (blown - calm)[garment.strands[:, -1], :2] @ turn[:2, :2]
     assert (moved @ way).min() > -0.005  # to windward legs hold the cloth
     assert 0.08 < (moved @ way).max() < 0.6 * np.sin(0.2) + 0.005  # of a strand of 0.6 m

@@ -1,9 +1,8 @@
 """Re-constraining: T-CL4 on the skirt, T-CL5 on a tube around a thigh."""
 
-import drape_bodies
 import numpy as np
 import pytest
-from drape_bodies import SKIN, check_whole_and_outside, deep_poses, distances, draper, leg_poses, legs
+from drape_bodies import SKIN, check_whole_and_outside, deep_poses, distances, draper, leg_poses, legs, skirted
 from mocapflow_draping.strands import strands_of
 from mocapflow_garments.cylinder import Cylinder
 
@@ -14,12 +13,6 @@ from mocapflow.scene import Scene
 def ring_strain(garment, draped):
     a, b = garment.rings.T
     return np.linalg.norm(draped[:, a] - draped[:, b], axis=-1) / garment.ring_length - 1
-
-
-@pytest.fixture(scope="module")
-def skirted():
-    """A skirt on legs of capsules."""
-    return drape_bodies.skirted()
 
 
 @pytest.fixture(scope="module")
@@ -34,44 +27,49 @@ def drape(scene, poses, **settings):
     return draper(**settings).drape(poses, still, Past(), scene)
 
 
-def test_rings_come_back_to_their_length(skirted):
-    loose = ring_strain(skirted.garment, drape(skirted, leg_poses(), sweeps=0)).max(axis=1)
-    some = ring_strain(skirted.garment, drape(skirted, leg_poses(), sweeps=40)).max(axis=1)
+def test_rings_come_back_to_their_length():
+    scene = skirted()
+    loose = ring_strain(scene.garment, drape(scene, leg_poses(), sweeps=0)).max(axis=1)
+    some = ring_strain(scene.garment, drape(scene, leg_poses(), sweeps=40)).max(axis=1)
     assert loose[1] > 1.0  # a raised knee tears the fallen strands apart
     assert (some < 0.24).all()
 
 
 @pytest.mark.parametrize("longest", [1.0, 1.1, 1.3])
-def test_what_was_too_long_becomes_as_long_as_allowed(skirted, longest):
+def test_what_was_too_long_becomes_as_long_as_allowed(longest):
     """T-CL4: in the three poses that part the strands, links of more than half again their length."""
+    scene = skirted()
     rule = dict(stiff=0.0, bending_m=0.0, longest=longest)
-    fallen, closed = (ring_strain(skirted.garment, drape(skirted, leg_poses(), sweeps=n, **rule)) for n in (0, 60))
+    fallen, closed = (ring_strain(scene.garment, drape(scene, leg_poses(), sweeps=n, **rule)) for n in (0, 60))
     far = fallen > 0.5
     assert far[1:].any(axis=1).all()
     assert np.quantile(closed[far], 0.25) > longest - 1 - 0.01
     assert closed.max() < longest - 1 + 0.04 * longest  # within 3 % of their length rings are let be
 
 
-def test_strands_keep_their_length_and_particles_stay_outside(skirted):
+def test_strands_keep_their_length_and_particles_stay_outside():
+    scene = skirted()
     poses = leg_poses()
-    draped = drape(skirted, poses, sweeps=40)
-    check_whole_and_outside(skirted, draped, poses)
+    draped = drape(scene, poses, sweeps=40)
+    check_whole_and_outside(scene, draped, poses)
 
 
-def test_no_ring_parts_around_a_raised_thigh(skirted):
+def test_no_ring_parts_around_a_raised_thigh():
+    scene = skirted()
     poses = deep_poses()
-    draped = drape(skirted, poses)
-    assert np.quantile(ring_strain(skirted.garment, draped), 0.99) < 0.5
-    a, b = skirted.garment.rings.T
+    draped = drape(scene, poses)
+    assert np.quantile(ring_strain(scene.garment, draped), 0.99) < 0.5
+    a, b = scene.garment.rings.T
     middles = (draped[:, a] + draped[:, b]) / 2
-    assert distances(skirted.body, middles, poses).min() > -0.03  # no limb between neighbours
-    check_whole_and_outside(skirted, draped, poses)
+    assert distances(scene.body, middles, poses).min() > -0.03  # no limb between neighbours
+    check_whole_and_outside(scene, draped, poses)
 
 
-def test_a_strand_takes_up_a_new_direction_gradually(skirted):
+def test_a_strand_takes_up_a_new_direction_gradually():
+    scene = skirted()
     knee_up = leg_poses()
-    sharp, soft = (drape(skirted, knee_up, bending_m=m)[1] for m in (0.0, 0.06))
-    grid = strands_of(skirted.garment, skirted.body).vertex
+    sharp, soft = (drape(scene, knee_up, bending_m=m)[1] for m in (0.0, 0.06))
+    grid = strands_of(scene.garment, scene.body).vertex
 
     def sharpest(cloth):
         bars = np.diff(cloth[grid], axis=1)
@@ -82,34 +80,36 @@ def test_a_strand_takes_up_a_new_direction_gradually(skirted):
 
 
 @pytest.mark.parametrize("rule", ["literal", "contact"])
-def test_links_that_are_short_stay_as_they_are(skirted, rule):
+def test_links_that_are_short_stay_as_they_are(rule):
     """T-CL4: all around a person who stands; behind, where over-long ones before a raised thigh are shortened."""
+    scene = skirted()
     poses, settings = leg_poses(), dict(rule=rule, stiff=0.0, bending_m=0.0, longest=1.1)
-    fallen, closed = (drape(skirted, poses, sweeps=sweeps, **settings) for sweeps in (0, 40))
-    strands, strain = strands_of(skirted.garment, skirted.body), ring_strain(skirted.garment, fallen)
+    fallen, closed = (drape(scene, poses, sweeps=sweeps, **settings) for sweeps in (0, 40))
+    strands, strain = strands_of(scene.garment, scene.body), ring_strain(scene.garment, fallen)
     moved = np.linalg.norm(closed - fallen, axis=-1)
     behind = strands.vertex[strands.facing[:, 1] > 0.8]
-    linked = np.isin(skirted.garment.rings, behind).all(axis=1)
+    linked = np.isin(scene.garment.rings, behind).all(axis=1)
     assert (strain[0] < -1e-3).mean() > 0.9 and (strain[1:, linked] < -1e-3).mean(axis=1).min() > 0.9
     assert max(moved[0].max(), moved[:, behind].max()) < 1e-9
     assert (moved[1:].max(axis=1) > 0.05).all()
 
 
-def test_by_the_literal_rule_what_touches_stays_and_strands_keep_their_length(skirted):
+def test_by_the_literal_rule_what_touches_stays_and_strands_keep_their_length():
     """T-CL4: pinned by the skin, and taut above: only the free ends of strands come back to each other."""
+    scene = skirted()
     poses, rule = leg_poses(), dict(rule="literal", stiff=0.0, bending_m=0.0, longest=1.1)
-    fallen, closed = (drape(skirted, poses, sweeps=sweeps, **rule) for sweeps in (0, 40))
-    strands = strands_of(skirted.garment, skirted.body)
+    fallen, closed = (drape(scene, poses, sweeps=sweeps, **rule) for sweeps in (0, 40))
+    strands = strands_of(scene.garment, scene.body)
     rows = np.arange(strands.vertex.shape[1])
-    touches = (distances(skirted.body, fallen, poses) < SKIN)[:, strands.vertex]
+    touches = (distances(scene.body, fallen, poses) < SKIN)[:, strands.vertex]
     stays = rows <= np.where(touches, rows, 0).max(axis=2, keepdims=True)
     moved = np.linalg.norm((closed - fallen)[:, strands.vertex], axis=-1)
     assert moved[stays].max() < 1e-9
     assert moved[~stays].max() > 0.05
     lengths = np.linalg.norm(np.diff(closed[:, strands.vertex], axis=2), axis=-1)
     assert np.abs(lengths / strands.links - 1).max() < 1e-9
-    assert distances(skirted.body, closed, poses)[:, strands.vertex][~stays].min() > SKIN - 1e-4
-    before, after = (np.maximum(ring_strain(skirted.garment, cloth)[1:], 0.1) for cloth in (fallen, closed))
+    assert distances(scene.body, closed, poses)[:, strands.vertex][~stays].min() > SKIN - 1e-4
+    before, after = (np.maximum(ring_strain(scene.garment, cloth)[1:], 0.1) for cloth in (fallen, closed))
     assert (after.mean(axis=1) < before.mean(axis=1)).all()  # standing, no ring is too long
 
 

@@ -4,7 +4,7 @@ import logging
 
 import numpy as np
 import pytest
-from keypoint_recording import DEMO, copy_demo, write
+from keypoint_recording import DEMO, copy_demo, length, write
 from mocapflow_bodies.template import Template
 from mocapflow_fitting.fit_subject import FitSubject
 from mocapflow_fitting.proportions import PROPORTIONS, scaled
@@ -16,20 +16,6 @@ from mocapflow.recordings.recording import open_recording
 from mocapflow.scene import Scene
 
 LIMBS = (("hip_l", "knee_l"), ("knee_r", "ankle_r"), ("shoulder_r", "elbow_r"), ("elbow_l", "wrist_l"))
-
-
-@pytest.fixture(scope="module")
-def body():
-    return Template().load(DEMO)
-
-
-@pytest.fixture(scope="module")
-def cameras():
-    return open_recording(DEMO).cameras
-
-
-def length(body, a, b):
-    return np.linalg.norm(body.positions[body.joint(a)] - body.positions[body.joint(b)])
 
 
 def poses(body, count):

@@ -1,10 +1,13 @@
 """Edges inside the silhouette: found to a fraction of a pixel where two colours meet, silent where they do not."""
 
 from dataclasses import fields, replace
+from functools import partial
 
 import cv2
+import matching_scenes
 import numpy as np
 import pytest
+from matching_scenes import FIRST
 from mocapflow_levelset import splits
 from mocapflow_levelset.colours import BINS, bins_of
 from mocapflow_levelset.inner import Search, inner_contours, told_apart
@@ -19,10 +22,10 @@ from mocapflow.geometry import twists
 from mocapflow.geometry.cameras import magnification, project
 from mocapflow.geometry.silhouettes import outline
 from mocapflow.pooling import pool
-from mocapflow.testing import tiny_cloth, tiny_pose, tiny_segmentation
+from mocapflow.testing import tiny_pose, tiny_segmentation
 
 ONE, OTHER = SKIN, CLOTHS
-FIRST = Turn(index=0)
+surface_at = partial(matching_scenes.surface_at, scene=SCENE)
 
 
 def halves(edge, turn=0.0, one=ONE, other=OTHER, noise=0.0):
@@ -82,10 +85,6 @@ def kicked(degrees):
     angles = pose.angles.copy()
     angles[SCENE.body.screw_names.index("hip_l.flexion")] += np.radians(degrees)
     return Pose(root=pose.root, angles=angles)
-
-
-def surface_at(pose):
-    return SCENE.surface(pose, tiny_cloth(SCENE, pose))
 
 
 def leaning(degrees):

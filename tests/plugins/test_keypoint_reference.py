@@ -6,13 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from keypoint_recording import copy_demo, write
-from mocapflow_bodies.template import Template
+from keypoint_recording import copy_demo, template, write
 from mocapflow_evaluation.evaluate import Evaluate
 from mocapflow_evaluation.keypoint_reference import low_pass
 from mocapflow_fitting.align_cameras import turn
 from mocapflow_fitting.landmarks import landmarks
-from results_scene import DEMO, make_track, stepping
+from results_scene import make_track, stepping
 
 from mocapflow.geometry import kinematics
 from mocapflow.io import markers
@@ -21,7 +20,7 @@ from mocapflow.results import Evaluation, RunFolder, Track
 from mocapflow.scene import Scene
 
 FRAMES = 16  # a little more than the filter needs
-BODY = Template().load(DEMO)
+BODY = template()
 
 
 @pytest.fixture(scope="module")

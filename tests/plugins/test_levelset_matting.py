@@ -48,7 +48,7 @@ def test_where_nothing_counts_the_contour_stays():
 
 def test_an_edge_that_cannot_be_seen_moves_nothing():
     """A shirt of the wall's colour: the faint noise is all there is to see."""
-    image, wall, distance = pictured(20)
+    _, wall, distance = pictured(20)
     same = np.clip(np.rint(wall + np.random.default_rng(1).normal(0, 1, wall.shape)), 0, 255).astype(np.uint8)
     level = sharpened(distance, same, wall, np.ones(distance.shape, bool), 2)
     assert np.abs(level - distance).max() < 0.15

@@ -30,11 +30,6 @@ def body():
 
 
 @pytest.fixture(scope="module")
-def cameras():
-    return open_recording(DEMO).cameras
-
-
-@pytest.fixture(scope="module")
 def pose(body):
     return read_pose(DEMO / "init.json", body)
 

@@ -77,7 +77,7 @@ def test_one_part_is_the_whole(path):
 
 def test_parts_are_made_resumed_and_joined(tmp_path, path):
     store = tmp_path / "store.zarr"
-    whole, _ = run_tiny(path, tmp_path, frames=13)  # the first part of the whole: its frames serve both
+    run_tiny(path, tmp_path, frames=13)  # the first part of the whole: its frames serve both
     pipeline = load(path, *IN_TWO)
     assert {line.label: line.action for line in plan(pipeline, store=store)}["track_1"] == "hit"
     chains = [step.label for step in prepare(pipeline, store=store).steps if step.chain]

@@ -131,7 +131,7 @@ def test_what_a_stage_warned_of_is_told_again_when_it_comes_from_the_store(tmp_p
         assert f"warning: {said}" in lines
 
 
-def test_what_a_track_warned_of_is_kept_with_its_frames(tmp_path, path, monkeypatch, caplog):
+def test_what_a_track_warned_of_is_kept_with_its_frames(tmp_path, path, monkeypatch):
     def warned():
         recipe = json.loads((tmp_path / "out" / "results.json").read_text())["recipe"]
         return recipe["stages"]["track"]["warnings"]

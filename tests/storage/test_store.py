@@ -267,7 +267,7 @@ def test_silhouettes_keep_their_mask_and_an_eighth_of_a_pixel():
     assert np.abs(back - distance)[near].max() <= 1 / FINE
 
 
-def test_matches_come_back(tmp_path):
+def test_matches_come_back():
     frame = Frame(index=3, time=0.0, images=(), usable=np.zeros(0, bool))
     surface = type("S", (), {"vertices": np.zeros((5, 3))})
     matches = TinyMatcher().match(frame, None, surface, None, None, None)
