@@ -640,18 +640,21 @@ def test_nobody_begins_to_write_what_is_being_removed(store, monkeypatch):
     made = put(store, VALUES["start"])
     aside, written = Store.set_aside, threading.Event()
 
-    def slow(self, path):
-        threading.Thread(target=write, daemon=True).start()
-        assert not written.wait(0.3)
-        return aside(self, path)
-
     def write():
         with store.writer(made.key, "some", print):
             written.set()
 
+    writer = threading.Thread(target=write, daemon=True)
+
+    def slow(self, path):
+        writer.start()
+        assert not written.wait(0.3)
+        return aside(self, path)
+
     monkeypatch.setattr(Store, "set_aside", slow)
     assert store.drop(made.path) and store.find(made.key) is None
-    assert written.wait(5) and not store.aside()
+    writer.join(5)
+    assert written.is_set() and not store.aside()
     assert store.drop(made.path)  # gone already
 
 
