@@ -99,7 +99,9 @@ class Resolver:
 
     def _wrong_setting(self, cls: type[BaseModel], error: ValidationError, steps: Steps) -> MocapflowError:
         errors = error.errors(include_url=False)
-        first = next((wrong for wrong in errors if wrong["type"] == "extra_forbidden"), errors[0])  # a typo, maybe
+        first = errors[0]
+        if first["type"] == "missing":  # it may be there, misspelt
+            first = next((wrong for wrong in errors if wrong["type"] == "extra_forbidden"), first)
         location = first["loc"]
         if first["type"] == "missing":
             described = ", ".join(dotted(wrong["loc"]) for wrong in error.errors() if wrong["type"] == "missing")

@@ -161,6 +161,8 @@ def test_a_plugin_file_named_by_the_pipeline(folder):
         ("garment: skirt", "garment: {use: skirt, lenght_m: 0.7}",
          "skirt.yaml:2:23  garment.lenght_m: unknown setting of skirt (hem_circumference_m, length_m, "
          "waist_circumference_m, waist_height_m)\n       did you mean 'length_m'?"),
+        ("share: 0.5", "share: -1, shares: 2",  # what is wrong comes first, but for what is missing
+         "skirt.yaml:8:48  stages.track.matchers.1.share: input should be greater than 0, not -1"),
         ("share: 0.5", "share: -1",
          "skirt.yaml:8:48  stages.track.matchers.1.share: input should be greater than 0, not -1"),
         ("share: 0.5", "share: yes",
