@@ -1,4 +1,4 @@
-"""From what a lens shows to what the steps see: an undistorted, resized image of a pinhole camera."""
+"""From what a lens shows to what the steps see: an undistorted, resized, brightened image of a pinhole camera."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ class View:
 
     lens: Camera
     scale: float = 1.0
+    gain: float = 1.0  # of all grey levels
 
     @cached_property
     def camera(self) -> Camera:
@@ -28,12 +29,14 @@ class View:
         return pinhole(scaled(self.lens, self.scale))
 
     def image(self, image: U8 | None) -> U8:
-        """Return an image (H, W, 3) of the lens resized and undistorted; a black one where it is lost."""
+        """Return an image (H, W, 3) of the lens brightened, resized and undistorted; a black one where it is lost."""
         import cv2
 
         width, height = (int(n) for n in self.camera.size)
         if image is None:
             return np.zeros((height, width, 3), np.uint8)
+        if self.gain != 1:
+            image = np.asarray(cv2.convertScaleAbs(image, alpha=self.gain), np.uint8)
         if image.shape[:2] != (height, width):
             image = np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
         if self._maps is None:

@@ -13,6 +13,7 @@ def mocapflow_stages() -> list[type[Stage]]:
     from mocapflow_robustness.check_views import CheckViews
     from mocapflow_robustness.corrupt import Corrupt
     from mocapflow_robustness.denoise import Denoise
+    from mocapflow_robustness.exposure import Exposure
     from mocapflow_robustness.hysteresis import Hysteresis
 
-    return [Bilateral, CheckViews, Corrupt, Denoise, Hysteresis]
+    return [Bilateral, CheckViews, Corrupt, Denoise, Exposure, Hysteresis]
