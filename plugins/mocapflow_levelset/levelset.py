@@ -11,7 +11,7 @@ from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, Pos
 from mocapflow.assets import Background, Camera
 from mocapflow.data import Frame, FrameState, Past, Segmentation, Silhouette, Surface, Turn
 from mocapflow.geometry.silhouettes import model_distance
-from mocapflow.records import F32, Bool
+from mocapflow.records import F32, U8, Bool
 from mocapflow.scene import Scene
 from mocapflow.settings import PositiveOrInf
 from mocapflow_levelset.channels import ChannelName
@@ -91,7 +91,7 @@ class LevelSet(ShadowAware):
             view = self._view(frame, surface, past, scene, c, levels)
             if c in last:
                 view = view._replace(start=last[c].distance, moved=parts[c])
-            found = find(view, levels, self._method(), self.band_px)
+            found = find(view, levels, self._method(view.image), self.band_px)
             silhouettes[c] = Silhouette(camera=c, layer=PERSON, distance=found.level)
             for term, cost in found.costs._asdict().items():
                 key = f"{scene.cameras[c].name}.{term}"
@@ -164,7 +164,7 @@ class LevelSet(ShadowAware):
     def _rhythm(self, steps: int, to_rest: bool = False) -> Rhythm:
         return Rhythm(steps, self.statistics_every, self.redistance_every, to_rest)
 
-    def _method(self) -> Method:
+    def _method(self, image: U8) -> Method:
         return Method(
             channels=self.channels,
             weights=Weights(
@@ -176,7 +176,7 @@ class LevelSet(ShadowAware):
                 step=1.0,  # `length_weight` is stable with it
                 band_px=INNER_BAND_PX,
             ),
-            shadow=self.shadow(),
+            shadow=self.shadow(image),
             calm_px=0.0,  # the empty scene is compared with small images alone, which are calm
             decorrelate=self.decorrelate,
             stride=self.stride_px,

@@ -12,10 +12,13 @@ from mocapflow.components import Segmenter
 from mocapflow.data import Surface
 from mocapflow.geometry.cameras import project
 from mocapflow.memo import memoised
-from mocapflow.records import F64, Bool
+from mocapflow.records import F64, U8, Bool
 from mocapflow_levelset.plates import Shadow
 
 CORNERS = 72
+THIN = 8  # every so many-th pixel tells whether there are colours
+GREY = 8  # levels between the colours of a pixel that has none; compression makes 3
+FEW = 0.001  # of the pixels: a lamp of the camera's own, a stamp
 REACH_M = 2.0  # from the person, where their shadow may fall
 USUAL = Shadow()
 
@@ -27,11 +30,20 @@ class ShadowAware(Segmenter):
     shadow_share: Annotated[float, Field(ge=0, lt=1)] = USUAL.share  # of the background; 0: shadows count as changes
     shadow_reach_m: PositiveFloat = REACH_M  # shadows fall on the floor within this distance of the person
     darkest_shadow: Annotated[float, Field(gt=0, lt=1)] = USUAL.darkest  # factor of L + 16, a and b
+    darkest_grey_shadow: Annotated[float, Field(gt=0, lt=1)] = 0.8  # the same in pictures without colours to tell it by
     shadow_chroma: PositiveFloat = USUAL.chroma  # off the plate's chromaticity, share of the range
 
-    def shadow(self) -> Shadow:
-        """Return what counts as background, as it is set."""
-        return Shadow(self.spread_floor, self.shadow_share, self.darkest_shadow, self.shadow_chroma)
+    def shadow(self, image: U8) -> Shadow:
+        """Return what counts as background in an image (H, W, 3), as it is set."""
+        darkest = max(self.darkest_shadow, self.darkest_grey_shadow) if colourless(image) else self.darkest_shadow
+        return Shadow(self.spread_floor, self.shadow_share, darkest, self.shadow_chroma)
+
+
+def colourless(image: U8) -> bool:
+    """Return whether an image (H, W, 3) is of a camera that sees no colours: even a grey room has people with skin."""
+    blue, green, red = np.moveaxis(image[::THIN, ::THIN], 2, 0)
+    light, dark = np.maximum(np.maximum(blue, green), red), np.minimum(np.minimum(blue, green), red)
+    return bool(np.mean(light - dark > GREY) < FEW)
 
 
 @memoised

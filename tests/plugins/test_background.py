@@ -8,7 +8,7 @@ from mocapflow_bodies.scanned import Scanned
 from mocapflow_fitting.start_from_file import StartFromFile
 from mocapflow_levelset.background import BackgroundDifference
 from mocapflow_levelset.plates import plate_in
-from mocapflow_levelset.shadows import floor_around
+from mocapflow_levelset.shadows import colourless, floor_around
 from mocapflow_sequence.background import EmptyScene
 from mocapflow_sequence.colours import more_common
 from mocapflow_sequence.commonest import LEAST_SAME, commonest
@@ -315,6 +315,30 @@ def test_darker_clothes_of_the_rooms_colour_are_no_shadow_off_the_floor():
     off_floor = BackgroundDifference().find(image, nowhere, np.zeros(SHAPE, bool), known(), 0)
     assert ((off_floor > 0) == (person() > 0)).mean() > 0.98
     assert (BackgroundDifference().find(image, nowhere, FLOOR, known(), 0) > 0).mean() < 0.05
+
+
+@pytest.mark.parametrize(("light", "found"), [(0.3, True), (0.7, False)])
+def test_without_colours_only_a_light_shadow_is_one(light, found):
+    """Of a camera that sees no colours, dark legs before the floor are the person, as is a shadow as dark as they."""
+    floor, legs = (
+        np.repeat(row.mean(axis=2, keepdims=True), 3, axis=2) for row in (room(), room() * light ** (1 / 2.2))
+    )
+    shape = np.clip(person() / 1.5 + 0.5, 0, 1)[..., None]
+    noise = np.random.default_rng(0).normal(0, 3, (*SHAPE, 1))
+    image = np.clip(shape * legs + (1 - shape) * floor + noise, 0, 255).astype(np.uint8)
+    background = Background(mean=(floor.astype(np.float32),), spread=(np.full(floor.shape, 3, np.float32),))
+    nowhere = np.full(SHAPE, -12, np.float32)
+    share = (BackgroundDifference().find(image, nowhere, FLOOR, background, 0) > 0)[person() > 0].mean()
+    assert share > 0.95 if found else share < 0.05
+    told = BackgroundDifference(darkest_grey_shadow=0.5).find(image, nowhere, FLOOR, background, 0) > 0
+    assert told[person() > 0].mean() < 0.05
+
+
+def test_a_camera_sees_colours_if_some_pixels_have_one():
+    grey = np.full((400, 320, 3), 90, np.uint8) + np.arange(3, dtype=np.uint8)
+    assert colourless(grey)
+    grey[40:60, 40:60] = (120, 140, 180)  # a face
+    assert not colourless(grey)
 
 
 def test_shadows_may_fall_around_the_feet_only():
