@@ -325,7 +325,8 @@ def test_without_colours_only_a_light_shadow_is_one(light, found):
     )
     shape = np.clip(person() / 1.5 + 0.5, 0, 1)[..., None]
     noise = np.random.default_rng(0).normal(0, 3, (*SHAPE, 1))
-    image = np.clip(shape * legs + (1 - shape) * floor + noise, 0, 255).astype(np.uint8)
+    dark = floor * (1 - shape + shape * light ** (1 / 2.2))
+    image = np.clip(dark + noise, 0, 255).astype(np.uint8)
     background = Background(mean=(floor.astype(np.float32),), spread=(np.full(floor.shape, 3, np.float32),))
     nowhere = np.full(SHAPE, -12, np.float32)
     share = (BackgroundDifference().find(image, nowhere, FLOOR, background, 0) > 0)[person() > 0].mean()
