@@ -1,4 +1,4 @@
-"""From what a lens shows to what the steps see: an undistorted, resized, brightened image of a pinhole camera."""
+"""From what a lens shows to what the steps see: an undistorted, resized image of a pinhole camera."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class View:
 
     lens: Camera
     scale: float = 1.0
-    gain: float = 1.0  # of all grey levels
+    tone: U8 | None = None  # (256, 3) what each grey level of blue, green and red becomes
 
     @cached_property
     def camera(self) -> Camera:
@@ -29,14 +29,14 @@ class View:
         return pinhole(scaled(self.lens, self.scale))
 
     def image(self, image: U8 | None) -> U8:
-        """Return an image (H, W, 3) of the lens brightened, resized and undistorted; a black one where it is lost."""
+        """Return an image (H, W, 3) of the lens toned, resized and undistorted; a black one where it is lost."""
         import cv2
 
         width, height = (int(n) for n in self.camera.size)
         if image is None:
             return np.zeros((height, width, 3), np.uint8)
-        if self.gain != 1:
-            image = np.asarray(cv2.convertScaleAbs(image, alpha=self.gain), np.uint8)
+        if self.tone is not None:
+            image = toned(image, self.tone)
         if image.shape[:2] != (height, width):
             image = np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
         if self._maps is None:
@@ -67,3 +67,10 @@ class View:
         if self.lens.fisheye:
             return cv2.fisheye.initUndistortRectifyMap(k, self.lens.distortion[:4], np.eye(3), k, size, cv2.CV_16SC2)
         return cv2.initUndistortRectifyMap(k, self.lens.distortion, np.eye(3), k, size, cv2.CV_16SC2)
+
+
+def toned(image: U8, table: U8) -> U8:
+    """Return an image (H, W, 3) whose grey levels are those of a table (256, 3) by level and colour."""
+    import cv2
+
+    return np.asarray(cv2.LUT(image, table[None]), np.uint8)
