@@ -35,8 +35,7 @@ class View:
         width, height = (int(n) for n in self.camera.size)
         if image is None:
             return np.zeros((height, width, 3), np.uint8)
-        if self.tone is not None:
-            image = toned(image, self.tone)
+        image = toned(image, self.tone)
         if image.shape[:2] != (height, width):
             image = np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
         if self._maps is None:
@@ -69,8 +68,8 @@ class View:
         return cv2.initUndistortRectifyMap(k, self.lens.distortion, np.eye(3), k, size, cv2.CV_16SC2)
 
 
-def toned(image: U8, table: U8) -> U8:
-    """Return an image (H, W, 3) whose grey levels are those of a table (256, 3) by level and colour."""
+def toned(image: U8, table: U8 | None) -> U8:
+    """Return an image (H, W, 3) whose grey levels are those of a table (256, 3) by level and colour; None: the same."""
     import cv2
 
-    return np.asarray(cv2.LUT(image, table[None]), np.uint8)
+    return image if table is None else np.asarray(cv2.LUT(image, table[None]), np.uint8)

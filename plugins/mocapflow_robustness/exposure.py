@@ -1,8 +1,8 @@
-"""Stage `exposure`: pictures of one recording become as bright and as rich in contrast as others."""
+"""Stage `exposure`: pictures that are too dark, tinged, or not always as bright are set right."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
 
@@ -15,29 +15,28 @@ from mocapflow.io.lenses import toned
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64, U8
 
-Level = Annotated[float, Field(ge=0, le=255)]
 Factor = Annotated[float, Field(ge=1)]
 
-DARK, BRIGHT = 1, 95  # % of the pixels that are darker than what counts as the dark and the bright parts of a picture
-THIN = 8  # every so many-th pixel tells
+BRIGHT = 95  # % of the pixels that are darker than what counts as the bright parts of a picture
+PIXELS = 40  # of a row that are looked at, and as many of a column of that height
 FIRST = 10  # frames of the videos that tell how a camera is set, whichever frames a run has
 LIT = 30  # grey levels; darker pixels don't tell by how much a picture is brighter than another
+LEAST = 0.1  # share of the pixels that have to tell
+ALIKE = 0.05  # median share by which factors of pixels may differ: those of one room differ by 0.01
 
 
 class Exposure(Stage):
     """Corrects cameras that are set badly, and those whose brightness changes.
 
-    What tells a person from the room is said in shares of the range of grey levels, as well exposed pictures use it. A
-    camera that shows all too dark, through haze or in one colour has the levels of frames and plates spread, alike in
-    all pictures; well set ones stay as they are. A frame that is brighter or darker than the first one all over, for
-    the sun comes out or a camera sets itself, becomes as bright as that.
+    What tells a person from the room is said in shares of the range of grey levels, as well exposed pictures use it.
+    So the frames and plates of a camera that shows all too dark or in one colour are brightened, all by the same
+    factors; well set ones stay as they are. A frame that is brighter or darker than the first ones all over, for the
+    sun comes out or a camera sets itself, becomes as bright as they.
     """
 
     name: ClassVar[str] = "exposure"
     bright: Annotated[float, Field(gt=0, le=255)] = 215.0  # grey level that the bright parts of a picture should have
-    dark: Level = 40.0  # likewise, of its dark parts, where there is haze
     darker: Factor = 1.25  # than that by this factor, and the camera is set too dark
-    haze: Level = 75.0  # grey level of the dark parts from which on there is haze
     cast: Factor = 2.0  # ratio of the brightest to the darkest of the colours from which on a picture is tinged
     most: Factor = 5.0  # factor of grey levels at most: more shows noise
     steady: Annotated[float, Field(ge=0, lt=1)] = 0.02  # change of brightness, as a share, that frames may keep
@@ -46,32 +45,26 @@ class Exposure(Stage):
         """Return the recording as it looks corrected."""
         first = list(replace(recording, indices=recording.indices[:FIRST]).frames())
         cameras = list(zip(*(frame.images for frame in first), strict=True))
-        tones = [self.tone(np.max([levels(image) for image in images], axis=0)) for images in cameras]
-        views = tuple(
-            view if tone is None else replace(view, tone=tone)
-            for view, tone in zip(recording.views, tones, strict=True)
-        )
-        lit = [max(images, key=lambda image: float(image.mean())) for images in cameras]
-        shown = [image if tone is None else toned(image, tone) for image, tone in zip(lit, tones, strict=True)]
-        names = (view.lens.name for view in views)
-        steady = Steadied(self.steady, dict(zip(names, map(thinned, shown), strict=True)))
-        return replace(recording, views=views, changes=(*recording.changes, steady))
+        tones = [self.tone(np.max([brightness(image) for image in images], axis=0)) for images in cameras]
+        views = tuple(replace(view, tone=tone) for view, tone in zip(recording.views, tones, strict=True))
+        shown = {
+            view.lens.name: toned(thinned(lit(images)), view.tone) for view, images in zip(views, cameras, strict=True)
+        }
+        return replace(recording, views=views, changes=(*recording.changes, Steadied(self.steady, shown)))
 
-    def tone(self, levels: F64) -> U8 | None:
-        """Return what grey levels become (256, 3) by dark and bright parts (2, 3) of pictures; None: the same."""
-        black, white = levels[0].min(), levels[1].max()
-        hazy, tinged = black > self.haze, white > self.cast * levels[1].min()
-        if white * self.darker > self.bright and not hazy and not tinged:
+    def tone(self, bright: F64) -> U8 | None:
+        """Return what grey levels become (256, 3) by those of the bright parts (3,) of pictures; None: the same."""
+        most, least = bright.max(), bright.min()
+        tinged = most > self.cast * least
+        if most * self.darker > self.bright and not tinged:
             return None
-        offset = max(black - self.dark, 0.0) if hazy else 0.0
-        shown = levels[1] if tinged else np.full(3, white)
-        gain = np.clip(self.bright / np.maximum(shown - offset, 1), None, self.most)
-        return np.clip(np.rint((np.arange(256)[:, None] - offset) * gain), 0, 255).astype(np.uint8)
+        gain = np.clip(self.bright / np.maximum(bright if tinged else most, 1), None, self.most)
+        return table(np.broadcast_to(gain, 3))
 
 
 @dataclass(frozen=True)
 class Steadied:
-    """Frames as bright, in each colour, as a first one, of which every so many-th pixel (h, w, 3) is known."""
+    """Frames as bright, in each colour, as a first one, of which some pixels (h, w, 3) are known."""
 
     steady: float  # share by which they may differ
     first: Mapping[str, U8]  # by camera
@@ -88,22 +81,40 @@ class Steadied:
         gain = brighter(thinned(image), first)
         if gain is None or np.all(np.abs(gain - 1) <= self.steady):
             return image
-        return toned(image, np.clip(np.rint(np.arange(256)[:, None] / gain), 0, 255).astype(np.uint8))
+        return toned(image, table(1 / gain))
 
 
 def brighter(image: U8, first: U8) -> F64 | None:
-    """Return by which factors (3,) most pixels of an image (h, w, 3) are brighter than those of another; None: dark."""
-    lit = ((image >= LIT) & (first >= LIT) & (image < 255) & (first < 255)).all(axis=2)
-    if lit.mean() < 0.1:
+    """Return by which factors (3,) an image (h, w, 3) is brighter than another, by most of it; None: nobody can tell.
+
+    Nobody can of black pictures, nor of those of different rooms, whose factors differ from pixel to pixel.
+    """
+    told = ((np.minimum(image, first) >= LIT) & (np.maximum(image, first) < 255)).all(axis=2)
+    if told.mean() < LEAST:
         return None
-    return np.asarray(np.median(image[lit] / first[lit].astype(float), axis=0), float)
+    factors = image[told] / first[told].astype(float)
+    gain = np.median(factors, axis=0)
+    alike = np.median(np.abs(factors / gain - 1), axis=0).max() < ALIKE
+    return np.asarray(gain, float) if alike else None
 
 
-def levels(image: U8) -> F64:
-    """Return the grey levels (2, 3) of the dark and the bright parts of an image (H, W, 3) in each colour."""
-    return np.asarray(np.percentile(thinned(image).reshape(-1, 3), (DARK, BRIGHT), axis=0), float)
+def lit(images: Sequence[U8]) -> U8:
+    """Return the first of some pictures (H, W, 3) that is no black one."""
+    means = np.array([image.mean() for image in images])
+    return images[int(np.argmax(means >= 0.5 * means.max()))]
+
+
+def brightness(image: U8) -> F64:
+    """Return the grey levels (3,) of the bright parts of an image (H, W, 3), colour by colour."""
+    return np.asarray(np.percentile(thinned(image).reshape(-1, 3), BRIGHT, axis=0), float)
+
+
+def table(gain: F64) -> U8:
+    """Return what grey levels become (256, 3), brightened by factors (3,)."""
+    return np.clip(np.rint(np.arange(256)[:, None] * gain), 0, 255).astype(np.uint8)
 
 
 def thinned(image: U8) -> U8:
     """Return every so many-th pixel (h, w, 3) of an image (H, W, 3)."""
-    return np.ascontiguousarray(image[::THIN, ::THIN])
+    step = max(image.shape[1] // PIXELS, 1)
+    return np.ascontiguousarray(image[::step, ::step])
