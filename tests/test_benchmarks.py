@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import csv
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from mocapflow.config.pipeline import load_pipeline
 from mocapflow.help.shipped import shipped
+from mocapflow.running.runner import run
 
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 
@@ -31,3 +34,18 @@ def test_a_benchmark_runs(call):
     done = subprocess.run(command, check=False, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kind", ["dark", "grey", "lens", "world"])
+def test_a_person_filmed_otherwise_is_tracked_as_well(tmp_path, kind):
+    """Too dark, without colours, through lenses that bend, in another world: the same knees."""
+    script = [sys.executable, BENCHMARKS / "filmed_otherwise.py", CLIP, tmp_path, kind]
+    subprocess.run(script, check=True)
+    changes = [f"stages.{stage}=null" for stage in ("overlay", "virtual", "report")]
+    skirt = shipped("pipelines", "skirt.yaml")
+    pipeline = load_pipeline(skirt, recording=tmp_path / kind, changes=changes, frames=slice(0, 24))
+    run(pipeline, store=tmp_path / "store.zarr", out=tmp_path / "run")
+    with (tmp_path / "run" / "results" / "evaluation.csv").open() as file:
+        rms = {row["angle"]: float(row["rms_deg"]) for row in csv.DictReader(file)}
+    assert max(rms["knee_flexion_l"], rms["knee_flexion_r"]) <= 3.0
