@@ -17,7 +17,7 @@ from mocapflow_levelset.plates import Shadow
 
 CORNERS = 72
 THIN = 8  # every so many-th pixel tells whether there are colours
-GREY = 24  # levels between the colours of a pixel that has hardly any; skin has 60 to 100
+GREY = 32  # levels between the colours of a pixel that has hardly any; skin has 60 to 100
 FEW = 0.001  # of the pixels: a lamp of the camera's own, a stamp
 REACH_M = 2.0  # from the person, where their shadow may fall
 USUAL = Shadow()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
@@ -11,10 +12,11 @@ from pydantic import Field
 
 from mocapflow.components import Stage
 from mocapflow.data import Frame
-from mocapflow.io.lenses import toned
+from mocapflow.io.lenses import View, toned
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64, U8
 
+LOG = logging.getLogger("mocapflow")
 Factor = Annotated[float, Field(ge=1)]
 
 BRIGHT = 95  # % of the pixels that are darker than what counts as the bright parts of a picture
@@ -22,6 +24,7 @@ PIXELS = 40  # of a row that are looked at, and as many of a column of that heig
 FIRST = 10  # frames of the videos that tell how a camera is set, whichever frames a run has
 LIT = 30  # grey levels; darker pixels don't tell by how much a picture is brighter than another
 LEAST = 0.1  # share of the pixels that have to tell
+WHITE = 0.1  # share of pictures in which a colour is at the end of its range, from which on a camera is overexposed
 ALIKE = 0.05  # median share by which factors of pixels may differ: those of one room differ by 0.01
 
 
@@ -43,23 +46,38 @@ class Exposure(Stage):
 
     def run(self, recording: Recording) -> Recording:
         """Return the recording as it looks corrected."""
-        first = list(replace(recording, indices=recording.indices[:FIRST]).frames())
-        cameras = list(zip(*(frame.images for frame in first), strict=True))
-        tones = [self.tone(np.max([brightness(image) for image in images], axis=0)) for images in cameras]
-        views = tuple(replace(view, tone=tone) for view, tone in zip(recording.views, tones, strict=True))
-        shown = {
-            view.lens.name: toned(thinned(lit(images)), view.tone) for view, images in zip(views, cameras, strict=True)
-        }
-        return replace(recording, views=views, changes=(*recording.changes, Steadied(self.steady, shown)))
+        beginning = replace(recording, indices=recording.indices[:FIRST]).frames()
+        cameras = list(zip(*(map(thinned, frame.images) for frame in beginning), strict=True))
+        views = tuple(map(self._corrected, recording.views, cameras))
+        first = {view.lens.name: toned(lit(images), view.tone) for view, images in zip(views, cameras, strict=True)}
+        return replace(recording, views=views, changes=(*recording.changes, Steadied(self.steady, first)))
 
-    def tone(self, bright: F64) -> U8 | None:
-        """Return what grey levels become (256, 3) by those of the bright parts (3,) of pictures; None: the same."""
-        most, least = bright.max(), bright.min()
-        tinged = most > self.cast * least
+    def _corrected(self, view: View, images: Sequence[U8]) -> View:
+        """Return the view of a camera that is set right, and warn of what was wrong."""
+        white = np.mean([(image == 255).any(axis=2).mean() for image in images])
+        if white > WHITE:
+            LOG.warning(
+                "%s is overexposed, %.0f %% of its pictures: a shadow there may pass for the person",
+                view.lens.name,
+                100 * white,
+            )
+        gains = self.gains(np.max([brightness(image) for image in images], axis=0))
+        if gains is None:
+            return view
+        told = ", ".join(
+            f"{color} {gain:.2g} times" for color, gain in zip(("blue", "green", "red"), gains, strict=True)
+        )
+        LOG.warning("%s is too dark or tinged: its pictures are brightened, %s", view.lens.name, told)
+        return replace(view, tone=table(gains))
+
+    def gains(self, bright: F64) -> F64 | None:
+        """Return factors (3,) of the colours by the grey levels (3,) of the bright parts of pictures; None: all is well."""
+        most = bright.max()
+        tinged = most > self.cast * bright.min()
         if most * self.darker > self.bright and not tinged:
             return None
-        gain = np.clip(self.bright / np.maximum(bright if tinged else most, 1), None, self.most)
-        return table(np.broadcast_to(gain, 3))
+        gain = self.bright / np.maximum(bright if tinged else most, 1)
+        return np.broadcast_to(np.minimum(gain, self.most), 3)
 
 
 @dataclass(frozen=True)
@@ -106,7 +124,7 @@ def lit(images: Sequence[U8]) -> U8:
 
 def brightness(image: U8) -> F64:
     """Return the grey levels (3,) of the bright parts of an image (H, W, 3), colour by colour."""
-    return np.asarray(np.percentile(thinned(image).reshape(-1, 3), BRIGHT, axis=0), float)
+    return np.asarray(np.percentile(image, BRIGHT, axis=(0, 1)), float)
 
 
 def table(gain: F64) -> U8:

@@ -40,7 +40,7 @@ def off(one, other):
     return float(np.median(np.abs(one.astype(float) - other)))
 
 
-def test_a_dark_camera_is_brightened_with_its_plate_and_no_other(filmed):
+def test_a_dark_camera_is_brightened_with_its_plate_and_no_other(filmed, caplog):
     """One was stopped down; one begins with a black picture."""
     always, once = [1.0] * 3, [0, 1, 1]
     dim = filmed(
@@ -49,6 +49,7 @@ def test_a_dark_camera_is_brightened_with_its_plate_and_no_other(filmed):
     )
     true, brightened = open_recording(DEMO), Exposure().run(dim)
     assert [view.tone is None for view in brightened.views] == [True, False, True, True]
+    assert [said.getMessage()[:20] for said in caplog.records] == ["cam02 is too dark or"]
     seen = brightened.frame(2).images[1]
     assert brightness(seen).max() == pytest.approx(Exposure().bright, abs=2)
     assert off(seen, true.frame(2).images[1]) < 5
@@ -62,6 +63,16 @@ def test_a_tinged_camera_shows_white_as_white(filmed):
     tinged = filmed(dict.fromkeys(cameras, [warm] * 3), dict.fromkeys(cameras, warm))
     for picture in Exposure().run(tinged).frame(0).images:
         np.testing.assert_allclose(brightness(picture), Exposure().bright, atol=3)
+
+
+def test_an_overexposed_camera_is_told(filmed, caplog):
+    always = [1.0] * 3
+    filmed_so = filmed(
+        {"cam01": always, "cam02": [1.5] * 3, "cam03": always, "cam04": always},
+        {"cam01": 1, "cam02": 1.5, "cam03": 1, "cam04": 1},
+    )
+    assert Exposure().run(filmed_so).views[1].tone is None
+    assert [said.getMessage()[:20] for said in caplog.records] == ["cam02 is overexposed"]
 
 
 def test_frames_that_grow_darker_are_as_bright_as_the_first(filmed):
@@ -109,8 +120,5 @@ def test_how_much_brighter_is_told_by_most_of_a_room_and_not_of_another_room():
     ],
 )
 def test_gains(bright, gain):
-    tone = Exposure(bright=200, darker=1.25, most=4).tone(np.array(bright, float))
-    if gain is None:
-        assert tone is None
-    else:
-        np.testing.assert_allclose(tone[40], np.array(gain) * 40, atol=0.51)
+    found = Exposure(bright=200, darker=1.25, most=4).gains(np.array(bright, float))
+    assert found is None if gain is None else found == pytest.approx(gain)
