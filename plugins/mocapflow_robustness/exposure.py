@@ -54,24 +54,20 @@ class Exposure(Stage):
 
     def _corrected(self, view: View, images: Sequence[U8]) -> View:
         """Return the view of a camera that is set right, and warn of what was wrong."""
-        white = np.mean([(image == 255).any(axis=2).mean() for image in images])
+        name, white = view.lens.name, np.mean([(image == 255).any(axis=2).mean() for image in images])
         if white > WHITE:
-            LOG.warning(
-                "%s is overexposed, %.0f %% of its pictures: a shadow there may pass for the person",
-                view.lens.name,
-                100 * white,
-            )
+            LOG.warning(f"{name} is overexposed, {white:.0%} of its pictures: a shadow there may pass for the person")
         gains = self.gains(np.max([brightness(image) for image in images], axis=0))
         if gains is None:
             return view
-        told = ", ".join(
-            f"{color} {gain:.2g} times" for color, gain in zip(("blue", "green", "red"), gains, strict=True)
+        blue, green, red = gains
+        LOG.warning(
+            f"{name} is too dark or tinged: blue {blue:.2g}, green {green:.2g}, red {red:.2g} times as bright now"
         )
-        LOG.warning("%s is too dark or tinged: its pictures are brightened, %s", view.lens.name, told)
         return replace(view, tone=table(gains))
 
     def gains(self, bright: F64) -> F64 | None:
-        """Return factors (3,) of the colours by the grey levels (3,) of the bright parts of pictures; None: all is well."""
+        """Return the factors (3,) for a camera whose pictures have bright parts of these grey levels (3,); None: none."""
         most = bright.max()
         tinged = most > self.cast * bright.min()
         if most * self.darker > self.bright and not tinged:
