@@ -67,7 +67,7 @@ class Exposure(Stage):
         return replace(view, tone=table(gains))
 
     def gains(self, bright: F64) -> F64 | None:
-        """Return the factors (3,) for a camera whose pictures have bright parts of these grey levels (3,); None: none."""
+        """Return the factors (3,) for a camera whose bright parts have these grey levels (3,), None for a good one."""
         most = bright.max()
         tinged = most > self.cast * bright.min()
         if most * self.darker > self.bright and not tinged:
