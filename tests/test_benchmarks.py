@@ -37,14 +37,14 @@ def test_a_benchmark_runs(call):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("kind", ["dark", "grey", "lens", "world"])
+@pytest.mark.parametrize("kind", ["dark", "drift", "grey", "lens", "world"])
 def test_a_person_filmed_otherwise_is_tracked_as_well(tmp_path, kind):
-    """Too dark, without colours, through lenses that bend, in another world: the same knees."""
+    """The first three were lost before there was `exposure` and before grey pictures had lighter shadows."""
     script = [sys.executable, BENCHMARKS / "filmed_otherwise.py", CLIP, tmp_path, kind]
     subprocess.run(script, check=True)
     changes = [f"stages.{stage}=null" for stage in ("overlay", "virtual", "report")]
     skirt = shipped("pipelines", "skirt.yaml")
-    pipeline = load_pipeline(skirt, recording=tmp_path / kind, changes=changes, frames=slice(0, 24))
+    pipeline = load_pipeline(skirt, recording=tmp_path / kind, changes=changes, frames=slice(0, 36))
     run(pipeline, store=tmp_path / "store.zarr", out=tmp_path / "run")
     with (tmp_path / "run" / "results" / "evaluation.csv").open() as file:
         rms = {row["angle"]: float(row["rms_deg"]) for row in csv.DictReader(file)}

@@ -9,7 +9,7 @@ import numpy as np
 
 from mocapflow.assets import Camera
 from mocapflow.geometry.cameras import bends, pinhole, scaled, undistort
-from mocapflow.records import F64, U8, record
+from mocapflow.records import F64, U8, array, record
 
 
 @record
@@ -21,7 +21,7 @@ class View:
 
     lens: Camera
     scale: float = 1.0
-    tone: U8 | None = None  # (256, 3) what each grey level of blue, green and red becomes
+    levels: U8 | None = array(256, 3, unit="grey level that each one of blue, green and red becomes", default=None)
 
     @cached_property
     def camera(self) -> Camera:
@@ -29,13 +29,13 @@ class View:
         return pinhole(scaled(self.lens, self.scale))
 
     def image(self, image: U8 | None) -> U8:
-        """Return an image (H, W, 3) of the lens toned, resized and undistorted; a black one where it is lost."""
+        """Return an image (H, W, 3) of the lens at these levels, resized and undistorted; black where it is lost."""
         import cv2
 
         width, height = (int(n) for n in self.camera.size)
         if image is None:
             return np.zeros((height, width, 3), np.uint8)
-        image = toned(image, self.tone)
+        image = with_levels(image, self.levels)
         if image.shape[:2] != (height, width):
             image = np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
         if self._maps is None:
@@ -68,8 +68,8 @@ class View:
         return cv2.initUndistortRectifyMap(k, self.lens.distortion, np.eye(3), k, size, cv2.CV_16SC2)
 
 
-def toned(image: U8, table: U8 | None) -> U8:
-    """Return an image (H, W, 3) whose grey levels are those of a table (256, 3) by level and colour; None: the same."""
+def with_levels(image: U8, levels: U8 | None) -> U8:
+    """Return an image (H, W, 3) whose grey levels became those of a table (256, 3) by colour; None: the same."""
     import cv2
 
-    return image if table is None else np.asarray(cv2.LUT(image, table[None]), np.uint8)
+    return image if levels is None else np.asarray(cv2.LUT(image, levels[None]), np.uint8)

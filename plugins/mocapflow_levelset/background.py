@@ -18,7 +18,7 @@ from mocapflow_levelset.evidence import calmed
 from mocapflow_levelset.evolve import Rhythm, Weights
 from mocapflow_levelset.levelset import INNER_BAND_PX, PERSON
 from mocapflow_levelset.masks import counted
-from mocapflow_levelset.plates import Plate, density_image, plate_in
+from mocapflow_levelset.plates import Plate, Shadow, density_image, plate_in
 from mocapflow_levelset.shadows import ShadowAware, floor_around
 from mocapflow_levelset.statistics import Window
 from mocapflow_levelset.view import Empty, Level, Method, View, find
@@ -79,19 +79,19 @@ class BackgroundDifference(ShadowAware):
             camera: which of its views.
             hidden: (H, W) True where the picture shows nothing of the person; None: nowhere.
         """
-        plate = plate_in(background, camera, CHANNELS)
-        start = self._start(image, model, plate, floor, hidden)
+        plate, shadow = plate_in(background, camera, CHANNELS), self.shadow(image, background, camera)
+        start = self._start(image, model, plate, floor, shadow, hidden)
         view = View(image, start, start, counted(start.shape, 0, hidden), Empty({1: plate}, floor))
         against_plate = Level(1, Rhythm(REFINE_STEPS, 3, 3), Window(12.0, 8, 0.02))
         levels = [against_plate, against_plate._replace(use_plate=False)]
-        return find(view, levels, self._method(image), self.band_px).level
+        return find(view, levels, self._method(shadow), self.band_px).level
 
-    def _start(self, image: U8, model: F32, plate: Plate, floor: Bool, hidden: Bool | None) -> F32:
+    def _start(self, image: U8, model: F32, plate: Plate, floor: Bool, shadow: Shadow, hidden: Bool | None) -> F32:
         """Return a level set (H, W), not a distance: positive where the image is unlike the plate."""
         import cv2
 
         calm = features(calmed(image, self.smooth_px), CHANNELS)
-        density = density_image(calm, plate, floor, CHANNELS, self.shadow(image))
+        density = density_image(calm, plate, floor, CHANNELS, shadow)
         unknown, bounded = np.isnan(density), np.nan_to_num(np.clip(-density, -6, 6))
         change = cv2.GaussianBlur(bounded, (0, 0), self.smooth_px)
         untold = unknown if hidden is None else unknown | hidden
@@ -120,13 +120,13 @@ class BackgroundDifference(ShadowAware):
         kept: Bool = person | small[label]
         return kept
 
-    def _method(self, image: U8) -> Method:
+    def _method(self, shadow: Shadow) -> Method:
         return Method(
             channels=CHANNELS,
             weights=Weights(
                 sigma_px=1.5, length=self.length_weight, shape=0.0, clip=6.0, step=1.0, band_px=INNER_BAND_PX
             ),
-            shadow=self.shadow(image),
+            shadow=shadow,
             calm_px=self.smooth_px,
             decorrelate=False,
             stride=STRIDE,

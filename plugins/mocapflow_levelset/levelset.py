@@ -11,7 +11,7 @@ from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, Pos
 from mocapflow.assets import Background, Camera
 from mocapflow.data import Frame, FrameState, Past, Segmentation, Silhouette, Surface, Turn
 from mocapflow.geometry.silhouettes import model_distance
-from mocapflow.records import F32, U8, Bool
+from mocapflow.records import F32, Bool
 from mocapflow.scene import Scene
 from mocapflow.settings import PositiveOrInf
 from mocapflow_levelset.channels import ChannelName
@@ -19,7 +19,7 @@ from mocapflow_levelset.contact import contact_zone
 from mocapflow_levelset.evolve import Rhythm, Weights
 from mocapflow_levelset.masks import counted, without_cut
 from mocapflow_levelset.moved import moved_outline
-from mocapflow_levelset.plates import plate_in
+from mocapflow_levelset.plates import Shadow, plate_in
 from mocapflow_levelset.shadows import ShadowAware, floor_around
 from mocapflow_levelset.statistics import Window
 from mocapflow_levelset.view import Contact, Empty, Level, Matte, Method, View, find
@@ -91,7 +91,8 @@ class LevelSet(ShadowAware):
             view = self._view(frame, surface, past, scene, c, levels)
             if c in last:
                 view = view._replace(start=last[c].distance, moved=parts[c])
-            found = find(view, levels, self._method(view.image), self.band_px)
+            shadow = self.shadow(view.image, self._background(scene), c)
+            found = find(view, levels, self._method(shadow), self.band_px)
             silhouettes[c] = Silhouette(camera=c, layer=PERSON, distance=found.level)
             for term, cost in found.costs._asdict().items():
                 key = f"{scene.cameras[c].name}.{term}"
@@ -164,7 +165,7 @@ class LevelSet(ShadowAware):
     def _rhythm(self, steps: int, to_rest: bool = False) -> Rhythm:
         return Rhythm(steps, self.statistics_every, self.redistance_every, to_rest)
 
-    def _method(self, image: U8) -> Method:
+    def _method(self, shadow: Shadow) -> Method:
         return Method(
             channels=self.channels,
             weights=Weights(
@@ -176,7 +177,7 @@ class LevelSet(ShadowAware):
                 step=1.0,  # `length_weight` is stable with it
                 band_px=INNER_BAND_PX,
             ),
-            shadow=self.shadow(image),
+            shadow=shadow,
             calm_px=0.0,  # the empty scene is compared with small images alone, which are calm
             decorrelate=self.decorrelate,
             stride=self.stride_px,

@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, PositiveFloat
 
-from mocapflow.assets import Camera
+from mocapflow.assets import Background, Camera
 from mocapflow.components import Segmenter
 from mocapflow.data import Surface
 from mocapflow.geometry.cameras import project
@@ -16,7 +16,7 @@ from mocapflow.records import F64, U8, Bool
 from mocapflow_levelset.plates import Shadow
 
 CORNERS = 72
-THIN = 8  # every so many-th pixel tells whether there are colours
+THIN = 4  # every so many-th pixel tells whether there are colours
 GREY = 32  # levels between the colours of a pixel that has hardly any; skin has 60 to 100
 FEW = 0.001  # of the pixels: a lamp of the camera's own, a stamp
 REACH_M = 2.0  # from the person, where their shadow may fall
@@ -33,17 +33,24 @@ class ShadowAware(Segmenter):
     darkest_grey_shadow: Annotated[float, Field(gt=0, lt=1)] = 0.8  # the same in pictures without colours to tell it by
     shadow_chroma: PositiveFloat = USUAL.chroma  # off the plate's chromaticity, share of the range
 
-    def shadow(self, image: U8) -> Shadow:
-        """Return what counts as background in an image (H, W, 3), as it is set."""
-        darkest = max(self.darkest_shadow, self.darkest_grey_shadow) if colourless(image) else self.darkest_shadow
+    def shadow(self, image: U8, background: Background | None, camera: int) -> Shadow:
+        """Return what counts as background in an image (H, W, 3) of a camera, as it is set."""
+        grey = background is not None and _grey_room(background, camera) and colourless(image)
+        darkest = max(self.darkest_shadow, self.darkest_grey_shadow) if grey else self.darkest_shadow
         return Shadow(self.spread_floor, self.shadow_share, darkest, self.shadow_chroma)
 
 
 def colourless(image: U8) -> bool:
-    """Return whether an image (H, W, 3) is of a camera that sees no colours: even a grey room has people with skin."""
+    """Return whether an image (H, W, 3) has hardly any colours."""
     blue, green, red = np.moveaxis(image[::THIN, ::THIN], 2, 0)
     light, dark = np.maximum(np.maximum(blue, green), red), np.minimum(np.minimum(blue, green), red)
     return bool(np.mean(light - dark > GREY) < FEW)
+
+
+@memoised
+def _grey_room(background: Background, camera: int) -> bool:
+    """Return whether the empty scene has hardly any colours: then the person tells whether the camera sees any."""
+    return colourless(np.clip(np.rint(background.mean[camera]), 0, 255).astype(np.uint8))
 
 
 @memoised

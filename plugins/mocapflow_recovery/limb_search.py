@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from math import inf
@@ -29,6 +29,7 @@ from mocapflow_recovery.judge import Fit, Given, Judge, stray_of, surface_of
 from mocapflow_recovery.looks import Looks
 from mocapflow_recovery.sampling import Plan, Spread
 from mocapflow_recovery.suspicion import Signs, Suspicion, suspicion
+from mocapflow_recovery.told import untold
 
 LOG = logging.getLogger("mocapflow")
 CURED = 2.0  # times as far apart may be what is doubted no more: a leg lay where a skirt flew
@@ -106,6 +107,8 @@ class LimbSearch(Recovery):
             return noted(result, UNSEEN, doubted=True)
         if np.mean([view.known for view in seen]) < self.least_known:
             return result if past.moments else noted(result, UNKNOWN, doubted=False)
+        if not past.moments:
+            self._warn(untold(surface, seen, model.scene.body))
         stray = stray_of(surface, model.scene, seen)
         fitted, believed, body = result.state.estimate.pose, state.estimate.pose, model.scene.body
         suspected = suspicion(self.signs, stray, fitted, believed, past, body, self._density)
@@ -117,6 +120,10 @@ class LimbSearch(Recovery):
         judge = self._judge(believed, result, seen, past, model)
         looks = Looks(judge, self._plan(body), believed, fitted, self.gain, self.tolerance)
         return self._searched(frame.index, judge.of(result), looks, suspected, settle)
+
+    def _warn(self, limbs: Mapping[str, float]) -> None:
+        for joint, share in limbs.items():
+            LOG.warning(f"from {joint} on {share:.0%} of the person differ from the room: lost, it may not be missed")
 
     def views(self, frame: Frame, surface: Surface, past: Past, scene: Scene) -> list[View]:
         """Return what the views of a frame surely show around a surface, in a scene whose empty room is known."""

@@ -12,123 +12,148 @@ from pydantic import Field
 
 from mocapflow.components import Stage
 from mocapflow.data import Frame
-from mocapflow.io.lenses import View, toned
+from mocapflow.errors import PipelineError
+from mocapflow.io.lenses import View, with_levels
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64, U8
 
 LOG = logging.getLogger("mocapflow")
 Factor = Annotated[float, Field(ge=1)]
 
-BRIGHT = 95  # % of the pixels that are darker than what counts as the bright parts of a picture
-PIXELS = 40  # of a row that are looked at, and as many of a column of that height
 FIRST = 10  # frames of the videos that tell how a camera is set, whichever frames a run has
-LIT = 30  # grey levels; darker pixels don't tell by how much a picture is brighter than another
-LEAST = 0.1  # share of the pixels that have to tell
-WHITE = 0.1  # share of pictures in which a colour is at the end of its range, from which on a camera is overexposed
-ALIKE = 0.05  # median share by which factors of pixels may differ: those of one room differ by 0.01
+BRIGHT, BRIGHTEST = 95, 99.5  # % of the pixels that are darker than the bright parts of a picture, than nearly all
+STEP = 8  # px between the pixels that tell of a picture's levels
+WHITE = 0.1  # share of the pixels with a colour at the end of its range, from which on a camera is overexposed
+ACROSS = 40  # blocks of a picture, whose brightness is compared: a pixel alone is noisy
+DARK = 30  # grey levels; darker blocks don't tell by how much a picture is brighter than another
+TELLING = 0.1  # share of the blocks that have to tell
+ALIKE = 0.05  # median share by which the factors of blocks may differ: those of one room differ by 0.01
 
 
 class Exposure(Stage):
-    """Corrects cameras that are set badly, and those whose brightness changes.
+    """Corrects cameras that are set badly, and pictures that are not as bright as others of their camera.
 
     What tells a person from the room is said in shares of the range of grey levels, as well exposed pictures use it.
-    So the frames and plates of a camera that shows all too dark or in one colour are brightened, all by the same
-    factors; well set ones stay as they are. A frame that is brighter or darker than the first ones all over, for the
-    sun comes out or a camera sets itself, becomes as bright as they.
+    So frames and plates of a camera that shows all too dark, or in one colour, have their levels multiplied, of each
+    colour by one factor in all pictures, so far as the brightest parts allow; of other cameras they stay. A frame that
+    is brighter or darker all over than the first ones, for the sun comes out or a camera sets itself, becomes as
+    bright as they. It has to stand before all stages that change pictures.
     """
 
     name: ClassVar[str] = "exposure"
     bright: Annotated[float, Field(gt=0, le=255)] = 215.0  # grey level that the bright parts of a picture should have
-    darker: Factor = 1.25  # than that by this factor, and the camera is set too dark
-    cast: Factor = 2.0  # ratio of the brightest to the darkest of the colours from which on a picture is tinged
-    most: Factor = 5.0  # factor of grey levels at most: more shows noise
-    steady: Annotated[float, Field(ge=0, lt=1)] = 0.02  # change of brightness, as a share, that frames may keep
+    least_gain: Factor = 1.25  # factor of grey levels below which they stay
+    most_gain: Factor = 5.0  # factor at most: more shows noise
+    tinged: Factor = (
+        2.0  # ratio of the brightest to the darkest colour of the bright parts, from which on it is a tinge
+    )
+    tolerance: Annotated[float, Field(ge=0, lt=1)] = 0.02  # share by which a frame may be brighter or darker
 
     def run(self, recording: Recording) -> Recording:
-        """Return the recording as it looks corrected."""
-        beginning = replace(recording, indices=recording.indices[:FIRST]).frames()
-        cameras = list(zip(*(map(thinned, frame.images) for frame in beginning), strict=True))
-        views = tuple(map(self._corrected, recording.views, cameras))
-        first = {view.lens.name: toned(lit(images), view.tone) for view, images in zip(views, cameras, strict=True)}
-        return replace(recording, views=views, changes=(*recording.changes, Steadied(self.steady, first)))
+        """Return the recording as it looks corrected.
 
-    def _corrected(self, view: View, images: Sequence[U8]) -> View:
-        """Return the view of a camera that is set right, and warn of what was wrong."""
-        name, white = view.lens.name, np.mean([(image == 255).any(axis=2).mean() for image in images])
+        Raises:
+            PipelineError: a stage before changes pictures.
+        """
+        if recording.changes:
+            hint = "put it before the stages that change pictures, as `corrupt` and `denoise` do"
+            raise PipelineError("the stage 'exposure' sets cameras right, and pictures were changed already", hint=hint)
+        usual = typical(recording)
+        views = tuple(self._corrected(view, usual.get(view.lens.name)) for view in recording.views)
+        levels = {view.lens.name: view.levels for view in views}
+        shown = {name: blocks(with_levels(image, levels[name])) for name, image in usual.items()}
+        return replace(recording, views=views, changes=(Steadied(self.tolerance, shown),))
+
+    def _corrected(self, view: View, image: U8 | None) -> View:
+        """Return the view of a camera set right by a picture (H, W, 3) of it, if any, and warn of what was wrong."""
+        if image is None:
+            return view
+        name, pixels = view.lens.name, image[::STEP, ::STEP]
+        white = float((pixels == 255).any(axis=2).mean())
         if white > WHITE:
-            LOG.warning(f"{name} is overexposed, {white:.0%} of its pictures: a shadow there may pass for the person")
-        gains = self.gains(np.max([brightness(image) for image in images], axis=0))
+            LOG.warning(f"{name} is overexposed, {white:.0%} of its picture: a shadow there may pass for the person")
+        gains = self.gains(*np.percentile(pixels, (BRIGHT, BRIGHTEST), axis=(0, 1)))
         if gains is None:
             return view
         blue, green, red = gains
         LOG.warning(
             f"{name} is too dark or tinged: blue {blue:.2g}, green {green:.2g}, red {red:.2g} times as bright now"
         )
-        return replace(view, tone=table(gains))
+        return replace(view, levels=multiplied(gains))
 
-    def gains(self, bright: F64) -> F64 | None:
-        """Return the factors (3,) for a camera whose bright parts have these grey levels (3,), None for a good one."""
-        most = bright.max()
-        tinged = most > self.cast * bright.min()
-        if most * self.darker > self.bright and not tinged:
-            return None
-        gain = self.bright / np.maximum(bright if tinged else most, 1)
-        return np.broadcast_to(np.minimum(gain, self.most), 3)
+    def gains(self, bright: F64, brightest: F64) -> F64 | None:
+        """Return factors (3,) of the levels of the colours, None where they stay.
+
+        Args:
+            bright: (3,) grey levels of the bright parts, by colour.
+            brightest: (3,) those that hardly any pixel exceeds: they stay within the range.
+        """
+        is_tinged = bright.max() > self.tinged * bright.min()
+        wanted = self.bright / np.maximum(bright if is_tinged else np.full(3, bright.max()), 1)
+        room = 255 / np.maximum(brightest if is_tinged else np.full(3, brightest.max()), 1)
+        gains = np.clip(np.minimum(wanted, room), 1, self.most_gain)
+        return gains if gains.max() >= self.least_gain else None
 
 
 @dataclass(frozen=True)
 class Steadied:
-    """Frames as bright, in each colour, as a first one, of which some pixels (h, w, 3) are known."""
+    """Frames as bright, in each colour, as a typical one of their camera."""
 
-    steady: float  # share by which they may differ
-    first: Mapping[str, U8]  # by camera
+    tolerance: float  # share by which they may differ
+    typical: Mapping[str, U8]  # blocks (h, w, 3) of that picture, by camera
 
     def frames(self, source: Recording, indices: range) -> Iterator[Frame]:
         """Yield the steadied frames."""
-        first = [self.first[view.lens.name] for view in source.views]
+        typical = [self.typical.get(view.lens.name) for view in source.views]
         for frame in replace(source, indices=indices).frames():
-            images = (self.image(image, thin) for image, thin in zip(frame.images, first, strict=True))
+            images = (self.image(image, usual) for image, usual in zip(frame.images, typical, strict=True))
             yield replace(frame, images=tuple(images))
 
-    def image(self, image: U8, first: U8) -> U8:
-        """Return an image (H, W, 3) as bright as the first one; one of another room, or black, stays."""
-        gain = brighter(thinned(image), first)
-        if gain is None or np.all(np.abs(gain - 1) <= self.steady):
+    def image(self, image: U8, typical: U8 | None) -> U8:
+        """Return an image (H, W, 3) as bright as a typical one, if that is known and of the same room."""
+        gain = None if typical is None else brighter(blocks(image), typical)
+        if gain is None or np.all(np.abs(gain - 1) <= self.tolerance):
             return image
-        return toned(image, table(1 / gain))
+        return with_levels(image, multiplied(1 / gain))
 
 
-def brighter(image: U8, first: U8) -> F64 | None:
-    """Return by which factors (3,) an image (h, w, 3) is brighter than another, by most of it; None: nobody can tell.
+def typical(recording: Recording) -> dict[str, U8]:
+    """Return, by camera, the picture (H, W, 3) of median brightness of those first ones that show anything."""
+    first = replace(recording, indices=range(min(FIRST, recording.length)))
+    shown: dict[str, list[U8]] = {}
+    for frame in first.frames():
+        for camera in np.flatnonzero(frame.usable):
+            if frame.images[camera].max() >= DARK:
+                shown.setdefault(recording.views[camera].lens.name, []).append(frame.images[camera])
+    return {name: _median(images) for name, images in shown.items()}
 
-    Nobody can of black pictures, nor of those of different rooms, whose factors differ from pixel to pixel.
+
+def _median(images: Sequence[U8]) -> U8:
+    return sorted(images, key=lambda image: float(image[::STEP, ::STEP].mean()))[len(images) // 2]
+
+
+def brighter(image: U8, typical: U8) -> F64 | None:
+    """Return by which factors (3,) the blocks (h, w, 3) of a picture are brighter, most of them; None: nobody can tell.
+
+    Nobody can of black pictures, nor of those of different rooms, whose factors differ from block to block.
     """
-    told = ((np.minimum(image, first) >= LIT) & (np.maximum(image, first) < 255)).all(axis=2)
-    if told.mean() < LEAST:
+    told = ((np.minimum(image, typical) >= DARK) & (np.maximum(image, typical) < 255)).all(axis=2)
+    if told.mean() < TELLING:
         return None
-    factors = image[told] / first[told].astype(float)
+    factors = image[told] / typical[told].astype(float)
     gain = np.median(factors, axis=0)
     alike = np.median(np.abs(factors / gain - 1), axis=0).max() < ALIKE
     return np.asarray(gain, float) if alike else None
 
 
-def lit(images: Sequence[U8]) -> U8:
-    """Return the first of some pictures (H, W, 3) that is no black one."""
-    means = np.array([image.mean() for image in images])
-    return images[int(np.argmax(means >= 0.5 * means.max()))]
+def multiplied(gains: F64) -> U8:
+    """Return what grey levels become (256, 3), each colour multiplied by its factor (3,)."""
+    return np.clip(np.rint(np.arange(256)[:, None] * gains), 0, 255).astype(np.uint8)
 
 
-def brightness(image: U8) -> F64:
-    """Return the grey levels (3,) of the bright parts of an image (H, W, 3), colour by colour."""
-    return np.asarray(np.percentile(image, BRIGHT, axis=(0, 1)), float)
+def blocks(image: U8) -> U8:
+    """Return the mean colours (h, w, 3) of the square blocks of an image (H, W, 3), `ACROSS` of them side by side."""
+    import cv2
 
-
-def table(gain: F64) -> U8:
-    """Return what grey levels become (256, 3), brightened by factors (3,)."""
-    return np.clip(np.rint(np.arange(256)[:, None] * gain), 0, 255).astype(np.uint8)
-
-
-def thinned(image: U8) -> U8:
-    """Return every so many-th pixel (h, w, 3) of an image (H, W, 3)."""
-    step = max(image.shape[1] // PIXELS, 1)
-    return np.ascontiguousarray(image[::step, ::step])
+    height = max(round(ACROSS * image.shape[0] / image.shape[1]), 1)
+    return np.asarray(cv2.resize(image, (ACROSS, height), interpolation=cv2.INTER_AREA), np.uint8)

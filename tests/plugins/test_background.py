@@ -7,7 +7,7 @@ import pytest
 from mocapflow_bodies.scanned import Scanned
 from mocapflow_fitting.start_from_file import StartFromFile
 from mocapflow_levelset.background import BackgroundDifference
-from mocapflow_levelset.plates import plate_in
+from mocapflow_levelset.plates import Shadow, plate_in
 from mocapflow_levelset.shadows import colourless, floor_around
 from mocapflow_sequence.background import EmptyScene
 from mocapflow_sequence.colours import more_common
@@ -109,7 +109,8 @@ def test_where_nobody_knows_the_room_the_model_tells():
     background.spread[0].flags.writeable = True
     background.spread[0][:, :101] = np.inf
     moved = np.roll(model(), -6, axis=1)  # off by 6 px
-    start = BackgroundDifference()._start(picture(1.0), moved, plate_in(background, 0, ("lab",)), FLOOR, None) > 0
+    plate = plate_in(background, 0, ("lab",))
+    start = BackgroundDifference()._start(picture(1.0), moved, plate, FLOOR, Shadow(), None) > 0
     np.testing.assert_array_equal(start[:, :95], moved[:, :95] > 0)
     assert (start[:, 106:] == (person() > 0)[:, 106:]).mean() > 0.99
 
@@ -333,6 +334,21 @@ def test_without_colours_only_a_light_shadow_is_one(light, found):
     assert share > 0.95 if found else share < 0.05
     told = BackgroundDifference(darkest_grey_shadow=0.5).find(image, nowhere, FLOOR, background, 0) > 0
     assert told[person() > 0].mean() < 0.05
+
+
+def test_a_grey_room_may_be_seen_in_colour():
+    """Then a shadow may be dark, for the person's skin tells that there are colours."""
+    grey = np.full((*SHAPE, 3), 120, np.uint8)
+    somebody = grey.copy()
+    somebody[20:60, 80:110] = (90, 110, 170)
+    background = Background(mean=(grey.astype(np.float32),), spread=(np.full(grey.shape, 3, np.float32),))
+    segmenter = BackgroundDifference()
+    darkest = {
+        name: segmenter.shadow(image, background, 0).darkest
+        for name, image in {"grey": grey, "coloured": somebody}.items()
+    }
+    assert darkest == {"grey": segmenter.darkest_grey_shadow, "coloured": segmenter.darkest_shadow}
+    assert segmenter.shadow(grey, known(), 0).darkest == segmenter.darkest_shadow  # its room has colours
 
 
 def test_a_camera_sees_colours_if_some_pixels_have_one():

@@ -1,15 +1,22 @@
-"""Cameras that are too dark or tinged are set right, frames and plates alike, and so are frames that grow darker."""
+"""Cameras that are too dark or tinged are set right, frames and plates alike, and so are frames that are darker."""
+
+from dataclasses import replace
 
 import cv2
 import numpy as np
 import pytest
-from mocapflow_robustness.exposure import Exposure, brighter, brightness, thinned
+from mocapflow_robustness.corrupt import Corrupt
+from mocapflow_robustness.exposure import STEP, Exposure, brighter
 
+from mocapflow.errors import PipelineError
 from mocapflow.help.shipped import shipped
 from mocapflow.recordings.recording import Recording, open_recording
 
 DEMO = shipped("examples", "data", "skirt_steps")
-SHADE = np.random.default_rng(0).uniform(60, 180, (50, 40, 1)) * [0.8, 1, 1.1]  # of a room
+CAMERAS = ("cam01", "cam02", "cam03", "cam04")
+WARM = (0.5, 0.85, 1.1)
+SHADE = np.random.default_rng(0).uniform(60, 180, (50, 40, 1)) * [0.8, 1, 1.1]  # blocks of a room
+FRAMES = 12
 
 
 def times(image, factor):
@@ -18,21 +25,28 @@ def times(image, factor):
 
 @pytest.fixture
 def filmed(tmp_path):
-    """Three frames of the demo as cameras have them whose grey levels are multiplied, in each frame and on plates."""
+    """The beginning of the demo as cameras have it whose levels are multiplied: in each frame, and on the plate."""
 
-    def film(factors, plates) -> Recording:
+    def film(plates=None, **factors) -> Recording:
         (tmp_path / "cameras.toml").write_text((DEMO / "cameras.toml").read_text())
         (tmp_path / "background").mkdir()
-        for view, (camera, factor) in enumerate(plates.items()):
+        frames = list(open_recording(DEMO, stop=FRAMES).frames())
+        for number, camera in enumerate(CAMERAS):
             (tmp_path / "videos" / camera).mkdir(parents=True)
             plate = cv2.imread(str(DEMO / "background" / f"{camera}.png"))
-            cv2.imwrite(str(tmp_path / "background" / f"{camera}.png"), times(plate, factor))
-            for frame in open_recording(DEMO, stop=3).frames():
-                picture = times(frame.images[view], factors[camera][frame.index])
-                cv2.imwrite(str(tmp_path / "videos" / camera / f"{frame.index}.png"), picture)
+            cv2.imwrite(str(tmp_path / "background" / f"{camera}.png"), times(plate, (plates or {}).get(camera, 1)))
+            for frame, factor in zip(frames, factors.get(camera, [1] * FRAMES), strict=True):
+                if factor is not None:  # a frame that is missing
+                    picture = times(frame.images[number], factor)
+                    cv2.imwrite(str(tmp_path / "videos" / camera / f"{frame.index:02}.png"), picture)
         return open_recording(tmp_path)
 
     return film
+
+
+@pytest.fixture
+def true():
+    return open_recording(DEMO)
 
 
 def off(one, other):
@@ -40,85 +54,115 @@ def off(one, other):
     return float(np.median(np.abs(one.astype(float) - other)))
 
 
-def test_a_dark_camera_is_brightened_with_its_plate_and_no_other(filmed, caplog):
-    """One was stopped down; one begins with a black picture."""
-    always, once = [1.0] * 3, [0, 1, 1]
-    dim = filmed(
-        {"cam01": always, "cam02": [0.4] * 3, "cam03": once, "cam04": always},
-        {"cam01": 1, "cam02": 0.4, "cam03": 1, "cam04": 1},
-    )
-    true, brightened = open_recording(DEMO), Exposure().run(dim)
-    assert [view.tone is None for view in brightened.views] == [True, False, True, True]
+def test_a_dark_camera_is_brightened_with_its_plate_and_no_other(filmed, true, caplog):
+    dim = filmed(plates={"cam02": 0.4}, cam02=[0.4] * FRAMES)
+    brightened = Exposure().run(dim)
+    assert [view.levels is None for view in brightened.views] == [True, False, True, True]
     assert [said.getMessage()[:20] for said in caplog.records] == ["cam02 is too dark or"]
     seen = brightened.frame(2).images[1]
-    assert brightness(seen).max() == pytest.approx(Exposure().bright, abs=2)
     assert off(seen, true.frame(2).images[1]) < 5
     assert off(dim.frame(2).images[1], true.frame(2).images[1]) > 50
     assert off(brightened.background().mean[1], true.background().mean[1]) < 5
+    np.testing.assert_array_equal(brightened.seen_by(1).frame(2).images[0], seen)
 
 
-def test_a_tinged_camera_shows_white_as_white(filmed):
-    warm = (0.5, 0.85, 1.1)
-    cameras = ("cam01", "cam02", "cam03", "cam04")
-    tinged = filmed(dict.fromkeys(cameras, [warm] * 3), dict.fromkeys(cameras, warm))
-    for picture in Exposure().run(tinged).frame(0).images:
-        np.testing.assert_allclose(brightness(picture), Exposure().bright, atol=3)
+def test_a_tinged_camera_shows_white_nearly_as_white(filmed):
+    tinged = filmed(plates=dict.fromkeys(CAMERAS, WARM), **dict.fromkeys(CAMERAS, [WARM] * FRAMES))
+    for before, after in zip(tinged.frame(0).images, Exposure().run(tinged).frame(0).images, strict=True):
+        was, bright = (np.percentile(picture[::STEP, ::STEP], 95, axis=(0, 1)) for picture in (before, after))
+        assert was.max() > 3 * was.min()
+        assert bright.max() < 1.4 * bright.min()
 
 
 def test_an_overexposed_camera_is_told(filmed, caplog):
-    always = [1.0] * 3
-    filmed_so = filmed(
-        {"cam01": always, "cam02": [1.5] * 3, "cam03": always, "cam04": always},
-        {"cam01": 1, "cam02": 1.5, "cam03": 1, "cam04": 1},
-    )
-    assert Exposure().run(filmed_so).views[1].tone is None
+    assert Exposure().run(filmed(cam02=[1.5] * FRAMES)).views[1].levels is None
     assert [said.getMessage()[:20] for said in caplog.records] == ["cam02 is overexposed"]
 
 
-def test_frames_that_grow_darker_are_as_bright_as_the_first(filmed):
-    """In one of them by cloud, in one by the camera's own will; one shows nothing in the last frame."""
-    always, cloud = [1.0] * 3, [1, 0.95, 0.8]
-    dim = filmed(
-        {"cam01": cloud, "cam02": [1, 1.1, 1.2], "cam03": [1, 1, 0], "cam04": always},
-        dict.fromkeys(("cam01", "cam02", "cam03", "cam04"), 1),
-    )
-    true, steady = open_recording(DEMO).frame(2).images, Exposure().run(dim).frame(2).images
-    filmed_so = dim.frame(2).images
+def test_frames_that_grow_darker_are_as_bright_as_usual(filmed, true):
+    """In one camera by cloud, in one by its own will; one shows nothing in the last frame."""
+    usual = [1.0] * (FRAMES - 1)
+    changing = filmed(cam01=[*usual, 0.8], cam02=[*usual, 1.2], cam03=[*usual, 0])
+    last = FRAMES - 1
+    expected, steady, seen = (each.frame(last).images for each in (true, Exposure().run(changing), changing))
     for view in (0, 1):
-        assert off(steady[view], true[view]) <= 1
-        assert off(filmed_so[view], true[view]) > 20
+        assert off(steady[view], expected[view]) <= 1
+        assert off(seen[view], expected[view]) > 20
     assert not steady[2].any()
-    np.testing.assert_array_equal(steady[3], filmed_so[3])
+    np.testing.assert_array_equal(steady[3], seen[3])
 
 
-def test_a_recording_that_is_well_exposed_stays_as_it_is():
-    recording = open_recording(DEMO)
-    same = Exposure().run(recording)
-    assert all(view.tone is None for view in same.views)
-    for before, after in zip(recording.frame(30).images, same.frame(30).images, strict=True):
+@pytest.mark.parametrize("odd", [0.6, 20.0, 0.0, None], ids=["dark", "white", "black", "missing"])
+def test_an_odd_first_frame_does_not_tell_how_a_camera_is_set(filmed, true, odd):
+    """It is brought to the others, or stays; the others stay."""
+    recording = filmed(cam01=[odd, *[1] * (FRAMES - 1)])
+    corrected = Exposure().run(recording)
+    assert corrected.views[0].levels is None
+    np.testing.assert_array_equal(corrected.frame(5).images[0], recording.frame(5).images[0])
+    if odd == 0.6:
+        assert off(corrected.frame(0).images[0], true.frame(0).images[0]) <= 1
+    else:
+        np.testing.assert_array_equal(corrected.frame(0).images[0], recording.frame(0).images[0])
+
+
+@pytest.mark.parametrize("lost", [0.0, None], ids=["black", "missing"])
+def test_a_camera_that_shows_nothing_for_long_stays_as_it_is(filmed, lost):
+    recording = filmed(cam01=[*[lost] * 10, 1, 1])
+    corrected = Exposure().run(recording)
+    assert corrected.views[0].levels is None
+    np.testing.assert_array_equal(corrected.frame(11).images[0], recording.frame(11).images[0])
+
+
+def test_a_recording_that_is_well_exposed_stays_as_it_is(true):
+    same = Exposure().run(true)
+    assert all(view.levels is None for view in same.views)
+    for before, after in zip(true.frame(30).images, same.frame(30).images, strict=True):
         np.testing.assert_array_equal(before, after)
 
 
-def test_how_much_brighter_is_told_by_most_of_a_room_and_not_of_another_room():
-    room = times(SHADE, 1)
-    dim = times(room, [0.7, 0.8, 0.9])
+def test_the_first_frames_of_the_videos_tell_wherever_a_run_begins(filmed):
+    dim = filmed(cam01=[0.4] * FRAMES)
+    late = replace(dim, indices=dim.indices[10:])
+    one, other = (Exposure().run(recording).views[0].levels for recording in (dim, late))
+    np.testing.assert_array_equal(one, other)
+
+
+def test_it_stands_before_what_changes_pictures(true):
+    with pytest.raises(PipelineError, match="changed already"):
+        Exposure().run(Corrupt(noise=0.5).run(true))
+
+
+@pytest.mark.parametrize("noise", [0, 8])
+def test_how_much_brighter_is_told_by_most_of_a_room(noise):
+    """Noise of pixels; that of blocks of 8 x 8 is an eighth of it."""
+    room, dim = times(SHADE, 1), SHADE * [0.7, 0.8, 0.9]
     dim[10:30, 5:20] = (20, 200, 40)  # somebody
-    np.testing.assert_allclose(brighter(dim, room), [0.7, 0.8, 0.9], atol=0.01)
-    assert brighter(times(room[::-1], 1), room) is None
+    noisy = dim + np.random.default_rng(1).normal(0, noise / 8, dim.shape)
+    np.testing.assert_allclose(brighter(times(noisy, 1), room), [0.7, 0.8, 0.9], atol=0.01)
+
+
+def test_how_much_brighter_nobody_can_tell_of_another_room_or_a_black_one():
+    room = times(SHADE, 1)
+    assert brighter(room[::-1], room) is None
     assert brighter(times(room, 0.1), room) is None
-    assert brighter(thinned(np.zeros((400, 320, 3), np.uint8)), thinned(np.zeros((400, 320, 3), np.uint8))) is None
+    assert brighter(room * np.uint8(0), room * np.uint8(0)) is None
 
 
 @pytest.mark.parametrize(
-    ("bright", "gain"),
+    ("bright", "brightest", "gains"),
     [
-        ((180, 200, 210), None),  # well set
-        ((110, 150, 180), None),  # warm light, as many a room has
-        ((60, 80, 100), (2, 2, 2)),
-        ((20, 20, 20), (4, 4, 4)),  # no more
-        ((80, 150, 200), (2.5, 200 / 150, 1)),  # tinged
+        ((180, 200, 210), (220, 230, 240), None),  # well set
+        ((110, 150, 180), (150, 190, 220), None),  # warm light, as many a room has
+        ((60, 80, 100), (70, 90, 120), (2, 2, 2)),
+        ((20, 20, 20), (30, 30, 30), (4, 4, 4)),  # no more
+        ((20, 20, 20), (60, 150, 170), (1.5, 1.5, 1.5)),  # no more: somebody who is lit in a dark room
+        ((20, 20, 20), (100, 200, 250), None),  # well lit
+        ((80, 150, 200), (100, 160, 210), (2.5, 200 / 150, 1)),  # tinged
+        ((60, 180, 60), (230, 250, 240), None),  # a green room, in which somebody wears all colours
     ],
 )
-def test_gains(bright, gain):
-    found = Exposure(bright=200, darker=1.25, most=4).gains(np.array(bright, float))
-    assert found is None if gain is None else found == pytest.approx(gain)
+def test_gains(bright, brightest, gains):
+    found = Exposure(bright=200, least_gain=1.25, most_gain=4).gains(
+        np.array(bright, float), np.array(brightest, float)
+    )
+    assert found is None if gains is None else found == pytest.approx(gains)

@@ -10,7 +10,7 @@ from mocapflow_levelset.layered import Layered
 from mocapflow_levelset.levelset import LevelSet
 from mocapflow_levelset.masks import counted, without_cut
 from mocapflow_levelset.moved import moved_outline
-from mocapflow_levelset.plates import plate_of
+from mocapflow_levelset.plates import Shadow, plate_of
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.view import Empty, View, find
 
@@ -143,7 +143,7 @@ def test_a_part_says_what_it_costs_more_than_the_start():
     moved[60:100, 44] = True
     levels, method, view = (
         segmenter._levels(warm=False),
-        segmenter._method(image),
+        segmenter._method(Shadow()),
         View(image, start, start, counted(start.shape, 3)),
     )
     part, whole = (find(each, levels, method, 12.0) for each in (view._replace(moved=moved), view))
@@ -227,7 +227,7 @@ def test_the_contour_is_sub_pixel():
     for scene in (Empty(plates, np.ones((160, 160), bool)), None):
         segmenter = LevelSet(shape_weight=0.0)
         view = View(image, start, start, counted(start.shape, 3), scene)
-        found = find(view, segmenter._levels(warm=False), segmenter._method(image), 12.0).level
+        found = find(view, segmenter._levels(warm=False), segmenter._method(Shadow()), 12.0).level
         at = np.abs(found) < 0.7
         assert abs((found - exact)[at].mean()) < 0.15
         assert np.abs((found - exact)[at]).mean() < 0.35
@@ -274,7 +274,7 @@ def test_the_start_may_touch_the_image_border():
     image = np.random.default_rng(0).integers(0, 256, (160, 160, 3), dtype=np.uint8)
     segmenter = LevelSet()
     view = View(image, start, start, counted(start.shape, 3))
-    found = find(view, segmenter._levels(warm=False), segmenter._method(image), 12.0)
+    found = find(view, segmenter._levels(warm=False), segmenter._method(Shadow()), 12.0)
     assert np.isfinite(found.level).all() and found.level.shape == start.shape
 
 

@@ -1,0 +1,46 @@
+"""Which limbs hardly differ from the room behind them: lost, they are not missed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mocapflow.assets import Body
+from mocapflow.data import Surface
+from mocapflow.geometry.cameras import project
+from mocapflow.geometry.kinematics import descendants
+from mocapflow.records import Bool
+from mocapflow_recovery.certain import View
+
+BEGIN = ("knee", "elbow")  # joints that limbs begin at, on either side
+LEAST = 0.1  # share of a limb that has to be told; good pictures tell 0.2 to 0.7 of a shank and foot
+
+
+def untold(surface: Surface, seen: Sequence[View], body: Body) -> dict[str, float]:
+    """Return the joints from which on a limb looks like the room, each with the share that differs, in all views.
+
+    Args:
+        surface: the person as fitted.
+        seen: what the views surely show.
+        body: whose vertices come first in the surface.
+    """
+    person = np.mean([_on_person(surface, view)[: len(body.vertices)] for view in seen], axis=0)
+    below = descendants(body.parents)
+    limbs = {name: below[joint][body.main_joint] for joint, name in enumerate(body.joint_names) if _begins(name)}
+    shares = {name: float(person[limb].mean()) for name, limb in limbs.items() if limb.any()}
+    return {name: share for name, share in shares.items() if share < LEAST}
+
+
+def _begins(name: str) -> bool:
+    return name.rpartition("_")[0] in BEGIN
+
+
+def _on_person(surface: Surface, view: View) -> Bool:
+    """Return which vertices (V,) lie where a view surely shows the person; none does beyond its edges."""
+    pixels, on_it = project(surface.vertices, view.camera), np.zeros(len(surface.vertices), bool)
+    size = np.array(view.person.shape[::-1])
+    inside = np.isfinite(pixels).all(axis=1) & (pixels > -0.5).all(axis=1) & (pixels < size - 0.5).all(axis=1)
+    column, row = np.rint(pixels[inside]).astype(int).T
+    on_it[inside] = view.person[row, column]
+    return on_it

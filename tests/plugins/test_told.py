@@ -1,0 +1,50 @@
+"""A limb that looks like the room is told, for nobody would miss it."""
+
+from dataclasses import replace
+
+import numpy as np
+from mocapflow_recovery.certain import small_room, views
+from mocapflow_recovery.limb_search import LimbSearch
+from mocapflow_recovery.told import untold
+
+from mocapflow.data import NO_CLOTH
+from mocapflow.geometry.cameras import project
+from mocapflow.testing import pictures, recovery, scenes
+
+SCENE = scenes.tiny_scene()
+POSE = scenes.tiny_pose(SCENE, 3, 0.1)
+FRAME = pictures.tiny_frame(SCENE, POSE)
+SURFACE = SCENE.surface(POSE, NO_CLOTH)
+
+
+def without_feet():
+    """Return the frame as if below the knees there were only the room."""
+    knee = SURFACE.vertices[SCENE.body.main_joint == SCENE.body.joint("knee_l")][:, 2].max()
+    top = np.array([[*SURFACE.vertices[:, :2].mean(axis=0), knee]])
+    images = []
+    for image, room, camera in zip(FRAME.images, SCENE.background.mean, SCENE.cameras, strict=True):
+        row = max(int(project(top, camera)[0, 1]) - 12, 0)
+        images.append(np.vstack([image[:row], room[row:].astype(np.uint8)]))
+    return replace(FRAME, images=tuple(images))
+
+
+def seen(frame):
+    return views(frame, SURFACE, small_room(SCENE.background, SCENE.cameras, 120), 0.35)
+
+
+def test_limbs_that_differ_from_the_room_are_not_told():
+    assert untold(SURFACE, seen(FRAME), SCENE.body) == {}
+
+
+def test_limbs_that_look_like_the_room_are():
+    told = untold(SURFACE, seen(without_feet()), SCENE.body)
+    assert set(told) == {name for name in SCENE.body.joint_names if name.startswith("knee")}
+    assert max(told.values()) < 0.1
+
+
+def test_the_search_warns_of_them_in_the_first_frame(caplog):
+    state = pictures.tiny_state(SCENE, POSE, POSE)
+    fitted, past = recovery.settled(state, scene=SCENE), replace(scenes.tiny_past(SCENE, POSE), moments=())
+    search = LimbSearch(beginnings=False, uncovered_cm2=1e6, floating_cm2=1e6)
+    search.recover(without_feet(), state, fitted, past, scenes.tiny_model(SCENE), lambda *_: fitted)
+    assert any("from knee_l on" in said.getMessage() for said in caplog.records)
