@@ -1,7 +1,7 @@
 """The same person and motion, filmed otherwise: what a tracker makes of both must be the same.
 
-`python benchmarks/filmed_otherwise.py RECORDING OUT KIND…` writes a recording OUT/KIND for each of KINDS. Pictures are
-written without loss.
+`python benchmarks/filmed_otherwise.py RECORDING OUT KIND…` writes a recording OUT/KIND for each of KINDS. It takes
+recordings whose lenses do not bend, with one plate a camera, as the demo clips are; pictures are written without loss.
 """
 
 from __future__ import annotations

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
 
 from mocapflow.components import Stage
-from mocapflow.data import Frame
 from mocapflow.errors import PipelineError
 from mocapflow.io.lenses import View, with_levels
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64, U8
+from mocapflow_robustness.steadying import Steadied, blocks, multiplied
 
 LOG = logging.getLogger("mocapflow")
 Factor = Annotated[float, Field(ge=1)]
@@ -24,10 +24,7 @@ FIRST = 10  # frames of the videos that tell how a camera is set, whichever fram
 BRIGHT, BRIGHTEST = 95, 99.5  # % of the pixels that are darker than the bright parts of a picture, than nearly all
 STEP = 8  # px between the pixels that tell of a picture's levels
 WHITE = 0.1  # share of the pixels with a colour at the end of its range, from which on a camera is overexposed
-ACROSS = 40  # blocks of a picture, whose brightness is compared: a pixel alone is noisy
-DARK = 30  # grey levels; darker blocks don't tell by how much a picture is brighter than another
-TELLING = 0.1  # share of the blocks that have to tell
-ALIKE = 0.05  # median share by which the factors of blocks may differ: those of one room differ by 0.01
+BLACK = 30  # grey levels that nothing in a picture exceeds that shows nothing
 
 
 class Exposure(Stage):
@@ -44,9 +41,7 @@ class Exposure(Stage):
     bright: Annotated[float, Field(gt=0, le=255)] = 215.0  # grey level that the bright parts of a picture should have
     least_gain: Factor = 1.25  # factor of grey levels below which they stay
     most_gain: Factor = 5.0  # factor at most: more shows noise
-    tinged: Factor = (
-        2.0  # ratio of the brightest to the darkest colour of the bright parts, from which on it is a tinge
-    )
+    tinged: Factor = 2.0  # ratio of the brightest to the darkest colour of the bright parts: more is a tinge
     tolerance: Annotated[float, Field(ge=0, lt=1)] = 0.02  # share by which a frame may be brighter or darker
 
     def run(self, recording: Recording) -> Recording:
@@ -88,33 +83,11 @@ class Exposure(Stage):
             bright: (3,) grey levels of the bright parts, by colour.
             brightest: (3,) those that hardly any pixel exceeds: they stay within the range.
         """
-        is_tinged = bright.max() > self.tinged * bright.min()
-        wanted = self.bright / np.maximum(bright if is_tinged else np.full(3, bright.max()), 1)
-        room = 255 / np.maximum(brightest if is_tinged else np.full(3, brightest.max()), 1)
-        gains = np.clip(np.minimum(wanted, room), 1, self.most_gain)
+        if bright.max() <= self.tinged * bright.min():
+            bright, brightest = np.full(3, bright.max()), np.full(3, brightest.max())
+        gains = np.minimum(self.bright / np.maximum(bright, 1), 255 / np.maximum(brightest, 1))
+        gains = np.clip(gains, 1, self.most_gain)
         return gains if gains.max() >= self.least_gain else None
-
-
-@dataclass(frozen=True)
-class Steadied:
-    """Frames as bright, in each colour, as a typical one of their camera."""
-
-    tolerance: float  # share by which they may differ
-    typical: Mapping[str, U8]  # blocks (h, w, 3) of that picture, by camera
-
-    def frames(self, source: Recording, indices: range) -> Iterator[Frame]:
-        """Yield the steadied frames."""
-        typical = [self.typical.get(view.lens.name) for view in source.views]
-        for frame in replace(source, indices=indices).frames():
-            images = (self.image(image, usual) for image, usual in zip(frame.images, typical, strict=True))
-            yield replace(frame, images=tuple(images))
-
-    def image(self, image: U8, typical: U8 | None) -> U8:
-        """Return an image (H, W, 3) as bright as a typical one, if that is known and of the same room."""
-        gain = None if typical is None else brighter(blocks(image), typical)
-        if gain is None or np.all(np.abs(gain - 1) <= self.tolerance):
-            return image
-        return with_levels(image, multiplied(1 / gain))
 
 
 def typical(recording: Recording) -> dict[str, U8]:
@@ -123,37 +96,10 @@ def typical(recording: Recording) -> dict[str, U8]:
     shown: dict[str, list[U8]] = {}
     for frame in first.frames():
         for camera in np.flatnonzero(frame.usable):
-            if frame.images[camera].max() >= DARK:
+            if frame.images[camera].max() > BLACK:
                 shown.setdefault(recording.views[camera].lens.name, []).append(frame.images[camera])
     return {name: _median(images) for name, images in shown.items()}
 
 
 def _median(images: Sequence[U8]) -> U8:
     return sorted(images, key=lambda image: float(image[::STEP, ::STEP].mean()))[len(images) // 2]
-
-
-def brighter(image: U8, typical: U8) -> F64 | None:
-    """Return by which factors (3,) the blocks (h, w, 3) of a picture are brighter, most of them; None: nobody can tell.
-
-    Nobody can of black pictures, nor of those of different rooms, whose factors differ from block to block.
-    """
-    told = ((np.minimum(image, typical) >= DARK) & (np.maximum(image, typical) < 255)).all(axis=2)
-    if told.mean() < TELLING:
-        return None
-    factors = image[told] / typical[told].astype(float)
-    gain = np.median(factors, axis=0)
-    alike = np.median(np.abs(factors / gain - 1), axis=0).max() < ALIKE
-    return np.asarray(gain, float) if alike else None
-
-
-def multiplied(gains: F64) -> U8:
-    """Return what grey levels become (256, 3), each colour multiplied by its factor (3,)."""
-    return np.clip(np.rint(np.arange(256)[:, None] * gains), 0, 255).astype(np.uint8)
-
-
-def blocks(image: U8) -> U8:
-    """Return the mean colours (h, w, 3) of the square blocks of an image (H, W, 3), `ACROSS` of them side by side."""
-    import cv2
-
-    height = max(round(ACROSS * image.shape[0] / image.shape[1]), 1)
-    return np.asarray(cv2.resize(image, (ACROSS, height), interpolation=cv2.INTER_AREA), np.uint8)

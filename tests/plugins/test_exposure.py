@@ -6,7 +6,8 @@ import cv2
 import numpy as np
 import pytest
 from mocapflow_robustness.corrupt import Corrupt
-from mocapflow_robustness.exposure import STEP, Exposure, brighter
+from mocapflow_robustness.exposure import STEP, Exposure
+from mocapflow_robustness.steadying import brighter
 
 from mocapflow.errors import PipelineError
 from mocapflow.help.shipped import shipped
