@@ -123,7 +123,7 @@ class LimbSearch(Recovery):
 
     def _warn(self, limbs: Mapping[str, float]) -> None:
         for joint, share in limbs.items():
-            LOG.warning(f"from {joint} on {share:.0%} of the person differ from the room: lost, it may not be missed")
+            LOG.warning(f"from {joint} on only {share:.0%} differ from the room: this limb may be lost unnoticed")
 
     def views(self, frame: Frame, surface: Surface, past: Past, scene: Scene) -> list[View]:
         """Return what the views of a frame surely show around a surface, in a scene whose empty room is known."""
