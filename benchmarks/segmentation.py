@@ -18,7 +18,7 @@ import numpy as np
 from mocapflow_levelset.grabcut import GrabCut
 from mocapflow_levelset.levelset import LevelSet
 from mocapflow_levelset.masks import counted
-from mocapflow_levelset.plates import Plate, plate_of
+from mocapflow_levelset.plates import Shadow, Plate, plate_of
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.view import Empty, View, find
 from skimage.segmentation import chan_vese, morphological_chan_vese
@@ -92,7 +92,7 @@ def levelset(task: Task, start: F32, known: bool = False) -> Bool:
     levels = segmenter._levels(warm=False)
     empty = Empty(task.plates, np.zeros((HEIGHT, WIDTH), bool)) if known else None
     view = View(task.image, start, start, counted(start.shape, segmenter.border_px), empty)
-    return find(view, levels, segmenter._method(), BAND_PX).level > 0
+    return find(view, levels, segmenter._method(Shadow()), BAND_PX).level > 0
 
 
 def grabcut(task: Task, start: F32, iterations: int) -> Bool:

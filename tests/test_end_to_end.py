@@ -231,7 +231,8 @@ def test_a_second_run_computes_nothing(whole, home):
         lines = call(*words, cwd=home).splitlines()
         assert {f"{stage}: from the store" for stage in ("background", "start", "track", "smooth")} <= set(lines)
         running = {line.split(":")[0] for line in lines if ": running" in line}
-        assert running <= {"export", "evaluate", "overlay", "virtual", "report"}
+        # `exposure` but says how frames are to be read
+        assert running <= {"exposure", "export", "evaluate", "overlay", "virtual", "report"}
     assert (whole["skirt"] / "results/angles.csv").read_bytes() == before
     assert same_angles(home / "again", whole["skirt"])
 
