@@ -18,7 +18,7 @@ import numpy as np
 from mocapflow_levelset.grabcut import GrabCut
 from mocapflow_levelset.levelset import LevelSet
 from mocapflow_levelset.masks import counted
-from mocapflow_levelset.plates import Shadow, Plate, plate_of
+from mocapflow_levelset.plates import Plate, Shadow, plate_of
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.view import Empty, View, find
 from skimage.segmentation import chan_vese, morphological_chan_vese
