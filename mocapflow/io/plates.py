@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -14,6 +15,8 @@ from mocapflow.io.folders import plates
 from mocapflow.io.images import check_depth, read_image
 from mocapflow.io.lenses import View
 from mocapflow.records import F32, U8, Bool
+
+Picture = TypeVar("Picture", U8, F32)
 
 LEAST_SPREAD = 1.0  # grey levels; the rounding of 8-bit pictures alone makes 0.3
 USUAL_SPREAD = 4.0  # grey levels; where no frame can be compared with the plate
@@ -87,7 +90,7 @@ def _compared(plate: F32, first: Frame, camera: int, path: Path) -> tuple[F32, F
     usual = np.full((1, 3), USUAL_SPREAD / NORMAL, np.float32)
     if not shown[::THIN, ::THIN].any():
         return plate, usual
-    matched, room, seen = toned(plate, frame, shown), _blocks(plate), _blocks(frame)
+    matched, room, seen = toned(plate, frame, shown), blocks(plate), blocks(frame)
     if _blank(room, seen):
         return matched, usual
     _check_colours(room, seen, path)
@@ -138,11 +141,11 @@ def _check_colours(room: F32, seen: F32, path: Path) -> None:
         raise RecordingError("this clean plate is in colour, the video is grey", where=str(path), hint=hint)
 
 
-def _blocks(picture: F32) -> F32:
-    """Return the mean colours (h, w, 3) of the blocks of a picture (H, W, 3)."""
+def blocks(picture: Picture, side_px: int = BLOCK) -> Picture:
+    """Return the mean colours (h, w, 3) of the square blocks of a picture (H, W, 3)."""
     import cv2
 
-    size = (max(picture.shape[1] // BLOCK, 1), max(picture.shape[0] // BLOCK, 1))
+    size = (max(picture.shape[1] // side_px, 1), max(picture.shape[0] // side_px, 1))
     return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA))
 
 

@@ -17,8 +17,8 @@ from mocapflow_levelset.plates import Shadow
 
 CORNERS = 72
 THIN = 4  # every so many-th pixel tells whether there are colours
-GREY = 32  # levels between the colours of a pixel that has hardly any; skin has 60 to 100
-FEW = 0.001  # of the pixels: a lamp of the camera's own, a stamp
+GREY = 32  # levels between the colours of a pixel that has hardly any; bare skin has 20 to 75
+FEW = 0.001  # share of the pixels that may have more: a stamp, a coloured lamp
 REACH_M = 2.0  # from the person, where their shadow may fall
 USUAL = Shadow()
 

@@ -15,7 +15,7 @@ from mocapflow.errors import PipelineError
 from mocapflow.io.lenses import View, with_levels
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64, U8
-from mocapflow_robustness.steadying import Steadied, blocks, multiplied
+from mocapflow_robustness.steadying import Steadied, multiplied, small
 
 LOG = logging.getLogger("mocapflow")
 Factor = Annotated[float, Field(ge=1)]
@@ -24,7 +24,7 @@ FIRST = 10  # frames of the videos that tell how a camera is set, whichever fram
 BRIGHT, BRIGHTEST = 95, 99.5  # % of the pixels that are darker than the bright parts of a picture, than nearly all
 STEP = 8  # px between the pixels that tell of a picture's levels
 WHITE = 0.1  # share of the pixels with a colour at the end of its range, from which on a camera is overexposed
-BLACK = 30  # grey levels that nothing in a picture exceeds that shows nothing
+BLACK = 30  # grey level; a picture without a brighter pixel shows nothing
 
 
 class Exposure(Stage):
@@ -56,7 +56,7 @@ class Exposure(Stage):
         usual = typical(recording)
         views = tuple(self._corrected(view, usual.get(view.lens.name)) for view in recording.views)
         levels = {view.lens.name: view.levels for view in views}
-        shown = {name: blocks(with_levels(image, levels[name])) for name, image in usual.items()}
+        shown = {name: small(with_levels(image, levels[name])) for name, image in usual.items()}
         return replace(recording, views=views, changes=(Steadied(self.tolerance, shown),))
 
     def _corrected(self, view: View, image: U8 | None) -> View:
@@ -70,10 +70,8 @@ class Exposure(Stage):
         gains = self.gains(*np.percentile(pixels, (BRIGHT, BRIGHTEST), axis=(0, 1)))
         if gains is None:
             return view
-        blue, green, red = gains
-        LOG.warning(
-            f"{name} is too dark or tinged: blue {blue:.2g}, green {green:.2g}, red {red:.2g} times as bright now"
-        )
+        wrong, (blue, green, red) = "tinged" if np.ptp(gains) else "too dark", gains
+        LOG.warning(f"{name} is {wrong}: blue {blue:.2g}, green {green:.2g}, red {red:.2g} times as bright now")
         return replace(view, levels=multiplied(gains))
 
     def gains(self, bright: F64, brightest: F64) -> F64 | None:

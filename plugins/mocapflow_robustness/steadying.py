@@ -9,6 +9,7 @@ import numpy as np
 
 from mocapflow.data import Frame
 from mocapflow.io.lenses import with_levels
+from mocapflow.io.plates import blocks
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64, U8
 
@@ -34,7 +35,7 @@ class Steadied:
 
     def image(self, image: U8, typical: U8 | None) -> U8:
         """Return an image (H, W, 3) as bright as a typical one, if that is known and of the same room."""
-        gain = None if typical is None else brighter(blocks(image), typical)
+        gain = None if typical is None else brighter(small(image), typical)
         if gain is None or np.all(np.abs(gain - 1) <= self.tolerance):
             return image
         return with_levels(image, multiplied(1 / gain))
@@ -59,9 +60,6 @@ def multiplied(gains: F64) -> U8:
     return np.clip(np.rint(np.arange(256)[:, None] * gains), 0, 255).astype(np.uint8)
 
 
-def blocks(image: U8) -> U8:
-    """Return the mean colours (h, w, 3) of the square blocks of an image (H, W, 3), `ACROSS` of them side by side."""
-    import cv2
-
-    height = max(round(ACROSS * image.shape[0] / image.shape[1]), 1)
-    return np.asarray(cv2.resize(image, (ACROSS, height), interpolation=cv2.INTER_AREA), np.uint8)
+def small(image: U8) -> U8:
+    """Return the blocks (h, w, 3) of an image (H, W, 3), `ACROSS` of them side by side."""
+    return blocks(image, max(image.shape[1] // ACROSS, 1))
