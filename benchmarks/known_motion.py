@@ -7,7 +7,7 @@ truth. The body is posed in `known_poses.py`, by a motion of DATA or of `known_s
 `known_garments.py`; `known_motion_blender.py` drapes it with Blender's cloth and draws what each camera sees; softness
 of the lens and noise of the sensor are added here. Nothing of the tracker takes part, its kinematics neither: what
 shared code with it could not tell that it is wrong. On one core about 2 s a view: 8 minutes a take of 50 frames.
-OUT/room_A and room_B keep the empty rooms for the next take; delete them when the room, the light or the cameras here
+OUT/room_A and so on keep the empty rooms for the next take; delete them when the room, the light or the cameras here
 have changed. Where a leg has come through the cloth, which the simulation does not prevent, the take's README says so.
 """
 
@@ -127,7 +127,7 @@ def prepare(take: Take, data: Path, out: Path) -> None:
     write_truth(body, chain(body, motion)[1], out / "truth")
     garment = sew(body, measures)
     np.savez(
-        out / "work/scene.npz", first=first, plates=PLATES, subject=take.subject, cameras=json.dumps(cameras),
+        out / "work/scene.npz", first=first, plates=PLATES, room=take.place, cameras=json.dumps(cameras),
         body=skin(body, whole).astype("f4"), faces=body.faces, paint=painted(body, take.subject),
         garment=carried(body, garment.vertices, garment.pinned, whole).astype("f4"), quads=garment.quads,
         pinned=garment.pinned, cloth_paint=np.where(garment.stripe[:, None], *take.stripes),
@@ -236,7 +236,7 @@ def _fading(width: int, height: int, margin: int = 12) -> np.ndarray:
 
 def main(name: str, data: Path, to: Path) -> None:
     """Make one take."""
-    out, room, script = to / name, to / f"room_{TAKES[name].subject}", Path(__file__).parent / "known_motion_blender.py"
+    out, room, script = to / name, to / f"room_{TAKES[name].place}", Path(__file__).parent / "known_motion_blender.py"
     prepare(TAKES[name], data, out)
     (out / "README.md").write_text(ABOUT.format(name=name, take=TAKES[name], rate=RATE, tone=TONE))
     room.mkdir(exist_ok=True)

@@ -30,6 +30,12 @@ class Take:
     frames: int = 50
     flight: tuple[int, int] | None = None  # frames of take-off and landing
     cut: dict[str, float] = field(default_factory=dict)  # m, measures in which the garment differs from its owner's
+    room: str = ""  # one of those of `known_motion_blender.py`; if empty, the one that is named like the subject
+
+    @property
+    def place(self) -> str:
+        """The name of the room."""
+        return self.room or self.subject
 
 
 TAKES = {
@@ -92,4 +98,7 @@ TAKES = {
     "kneel_B_skirt": Take("B", "skirt", "kneel", 111, GREEN, frames=60),
     "jack_A_skirt": Take("A", "skirt", "jack", 112, GREY),
     "walk_A_trousers": Take("A", "shorts", "walk_A", 113, GREY, start=20, cut=SLACKS),
+    # other rooms: white, and of the colour of skin
+    "walk_A_studio": Take("A", "skirt", "walk_A", 121, GREEN, start=150, frames=40, room="studio"),
+    "kneeup_B_carpet": Take("B", "shorts", "kneeup_B", 122, GREY, start=140, frames=40, room="carpet"),
 }
