@@ -130,6 +130,7 @@ class Background:
 
     mean: tuple[F32, ...] = arrays("H", "W", "BGR", unit="grey levels")
     spread: tuple[F32, ...] = arrays("H", "W", "BGR", unit="grey levels, standard deviation; inf where nobody knows")
+    floor_m: float | None = None  # height of the floor, where shadows have told it
 
     @cached_property
     def known(self) -> tuple[Bool, ...]:

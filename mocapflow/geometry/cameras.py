@@ -72,6 +72,11 @@ def scaled(camera: Camera, factor: float) -> Camera:
     return replace(camera, intrinsics=scale @ camera.intrinsics, size=size)
 
 
+def shrunk(camera: Camera, factor: int) -> Camera:
+    """Return a camera whose pixels are the means of squares of another's; what is left over is dropped."""
+    return scaled(replace(camera, size=camera.size // factor * factor), 1 / factor)
+
+
 def bends(camera: Camera) -> bool:
     """Tell whether the lens shows anything but a pinhole image; a fisheye does without any coefficient."""
     return camera.fisheye or bool(camera.distortion.any())

@@ -19,7 +19,7 @@ from mocapflow_levelset.evolve import Rhythm, Weights
 from mocapflow_levelset.levelset import INNER_BAND_PX, PERSON
 from mocapflow_levelset.masks import counted
 from mocapflow_levelset.plates import Plate, Shadow, density_image, plate_in
-from mocapflow_levelset.shadows import ShadowAware, floor_around
+from mocapflow_levelset.shadows import ShadowAware, shadowed
 from mocapflow_levelset.statistics import Window
 from mocapflow_levelset.view import Empty, Level, Method, View, find
 
@@ -61,7 +61,7 @@ class BackgroundDifference(ShadowAware):
             if not frame.usable[c]:
                 continue
             model = model_distance(surface, camera, self.band_px)
-            floor = floor_around(surface, camera, self.shadow_reach_m)
+            floor = shadowed(frame, surface, scene, c, self.shadow_reach_m)
             distance = self.find(frame.images[c], model, floor, scene.background, c, frame.hidden_in(c))
             silhouettes.append(Silhouette(camera=c, layer=PERSON, distance=distance))
         return Segmentation(silhouettes=tuple(silhouettes))

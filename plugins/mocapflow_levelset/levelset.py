@@ -20,7 +20,7 @@ from mocapflow_levelset.evolve import Rhythm, Weights
 from mocapflow_levelset.masks import counted, without_cut
 from mocapflow_levelset.moved import moved_outline
 from mocapflow_levelset.plates import Shadow, plate_in
-from mocapflow_levelset.shadows import ShadowAware, floor_around
+from mocapflow_levelset.shadows import ShadowAware, shadowed
 from mocapflow_levelset.statistics import Window
 from mocapflow_levelset.view import Contact, Empty, Level, Matte, Method, View, find
 
@@ -111,7 +111,7 @@ class LevelSet(ShadowAware):
             start=model,
             prior=model,
             counted=without_cut(counts, model, scene.body, surface, lens),
-            empty=self._empty(scene, surface, camera, levels),
+            empty=self._empty(frame, surface, scene, camera, levels),
             colours=self._colours(past, camera),
             contact=self._contact(surface, lens),
             matte=self._matte(scene, camera),
@@ -123,13 +123,15 @@ class LevelSet(ShadowAware):
             return None
         return moved_outline(surface, turn.change, camera, self.keep_px)
 
-    def _empty(self, scene: Scene, surface: Surface, camera: int, levels: Sequence[Level]) -> Empty | None:
+    def _empty(
+        self, frame: Frame, surface: Surface, scene: Scene, camera: int, levels: Sequence[Level]
+    ) -> Empty | None:
         background = self._background(scene)
         if background is None:
             return None
         factors = [level.factor for level in levels if level.use_plate]
         plates = {factor: plate_in(background, camera, self.channels, factor) for factor in factors}
-        return Empty(plates, floor_around(surface, scene.cameras[camera], self.shadow_reach_m))
+        return Empty(plates, shadowed(frame, surface, scene, camera, self.shadow_reach_m))
 
     def _colours(self, past: Past, camera: int) -> F32 | None:
         """Return what colours tell of person and room in a view (BINS,); None: nothing is learned."""

@@ -9,10 +9,12 @@ from pydantic import Field, PositiveFloat
 
 from mocapflow.assets import Background, Camera
 from mocapflow.components import Segmenter
-from mocapflow.data import Surface
+from mocapflow.data import Frame, Surface
 from mocapflow.geometry.cameras import project
 from mocapflow.memo import memoised
 from mocapflow.records import F64, U8, Bool
+from mocapflow.scene import Scene
+from mocapflow_levelset.one_floor import no_shadows
 from mocapflow_levelset.plates import Shadow
 
 CORNERS = 72
@@ -61,6 +63,13 @@ def _circle(surface: Surface, radius_m: float) -> F64:
     angles = np.linspace(0, 2 * np.pi, CORNERS, endpoint=False)
     circle = middle + radius_m * np.column_stack([np.cos(angles), np.sin(angles)])
     return np.column_stack([circle, np.full(CORNERS, feet)])
+
+
+def shadowed(frame: Frame, surface: Surface, scene: Scene, camera: int, reach_m: float = REACH_M) -> Bool:
+    """Return True for pixels (H, W) that may show the person's shadow, as far as the other views know."""
+    floor = floor_around(surface, scene.cameras[camera], reach_m)
+    others = None if scene.background is None else no_shadows(frame, scene.background, scene.cameras)
+    return floor if others is None else floor & ~others[camera]
 
 
 def floor_around(surface: Surface, camera: Camera, reach_m: float = REACH_M) -> Bool:

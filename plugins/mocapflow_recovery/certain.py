@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +14,7 @@ from mocapflow_levelset.shadows import floor_around
 
 from mocapflow.assets import Background, Camera
 from mocapflow.data import Frame, Surface
-from mocapflow.geometry.cameras import magnification, scaled
+from mocapflow.geometry.cameras import magnification, shrunk
 from mocapflow.geometry.silhouettes import mask, outline
 from mocapflow.memo import memoised
 from mocapflow.records import F32, F64, U8, Bool
@@ -57,12 +57,14 @@ def small_room(background: Background, cameras: tuple[Camera, ...], rows: int) -
     return Room(tuple(map(shrunk, cameras, factors)), factors, tuple(plates))
 
 
-def shrunk(camera: Camera, factor: int) -> Camera:
-    """Return a camera whose pixels are the means of squares of another's; what is left over is dropped."""
-    return scaled(replace(camera, size=camera.size // factor * factor), 1 / factor)
-
-
-def views(frame: Frame, surface: Surface, room: Room, near_m: float, garment: F64 | None = None) -> list[View]:
+def views(
+    frame: Frame,
+    surface: Surface,
+    room: Room,
+    near_m: float,
+    garment: F64 | None = None,
+    no_shadow: Sequence[Bool] | None = None,
+) -> list[View]:
     """Return what the usable views of a frame surely show, each at the size of its camera.
 
     A view that is unlike the empty room nearly everywhere shows nothing surely and is left out.
@@ -73,6 +75,7 @@ def views(frame: Frame, surface: Surface, room: Room, near_m: float, garment: F6
         room: the empty room, small.
         near_m: see `surface`.
         garment: (BINS,) log density of colours on the garment over that on parts outside of it; None: it is not known.
+        no_shadow: (H, W) by camera, in full size, True where other views see that there is none; None: nobody knows.
     """
     found, middle = [], surface.vertices.mean(axis=0)
     for number in np.flatnonzero(frame.usable):
@@ -80,7 +83,10 @@ def views(frame: Frame, surface: Surface, room: Room, near_m: float, garment: F6
         model, size = mask(outline(surface, camera), camera), 1 / magnification(camera, middle)
         image, hidden = frame.images[number], frame.hidden_in(int(number))
         small = crops.shrink(image, factor)
-        changed, same = _compared(small, plate, floor_around(surface, camera))
+        floor = floor_around(surface, camera)
+        if no_shadow is not None:
+            floor = floor & ~crops.shrink_mask(no_shadow[int(number)], factor)
+        changed, same = _compared(small, plate, floor)
         told = True if hidden is None else crops.shrink(hidden.astype(np.float32), factor) == 0
         person = _near(changed & told, model, near_m / size)
         seen, expected = np.count_nonzero(person), np.count_nonzero(model)

@@ -11,6 +11,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 from mocapflow_levelset.layers import garment_told
+from mocapflow_levelset.one_floor import no_shadows
 from mocapflow_priors.density import Density, Poses, read
 from mocapflow_priors.parzen import SHIPPED
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
@@ -129,7 +130,8 @@ class LimbSearch(Recovery):
         """Return what the views of a frame surely show around a surface, in a scene whose empty room is known."""
         assert scene.background is not None
         room = small_room(scene.background, scene.cameras, self.rows)
-        return views(frame, surface, room, self.near_m, garment_told(past, scene))
+        no_shadow = no_shadows(frame, scene.background, scene.cameras)
+        return views(frame, surface, room, self.near_m, garment_told(past, scene), no_shadow)
 
     def _searched(self, index: int, fit: Fit, looks: Looks, suspected: Suspicion, settle: Settle) -> FrameResult:
         """Return the result of the best pose that is found, or that of the fit where none is better."""

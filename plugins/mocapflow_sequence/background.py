@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
+from mocapflow_levelset.floor_height import floor_height, grey_floor
 from pydantic import Field
 
 from mocapflow.assets import Background
@@ -22,6 +23,7 @@ from mocapflow_sequence.commonest import commonest
 from mocapflow_sequence.first_frame import Learnt, empty_scene
 
 LOG = logging.getLogger("mocapflow")
+FLOOR_FRAMES = 4  # in which the person's shadow may tell the height of the floor
 
 
 class EmptyScene(Stage):
@@ -31,6 +33,9 @@ class EmptyScene(Stage):
     the pose of the first frame and by the colours beside the person in it, if a stage before makes a `Start`, else the
     commonest. Nobody knows what is behind a person who stays in place throughout. Memory is bounded by `samples`
     pictures of one camera.
+
+    Of a floor without colours it learns the height, too, if the person's shadow tells it: then views can tell grey
+    clothes from shadows together (`mocapflow_levelset.one_floor`).
     """
 
     name: ClassVar[str] = "background"
@@ -57,6 +62,10 @@ class EmptyScene(Stage):
             RecordingError: plates are missing, see `need`, or a camera has too few readable frames to learn from.
         """
         self.need(recording)
+        room = self._room(recording, scene, start)
+        return room if start is None else replace(room, floor_m=self._floor(room, recording, scene, start))
+
+    def _room(self, recording: Recording, scene: Scene, start: Start | None) -> Background:
         plates = None if self.source == "recording" else recording.background()
         if plates is not None:
             return plates
@@ -68,6 +77,15 @@ class EmptyScene(Stage):
             )
         learnt = list(self._learnt(recording, scene, start))
         return Background(mean=tuple(view.mean for view in learnt), spread=tuple(view.spread for view in learnt))
+
+    def _floor(self, room: Background, recording: Recording, scene: Scene, start: Start) -> float | None:
+        """Return the height of a floor without colours, looked for about the lowest point of the start pose."""
+        body = scene.undressed.surface(start.pose, NO_CLOTH)
+        if not grey_floor(room, scene.cameras, body):
+            return None
+        step = max(recording.length // FLOOR_FRAMES, 1)
+        frames = (recording.frame(index) for index in range(step // 2, recording.length, step))
+        return floor_height(frames, room, scene.cameras, float(body.vertices[:, 2].min()))
 
     def _learnt(self, recording: Recording, scene: Scene, start: Start | None) -> Iterator[Learnt]:
         """Yield the empty scene of each view; without a start pose the commonest colours, whoever's they are."""
