@@ -236,7 +236,7 @@ def _fading(width: int, height: int, margin: int = 12) -> np.ndarray:
 
 def main(name: str, data: Path, to: Path) -> None:
     """Make one take."""
-    out, room, script = to / name, to / f"room_{TAKES[name].place}", Path(__file__).parent / "known_motion_blender.py"
+    out, room, script = to / name, to / TAKES[name].plates, Path(__file__).parent / "known_motion_blender.py"
     prepare(TAKES[name], data, out)
     (out / "README.md").write_text(ABOUT.format(name=name, take=TAKES[name], rate=RATE, tone=TONE))
     room.mkdir(exist_ok=True)

@@ -37,6 +37,11 @@ class Take:
         """The name of the room."""
         return self.room or self.subject
 
+    @property
+    def plates(self) -> str:
+        """The folder of the empty room, as the subject's cameras see it."""
+        return f"room_{self.subject}_{self.room}" if self.room else f"room_{self.subject}"
+
 
 TAKES = {
     "legcross_A_skirt": Take("A", "skirt", "legcross_A", 1, PURPLE, start=150),
@@ -100,5 +105,6 @@ TAKES = {
     "walk_A_trousers": Take("A", "shorts", "walk_A", 113, GREY, start=20, cut=SLACKS),
     # other rooms: white, and of the colour of skin
     "walk_A_studio": Take("A", "skirt", "walk_A", 121, GREEN, start=150, frames=40, room="studio"),
+    "kneeup_B_studio": Take("B", "shorts", "kneeup_B", 123, PURPLE, start=140, frames=24, room="studio"),
     "kneeup_B_carpet": Take("B", "shorts", "kneeup_B", 122, GREY, start=140, frames=40, room="carpet"),
 }

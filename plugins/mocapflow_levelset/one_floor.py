@@ -1,7 +1,7 @@
 """Shadows on the floor look the same from everywhere: what the other views of the floor contradict is no shadow.
 
 A matt floor sends as much of a shadow's light to one camera as to another. So a grey sock before a grey floor, which in
-one view can't be told from a shadow, is told by two others that see the floor behind it lit, or darker.
+one view can't be told from a shadow, is told by another that sees the floor behind it lit, or two that see it darker.
 """
 
 from __future__ import annotations
@@ -68,7 +68,9 @@ def light_on(image: U8, plate: Plate) -> F32:
 
 
 def contradicted(views: Sequence[Small], floor_m: float) -> list[Bool]:
-    """Return for each view where (h, w) its pixels have another light than two other views, at least, see there.
+    """Return for each view where (h, w) its pixels have another light than others see there.
+
+    These are two views that agree, or one that sees the floor fully lit; and none sees the light that this one sees.
 
     Args:
         views: small views of one moment.
@@ -196,7 +198,7 @@ def _look(light, way, places, out):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, error_model="numpy")
 def _alone(light, seen, tolerance):  # type: ignore[no-untyped-def]
-    """Return 1 where two views (V, N, 2) agree with each other, and none with this one's light (N,)."""
+    """Return 1 where one view (V, N, 2) sees the floor lit or two agree, and none sees this one's light (N,)."""
     out = np.zeros(len(light), np.uint8)
     for n in range(len(light)):
         alone, agree = True, False
