@@ -1,15 +1,17 @@
 """Shadows on one floor, seen by several cameras: what only one of them sees is no shadow."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from mocapflow_levelset.floor_height import floor_height, grey_floor
 from mocapflow_levelset.one_floor import contradicted, no_shadows, small_views
 from mocapflow_levelset.shadows import floor_around, shadowed
+from mocapflow_sequence.background import EmptyScene
 
 from mocapflow.assets import Background
-from mocapflow.data import NO_CLOTH, Frame
+from mocapflow.data import NO_CLOTH, Frame, Start
 from mocapflow.testing import scenes
 
 SCENE = scenes.tiny_scene()
@@ -79,6 +81,14 @@ def test_without_a_shadow_nothing_tells_it():
 def test_only_a_floor_without_colours_needs_the_others():
     assert grey_floor(pictures()[1], CAMERAS, BODY)
     assert not grey_floor(pictures(colour=(90, 140, 180))[1], CAMERAS, BODY)
+
+
+@pytest.mark.parametrize(("colour", "found"), [(GREY, FLOOR_M), ((90, 140, 180), None)])
+def test_the_stage_looks_for_a_floor_without_colours(colour, found):
+    _, room = pictures(colour)
+    recording = SimpleNamespace(length=8, frame=lambda index: pictures(colour, seed=index)[0])
+    floor_m = EmptyScene()._floor(room, recording, SCENE, Start(pose=POSE, parameters=np.empty(0)))
+    assert floor_m == (found if found is None else pytest.approx(found, abs=0.015))
 
 
 def test_shadows_may_fall_where_the_others_see_them():
