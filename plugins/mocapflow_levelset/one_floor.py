@@ -20,7 +20,7 @@ from mocapflow.records import F32, F64, I32, U8, Bool
 from mocapflow_levelset import crops
 from mocapflow_levelset.channels import ChannelName, features
 from mocapflow_levelset.evidence import calmed
-from mocapflow_levelset.plates import BENDING, BLACK, Plate, Shadow, plate_in
+from mocapflow_levelset.plates import Plate, Shadow, on_ray, plate_in
 
 CHANNELS: tuple[ChannelName, ...] = ("lab",)
 USUAL = Shadow()
@@ -61,10 +61,11 @@ def small_views(frame: Frame, background: Background, cameras: Sequence[Camera],
 def light_on(image: U8, plate: Plate) -> F32:
     """Return the factor (h, w) by which an image (h, w, 3) is darker than its plate, NaN where it is something else."""
     values = features(calmed(image, CALM_PX), CHANNELS)
-    out = np.empty(values.shape[1:], np.float32)
-    limits = np.array([USUAL.darkest, BRIGHTER, USUAL.chroma, BENDING, OFF], np.float32)
-    _light(values, plate.planes, plate.spread, limits, np.array(BLACK, np.float32), out)
-    return out
+    flat, expected = values.reshape(len(values), -1), plate.planes.reshape(len(values), -1)
+    out = np.empty(flat.shape[1], np.float32)
+    limits = tuple(np.float32(limit) for limit in (USUAL.darkest, BRIGHTER, USUAL.chroma, OFF))
+    _light(flat, expected, plate.spread.ravel(), limits, out)
+    return out.reshape(image.shape[:2])
 
 
 def contradicted(views: Sequence[Small], floor_m: float) -> list[Bool]:
@@ -160,21 +161,12 @@ def _enlarged(mask: Bool, factor: int, camera: Camera) -> Bool:
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _light(values, plate, spread, limits, black, out):  # type: ignore[no-untyped-def]
-    darkest, brightest, chroma, bending, most = limits
-    for y in range(out.shape[0]):
-        for x in range(out.shape[1]):
-            square, along, whole = np.float32(0), np.float32(0), np.float32(0)
-            for c in range(3):
-                expected, value = plate[c, y, x] - black[c], values[c, y, x] - black[c]
-                square += expected * expected
-                along += expected * value
-                whole += value * value
-            light = along / square
-            a, b = plate[1, y, x] - black[1], plate[2, y, x] - black[2]
-            across = chroma * chroma + bending * bending * (a * a + b * b)
-            floor = whole - light * along < most * most * across and darkest < light < brightest
-            out[y, x] = light if floor and np.isfinite(spread[y, x]) else np.nan
+def _light(values, plate, spread, limits, out):  # type: ignore[no-untyped-def]
+    darkest, brightest, chroma, most = limits
+    for n in range(out.size):
+        light, _, residual, across = on_ray(values, plate, n, 0, chroma)
+        floor = residual < most * most * across and darkest < light < brightest
+        out[n] = light if floor and np.isfinite(spread[n]) else np.nan
 
 
 @numba.njit(cache=True, error_model="numpy")

@@ -118,6 +118,20 @@ def _in_shadow(values, plate, n, lab, inverse, shadow):  # type: ignore[no-untyp
     _, share, darkest, chroma = shadow
     if share <= 0:
         return STRANGER
+    k, square, residual, across = on_ray(values, plate, n, lab, chroma)
+    beyond = k - min(max(k, darkest), np.float32(1))
+    off = np.float32(0.5) * residual / across + beyond * beyond * square * inverse
+    flat = np.log(share / ((np.float32(1) - darkest) * np.sqrt(square)))
+    return flat + LOG_ROOT + LOG_ROOT - np.log(across) - off
+
+
+@numba.njit(cache=True, error_model="numpy")
+def on_ray(values, plate, n, lab, chroma):  # type: ignore[no-untyped-def]
+    """Return where pixel n is along the ray of its plate's shadows, and how far off.
+
+    These are the factor of the plate's light, the plate's square distance from black, the pixel's square distance from
+    the ray, and the variance of a shadow's.
+    """
     l0, a0, b0 = (
         plate[lab, n] - np.float32(BLACK[0]),
         plate[lab + 1, n] - np.float32(BLACK[1]),
@@ -130,10 +144,7 @@ def _in_shadow(values, plate, n, lab, inverse, shadow):  # type: ignore[no-untyp
     )
     square = l0 * l0 + a0 * a0 + b0 * b0
     k = (l1 * l0 + a1 * a0 + b1 * b0) / square
-    beyond = k - min(max(k, darkest), np.float32(1))
     r0, r1, r2 = l1 - k * l0, a1 - k * a0, b1 - k * b0
     # the stronger a colour, the more the colours of lamp and room bend its ray
     across = chroma * chroma + np.float32(BENDING * BENDING) * (a0 * a0 + b0 * b0)
-    off = np.float32(0.5) * (r0 * r0 + r1 * r1 + r2 * r2) / across + beyond * beyond * square * inverse
-    flat = np.log(share / ((np.float32(1) - darkest) * np.sqrt(square)))
-    return flat + LOG_ROOT + LOG_ROOT - np.log(across) - off
+    return k, square, r0 * r0 + r1 * r1 + r2 * r2, across
