@@ -18,7 +18,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import cv2
@@ -127,7 +127,8 @@ def prepare(take: Take, data: Path, out: Path) -> None:
     write_truth(body, chain(body, motion)[1], out / "truth")
     garment = sew(body, measures)
     np.savez(
-        out / "work/scene.npz", first=first, plates=PLATES, room=take.place, cameras=json.dumps(cameras),
+        out / "work/scene.npz", first=first, plates=PLATES,
+        room=json.dumps(asdict(take.place)), cameras=json.dumps(cameras),
         body=skin(body, whole).astype("f4"), faces=body.faces, paint=painted(body, take.subject),
         garment=carried(body, garment.vertices, garment.pinned, whole).astype("f4"), quads=garment.quads,
         pinned=garment.pinned, cloth_paint=np.where(garment.stripe[:, None], *take.stripes),

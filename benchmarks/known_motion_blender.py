@@ -1,8 +1,7 @@
 """Blender's part of `known_motion.py`: `blender -b -t 1 -P known_motion_blender.py -- WORK ROOM` (Blender 3.4).
 
-Reads WORK/scene.npz, which names one of `ROOMS`. Writes to WORK cloth.npy (T,C,3), CAMERA_FRAME.png (what surrounds the
-person) and boxes.json: x, y, width and height of these per camera and frame. Writes CAMERA_K.png, the empty room, to
-ROOM unless it is there.
+Reads WORK/scene.npz. Writes to WORK cloth.npy (T,C,3), CAMERA_FRAME.png (what surrounds the person) and boxes.json:
+x, y, width and height of these per camera and frame. Writes CAMERA_K.png, the empty room, to ROOM unless it is there.
 """
 
 from __future__ import annotations
@@ -25,23 +24,6 @@ HALF = 5.0  # m, of the room's width
 AMBIENT = 0.30  # light from all around that costs no noise
 Colour = tuple[float, ...]
 Box = tuple[int, int, int, int]  # x, y, width, height
-
-
-class Room(NamedTuple):
-    """Where a recording is made: where its lamp hangs, and colours."""
-
-    lamp: Colour
-    wall: Colour
-    floor: Colour = (0.50, 0.42, 0.32)
-    boards: bool = True  # the floor's
-
-
-ROOMS = {
-    "A": Room((0.7, -0.6, 3.9), wall=(0.34, 0.37, 0.39)),
-    "B": Room((-0.6, -0.7, 3.9), wall=(0.34, 0.31, 0.28)),
-    "studio": Room((0.4, -1.0, 3.9), wall=(0.60, 0.60, 0.58), floor=(0.58, 0.58, 0.56), boards=False),
-    "carpet": Room((-0.9, 0.3, 3.9), wall=(0.40, 0.30, 0.18), floor=(0.30, 0.17, 0.11), boards=False),  # like skin
-}
 
 
 def add_mesh(name: str, vertices: np.ndarray, faces: np.ndarray) -> Any:
@@ -190,12 +172,11 @@ def along_wall(
     add_box(tuple(low), tuple(high), look)
 
 
-def furnish(name: str) -> None:
-    """Build floor, walls, pictures, boxes, tape on the floor and light."""
-    room, random = ROOMS[name], np.random.default_rng(ord(name[0]))
-    wall, floor = mottled(room.wall, 0.06, 0.7), mottled(room.floor, 0.15, 6.0)
+def furnish(room: dict[str, Any]) -> None:
+    """Build floor, walls, pictures, boxes, tape on the floor and light, of a `known_takes.Room`."""
+    random, wall = np.random.default_rng(room["seed"]), mottled(room["wall"], 0.06, 0.7)
     base, tape = mottled((0.07, 0.05, 0.04), 0.1, 5.0), mottled((0.62, 0.58, 0.16), 0.1, 5.0)
-    add_box((-HALF, -HALF, -0.1), (HALF, HALF, 0.0), floor, room.boards)
+    add_box((-HALF, -HALF, -0.1), (HALF, HALF, 0.0), mottled(room["floor"], 0.15, 6.0), room["boards"])
     add_box((-0.9, -0.35, 0.0), (0.9, -0.31, 0.002), tape)
     add_box((0.25, -1.2, 0.0), (0.29, 1.0, 0.0021), tape)
     for axis, sign in ((0, -1), (0, 1), (1, -1), (1, 1)):
@@ -210,8 +191,8 @@ def furnish(name: str) -> None:
         look = mottled(random.uniform(0.05, 0.45, 3), 0.4, 5.0)
         along_wall(axis, sign, (0.5, 0.9), (place, place + width), (0, top), look)
     lamp = bpy.data.objects.new("lamp", bpy.data.lights.new("lamp", "AREA"))
-    lamp.data.energy, lamp.data.size, lamp.location = 215, 1.0, room.lamp
-    lamp.rotation_euler = (Vector((0, 0, 0.6)) - Vector(room.lamp)).to_track_quat("-Z", "Y").to_euler()
+    lamp.data.energy, lamp.data.size, lamp.location = 215, 1.0, room["lamp"]
+    lamp.rotation_euler = (Vector((0, 0, 0.6)) - Vector(room["lamp"])).to_track_quat("-Z", "Y").to_euler()
     bpy.context.scene.collection.objects.link(lamp)
     bpy.context.scene.world = world = bpy.data.worlds.new("world")
     world.use_nodes = True
@@ -278,7 +259,7 @@ def dress(scene: dict[str, np.ndarray]) -> tuple[Any, Any]:
 def main() -> None:
     """Drape and draw."""
     scene = dict(np.load(WORK / "scene.npz"))
-    room, plates, given = str(scene["room"]), int(scene["plates"]), json.loads(str(scene["cameras"]))
+    plates, room, given = int(scene["plates"]), *(json.loads(str(scene[k])) for k in ("room", "cameras"))
     for thing in list(bpy.data.objects):
         bpy.data.objects.remove(thing)
     cloth = drape(scene)
@@ -296,7 +277,7 @@ def main() -> None:
             thing.data.vertices.foreach_set("co", places.ravel())
             thing.data.update()
         for name, camera in cameras.items():
-            boxes[name].append(surroundings(np.vstack(shapes)[::5], ROOMS[room].lamp, given[name]))
+            boxes[name].append(surroundings(np.vstack(shapes)[::5], room["lamp"], given[name]))
             draw(camera, WORK / f"{name}_{frame:06}.png", frame % plates, boxes[name][-1])
     (WORK / "boxes.json").write_text(json.dumps(boxes))
 

@@ -18,6 +18,25 @@ SLACKS = {**TROUSERS, "length": 0.84, "inseam": 0.60}  # above a shorter wearer'
 
 
 @dataclass(frozen=True)
+class Room:
+    """Where a recording is made."""
+
+    seed: int  # of the pictures on the walls and the boxes
+    lamp: tuple[float, float, float]  # m, where it hangs
+    wall: tuple[float, float, float]  # colour
+    floor: tuple[float, float, float] = (0.50, 0.42, 0.32)
+    boards: bool = True  # the floor's
+
+
+ROOMS = {
+    "A": Room(ord("A"), (0.7, -0.6, 3.9), wall=(0.34, 0.37, 0.39)),
+    "B": Room(ord("B"), (-0.6, -0.7, 3.9), wall=(0.34, 0.31, 0.28)),
+    "studio": Room(ord("s"), (0.4, -1.0, 3.9), wall=(0.60, 0.60, 0.58), floor=(0.58, 0.58, 0.56), boards=False),
+    "carpet": Room(ord("c"), (-0.9, 0.3, 3.9), (0.40, 0.30, 0.18), (0.30, 0.17, 0.11), boards=False),  # like skin
+}
+
+
+@dataclass(frozen=True)
 class Take:
     """Who wears what and moves how: a file of DATA/motions from a frame on, or one of `SCRIPTS`."""
 
@@ -30,12 +49,12 @@ class Take:
     frames: int = 50
     flight: tuple[int, int] | None = None  # frames of take-off and landing
     cut: dict[str, float] = field(default_factory=dict)  # m, measures in which the garment differs from its owner's
-    room: str = ""  # one of those of `known_motion_blender.py`; if empty, the one that is named like the subject
+    room: str = ""  # one of `ROOMS`; if empty, the one that is named like the subject
 
     @property
-    def place(self) -> str:
-        """The name of the room."""
-        return self.room or self.subject
+    def place(self) -> Room:
+        """The room."""
+        return ROOMS[self.room or self.subject]
 
     @property
     def plates(self) -> str:
