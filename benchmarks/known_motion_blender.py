@@ -224,8 +224,8 @@ def add_camera(name: str, given: dict[str, Any]) -> Any:
     return camera
 
 
-def surroundings(points: np.ndarray, light: Colour, camera: dict[str, Any], pad: int = 20) -> Box:
-    """Return the box of the picture around points (N,3) and their shadow on the floor."""
+def surroundings(points: np.ndarray, light: Colour, camera: dict[str, Any], pad: int) -> Box:
+    """Return the box of the picture around points (N,3) and their shadow on the floor, and so many pixels more."""
     away = points - np.array(light)
     shadow = np.array(light) - away * (light[2] / away[:, 2:])
     seen = np.vstack([points, shadow]) @ np.transpose(camera["turn"]) + camera["translation"]
@@ -277,7 +277,7 @@ def main() -> None:
             thing.data.vertices.foreach_set("co", places.ravel())
             thing.data.update()
         for name, camera in cameras.items():
-            boxes[name].append(surroundings(np.vstack(shapes)[::5], room["lamp"], given[name]))
+            boxes[name].append(surroundings(np.vstack(shapes)[::5], room["lamp"], given[name], room["pad_px"]))
             draw(camera, WORK / f"{name}_{frame:06}.png", frame % plates, boxes[name][-1])
     (WORK / "boxes.json").write_text(json.dumps(boxes))
 

@@ -15,6 +15,7 @@ WIDE = {"length": 0.60, "hem_circumference": 2.4}
 CULOTTES = {"length": 0.68, "inseam": 0.44, "leg_opening_circumference": 0.66}
 TROUSERS = {"length": 0.90, "inseam": 0.66, "leg_opening_circumference": 0.48}
 SLACKS = {**TROUSERS, "length": 0.84, "inseam": 0.60}  # above a shorter wearer's ankles
+WHOLE = 2000  # px, more than a picture: on a floor of one colour it shows where a picture was pasted in
 
 
 @dataclass(frozen=True)
@@ -26,12 +27,18 @@ class Room:
     wall: tuple[float, float, float]  # colour
     floor: tuple[float, float, float] = (0.50, 0.42, 0.32)
     boards: bool = True  # the floor's
+    pad_px: int = 20  # around the person and the shadow, what is drawn anew in a frame
 
 
 ROOMS = {
     "A": Room(ord("A"), (0.7, -0.6, 3.9), wall=(0.34, 0.37, 0.39)),
     "B": Room(ord("B"), (-0.6, -0.7, 3.9), wall=(0.34, 0.31, 0.28)),
-    "studio": Room(ord("s"), (0.4, -1.0, 3.9), wall=(0.60, 0.60, 0.58), floor=(0.58, 0.58, 0.56), boards=False),
+    "studio": Room(
+        ord("s"), (0.4, -1.0, 3.9), wall=(0.60, 0.60, 0.58), floor=(0.58, 0.58, 0.56), boards=False, pad_px=WHOLE
+    ),
+    "lab": Room(
+        ord("l"), (-0.8, -0.2, 3.9), wall=(0.55, 0.56, 0.58), floor=(0.42, 0.43, 0.45), boards=False, pad_px=WHOLE
+    ),
     "carpet": Room(ord("c"), (-0.9, 0.3, 3.9), (0.40, 0.30, 0.18), (0.30, 0.17, 0.11), boards=False),  # like skin
 }
 
@@ -125,5 +132,6 @@ TAKES = {
     # other rooms: white, and of the colour of skin
     "walk_A_studio": Take("A", "skirt", "walk_A", 121, GREEN, start=150, frames=40, room="studio"),
     "kneeup_B_studio": Take("B", "shorts", "kneeup_B", 123, PURPLE, start=140, frames=24, room="studio"),
+    "dance_A_lab": Take("A", "skirt", "dance", 124, GREY, frames=40, room="lab"),
     "kneeup_B_carpet": Take("B", "shorts", "kneeup_B", 122, GREY, start=140, frames=40, room="carpet"),
 }

@@ -159,13 +159,16 @@ class Registry:
 def load_registry(local_files: Iterable[Path] = ()) -> Registry:
     """Return a registry of all installed plugins, the built-in ones first, and of plugin files."""
     registry = Registry()
-    for entry in sorted(entry_points(group=GROUP), key=lambda e: (_distribution(e) != GROUP, _distribution(e), e.name)):
-        version = entry.dist.version if entry.dist else ""
-        registry.add(Origin(entry.name, _distribution(entry), version), entry.load)
+    found = {_origin(entry): entry for entry in entry_points(group=GROUP)}
+    for origin in sorted(found, key=lambda origin: (origin.distribution != GROUP, origin.distribution, origin.plugin)):
+        registry.add(origin, found[origin].load)
     for path in local_files:
         registry.add(Origin(path.stem, str(path)), partial(import_file, path))
     return registry
 
 
-def _distribution(entry: EntryPoint) -> str:
-    return entry.dist.name if entry.dist else ""
+def _origin(entry: EntryPoint) -> Origin:
+    if entry.dist is None:
+        return Origin(entry.name, "")
+    metadata = entry.dist.metadata  # is read each time
+    return Origin(entry.name, metadata["Name"], metadata["Version"])

@@ -95,6 +95,7 @@ def test_a_run_folder_within_the_recording_is_refused_before_it_is_made(call, tm
         ("{room: background}", "background/cam03.png", "no clean plate of cam03"),
     ],
 )
+@pytest.mark.long
 def test_a_plan_tells_what_is_missing_as_a_run_does_before_it_begins(call, tmp_path, stages, lost, message):
     shutil.copytree(CLIP, tmp_path / "clip")
     shutil.rmtree(tmp_path / "clip/keypoints", ignore_errors=True)
@@ -416,6 +417,7 @@ def test_paths_of_changes_start_where_the_run_was_begun(call, tmp_path, monkeypa
 
 
 @pytest.mark.parametrize("truth", [[], ["--truth", str(CLIP / "truth/angles.csv")]])
+@pytest.mark.long
 def test_a_comparison_is_made_as_in_the_run(call, tmp_path, truth):
     known = read_columns(CLIP / "truth/angles.csv")
     late = {name: np.roll(column, 8) if name != "frame" else column for name, column in known.items()}
@@ -430,6 +432,7 @@ def test_a_comparison_is_made_as_in_the_run(call, tmp_path, truth):
     assert lags[1] is None  # none is found so near
 
 
+@pytest.mark.long
 def test_a_run_folder_from_elsewhere_is_compared_with_what_is_given(call, tmp_path):
     known = read_columns(CLIP / "truth/angles.csv")
     tables.write_columns(layout.place(tmp_path, layout.ANGLES), {**known, "time": known["frame"] / 30})
@@ -533,6 +536,7 @@ def test_a_bar_fits_the_terminal_and_what_comes_after_it_begins_a_line(monkeypat
 
 
 @pytest.mark.parametrize("garment", ["skirt", "shorts", "cylinder"])
+@pytest.mark.long
 def test_a_garment_is_drawn(call, garment):
     shown = call("show", "garment", garment, "--out", "garment.png")
     assert shown.exit_code == 0, shown.output
@@ -590,6 +594,7 @@ def test_only_a_garment_has_a_picture(call):
     assert "only a garment has a picture" in call("show", "matcher", "contour_icp", "--out", "it.png").output
 
 
+@pytest.mark.long
 def test_the_module_runs_as_the_command_does_and_decoders_do_not_talk_besides(tmp_path):
     shutil.copytree(CLIP, tmp_path / "clip")
     video = tmp_path / "clip" / "videos" / "cam02.mp4"

@@ -68,6 +68,7 @@ def test_a_run_is_asked_after_interrupted_and_gone_on_with(tmp_path, path, stop)
     assert same(the_track(tmp_path), the_track(whole))
 
 
+@pytest.mark.long
 def test_a_killed_run_is_known_to_have_ended(tmp_path, path):
     with started(["run", path.name, "--out", "out", "--store", "store.zarr"], tmp_path, slow="0.1") as run:
         assert run.stderr is not None

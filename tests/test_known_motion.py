@@ -70,6 +70,7 @@ def test_bent_joints_show_in_the_signs_of_the_angles():
         assert bent[name] - straight[name] == pytest.approx(by, abs=8)  # the centres are not quite in a plane
 
 
+@pytest.mark.long
 def test_scripted_motions_stand_on_the_floor():
     body = made.read_body(SKIRT / "subject")
     for script in made.SCRIPTS:
@@ -111,6 +112,7 @@ def test_garments_have_their_measures(wearer):
             assert along == pytest.approx(measures["length"] - measures["inseam"], rel=0.03)
 
 
+@pytest.mark.long
 def test_a_leg_that_comes_through_the_cloth_is_told():
     body = made.read_body(SKIRT / "subject")
     garment = sew(body, json.loads((SKIRT / "subject/garment.json").read_text()))

@@ -83,6 +83,7 @@ def count(store):
     return max((a.frames for a in store.artifacts() if a.path.name.startswith("track-")), default=0)
 
 
+@pytest.mark.long
 def test_growing_stop_continues(tmp_path, path, whole):
     for frames in (1, 2, 5, 12):
         _, lines = run_tiny(path, tmp_path / "grown", frames=frames)
@@ -108,6 +109,7 @@ def test_a_smaller_stop_has_the_notes_of_its_frames_only(tmp_path, path):
     assert short == tuple(note for note in longer if note.startswith("frame 1:"))
 
 
+@pytest.mark.long
 def test_a_smaller_stop_than_what_is_half_done(tmp_path, path, monkeypatch, whole):
     monkeypatch.setenv("TINY_RAISE_AT", "8")
     with pytest.raises(ComponentFailed):
@@ -165,6 +167,7 @@ def origin(path):
     return pipeline.registry.origin(type(track.segmenter))
 
 
+@pytest.mark.long
 def test_lost_frames_keep_the_prediction_and_say_so(tmp_path):
     clip = write_recording(tmp_path / "clip", frames=9, cameras=3)
     for camera, frame in [("cam01", 3), ("cam01", 4), ("cam02", 4), ("cam01", 5), ("cam02", 5), ("cam03", 5)]:
@@ -286,6 +289,7 @@ def test_a_doubted_frame_is_kept_as_such(tmp_path, monkeypatch):
     assert pasts[3:] == [[False, False, True], [False, True, False], [True, False, False]]
 
 
+@pytest.mark.long
 def test_without_a_garment_there_is_no_cloth(tmp_path):
     stages = STAGES | {"track": STAGES["track"] | {"draper": None, "cloth_fitter": None}}
     path = write_pipeline(tmp_path, write_recording(tmp_path / "clip"), garment=None, stages=stages)

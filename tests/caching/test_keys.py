@@ -307,6 +307,7 @@ def test_all_of_mocapflow_that_a_plugin_or_the_core_imports_counts():
     assert {"series", "geometry", "steady", "storage.checkpoint"} <= imported <= known
 
 
+@pytest.mark.long
 def test_an_edited_plugin_file_changes_the_keys_of_its_components(tmp_path, clip):
     path = write_pipeline(tmp_path, clip)
     copy = tmp_path / "plugin.py"
@@ -320,6 +321,7 @@ def test_an_edited_plugin_file_changes_the_keys_of_its_components(tmp_path, clip
     assert changed(found[0], found[2]) == set(TRACK)  # one file, one digest
 
 
+@pytest.mark.long
 def test_where_a_plugin_file_lies_does_not_count(tmp_path, clip):
     path = write_pipeline(tmp_path, clip)
     text, found = path.read_text(), []

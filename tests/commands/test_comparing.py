@@ -37,12 +37,14 @@ def runs():
         return {(run["variant"], run["recording"]): (int(run["frames"]), run["failed"]) for run in csv.DictReader(file)}
 
 
+@pytest.mark.long
 def test_all_cells(compare):
     done = compare("--frames", "0:2")
     assert done.exit_code == 0, done.output
     assert runs() == {(variant, clip): (2, "") for variant in ("one", "other") for clip in ("long", "short")}
 
 
+@pytest.mark.long
 def test_a_cell_that_fails_does_not_end_the_others(compare, monkeypatch):
     monkeypatch.setenv("TINY_RAISE_AT", "5")
     done = compare()

@@ -45,6 +45,7 @@ def test_a_damaged_memory_of_the_run_is_told(call):
     assert told.exit_code == 2 and "command.json  this file is damaged" in told.stderr
 
 
+@pytest.mark.long
 def test_results_of_another_run_are_set_aside(call):
     run(call)
     (OUT / layout.ERRORS).write_text("of the first run")
@@ -109,6 +110,7 @@ def test_what_differs_is_named():
     assert differing({"track": "a", "smooth": "b"}, {"track": "a", "export": "d"}) == ["smooth", "export"]
 
 
+@pytest.mark.long
 def test_an_export_is_of_the_track_that_was_exported(call):
     run(call, "--set", "stages.export={use: export, from: {track: track}, formats: [csv]}")
     files = (OUT / layout.ANGLES).read_text(), (OUT / layout.RUN).read_text()
@@ -129,6 +131,7 @@ def test_an_export_is_of_the_track_that_was_exported(call):
     ],
     ids=["a setting", "a stage removed", "another track exported"],
 )
+@pytest.mark.long
 def test_an_export_after_an_edit_is_refused(call, edit, changed):
     run(call)
     content = yaml.safe_load(Path("tiny.yaml").read_text())

@@ -404,6 +404,7 @@ def shipped_files(experiments):
 
 
 @pytest.mark.parametrize("file", shipped_files(experiments=True), ids=lambda file: file.name)
+@pytest.mark.long
 def test_every_cell_of_a_shipped_experiment_loads(file):
     for cell in load_experiment(file):
         options = {"recording": cell.recording, "changes": cell.changes, "folder": cell.folder}

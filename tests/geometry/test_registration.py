@@ -41,6 +41,7 @@ def test_error_with_noise_is_what_theory_predicts() -> None:
     assert np.sqrt(np.mean(outside)) > np.sqrt(3) * sd  # a point that was left out shows its own noise and the fit's
 
 
+@pytest.mark.long
 def test_how_far_a_noisy_motion_carries_points_astray_is_what_theory_predicts() -> None:
     """T-CAL: at the points' middle sd² 3/N, elsewhere more: target registration error (Fitzpatrick et al. 1998)."""
     count, sd, draws = 20, 0.001, 400

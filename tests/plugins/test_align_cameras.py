@@ -28,6 +28,7 @@ def aligned(folder, body, cameras, least_px, frames=8):
     return AlignCameras(frames=frames, sigma_px=1.0, least_px=least_px).run(open_recording(folder, stop=8)).cameras
 
 
+@pytest.mark.long
 def test_good_cameras_are_left_as_they_are(body, tmp_path):
     folder = copy_demo(tmp_path / "recording")
     cameras = open_recording(folder).cameras
@@ -35,6 +36,7 @@ def test_good_cameras_are_left_as_they_are(body, tmp_path):
     assert all(np.array_equal(a.camera_from_world, b.camera_from_world) for a, b in zip(found, cameras, strict=True))
 
 
+@pytest.mark.long
 def test_a_knocked_camera_is_turned_back(body, tmp_path, caplog):
     folder = copy_demo(tmp_path / "recording")
     cameras = open_recording(folder).cameras

@@ -138,6 +138,7 @@ def test_computed_weights_move_the_mesh_nearly_as_given_ones(body, recording):
         assert np.sqrt((distance**2).mean()) < 0.007 and np.percentile(distance, 95) < 0.015
 
 
+@pytest.mark.long
 def test_morph_reads_the_second_shape(body, recording):
     shape = body.vertices + 0.01
     lines = [f"v {x} {y} {z}" for x, y, z in shape] + [f"f {a} {b} {c}" for a, b, c in body.faces + 1]

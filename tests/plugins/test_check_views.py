@@ -187,6 +187,7 @@ def test_a_frame_passes_without_its_wrong_views():
     assert checks.passed(good) is good
 
 
+@pytest.mark.long
 def test_the_track_goes_without_them_and_says_so(tmp_path, clip):
     spoil = {"use": "corrupt", "events": [{"what": "black", "first": 2, "count": 1, "views": ["cam01"]}]}
     path = write_pipeline(tmp_path, clip, stages={"corrupt": spoil, "checks": "check_views", **STAGES})

@@ -187,6 +187,7 @@ def test_five_degrees_off_is_found_to_less_than_one():
     assert max(knee_error_deg(SCENE, [ContourIcp()], seed) for seed in STARTS) < 1.0
 
 
+@pytest.mark.long
 def test_clutter():
     """T-ICP2, a quarter of stray points in every contour; plain least squares is led astray by them."""
     plain = ContourIcp(first_loss="none", later_loss="none")

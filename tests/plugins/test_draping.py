@@ -61,6 +61,7 @@ def test_distances_of_a_box_are_exact():
     np.testing.assert_allclose(distance, exact, atol=1e-12)
 
 
+@pytest.mark.long
 def test_fields_follow_the_joints():
     scene, poses = skirted(), leg_poses()
     shins = (scene.body.vertices[:, 2] > 0.15) & (scene.body.vertices[:, 2] < 0.4)

@@ -114,6 +114,7 @@ def test_by_the_literal_rule_what_touches_stays_and_strands_keep_their_length():
 
 
 @pytest.mark.parametrize("flexion", [0, 30, 60, 90])
+@pytest.mark.long
 def test_a_tube_stays_around_its_thigh(tube, flexion):
     poses = PoseBatch(root=np.eye(4)[None], angles=np.radians([[flexion, 0, 0, 0]]))
     draped = drape(tube, poses, sweeps=20)

@@ -85,6 +85,7 @@ def test_a_strand_goes_with_the_thigh_under_it():
     assert (along[right] @ DOWN > 0.9).all()
 
 
+@pytest.mark.long
 def test_a_skirt_closes_over_a_leg_that_is_raised_aside():
     """The trunk lies on its side, one leg stands and the other is level: T-CL4 allows 0.24."""
     body, aside = legs(), np.array([[0.0, -1, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0]])

@@ -115,6 +115,7 @@ def hanging_together(seconds: float, rate: float, takes: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("rate", [10.0, 120.0])
+@pytest.mark.long
 def test_the_interval_of_an_rms_does_not_hang_on_the_frame_rate(rate: float) -> None:
     low, high = np.transpose([compare.rms_interval(error, rate) for error in hanging_together(16.0, rate, 120)])
     assert 0.72 < np.mean((low <= np.sqrt(2)) & (np.sqrt(2) <= high)) < 0.95
@@ -176,6 +177,7 @@ def test_without_reference_there_is_a_note_and_no_error(tmp_path: Path) -> None:
     assert not former.exists()
 
 
+@pytest.mark.long
 def test_demo_truth_is_found(tmp_path: Path) -> None:
     scene = demo_scene()
     recording = SimpleNamespace(folder=DEMO)
@@ -224,6 +226,7 @@ def test_a_comparison_forgets_what_another_reference_left_but_the_keypoints(tmp_
     ]
 
 
+@pytest.mark.long
 def test_a_reference_in_radians_or_out_of_order_is_told(tmp_path: Path) -> None:
     columns = read_columns(DEMO / "truth" / "angles.csv")
     clock = {"frame": columns.pop("frame")}

@@ -84,6 +84,7 @@ def test_unknown_proportions(body):
     assert "girth" in PROPORTIONS
 
 
+@pytest.mark.long
 def test_lengths_come_back_from_keypoints(body, cameras, tmp_path):
     person = scaled(body, {"stature": 1.06, "thigh": 1.05, "shank": 0.97, "upper_arm": 1.04, "trunk": 0.97})
     folder = copy_demo(tmp_path / "recording")
@@ -95,6 +96,7 @@ def test_lengths_come_back_from_keypoints(body, cameras, tmp_path):
         assert after < 0.012 and after < 0.7 * before, ends  # m; the prior draws towards average proportions
 
 
+@pytest.mark.long
 def test_a_standing_trial_of_somebody_else_is_left_out(body, cameras, tmp_path, caplog):
     folder = copy_demo(tmp_path / "recording")
     write(folder, body, poses(body, 3), cameras, noise_px=0.2)

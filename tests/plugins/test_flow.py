@@ -136,6 +136,7 @@ def test_the_loop_hands_the_flow_to_its_steps(tmp_path):
     assert sum(sum(counts) for _, *counts in seen) > 0
 
 
+@pytest.mark.long
 def test_a_longer_run_follows_anew_but_the_track_goes_on(tmp_path):
     clip, digests = write_recording(tmp_path / "clip", frames=4), Digests()
     whole, part = (

@@ -187,6 +187,7 @@ def test_usd_plays_every_other_frame_at_the_speed_of_the_recording(result: Resul
     assert played == pytest.approx(track.time[-1] - track.time[0])
 
 
+@pytest.mark.long
 def test_rerun_holds_everything_on_one_timeline(result: Result, tmp_path: Path) -> None:
     logged = readers.rerun_entities(write("rrd", result, tmp_path))
     track, body = result.track, result.scene.body

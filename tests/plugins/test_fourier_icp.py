@@ -136,6 +136,7 @@ def test_curvature_counts_as_a_distance():
     assert nearest_compatible(one, normal, other, np.repeat(normal, 2, axis=0), 10.0, -1.0)[0] == 1
 
 
+@pytest.mark.long
 def test_twenty_degrees_off():
     """T-ICP3: as many starts are found with the low-pass as without."""
     plain, low = (

@@ -77,6 +77,7 @@ def test_a_turned_camera_gives_others(track: Track, recording: Recording, tmp_pa
 
 
 @pytest.mark.usefixtures("undrawn")
+@pytest.mark.long
 def test_a_point_that_one_camera_mistakes_is_where_the_others_see_it(
     track: Track, recording: Recording, tmp_path: Path
 ) -> None:

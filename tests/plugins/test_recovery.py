@@ -299,6 +299,7 @@ def test_a_foot_does_not_turn_because_its_leg_was_found() -> None:
     [(8, 1, 3, True), (9, 1, 3, False), (9, 1, 2, True), (32, 4, 3, True), (36, 4, 3, False)],
     ids=["in turn", "not in turn", "new", "in turn, one frame of four", "not in turn, one frame of four"],
 )
+@pytest.mark.long
 def test_doubts_that_last_are_looked_into_now_and_then(index, every, doubts, looked) -> None:
     """As where the room behind the person is not known rightly: the search takes as long as tens of frames."""
     calls = []
@@ -350,6 +351,7 @@ def test_limbs_are_looked_for_where_enough_of_the_room_is_known(columns, looked)
     [(Past(), 0.9, 5), (Past(), 0.0, 1), (scenes.tiny_past(SCENE, POSE), 0.9, 1)],
     ids=["doubted", "not doubted", "a later frame"],
 )
+@pytest.mark.long
 def test_a_first_frame_that_is_doubted_is_searched_twice_and_turned_round(past, end, times) -> None:
     begun, lost = [], pictures.tiny_state(SCENE, astray(end), POSE)
 
@@ -361,6 +363,7 @@ def test_a_first_frame_that_is_doubted_is_searched_twice_and_turned_round(past, 
     assert len(begun) == times
 
 
+@pytest.mark.long
 def test_a_first_pose_that_looks_the_other_way_is_turned_round(caplog) -> None:
     change = np.zeros(len(POSE.angles))
     change[SCENE.body.screw_names.index("knee_l.flexion")] = 1.2  # of no other pose: no knee bends forward
@@ -497,6 +500,7 @@ def test_cloth_that_strays_calls_for_a_search_and_is_not_doubted(monkeypatch, fo
     [(0.07, 9, 1, False), (0.12, 9, 1, True), (0.12, 9, 3, False), (0.12, 8, 3, True)],
     ids=["a little", "new", "not in turn", "in turn"],
 )
+@pytest.mark.long
 def test_a_joint_beyond_its_limits_is_looked_for_though_nothing_strays(beyond, index, before, looked) -> None:
     """5 degrees are 0.09: a limit is soft, and who is made so stays beyond it."""
     limits = SCENE.body.limits.copy()

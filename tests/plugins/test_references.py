@@ -155,6 +155,7 @@ def test_two_rigs_are_brought_together_by_common_points(own: Ours, tmp_path: Pat
 
 
 @pytest.mark.usefixtures("unrendered")
+@pytest.mark.long
 def test_without_common_points_joint_centres_do(own: Ours, tmp_path: Path) -> None:
     read(tmp_path, moved(PLACES)[0])
     got = evaluate(own, tmp_path / "markers.c3d", tmp_path)
@@ -219,6 +220,7 @@ def test_a_faster_marker_system_that_started_later(own: Ours, tmp_path: Path) ->
 @pytest.mark.usefixtures("unrendered")
 @pytest.mark.parametrize("kept", [slice(1, 20), slice(3, 60, 3), slice(10, 60, 3)], ids=str)
 @pytest.mark.parametrize("name", ["joints.c3d", "joints.trc", "angles.mot"])
+@pytest.mark.long
 def test_a_run_against_its_own_files_is_off_by_nothing(tmp_path: Path, name: str, kept: slice) -> None:
     pytest.importorskip("ezc3d")
     track = make_track(TRACK.root[kept], TRACK.angles[kept])

@@ -155,6 +155,7 @@ def test_a_canvas_knows_what_triangles_may_cover() -> None:
     assert veiled.box(corners - [0, 4.0, 0]) == (slice(None), slice(None))  # behind the camera: anything may be
 
 
+@pytest.mark.long
 def test_report_holds_everything(scene: Scene, track: Track, recording: Recording, tmp_path: Path) -> None:
     run_folder = RunFolder(path=tmp_path, recipe={"pipeline": "<skirt>", "versions": {"numpy": "2"}})
     observed = track.observed.copy()
@@ -214,6 +215,7 @@ def test_report_fetches_nothing(page: str) -> None:
     assert "url(" not in style and "@import" not in style
 
 
+@pytest.mark.long
 def test_report_without_reference(scene: Scene, track: Track, recording: Recording, page: str, tmp_path: Path) -> None:
     run_folder = RunFolder(path=tmp_path, recipe={})
     nothing = Evaluation(reference="", rows=(), notes=("the recording has no truth/angles.csv",))
@@ -223,6 +225,7 @@ def test_report_without_reference(scene: Scene, track: Track, recording: Recordi
 
 
 @pytest.mark.usefixtures("unrendered")  # the report draws the angles, not the evaluation
+@pytest.mark.long
 def test_an_angle_that_the_reference_never_has_is_drawn_without_it(
     scene: Scene, track: Track, recording: Recording, tmp_path: Path
 ) -> None:

@@ -149,6 +149,7 @@ def test_frames_without_people_are_passed_over(body, pose, recording, tmp_path):
         StartFromKeypoints().run(open_recording(folder, stop=1), scene)
 
 
+@pytest.mark.long
 def test_frames_that_show_nothing_of_what_the_body_has_are_passed_over(body, pose, recording, tmp_path):
     """Legs, of a person whose legs are behind a table in the first frame."""
     folder = copy_demo(tmp_path / "recording")

@@ -216,6 +216,7 @@ def test_an_angle_of_one_side(body: Body, tmp_path: Path, wanted: str) -> None:
     assert training.fit([tmp_path / "knees.csv"], body, [wanted]).names == ("knee_l.flexion",)
 
 
+@pytest.mark.long
 def test_errors(body: Body, tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"no kind of file with joint angles\n.*known: \.bvh, \.csv, \.mot, \.npz"):
         training.read_angles(tmp_path / "take.txt", body)

@@ -77,6 +77,7 @@ def edit(path, change):
 
 
 @pytest.mark.parametrize("clip", ["skirt_steps", "shorts_steps"])
+@pytest.mark.long
 def test_the_demo_is_healthy(clip):
     assert [f for f in examine(DEMO / clip) if f.severity != "note"] == []
 

@@ -44,6 +44,7 @@ def test_videos_of_two_cameras_that_are_exchanged(clip):
     assert said(clip) == ["nobody stands where the first pose says in cam01, cam02"]
 
 
+@pytest.mark.long
 def test_a_first_pose_where_nobody_stands(clip, monkeypatch):
     pose = json.loads((clip / "init.json").read_text())
     pose["root_translation"][0] += 0.8

@@ -75,6 +75,7 @@ def test_a_lag_between_signals_is_found_between_frames(lag):
     assert synchrony.best_lag(np.ones((80, 1)), np.ones((80, 1)), 10)[1] == 0  # nothing moves
 
 
+@pytest.mark.long
 def test_a_late_camera_is_measured_and_heeded(tmp_path):
     folder = write(tmp_path / "clip", {"cam02": 3})
     measured = {m.camera: m for m in synchrony.measure(open_recording(folder))}
@@ -134,6 +135,7 @@ def test_a_wrong_recording_json_is_explained(tmp_path, text, said):
         open_recording(folder)
 
 
+@pytest.mark.long
 def test_the_standard_deviation_of_a_lag_is_that_of_repeated_noise():
     random, t = np.random.default_rng(0), np.arange(200)
     true = np.stack([np.sin(t / 9), np.cos(t / 13)], axis=1)

@@ -38,6 +38,7 @@ def test_a_part_has_its_own_start_and_others_see_the_whole(path):
     assert wiring["smooth"]["track"] == "track"
 
 
+@pytest.mark.long
 def test_each_of_two_tracks_is_joined_of_its_own_parts(tmp_path):
     stages = {label: STAGES[label] for label in ("background", "start")}
     stages |= {"first": STAGES["track"], "track": STAGES["track"], "smooth": "tiny_smooth", "export": "tiny_export"}
@@ -75,6 +76,7 @@ def test_one_part_is_the_whole(path):
     assert in_parts(pipeline, range(20)) is pipeline
 
 
+@pytest.mark.long
 def test_parts_are_made_resumed_and_joined(tmp_path, path):
     store = tmp_path / "store.zarr"
     run_tiny(path, tmp_path, frames=13)  # the first part of the whole: its frames serve both

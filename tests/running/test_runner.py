@@ -118,6 +118,7 @@ def test_later_stages_know_how_the_earlier_ones_were_made(tmp_path, ran):
     assert recipe["settings"]["track"]["settings"]["segmenter"]["settings"]["sigma_px"] == 2.0
 
 
+@pytest.mark.long
 def test_what_a_stage_warned_of_is_told_again_when_it_comes_from_the_store(tmp_path, path, caplog):
     far, said = "stages.start={use: tiny_start, angle_rad: 1.5}", "the first pose bends far"
     run_tiny(path, tmp_path, far)
@@ -292,6 +293,7 @@ def test_results_do_not_depend_on_truth_and_reference(tmp_path, ran):
 
 
 @pytest.mark.parametrize("at", ["start", "track"])
+@pytest.mark.long
 def test_a_file_that_changes_while_a_run_goes_on_ends_it(tmp_path, monkeypatch, at):
     path = write_pipeline(tmp_path, write_recording(tmp_path / "clip", video=True))
     file = tmp_path / "clip" / "videos" / "cam01.mp4"

@@ -49,6 +49,7 @@ def copies(url):
 
 
 @everywhere
+@pytest.mark.long
 def test_what_one_has_made_another_finds(tmp_path, path, url):
     shared(path, tmp_path / "one", url)
     actions_of_plan = {line.label: line.action for line in plan(load(path), store=tmp_path / "two/store.zarr", url=url)}
@@ -72,6 +73,7 @@ def test_a_copy_is_plain_zarr(tmp_path, path, url):
     assert group[name].attrs["complete"] is True
 
 
+@pytest.mark.long
 def test_a_run_that_stopped_goes_on_elsewhere(tmp_path, path, url, monkeypatch):
     monkeypatch.setenv("TINY_RAISE_AT", "7")
     with pytest.raises(ComponentFailed, match="failed at frame 7"):
@@ -98,6 +100,7 @@ def test_who_writes_looks_at_what_is_here(tmp_path, path, url):
     assert store.load(store.find(key)) is not None
 
 
+@pytest.mark.long
 def test_what_is_made_anew_takes_the_place_of_the_copy(tmp_path, path, url, monkeypatch):
     shared(path, tmp_path / "one", url)
     pipeline, folder = load(path), tmp_path / "one"
@@ -143,6 +146,7 @@ def cut_line(monkeypatch, url):
 
 
 @everywhere
+@pytest.mark.long
 def test_a_copy_that_breaks_off_leaves_what_is_here(tmp_path, path, url, monkeypatch):
     shared(path, tmp_path / "one", url)
     run_tiny(path, tmp_path / "two", frames=5)
@@ -157,6 +161,7 @@ def test_a_copy_that_breaks_off_leaves_what_is_here(tmp_path, path, url, monkeyp
     assert same(the_track(tmp_path / "one"), the_track(tmp_path / "two"))
 
 
+@pytest.mark.long
 def test_a_copy_that_is_dropped_meanwhile_leaves_what_is_here(tmp_path, path, url, monkeypatch):
     """Another machine has sent one that is further."""
     shared(path, tmp_path / "one", url)
@@ -174,6 +179,7 @@ def test_a_copy_that_is_dropped_meanwhile_leaves_what_is_here(tmp_path, path, ur
     assert same(the_track(tmp_path / "one"), the_track(tmp_path / "two"))
 
 
+@pytest.mark.long
 def test_a_copy_takes_the_place_of_what_is_damaged_here(tmp_path, path, url):
     shared(path, tmp_path / "one", url)
     run_tiny(path, tmp_path / "two", frames=5)
@@ -184,6 +190,7 @@ def test_a_copy_takes_the_place_of_what_is_damaged_here(tmp_path, path, url):
     assert same(the_track(tmp_path / "one"), the_track(tmp_path / "two"))
 
 
+@pytest.mark.long
 def test_a_copy_takes_the_place_of_a_result_that_is_damaged_here(tmp_path, path, url):
     shared(path, tmp_path / "one", url)
     before = copies(url)
@@ -224,6 +231,7 @@ def test_two_that_make_the_same_leave_one_copy(tmp_path, path, url):
     assert json.loads((artifact.path / "zarr.json").read_text())["attributes"] == here.find(artifact.key).attributes
 
 
+@pytest.mark.long
 def test_a_damaged_copy_is_made_anew(tmp_path, path, url):
     shared(path, tmp_path / "one", url)
     files, root = fsspec.core.url_to_fs(url)

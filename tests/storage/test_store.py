@@ -173,6 +173,7 @@ def test_every_array_of_a_store_says_its_axes_and_unit(tmp_path, path):
 
 
 @pytest.mark.usefixtures("ran")
+@pytest.mark.long
 def test_a_track_is_read_by_xarray(tmp_path):
     xarray = pytest.importorskip("xarray")
     (folder,) = (tmp_path / "store.zarr").glob("track-*")
@@ -199,6 +200,7 @@ def test_a_track_has_named_arrays_whose_equal_axes_are_equally_long(tmp_path, pa
 
 
 @pytest.mark.parametrize("damaged", [False, True])
+@pytest.mark.long
 def test_others_read_the_store_without_complaint(tmp_path, path, damaged):
     xarray = pytest.importorskip("xarray")
     run_tiny(path, tmp_path, frames=5)
