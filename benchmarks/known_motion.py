@@ -199,7 +199,7 @@ def finish(take: Take, out: Path, room: Path) -> None:
         pictures = []
         for frame, (x, y, w, h) in enumerate(boxes):
             picture, drawn = empty[frame % PLATES].copy(), cv2.imread(str(out / f"work/{camera}_{frame:06}.png"))
-            weight = _fading(w, h)[..., None]
+            weight = _fading([x, y, w, h], picture.shape)[..., None]
             picture[y : y + h, x : x + w] += weight * (drawn - picture[y : y + h, x : x + w])
             noisy = _soft(picture) * TONE + random.normal(0, NOISE, picture.shape)
             pictures.append(np.clip(noisy.round(), 0, 255).astype("u1"))
@@ -229,10 +229,17 @@ def _soft(picture: np.ndarray) -> np.ndarray:
     return cv2.GaussianBlur(picture, (0, 0), SOFTNESS_PX)
 
 
-def _fading(width: int, height: int, margin: int = 12) -> np.ndarray:
-    """Return weights (H,W) that fall to zero at the border of a box."""
-    x, y = (np.minimum(np.arange(n) + 1, n - np.arange(n)) / margin for n in (width, height))
-    return np.clip(np.minimum(x[None], y[:, None]), 0, 1).astype("f4")
+def _fading(box: list[int], shape: tuple[int, ...], margin: int = 12) -> np.ndarray:
+    """Return weights (H,W) that fall to zero at the border of a box (x, y, width, height), except at the picture's."""
+    (x, y, width, height), (rows, columns) = box, shape[:2]
+    across, down = _ramp(width, x > 0, x + width < columns), _ramp(height, y > 0, y + height < rows)
+    return np.clip(np.minimum(across, down[:, None]) / margin, 0, 1).astype("f4")
+
+
+def _ramp(length: int, first: bool, last: bool) -> np.ndarray:
+    """Return the distance to the ends of a line that count, 1 there."""
+    along = np.arange(1.0, length + 1)
+    return np.minimum(along if first else np.inf, along[::-1] if last else np.inf) * np.ones(length)
 
 
 def main(name: str, data: Path, to: Path) -> None:

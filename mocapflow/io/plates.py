@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TypeVar
@@ -14,8 +15,10 @@ from mocapflow.errors import RecordingError
 from mocapflow.io.folders import plates
 from mocapflow.io.images import check_depth, read_image
 from mocapflow.io.lenses import View
+from mocapflow.io.turned import as_seen, shift_px, turn_between
 from mocapflow.records import F32, U8, Bool
 
+LOG = logging.getLogger("mocapflow")
 Picture = TypeVar("Picture", U8, F32)
 
 LEAST_SPREAD = 1.0  # grey levels; the rounding of 8-bit pictures alone makes 0.3
@@ -27,16 +30,21 @@ FARTHEST = 2.5  # standard deviations within which a pixel agrees
 MOST_GAIN = 1.5  # between a plate and a frame of one recording
 BLOCK = 8  # px, a side of the squares whose mean colours are looked at: noise has colours too
 GREY, COLOURED = 6.0, 20.0  # grey levels between channels or blocks: no colour or contrast, codecs make 3; surely some
+TURNED = (
+    "%s has turned by %.1f px since its clean plate was taken, which is laid over its first picture;"
+    " if its calibration is older than that, too, see the stage align_cameras"
+)
 SAME_ROOM = 10.0  # grey levels, median difference of a frame and its toned plate: above, it shows something else
 
 
 def background(folder: Path, views: Sequence[View], first: Callable[[], Frame]) -> Background | None:
     """Return the empty scene from background/<camera>.png or background/<camera>/*.png, None without plates.
 
-    Plates take the brightness and contrast of the first frame: cameras drift, and a person dims a room. With one plate
-    per camera the spread is one number per channel: the robust spread (1.4826 times the median absolute difference) of
-    the first frame against it, which people in the picture hardly change. With several it is the larger of that of
-    each pixel and its median over the picture.
+    Plates take the brightness and contrast of the first frame: cameras drift, and a person dims a room. A plate of a
+    camera that was nudged since is laid over the first frame; where it reaches beyond, the spread is inf. With one
+    plate per camera the spread is one number per channel: the robust spread (1.4826 times the median absolute
+    difference) of the first frame against it, which people in the picture hardly change. With several it is the larger
+    of that of each pixel and its median over the picture.
 
     Args:
         folder: the recording.
@@ -74,19 +82,37 @@ def plate_files(folder: Path, views: Sequence[View]) -> list[tuple[Path, ...]]:
 
 def _one(files: Sequence[Path], view: View, first: Frame, camera: int) -> tuple[F32, F32]:
     pictures = np.stack([view.image(_read(path, view)) for path in files]).astype(np.float32)
-    mean, off = _compared(pictures.mean(axis=0), first, camera, files[0])
+    frame, shown = first.images[camera].astype(np.float32), _shown(first, camera)
+    pictures, known = _laid_over(pictures, frame, shown, view)
+    mean, off = _compared(pictures.mean(axis=0), frame, shown & known, files[0])
     if len(files) > 1:
         each = pictures.std(axis=0, ddof=1)
         spread = np.maximum(each, np.median(each, axis=(0, 1)))
     else:
         spread = np.broadcast_to(NORMAL * np.median(off, axis=0), mean.shape)
-    return mean, np.maximum(spread, LEAST_SPREAD).astype(np.float32)
+    return mean, np.where(known[..., None], np.maximum(spread, LEAST_SPREAD), np.inf).astype(np.float32)
 
 
-def _compared(plate: F32, first: Frame, camera: int, path: Path) -> tuple[F32, F32]:
+def _laid_over(plates: F32, frame: F32, shown: Bool, view: View) -> tuple[F32, Bool]:
+    """Return plates (N, H, W, 3) as the camera of a frame (H, W, 3) sees the room, and where (H, W) it is known."""
+    plate, turn = plates.mean(axis=0), None
+    if shown[::THIN, ::THIN].any():
+        turn = turn_between(toned(plate, frame, shown), frame, shown, view.camera)
+    if turn is None:
+        return plates, np.ones(shown.shape, bool)
+    LOG.warning(TURNED, view.lens.name, shift_px(turn, view.camera))
+    moved = [as_seen(plate, turn) for plate in plates]
+    return np.stack([plate for plate, _ in moved]), moved[0][1]
+
+
+def _shown(frame: Frame, camera: int) -> Bool:
+    """Return which pixels (H, W) of a picture show the room, or somebody in it."""
+    hidden, size = frame.hidden_in(camera), frame.images[camera].shape[:2]
+    return np.full(size, frame.usable[camera]) if hidden is None else ~hidden & frame.usable[camera]
+
+
+def _compared(plate: F32, frame: F32, shown: Bool, path: Path) -> tuple[F32, F32]:
     """Return a plate (H, W, 3) in the tone of the first frame, and how far pixels of that (N, 3) are off it."""
-    frame, hidden = first.images[camera].astype(np.float32), first.hidden_in(camera)
-    shown = np.full(frame.shape[:2], first.usable[camera]) if hidden is None else ~hidden & first.usable[camera]
     usual = np.full((1, 3), USUAL_SPREAD / NORMAL, np.float32)
     if not shown[::THIN, ::THIN].any():
         return plate, usual

@@ -1,0 +1,123 @@
+"""Clean plates of a camera that was nudged afterwards."""
+
+import shutil
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from mocapflow.assets import Camera
+from mocapflow.io.turned import as_seen, shift_px, turn_between
+from mocapflow.recordings.recording import open_recording
+
+DEMO = Path(__file__).parents[2] / "examples" / "data" / "skirt_steps"
+CAMERA = Camera(
+    name="cam01",
+    intrinsics=np.array([[430.0, 0, 160], [0, 430, 200], [0, 0, 1]]),
+    distortion=np.zeros(5),
+    size=np.array([320, 400], np.int32),
+    camera_from_world=np.eye(4),
+)
+EVERYWHERE = np.ones((400, 320), bool)
+
+
+def room(noise=1.0, seed=0, height=400, width=320):
+    """A room with many things in it, the same for every seed of the noise."""
+    coarse = np.random.default_rng(7).uniform(40, 200, (height // 20, width // 20, 3))
+    smooth = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_CUBIC)
+    return (smooth + np.random.default_rng(seed).normal(0, noise, smooth.shape)).astype(np.float32)
+
+
+def homography(degrees, camera=CAMERA):
+    """Of a camera turned about its axes."""
+    turn = Rotation.from_euler("xyz", degrees, degrees=True).as_matrix()
+    return camera.intrinsics @ turn @ np.linalg.inv(camera.intrinsics)
+
+
+def seen(turn, noise=1.0):
+    return as_seen(room(0.0), turn)[0] + np.random.default_rng(1).normal(0, noise, (400, 320, 3)).astype(np.float32)
+
+
+def corners_off(found, true):
+    ends = np.array([[0, 0, 1], [320, 0, 1], [0, 400, 1], [320, 400, 1.0]])
+    here, there = ends @ found.T, ends @ true.T
+    return np.linalg.norm(here[:, :2] / here[:, 2:] - there[:, :2] / there[:, 2:], axis=1).max()
+
+
+@pytest.mark.parametrize("degrees", [(0.15, 0, 0), (0.2, -0.3, 0.4), (-1.5, 2.0, 1.0), (0, 4.0, 0)])
+def test_the_turn_of_a_camera_is_found(degrees):
+    true = homography(degrees)
+    assert corners_off(turn_between(room(), seen(true), EVERYWHERE, CAMERA), true) < 0.15
+
+
+def test_whoever_stands_before_the_room_does_not_count():
+    true = homography((0.2, -0.3, 0.4))
+    picture = seen(true)
+    person = np.random.default_rng(3).uniform(0, 255, (30, 13, 3))
+    picture[60:360, 90:220] = cv2.resize(person, (130, 300), interpolation=cv2.INTER_CUBIC)
+    assert corners_off(turn_between(room(), picture, EVERYWHERE, CAMERA), true) < 0.2
+
+
+def test_what_moves_together_in_a_corner_is_not_the_room():
+    true, picture = homography((0.2, -0.3, 0.4)), seen(homography((0.2, -0.3, 0.4)))
+    picture[300:, :110] = np.roll(room(), 9, axis=1)[300:, :110]  # a carpet that somebody pushed
+    assert corners_off(turn_between(room(), picture, EVERYWHERE, CAMERA), true) < 0.2
+
+
+def test_hidden_pixels_do_not_count():
+    true, picture = homography((0.2, -0.3, 0.4)), seen(homography((0.2, -0.3, 0.4)))
+    picture[:, :250] = np.roll(room(), 9, axis=1)[:, :250]
+    shown = EVERYWHERE.copy()
+    shown[:, :250] = False
+    assert corners_off(turn_between(room(), picture, shown, CAMERA), true) < 0.4
+
+
+@pytest.mark.parametrize(
+    "picture",
+    [
+        room(seed=2),
+        room(8.0, seed=2),
+        seen(homography((0.02, 0, 0))),
+        np.flip(room(), axis=1).copy(),
+        np.zeros((400, 320, 3), np.float32),
+    ],
+    ids=["at rest", "noise", "by a sixth of a pixel", "another room", "black"],
+)
+def test_the_plate_stays_where_nothing_or_nobody_tells(picture):
+    assert turn_between(room(seed=1), picture, EVERYWHERE, CAMERA) is None
+
+
+def test_a_bland_room_tells_nothing():
+    grey = np.full((400, 320, 3), 120, np.float32)
+    assert turn_between(grey, grey, EVERYWHERE, CAMERA) is None
+
+
+def test_a_plate_is_not_known_beyond_its_border():
+    turn = homography((0, 1.0, 0))  # by 430 tan 1° = 7.5 px
+    moved, known = as_seen(room(0.0), turn)
+    assert shift_px(turn, CAMERA) == pytest.approx(430 * np.tan(np.radians(1)), rel=0.2)
+    assert known.mean() == pytest.approx(1 - 7.5 / 320, abs=0.01)
+    back, _ = as_seen(moved, np.linalg.inv(turn))
+    np.testing.assert_allclose(back[20:-20, 20:-20], room(0.0)[20:-20, 20:-20], atol=1.0)
+
+
+def test_a_plate_is_laid_over_the_first_frame_and_it_is_said(tmp_path, caplog):
+    folder = Path(shutil.copytree(DEMO, tmp_path / "recording"))
+    good, file = open_recording(folder).background(), folder / "background" / "cam02.png"
+    camera = open_recording(folder).cameras[1]
+    turn = homography((0.3, 0.2, 0.5), camera)
+    moved, _ = as_seen(cv2.imread(str(file)).astype(np.float32), turn)
+    assert caplog.messages == []
+    cv2.imwrite(str(file), np.rint(moved).astype(np.uint8))
+    room = open_recording(folder).background()
+    (message,) = caplog.messages
+    assert message.startswith("cam02 has turned by ")
+    assert float(message.split()[4]) == pytest.approx(shift_px(np.linalg.inv(turn), camera), abs=0.3)
+    for number in (0, 2, 3):
+        np.testing.assert_array_equal(room.mean[number], good.mean[number])
+    known = room.known[1]
+    assert 0.95 < known.mean() < 0.995
+    assert np.percentile(np.abs(room.mean[1] - good.mean[1])[known], 95) < 3.0  # grey levels; 20 if it stays
+    assert room.spread[1][known].max() < 1.3 * good.spread[1].max()
