@@ -12,20 +12,27 @@ from typing import Any
 import numpy as np
 
 from mocapflow.data import Flow, Frame, FrameResult, Pose, blind
+from mocapflow.knocks import Knocks
 from mocapflow.records import F32, F64, I16, I32, Bool, Watch, array, record, unwatched
 from mocapflow.series import Wide
 
 
 @record
 class ViewChecks:
-    """Pictures of a recording that are not what a camera saw at that moment."""
+    """Pictures of a recording that are not what a camera saw at that moment, or not from where it was calibrated."""
 
     frame: I32 = array("P", unit="frame index, ascending")
     camera: I16 = array("P", unit="camera index")
     reasons: tuple[str, ...]  # P, for people
+    knocks: Knocks | None = None  # None: all cameras stood still
+
+    def steadied(self, frame: Frame) -> Frame:
+        """Return a frame as knocked cameras would have seen it, had they stood still."""
+        return frame if self.knocks is None else self.knocks.undone(frame)
 
     def passed(self, frame: Frame) -> Frame:
-        """Return a frame whose wrong views are not usable."""
+        """Return a frame, steadied, whose wrong views are not usable."""
+        frame = self.steadied(frame)
         first, last = np.searchsorted(self.frame, [frame.index, frame.index + 1])
         if first == last:
             return frame

@@ -31,6 +31,7 @@ CORE = (
     "functional",
     "geometry",
     "guards.answers",
+    "knocks",
     "loop",
     "model",
     "periodic",

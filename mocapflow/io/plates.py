@@ -12,10 +12,10 @@ import numpy as np
 from mocapflow.assets import Background
 from mocapflow.data import Frame
 from mocapflow.errors import RecordingError
+from mocapflow.geometry.turned import LEAST_PX, as_seen, shift_px, turn_between
 from mocapflow.io.folders import plates
 from mocapflow.io.images import check_depth, read_image
 from mocapflow.io.lenses import View
-from mocapflow.io.turned import as_seen, shift_px, turn_between
 from mocapflow.records import F32, U8, Bool
 
 LOG = logging.getLogger("mocapflow")
@@ -95,14 +95,18 @@ def _one(files: Sequence[Path], view: View, first: Frame, camera: int) -> tuple[
 
 def _laid_over(plates: F32, frame: F32, shown: Bool, view: View) -> tuple[F32, Bool]:
     """Return plates (N, H, W, 3) as the camera of a frame (H, W, 3) sees the room, and where (H, W) it is known."""
-    plate, turn = plates.mean(axis=0), None
+    turn, plate = None, plates.mean(axis=0)
     if shown[::THIN, ::THIN].any():
-        turn = turn_between(toned(plate, frame, shown), frame, shown, view.camera)
-    if turn is None:
+        turn = turn_between(_levels(toned(plate, frame, shown)), _levels(frame), shown, view.camera)
+    if turn is None or shift_px(turn, view.camera) < LEAST_PX:
         return plates, np.ones(shown.shape, bool)
     LOG.warning(TURNED, view.lens.name, shift_px(turn, view.camera))
     moved = [as_seen(plate, turn) for plate in plates]
     return np.stack([plate for plate, _ in moved]), moved[0][1]
+
+
+def _levels(picture: F32) -> U8:
+    return np.clip(np.rint(picture), 0, 255).astype(np.uint8)
 
 
 def _shown(frame: Frame, camera: int) -> Bool:

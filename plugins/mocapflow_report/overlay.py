@@ -13,7 +13,7 @@ from mocapflow.data import CLOTH, NO_CLOTH, Frame, Pose, Surface
 from mocapflow.geometry import cameras, kinematics, meshes, silhouettes
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64, I32, U8
-from mocapflow.results import Files, RunFolder, Track
+from mocapflow.results import Files, RunFolder, Track, ViewChecks
 from mocapflow.scene import Scene
 from mocapflow_report import drawing
 
@@ -30,13 +30,20 @@ class Overlay(Stage):
     name: ClassVar[str] = "overlay"
     codec: Literal["mp4v", "vp09"] = "mp4v"  # vp09 plays in browsers, mp4v is fast
 
-    def run(self, track: Track, scene: Scene, recording: Recording, run_folder: RunFolder) -> Files:
+    def run(
+        self,
+        track: Track,
+        scene: Scene,
+        recording: Recording,
+        run_folder: RunFolder,
+        checks: ViewChecks | None = None,
+    ) -> Files:
         """Write one video per view and return their paths."""
         paths = [layout.place(run_folder.path, layout.overlay(camera.name)) for camera in scene.cameras]
         rows = {int(index): row for row, index in enumerate(track.frame)}
         painter = Painter(scene)
         with drawing.videos(paths, recording.run_rate, self.codec) as opened:
-            for frame in recording.frames():
+            for frame in recording.frames() if checks is None else map(checks.steadied, recording.frames()):
                 if frame.index in rows:
                     for view, video in enumerate(opened):
                         video.write(painter.paint(frame, track, rows[frame.index], view))

@@ -16,7 +16,7 @@ from mocapflow.geometry import kinematics
 from mocapflow.io.atomic import atomic_write
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
-from mocapflow.results import Evaluation, Files, RunFolder, Track
+from mocapflow.results import Evaluation, Files, RunFolder, Track, ViewChecks
 from mocapflow.scene import Scene
 from mocapflow_report import page, plots, report_rows
 from mocapflow_report.stills import stills
@@ -42,6 +42,7 @@ class Report(Stage):
         recording: Recording,
         run_folder: RunFolder,
         evaluation: Evaluation | None = None,
+        checks: ViewChecks | None = None,
     ) -> Files:
         """Write the report and return its paths."""
         series = measured(track, scene)
@@ -56,12 +57,13 @@ class Report(Stage):
             *report_rows.notes(track),
         ]
         names = [camera.name for camera in scene.cameras]
+        shown = stills(track, scene, recording, checks)
         sections = [
             ("At a glance", page.listing(report_rows.glance(track, names, evaluation))),
             ("Angles", _shown([curves]) + page.table(report_rows.ranges(columns))),
             ("Gait cycle", _shown(strides)),
             ("Deviation from the reference", _deviations(evaluation)),
-            ("Overlay", "\n".join(page.picture(jpeg, "jpeg", said) for said, jpeg in stills(track, scene, recording))),
+            ("Overlay", "\n".join(page.picture(jpeg, "jpeg", said) for said, jpeg in shown)),
             ("Overlap of model and image", _shown([overlap])),
             ("What happened", page.listing(happened)),
             ("CPU time", page.table(report_rows.times(track)) + page.listing([COMPILED])),

@@ -6,21 +6,24 @@ import numpy as np
 
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import U8
-from mocapflow.results import Track
+from mocapflow.results import Track, ViewChecks
 from mocapflow.scene import Scene
 from mocapflow_report.overlay import Painter
 
 WIDTH = 1500  # px
 
 
-def stills(track: Track, scene: Scene, recording: Recording) -> list[tuple[str, bytes]]:
+def stills(
+    track: Track, scene: Scene, recording: Recording, checks: ViewChecks | None = None
+) -> list[tuple[str, bytes]]:
     """Return captions and jpegs of the best, median and worst frame by overlap, all views side by side."""
     import cv2
 
     chosen = chosen_rows(track)
     painter, found = Painter(scene), {}
     last = max(int(track.frame[row]) for row in chosen.values())
-    for frame in recording.until(last).frames():
+    frames = recording.until(last).frames()
+    for frame in frames if checks is None else map(checks.steadied, frames):
         for what, row in chosen.items():
             if track.frame[row] == frame.index:
                 wall = _side_by_side([painter.paint(frame, track, row, view) for view in range(len(scene.cameras))])

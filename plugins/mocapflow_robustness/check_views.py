@@ -13,9 +13,10 @@ from mocapflow.assets import Background
 from mocapflow.components import Stage
 from mocapflow.recordings.freezing import frozen_from, repeated
 from mocapflow.recordings.recording import Recording
-from mocapflow.records import F32, Bool
+from mocapflow.records import F32, U8, Bool
 from mocapflow.results import ViewChecks
 from mocapflow_robustness import doubts
+from mocapflow_robustness.knocked import Probes
 from mocapflow_robustness.thumbnails import Thumbnails, thumbnail, thumbnails
 
 Factor = Annotated[float, Field(gt=1)]
@@ -27,6 +28,10 @@ class CheckViews(Stage):
     It needs no pose, so a track that is lost can't make it distrust the images, and it looks ahead: what jumps away
     and comes back within a few frames is no motion. The track goes without these pictures and says so. What stays
     unnoticed: another moment that differs little from the true one or lasts long, and a repeated picture in all views.
+
+    Of a camera that was knocked meanwhile the track sees the pictures moved back. How it stands is compared with the
+    empty scene every two seconds, and frame by frame between two of these frames that differ: one that is put back at
+    once stays unnoticed.
     """
 
     name: ClassVar[str] = "check_views"
@@ -36,8 +41,9 @@ class CheckViews(Stage):
     joint_jump: Factor = 1.3  # and in a view that jumps together with that one
 
     def run(self, recording: Recording, background: Background | None = None) -> ViewChecks:
-        """Return the pictures to do without, each with a reason."""
-        seen = thumbnails(recording)
+        """Return the pictures to do without, each with a reason, and when cameras were knocked."""
+        probes = Probes(recording, {} if background is None else dict(enumerate(_pictures(background))))
+        seen = thumbnails(recording, probes.look)
         names = [camera.name for camera in recording.cameras]
         said = self.doubt(seen, rooms(seen, background), recording.frame_rate, names)
         rows, cameras = np.nonzero(said != "")
@@ -45,6 +51,7 @@ class CheckViews(Stage):
             frame=rows.astype(np.int32),
             camera=cameras.astype(np.int16),
             reasons=tuple(said[rows, cameras].tolist()),
+            knocks=probes.knocks(),
         )
 
     def longest(self, frame_rate: float) -> int:
@@ -81,7 +88,13 @@ def rooms(seen: Thumbnails, background: Background | None) -> F32:
     if background is None:
         shown = seen.there & ~frozen(seen)
         return np.stack([median(seen.grey[shown[:, c], c]) for c in range(seen.grey.shape[1])])
-    return np.stack([thumbnail(np.clip(np.rint(mean), 0, 255).astype(np.uint8)) for mean in background.mean])
+    return np.stack([thumbnail(room) for room, _ in _pictures(background)])
+
+
+def _pictures(background: Background) -> list[tuple[U8, Bool]]:
+    """Return what each camera shows (H, W, 3) of the empty scene, and where (H, W) that is known."""
+    rooms = (np.clip(np.rint(mean), 0, 255).astype(np.uint8) for mean in background.mean)
+    return list(zip(rooms, background.known, strict=True))
 
 
 def frozen(seen: Thumbnails) -> Bool:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
+from mocapflow.data import Frame
 from mocapflow.recordings.freezing import difference
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F32, F64, U8, Bool, array, record
@@ -23,13 +25,14 @@ class Thumbnails:
     there: Bool = array("T", "C", unit="False where there is no picture")
 
 
-def thumbnails(recording: Recording) -> Thumbnails:
-    """Return the thumbnails of all frames of a recording; every video is decoded once."""
+def thumbnails(recording: Recording, look: Callable[[Frame], None] = lambda frame: None) -> Thumbnails:
+    """Return the thumbnails of all frames of a recording, and look at these; every video is decoded once."""
     everything = replace(recording, indices=range(recording.length))
     grey = np.zeros((recording.length, len(recording.views), SIDE, SIDE), np.float32)
     news, there = np.full(grey.shape[:2], np.nan), np.zeros(grey.shape[:2], bool)
     before: list[U8 | None] = [None] * len(recording.views)
     for row, frame in enumerate(everything.frames()):
+        look(frame)
         there[row] = frame.usable
         for camera in np.flatnonzero(frame.usable):
             image, last = frame.images[camera], before[camera]

@@ -1,0 +1,103 @@
+"""How a camera that was nudged has turned between two pictures of a room, and what it would have seen before."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+import numpy as np
+
+from mocapflow.assets import Camera
+from mocapflow.records import F32, F64, U8, Bool
+
+Picture = TypeVar("Picture", U8, F32)
+
+CORNERS, STRENGTH, SPACING_PX = 200, 0.005, 8.0  # at most; share of the strongest one's strength; apart
+WINDOW_PX, LEVELS, STEPS, REST_PX = 21, 3, 30, 0.01  # that is compared; of the pyramid; at most a level; small enough
+ROUND_TRIP_PX = 0.3  # from a corner to where following it there and back leads
+AGREE_PX = 1.0  # a corner off the common motion belongs to the person, or to what was moved in the room
+FEWEST, SHARE = 12, 0.6  # of corners that have to agree
+LEAST_PX = 0.5  # that pictures of a camera that has moved are shifted; noise of one at rest makes 0.3 at most
+
+
+def turn_between(before: U8, after: U8, shown: Bool, camera: Camera) -> F64 | None:
+    """Return how pixels of a picture of a room lie in a later one of the same camera; None where too little tells.
+
+    The result is a homography (3, 3), that of a rotation about the camera's centre: by a nudge the room comes no
+    nearer. Whoever stands or moves in the room does not count, as long as most of it is seen.
+
+    Args:
+        before: (H, W, 3) BGR.
+        after: (H, W, 3) BGR, about as bright.
+        shown: (H, W) which pixels of the first picture count.
+        camera: a pinhole, as calibrated.
+    """
+    import cv2
+    from scipy.spatial.transform import Rotation
+
+    here, there = _followed(_grey(before), _grey(after), shown)
+    if len(here) < FEWEST:
+        return None
+    _, agree = cv2.findHomography(here, there, cv2.RANSAC, AGREE_PX)
+    inner = agree.ravel().astype(bool)
+    if inner.sum() < max(FEWEST, SHARE * len(here)):
+        return None
+    back = np.linalg.inv(camera.intrinsics)
+    old, new = (np.column_stack([p[inner], np.ones(inner.sum())]) @ back.T for p in (here, there))
+    return np.asarray(camera.intrinsics @ Rotation.align_vectors(new, old)[0].as_matrix() @ back, float)
+
+
+def shift_px(turn: F64, camera: Camera) -> float:
+    """Return how far the middle of a side of the picture moves at most, if pixels move by a homography (3, 3)."""
+    width, height = camera.size
+    ends = np.array([[0, height / 2, 1], [width, height / 2, 1], [width / 2, 0, 1], [width / 2, height, 1]])
+    moved = ends @ turn.T
+    return float(np.linalg.norm(moved[:, :2] / moved[:, 2:] - ends[:, :2], axis=1).max())
+
+
+def as_seen(picture: Picture, turn: F64) -> tuple[Picture, Bool]:
+    """Return what a camera that has turned sees of a picture (H, W or H, W, 3), and where (H, W) that is known."""
+    import cv2
+
+    height, width = picture.shape[:2]
+    size = (width, height)
+    moved = cv2.warpPerspective(picture, turn, size, flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+    known = cv2.warpPerspective(np.ones((height, width), np.float32), turn, size) > 1 - 1e-6
+    return np.clip(moved, 0, 255).astype(picture.dtype), np.asarray(known)
+
+
+def points_seen(points: F64, turn: F64) -> F64:
+    """Return points (..., 2 or more: px, px and what stays) of a picture where a camera that has turned sees them."""
+    seen, pixels = points.copy(), np.concatenate([points[..., :2], np.ones_like(points[..., :1])], axis=-1) @ turn.T
+    seen[..., :2] = pixels[..., :2] / pixels[..., 2:]
+    return seen
+
+
+def _grey(picture: U8) -> U8:
+    import cv2
+
+    return np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY))
+
+
+def _followed(before: U8, after: U8, shown: Bool) -> tuple[F32, F32]:
+    """Return corners (N, 2) of a grey picture and where another one has them."""
+    import cv2
+
+    corners = cv2.goodFeaturesToTrack(before, CORNERS, STRENGTH, SPACING_PX, mask=shown.view(np.uint8), blockSize=5)
+    if corners is None:
+        return np.zeros((0, 2), np.float32), np.zeros((0, 2), np.float32)
+    start = np.asarray(corners[:, 0], np.float32)
+    there, found = _step(before, after, start)
+    back, refound = _step(after, before, there)
+    kept = found & refound & (np.linalg.norm(back - start, axis=1) < ROUND_TRIP_PX)
+    return start[kept], there[kept]
+
+
+def _step(old: U8, new: U8, points: F32) -> tuple[F32, Bool]:
+    """Return where points (N, 2) px of a grey picture (H, W) are in another, and which were found."""
+    import cv2
+
+    stop = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, STEPS, REST_PX)
+    there, found, _ = cv2.calcOpticalFlowPyrLK(
+        old, new, points, np.empty_like(points), winSize=(WINDOW_PX, WINDOW_PX), maxLevel=LEVELS, criteria=stop
+    )
+    return np.asarray(there, np.float32), np.asarray(found).ravel().astype(bool)
