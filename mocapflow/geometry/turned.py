@@ -43,7 +43,12 @@ def turn_between(before: U8, after: U8, shown: Bool, camera: Camera) -> F64 | No
         return None
     back = np.linalg.inv(camera.intrinsics)
     old, new = (np.column_stack([p[inner], np.ones(inner.sum())]) @ back.T for p in (here, there))
-    return np.asarray(camera.intrinsics @ Rotation.align_vectors(new, old)[0].as_matrix() @ back, float)
+    return homography(Rotation.align_vectors(new, old)[0].as_matrix(), camera)
+
+
+def homography(rotation: F64, camera: Camera) -> F64:
+    """Return how pixels (3, 3) of a pinhole camera move if a rotation (3, 3) turns what it sees, in its own axes."""
+    return np.asarray(camera.intrinsics @ rotation @ np.linalg.inv(camera.intrinsics), float)
 
 
 def shift_px(turn: F64, camera: Camera) -> float:

@@ -13,6 +13,7 @@ from pydantic import Field, NonNegativeInt, model_validator
 from mocapflow.components import Stage
 from mocapflow.data import Frame
 from mocapflow.errors import RecordingError, alternatives
+from mocapflow.geometry.turned import as_seen
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import U8
 from mocapflow_robustness import pixels
@@ -25,7 +26,7 @@ Tapes = dict[tuple[Event, str], Tape]
 
 
 class Corrupt(Stage):
-    """Noise, rectangles and a stripe over every picture, and events: black, torn, wrong, late or missing frames.
+    """Noise, rectangles and a stripe over every picture, and events: black, torn, wrong, missing ones, a knocked camera.
 
     Pictures are changed as they are read; the files are left alone. What becomes of a picture depends on the seed, its
     camera and its number only. Clean plates stay clean.
@@ -131,6 +132,8 @@ class Corruption:
         if event.what == "covered":
             return pixels.covered(image, event.first_covered(len(image)), len(image))
         names = [v.lens.name for v in self.whole.views]
+        if event.what == "knocked":
+            return as_seen(image, event.homography(self.whole.cameras[names.index(view)]))[0]
         camera = (names.index(view) + (event.what == "other_camera")) % len(names)
         tape = tapes.setdefault((event, view), Tape(self.whole.seen_by(camera)))
         return fitted(tape.at(event.source(frame.index, self.whole.length)).images[0], image)

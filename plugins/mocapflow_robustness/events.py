@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field, NonNegativeInt, PositiveInt
 
+from mocapflow.assets import Camera
+from mocapflow.geometry.turned import homography
+from mocapflow.records import F64
 from mocapflow.settings import Settings
 
 
@@ -13,12 +17,13 @@ class Event(Settings):
     """Something that happens to some cameras over some frames."""
 
     what: Literal[
-        "black", "torn", "covered", "frozen", "late", "other_time", "other_camera", "dropped"
+        "black", "torn", "covered", "frozen", "late", "other_time", "other_camera", "dropped", "knocked"
     ]  # to the pictures
     first: NonNegativeInt = 0  # frame
     count: PositiveInt | None = None  # frames; none: for good
     views: tuple[str, ...] = ()  # names of cameras; none: all of them
     by: PositiveInt = 3  # late: so many frames; other_time: so many frames ahead, or back where there are none
+    turn_deg: float = 0.5  # knocked: so far the camera turns to its right
     share: Annotated[float, Field(gt=0, le=1)] = 0.5  # covered, and known to be: the lower part of the picture
 
     def holds(self, index: int, view: str) -> bool:
@@ -29,6 +34,12 @@ class Event(Settings):
     def first_covered(self, height: int) -> int:
         """Return the first row that is covered, in a picture so high."""
         return round(height * (1 - self.share))
+
+    def homography(self, camera: Camera) -> F64:
+        """Return how pixels (3, 3) of a camera move that is knocked."""
+        angle = np.radians(self.turn_deg)
+        to_the_left = np.array([[np.cos(angle), 0, -np.sin(angle)], [0, 1, 0], [np.sin(angle), 0, np.cos(angle)]])
+        return homography(to_the_left, camera)  # of what it sees
 
     def source(self, index: int, length: int) -> int:
         """Return which frame, of `length`, stands in the place of a frame."""
