@@ -26,7 +26,7 @@ Tapes = dict[tuple[Event, str], Tape]
 
 
 class Corrupt(Stage):
-    """Noise, rectangles and a stripe over every picture, and events: black, torn, wrong, missing ones, a knocked camera.
+    """Noise, rectangles and a stripe over every picture, and events: wrong or missing pictures, a knocked camera.
 
     Pictures are changed as they are read; the files are left alone. What becomes of a picture depends on the seed, its
     camera and its number only. Clean plates stay clean.
