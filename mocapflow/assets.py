@@ -131,6 +131,9 @@ class Background:
     mean: tuple[F32, ...] = arrays("H", "W", "BGR", unit="grey levels")
     spread: tuple[F32, ...] = arrays("H", "W", "BGR", unit="grey levels, standard deviation; inf where nobody knows")
     floor_m: float | None = None  # height of the floor, where shadows have told it
+    turned_px: tuple[
+        float, ...
+    ] = ()  # by camera, how far it had turned since its plate, which is moved; empty: none had
 
     @cached_property
     def known(self) -> tuple[Bool, ...]:

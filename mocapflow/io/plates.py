@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 
-from mocapflow.assets import Background
+from mocapflow.assets import Background, Camera
 from mocapflow.data import Frame
 from mocapflow.errors import RecordingError
 from mocapflow.geometry.turned import LEAST_PX, as_seen, shift_px, turn_between
@@ -18,7 +17,6 @@ from mocapflow.io.images import check_depth, read_image
 from mocapflow.io.lenses import View
 from mocapflow.records import F32, U8, Bool
 
-LOG = logging.getLogger("mocapflow")
 Picture = TypeVar("Picture", U8, F32)
 
 LEAST_SPREAD = 1.0  # grey levels; the rounding of 8-bit pictures alone makes 0.3
@@ -30,10 +28,6 @@ FARTHEST = 2.5  # standard deviations within which a pixel agrees
 MOST_GAIN = 1.5  # between a plate and a frame of one recording
 BLOCK = 8  # px, a side of the squares whose mean colours are looked at: noise has colours too
 GREY, COLOURED = 6.0, 20.0  # grey levels between channels or blocks: no colour or contrast, codecs make 3; surely some
-TURNED = (
-    "%s has turned by %.1f px since its clean plate was taken, which is laid over its first picture;"
-    " if its calibration is older than that, too, see the stage align_cameras"
-)
 SAME_ROOM = 10.0  # grey levels, median difference of a frame and its toned plate: above, it shows something else
 
 
@@ -60,7 +54,8 @@ def background(folder: Path, views: Sequence[View], first: Callable[[], Frame]) 
         return None
     frame = first()
     rows = [_one(files, view, frame, camera) for camera, (files, view) in enumerate(zip(found, views, strict=True))]
-    return Background(mean=tuple(mean for mean, _ in rows), spread=tuple(spread for _, spread in rows))
+    mean, spread, turned = zip(*rows, strict=True)
+    return Background(mean=mean, spread=spread, turned_px=turned)
 
 
 def plate_files(folder: Path, views: Sequence[View]) -> list[tuple[Path, ...]]:
@@ -80,29 +75,29 @@ def plate_files(folder: Path, views: Sequence[View]) -> list[tuple[Path, ...]]:
     return found if any(found) else []
 
 
-def _one(files: Sequence[Path], view: View, first: Frame, camera: int) -> tuple[F32, F32]:
+def _one(files: Sequence[Path], view: View, first: Frame, camera: int) -> tuple[F32, F32, float]:
+    """Return mean and spread (H, W, 3) of a camera's plates, and how far (px) it has turned since they were taken."""
     pictures = np.stack([view.image(_read(path, view)) for path in files]).astype(np.float32)
     frame, shown = first.images[camera].astype(np.float32), _shown(first, camera)
-    pictures, known = _laid_over(pictures, frame, shown, view)
+    pictures, known, turned_px = _laid_over(pictures, frame, shown, view.camera)
     mean, off = _compared(pictures.mean(axis=0), frame, shown & known, files[0])
     if len(files) > 1:
         each = pictures.std(axis=0, ddof=1)
         spread = np.maximum(each, np.median(each, axis=(0, 1)))
     else:
         spread = np.broadcast_to(NORMAL * np.median(off, axis=0), mean.shape)
-    return mean, np.where(known[..., None], np.maximum(spread, LEAST_SPREAD), np.inf).astype(np.float32)
+    return mean, np.where(known[..., None], np.maximum(spread, LEAST_SPREAD), np.inf).astype(np.float32), turned_px
 
 
-def _laid_over(plates: F32, frame: F32, shown: Bool, view: View) -> tuple[F32, Bool]:
-    """Return plates (N, H, W, 3) as the camera of a frame (H, W, 3) sees the room, and where (H, W) it is known."""
-    turn, plate = None, plates.mean(axis=0)
+def _laid_over(plates: F32, frame: F32, shown: Bool, camera: Camera) -> tuple[F32, Bool, float]:
+    """Return plates (N, H, W, 3) as the camera of a frame (H, W, 3) sees the room, where it is known, and px."""
+    turn, mean = None, plates.mean(axis=0)
     if shown[::THIN, ::THIN].any():
-        turn = turn_between(_levels(toned(plate, frame, shown)), _levels(frame), shown, view.camera)
-    if turn is None or shift_px(turn, view.camera) < LEAST_PX:
-        return plates, np.ones(shown.shape, bool)
-    LOG.warning(TURNED, view.lens.name, shift_px(turn, view.camera))
+        turn = turn_between(_levels(toned(mean, frame, shown)), _levels(frame), shown, camera)
+    if turn is None or shift_px(turn, camera) < LEAST_PX:
+        return plates, np.ones(shown.shape, bool), 0.0
     moved = [as_seen(plate, turn) for plate in plates]
-    return np.stack([plate for plate, _ in moved]), moved[0][1]
+    return np.stack([plate for plate, _ in moved]), moved[0][1], shift_px(turn, camera)
 
 
 def _levels(picture: F32) -> U8:

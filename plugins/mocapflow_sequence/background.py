@@ -23,6 +23,10 @@ from mocapflow_sequence.commonest import commonest
 from mocapflow_sequence.first_frame import Learnt, empty_scene
 
 LOG = logging.getLogger("mocapflow")
+TURNED = (
+    "%s has turned by %.1f px since its clean plate was taken, which is laid over its first picture;"
+    " if its calibration is older than that, too, calibrate again, or see the stage align_cameras"
+)
 FLOOR_FRAMES = 4  # in which the person's shadow may tell the height of the floor
 
 
@@ -68,6 +72,9 @@ class EmptyScene(Stage):
     def _room(self, recording: Recording, scene: Scene, start: Start | None) -> Background:
         plates = None if self.source == "recording" else recording.background()
         if plates is not None:
+            for view, shift in zip(recording.views, plates.turned_px, strict=True):
+                if shift:
+                    LOG.warning(TURNED, view.lens.name, shift)
             return plates
         if self.source == "auto":
             LOG.warning(

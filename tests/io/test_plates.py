@@ -1,16 +1,26 @@
 """Clean plates: mean and spread of the empty scene."""
 
+import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from mocapflow_sequence.background import EmptyScene
+from scipy.spatial.transform import Rotation
 
 from mocapflow.errors import RecordingError
+from mocapflow.geometry.turned import as_seen, homography, shift_px
 from mocapflow.io.plates import toned
+from mocapflow.recordings.first_look import examine_first_frame
 from mocapflow.recordings.recording import open_recording
 from mocapflow.records import record
+from mocapflow.registry import load_registry
+from mocapflow.testing import scenes
 from tests.fixtures.recordings import NAMES, SIZE, write_recording
+
+DEMO = Path(__file__).parents[2] / "examples" / "data" / "skirt_steps"
 
 
 def plate(path, level=30, size=SIZE, noise=0.0, seed=0):
@@ -191,3 +201,37 @@ def test_bad_plates(tmp_path):
     (tmp_path / "background" / "cam03.png").write_text("no image")
     with pytest.raises(RecordingError, match=r"cam03\.png  this clean plate can't be read"):
         open_recording(tmp_path).background()
+
+
+@pytest.fixture
+def nudged(tmp_path):
+    """The demo, the plate of cam02 taken before the camera was nudged, and how far (px) that moved it."""
+    folder = Path(shutil.copytree(DEMO, tmp_path / "recording"))
+    camera, file = open_recording(folder).cameras[1], folder / "background" / "cam02.png"
+    turn = homography(Rotation.from_euler("xyz", (0.3, 0.2, 0.5), degrees=True).as_matrix(), camera)
+    moved, _ = as_seen(cv2.imread(str(file)), turn)
+    cv2.imwrite(str(file), moved)
+    return folder, shift_px(np.linalg.inv(turn), camera)
+
+
+def test_a_plate_is_laid_over_the_first_frame(nudged):
+    folder, shift = nudged
+    good, room = open_recording(DEMO).background(), open_recording(folder).background()
+    assert good.turned_px == (0, 0, 0, 0)
+    assert room.turned_px == pytest.approx((0, shift, 0, 0), abs=0.3)
+    for number in (0, 2, 3):
+        np.testing.assert_array_equal(room.mean[number], good.mean[number])
+    known = room.known[1]
+    assert 0.95 < known.mean() < 0.995
+    assert np.percentile(np.abs(room.mean[1] - good.mean[1])[known], 95) < 3.0  # grey levels; 20 if it stays
+    assert room.spread[1][known].max() < 1.3 * good.spread[1].max()
+
+
+def test_a_run_says_so(nudged, caplog):
+    EmptyScene().run(open_recording(nudged[0]), scenes.tiny_scene())
+    assert [message.partition(" px")[0][:-4] for message in caplog.messages] == ["cam02 has turned by"]
+
+
+def test_the_doctor_says_so(nudged):
+    found = list(examine_first_frame(nudged[0], load_registry()))
+    assert [finding.message.partition(" px")[0][:-4] for finding in found] == ["cam02 has turned by"]
