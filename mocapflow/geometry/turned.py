@@ -1,4 +1,4 @@
-"""How a camera that was nudged has turned between two pictures of a room, and what it would have seen before."""
+"""How a camera has turned, or was focused anew, between two pictures of a room, and what it would have seen before."""
 
 from __future__ import annotations
 
@@ -22,8 +22,9 @@ LEAST_PX = 0.5  # that pictures of a camera that has moved are shifted; noise of
 def turn_between(before: U8, after: U8, shown: Bool, camera: Camera) -> F64 | None:
     """Return how pixels of a picture of a room lie in a later one of the same camera; None where too little tells.
 
-    The result is a homography (3, 3), that of a rotation about the camera's centre: by a nudge the room comes no
-    nearer. Whoever stands or moves in the room does not count, as long as most of it is seen.
+    The result is a homography (3, 3), that of a rotation about the camera's centre and of a lens that is focused anew:
+    by a nudge the room comes no nearer. Whoever stands or moves in the room does not count, as long as most of it is
+    seen.
 
     Args:
         before: (H, W, 3) BGR.
@@ -32,23 +33,24 @@ def turn_between(before: U8, after: U8, shown: Bool, camera: Camera) -> F64 | No
         camera: a pinhole, as calibrated.
     """
     import cv2
-    from scipy.spatial.transform import Rotation
 
-    here, there = _followed(_grey(before), _grey(after), shown)
+    here, there = (points.astype(float) for points in _followed(_grey(before), _grey(after), shown))
     if len(here) < FEWEST:
         return None
     _, agree = cv2.findHomography(here, there, cv2.RANSAC, AGREE_PX)
     inner = agree.ravel().astype(bool)
     if inner.sum() < max(FEWEST, SHARE * len(here)):
         return None
-    back = np.linalg.inv(camera.intrinsics)
-    old, new = (np.column_stack([p[inner], np.ones(inner.sum())]) @ back.T for p in (here, there))
-    return homography(Rotation.align_vectors(new, old)[0].as_matrix(), camera)
+    return _fitted(here[inner], there[inner], camera)
 
 
-def homography(rotation: F64, camera: Camera) -> F64:
-    """Return how pixels (3, 3) of a pinhole camera move if a rotation (3, 3) turns what it sees, in its own axes."""
-    return np.asarray(camera.intrinsics @ rotation @ np.linalg.inv(camera.intrinsics), float)
+def homography(rotation: F64, camera: Camera, zoom: float = 1.0) -> F64:
+    """Return how pixels (3, 3) of a pinhole camera move if a rotation (3, 3) turns what it sees, in its own axes.
+
+    Its focal length becomes `zoom` times as long after that.
+    """
+    lens = camera.intrinsics @ np.diag([zoom, zoom, 1.0])
+    return np.asarray(lens @ rotation @ np.linalg.inv(camera.intrinsics), float)
 
 
 def shift_px(turn: F64, camera: Camera) -> float:
@@ -75,6 +77,20 @@ def points_seen(points: F64, turn: F64) -> F64:
     seen, pixels = points.copy(), np.concatenate([points[..., :2], np.ones_like(points[..., :1])], axis=-1) @ turn.T
     seen[..., :2] = pixels[..., :2] / pixels[..., 2:]
     return seen
+
+
+def _fitted(here: F64, there: F64, camera: Camera) -> F64:
+    """Return the homography (3, 3) of the turn and zoom that take pixels (N, 2) nearest to others."""
+    from scipy.optimize import least_squares
+    from scipy.spatial.transform import Rotation
+
+    def motion(parameters: F64) -> F64:
+        return homography(Rotation.from_rotvec(parameters[:3]).as_matrix(), camera, parameters[3])
+
+    def off(parameters: F64) -> F64:
+        return np.ravel(points_seen(here, motion(parameters)) - there)
+
+    return motion(least_squares(off, np.array([0.0, 0.0, 0.0, 1.0]), method="lm").x)
 
 
 def _grey(picture: U8) -> U8:

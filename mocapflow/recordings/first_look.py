@@ -37,7 +37,7 @@ def examine_first_frame(folder: Path, registry: Registry) -> Iterator[Finding]:
     for name, shift in zip(names, plates.turned_px, strict=True):
         if shift:
             hint = "the plate is laid over the first frame; calibrate again, if that is older than the plate"
-            yield warning(f"{name} has turned by {shift:.1f} px since its clean plate was taken", hint, folder)
+            yield warning(f"{name} has moved by {shift:.1f} px since its clean plate was taken", hint, folder)
     foreign = [name for name, seen in zip(names, somebody, strict=True) if seen is not None and seen.mean() > FOREIGN]
     if foreign:
         hint = "was the camera moved, the light changed, or the file of another camera copied here?"

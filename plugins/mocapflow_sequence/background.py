@@ -24,7 +24,7 @@ from mocapflow_sequence.first_frame import Learnt, empty_scene
 
 LOG = logging.getLogger("mocapflow")
 TURNED = (
-    "%s has turned by %.1f px since its clean plate was taken, which is laid over its first picture;"
+    "%s has moved by %.1f px since its clean plate was taken, which is laid over its first picture;"
     " if its calibration is older than that, too, calibrate again, or see the stage align_cameras"
 )
 FLOOR_FRAMES = 4  # in which the person's shadow may tell the height of the floor

@@ -51,6 +51,12 @@ def test_the_turn_of_a_camera_is_found(degrees):
     assert corners_off(turn_between(room(), seen(true), EVERYWHERE, CAMERA), true) < 0.15
 
 
+@pytest.mark.parametrize("zoom", [0.99, 1.004])
+def test_a_lens_that_is_focused_anew_is_told_from_a_turn(zoom):
+    true = CAMERA.intrinsics @ np.diag([zoom, zoom, 1.0]) @ np.linalg.inv(CAMERA.intrinsics) @ homography((0, 0.3, 0))
+    assert corners_off(turn_between(room(), seen(true), EVERYWHERE, CAMERA), true) < 0.15
+
+
 def test_whoever_stands_before_the_room_does_not_count():
     true = homography((0.2, -0.3, 0.4))
     picture = seen(true)

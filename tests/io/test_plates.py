@@ -229,9 +229,9 @@ def test_a_plate_is_laid_over_the_first_frame(nudged):
 
 def test_a_run_says_so(nudged, caplog):
     EmptyScene().run(open_recording(nudged[0]), scenes.tiny_scene())
-    assert [message.partition(" px")[0][:-4] for message in caplog.messages] == ["cam02 has turned by"]
+    assert [message.partition(" px")[0][:-4] for message in caplog.messages] == ["cam02 has moved by"]
 
 
 def test_the_doctor_says_so(nudged):
     found = list(examine_first_frame(nudged[0], load_registry()))
-    assert [finding.message.partition(" px")[0][:-4] for finding in found] == ["cam02 has turned by"]
+    assert [finding.message.partition(" px")[0][:-4] for finding in found] == ["cam02 has moved by"]
