@@ -16,15 +16,15 @@ WINDOW_PX, LEVELS, STEPS, REST_PX = 21, 3, 30, 0.01  # that is compared; of the 
 ROUND_TRIP_PX = 0.3  # from a corner to where following it there and back leads
 AGREE_PX = 1.0  # a corner off the common motion belongs to the person, or to what was moved in the room
 FEWEST, SHARE = 12, 0.6  # of corners that have to agree
-LEAST_PX = 0.5  # that pictures of a camera that has moved are shifted; noise of one at rest makes 0.3 at most
+LEAST_PX, CLEAR = 0.5, 2.0  # by which corners of the room move, root mean square; times what the motion leaves of it
 
 
 def turn_between(before: U8, after: U8, shown: Bool, camera: Camera) -> F64 | None:
     """Return how pixels of a picture of a room lie in a later one of the same camera; None where too little tells.
 
     The result is a homography (3, 3), that of a rotation about the camera's centre and of a lens that is focused anew:
-    by a nudge the room comes no nearer. Whoever stands or moves in the room does not count, as long as most of it is
-    seen.
+    by a nudge the room comes no nearer. It is the identity of a camera that rests. Whoever stands or moves in the room
+    does not count, as long as most of it is seen.
 
     Args:
         before: (H, W, 3) BGR.
@@ -41,7 +41,11 @@ def turn_between(before: U8, after: U8, shown: Bool, camera: Camera) -> F64 | No
     inner = agree.ravel().astype(bool)
     if inner.sum() < max(FEWEST, SHARE * len(here)):
         return None
-    return _fitted(here[inner], there[inner], camera)
+    here, there = here[inner], there[inner]
+    turn = _fitted(here, there, camera)
+    explained = points_seen(here, turn)
+    clear_px = max(LEAST_PX, CLEAR * _rms(there - explained))
+    return turn if _rms(explained - here) >= clear_px else np.eye(3)
 
 
 def homography(rotation: F64, camera: Camera, zoom: float = 1.0) -> F64:
@@ -91,6 +95,10 @@ def _fitted(here: F64, there: F64, camera: Camera) -> F64:
         return np.ravel(points_seen(here, motion(parameters)) - there)
 
     return motion(least_squares(off, np.array([0.0, 0.0, 0.0, 1.0]), method="lm").x)
+
+
+def _rms(offsets: F64) -> float:
+    return float(np.sqrt(np.square(offsets).sum(axis=1).mean()))
 
 
 def _grey(picture: U8) -> U8:

@@ -11,7 +11,7 @@ import numpy as np
 from mocapflow.assets import Background, Camera
 from mocapflow.data import Frame
 from mocapflow.errors import RecordingError
-from mocapflow.geometry.turned import LEAST_PX, as_seen, shift_px, turn_between
+from mocapflow.geometry.turned import as_seen, shift_px, turn_between
 from mocapflow.io.folders import plates
 from mocapflow.io.images import check_depth, read_image
 from mocapflow.io.lenses import View
@@ -94,7 +94,7 @@ def _laid_over(plates: F32, frame: F32, shown: Bool, camera: Camera) -> tuple[F3
     turn, mean = None, plates.mean(axis=0)
     if shown[::THIN, ::THIN].any():
         turn = turn_between(_levels(toned(mean, frame, shown)), _levels(frame), shown, camera)
-    if turn is None or shift_px(turn, camera) < LEAST_PX:
+    if turn is None or np.array_equal(turn, np.eye(3)):
         return plates, np.ones(shown.shape, bool), 0.0
     moved = [as_seen(plate, turn) for plate in plates]
     return np.stack([plate for plate, _ in moved]), moved[0][1], shift_px(turn, camera)
