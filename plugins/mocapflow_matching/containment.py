@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import numba
 import numpy as np
+from mocapflow_levelset.camouflage import told_from_the_room
 from pydantic import PositiveFloat
 
 from mocapflow.assets import Camera
@@ -38,7 +39,8 @@ class Containment(Matcher):
         self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn
     ) -> Matches:
         """Return the pairs of every view; see the class."""
-        return pool([self.match_view(scene.cameras[s.camera], s, surface) for s in segmentation.of("person")])
+        views = [self.match_view(scene.cameras[s.camera], s, surface) for s in segmentation.of("person")]
+        return told_from_the_room(pool(views), past)
 
     def match_view(self, camera: Camera, silhouette: Silhouette, surface: Surface) -> Matches:
         """Return the pairs of one view."""

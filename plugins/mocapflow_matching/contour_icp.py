@@ -6,6 +6,7 @@ from typing import Annotated, Literal, NamedTuple
 
 import numba
 import numpy as np
+from mocapflow_levelset.camouflage import told_from_the_room
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from mocapflow.components import Matcher
@@ -86,7 +87,8 @@ class ContourIcp(Matcher):
         self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn
     ) -> Matches:
         """Return pairs of contour points; see the class."""
-        return pool([self.match_view(s, surface, scene, turn) for s in segmentation.of("person")])
+        views = [self.match_view(s, surface, scene, turn) for s in segmentation.of("person")]
+        return told_from_the_room(pool(views), past)
 
     def match_view(self, silhouette: Silhouette, surface: Surface, scene: Scene, turn: Turn) -> Matches:
         """Return the pairs of one view."""

@@ -10,6 +10,7 @@ from math import inf
 from typing import Annotated, ClassVar
 
 import numpy as np
+from mocapflow_levelset.camouflage import with_feet
 from mocapflow_levelset.layers import garment_told
 from mocapflow_levelset.one_floor import no_shadows
 from mocapflow_priors.density import Density, Poses, read
@@ -30,12 +31,13 @@ from mocapflow_recovery.judge import Fit, Given, Judge, stray_of, surface_of
 from mocapflow_recovery.looks import Looks
 from mocapflow_recovery.sampling import Plan, Spread
 from mocapflow_recovery.suspicion import Signs, Suspicion, suspicion
-from mocapflow_recovery.told import untold
+from mocapflow_recovery.told import like_the_floor, untold
 
 LOG = logging.getLogger("mocapflow")
 CURED = 2.0  # times as far apart may be what is doubted no more: a leg lay where a skirt flew
 CLEARED = 1.1  # the same, what leaves no hint: of a foot that was lost all other limbs and the cloth tell nothing
 UNKNOWN = "too little is known of the room behind the person: limbs that are lost are not looked for"
+FEET_UNTOLD = "the feet look like the floor: they are not compared with the pictures, and ankles rest on the priors"
 UNSEEN = "fit doubted: no picture tells person from room where it lies"
 Settle = Callable[[Pose, F64], FrameResult]  # from a pose, with cloth parameters
 Look = Callable[[np.random.Generator], Pose]  # finds a pose by samples
@@ -64,6 +66,8 @@ class LimbSearch(Recovery):
     A joint bent too far, and a limb that leapt, are looked for alone: nothing is known against the others.
     A doubt that lasts is mostly one about the room, and a joint that stays beyond its limits can be bent so far: such
     frames are searched now and then only (`vain_every`).
+    Where the first frame shows feet that look like a floor without colours, white socks on white, later frames do not
+    match them: the outline ends above them, and would draw them up.
     It needs the empty scene; where little of it is known behind the person every fit is taken as it is.
     """
 
@@ -102,6 +106,31 @@ class LimbSearch(Recovery):
         settle: Settle,
     ) -> FrameResult:
         """Return the result, or a better one; see the class."""
+        found = self._recovered(frame, state, result, past, model, settle)
+        return found if past.moments or past.after_gap else self._feet_told(frame, found, past, model)
+
+    def _feet_told(self, frame: Frame, result: FrameResult, past: Past, model: ClothedModel) -> FrameResult:
+        """Return the result of the first frame; if feet look like a floor without colours it says so to later ones."""
+        background, surface = model.scene.background, surface_of(model, result)
+        if background is None or background.floor_m is None:
+            return result
+        seen = self.views(frame, surface, past, model.scene)
+        if not seen or not (feet := like_the_floor(surface, seen, model.scene.body)).any():
+            return result
+        LOG.warning(FEET_UNTOLD)
+        segmentation = result.state.segmentation
+        known = replace(segmentation, appearance=with_feet(segmentation.appearance, feet))
+        return replace(result, state=replace(result.state, segmentation=known))
+
+    def _recovered(
+        self,
+        frame: Frame,
+        state: FrameState,
+        result: FrameResult,
+        past: Past,
+        model: ClothedModel,
+        settle: Settle,
+    ) -> FrameResult:
         surface = surface_of(model, result)
         seen = self.views(frame, surface, past, model.scene)
         if not seen:

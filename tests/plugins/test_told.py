@@ -3,9 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
+from mocapflow_levelset.camouflage import FEET
+from mocapflow_recovery import limb_search
 from mocapflow_recovery.certain import small_room, views
 from mocapflow_recovery.limb_search import LimbSearch
-from mocapflow_recovery.told import untold
+from mocapflow_recovery.told import like_the_floor, untold
 
 from mocapflow.data import NO_CLOTH
 from mocapflow.geometry.cameras import project
@@ -48,3 +51,31 @@ def test_the_search_warns_of_them_in_the_first_frame(caplog):
     search = LimbSearch(beginnings=False, uncovered_cm2=1e6, floating_cm2=1e6)
     search.recover(without_feet(), state, fitted, past, scenes.tiny_model(SCENE), lambda *_: fitted)
     assert any("from knee_l on" in said.getMessage() for said in caplog.records)
+
+
+def test_feet_that_look_like_the_room_are_told_from_others():
+    feet = np.isin(SCENE.body.main_joint, [SCENE.body.joint("ankle_l"), SCENE.body.joint("ankle_r")])
+    np.testing.assert_array_equal(like_the_floor(SURFACE, seen(without_feet()), SCENE.body), feet)
+    assert not like_the_floor(SURFACE, seen(FRAME), SCENE.body).any()
+
+
+@pytest.mark.parametrize(
+    ("frame", "floor_m", "first", "known"),
+    [
+        (without_feet(), 0.0, True, True),
+        (FRAME, 0.0, True, False),
+        (without_feet(), None, True, False),
+        (without_feet(), 0.0, False, False),
+    ],
+    ids=["white socks", "others", "on a floor with colours", "in a later frame"],
+)
+def test_later_frames_are_told_what_the_first_shows(frame, floor_m, first, known, monkeypatch, caplog):
+    monkeypatch.setattr(limb_search, "no_shadows", lambda *_: None)  # two small views tell nothing together
+    scene = replace(SCENE, background=replace(SCENE.background, floor_m=floor_m))
+    state, past = pictures.tiny_state(scene, POSE, POSE), scenes.tiny_past(scene, POSE)
+    fitted = recovery.settled(state, scene=scene)
+    search = LimbSearch(beginnings=False, uncovered_cm2=1e6, floating_cm2=1e6)
+    past = replace(past, moments=()) if first else past
+    found = search.recover(frame, state, fitted, past, scenes.tiny_model(scene), lambda *_: fitted)
+    assert (FEET in found.state.segmentation.appearance) == known
+    assert ("the feet look like the floor" in caplog.text) == known

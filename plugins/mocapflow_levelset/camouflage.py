@@ -1,0 +1,34 @@
+"""Feet that look like the floor: an outline that ends above them tells nothing of where they are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from mocapflow.data import Matches, Past
+from mocapflow.records import F64, Bool
+
+FEET = "feet that look like the floor"  # of Segmentation.appearance: (V,) 1 for vertices of the body that do, else 0
+
+
+def with_feet(appearance: Mapping[str, F64], vertices: Bool) -> dict[str, F64]:
+    """Return what is known of appearances, and which vertices (V,) of the body look like the floor."""
+    return {**appearance, FEET: vertices.astype(np.float64)}
+
+
+def told_from_the_room(matches: Matches, past: Past) -> Matches:
+    """Return matches without those of parts that look like the room: their outline is none of the person's."""
+    if FEET not in past.appearance:
+        return matches
+    like_the_floor = np.flatnonzero(past.appearance[FEET])
+    kept = ~np.isin(matches.vertex, like_the_floor)
+    return replace(
+        matches,
+        camera=matches.camera[kept],
+        pixel=matches.pixel[kept],
+        direction=matches.direction[kept],
+        vertex=matches.vertex[kept],
+        weight=matches.weight[kept],
+    )

@@ -1,0 +1,61 @@
+"""Feet that look like the floor are not matched."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matching_scenes import FIRST, FRAME, seen
+from mocapflow_levelset.camouflage import FEET, told_from_the_room, with_feet
+from mocapflow_matching.containment import Containment
+from mocapflow_matching.contour_icp import ContourIcp
+
+from mocapflow.data import NO_CLOTH, Past, Pose, empty_matches
+from mocapflow.testing import tiny_pose, tiny_scene
+
+SCENE = tiny_scene()
+LEG = np.isin(SCENE.body.main_joint, [SCENE.body.joint("knee_l"), SCENE.body.joint("hip_l")])
+PAST = Past(appearance=with_feet({"layers": np.ones((2, 3))}, LEG))
+
+
+@pytest.fixture(scope="module")
+def truth():
+    return tiny_pose(SCENE)
+
+
+def bent(pose, degrees):
+    """The same pose with the left hip spread."""
+    angles = pose.angles.copy()
+    angles[SCENE.body.screw_names.index("hip_l.abduction")] += np.radians(degrees)
+    return Pose(root=pose.root, angles=angles)
+
+
+@pytest.mark.parametrize("matcher", [ContourIcp(), Containment()], ids=["contour_icp", "containment"])
+def test_pairs_of_what_looks_like_the_room_are_left_out(matcher, truth):
+    surface, shown = SCENE.surface(bent(truth, 15), NO_CLOTH), seen(SCENE.surface(truth, NO_CLOTH), SCENE)
+    every = matcher.match(FRAME, shown, surface, Past(), SCENE, FIRST)
+    kept = matcher.match(FRAME, shown, surface, PAST, SCENE, FIRST)
+    leg = LEG[every.vertex]
+    assert leg.any()
+    for name in ("camera", "pixel", "direction", "vertex", "weight"):
+        np.testing.assert_array_equal(getattr(kept, name), getattr(every, name)[~leg])
+
+
+def test_what_was_known_of_appearances_stays():
+    assert set(PAST.appearance) == {"layers", FEET}
+    assert PAST.appearance[FEET].shape == (len(SCENE.body.vertices),)
+
+
+def test_cloth_is_no_part_of_the_body(truth):
+    clothed = tiny_scene(clothed=True)
+    first_of_cloth = len(clothed.body.vertices)
+    matches = replace(
+        empty_matches(),
+        camera=np.zeros(2, np.int16),
+        pixel=np.zeros((2, 2)),
+        direction=np.zeros((2, 2)),
+        vertex=np.array([0, first_of_cloth], np.int32),
+        weight=np.ones(2),
+    )
+    everything = Past(appearance=with_feet({}, np.ones(first_of_cloth, bool)))
+    assert told_from_the_room(matches, everything).vertex.tolist() == [first_of_cloth]
+    assert told_from_the_room(matches, Past()) is matches
