@@ -60,6 +60,13 @@ class Given(Segmenter):
         return state.segmentation
 
 
+def bent(pose: Pose, degrees: float, scene: Scene) -> Pose:
+    """The same pose with the left hip spread."""
+    angles = pose.angles.copy()
+    angles[scene.body.screw_names.index("hip_l.abduction")] += np.radians(degrees)
+    return Pose(root=pose.root, angles=angles)
+
+
 def surface_at(pose: Pose, scene: Scene) -> Surface:
     """The surface at a pose, in the garment of the scene if it has one."""
     return scene.surface(pose, tiny_cloth(scene, pose))

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from matching_scenes import FIRST, FRAME, seen
+from matching_scenes import FIRST, FRAME, bent, seen
 from mocapflow_levelset.camouflage import FEET, told_from_the_room, with_feet
 from mocapflow_matching.containment import Containment
 from mocapflow_matching.contour_icp import ContourIcp
 
-from mocapflow.data import NO_CLOTH, Past, Pose, empty_matches
+from mocapflow.data import NO_CLOTH, Past, empty_matches
 from mocapflow.testing import tiny_pose, tiny_scene
 
 SCENE = tiny_scene()
@@ -22,16 +22,9 @@ def truth():
     return tiny_pose(SCENE)
 
 
-def bent(pose, degrees):
-    """The same pose with the left hip spread."""
-    angles = pose.angles.copy()
-    angles[SCENE.body.screw_names.index("hip_l.abduction")] += np.radians(degrees)
-    return Pose(root=pose.root, angles=angles)
-
-
 @pytest.mark.parametrize("matcher", [ContourIcp(), Containment()], ids=["contour_icp", "containment"])
 def test_pairs_of_what_looks_like_the_room_are_left_out(matcher, truth):
-    surface, shown = SCENE.surface(bent(truth, 15), NO_CLOTH), seen(SCENE.surface(truth, NO_CLOTH), SCENE)
+    surface, shown = SCENE.surface(bent(truth, 15, SCENE), NO_CLOTH), seen(SCENE.surface(truth, NO_CLOTH), SCENE)
     every = matcher.match(FRAME, shown, surface, Past(), SCENE, FIRST)
     kept = matcher.match(FRAME, shown, surface, PAST, SCENE, FIRST)
     leg = LEG[every.vertex]

@@ -9,7 +9,7 @@ from matching_scenes import FIRST, FRAME, seen
 from mocapflow_matching.containment import Containment, inside_px
 from mocapflow_matching.robust import robust_weights
 
-from mocapflow.data import CLOTH, NO_CLOTH, Past, Pose
+from mocapflow.data import CLOTH, NO_CLOTH, Past
 from mocapflow.geometry.cameras import project
 from mocapflow.geometry.silhouettes import occluding_contour
 from mocapflow.testing import tiny_pose, tiny_scene
@@ -17,18 +17,12 @@ from mocapflow.testing import tiny_pose, tiny_scene
 SCENE = tiny_scene(clothed=True)
 BARE = tiny_scene()
 surface_at = partial(matching_scenes.surface_at, scene=SCENE)
+bent = partial(matching_scenes.bent, scene=SCENE)  # the leg sticks out of the tube, the cloth stays
 
 
 @pytest.fixture(scope="module")
 def truth():
     return tiny_pose(SCENE)
-
-
-def bent(pose, degrees):
-    """The same pose with the left hip spread: the leg sticks out of the tube, the cloth stays."""
-    angles = pose.angles.copy()
-    angles[SCENE.body.screw_names.index("hip_l.abduction")] += np.radians(degrees)
-    return Pose(root=pose.root, angles=angles)
 
 
 def match(surface, segmentation, scene=SCENE, **settings):
