@@ -62,6 +62,7 @@ def fitter(request):
     return request.param
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("azimuth_deg", [10.0, 155.0, 280.0])
 def test_a_known_wind_is_recovered_within_one_sampling_step(fitter, model, azimuth_deg):
     """T-SYS2."""

@@ -24,6 +24,7 @@ def clothed(request):
     return Scene(cameras=(), body=body, garment=request.param.sew(body))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("sweeps", [0, 4, 40])
 def test_velocities_are_the_slopes_of_the_drape(clothed, sweeps, monkeypatch):
     monkeypatch.setattr(differences, "ANGLE_STEP", 1e-5)

@@ -52,8 +52,7 @@ def test_nobody_knocked_a_camera(demo, caplog):
     assert caplog.messages == []
 
 
-@pytest.mark.parametrize("first", [1, 20, 58])
-@pytest.mark.parametrize("degrees", [0.15, -1.2])
+@pytest.mark.parametrize(("first", "degrees"), [(1, 0.15), (20, -1.2), (58, 0.15)])
 def test_the_frame_and_the_turn_are_found(demo, caplog, first, degrees):
     ((frame, camera, off),) = found(demo, (first, degrees))
     assert (frame, camera) == (first, 1)
