@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from mocapflow.errors import GarmentError, MocapflowError, ShapeError, alternatives
-from mocapflow.records import F32, F64, I32, Bool, array, arrays, record
+from mocapflow.records import F32, F64, I32, U8, Bool, array, arrays, record
 
 
 @record
@@ -131,14 +131,17 @@ class Background:
     mean: tuple[F32, ...] = arrays("H", "W", "BGR", unit="grey levels")
     spread: tuple[F32, ...] = arrays("H", "W", "BGR", unit="grey levels, standard deviation; inf where nobody knows")
     floor_m: float | None = None  # height of the floor, where shadows have told it
-    turned_px: tuple[
-        float, ...
-    ] = ()  # by camera, how far it had turned since its plate, which is moved; empty: none had
+    turned_px: tuple[float, ...] = ()  # by camera, since its plate was taken and before it was moved; empty: none had
 
     @cached_property
     def known(self) -> tuple[Bool, ...]:
         """Where it is known what a view shows without the person: (H, W) each."""
         return tuple(np.asarray(np.isfinite(spread).all(axis=2)) for spread in self.spread)
+
+    @cached_property
+    def pictures(self) -> tuple[U8, ...]:
+        """What a view shows without the person: (H, W, 3) each."""
+        return tuple(np.clip(np.rint(mean), 0, 255).astype(np.uint8) for mean in self.mean)
 
 
 def _stray(index: I32, count: int, least: int) -> int | None:

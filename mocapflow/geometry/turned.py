@@ -60,9 +60,8 @@ def homography(rotation: F64, camera: Camera, zoom: float = 1.0) -> F64:
 def shift_px(turn: F64, camera: Camera) -> float:
     """Return how far the middle of a side of the picture moves at most, if pixels move by a homography (3, 3)."""
     width, height = camera.size
-    ends = np.array([[0, height / 2, 1], [width, height / 2, 1], [width / 2, 0, 1], [width / 2, height, 1]])
-    moved = ends @ turn.T
-    return float(np.linalg.norm(moved[:, :2] / moved[:, 2:] - ends[:, :2], axis=1).max())
+    middles = np.array([[0, height / 2], [width, height / 2], [width / 2, 0], [width / 2, height]])
+    return float(np.linalg.norm(points_seen(middles, turn) - middles, axis=1).max())
 
 
 def as_seen(picture: Picture, turn: F64) -> tuple[Picture, Bool]:

@@ -19,7 +19,7 @@ def with_feet(appearance: Mapping[str, F64], vertices: Bool) -> dict[str, F64]:
 
 
 def told_from_the_room(matches: Matches, past: Past) -> Matches:
-    """Return matches without those of parts that look like the room: their outline is none of the person's."""
+    """Return matches without those of parts that look like the room: the outline of the person ends elsewhere."""
     if FEET not in past.appearance:
         return matches
     like_the_floor = np.flatnonzero(past.appearance[FEET])

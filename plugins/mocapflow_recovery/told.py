@@ -10,13 +10,13 @@ from mocapflow.assets import Body
 from mocapflow.data import Surface
 from mocapflow.geometry.cameras import project
 from mocapflow.geometry.kinematics import descendants
-from mocapflow.records import Bool
+from mocapflow.records import F64, Bool
 from mocapflow_recovery.certain import View
 
 BEGIN = ("knee", "elbow")  # joints that limbs begin at, on either side
 FOOT = ("ankle", "toe")  # joints that move a foot, on either side
 LEAST = 0.1  # share of a limb that has to be told; of shanks and feet well lit pictures tell 0.37 to 0.81
-LEAST_OF_FEET = 0.35  # the same of both feet alone: white socks on white floors have 0.20 to 0.28, others 0.42 to 0.81
+LEAST_OF_FEET = 0.35  # of both; 0.20 to 0.28 are told on white floors, 0.1 in grey pictures, else 0.42 to 0.81
 
 
 def untold(surface: Surface, seen: Sequence[View], body: Body) -> dict[str, float]:
@@ -27,7 +27,7 @@ def untold(surface: Surface, seen: Sequence[View], body: Body) -> dict[str, floa
         seen: what the views surely show.
         body: whose vertices come first in the surface.
     """
-    person = np.mean([_on_person(surface, view)[: len(body.vertices)] for view in seen], axis=0)
+    person = _told(surface, seen, body)
     below = descendants(body.parents)
     limbs = {name: below[joint][body.main_joint] for joint, name in enumerate(body.joint_names) if _begins(name)}
     shares = {name: float(person[limb].mean()) for name, limb in limbs.items() if limb.any()}
@@ -37,12 +37,16 @@ def untold(surface: Surface, seen: Sequence[View], body: Body) -> dict[str, floa
 def like_the_floor(surface: Surface, seen: Sequence[View], body: Body) -> Bool:
     """Return which vertices (V,) of the body are of feet that look like the room, in all views: of both, or none."""
     feet = np.array([name.rpartition("_")[0] in FOOT for name in body.joint_names])[body.main_joint]
-    person = np.mean([_on_person(surface, view)[: len(body.vertices)] for view in seen], axis=0)
-    return feet if feet.any() and person[feet].mean() < LEAST_OF_FEET else np.zeros(len(feet), bool)
+    return feet if feet.any() and _told(surface, seen, body)[feet].mean() < LEAST_OF_FEET else np.zeros(len(feet), bool)
 
 
 def _begins(name: str) -> bool:
     return name.rpartition("_")[0] in BEGIN
+
+
+def _told(surface: Surface, seen: Sequence[View], body: Body) -> F64:
+    """Return the share (V,) of the views that surely show the person where a vertex of the body is."""
+    return np.asarray(np.mean([_on_person(surface, view)[: len(body.vertices)] for view in seen], axis=0))
 
 
 def _on_person(surface: Surface, view: View) -> Bool:

@@ -13,7 +13,7 @@ from mocapflow.assets import Background
 from mocapflow.components import Stage
 from mocapflow.recordings.freezing import frozen_from, repeated
 from mocapflow.recordings.recording import Recording
-from mocapflow.records import F32, U8, Bool
+from mocapflow.records import F32, Bool
 from mocapflow.results import ViewChecks
 from mocapflow_robustness import doubts
 from mocapflow_robustness.knocked import Probes
@@ -42,7 +42,8 @@ class CheckViews(Stage):
 
     def run(self, recording: Recording, background: Background | None = None) -> ViewChecks:
         """Return the pictures to do without, each with a reason, and when cameras were knocked."""
-        probes = Probes(recording, {} if background is None else dict(enumerate(_pictures(background))))
+        known = () if background is None else zip(background.pictures, background.known, strict=True)
+        probes = Probes(recording, room=dict(enumerate(known)))
         seen = thumbnails(recording, probes.look)
         names = [camera.name for camera in recording.cameras]
         said = self.doubt(seen, rooms(seen, background), recording.frame_rate, names)
@@ -88,13 +89,7 @@ def rooms(seen: Thumbnails, background: Background | None) -> F32:
     if background is None:
         shown = seen.there & ~frozen(seen)
         return np.stack([median(seen.grey[shown[:, c], c]) for c in range(seen.grey.shape[1])])
-    return np.stack([thumbnail(room) for room, _ in _pictures(background)])
-
-
-def _pictures(background: Background) -> list[tuple[U8, Bool]]:
-    """Return what each camera shows (H, W, 3) of the empty scene, and where (H, W) that is known."""
-    rooms = (np.clip(np.rint(mean), 0, 255).astype(np.uint8) for mean in background.mean)
-    return list(zip(rooms, background.known, strict=True))
+    return np.stack([thumbnail(room) for room in background.pictures])
 
 
 def frozen(seen: Thumbnails) -> Bool:

@@ -19,8 +19,9 @@ from results_scene import DEMO, demo_scene, stepping
 from mocapflow.errors import StoreError
 from mocapflow.geometry import cameras
 from mocapflow.io.columns import read_columns
+from mocapflow.knocks import Knocks
 from mocapflow.recordings.recording import Recording, open_recording
-from mocapflow.results import Evaluation, RunFolder, Track
+from mocapflow.results import Evaluation, RunFolder, Track, ViewChecks
 from mocapflow.scene import Scene
 
 
@@ -247,6 +248,23 @@ def test_shown_frames_are_best_median_and_worst(track: Track) -> None:
     }
     unknown = replace(track, overlap=np.full((4, 4), np.nan))
     assert chosen_rows(unknown) == {"first": 0, "middle": 2, "last": 3}
+
+
+def test_pictures_of_knocked_cameras_are_drawn_on_moved_back(
+    scene: Scene, track: Track, recording: Recording, tmp_path: Path
+) -> None:
+    first, down = np.zeros(1, np.int32), np.array([[1.0, 0, 0], [0, 1, 40], [0, 0, 1]])
+    knocks = Knocks(frame=first, camera=np.ones(1, np.int16), turn=down[None])
+    checks = ViewChecks(frame=first[:0], camera=np.empty(0, np.int16), reasons=(), knocks=knocks)
+    given = {"track": track, "scene": scene, "recording": recording}
+    run_folder = RunFolder(path=tmp_path, recipe={})
+    knocked, still = (
+        [read_back(path) for path in Overlay().run(**given, run_folder=run_folder, checks=c).paths]
+        for c in (checks, None)
+    )
+    assert np.abs(knocked[0].astype(int) - still[0]).max() == 0
+    assert np.abs(knocked[1].astype(int) - still[1]).mean() > 1
+    assert stills(**given, checks=checks) != stills(**given)
 
 
 def test_progress_ends_with_the_last_frame_shown(scene: Scene, track: Track, recording: Recording) -> None:
