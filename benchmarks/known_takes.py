@@ -133,5 +133,6 @@ TAKES = {
     "walk_A_studio": Take("A", "skirt", "walk_A", 121, GREEN, start=150, frames=40, room="studio"),
     "kneeup_B_studio": Take("B", "shorts", "kneeup_B", 123, PURPLE, start=140, frames=24, room="studio"),
     "dance_A_lab": Take("A", "skirt", "dance", 124, GREY, frames=40, room="lab"),
+    "lunge_A_studio": Take("A", "skirt", "lunge", 125, PURPLE, frames=40, room="studio"),
     "kneeup_B_carpet": Take("B", "shorts", "kneeup_B", 122, GREY, start=140, frames=40, room="carpet"),
 }

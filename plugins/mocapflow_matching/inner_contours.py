@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import ClassVar, Literal
 
 import numpy as np
+from mocapflow_levelset.camouflage import told_from_the_room
 from pydantic import PositiveFloat
 
 from mocapflow.components import Matcher
@@ -40,9 +41,9 @@ class InnerContours(Matcher):
         self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn
     ) -> Matches:
         """Return the pairs of every view, weighted by how well they fit the surface."""
-        inner = segmentation.inner
-        if inner is None:
+        if segmentation.inner is None:
             return empty_matches()
+        inner = told_from_the_room(segmentation.inner, past)
         image = project_each(surface.vertices[inner.vertex], inner.camera, scene.cameras)
         away = np.einsum("ma,ma->m", inner.pixel - image, inner.direction)
         worn = surface.cloth[inner.vertex]

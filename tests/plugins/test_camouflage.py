@@ -8,8 +8,10 @@ from matching_scenes import FIRST, FRAME, bent, seen
 from mocapflow_levelset.camouflage import FEET, told_from_the_room, with_feet
 from mocapflow_matching.containment import Containment
 from mocapflow_matching.contour_icp import ContourIcp
+from mocapflow_matching.inner_contours import InnerContours
 
-from mocapflow.data import NO_CLOTH, Past, empty_matches
+from mocapflow.data import NO_CLOTH, Matches, Past, empty_matches
+from mocapflow.geometry.cameras import project
 from mocapflow.testing import tiny_pose, tiny_scene
 
 SCENE = tiny_scene()
@@ -31,6 +33,21 @@ def test_pairs_of_what_looks_like_the_room_are_left_out(matcher, truth):
     assert leg.any()
     for name in ("camera", "pixel", "direction", "vertex", "weight"):
         np.testing.assert_array_equal(getattr(kept, name), getattr(every, name)[~leg])
+
+
+def test_ends_of_parts_that_look_like_the_room_are_left_out(truth):
+    surface, vertex = SCENE.surface(truth, NO_CLOTH), np.arange(len(LEG), dtype=np.int32)
+    ends = Matches(
+        camera=np.zeros(len(vertex), np.int16),
+        pixel=project(surface.vertices, SCENE.cameras[0]),
+        direction=np.tile([1.0, 0.0], (len(vertex), 1)),
+        vertex=vertex,
+        weight=np.ones(len(vertex)),
+    )
+    shown = replace(seen(surface, SCENE), inner=ends)
+    every, kept = (InnerContours().match(FRAME, shown, surface, past, SCENE, FIRST) for past in (Past(), PAST))
+    assert len(every.vertex) == len(LEG)
+    np.testing.assert_array_equal(kept.vertex, np.flatnonzero(~LEG))
 
 
 def test_what_was_known_of_appearances_stays():

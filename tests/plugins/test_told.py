@@ -53,10 +53,19 @@ def test_the_search_warns_of_them_in_the_first_frame(caplog):
     assert any("from knee_l on" in said.getMessage() for said in caplog.records)
 
 
-def test_feet_that_look_like_the_room_are_told_from_others():
-    feet = np.isin(SCENE.body.main_joint, [SCENE.body.joint("ankle_l"), SCENE.body.joint("ankle_r")])
-    np.testing.assert_array_equal(like_the_floor(SURFACE, seen(without_feet()), SCENE.body), feet)
-    assert not like_the_floor(SURFACE, seen(FRAME), SCENE.body).any()
+@pytest.mark.parametrize(("share", "moves"), [(0.3, True), (0.02, False)])
+def test_feet_that_look_like_the_room_are_told_from_others(share, moves):
+    """With what moves with them, so that nothing tells of an ankle."""
+    body = SCENE.body
+    ankle, knee = body.joint("ankle_l"), body.joint("knee_l")
+    feet, shank = np.isin(body.main_joint, [ankle, body.joint("ankle_r")]), np.flatnonzero(body.main_joint == knee)[0]
+    carriers, weights = body.skin_joint.copy(), body.skin_weight.copy()
+    carriers[shank], weights[shank] = [knee, ankle, 0, 0, 0], [1 - share, share, 0, 0, 0]
+    body = replace(body, skin_joint=carriers, skin_weight=weights)
+    told = like_the_floor(SURFACE, seen(without_feet()), body)
+    assert told[feet].all()
+    assert told[shank] == moves
+    assert not like_the_floor(SURFACE, seen(FRAME), body).any()
 
 
 @pytest.mark.parametrize(
