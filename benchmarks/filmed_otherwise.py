@@ -27,6 +27,8 @@ PLATE = -1  # the frame number of a plate
 WARM = np.array([0.5, 0.85, 1.1])  # factors of blue, green and red
 LENSES = ((-0.25, 0.08, 0.001, -0.0005), (-0.2, 0.05, 0, 0.001), (0.12, -0.05, 0, 0), (-0.3, 0.1, 0, 0))
 SIZES = ((1.5, 1.5), (0.75, 0.75), (1.25, 1.0), (1.0, 1.0))  # factors of width and height
+BELOW, FROM, TO = 0.78, 0.4, 0.77  # rows and columns of pictures where furniture stands, share of them
+WOOD = np.array([70, 105, 130], np.uint8)  # BGR
 TURN, SHIFT = cv2.Rodrigues(np.array([0, 0, 2.3]))[0], np.array([40.0, -25.0, 0.0])  # of the world, rad and m
 
 
@@ -50,6 +52,20 @@ def times(image: U8, factor: float | F64) -> U8:
 def grey(image: U8, *_: object) -> U8:
     """An image (H, W, 3) without colours."""
     return np.repeat(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)[..., None], 3, axis=2)
+
+
+def before(image: U8) -> U8:
+    """Return the part (h, w, 3) of an image (H, W, 3) where furniture stands between camera and person."""
+    height, width = image.shape[:2]
+    return image[round(BELOW * height) :, round(FROM * width) : round(TO * width)]
+
+
+def behind_furniture(image: U8, _frame: int, number: int, _camera: Camera) -> U8:
+    """An image (H, W, 3) with a box before the feet, if it is one of the first camera."""
+    shown = image.copy()
+    if number == 0:
+        before(shown)[:] = WOOD
+    return shown
 
 
 def through_lens(image: U8, _frame: int, _number: int, camera: Camera) -> U8:
@@ -86,6 +102,7 @@ KINDS = {
     "sizes": Kind(
         resized, lambda image, _f, _n, camera: cv2.resize(image, camera.size.tolist(), None, 0, 0, cv2.INTER_AREA)
     ),
+    "furniture": Kind(lambda _, camera: camera, behind_furniture),
     "world": Kind(moved, lambda image, *_: image),
 }
 
@@ -107,6 +124,11 @@ def write(source: Path, folder: Path, name: str) -> None:
             cv2.imwrite(str(folder / "videos" / camera.name / f"{frame.index:05}.png"), shown)
     if name == "world":
         _move(folder)
+    if name == "furniture":
+        painted = np.zeros((*cameras[0].size[::-1], 3), np.uint8)
+        before(painted)[:] = 255
+        (folder / "occluders").mkdir()
+        cv2.imwrite(str(folder / "occluders" / f"{cameras[0].name}.png"), painted)
 
 
 def _move(folder: Path) -> None:

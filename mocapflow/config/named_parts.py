@@ -26,7 +26,11 @@ FILES = {"cameras": "cameras.toml", "init": "init.json", "late_frames": TIMING}
 SUBJECT = {"body": "body.obj", "skeleton": "skeleton.json", "weights": "weights.npz", "garment": "garment.json"}
 TRUTH = {"angles": "angles.csv", "joints": "joints.npz", "cloth": "cloth.npz", "body": "body.npz"}
 FREE: Mapping[str, str] = {}  # names are those of cameras, or anybody's
-FOLDERS = {"videos": FREE, "background": FREE, "keypoints": FREE, "reference": FREE, "subject": SUBJECT, "truth": TRUTH}
+FOLDERS = {
+    **dict.fromkeys(("videos", "background", "occluders", "keypoints", "reference"), FREE),
+    "subject": SUBJECT,
+    "truth": TRUTH,
+}
 WHOLE = "static"  # is a recording of its own
 ALONE = {"truth": "angles", "reference": "reference"}  # what a single file in place of such a folder is
 REQUIRED = ("cameras", "videos")

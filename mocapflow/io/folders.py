@@ -16,7 +16,7 @@ from mocapflow.io.lateness import late_frames
 from mocapflow.io.video import VIDEOS, Video, count_from_first, open_video
 from mocapflow.records import record
 
-KEYPOINTS = "keypoints"
+KEYPOINTS, OCCLUDERS = "keypoints", "occluders"
 KEYPOINT_ENDINGS = ("_json", "")
 
 
@@ -62,7 +62,7 @@ def gather(folder: Path, calibration: Path | None) -> Parts:
         calibration=calibration,
         frame_rate=rate,
         length=length,
-        warnings=(*cut, *broken, *gaps, *assumed, *odd, *plate_warnings(folder, cameras)),
+        warnings=(*cut, *broken, *gaps, *assumed, *odd, *unused_pictures(folder, cameras)),
     )
 
 
@@ -92,21 +92,41 @@ def plates(folder: Path, camera: str) -> tuple[Path, ...]:
         RecordingError: two images have the name of the camera.
     """
     place = folder / "background"
-    single = [path for path in _images(place) if path.stem == camera]
-    if len(single) > 1:
-        hint = f"keep one of them, or put all plates of this camera into background/{camera}/"
-        names = ", ".join(path.name for path in single)
-        raise RecordingError(f"{len(single)} clean plates of {camera}: {names}", where=str(place), hint=hint)
-    return tuple(single or _images(place / camera))
+    single = picture_of(place, camera, "clean plates", f", or put all plates of this camera into background/{camera}/")
+    return (single,) if single else tuple(_images(place / camera))
 
 
-def plate_warnings(folder: Path, cameras: Sequence[Camera]) -> list[str]:
-    """Say what in background/ is no clean plate of any camera."""
-    found = {path for camera in cameras for path in plates(folder, camera.name)}
-    used = found | {path.parent for path in found}
-    unused = [path.name for path in _entries(folder / "background") if path not in used]
-    names = f"plates are named after their cameras: {cameras[0].name}.png"
-    return [f"not used from background/: {', '.join(unused)}; {names}"] if unused else []
+def picture_of(place: Path, camera: str, what: str, or_else: str = "") -> Path | None:
+    """Return the image in a folder that is named after a camera; None where there is none.
+
+    Raises:
+        RecordingError: two images have the name of the camera.
+    """
+    found = [path for path in _images(place) if path.stem == camera]
+    if len(found) > 1:
+        names = ", ".join(path.name for path in found)
+        hint = f"keep one of them{or_else}"
+        raise RecordingError(f"{len(found)} {what} of {camera}: {names}", where=str(place), hint=hint)
+    return found[0] if found else None
+
+
+def occluders(folder: Path, cameras: Sequence[Camera]) -> list[Path]:
+    """Return the pictures of what stands before cameras: occluders/<camera>.png, of those that have one.
+
+    Raises:
+        RecordingError: two images have the name of a camera.
+    """
+    found = (picture_of(folder / OCCLUDERS, camera.name, "pictures of occluders") for camera in cameras)
+    return [path for path in found if path]
+
+
+def unused_pictures(folder: Path, cameras: Sequence[Camera]) -> list[str]:
+    """Say what in background/ and occluders/ is of no camera."""
+    taken = {path for camera in cameras for path in plates(folder, camera.name)}
+    used = {"background": taken | {path.parent for path in taken}, OCCLUDERS: set(occluders(folder, cameras))}
+    names = f"pictures are named after their cameras: {cameras[0].name}.png"
+    unused = {place: [p.name for p in _entries(folder / place) if p not in known] for place, known in used.items()}
+    return [f"not used from {place}/: {', '.join(these)}; {names}" for place, these in unused.items() if these]
 
 
 def match_videos(folder: Path, names: Sequence[str], calibration: Path) -> tuple[Path, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from mocapflow.assets import Camera
 from mocapflow.geometry.cameras import bends, pinhole, scaled, undistort
-from mocapflow.records import F64, U8, array, record
+from mocapflow.records import F64, U8, Bool, array, record
 
 
 @record
@@ -22,6 +23,7 @@ class View:
     lens: Camera
     scale: float = 1.0
     levels: U8 | None = array(256, 3, unit="grey level that each one of blue, green and red becomes", default=None)
+    occluder: Bool | None = array("H", "W", unit="where something stands before all else; None: nowhere", default=None)
 
     @cached_property
     def camera(self) -> Camera:
@@ -41,6 +43,14 @@ class View:
         if self._maps is None:
             return image
         return np.asarray(cv2.remap(image, *self._maps, cv2.INTER_LINEAR), np.uint8)
+
+    @cached_property
+    def hidden(self) -> Bool | None:
+        """Where (H, W) `image`'s results show what stands before all else; None: nowhere."""
+        if self.occluder is None:
+            return None
+        white = np.where(self.occluder[..., None], 255, np.zeros(3)).astype(np.uint8)
+        return np.asarray(replace(self, levels=None, occluder=None).image(white)[..., 0] > 0)
 
     def points(self, points: F64) -> F64:
         """Return keypoints (N, K, 3: px, px, confidence) of the lens where they are in `image`'s results.

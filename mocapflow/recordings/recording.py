@@ -1,4 +1,4 @@
-"""A recording folder: cameras, videos, keypoints and clean plates, read one frame at a time."""
+"""A recording folder: cameras, videos, keypoints, clean plates and occluders, read one frame at a time."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ from mocapflow.io.cameras import calibration_files
 from mocapflow.io.keypoints import keypoint_files, people_at
 from mocapflow.io.lateness import TIMING
 from mocapflow.io.lenses import View
+from mocapflow.io.occluders import occluder
 from mocapflow.io.plates import background
 from mocapflow.io.video import Video, read_frames
-from mocapflow.records import F64, Watch, record, unwatched
+from mocapflow.records import F64, Bool, Watch, record, unwatched
 
 LEAST_PX = 8  # from side to side; nobody is seen in fewer
 
@@ -122,6 +123,7 @@ class Recording:
         paths += [path for path in (self.folder / TIMING,) if path.exists()]
         paths += [folder for folder in self.keypoint_folders if folder is not None]
         paths += [plate for view in self.views for plate in folders.plates(self.folder, view.lens.name)]
+        paths += folders.occluders(self.folder, self.lenses)
         return {
             path.relative_to(self.folder).as_posix() if path.is_relative_to(self.folder) else path.name: path
             for path in paths
@@ -141,7 +143,7 @@ class Recording:
 
 def decoded(views: Sequence[View], videos: Sequence[Video], indices: range, frame_rate: float) -> Iterator[Frame]:
     """Yield what videos show in frames of these numbers, as their cameras' views have it."""
-    pictures = zip(*(read_frames(video, indices) for video in videos), strict=True)
+    pictures, hidden = zip(*(read_frames(video, indices) for video in videos), strict=True), hidden_in(views)
     for index, row in zip(indices, pictures, strict=True):
         usable = np.array([image is not None for image, _ in row])
         yield Frame(
@@ -150,7 +152,16 @@ def decoded(views: Sequence[View], videos: Sequence[Video], indices: range, fram
             images=tuple(view.image(image) for view, (image, _) in zip(views, row, strict=True)),
             usable=usable,
             reasons=() if usable.all() else tuple(reason for _, reason in row),
+            hidden=hidden,
         )
+
+
+def hidden_in(views: Sequence[View]) -> tuple[Bool, ...]:
+    """Return where (H, W) occluders stand in each view; () where none is known in any."""
+    if all(view.hidden is None for view in views):
+        return ()
+    nowhere = (np.zeros(view.camera.size[::-1], bool) for view in views)
+    return tuple(none if view.hidden is None else view.hidden for view, none in zip(views, nowhere, strict=True))
 
 
 def open_recording(
@@ -165,7 +176,7 @@ def open_recording(
     """Open a recording folder; nothing is decoded but the ends of the videos.
 
     Args:
-        folder: cameras.toml (or another calibration) and videos/; keypoints/, background/ and static/ if there.
+        folder: cameras.toml (or another calibration), videos/; keypoints/, background/, occluders/, static/ if there.
         start: first frame.
         stop: frame after the last; None: to the end.
         step: take every so many frames.
@@ -192,7 +203,7 @@ def open_recording(
         )
     return Recording(
         folder=folder,
-        views=tuple(View(lens=lens, scale=scale) for lens in parts.lenses),
+        views=tuple(View(lens=lens, scale=scale, occluder=occluder(folder, lens)) for lens in parts.lenses),
         videos=parts.videos,
         keypoint_folders=parts.keypoint_folders,
         calibration=parts.calibration,

@@ -18,6 +18,7 @@ from mocapflow.io.findings import Finding, attempt, note, warning
 from mocapflow.io.images import name_frames
 from mocapflow.io.lateness import late_frames
 from mocapflow.io.lenses import View
+from mocapflow.io.occluders import occluder
 from mocapflow.io.plates import background
 from mocapflow.io.rigs import examine_rig
 from mocapflow.io.video import Video, count_from_first, open_video, read_frames
@@ -57,10 +58,10 @@ def examine_trial(folder: Path, calibration: Path, rig: bool = True) -> list[Fin
         delayed = [replace(video, late=frames) for video, frames in zip(whole, late, strict=True)]
         attempt(lambda: agreement.check_lateness(cameras, delayed, length, folder), findings)
     odd = attempt(lambda: folders.keypoint_warnings(folder, cameras, length, whole[0].first), findings)
-    unused = attempt(lambda: folders.plate_warnings(folder, cameras), findings)
+    unused = attempt(lambda: folders.unused_pictures(folder, cameras), findings)
     findings += [warning(text, where=folder) for text in (*(odd or ()), *(unused or ()))]
     if fitted is not None and unused is not None:
-        views = [View(lens=lens) for lens in lenses]
+        views = [View(lens=lens, occluder=attempt(partial(occluder, folder, lens), findings)) for lens in lenses]
         attempt(lambda: background(folder, views, lambda: next(decoded(views, whole, range(1), 1.0))), findings)
     return findings
 

@@ -21,7 +21,7 @@ from mocapflow.storage.shared import open_store
 from mocapflow.storage.store import Report, Store
 
 # what a recording holds; files of a run in there would be taken for its own
-INPUTS = ("videos", "background", "subject", "keypoints", "static", "truth", "reference")
+INPUTS = ("videos", "background", "occluders", "subject", "keypoints", "static", "truth", "reference")
 
 
 @dataclass(frozen=True)

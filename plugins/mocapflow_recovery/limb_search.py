@@ -31,13 +31,17 @@ from mocapflow_recovery.judge import Fit, Given, Judge, stray_of, surface_of
 from mocapflow_recovery.looks import Looks
 from mocapflow_recovery.sampling import Plan, Spread
 from mocapflow_recovery.suspicion import Signs, Suspicion, suspicion
-from mocapflow_recovery.told import like_the_floor, untold
+from mocapflow_recovery.told import behind, like_the_floor, untold
 
 LOG = logging.getLogger("mocapflow")
 CURED = 2.0  # times as far apart may be what is doubted no more: a leg lay where a skirt flew
 CLEARED = 1.1  # the same, what leaves no hint: of a foot that was lost all other limbs and the cloth tell nothing
 UNKNOWN = "too little is known of the room behind the person: limbs that are lost are not looked for"
 FEET_UNTOLD = "the feet look like the floor: outlines are not compared with them, and ankles are unsure"
+HIDDEN = (
+    "%s shows the empty room where the first pose and the other views have the leg from %s on:"
+    " if something stands before it, paint that white in occluders/%s.png; else mend the first pose"
+)
 UNSEEN = "fit doubted: no picture tells person from room where it lies"
 Settle = Callable[[Pose, F64], FrameResult]  # from a pose, with cloth parameters
 Look = Callable[[np.random.Generator], Pose]  # finds a pose by samples
@@ -139,6 +143,7 @@ class LimbSearch(Recovery):
             return result if past.moments else noted(result, UNKNOWN, doubted=False)
         if not past.moments:
             self._warn(untold(surface, seen, model.scene.body))
+            self._warn_of_furniture(frame, state, past, model.scene)
         stray = stray_of(surface, model.scene, seen)
         fitted, believed, body = result.state.estimate.pose, state.estimate.pose, model.scene.body
         suspected = suspicion(self.signs, stray, fitted, believed, past, body, self._density)
@@ -154,6 +159,11 @@ class LimbSearch(Recovery):
     def _warn(self, limbs: Mapping[str, float]) -> None:
         for joint, share in limbs.items():
             LOG.warning(f"from {joint} on only {share:.0%} differ from the room: this limb may be lost unnoticed")
+
+    def _warn_of_furniture(self, frame: Frame, state: FrameState, past: Past, scene: Scene) -> None:
+        surface = scene.surface(state.estimate.pose, state.cloth)
+        for camera, joints in behind(surface, self.views(frame, surface, past, scene), scene.body).items():
+            LOG.warning(HIDDEN, camera, " and ".join(joints), camera)
 
     def views(self, frame: Frame, surface: Surface, past: Past, scene: Scene) -> list[View]:
         """Return what the views of a frame surely show around a surface, in a scene whose empty room is known."""

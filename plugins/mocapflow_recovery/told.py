@@ -1,4 +1,4 @@
-"""Which limbs and feet hardly differ from the room behind them: lost, they are not missed."""
+"""Which limbs views do not tell from the room: they look like it, or something of it stands before them."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ BEGIN = ("knee", "elbow")  # joints that limbs begin at, on either side
 FOOT = ("ankle", "toe")  # joints that move a foot, on either side
 LEAST = 0.1  # share of a limb that has to be told; of shanks and feet well lit pictures tell 0.37 to 0.81
 CARRIES = 0.1  # share of its motion from which on a point of a shank tells of the foot, too
+NEAR_M = 0.06  # from what may be the person: a first pose is about as far off
+UNSHOWN, UNSURE = 0.4, 0.7  # shares of a leg: of less the room is shown, more than the other is shown
 LEAST_OF_FEET = 0.35  # of both; 0.20 to 0.28 are told on white floors, 0.1 in grey pictures, else 0.42 to 0.81
 
 
@@ -42,20 +44,40 @@ def like_the_floor(surface: Surface, seen: Sequence[View], body: Body) -> Bool:
     return moved if feet.any() and _told(surface, seen, body)[feet].mean() < LEAST_OF_FEET else np.zeros_like(moved)
 
 
+def behind(surface: Surface, seen: Sequence[View], body: Body) -> dict[str, list[str]]:
+    """Return the cameras that show the room where the others show a leg, each with the joints from which on.
+
+    Args:
+        surface: the person as given.
+        seen: what the views surely show.
+        body: whose vertices come first in the surface.
+    """
+    near = np.array([_seen_by(view, view.away * view.pixel_m < NEAR_M, surface, True) for view in seen])
+    below, found = descendants(body.parents), dict[str, list[str]]()
+    for joint in (number for number, name in enumerate(body.joint_names) if name.rpartition("_")[0] == BEGIN[0]):
+        shares = near[:, : len(body.vertices)][:, below[joint][body.main_joint]].mean(axis=1)
+        lost = np.flatnonzero(shares < UNSHOWN)
+        if len(lost) <= len(seen) / 2 and np.delete(shares, lost).min(initial=1) > UNSURE:
+            for view in lost.tolist():
+                found.setdefault(seen[view].camera.name, []).append(body.joint_names[joint])
+    return found
+
+
 def _begins(name: str) -> bool:
     return name.rpartition("_")[0] in BEGIN
 
 
 def _told(surface: Surface, seen: Sequence[View], body: Body) -> F64:
     """Return the share (V,) of the views that surely show the person where a vertex of the body is."""
-    return np.asarray(np.mean([_on_person(surface, view)[: len(body.vertices)] for view in seen], axis=0))
+    on_person = [_seen_by(view, view.person, surface, False) for view in seen]
+    return np.asarray(np.mean(on_person, axis=0)[: len(body.vertices)])
 
 
-def _on_person(surface: Surface, view: View) -> Bool:
-    """Return which vertices (V,) lie where a view surely shows the person; none does beyond its edges."""
-    pixels, on_it = project(surface.vertices, view.camera), np.zeros(len(surface.vertices), bool)
-    size = np.array(view.person.shape[::-1])
+def _seen_by(view: View, shown: Bool, surface: Surface, beyond: bool) -> Bool:
+    """Return what a view shows (h, w) where vertices lie: (N,), or else what holds beyond its edges."""
+    pixels, found = project(surface.vertices, view.camera), np.full(len(surface.vertices), beyond)
+    size = np.array(shown.shape[::-1])
     inside = np.isfinite(pixels).all(axis=1) & (pixels > -0.5).all(axis=1) & (pixels < size - 0.5).all(axis=1)
     column, row = np.rint(pixels[inside]).astype(int).T
-    on_it[inside] = view.person[row, column]
-    return on_it
+    found[inside] = shown[row, column]
+    return found

@@ -119,9 +119,10 @@ def test_cameras_are_of_any_known_format(tmp_path, spread, files, named, links):
 
 
 def test_what_is_wrong_is_told_by_its_line(tmp_path, spread):
-    known = "available: background, cameras, init, keypoints, late_frames, reference, static, subject, truth, videos"
+    parts = "background, cameras, init, keypoints, late_frames, occluders, reference, static, subject, truth, videos"
     assert refused(tmp_path, vidoes="clip") == (
-        f"HERE/mine.yaml:6:3  recording.vidoes: no part of a recording\n       {known} — did you mean 'videos'?"
+        "HERE/mine.yaml:6:3  recording.vidoes: no part of a recording\n"
+        f"       available: {parts} — did you mean 'videos'?"
     )
     assert refused(tmp_path, init="lab/rig.tml") == (
         "HERE/mine.yaml:6:3  recording.init: there is no file HERE/lab/rig.tml\n"

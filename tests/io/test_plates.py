@@ -61,7 +61,7 @@ def test_what_is_no_plate_of_any_camera_is_said(tmp_path):
     recording = open_recording(tmp_path)
     assert recording.background() is None
     assert recording.warnings == (
-        "not used from background/: cam01.heic, empty.png; plates are named after their cameras: cam01.png",
+        "not used from background/: cam01.heic, empty.png; pictures are named after their cameras: cam01.png",
     )
 
 

@@ -8,7 +8,7 @@ from mocapflow_levelset.camouflage import FEET
 from mocapflow_recovery import limb_search
 from mocapflow_recovery.certain import small_room, views
 from mocapflow_recovery.limb_search import LimbSearch
-from mocapflow_recovery.told import like_the_floor, untold
+from mocapflow_recovery.told import behind, like_the_floor, untold
 
 from mocapflow.data import NO_CLOTH
 from mocapflow.geometry.cameras import project
@@ -88,3 +88,29 @@ def test_later_frames_are_told_what_the_first_shows(frame, floor_m, first, known
     found = search.recover(frame, state, fitted, past, scenes.tiny_model(scene), lambda *_: fitted)
     assert (FEET in found.state.segmentation.appearance) == known
     assert ("the feet look like the floor" in caplog.text) == known
+
+
+@pytest.mark.parametrize(
+    ("views", "told"), [((), ()), ((1,), ("cam02",)), ((0, 1), ("cam01", "cam02")), ((0, 1, 2), ())]
+)
+def test_legs_are_told_that_some_views_show_nothing_of_though_others_do(views, told):
+    """Furniture stands before them there; what most views lack is elsewhere."""
+    images, behind_furniture = list(FRAME.images), without_feet().images
+    for view in views:
+        images[view] = behind_furniture[view]
+    legs = ["knee_l", "knee_r"]
+    found = behind(SURFACE, seen(replace(FRAME, images=tuple(images))), SCENE.body)
+    assert found == {camera: legs for camera in told}
+
+
+def test_the_search_warns_of_furniture_before_legs_in_the_first_frame(caplog):
+    state, images = pictures.tiny_state(SCENE, POSE, POSE), list(FRAME.images)
+    images[1] = without_feet().images[1]
+    fitted, past = recovery.settled(state, scene=SCENE), replace(scenes.tiny_past(SCENE, POSE), moments=())
+    search = LimbSearch(beginnings=False, uncovered_cm2=1e6, floating_cm2=1e6)
+    hidden = replace(FRAME, images=tuple(images))
+    search.recover(hidden, state, fitted, past, scenes.tiny_model(SCENE), lambda *_: fitted)
+    assert "paint that white in occluders/cam02.png" in caplog.text
+    caplog.clear()
+    search.recover(FRAME, state, fitted, past, scenes.tiny_model(SCENE), lambda *_: fitted)
+    assert "occluders" not in caplog.text

@@ -261,7 +261,7 @@ def test_a_plate_of_no_camera(good):
     (good / "background" / "cam01.png").rename(good / "background" / "cam1.png")
     assert errors(good) == ["no clean plate of cam01"]
     assert messages(good, "warning") == [
-        "not used from background/: cam1.png; plates are named after their cameras: cam01.png"
+        "not used from background/: cam1.png; pictures are named after their cameras: cam01.png"
     ]
 
 
