@@ -16,7 +16,7 @@ from mocapflow_recovery.certain import View
 BEGIN = ("knee", "elbow")  # joints that limbs begin at, on either side
 FOOT = ("ankle", "toe")  # joints that move a foot, on either side
 LEAST = 0.1  # share of a limb that has to be told; of shanks and feet well lit pictures tell 0.37 to 0.81
-CARRIES = 0.1  # share of its motion from which on a point of a shank tells of the foot, too
+CARRIES = 0.25  # share of its motion from which on a point of a shank tells of the foot, too
 NEAR_M = 0.06  # from what may be the person: a first pose is about as far off
 UNSHOWN, UNSURE = 0.4, 0.7  # shares of a leg: of less the room is shown, more than the other is shown
 LEAST_OF_FEET = 0.35  # of both; 0.20 to 0.28 are told on white floors, 0.1 in grey pictures, else 0.42 to 0.81
