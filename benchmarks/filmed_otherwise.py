@@ -27,6 +27,7 @@ PLATE = -1  # the frame number of a plate
 WARM = np.array([0.5, 0.85, 1.1])  # factors of blue, green and red
 LENSES = ((-0.25, 0.08, 0.001, -0.0005), (-0.2, 0.05, 0, 0.001), (0.12, -0.05, 0, 0), (-0.3, 0.1, 0, 0))
 SIZES = ((1.5, 1.5), (0.75, 0.75), (1.25, 1.0), (1.0, 1.0))  # factors of width and height
+OUT = 15  # the frame from which on a lamp is out
 BELOW, FROM, TO = 0.78, 0.4, 0.77  # rows and columns of pictures where furniture stands, share of them
 WOOD = np.array([70, 105, 130], np.uint8)  # BGR
 TURN, SHIFT = cv2.Rodrigues(np.array([0, 0, 2.3]))[0], np.array([40.0, -25.0, 0.0])  # of the world, rad and m
@@ -52,6 +53,11 @@ def times(image: U8, factor: float | F64) -> U8:
 def grey(image: U8, *_: object) -> U8:
     """An image (H, W, 3) without colours."""
     return np.repeat(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)[..., None], 3, axis=2)
+
+
+def lamp_out(image: U8, frame: int, _number: int, _camera: Camera) -> U8:
+    """An image (H, W, 3) in which a lamp has gone out at the left, from frame 15 on."""
+    return image if frame < OUT else times(image, np.linspace(0.55, 1, image.shape[1])[:, None])
 
 
 def before(image: U8) -> U8:
@@ -98,6 +104,7 @@ KINDS = {
     "warm": brightened(lambda *_: WARM),
     "drift": brightened(lambda frame, number: 1 - 0.3 * max(frame, 0) / 60 * (1 + 0.3 * number) / 1.5),
     "flicker": brightened(lambda frame, number: 1 + 0.06 * np.sin(2.1 * frame + number) * (frame != PLATE)),
+    "lamp": Kind(lambda _, camera: camera, lamp_out),
     "lens": Kind(lambda number, camera: replace(camera, distortion=np.array([*LENSES[number], 0])), through_lens),
     "sizes": Kind(
         resized, lambda image, _f, _n, camera: cv2.resize(image, camera.size.tolist(), None, 0, 0, cv2.INTER_AREA)

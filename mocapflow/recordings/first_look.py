@@ -43,6 +43,8 @@ def examine_first_frame(folder: Path, registry: Registry) -> Iterator[Finding]:
         hint = "was the camera moved, the light changed, or the file of another camera copied here?"
         yield warning(f"the first frame of {', '.join(foreign)} is not of the room in its clean plate", hint, folder)
     elif (bodies := _bodies(recording, registry)) is not None:
+        if frame.hidden:
+            bodies = [body & ~hidden for body, hidden in zip(bodies, frame.hidden, strict=True)]
         triples = zip(names, bodies, somebody, strict=True)
         shares = {name: seen[body].mean() for name, body, seen in triples if seen is not None and body.any()}
         odd = [name for name, share in shares.items() if share < COVERED]

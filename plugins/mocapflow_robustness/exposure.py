@@ -33,8 +33,8 @@ class Exposure(Stage):
     What tells a person from the room is said in shares of the range of grey levels, as well exposed pictures use it.
     So frames and plates of a camera that shows all too dark, or in one colour, have their levels multiplied, of each
     colour by one factor in all pictures, so far as the brightest parts allow; of other cameras they stay. A frame that
-    is brighter or darker all over than the first ones, for the sun comes out or a camera sets itself, becomes as
-    bright as they. It has to stand before all stages that change pictures.
+    is brighter or darker than the first ones, all over or more at one side, for the sun comes out, a lamp goes out or a
+    camera sets itself, becomes as bright as they. It has to stand before all stages that change pictures.
     """
 
     name: ClassVar[str] = "exposure"

@@ -1,4 +1,4 @@
-"""Frames become as bright as a typical one of their camera."""
+"""Frames become as bright as a typical one of their camera, all over or from one side to the other."""
 
 from __future__ import annotations
 
@@ -11,12 +11,14 @@ from mocapflow.data import Frame
 from mocapflow.io.lenses import with_levels
 from mocapflow.io.plates import blocks
 from mocapflow.recordings.recording import Recording
-from mocapflow.records import F64, U8
+from mocapflow.records import F64, U8, Bool
 
 ACROSS = 40  # blocks of a picture, whose brightness is compared: a pixel alone is noisy
 DARK = 30  # grey levels; darker blocks don't tell by how much a picture is brighter than another
 TELLING = 0.1  # share of the blocks that have to tell
 ALIKE = 0.05  # median share by which the factors of blocks may differ: those of one room differ by 0.01
+FARTHEST = 2.5  # times the median by which factors may be off a light that changes across a picture: others are people
+FITS = 8  # of such a light to the blocks that agree with the last one
 
 
 @dataclass(frozen=True)
@@ -38,21 +40,52 @@ class Steadied:
         gain = None if typical is None else brighter(small(image), typical)
         if gain is None or np.all(np.abs(gain - 1) <= self.tolerance):
             return image
-        return with_levels(image, multiplied(1 / gain))
+        return with_levels(image, multiplied(1 / gain)) if gain.ndim == 1 else divided(image, gain)
 
 
 def brighter(image: U8, typical: U8) -> F64 | None:
-    """Return by which factors (3,) the blocks (h, w, 3) of a picture are brighter, most of them; None: nobody can tell.
+    """Return by which factors the blocks (h, w, 3) of a picture are brighter, (3,) or (h, w, 3); None: nobody can tell.
 
-    Nobody can of black pictures, nor of those of different rooms, whose factors differ from block to block.
+    One factor of each colour is that of most blocks. Where a lamp went out or the sun has come in at one side, factors
+    change across the picture, as polynomials of second order. Nobody can tell of black pictures, nor of those of
+    different rooms, whose factors differ from block to block.
     """
-    told = ((np.minimum(image, typical) >= DARK) & (np.maximum(image, typical) < 255)).all(axis=2)
+    told = np.asarray(((np.minimum(image, typical) >= DARK) & (np.maximum(image, typical) < 255)).all(axis=2))
     if told.mean() < TELLING:
         return None
     factors = image[told] / typical[told].astype(float)
-    gain = np.median(factors, axis=0)
-    alike = np.median(np.abs(factors / gain - 1), axis=0).max() < ALIKE
-    return np.asarray(gain, float) if alike else None
+    everywhere = np.median(factors, axis=0)
+    if _alike(factors / everywhere):
+        return np.asarray(everywhere, float)
+    across = _across(np.log(factors), told)
+    return across if _alike(factors / across[told]) else None
+
+
+def _alike(factors: F64) -> bool:
+    """Return whether most factors (N, 3) are about one."""
+    return bool(np.median(np.abs(factors - 1), axis=0).max() < ALIKE)
+
+
+def _across(logs: F64, told: Bool) -> F64:
+    """Return factors (h, w, 3) by polynomials through the logarithms (N, 3) of those of some blocks, outliers apart."""
+    y, x = (np.linspace(-1, 1, count) for count in told.shape)
+    x, y = np.meshgrid(x, y)
+    terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1)
+    agree = np.ones(len(logs), bool)
+    for _ in range(FITS):
+        weights = np.linalg.lstsq(terms[told][agree], logs[agree], rcond=None)[0]
+        off = np.abs(logs - terms[told] @ weights).max(axis=1)
+        agree = off <= FARTHEST * np.median(off)
+    return np.asarray(np.exp(terms @ weights))
+
+
+def divided(image: U8, gain: F64) -> U8:
+    """Return an image (H, W, 3) whose grey levels are divided by factors of its blocks (h, w, 3)."""
+    import cv2
+
+    height, width = image.shape[:2]
+    smooth = cv2.resize(1 / gain, (width, height), interpolation=cv2.INTER_LINEAR)
+    return np.asarray(np.clip(np.rint(image * smooth), 0, 255), np.uint8)
 
 
 def multiplied(gains: F64) -> U8:

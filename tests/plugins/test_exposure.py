@@ -94,6 +94,16 @@ def test_frames_that_grow_darker_are_as_bright_as_usual(filmed, true):
     np.testing.assert_array_equal(steady[3], seen[3])
 
 
+def test_a_lamp_that_goes_out_at_one_side_leaves_a_frame_as_bright_as_usual(filmed, true):
+    width = true.cameras[0].size[0]
+    fading = np.linspace(0.55, 1, width)[:, None] * np.ones(3)
+    dim = filmed(cam01=[*[1.0] * (FRAMES - 1), fading])
+    last = FRAMES - 1
+    steady, seen, expected = (each.frame(last).images[0] for each in (Exposure().run(dim), dim, true))
+    assert off(steady, expected) <= 1
+    assert off(seen, expected) > 15
+
+
 @pytest.mark.parametrize("odd", [0.6, 20.0, 0.0, None], ids=["dark", "white", "black", "missing"])
 def test_an_odd_first_frame_does_not_tell_how_a_camera_is_set(filmed, true, odd):
     """It is brought to the others, or stays; the others stay."""
@@ -143,6 +153,16 @@ def test_how_much_brighter_is_told_by_most_of_a_room(noise):
     room, dim = (each.repeat(8, axis=0).repeat(8, axis=1) for each in (SHADE, dim))
     noisy = (times(each + rng.normal(0, noise, each.shape), 1) for each in (dim, room))
     np.testing.assert_allclose(brighter(*map(small, noisy)), [0.7, 0.8, 0.9], atol=0.01)
+
+
+def test_how_much_brighter_is_told_where_light_changes_across_a_room():
+    y, x = np.meshgrid(np.linspace(-1, 1, 50), np.linspace(-1, 1, 40), indexing="ij")
+    light = np.exp(-0.3 + 0.25 * x - 0.1 * x * y + 0.1 * y**2)[..., None] * [1, 0.95, 0.9]
+    dim = SHADE * light
+    dim[10:35, 5:15] = (20, 200, 40)  # somebody
+    found = brighter(times(dim, 1), times(SHADE, 1))
+    assert found.shape == light.shape
+    np.testing.assert_allclose(found, light, rtol=0.02)
 
 
 def test_how_much_brighter_nobody_can_tell_of_another_room_or_a_black_one():

@@ -4,6 +4,8 @@ import json
 import shutil
 from dataclasses import replace
 
+import cv2
+import numpy as np
 import pytest
 from mocapflow_bodies.scanned import Scanned
 
@@ -62,3 +64,8 @@ def test_a_camera_whose_calibration_is_another_s(clip):
     cameras[1] = replace(cameras[1], camera_from_world=moved)
     write_cameras(clip / "cameras.toml", cameras)
     assert said(clip) == [f"nobody stands where the first pose says in {cameras[1].name}"]
+    furniture = np.full(cameras[1].size[::-1], 255, np.uint8)
+    furniture[:, :30] = 0
+    (clip / "occluders").mkdir()
+    cv2.imwrite(str(clip / "occluders" / f"{cameras[1].name}.png"), furniture)
+    assert said(clip) == []  # nobody can see there
