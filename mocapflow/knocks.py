@@ -20,7 +20,11 @@ class Knocks:
     turn: F64 = array("K", 3, 3, unit="homography from pixels of the camera's first picture to those since")
 
     def undone(self, frame: Frame) -> Frame:
-        """Return a frame as cameras that still stand as in the beginning would have seen it."""
+        """Return a frame as cameras that still stand as in the beginning would have seen it.
+
+        What is said to be hidden is hidden in both places: what covered the lens has moved in the picture, painted
+        furniture has not.
+        """
         since = self.frame <= frame.index
         turns = dict(zip(self.camera[since].tolist(), self.turn[since], strict=True))  # the last one of each
         if not turns:
@@ -30,7 +34,8 @@ class Knocks:
         people = list(frame.keypoints or [])
         for camera, turn in turns.items():
             back = np.linalg.inv(turn)
-            images[camera], hidden[camera] = _moved(images[camera], hidden[camera], back)
+            images[camera], moved = _moved(images[camera], hidden[camera], back)
+            hidden[camera] = hidden[camera] | moved
             if people:
                 people[camera] = points_seen(people[camera], back)
         return replace(frame, images=tuple(images), hidden=tuple(hidden), keypoints=tuple(people) or None)

@@ -50,13 +50,16 @@ def test_later_ones_show_what_the_camera_saw_before(knocks, index, degrees):
     assert np.abs(frame.images[1].astype(int) - room()).mean() > 2  # it did show something else
 
 
-def test_what_was_hidden_is_hidden_where_it_is_now(knocks):
+def test_what_was_hidden_stays_hidden_and_is_where_it_is_now(knocks):
     hidden = np.zeros((2, 60, 80), bool)
     hidden[:, 20:30, 40:50] = True
     found = knocks.undone(seen(5, 2.0, hidden=tuple(hidden)))
     np.testing.assert_array_equal(found.hidden[0], hidden[0])
+    assert found.hidden[1][hidden[1]].all()
+    moved = round(90 * np.tan(np.radians(2)))
     row, column = np.nonzero(found.hidden[1][15:35, 20:60])
-    assert (row.mean() + 15, column.mean() + 20) == pytest.approx((24.5, 44.5 - 90 * np.tan(np.radians(2))), abs=0.6)
+    assert (row.mean() + 15, column.mean() + 20) == pytest.approx((24.5, 44.5 - moved / 2), abs=0.6)
+    assert np.ptp(column) == pytest.approx(9 + moved, abs=1)
 
 
 def test_keypoints_move_along(knocks):

@@ -31,7 +31,7 @@ from mocapflow_recovery.judge import Fit, Given, Judge, stray_of, surface_of
 from mocapflow_recovery.looks import Looks
 from mocapflow_recovery.sampling import Plan, Spread
 from mocapflow_recovery.suspicion import Signs, Suspicion, suspicion
-from mocapflow_recovery.told import behind, like_the_floor, untold
+from mocapflow_recovery.told import hidden_legs, like_the_floor, untold
 
 LOG = logging.getLogger("mocapflow")
 CURED = 2.0  # times as far apart may be what is doubted no more: a leg lay where a skirt flew
@@ -162,7 +162,7 @@ class LimbSearch(Recovery):
 
     def _warn_of_furniture(self, frame: Frame, state: FrameState, past: Past, scene: Scene) -> None:
         surface = scene.surface(state.estimate.pose, state.cloth)
-        for camera, joints in behind(surface, self.views(frame, surface, past, scene), scene.body).items():
+        for camera, joints in hidden_legs(surface, self.views(frame, surface, past, scene), scene.body).items():
             LOG.warning(HIDDEN, camera, " and ".join(joints), camera)
 
     def views(self, frame: Frame, surface: Surface, past: Past, scene: Scene) -> list[View]:

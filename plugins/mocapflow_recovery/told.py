@@ -44,7 +44,7 @@ def like_the_floor(surface: Surface, seen: Sequence[View], body: Body) -> Bool:
     return moved if feet.any() and _told(surface, seen, body)[feet].mean() < LEAST_OF_FEET else np.zeros_like(moved)
 
 
-def behind(surface: Surface, seen: Sequence[View], body: Body) -> dict[str, list[str]]:
+def hidden_legs(surface: Surface, seen: Sequence[View], body: Body) -> dict[str, list[str]]:
     """Return the cameras that show the room where the others show a leg, each with the joints from which on.
 
     Args:

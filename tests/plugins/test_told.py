@@ -8,7 +8,7 @@ from mocapflow_levelset.camouflage import FEET
 from mocapflow_recovery import limb_search
 from mocapflow_recovery.certain import small_room, views
 from mocapflow_recovery.limb_search import LimbSearch
-from mocapflow_recovery.told import behind, like_the_floor, untold
+from mocapflow_recovery.told import hidden_legs, like_the_floor, untold
 
 from mocapflow.data import NO_CLOTH
 from mocapflow.geometry.cameras import project
@@ -99,7 +99,7 @@ def test_legs_are_told_that_some_views_show_nothing_of_though_others_do(views, t
     for view in views:
         images[view] = behind_furniture[view]
     legs = ["knee_l", "knee_r"]
-    found = behind(SURFACE, seen(replace(FRAME, images=tuple(images))), SCENE.body)
+    found = hidden_legs(SURFACE, seen(replace(FRAME, images=tuple(images))), SCENE.body)
     assert found == {camera: legs for camera in told}
 
 
