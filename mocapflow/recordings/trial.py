@@ -62,6 +62,10 @@ def examine_trial(folder: Path, calibration: Path, rig: bool = True) -> list[Fin
     findings += [warning(text, where=folder) for text in (*(odd or ()), *(unused or ()))]
     if fitted is not None and unused is not None:
         views = [View(lens=lens, occluder=attempt(partial(occluder, folder, lens), findings)) for lens in lenses]
+        painted = [(view.lens.name, view.occluder.mean()) for view in views if view.occluder is not None]
+        findings += [
+            note(f"{name}: {share:.0%} of its pictures are behind occluders", where=folder) for name, share in painted
+        ]
         attempt(lambda: background(folder, views, lambda: next(decoded(views, whole, range(1), 1.0))), findings)
     return findings
 

@@ -80,6 +80,13 @@ def test_a_picture_that_tells_nothing_is_refused_by_runs_and_by_the_doctor(spoil
     assert any(said in finding.message and finding.severity == "error" for finding in examine(tmp_path))
 
 
+def test_the_doctor_says_how_much_is_painted(tmp_path):
+    write_recording(tmp_path, frames=2)
+    paint(tmp_path, "cam02")
+    said = [finding.message for finding in examine(tmp_path) if "occluders" in finding.message]
+    assert said == ["cam02: 50% of its pictures are behind occluders"]
+
+
 def test_a_picture_of_no_camera_is_told(tmp_path):
     write_recording(tmp_path, frames=2)
     paint(tmp_path, "left")
