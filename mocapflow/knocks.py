@@ -22,8 +22,8 @@ class Knocks:
     def undone(self, frame: Frame) -> Frame:
         """Return a frame as cameras that still stand as in the beginning would have seen it.
 
-        What is said to be hidden is hidden in both places: what covered the lens has moved in the picture, painted
-        furniture has not.
+        What is said to be hidden is hidden in both places: moved back with what covers the lens now, and where painted
+        furniture stood in the beginning.
         """
         since = self.frame <= frame.index
         turns = dict(zip(self.camera[since].tolist(), self.turn[since], strict=True))  # the last one of each

@@ -71,10 +71,10 @@ def _across(logs: F64, told: Bool) -> F64:
     y, x = (np.linspace(-1, 1, count) for count in told.shape)
     x, y = np.meshgrid(x, y)
     terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1)
-    agree = np.ones(len(logs), bool)
+    known, agree = terms[told], np.ones(len(logs), bool)
     for _ in range(FITS):
-        weights = np.linalg.lstsq(terms[told][agree], logs[agree], rcond=None)[0]
-        off = np.abs(logs - terms[told] @ weights).max(axis=1)
+        weights = np.linalg.lstsq(known[agree], logs[agree], rcond=None)[0]
+        off = np.abs(logs - known @ weights).max(axis=1)
         agree = off <= FARTHEST * np.median(off)
     return np.asarray(np.exp(terms @ weights))
 
