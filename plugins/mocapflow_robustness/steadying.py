@@ -67,7 +67,10 @@ def _alike(factors: F64) -> bool:
 
 
 def _across(logs: F64, told: Bool) -> F64:
-    """Return factors (h, w, 3) by polynomials through the logarithms (N, 3) of those of some blocks, outliers apart."""
+    """Return factors (h, w, 3) by polynomials through the logarithms (N, 3) of those of some blocks, outliers apart.
+
+    Where no block tells, they are within those where some do: polynomials know no bounds.
+    """
     y, x = (np.linspace(-1, 1, count) for count in told.shape)
     x, y = np.meshgrid(x, y)
     terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1)
@@ -76,7 +79,8 @@ def _across(logs: F64, told: Bool) -> F64:
         weights = np.linalg.lstsq(known[agree], logs[agree], rcond=None)[0]
         off = np.abs(logs - known @ weights).max(axis=1)
         agree = off <= FARTHEST * np.median(off)
-    return np.asarray(np.exp(terms @ weights))
+    fitted = known[agree] @ weights
+    return np.asarray(np.exp(np.clip(terms @ weights, fitted.min(axis=0), fitted.max(axis=0))))
 
 
 def divided(image: U8, gain: F64) -> U8:

@@ -165,6 +165,15 @@ def test_how_much_brighter_is_told_where_light_changes_across_a_room():
     np.testing.assert_allclose(found, light, rtol=0.02)
 
 
+def test_light_that_changes_across_a_room_is_not_guessed_to_change_more_where_it_is_too_dark_to_tell():
+    light = np.exp(0.4 * np.linspace(-1, 1, 40))[None, :, None] * np.ones((50, 1, 3))
+    room, dark = SHADE.copy(), slice(None, 12)
+    room[:, dark] = 10
+    found = brighter(times(room * light, 1), times(room, 1))
+    np.testing.assert_allclose(found[:, 12:], light[:, 12:], rtol=0.02)
+    assert found[:, dark].min() >= light[:, 12:].min() * 0.98
+
+
 def test_how_much_brighter_nobody_can_tell_of_another_room_or_a_black_one():
     room = times(SHADE, 1)
     assert brighter(room[::-1], room) is None
