@@ -129,6 +129,10 @@ TAKES = {
     "kneel_B_skirt": Take("B", "skirt", "kneel", 111, GREEN, frames=60),
     "jack_A_skirt": Take("A", "skirt", "jack", 112, GREY),
     "walk_A_trousers": Take("A", "shorts", "walk_A", 113, GREY, start=20, cut=SLACKS),
+    "swing_B_skirt": Take("B", "skirt", "swing", 131, GREEN, frames=60),
+    "bow_A_skirt": Take("A", "skirt", "bow", 132, PURPLE, frames=60),
+    "plie_B_shorts": Take("B", "shorts", "plie", 133, GREY),
+    "sit_B_skirt": Take("B", "skirt", "sit", 134, PURPLE, frames=60),
     # other rooms: white, and of the colour of skin
     "walk_A_studio": Take("A", "skirt", "walk_A", 121, GREEN, start=150, frames=40, room="studio"),
     "kneeup_B_studio": Take("B", "shorts", "kneeup_B", 123, PURPLE, start=140, frames=24, room="studio"),

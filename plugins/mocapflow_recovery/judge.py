@@ -29,6 +29,11 @@ class Stray(NamedTuple):
     cloth: float  # uncovered as well; a limb may hold it there, or it flies
     near: float  # of the person, without cloth, off the model by `HINT_M` or more
 
+    @property
+    def area(self) -> float:
+        """What contradicts a fit, cm²."""
+        return self.uncovered + self.floating
+
     def __str__(self) -> str:
         worn = f" ({self.cloth:.0f} of it cloth)" if self.cloth >= 0.5 else ""
         area = self.uncovered + self.cloth
@@ -85,8 +90,7 @@ class Judge(NamedTuple):
 
     def stray(self, poses: Sequence[Pose]) -> F64:
         """Return for each pose (B,) how much of surface and person strays, without cloth, cm²."""
-        strays = [stray_of(surface, self.coarse, self.seen) for surface in self._surfaces(poses)]
-        return np.array([stray.uncovered + stray.floating for stray in strays])
+        return np.array([stray_of(surface, self.coarse, self.seen).area for surface in self._surfaces(poses)])
 
     def _apart(self, pose: Pose, surface: Surface, scene: Scene) -> float:
         strain = self.given.strain(pose) if self.given else 1.0

@@ -21,7 +21,6 @@ from mocapflow.assets import Body
 from mocapflow.components import Recovery
 from mocapflow.data import Frame, FrameResult, FrameState, Past, Pose, Surface
 from mocapflow.model import ClothedModel
-from mocapflow.periodic import falls_due
 from mocapflow.records import F64
 from mocapflow.scene import Scene
 from mocapflow.settings import PositiveOrInf
@@ -32,6 +31,7 @@ from mocapflow_recovery.looks import Looks
 from mocapflow_recovery.sampling import Plan, Spread
 from mocapflow_recovery.suspicion import Signs, Suspicion, suspicion
 from mocapflow_recovery.told import hidden_legs, like_the_floor, untold
+from mocapflow_recovery.vain import counted, forgotten, in_turn, vain_before
 
 LOG = logging.getLogger("mocapflow")
 CURED = 2.0  # times as far apart may be what is doubted no more: a leg lay where a skirt flew
@@ -42,6 +42,7 @@ HIDDEN = (
     "%s shows the empty room where the first pose and the other views have the leg from %s on:"
     " if something stands before it, paint that white in occluders/%s.png; else mend the first pose"
 )
+UNSEARCHED = "fit doubted as in frames before: not searched again yet"
 UNSEEN = "fit doubted: no picture tells person from room where it lies"
 Settle = Callable[[Pose, F64], FrameResult]  # from a pose, with cloth parameters
 Look = Callable[[np.random.Generator], Pose]  # finds a pose by samples
@@ -69,7 +70,7 @@ class LimbSearch(Recovery):
     if it flew, which leads none astray; the fit that agrees better by what is skin, and a little by cloth, is taken.
     A joint bent too far, and a limb that leapt, are looked for alone: nothing is known against the others.
     A doubt that lasts is mostly one about the room, and a joint that stays beyond its limits can be bent so far: such
-    frames are searched now and then only (`vain_every`).
+    frames are searched now and then only (`vain_every`), of a doubt that stays the same ever more rarely.
     Where the first frame shows feet that look like a floor without colours, white socks on white, later frames do not
     match them: the outline ends above them, and would draw them up.
     It needs the empty scene; where little of it is known behind the person every fit is taken as it is.
@@ -94,7 +95,7 @@ class LimbSearch(Recovery):
     seen_samples: NonNegativeInt = 100  # of each limb in the first round, from `poses`
     shares: Annotated[tuple[PositiveFloat, ...], Field(min_length=1)] = (1.0, 0.6, 0.4, 0.25, 0.12)  # of the spread
     first_looks: PositiveInt = 2  # of the first frame where its fit is doubted: each search is repeated so often
-    vain_every: PositiveInt = 4  # where the three frames before are doubted or overbent, one of so many is searched
+    vain_every: PositiveInt = 4  # after three searches in vain, or overbent frames, one of so many is searched at first
     start_deg: PositiveFloat = 6.0  # how far off, in each angle, the pose may be that the first frame starts from
     spread_deg: PositiveFloat = 25.0  # standard deviation of the first samples; less where a joint at rest hardly bends
     root_spread_deg: PositiveFloat = 8.0  # likewise, of the root's turn
@@ -148,13 +149,16 @@ class LimbSearch(Recovery):
         fitted, believed, body = result.state.estimate.pose, state.estimate.pose, model.scene.body
         suspected = suspicion(self.signs, stray, fitted, believed, past, body, self._density)
         if suspected is None:
-            return result
-        if self.signs.persist(suspected.doubtful, past, body) and not self._in_turn(frame.time, past):
-            unsearched = f"{suspected.why}: not searched, as the frames before are doubted, too"
-            return noted(result, unsearched, doubted=True) if suspected.doubtful else result
+            return forgotten(result, past)
+        if suspected.doubtful:
+            if not vain_before(past).due(stray.area, frame.time, past, self.vain_every):
+                return noted(result, UNSEARCHED, doubted=True)
+        elif self.signs.stay_bent(past, body) and not in_turn(self.vain_every, frame.time, past):
+            return forgotten(result, past)
         judge = self._judge(believed, result, seen, past, model)
         looks = Looks(judge, self._plan(body), believed, fitted, self.gain, self.tolerance)
-        return self._searched(frame.index, judge.of(result), looks, suspected, settle)
+        found = self._searched(frame.index, judge.of(result), looks, suspected, settle)
+        return counted(found, result, stray.area, past)
 
     def _warn(self, limbs: Mapping[str, float]) -> None:
         for joint, share in limbs.items():
@@ -191,11 +195,6 @@ class LimbSearch(Recovery):
         if suspected.doubtful:
             return noted(fit.result, f"{suspected.why}: search found nothing better", doubted=True)
         return fit.result
-
-    def _in_turn(self, time: float, past: Past) -> bool:
-        """Return whether this is the one of `vain_every` frames; counted by time, as frames may be left out."""
-        last = past.moments[-1].time
-        return falls_due(last, time, self.vain_every * (time - last))
 
     def _ways(self, looks: Looks, suspected: Suspicion) -> list[Look]:
         """Return the ways to look for the pose, each from its own samples."""

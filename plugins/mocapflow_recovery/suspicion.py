@@ -28,10 +28,10 @@ class Signs(NamedTuple):
         """Return whether the images contradict a fit."""
         return stray.uncovered > self.uncovered or stray.floating > self.floating
 
-    def persist(self, doubtful: bool, past: Past, body: Body) -> bool:
-        """Return whether all frames that are remembered are doubted, or else have a joint beyond its limits."""
-        alike = [m.doubted if doubtful else bool(overbent(m.pose, body, self.overbent)) for m in past.moments]
-        return len(alike) == REMEMBERED and all(alike)
+    def stay_bent(self, past: Past, body: Body) -> bool:
+        """Return whether all frames that are remembered have a joint beyond its limits."""
+        bent = [bool(overbent(moment.pose, body, self.overbent)) for moment in past.moments]
+        return len(bent) == REMEMBERED and all(bent)
 
 
 class Suspicion(NamedTuple):

@@ -13,12 +13,13 @@ from mocapflow_levelset.colours import BINS
 from mocapflow_priors.density import Density, write
 from mocapflow_recovery.certain import shrunk, small_room, views
 from mocapflow_recovery.disagreement import FLIES, HANGS, distance, floating_area, uncovered_areas
-from mocapflow_recovery.judge import Fit, Given, Stray
+from mocapflow_recovery.judge import Fit, Given, Stray, stray_of
 from mocapflow_recovery.leaps import eased, leaping
 from mocapflow_recovery.limb_search import LimbSearch
 from mocapflow_recovery.looks import Looks, turned_round
 from mocapflow_recovery.sampling import Plan, Spread, parts, put_back, samples, search, seen_samples, without_idle_parts
 from mocapflow_recovery.suspicion import Suspicion
+from mocapflow_recovery.vain import VAIN
 
 from mocapflow.data import NO_CLOTH, Frame, Past, Pose
 from mocapflow.geometry.cameras import project
@@ -295,12 +296,14 @@ def test_a_foot_does_not_turn_because_its_leg_was_found() -> None:
 
 
 @pytest.mark.parametrize(
-    ("index", "every", "doubts", "looked"),
-    [(8, 1, 3, True), (9, 1, 3, False), (9, 1, 2, True), (32, 4, 3, True), (36, 4, 3, False)],
-    ids=["in turn", "not in turn", "new", "in turn, one frame of four", "not in turn, one frame of four"],
-)
+    ("index", "every", "vain", "looked"),
+    [(8, 1, 3, True), (9, 1, 3, False), (9, 1, 2, True), (32, 4, 3, True), (36, 4, 3, False), (8, 1, 4, True),
+     (12, 1, 4, False)],
+    ids=["in turn", "not in turn", "new", "in turn, one frame of four", "not in turn, one frame of four",
+         "in turn, waiting longer", "not in turn, waiting longer"],
+)  # fmt: skip
 @pytest.mark.long
-def test_doubts_that_last_are_looked_into_now_and_then(index, every, doubts, looked) -> None:
+def test_doubts_that_last_are_looked_into_now_and_then(index, every, vain, looked) -> None:
     """As where the room behind the person is not known rightly: the search takes as long as tens of frames."""
     calls = []
 
@@ -308,13 +311,19 @@ def test_doubts_that_last_are_looked_into_now_and_then(index, every, doubts, loo
         calls.append(pose)
         return settled(pictures.tiny_state(SCENE, POSE, POSE))
 
-    moments = scenes.tiny_past(SCENE, POSE, POSE, POSE).moments
-    past = Past(moments=tuple(replace(moment, doubted=k < doubts) for k, moment in enumerate(moments)))
-    frame, past = at(index, past, every)
-    lost, model = pictures.tiny_state(SCENE, astray(0.9), POSE), scenes.tiny_model(SCENE)
-    found = LimbSearch(vain_every=4).recover(frame, lost, settled(lost), past, model, settle)
+    search, model, lost = (
+        LimbSearch(vain_every=4),
+        scenes.tiny_model(SCENE),
+        pictures.tiny_state(SCENE, astray(0.9), POSE),
+    )
+    frame, past = at(index, scenes.tiny_past(SCENE, POSE, POSE, POSE), every)
+    area = stray_of(surface(astray(0.9)), SCENE, search.views(frame, surface(astray(0.9)), past, SCENE)).area
+    past = replace(past, appearance={VAIN: np.array([vain, area])})
+    found = search.recover(frame, lost, settled(lost), past, model, settle)
     assert bool(calls) == looked
-    assert found.doubted != looked and ("not searched" in found.notes[-1]) != looked
+    assert found.doubted != looked and ("not searched" in "".join(found.notes)) != looked
+    left = {**past.appearance, **found.state.segmentation.appearance}[VAIN]
+    assert left[0] == (0 if looked else vain)
 
 
 @pytest.mark.parametrize(("end", "doubted"), [(0.0, False), (0.9, True)], ids=["found", "still astray"])

@@ -1,0 +1,83 @@
+"""Searches in vain: a doubt that stays as it is is mostly one about the room, and is looked into ever more rarely."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from mocapflow.data import FrameResult, Past
+from mocapflow.periodic import falls_due
+
+VAIN = "searches in vain"  # of Segmentation.appearance: (2,) a `Vain`
+SOON = 3  # such searches in a row, after which the next one waits
+LONGEST = 64  # frames that it waits, at most
+ALIKE = 1.5  # times as much, or as little, may stray of a doubt that is still the same
+
+
+class Vain(NamedTuple):
+    """Searches after which the fit was still doubted."""
+
+    count: int = 0  # in a row; from `SOON` on those that found nothing better of a doubt that stays the same
+    strayed: float = 0.0  # cm² that strayed before the last one
+
+    def due(self, strays: float, time: float, past: Past, every: int) -> bool:
+        """Return whether a fit of which so much strays (cm²) is searched now.
+
+        After a few searches one frame of `every` is; the wait doubles with each search that finds nothing better of a
+        doubt that stays the same.
+        """
+        if self.count < SOON:
+            return True
+        wait = min(every << (self.count - SOON), max(LONGEST, every)) if self.alike(strays) else every
+        return in_turn(wait, time, past)
+
+    def after(self, strays: float, helped: bool) -> Vain:
+        """Return what is known after one more search, of a fit of which so much (cm²) strayed."""
+        count = self.count + 1
+        return Vain(min(count, SOON) if helped or not self.alike(strays) else count, strays)
+
+    def alike(self, strays: float) -> bool:
+        """Return whether so much (cm²) is about what strayed before."""
+        return self.strayed < ALIKE * strays and strays < ALIKE * self.strayed
+
+
+def in_turn(every: int, time: float, past: Past) -> bool:
+    """Return whether this is the one frame of so many, or the first after a gap; by time, as frames may be left out."""
+    if not past.moments:
+        return True
+    last = past.moments[-1].time
+    return falls_due(last, time, every * (time - last))
+
+
+def vain_before(past: Past) -> Vain:
+    """Return what earlier frames were searched in vain."""
+    count, strayed = past.appearance.get(VAIN, np.zeros(2))
+    return Vain(int(count), float(strayed))
+
+
+def counted(found: FrameResult, fitted: FrameResult, strays: float, past: Past) -> FrameResult:
+    """Return what a search found, as later frames know it.
+
+    Args:
+        found: its result.
+        fitted: that of the loop; the same state: nothing better was found.
+        strays: cm² that strayed of it.
+        past: of the frame.
+    """
+    if not found.doubted:
+        return forgotten(found, past)
+    return _with(found, past, vain_before(past).after(strays, helped=found.state is not fitted.state))
+
+
+def forgotten(result: FrameResult, past: Past) -> FrameResult:
+    """Return a result that is not doubted: no search was in vain."""
+    return _with(result, past, Vain()) if vain_before(past).count else result
+
+
+def _with(result: FrameResult, past: Past, vain: Vain) -> FrameResult:
+    segmentation = result.state.segmentation
+    appearance = {**past.appearance, **segmentation.appearance, VAIN: np.array(vain, np.float64)}
+    known = replace(segmentation, appearance=appearance)
+    return replace(result, state=replace(result.state, segmentation=known))

@@ -1,0 +1,59 @@
+"""Tests of how often a doubt that stays is looked into."""
+
+from dataclasses import replace
+
+import numpy as np
+from mocapflow_recovery.vain import LONGEST, VAIN, counted, forgotten, vain_before
+
+from mocapflow.data import FrameResult, Past
+from mocapflow.testing import pictures, scenes
+from mocapflow.testing.recovery import settled
+
+SCENE = scenes.tiny_scene()
+POSE = scenes.tiny_pose(SCENE)
+FITTED = settled(pictures.tiny_state(SCENE, POSE, POSE), SCENE)
+OTHER = replace(FITTED, state=replace(FITTED.state))  # another state
+COLOURS = {"colours": np.ones(3)}
+
+
+def before(frame: int, appearance) -> Past:
+    past = scenes.tiny_past(SCENE, POSE)
+    return replace(past, moments=(replace(past.moments[0], time=(frame - 1) / 30),), appearance=appearance)
+
+
+def searched(strays, found: FrameResult = FITTED) -> list[int]:
+    """Return the frames that are searched if so much (cm²) strays in each, and they stay doubted."""
+    appearance, frames = {}, []
+    for frame, strayed in enumerate(strays):
+        past = before(frame, appearance)
+        if vain_before(past).due(strayed, frame / 30, past, every=4):
+            frames.append(frame)
+            result = counted(replace(found, doubted=True), FITTED, strayed, past)
+            appearance = result.state.segmentation.appearance
+    return frames
+
+
+def test_searches_in_vain_of_a_doubt_that_stays_grow_rare():
+    frames = searched(np.random.default_rng(0).uniform(7000, 9000, 3000))
+    assert frames[:7] == [0, 1, 2, 4, 8, 16, 32]
+    assert max(np.diff(frames)) == LONGEST and len(frames) < 3000 / LONGEST + 8
+
+
+def test_a_doubt_that_changes_is_looked_into_soon():
+    frames = searched([7000.0] * 101 + [200.0] * 20)
+    assert frames[-4:] == [64, 104, 108, 112]
+
+
+def test_searches_that_help_stay_as_frequent_though_the_fit_is_still_doubted():
+    assert searched([400.0] * 40, OTHER) == [0, 1, 2, *range(4, 40, 4)]
+
+
+def test_the_first_frame_after_a_gap_is_searched():
+    assert vain_before(Past(appearance={VAIN: np.array([9.0, 400.0])})).due(400.0, 1 / 30, Past(), every=4)
+
+
+def test_a_fit_that_is_not_doubted_ends_it_and_all_else_that_is_known_stays():
+    past = before(5, {VAIN: np.array([9.0, 400.0]), **COLOURS})
+    known = forgotten(FITTED, past).state.segmentation.appearance
+    assert vain_before(before(6, known)).count == 0 and (known["colours"] == 1).all()
+    assert forgotten(FITTED, before(5, COLOURS)) is FITTED
