@@ -39,8 +39,10 @@ class Fits:
         return Pose(root=other["root"], angles=other["angles"]) if other else self.before.pose(row)
 
     def cloth(self, row: int) -> Cloth:
-        """Return the cloth of a row as the track had it."""
-        track = self.before
+        """Return the cloth of a row as it stands."""
+        track, other = self.before, self._found.get(row)
+        if other:
+            return Cloth(vertices=other["cloth"], parameters=other["cloth_parameters"])
         return Cloth(vertices=np.array(track.cloth[row]), parameters=track.cloth_parameters[row].copy())
 
     def other(self, row: int) -> bool:
@@ -110,10 +112,10 @@ class Fits:
         return centres
 
     def _moment(self, row: int) -> Moment:
-        track = self.before
-        observed, doubted = track.observed[row].copy(), bool(track.doubted[row])
-        time, pose = float(track.time[row]), track.pose(row)
-        return Moment(time=time, pose=pose, cloth=self.cloth(row), observed=observed, doubted=doubted)
+        track, other = self.before, self._found.get(row)
+        observed = other["observed"] if other else track.observed[row].copy()
+        time, doubted = float(track.time[row]), bool(track.doubted[row])
+        return Moment(time=time, pose=self.pose(row), cloth=self.cloth(row), observed=observed, doubted=doubted)
 
 
 def _frame_of(note: str) -> int:

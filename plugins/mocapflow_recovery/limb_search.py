@@ -112,17 +112,21 @@ class LimbSearch(Recovery):
     ) -> FrameResult:
         """Return the result, or a better one; see the class."""
         found = self._recovered(frame, state, result, past, model, settle)
-        return found if past.moments or past.after_gap else self._feet_told(frame, found, past, model)
+        if past.moments or past.after_gap:
+            return found
+        told = self.feet_told(frame, found, past, model)
+        if told is not found:
+            LOG.warning(FEET_UNTOLD)
+        return told
 
-    def _feet_told(self, frame: Frame, result: FrameResult, past: Past, model: ClothedModel) -> FrameResult:
-        """Return the result of the first frame; if feet look like a floor without colours it says so to later ones."""
+    def feet_told(self, frame: Frame, result: FrameResult, past: Past, model: ClothedModel) -> FrameResult:
+        """Return the result of a frame; if feet look like a floor without colours in it, it says so to later ones."""
         background, surface = model.scene.background, surface_of(model, result)
         if background is None or background.floor_m is None:
             return result
         seen = self.views(frame, surface, past, model.scene)
         if not seen or not (feet := like_the_floor(surface, seen, model.scene.body)).any():
             return result
-        LOG.warning(FEET_UNTOLD)
         segmentation = result.state.segmentation
         known = replace(segmentation, appearance=with_feet(segmentation.appearance, feet))
         return replace(result, state=replace(result.state, segmentation=known))

@@ -107,8 +107,11 @@ class Hindsight(NamedTuple):
         return self.loop.settled(frame, past, self.model, begin, self.fits.cloth(row).parameters)
 
     def colours(self, frame: Frame, row: int) -> Mapping[str, F64]:
-        """Return what a frame shows of the person's colours; a track keeps only those of its end."""
-        result = self.settled(frame, row, self.fits.past(row, {}), self.fits.pose(row))
+        """Return what a frame shows of the person's colours, and of feet; a track keeps only those of its end."""
+        past, finder = self.fits.past(row, {}), self.loop.recovery
+        result = self.settled(frame, row, past, self.fits.pose(row))
+        if isinstance(finder, LimbSearch):
+            result = finder.feet_told(frame, result, past, self.model)
         return result.state.segmentation.appearance
 
     def strays(self, frame: Frame, row: int, past: Past, result: FrameResult) -> tuple[float, float]:

@@ -19,7 +19,7 @@ ALIKE = 1.5  # times as much, or as little, may stray of a doubt that is still t
 class Vain(NamedTuple):
     """Searches after which the fit was still doubted."""
 
-    count: int = 0  # in a row; from `SOON` on those that found nothing better of a doubt that stays the same
+    searches: int = 0  # in a row; from `SOON` on those that found nothing better of a doubt that stays the same
     strayed: float = 0.0  # cm² that strayed before the last one
 
     def due(self, strays: float, time: float, past: Past, every: int) -> bool:
@@ -28,15 +28,15 @@ class Vain(NamedTuple):
         After a few searches one frame of `every` is; the wait doubles with each search that finds nothing better of a
         doubt that stays the same.
         """
-        if self.count < SOON:
+        if self.searches < SOON:
             return True
-        wait = min(every << (self.count - SOON), max(LONGEST, every)) if self.alike(strays) else every
+        wait = min(every << (self.searches - SOON), max(LONGEST, every)) if self.alike(strays) else every
         return in_turn(wait, time, past)
 
     def after(self, strays: float, helped: bool) -> Vain:
         """Return what is known after one more search, of a fit of which so much (cm²) strayed."""
-        count = self.count + 1
-        return Vain(min(count, SOON) if helped or not self.alike(strays) else count, strays)
+        searches = self.searches + 1
+        return Vain(min(searches, SOON) if helped or not self.alike(strays) else searches, strays)
 
     def alike(self, strays: float) -> bool:
         """Return whether so much (cm²) is about what strayed before."""
@@ -53,8 +53,8 @@ def in_turn(every: int, time: float, past: Past) -> bool:
 
 def vain_before(past: Past) -> Vain:
     """Return what earlier frames were searched in vain."""
-    count, strayed = past.appearance.get(VAIN, np.zeros(2))
-    return Vain(int(count), float(strayed))
+    searches, strayed = past.appearance.get(VAIN, np.zeros(2))
+    return Vain(int(searches), float(strayed))
 
 
 def counted(found: FrameResult, fitted: FrameResult, strays: float, past: Past) -> FrameResult:
@@ -73,7 +73,7 @@ def counted(found: FrameResult, fitted: FrameResult, strays: float, past: Past) 
 
 def forgotten(result: FrameResult, past: Past) -> FrameResult:
     """Return a result that is not doubted: no search was in vain."""
-    return _with(result, past, Vain()) if vain_before(past).count else result
+    return _with(result, past, Vain()) if vain_before(past).searches else result
 
 
 def _with(result: FrameResult, past: Past, vain: Vain) -> FrameResult:

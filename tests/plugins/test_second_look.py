@@ -6,7 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mocapflow_levelset.camouflage import FEET
 from mocapflow_recovery.fits import Fits
+from mocapflow_recovery.limb_search import LimbSearch
 from mocapflow_recovery.second_look import HELD, LED, Hindsight, SecondLook, pictured, windows
 from results_scene import DEMO, demo_scene, stepping
 
@@ -84,6 +86,25 @@ def test_a_frame_that_leaps_is_fitted_again_from_between_its_neighbours(looked):
     first, note, last = again.notes
     assert (first, last) == astray(ROW).notes
     assert note == f"frame {ROW}: fitted again from between its neighbours"
+
+
+def test_what_a_frame_knows_of_those_before_it_is_their_better_fit():
+    fits, frame = Fits(astray(ROW), SCENE.body), next(RECORDING.frames(since=ROW))
+    fits.take(ROW, frame, fitted(TRUE.pose(ROW)))
+    latest = fits.past(ROW + 1, {}).moments[-1]
+    assert latest.pose.angles[KNEE] == TRUE.angles[ROW, KNEE] and latest.time == TRUE.time[ROW]
+    assert fits.past(ROW + 2, {}).moments[-1].pose.angles[KNEE] == TRUE.angles[ROW + 1, KNEE]
+
+
+def test_feet_that_look_like_the_floor_stay_unmatched(looked, monkeypatch):
+    def told(finder, frame, result, past, model):
+        known = replace(result.state.segmentation, appearance={FEET: np.ones(3)})
+        return replace(result, state=replace(result.state, segmentation=known))
+
+    monkeypatch.setattr(LimbSearch, "feet_told", told)
+    second_look(astray(ROW))
+    colours, *again = (past.appearance for _, past, _ in looked)
+    assert FEET not in colours and all(FEET in known for known in again)
 
 
 def test_a_limb_that_was_lost_for_some_frames_is_followed_back(looked):

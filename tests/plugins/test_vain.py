@@ -55,5 +55,5 @@ def test_the_first_frame_after_a_gap_is_searched():
 def test_a_fit_that_is_not_doubted_ends_it_and_all_else_that_is_known_stays():
     past = before(5, {VAIN: np.array([9.0, 400.0]), **COLOURS})
     known = forgotten(FITTED, past).state.segmentation.appearance
-    assert vain_before(before(6, known)).count == 0 and (known["colours"] == 1).all()
+    assert vain_before(before(6, known)).searches == 0 and (known["colours"] == 1).all()
     assert forgotten(FITTED, before(5, COLOURS)) is FITTED
