@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,20 +26,27 @@ class Knocks:
         What is said to be hidden is hidden in both places: moved back with what covers the lens now, and where painted
         furniture stood in the beginning.
         """
-        since = self.frame <= frame.index
-        turns = dict(zip(self.camera[since].tolist(), self.turn[since], strict=True))  # the last one of each
-        if not turns:
+        ways = self._back(frame.index)
+        if not ways:
             return frame
         images = list(frame.images)
         hidden = list(frame.hidden) or [np.zeros(image.shape[:2], bool) for image in images]
-        people = list(frame.keypoints or [])
-        for camera, turn in turns.items():
-            back = np.linalg.inv(turn)
+        for camera, back in ways.items():
             images[camera], moved = _moved(images[camera], hidden[camera], back)
             hidden[camera] = hidden[camera] | moved
-            if people:
-                people[camera] = points_seen(people[camera], back)
-        return replace(frame, images=tuple(images), hidden=tuple(hidden), keypoints=tuple(people) or None)
+        people = frame.keypoints and self.people(frame.index, frame.keypoints)
+        return replace(frame, images=tuple(images), hidden=tuple(hidden), keypoints=people)
+
+    def people(self, index: int, people: Sequence[F64]) -> tuple[F64, ...]:
+        """Return the keypoints of a frame, per camera (N, K, 3) px, px, confidence, as such cameras would see them."""
+        ways = self._back(index)
+        return tuple(points_seen(p, ways[camera]) if camera in ways else p for camera, p in enumerate(people))
+
+    def _back(self, index: int) -> dict[int, F64]:
+        """Return the homographies (3, 3) that move pictures of a frame back, by camera."""
+        since = self.frame <= index
+        turns = dict(zip(self.camera[since].tolist(), self.turn[since], strict=True))  # the last one of each
+        return {camera: np.linalg.inv(turn) for camera, turn in turns.items()}
 
 
 def _moved(image: U8, hidden: Bool, turn: F64) -> tuple[U8, Bool]:

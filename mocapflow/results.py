@@ -30,6 +30,12 @@ class ViewChecks:
         """Return a frame as knocked cameras would have seen it, had they stood still."""
         return frame if self.knocks is None else self.knocks.undone(frame)
 
+    def people(self, index: int, people: Sequence[F64]) -> tuple[F64, ...]:
+        """Return the keypoints of a frame, per camera (N, K, 3), steadied; none of wrong views."""
+        steady = people if self.knocks is None else self.knocks.people(index, people)
+        wrong = self.camera[self.frame == index]
+        return tuple(points[:0] if camera in wrong else points for camera, points in enumerate(steady))
+
     def passed(self, frame: Frame) -> Frame:
         """Return a frame, steadied, whose wrong views are not usable."""
         frame = self.steadied(frame)
@@ -40,6 +46,11 @@ class ViewChecks:
         for camera, reason in zip(self.camera[first:last], self.reasons[first:last], strict=True):
             usable[camera], reasons[camera] = False, reason
         return replace(frame, usable=usable, reasons=tuple(reasons))
+
+
+def steadied(frames: Iterable[Frame], checks: ViewChecks | None) -> Iterable[Frame]:
+    """Return frames as the track is drawn on them: see `ViewChecks.steadied`."""
+    return frames if checks is None else map(checks.steadied, frames)
 
 
 @record

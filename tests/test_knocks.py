@@ -71,6 +71,13 @@ def test_keypoints_move_along(knocks):
     assert found.keypoints[1][0, 1] == pytest.approx([*(pixel[:2] / pixel[2]), 0.4])
 
 
+def test_keypoints_of_wrong_views_are_none():
+    person = np.array([[[40.0, 30.0, 0.9]]])
+    checks = ViewChecks(frame=np.array([6], np.int32), camera=np.zeros(1, np.int16), reasons=("black",))
+    assert [len(points) for points in checks.people(6, (person, person))] == [0, 1]
+    assert [len(points) for points in checks.people(7, (person, person))] == [1, 1]
+
+
 def test_checks_pass_frames_on_as_they_were(knocks):
     nothing = {"frame": np.empty(0, np.int32), "camera": np.empty(0, np.int16), "reasons": ()}
     frame = seen(7, 2.0)

@@ -13,7 +13,7 @@ from pydantic import PositiveFloat
 from mocapflow.components import Stage
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
-from mocapflow.results import Evaluation, RunFolder, Track
+from mocapflow.results import Evaluation, RunFolder, Track, ViewChecks
 from mocapflow.scene import Scene
 from mocapflow_evaluation import compare, comparison_plots, cycles, findings, ours
 from mocapflow_evaluation.alignment import align, at_our_frames
@@ -35,7 +35,7 @@ class Evaluate(Stage):
     cameras of the run (`keypoint_reference`). Rows with frame numbers are matched by them, others interpolated at our
     times.
     Failures are not left out. A lag up to `longest_lag_s` that all angles share, and curves that count the other way,
-    are reported, and taken out in `rms_aligned_deg` alone.
+    are reported; `rms_aligned_deg` alone is without them and without the mean offset.
     Writes results/evaluation.csv and .json and, frame by frame, errors.csv; cycles.csv where somebody walks; and
     against joint centres or markers joint_distances.csv and the reference's stick model.
     """
@@ -50,14 +50,21 @@ class Evaluate(Stage):
         if path is not None and not path.is_dir():
             read_reference(path)
 
-    def run(self, track: Track, scene: Scene, recording: Recording, run_folder: RunFolder) -> Evaluation:
+    def run(
+        self,
+        track: Track,
+        scene: Scene,
+        recording: Recording,
+        run_folder: RunFolder,
+        checks: ViewChecks | None = None,
+    ) -> Evaluation:
         """Return the evaluation of the track."""
         layout.forget_comparison(run_folder.path)
         path, note = chosen(recording.folder, self.reference)
         if path is None:
             return Evaluation(reference="", rows=(), notes=(note,))
         if path.is_dir():
-            path = write_triangulated(recording, path, scene.cameras, run_folder.path)
+            path = write_triangulated(recording, path, scene.cameras, run_folder.path, checks)
         return evaluate(ours.of_track(track, scene), path, run_folder.path, self.longest_lag_s)
 
 

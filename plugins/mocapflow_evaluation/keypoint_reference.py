@@ -16,6 +16,7 @@ from mocapflow.assets import Camera
 from mocapflow.io import folders, markers
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
+from mocapflow.results import ViewChecks
 
 LOG = logging.getLogger("mocapflow")
 CUT_OFF_HZ = 6.0
@@ -23,7 +24,9 @@ ORDER = 4  # of both passes together
 MARGIN_S = 1.0  # s, looked at on both sides of the wanted frames: there the filter runs in
 
 
-def write_triangulated(recording: Recording, place: Path, cameras: Sequence[Camera], run_folder: Path) -> Path:
+def write_triangulated(
+    recording: Recording, place: Path, cameras: Sequence[Camera], run_folder: Path, checks: ViewChecks | None = None
+) -> Path:
     """Write the person's keypoints in space into a run folder; return the .trc.
 
     Args:
@@ -31,6 +34,7 @@ def write_triangulated(recording: Recording, place: Path, cameras: Sequence[Came
         place: folder of keypoints, like keypoints/ of a recording.
         cameras: pinhole cameras of the run, which may have been corrected since they were calibrated.
         run_folder: of the run.
+        checks: of the pictures: where cameras were knocked, keypoints are moved back.
 
     Raises:
         RecordingError: there are no keypoints of two cameras, or in no frame two cameras see the same person.
@@ -39,7 +43,7 @@ def write_triangulated(recording: Recording, place: Path, cameras: Sequence[Came
     recording = replace(recording, keypoint_folders=found)
     margin = round(MARGIN_S * recording.frame_rate)
     first, after = max(0, recording.indices[0] - margin), min(recording.length, recording.indices[-1] + 1 + margin)
-    people = persons(recording, range(first, after), cameras)
+    people = persons(recording, range(first, after), cameras, checks)
     names = names_of(recording, list(people), None)
     places = np.full((after, len(names), 3), np.nan)  # from the first frame of the recording on, as times are counted
     for index, person in people.items():

@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 from mocapflow.components import Stage
 from mocapflow.io import markers, opensim
 from mocapflow.recordings.recording import Recording
-from mocapflow.results import Files, RunFolder, Track
+from mocapflow.results import Files, RunFolder, Track, ViewChecks
 from mocapflow.scene import Scene
 from mocapflow_export import layout, runjson, tables
 from mocapflow_export.formats import Result, write
@@ -26,9 +26,16 @@ class WriteFormats(Stage):
     name: ClassVar[str] = "write_formats"
     formats: tuple[Format, ...] = ("csv", "mot", "trc")  # those beyond these three need their extra
 
-    def run(self, track: Track, scene: Scene, recording: Recording, run_folder: RunFolder) -> Files:
+    def run(
+        self,
+        track: Track,
+        scene: Scene,
+        recording: Recording,
+        run_folder: RunFolder,
+        checks: ViewChecks | None = None,
+    ) -> Files:
         """Write the files and return their paths."""
-        result = Result(track=track, scene=scene, recording=recording)
+        result = Result(track=track, scene=scene, recording=recording, checks=checks)
         return Files(paths=tuple(path for name in self.formats for path in written(name, result, run_folder.path)))
 
 
@@ -44,9 +51,16 @@ class Export(WriteFormats):
 
     name: ClassVar[str] = "export"
 
-    def run(self, track: Track, scene: Scene, recording: Recording, run_folder: RunFolder) -> Files:
+    def run(
+        self,
+        track: Track,
+        scene: Scene,
+        recording: Recording,
+        run_folder: RunFolder,
+        checks: ViewChecks | None = None,
+    ) -> Files:
         """Write the files and return their paths."""
-        files = super().run(track, scene, recording, run_folder)
+        files = super().run(track, scene, recording, run_folder, checks)
         doubts = misgivings(track, [camera.name for camera in scene.cameras])
         for doubt in doubts:
             LOG.warning(doubt)

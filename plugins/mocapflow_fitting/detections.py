@@ -9,6 +9,7 @@ import numpy as np
 from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.recordings.recording import Recording
+from mocapflow.results import ViewChecks
 from mocapflow_fitting.keypoint_fit import Seen
 from mocapflow_fitting.keypoint_layouts import LAYOUTS, Layout, layout_of, rows_of
 from mocapflow_fitting.person import Person, find_person
@@ -38,9 +39,12 @@ def need_keypoints(recording: Recording) -> None:
     )  # fmt: skip
 
 
-def person_at(recording: Recording, index: int, cameras: Sequence[Camera]) -> Person | None:
+def person_at(
+    recording: Recording, index: int, cameras: Sequence[Camera], checks: ViewChecks | None = None
+) -> Person | None:
     """Return the person in a frame; None where too few keypoints can be triangulated."""
-    person = find_person(recording.people(index), cameras)
+    people = recording.people(index)
+    person = find_person(people if checks is None else checks.people(index, people), cameras)
     found = 0 if person is None else np.isfinite(person.points.position).all(axis=1).sum()
     return person if found >= LEAST_POINTS else None
 
@@ -51,14 +55,17 @@ def spread(indices: range, count: int) -> list[int]:
     return [indices[row] for row in rows]
 
 
-def persons(recording: Recording, indices: Sequence[int], cameras: Sequence[Camera]) -> dict[int, Person]:
+def persons(
+    recording: Recording, indices: Sequence[int], cameras: Sequence[Camera], checks: ViewChecks | None = None
+) -> dict[int, Person]:
     """Return the person in each frame where there is one.
 
     Raises:
         RecordingError: there are no keypoints, or nobody is found in any frame.
     """
     need_keypoints(recording)
-    found = {index: person for index in indices if (person := person_at(recording, index, cameras)) is not None}
+    seen = {index: person_at(recording, index, cameras, checks) for index in indices}
+    found = {index: person for index, person in seen.items() if person is not None}
     if not found:
         hint = "check that keypoints and cameras belong together (`mocapflow doctor`)"
         where = str(recording.folder / "keypoints")

@@ -13,7 +13,7 @@ from mocapflow.data import CLOTH, NO_CLOTH, Frame, Pose, Surface
 from mocapflow.geometry import cameras, kinematics, meshes, silhouettes
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64, I32, U8
-from mocapflow.results import Files, RunFolder, Track, ViewChecks
+from mocapflow.results import Files, RunFolder, Track, ViewChecks, steadied
 from mocapflow.scene import Scene
 from mocapflow_report import drawing
 
@@ -43,7 +43,7 @@ class Overlay(Stage):
         rows = {int(index): row for row, index in enumerate(track.frame)}
         painter = Painter(scene)
         with drawing.videos(paths, recording.run_rate, self.codec) as opened:
-            for frame in recording.frames() if checks is None else map(checks.steadied, recording.frames()):
+            for frame in steadied(recording.frames(), checks):
                 if frame.index in rows:
                     for view, video in enumerate(opened):
                         video.write(painter.paint(frame, track, rows[frame.index], view))

@@ -6,7 +6,7 @@ import numpy as np
 
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import U8
-from mocapflow.results import Track, ViewChecks
+from mocapflow.results import Track, ViewChecks, steadied
 from mocapflow.scene import Scene
 from mocapflow_report.overlay import Painter
 
@@ -22,8 +22,7 @@ def stills(
     chosen = chosen_rows(track)
     painter, found = Painter(scene), {}
     last = max(int(track.frame[row]) for row in chosen.values())
-    frames = recording.until(last).frames()
-    for frame in frames if checks is None else map(checks.steadied, frames):
+    for frame in steadied(recording.until(last).frames(), checks):
         for what, row in chosen.items():
             if track.frame[row] == frame.index:
                 wall = _side_by_side([painter.paint(frame, track, row, view) for view in range(len(scene.cameras))])

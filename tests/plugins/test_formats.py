@@ -18,7 +18,9 @@ from scipy.spatial.transform import Rotation
 from mocapflow.errors import PipelineError
 from mocapflow.geometry import angles
 from mocapflow.io import markers
+from mocapflow.knocks import Knocks
 from mocapflow.recordings.recording import open_recording
+from mocapflow.results import ViewChecks
 
 NEAR = 1e-4  # m
 
@@ -204,6 +206,19 @@ def test_rerun_holds_everything_on_one_timeline(result: Result, tmp_path: Path) 
         assert cv2.imdecode(image, cv2.IMREAD_COLOR).shape == (*camera.size[::-1], 3)
         outline = np.concatenate(logged[f"/world/{camera.name}/outline"]["LineStrips2D:strips"][3])
         assert (outline.min(0) > 0).all() and (outline.max(0) < camera.size).all()
+
+
+def test_rerun_shows_pictures_of_a_knocked_camera_moved_back(result: Result, tmp_path: Path) -> None:
+    first, down = np.zeros(1, np.int32), np.array([[1.0, 0, 0], [0, 1, 40], [0, 0, 1]])
+    knocks = Knocks(frame=first, camera=np.ones(1, np.int16), turn=down[None])
+    checks = ViewChecks(frame=first[:0], camera=np.empty(0, np.int16), reasons=(), knocks=knocks)
+    still, knocked = (readers.rerun_entities(write("rrd", replace(result, checks=c), tmp_path)) for c in (None, checks))
+    same = {
+        camera: still[name]["EncodedImage:blob"][0] == knocked[name]["EncodedImage:blob"][0]
+        for camera in ("cam01", "cam02")
+        for name in [f"/world/{camera}/image"]
+    }
+    assert same == {"cam01": True, "cam02": False}
 
 
 def test_rerun_shows_no_picture_where_a_view_was_not_used(result: Result, tmp_path: Path) -> None:

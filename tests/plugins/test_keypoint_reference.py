@@ -15,8 +15,9 @@ from results_scene import make_track, stepping
 
 from mocapflow.geometry import kinematics
 from mocapflow.io import markers
+from mocapflow.knocks import Knocks
 from mocapflow.recordings.recording import Recording, open_recording
-from mocapflow.results import Evaluation, RunFolder, Track
+from mocapflow.results import Evaluation, RunFolder, Track, ViewChecks
 from mocapflow.scene import Scene
 
 FRAMES = 16  # a little more than the filter needs
@@ -44,9 +45,9 @@ def seen_by(recording: Recording):
     return turn(recording.cameras, turns)
 
 
-def evaluated(track: Track, recording: Recording, cameras, out: Path) -> Evaluation:
-    scene = Scene(cameras=cameras, body=BODY)
-    return Evaluate(reference="keypoints").run(track, scene, recording, RunFolder(path=out, recipe={}))
+def evaluated(track: Track, recording: Recording, cameras, out: Path, checks: ViewChecks | None = None) -> Evaluation:
+    scene, folder = Scene(cameras=cameras, body=BODY), RunFolder(path=out, recipe={})
+    return Evaluate(reference="keypoints").run(track, scene, recording, folder, checks)
 
 
 def apart(evaluation: Evaluation, track: Track) -> float:
@@ -74,6 +75,17 @@ def test_right_cameras_give_the_very_points(track: Track, recording: Recording, 
 @pytest.mark.usefixtures("unrendered")
 def test_a_turned_camera_gives_others(track: Track, recording: Recording, tmp_path: Path) -> None:
     assert apart(evaluated(track, recording, recording.cameras, tmp_path), track) > 0.005
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("unrendered")
+def test_keypoints_of_a_knocked_camera_are_moved_back(track: Track, recording: Recording, tmp_path: Path) -> None:
+    before, since = recording.cameras[1], seen_by(recording)[1]
+    turned = since.camera_from_world[:3, :3] @ before.camera_from_world[:3, :3].T
+    way = since.intrinsics @ turned @ np.linalg.inv(before.intrinsics)
+    knocks = Knocks(frame=np.zeros(1, np.int32), camera=np.ones(1, np.int16), turn=way[None])
+    checks = ViewChecks(frame=np.empty(0, np.int32), camera=np.empty(0, np.int16), reasons=(), knocks=knocks)
+    assert apart(evaluated(track, recording, recording.cameras, tmp_path, checks), track) < 1e-4
 
 
 @pytest.mark.usefixtures("undrawn")

@@ -13,7 +13,7 @@ from mocapflow.errors import PipelineError
 from mocapflow.geometry import kinematics
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64, record
-from mocapflow.results import Track
+from mocapflow.results import Track, ViewChecks
 from mocapflow.scene import Scene
 
 
@@ -24,6 +24,7 @@ class Result:
     track: Track
     scene: Scene
     recording: Recording
+    checks: ViewChecks | None = None  # of its pictures
 
     @cached_property
     def joints(self) -> F64:
