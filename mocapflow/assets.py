@@ -67,7 +67,7 @@ class Body:
             if (stray := _stray(index, count, least)) is not None:
                 raise ShapeError(f"Body: {what} names joint {stray} of {count}")
 
-    @property
+    @cached_property
     def main_joint(self) -> I32:
         """The joint (V,) that moves most of each vertex."""
         joint: I32 = self.skin_joint[np.arange(len(self.vertices)), self.skin_weight.argmax(axis=1)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from mocapflow.data import Frame, Matches, Past, Segmentation, Surface, Turn, em
 from mocapflow.geometry.cameras import project
 from mocapflow.geometry.contours import at_nearest
 from mocapflow.guards.answers import matches_of
+from mocapflow.records import joined_rows, picked_rows
 from mocapflow.scene import Scene
 
 
@@ -40,9 +41,7 @@ def unhidden(matches: Matches, frame: Frame, surface: Surface, cameras: Sequence
         rows = np.flatnonzero(matches.camera == number)
         points = project(surface.vertices.take(matches.vertex[rows], axis=0), cameras[number])
         seen[rows] = (at_nearest(hidden, matches.pixel[rows]) == 0) & (at_nearest(hidden, points) == 0)
-    if seen.all():
-        return matches
-    return replace(matches, **{each.name: getattr(matches, each.name)[seen] for each in fields(matches)})
+    return matches if seen.all() else picked_rows(matches, seen)
 
 
 def weighted(matches: Matches, share: float) -> Matches:
@@ -54,6 +53,4 @@ def pool(parts: Sequence[Matches]) -> Matches:
     """Return several sets of matches as one; none of none."""
     if len(parts) < 2:
         return parts[0] if parts else empty_matches()
-    return Matches(
-        **{each.name: np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Matches)}
-    )
+    return joined_rows(parts)

@@ -6,7 +6,7 @@ The declaration drives the check on construction and the dimension names in the 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any, NamedTuple, TypeVar, dataclass_transform
 
@@ -27,6 +27,7 @@ Bool = npt.NDArray[np.bool_]
 DTYPES = {"F64": "f8", "Wide": "f8", "F32": "f4", "I32": "i4", "I16": "i2", "I8": "i1", "U8": "u1", "Bool": "?"}
 
 Class = TypeVar("Class", bound=type)
+Record = TypeVar("Record")
 Watch = Callable[[int, int], None]  # told how many frames are done, of how many
 
 
@@ -117,3 +118,18 @@ def record(cls: Class) -> Class:
 
     cls.__post_init__ = check  # type: ignore[attr-defined]
     return dataclasses.dataclass(frozen=True, kw_only=True, eq=False)(cls)  # type: ignore[return-value]
+
+
+def picked_rows(rows: Record, which: I32 | Bool) -> Record:
+    """Return some rows of a record whose arrays have an entry for each row."""
+    return _each(rows, lambda name: getattr(rows, name)[which])
+
+
+def joined_rows(parts: Sequence[Record]) -> Record:
+    """Return the rows of several such records as one."""
+    return _each(parts[0], lambda name: np.concatenate([getattr(part, name) for part in parts]))
+
+
+def _each(rows: Record, make: Callable[[str], npt.NDArray[Any]]) -> Record:
+    changed: dict[str, Any] = {name: make(name) for name in array_fields(type(rows))}  # type: ignore[arg-type]
+    return dataclasses.replace(rows, **changed)  # type: ignore[type-var]  # records are dataclasses

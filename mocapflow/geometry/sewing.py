@@ -70,7 +70,7 @@ def sheet(
     grid = np.arange(count * length, dtype=np.int32).reshape(count, length)
     vertices = rows.reshape(-1, 3)
     pinned_to = nearest_skin(body, rows[:, 0])
-    moved_by = np.full(length, main_joint(body, pinned_to), np.int32) if carried_by is None else carried_by
+    moved_by = np.full(length, carrier(body, pinned_to), np.int32) if carried_by is None else carried_by
     left, right = (grid, np.roll(grid, -1, axis=0)) if closed else (grid[:-1], grid[1:])
     rings = np.stack([left.T, right.T], axis=-1).reshape(-1, 2)
     apart = np.linalg.norm(vertices[rings[:, 0]] - vertices[rings[:, 1]], axis=1)
@@ -117,7 +117,7 @@ def nearest_skin(body: Body, points: F64) -> I32:
     return nearest
 
 
-def main_joint(body: Body, vertices: I32) -> int:
+def carrier(body: Body, vertices: I32) -> int:
     """Return the joint that moves most of the given body vertices."""
     weight = np.zeros(len(body.parents))
     np.add.at(weight, body.skin_joint[vertices], body.skin_weight[vertices])

@@ -41,7 +41,7 @@ class Cylinder(Garment):
         along = np.linspace(0.0, self.length_m, self.rings)
         rows = plane.lift(band[:, None] + out[None, :, None] * facing[:, None])
         rows = pattern.even_links(rows + along[:, None] * plane.normal, link)
-        carried = [sewing.main_joint(body, sewing.nearest_skin(body, rows[:, row])) for row in range(self.rings)]
+        carried = [sewing.carrier(body, sewing.nearest_skin(body, rows[:, row])) for row in range(self.rings)]
         return sewing.sheet(
             self.name,
             body,

@@ -139,10 +139,10 @@ class Shorts(Garment):
         return [np.concatenate([outer, inner]) for outer, inner in pairs]
 
     def _carried_by(self, body: Body, vertices: F64, legs: list[I32], waist_skin: I32) -> I32:
-        carried = np.full(len(vertices), sewing.main_joint(body, waist_skin), np.int32)
+        carried = np.full(len(vertices), sewing.carrier(body, waist_skin), np.int32)
         for leg in legs:
             thigh = vertices[leg[:, : leg.shape[1] // 2 + 1]].reshape(-1, 3)  # a long leg ends at the shank
-            carried[leg] = sewing.main_joint(body, sewing.nearest_skin(body, thigh))
+            carried[leg] = sewing.carrier(body, sewing.nearest_skin(body, thigh))
         return carried
 
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from mocapflow.assets import Camera
 from mocapflow.data import Matches, Silhouette, Surface
-from mocapflow.records import F64, I32, U8, Bool
+from mocapflow.records import F64, I32, U8, Bool, picked_rows
 from mocapflow.scene import Scene
 from mocapflow_levelset import splits
-from mocapflow_levelset.inner_edges import behind_edges, chosen, inner_edges
+from mocapflow_levelset.inner_edges import behind_edges, inner_edges
 from mocapflow_levelset.layers import CLIP, Shown
 
 SPACING_PX = 4.0  # between the points of an edge of the model
@@ -46,12 +46,12 @@ def inner_contours(
         search.reach_px, search.half_px, search.least,
     )  # fmt: skip
     ended = np.isfinite(rough)  # few, so that what is seen is looked up for few
-    edges, rough = chosen(edges, ended), rough[ended]
+    edges, rough = picked_rows(edges, ended), rough[ended]
     behind = behind_edges(surface, camera, edges)
     offset, noise = splits.refine(image, edges.pixel, edges.normal, rough, search.half_px)
     pair = (behind >= 0) & known.apart[layers[edges.vertex], layers[behind]]
     pair &= np.abs(offset - rough) < search.half_px
-    edges, way = chosen(edges, pair), offset[pair]
+    edges, way = picked_rows(edges, pair), offset[pair]
     weight: F64 = 1 / (search.sigma_px**2 + noise[pair])
     return Matches(
         camera=np.full(len(way), silhouette.camera, np.int16),

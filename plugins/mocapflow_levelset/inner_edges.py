@@ -43,11 +43,3 @@ def behind_edges(surface: Surface, camera: Camera, edges: Contour) -> I32:
     before, behind = seen.reshape(2, -1)
     away: F64 = np.linalg.norm(surface.vertices[before] - surface.vertices[edges.vertex], axis=1)
     return np.where((before >= 0) & (away < NEAR), behind, np.int32(-1))
-
-
-def chosen(contour: Contour, which: Bool) -> Contour:
-    """Return some points of a contour."""
-    return Contour(
-        vertex=contour.vertex[which], anchor=contour.anchor[which], pixel=contour.pixel[which],
-        normal=contour.normal[which],
-    )  # fmt: skip

@@ -65,16 +65,6 @@ def low_passed(contour: F64, harmonics: int) -> Curve:
     )
 
 
-def joined(curves: Sequence[Curve]) -> Curve:
-    """Return the points of several curves as one."""
-    return Curve(
-        raw=np.concatenate([curve.raw for curve in curves]),
-        pixel=np.concatenate([curve.pixel for curve in curves]),
-        normal=np.concatenate([curve.normal for curve in curves]),
-        curvature=np.concatenate([curve.curvature for curve in curves]),
-    )
-
-
 def _signed_area(points: F64) -> float:
     ahead = np.roll(points, -1, axis=0)
     return 0.5 * float(np.sum(points[:, 0] * ahead[:, 1] - ahead[:, 0] * points[:, 1]))

@@ -6,7 +6,6 @@ from typing import ClassVar
 
 import numba
 import numpy as np
-from mocapflow_levelset.camouflage import told_from_the_room
 from pydantic import PositiveFloat
 
 from mocapflow.assets import Camera
@@ -17,6 +16,7 @@ from mocapflow.geometry.silhouettes import occluding_contour
 from mocapflow.pooling import pool
 from mocapflow.records import F64
 from mocapflow.scene import Scene
+from mocapflow_matching.camouflage import told_from_the_room
 from mocapflow_matching.robust import robust_weights
 from mocapflow_matching.uncertainty import ANY_DIRECTION
 

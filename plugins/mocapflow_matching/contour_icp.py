@@ -6,7 +6,6 @@ from typing import Annotated, Literal, NamedTuple
 
 import numba
 import numpy as np
-from mocapflow_levelset.camouflage import told_from_the_room
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from mocapflow.components import Matcher
@@ -27,6 +26,7 @@ from mocapflow.pooling import pool
 from mocapflow.records import F64, I32, Bool
 from mocapflow.scene import Scene
 from mocapflow.settings import PositiveOrInf
+from mocapflow_matching.camouflage import told_from_the_room
 from mocapflow_matching.robust import Loss, robust_weights
 from mocapflow_matching.uncertainty import contour_sigma
 

@@ -10,9 +10,9 @@ from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
 from mocapflow.data import Silhouette, Surface, Turn
 from mocapflow.geometry import silhouettes
 from mocapflow.geometry.contours import nearest_compatible
-from mocapflow.records import F64, Bool
+from mocapflow.records import F64, Bool, joined_rows
 from mocapflow.scene import Scene
-from mocapflow_matching.closed_curves import Curve, closed_contours, joined, low_passed
+from mocapflow_matching.closed_curves import Curve, closed_contours, low_passed
 from mocapflow_matching.containment import inside_px
 from mocapflow_matching.contour_icp import ContourIcp, ImageContour, ModelContour
 from mocapflow_matching.uncertainty import ANY_DIRECTION
@@ -65,7 +65,7 @@ class FourierIcp(ContourIcp):
             return None
         holes = len(one.holes) == len(other.holes)
         first, second = (
-            joined([low_passed(c, harmonics) for c in (*found.outer, *(found.holes if holes else ()))])
+            joined_rows([low_passed(c, harmonics) for c in (*found.outer, *(found.holes if holes else ()))])
             for found in (one, other)
         )
         return first, second

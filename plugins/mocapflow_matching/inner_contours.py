@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import ClassVar, Literal
 
 import numpy as np
-from mocapflow_levelset.camouflage import told_from_the_room
 from pydantic import PositiveFloat
 
 from mocapflow.components import Matcher
@@ -14,6 +13,7 @@ from mocapflow.data import Frame, Matches, Past, Segmentation, Surface, Turn, em
 from mocapflow.geometry.cameras import magnification, project_each
 from mocapflow.records import F64, Bool
 from mocapflow.scene import Scene
+from mocapflow_matching.camouflage import told_from_the_room
 from mocapflow_matching.robust import robust_weights
 
 FEWEST = 8  # pairs of a waistband: fewer do not tell a tilt from a height

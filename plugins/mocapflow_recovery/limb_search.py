@@ -10,9 +10,9 @@ from math import inf
 from typing import Annotated, ClassVar
 
 import numpy as np
-from mocapflow_levelset.camouflage import with_feet
 from mocapflow_levelset.layers import garment_told
 from mocapflow_levelset.one_floor import no_shadows
+from mocapflow_matching.camouflage import with_feet
 from mocapflow_priors.density import Density, Poses, read
 from mocapflow_priors.parzen import SHIPPED
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matching_scenes import FIRST, FRAME, bent, seen
-from mocapflow_levelset.camouflage import FEET, told_from_the_room, with_feet
+from mocapflow_matching.camouflage import FEET, told_from_the_room, with_feet
 from mocapflow_matching.containment import Containment
 from mocapflow_matching.contour_icp import ContourIcp
 from mocapflow_matching.inner_contours import InnerContours

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mocapflow_levelset.camouflage import FEET
+from mocapflow_matching.camouflage import FEET
 from mocapflow_recovery.fits import Fits
 from mocapflow_recovery.limb_search import LimbSearch
 from mocapflow_recovery.second_look import HELD, LED, Hindsight, SecondLook, pictured, windows

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mocapflow_levelset.camouflage import FEET
+from mocapflow_matching.camouflage import FEET
 from mocapflow_recovery import limb_search
 from mocapflow_recovery.certain import small_room, views
 from mocapflow_recovery.limb_search import LimbSearch

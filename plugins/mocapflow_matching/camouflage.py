@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
 from mocapflow.data import Matches, Past
-from mocapflow.records import F64, Bool
+from mocapflow.records import F64, Bool, picked_rows
 
 FEET = "feet that look like the floor"  # of Segmentation.appearance: (V,) 1 for vertices of the body that do, else 0
 
@@ -23,12 +22,4 @@ def told_from_the_room(matches: Matches, past: Past) -> Matches:
     if FEET not in past.appearance:
         return matches
     like_the_floor = np.flatnonzero(past.appearance[FEET])
-    kept = ~np.isin(matches.vertex, like_the_floor)
-    return replace(
-        matches,
-        camera=matches.camera[kept],
-        pixel=matches.pixel[kept],
-        direction=matches.direction[kept],
-        vertex=matches.vertex[kept],
-        weight=matches.weight[kept],
-    )
+    return picked_rows(matches, ~np.isin(matches.vertex, like_the_floor))
