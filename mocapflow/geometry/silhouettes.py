@@ -110,6 +110,13 @@ def _filled(first: I32, spans: I32, camera: Camera) -> Bool:
     return full
 
 
+def distance_to(inside: Bool) -> F32:
+    """Return the distance (H, W) px of each pixel's centre to the nearest one inside a mask; 0 there."""
+    import cv2
+
+    return np.asarray(cv2.distanceTransform((~inside).view(np.uint8), cv2.DIST_L2, 3), np.float32)
+
+
 def mask_distance(inside: Bool) -> F32:
     """Return the distance (H, W) px of each pixel's centre to the edge of a mask (H, W), positive inside, not clipped.
 

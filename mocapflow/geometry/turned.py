@@ -7,13 +7,13 @@ from typing import TypeVar
 import numpy as np
 
 from mocapflow.assets import Camera
+from mocapflow.geometry.following import Steps, followed
 from mocapflow.records import F32, F64, U8, Bool
 
 Picture = TypeVar("Picture", U8, F32)
 
 CORNERS, STRENGTH, SPACING_PX = 200, 0.005, 8.0  # at most; share of the strongest one's strength; apart
-WINDOW_PX, LEVELS, STEPS, REST_PX = 21, 3, 30, 0.01  # that is compared; of the pyramid; at most a level; small enough
-ROUND_TRIP_PX = 0.3  # from a corner to where following it there and back leads
+STEPS = Steps(window_px=21, levels=3, most=30, rest_px=0.01, round_trip_px=0.3)
 AGREE_PX = 1.0  # a corner off the common motion belongs to the person, or to what was moved in the room
 FEWEST, SHARE = 12, 0.6  # of corners that have to agree
 LEAST_PX, CLEAR = 0.5, 2.0  # by which corners of the room move, root mean square; times what the motion leaves of it
@@ -34,7 +34,7 @@ def turn_between(before: U8, after: U8, shown: Bool, camera: Camera) -> F64 | No
     """
     import cv2
 
-    here, there = (points.astype(float) for points in _followed(_grey(before), _grey(after), shown))
+    here, there = (points.astype(float) for points in _corners(_grey(before), _grey(after), shown))
     if len(here) < FEWEST:
         return None
     _, agree = cv2.findHomography(here, there, cv2.RANSAC, AGREE_PX)
@@ -106,7 +106,7 @@ def _grey(picture: U8) -> U8:
     return np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY))
 
 
-def _followed(before: U8, after: U8, shown: Bool) -> tuple[F32, F32]:
+def _corners(before: U8, after: U8, shown: Bool) -> tuple[F32, F32]:
     """Return corners (N, 2) of a grey picture and where another one has them."""
     import cv2
 
@@ -114,18 +114,5 @@ def _followed(before: U8, after: U8, shown: Bool) -> tuple[F32, F32]:
     if corners is None:
         return np.zeros((0, 2), np.float32), np.zeros((0, 2), np.float32)
     start = np.asarray(corners[:, 0], np.float32)
-    there, found = _step(before, after, start)
-    back, refound = _step(after, before, there)
-    kept = found & refound & (np.linalg.norm(back - start, axis=1) < ROUND_TRIP_PX)
+    there, kept = followed(before, after, start, STEPS)
     return start[kept], there[kept]
-
-
-def _step(old: U8, new: U8, points: F32) -> tuple[F32, Bool]:
-    """Return where points (N, 2) px of a grey picture (H, W) are in another, and which were found."""
-    import cv2
-
-    stop = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, STEPS, REST_PX)
-    there, found, _ = cv2.calcOpticalFlowPyrLK(
-        old, new, points, np.empty_like(points), winSize=(WINDOW_PX, WINDOW_PX), maxLevel=LEVELS, criteria=stop
-    )
-    return np.asarray(there, np.float32), np.asarray(found).ravel().astype(bool)

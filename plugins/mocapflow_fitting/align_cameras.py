@@ -14,6 +14,8 @@ from mocapflow.assets import Camera, Rig
 from mocapflow.components import Stage
 from mocapflow.geometry import twists
 from mocapflow.geometry.cameras import project
+from mocapflow.geometry.turned import homography, shift_px
+from mocapflow.recordings.paired_views import CONFIDENT
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow_fitting.detections import need_keypoints, persons, spread
@@ -49,12 +51,12 @@ class AlignCameras(Stage):
         people = persons(recording, spread(recording.indices, self.frames), cameras).values()
         pixels = np.concatenate([person.pixels for person in people], axis=1)
         confidence = np.concatenate([person.confidence for person in people], axis=1)
-        shared = (confidence > 0.3).sum(axis=0) >= min(3, len(cameras))  # two views nearly always agree
+        shared = (confidence > CONFIDENT).sum(axis=0) >= min(3, len(cameras))  # two views nearly always agree
         if not shared.any():
             LOG.warning("no keypoint is seen by three cameras: nothing tells whether they have turned")
             return Rig(cameras=cameras)
-        turned = self._turned(cameras, pixels[:, shared], np.where(confidence > 0.3, confidence, 0.0)[:, shared])
-        shifts = [shift_px(old, new) for old, new in zip(cameras, turned, strict=True)]
+        turned = self._turned(cameras, pixels[:, shared], np.where(confidence > CONFIDENT, confidence, 0.0)[:, shared])
+        shifts = [moved_px(old, new) for old, new in zip(cameras, turned, strict=True)]
         said = ", ".join(f"{camera.name} {shift:.1f} px" for camera, shift in zip(cameras, shifts, strict=True))
         if max(shifts) < self.least_px:
             LOG.info("cameras agree: %s", said)
@@ -88,8 +90,7 @@ def turn(cameras: Sequence[Camera], turns: F64) -> tuple[Camera, ...]:
     )
 
 
-def shift_px(old: Camera, new: Camera) -> float:
-    """Return how far the middle of the image moves (px) if one camera takes the place of the other."""
-    middle = np.linalg.inv(old.camera_from_world) @ np.array([0.0, 0.0, 3.0, 1.0])
-    pixels = [project(middle[None, :3], camera)[0] for camera in (old, new)]
-    return float(np.linalg.norm(pixels[1] - pixels[0]))
+def moved_px(old: Camera, new: Camera) -> float:
+    """Return how far the middle of a side of the picture moves (px) at most, if a camera turns into another one."""
+    rotation = new.camera_from_world[:3, :3] @ old.camera_from_world[:3, :3].T
+    return shift_px(homography(rotation, old), old)

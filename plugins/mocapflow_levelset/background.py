@@ -10,7 +10,7 @@ from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat
 from mocapflow.assets import Background
 from mocapflow.data import Frame, FrameState, Past, Segmentation, Silhouette, Turn
 from mocapflow.errors import RecordingError
-from mocapflow.geometry.silhouettes import model_distance
+from mocapflow.geometry.silhouettes import distance_to, model_distance
 from mocapflow.records import F32, U8, Bool
 from mocapflow.scene import Scene
 from mocapflow_levelset.channels import ChannelName, features
@@ -108,7 +108,7 @@ class BackgroundDifference(ShadowAware):
         area = stats[:, cv2.CC_STAT_AREA].astype(float)
         area[0] = 0
         if self.reach_px and (model > 0).any():
-            away = cv2.distanceTransform((model <= 0).astype(np.uint8), cv2.DIST_L2, 3)
+            away = distance_to(model > 0)
             near = np.unique(label[away <= self.reach_px])
             area[np.setdiff1d(np.arange(count), near)] = 0
         person = (area >= max(self.smallest_part * area.max(), 1))[label]

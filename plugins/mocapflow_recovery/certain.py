@@ -15,7 +15,7 @@ from mocapflow_levelset.shadows import floor_around
 from mocapflow.assets import Background, Camera
 from mocapflow.data import Frame, Surface
 from mocapflow.geometry.cameras import magnification, shrunk
-from mocapflow.geometry.silhouettes import mask, outline
+from mocapflow.geometry.silhouettes import distance_to, mask, outline
 from mocapflow.memo import memoised
 from mocapflow.records import F32, F64, U8, Bool
 
@@ -115,7 +115,7 @@ def _away(empty: Bool, person: Bool) -> F32:
     import cv2
 
     closed = cv2.morphologyEx(person.view(np.uint8), cv2.MORPH_CLOSE, SEAM)
-    return np.asarray(cv2.distanceTransform((empty & (closed == 0)).view(np.uint8), cv2.DIST_L2, 3), np.float32)
+    return distance_to(~empty | (closed != 0))
 
 
 def _near(changed: Bool, model: Bool, near_px: float) -> Bool:
@@ -123,9 +123,8 @@ def _near(changed: Bool, model: Bool, near_px: float) -> Bool:
     import cv2
 
     count, label, stats, _ = cv2.connectedComponentsWithStats(changed.view(np.uint8), connectivity=8)
-    away = cv2.distanceTransform((~model).view(np.uint8), cv2.DIST_L2, 3)
     kept = np.zeros(count, bool)
-    kept[label[away <= near_px]] = True
+    kept[label[distance_to(model) <= near_px]] = True
     kept[0] = False
     area = np.where(kept, stats[:, cv2.CC_STAT_AREA], 0)
     kept &= area >= max(SPECK * area.max(initial=0), 2)

@@ -11,8 +11,8 @@ from mocapflow_levelset.crops import around
 from mocapflow.data import Surface
 from mocapflow.geometry.cameras import projection
 from mocapflow.geometry.silhouette_kernels import project
-from mocapflow.geometry.silhouettes import covered, mask, outline
-from mocapflow.records import F32, F64, I32, Bool
+from mocapflow.geometry.silhouettes import covered, distance_to, mask, outline
+from mocapflow.records import F32, F64, I32
 from mocapflow_recovery.certain import View
 
 BEYOND = 1.1  # times the cap, from the person: no nearer by the distance transform, which is a twentieth short
@@ -39,7 +39,7 @@ def distance(surface: Surface, bare: Surface, views: Sequence[View], cap_m: floa
         skin = model if cloth == HANGS else covered(bare, view.camera)
         near = around(view.person, round(BEYOND * cap) + 2, 1)
         assert near is not None
-        off = _from_model(near.of(model))
+        off = distance_to(near.of(model))
         apart = _apart(model, skin, off, near.top, near.left, view.person, view.cloth, view.away, cap, cloth)
         total += apart * view.pixel_m / np.count_nonzero(view.person)
     return total / max(len(shown), 1)
@@ -52,7 +52,7 @@ def uncovered_areas(surface: Surface, views: Sequence[View], reaches_m: Sequence
     """
     areas = np.zeros((len(reaches_m), 2))
     for view in views:
-        off = _from_model(mask(outline(surface, view.camera), view.camera))
+        off = distance_to(mask(outline(surface, view.camera), view.camera))
         loose = view.person & (_from_cloth(surface, view) > cloth_m / view.pixel_m)
         for row, reach_m in enumerate(reaches_m):
             stray = loose & (off > reach_m / view.pixel_m)
@@ -80,14 +80,12 @@ def floating_area(bare: Surface, views: Sequence[View], reach_m: float) -> float
 
 def _from_cloth(surface: Surface, view: View) -> F32:
     """Return the distance (h, w) px of every pixel from the garment's vertices; far where there is no garment."""
-    import cv2
-
-    free = np.ones(view.person.shape, np.uint8)
+    cloth = np.zeros(view.person.shape, bool)
     _, column, row = _pixels(surface.vertices[surface.cloth], view)
     if not len(row):
-        return np.full(free.shape, np.inf, np.float32)
-    free[row, column] = 0
-    return np.asarray(cv2.distanceTransform(free, cv2.DIST_L2, 3), np.float32)
+        return np.full(cloth.shape, np.inf, np.float32)
+    cloth[row, column] = True
+    return distance_to(cloth)
 
 
 def _pixels(points: F64, view: View) -> tuple[I32, I32, I32]:
@@ -109,13 +107,6 @@ def _within(pixels, height, width):  # type: ignore[no-untyped-def]
             rows[count], column[count], row[count] = k, x, y
             count += 1
     return rows[:count], column[:count], row[:count]
-
-
-def _from_model(model: Bool) -> F32:
-    """Return the distance (h, w) px of every pixel from a silhouette (h, w)."""
-    import cv2
-
-    return np.asarray(cv2.distanceTransform((~model).view(np.uint8), cv2.DIST_L2, 3), np.float32)
 
 
 @numba.njit(cache=True)

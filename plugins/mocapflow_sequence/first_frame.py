@@ -11,7 +11,7 @@ from mocapflow_levelset.shadows import floor_around
 from mocapflow.assets import Camera
 from mocapflow.data import Surface
 from mocapflow.geometry.cameras import magnification
-from mocapflow.geometry.silhouettes import covered
+from mocapflow.geometry.silhouettes import covered, distance_to
 from mocapflow.records import F32, F64, U8, Bool
 from mocapflow_sequence.colours import DEEP, Colours, alike, every, lab_bins, more_common, shaded
 from mocapflow_sequence.commonest import commonest
@@ -107,12 +107,10 @@ def _shown(picture: U8, usual: F32) -> Colours:
 
 def _about(body: Surface, camera: Camera) -> tuple[Bool, F64]:
     """Return where (H, W) a body is seen, and how far (H, W) m from it every pixel is, at its distance."""
-    import cv2
-
     person = covered(body, camera)
     if not person.any():  # beside the picture or behind the camera
         return person, np.full(person.shape, np.inf)
-    away_px = np.asarray(cv2.distanceTransform((~person).view(np.uint8), cv2.DIST_L2, 3), np.float64)
+    away_px = distance_to(person).astype(np.float64)
     return person, away_px / magnification(camera, body.vertices.mean(axis=0))
 
 

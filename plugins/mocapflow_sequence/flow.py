@@ -11,8 +11,9 @@ from pydantic import Field, NonNegativeInt, PositiveFloat
 from mocapflow.assets import Background
 from mocapflow.components import Stage
 from mocapflow.data import Flow, Frame
+from mocapflow.geometry.following import Steps, followed
 from mocapflow.recordings.recording import Recording
-from mocapflow.records import F32, U8, Bool
+from mocapflow.records import F32, U8
 from mocapflow.results import ImageFlow, ViewChecks
 
 LEAST_CORNER = 0.005  # share of the best corner's strength
@@ -74,9 +75,7 @@ class FollowPoints(Stage):
         corners = self._corners(a, np.ones_like(a) if where is None else where)
         if corners is None:
             return NOTHING
-        there, found = self._step(a, b, corners)
-        back, refound = self._step(b, a, there)
-        kept = found & refound & (np.linalg.norm(back - corners, axis=1) < self.round_trip_px)
+        there, kept = followed(a, b, corners, Steps(self.window_px, self.levels, STEPS, REST_PX, self.round_trip_px))
         return Flow(pixel=corners[kept], displacement=(there - corners)[kept])
 
     def _corners(self, grey: U8, mask: U8) -> F32 | None:
@@ -90,16 +89,6 @@ class FollowPoints(Stage):
             grey[part], self.points, LEAST_CORNER, self.spacing_px, mask=mask[part], blockSize=BLOCK
         )
         return None if found is None else np.asarray(found + np.array([left, top]), np.float32).reshape(-1, 2)
-
-    def _step(self, old: U8, new: U8, points: F32) -> tuple[F32, Bool]:
-        import cv2
-
-        window = (self.window_px, self.window_px)
-        rest = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, STEPS, REST_PX)
-        to, found, _ = cv2.calcOpticalFlowPyrLK(  # type: ignore[call-overload]
-            old, new, points, None, winSize=window, maxLevel=self.levels, criteria=rest
-        )
-        return np.asarray(to, np.float32), np.asarray(found, bool).ravel()
 
     def _worth_following(self, frame: Frame, background: Background | None, camera: int) -> U8:
         """Return 1 where a view (H, W) may show the person, else 0."""
