@@ -209,7 +209,11 @@ def numbers(cells: Sequence[str], width: int, where: str) -> list[float]:
     """Return the numbers of a row; an empty cell is NaN."""
     if len(cells) != width:
         raise RecordingError(f"{len(cells)} columns; expected {width}", where=where)
+    return [_number(cell, f"{where}:{column}") if cell.strip() else np.nan for column, cell in enumerate(cells, 1)]
+
+
+def _number(cell: str, where: str) -> float:
     try:
-        return [float(cell) if cell.strip() else np.nan for cell in cells]
-    except ValueError as error:
-        raise RecordingError(str(error), where=where) from None
+        return float(cell)
+    except ValueError:
+        raise RecordingError(f"'{cell.strip()}' is no number", where=where) from None

@@ -5,12 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from mocapflow.io.paths import for_opencv
-from mocapflow.records import F64, I32
+from mocapflow.records import F64, I32, Bool
+
+
+class Stamps(NamedTuple):
+    """What a video file says of its frames."""
+
+    declared: int  # frames
+    rate: float  # frames a second; 0 where it does not say
+    time: F64  # (N,) ms, ascending
+    key: Bool  # (N,) whether a frame is decoded from nothing but itself
 
 
 @contextmanager
@@ -40,15 +49,18 @@ def grabs(capture: Any) -> Iterator[None]:
             failed += 1
 
 
-def read_stamps(path: Path) -> tuple[int, float, F64]:
-    """Return the declared number of frames, the frame rate, and the sorted stamps (N,) ms; nothing is decoded."""
+def read_stamps(path: Path) -> Stamps:
+    """Return the time stamps of a video file; nothing is decoded."""
     import cv2
 
     with open_capture(path, cv2.CAP_PROP_FORMAT, -1) as capture:
         declared, rate = capture.get(cv2.CAP_PROP_FRAME_COUNT), capture.get(cv2.CAP_PROP_FPS)
-        stamps = np.sort([capture.get(cv2.CAP_PROP_POS_MSEC) for _ in grabs(capture)])
+        what = cv2.CAP_PROP_POS_MSEC, cv2.CAP_PROP_LRF_HAS_KEY_FRAME
+        read = np.array([[capture.get(each) for each in what] for _ in grabs(capture)]).reshape(-1, 2)
     rate = rate if np.isfinite(rate) and 0 < rate < 1e5 else 0.0
-    return max(0, int(declared)), rate, stamps[stamps >= 0] if len(stamps) else np.empty(0)
+    stamps, keys = read[np.argsort(read[:, 0], kind="stable")].T
+    known = stamps >= 0
+    return Stamps(max(0, int(declared)), rate, stamps[known], keys[known] > 0)
 
 
 def number_frames(stamps: F64) -> I32:

@@ -1,14 +1,15 @@
 """The one video decoder: frames exactly in order, a placeholder with a reason where one is lost.
 
 The number of a frame comes from its time stamp, so a frame that the file lacks, or that can't be decoded, leaves
-a gap and does not shift the rest. All stamps are read once, without decoding, when a video is opened. Decoding
-always starts at the first frame: seeking lands on the wrong picture in some files, and a resumed run must see
-the same pixels.
+a gap and does not shift the rest. What is decoded from a damaged frame is lost, too. All stamps are read once, without
+decoding, when a video is opened. Decoding always starts at the first frame: seeking lands on the wrong picture in some
+files, and a resumed run must see the same pixels.
 """
 
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -20,8 +21,10 @@ from mocapflow.errors import RecordingError
 from mocapflow.io.images import IMAGES, check_depth, check_numbers, numbered, read_image
 from mocapflow.io.paths import led_nowhere
 from mocapflow.io.stamps import grabs, number_frames, open_capture, read_stamps
-from mocapflow.records import F64, I32, U8, array, record
+from mocapflow.records import F64, I32, U8, Bool, array, record
 
+NO_MORE = (sys.maxsize, False)  # the number after those of all frames
+TORN = "the frame is decoded from damaged ones"
 VIDEOS = (".mp4", ".avi", ".mov", ".mkv", ".m4v", ".webm", ".mpg")
 
 
@@ -36,6 +39,8 @@ class Video:
     declared: int  # frames, as the file says; more than `frames` where it breaks off
     stamps: F64 = array("N", unit="ms, time of each frame in the file, ascending; counted for images")
     numbers: I32 = array("N", unit="frame number of each stamp")
+    keys: Bool = array("N", unit="True for frames that are decoded from nothing but themselves")
+    gaps_tear: bool = False  # frames that are missing are damaged ones; else the camera has left them out
     first: int = 0  # number in the name of frame 0's image
     late: int = 0  # frames by which its pictures come after those of the other cameras
 
@@ -59,7 +64,7 @@ def open_video(path: Path) -> Video:
     if not os.access(path, os.R_OK):  # ffmpeg would only say that it can't be decoded
         hint = "let yourself read it, or copy it to a place of yours"
         raise RecordingError("this video may not be read: permission denied", where=str(path), hint=hint)
-    declared, rate, stamps = read_stamps(path)
+    declared, rate, stamps, keys = read_stamps(path)
     with open_capture(path) as capture:
         first = next((image for _ in grabs(capture) if (image := capture.retrieve()[1]) is not None), None)
     if first is None or not len(stamps):
@@ -80,6 +85,8 @@ def open_video(path: Path) -> Video:
         declared=max(declared, int(numbers[-1]) + 1),
         stamps=stamps,
         numbers=numbers,
+        keys=keys,
+        gaps_tear=declared > len(stamps),
     )
 
 
@@ -113,12 +120,12 @@ def read_frames(video: Video, indices: range) -> Iterator[tuple[U8 | None, str]]
 def _file_pictures(video: Video, indices: range) -> Iterator[tuple[U8 | None, str]]:
     with open_capture(video.path) as capture:
         decoded = _decoded(capture, video)
-        current = next(decoded, None)
+        current, torn = next(decoded, NO_MORE)
         for index in indices:
-            while current is not None and current < index:
-                current = next(decoded, None)
-            done, image = capture.retrieve() if current == index else (False, None)
-            yield (image, "") if done else (None, _why(video, index))
+            while current < index:
+                current, torn = next(decoded, NO_MORE)
+            done, image = capture.retrieve() if current == index and not torn else (False, None)
+            yield (image, "") if done else (None, TORN if current == index and torn else _why(video, index))
 
 
 def _why(video: Video, index: int) -> str:
@@ -131,16 +138,23 @@ def _why(video: Video, index: int) -> str:
     return "the frame can't be decoded"
 
 
-def _decoded(capture: Any, video: Video) -> Iterator[int]:
-    """Yield the number of each frame as it is decoded."""
+def _decoded(capture: Any, video: Video) -> Iterator[tuple[int, bool]]:
+    """Yield the number of each frame as it is decoded, and whether that is from frames that could not be.
+
+    A decoder goes on after a damaged frame with the differences from it, up to the next key frame.
+    """
     import cv2
 
     by_count = video.stamps[0] == video.stamps[-1]
+    before, torn = -1, False
     for count, _ in enumerate(grabs(capture)):
         now = capture.get(cv2.CAP_PROP_POS_MSEC)
         if count == 0 and now != video.stamps[0] and video.path.suffix.lower() == ".avi":
             by_count = True  # AVI keeps no times of display: with reordered frames only their order is known
-        yield int(video.numbers[count if by_count else np.abs(video.stamps - now).argmin()])
+        row = count if by_count else int(np.abs(video.stamps - now).argmin())
+        lost = row > before + 1 or (video.gaps_tear and row > 0 and video.numbers[row] > video.numbers[row - 1] + 1)
+        before, torn = row, bool((torn or lost) and not video.keys[row])
+        yield int(video.numbers[row]), torn
 
 
 def _open_folder(path: Path) -> Video:
@@ -165,6 +179,7 @@ def _open_folder(path: Path) -> Video:
         declared=max(files) + 1,
         stamps=np.arange(len(numbers), dtype=np.float64),
         numbers=numbers,
+        keys=np.ones(len(numbers), bool),
     )
 
 

@@ -49,6 +49,7 @@ def examine(folder: Path) -> list[Finding]:
     findings += [] if calibration is None else _start(folder, calibration)
     if not any(finding.severity == "error" for finding in findings):
         findings += examine_first_frame(folder, registry)
+        findings += _compared(folder, registry)
     findings += _garment(folder, registry)
     findings += _missing(folder)
     return sorted(findings, key=lambda finding: ("error", "warning", "note").index(finding.severity))
@@ -96,10 +97,19 @@ def _garment(folder: Path, registry: Registry) -> list[Finding]:
     try:
         garment = measures.recorded_garment(folder, registry)
         return [] if garment is None else _sewn(garment, folder, registry)
-    except UnknownComponent as problem:  # its plugin may be on another machine
-        return [warning(problem.message, problem.hint, problem.where)]
+    except UnknownComponent as problem:  # its plugin may be on another machine, unless it is misspelt
+        severe = error if "did you mean" in problem.hint else warning
+        return [severe(problem.message, problem.hint, problem.where)]
     except MocapflowError as problem:
         return [error(problem.message, problem.hint, problem.where or folder / measures.FILE)]
+
+
+def _compared(folder: Path, registry: Registry) -> list[Finding]:
+    """Return why what a run would be compared with can't be read; the evaluation alone opens it."""
+    evaluate: Any = registry.get("stage", "evaluate")
+    findings: list[Finding] = []
+    attempt(lambda: evaluate().need(open_recording(folder)), findings)
+    return findings
 
 
 def _sewn(garment: Garment, folder: Path, registry: Registry) -> list[Finding]:

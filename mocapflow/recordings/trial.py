@@ -86,7 +86,7 @@ def _looked_through(cameras: Sequence[Camera], videos: Sequence[Video], length: 
         column[:] = found[:length]
         if lost := [index for index in lost if index < video.frames]:
             why = "missing, damaged or of another size" if video.path.is_dir() else "can't be decoded"
-            hint = "the view is not used in these frames; the others keep their places"
+            hint = "the view is not used in these frames, some perhaps made from damaged ones; others keep their places"
             yield warning(f"{camera.name}: {name_frames(lost)} {why}", hint, video.path)
     for since, camera, video in zip(frozen_from(news), cameras, videos, strict=True):
         if since < length:

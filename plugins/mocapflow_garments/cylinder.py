@@ -25,8 +25,8 @@ class Cylinder(Garment):
     upper_circumference_m: pattern.Length = 0.60  # where it is pinned
     lower_circumference_m: pattern.Length = 0.55  # of its hem
     length_m: pattern.Length = 0.40  # along the cloth
-    strands: Annotated[int, Field(ge=8)] = 32  # columns of particles
-    rings: Annotated[int, Field(ge=3)] = 16  # rows of particles
+    strands: Annotated[int, Field(ge=8, le=512)] = 32  # columns of particles
+    rings: Annotated[int, Field(ge=3, le=512)] = 16  # rows of particles
     force_orders: tuple[Literal[0, 1, 2, 3], ...] = (0, 1)  # harmonics of the tail angle; 1 alone is a wind
 
     def sew(self, body: Body) -> GarmentMesh:

@@ -10,6 +10,7 @@ from pydantic import Field
 
 from mocapflow.assets import Body
 from mocapflow.errors import GarmentError
+from mocapflow.geometry.skeleton import skeleton_of, unsided
 from mocapflow.records import F64
 from mocapflow_garments import sections
 
@@ -47,7 +48,7 @@ def waistband(garment: str, body: Body, height: float, around: float) -> tuple[F
     """Return the torso's outline (N, 2) m at a height and how far outside it a band of a given length lies.
 
     Raises:
-        GarmentError: there is no body at that height or only legs, or the band is far too wide to stay up.
+        GarmentError: there is no body at that height only legs or shoulders, or the band is far too wide to stay up.
     """
     outlines = sections.outlines(body, sections.level(height))
     if not outlines:
@@ -60,6 +61,13 @@ def waistband(garment: str, body: Body, height: float, around: float) -> tuple[F
         raise GarmentError(
             f"{garment}: at waist_height_m = {height:.2f} the legs have parted already",
             hint="the height is metres above the floor, of the upper edge: above the body's crotch",
+        )
+    skeleton = skeleton_of(body)
+    arms = [at[2] for name, at in zip(skeleton.names, skeleton.positions, strict=True) if unsided(name) == "shoulder"]
+    if arms and height > min(arms):
+        raise GarmentError(
+            f"{garment}: at waist_height_m = {height:.2f} it would hang from the shoulders",
+            hint=f"the height is metres above the floor, of the upper edge; shoulders are {min(arms):.2f} m high",
         )
     tape = sections.perimeter(torso)
     away = (around - tape) / (2 * math.pi)

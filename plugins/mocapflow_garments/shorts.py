@@ -30,8 +30,8 @@ class Shorts(Garment):
     leg_opening_circumference_m: pattern.Length  # of each hem
     inseam_m: pattern.Length  # from the crotch to the hem
     length_m: pattern.Length  # along the cloth, outside of the leg
-    strands: Annotated[int, Field(ge=8, multiple_of=4)] = 32  # columns of particles of each leg
-    rings: Annotated[int, Field(ge=6)] = 20  # rows of particles
+    strands: Annotated[int, Field(ge=8, le=512, multiple_of=4)] = 32  # columns of particles of each leg
+    rings: Annotated[int, Field(ge=6, le=512)] = 20  # rows of particles
     force_orders: tuple[Literal[0, 1, 2, 3], ...] = (0, 1, 2)  # harmonics of the tail angle; 1 alone is a wind
 
     def sew(self, body: Body) -> GarmentMesh:

@@ -24,8 +24,8 @@ class Skirt(Garment):
     waist_circumference_m: pattern.Length  # of the upper edge
     hem_circumference_m: pattern.Length  # of the lower edge
     length_m: pattern.Length  # along the cloth
-    strands: Annotated[int, Field(ge=8)] = 48  # columns of particles
-    rings: Annotated[int, Field(ge=3)] = 24  # rows of particles
+    strands: Annotated[int, Field(ge=8, le=512)] = 48  # columns of particles
+    rings: Annotated[int, Field(ge=3, le=512)] = 24  # rows of particles
     force_orders: tuple[Literal[0, 1, 2, 3], ...] = (0, 1, 2)  # harmonics of the tail angle; 1 alone is a wind
 
     def sew(self, body: Body) -> GarmentMesh:

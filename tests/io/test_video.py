@@ -1,6 +1,7 @@
 """Frames in order, and gaps that stay gaps."""
 
 import os
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -10,7 +11,7 @@ from mocapflow.errors import RecordingError
 from mocapflow.io.images import name_frames, numbered
 from mocapflow.io.stamps import number_frames
 from mocapflow.io.video import open_video, read_frames
-from tests.fixtures.recordings import avi_frames, number_of, picture, write_video
+from tests.fixtures.recordings import avi_frames, mp4_frames, number_of, picture, write_video
 
 FRAMES = 20
 
@@ -49,6 +50,27 @@ def test_a_damaged_frame_leaves_a_gap(tmp_path):
     assert [i for i, (image, _) in enumerate(rows) if image is None] == [8]
     assert rows[8] == (None, "the frame can't be decoded")
     assert [number_of(image) for image, _ in rows if image is not None] == [i for i in range(FRAMES) if i != 8]
+
+
+@pytest.mark.parametrize(("ending", "bad", "key"), [("avi", 18, 28), ("avi", 12, 16), ("mp4", 18, 28), ("mp4", 12, 16)])
+def test_what_is_decoded_from_a_damaged_frame_is_lost_up_to_the_next_key_frame(tmp_path, ending, bad, key):
+    """Key frames are 0, 12, 16 and 28."""
+    path = write_video(tmp_path / f"a.{ending}", 30, codec="XVID" if ending == "avi" else "mp4v")
+    content = bytearray(path.read_bytes())
+    offset, length = (avi_frames if ending == "avi" else mp4_frames)(content)[bad]
+    content[offset : offset + length] = bytes(length)
+    path.write_bytes(content)
+    rows = list(read_frames(open_video(path), range(30)))
+    assert [i for i, (image, _) in enumerate(rows) if image is None] == list(range(bad, key))
+    assert {why for image, why in rows[bad + 1 : key]} == {"the frame is decoded from damaged ones"}
+    assert [number_of(image) for image, _ in rows[key:]] == list(range(key, 30))
+
+
+def test_what_a_camera_left_out_damages_nothing(tmp_path):
+    video = open_video(write_video(tmp_path / "a.mp4", FRAMES))
+    late = np.arange(FRAMES) + (np.arange(FRAMES) >= 5)  # frame 5 was never written
+    video = replace(video, numbers=late.astype(np.int32))
+    assert [index for index, (image, _) in enumerate(read_frames(video, range(FRAMES + 1))) if image is None] == [5]
 
 
 def test_a_truncated_video_has_placeholders_to_the_end(tmp_path):

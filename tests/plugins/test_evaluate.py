@@ -323,5 +323,5 @@ def test_a_reference_that_can_not_be_read_is_told_before_anything_runs(tmp_path:
     shutil.copytree(DEMO, recording, ignore=shutil.ignore_patterns("background"))
     Evaluate().need(open_recording(recording))
     (recording / "truth" / "angles.csv").write_text("frame,knee_flexion_l\n0,a\n")
-    with pytest.raises(RecordingError, match=r"angles.csv:2  could not convert"):
+    with pytest.raises(RecordingError, match=r"angles.csv:2:\d+  '.*' is no number"):
         Evaluate().need(open_recording(recording))

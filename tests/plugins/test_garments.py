@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from mocapflow.errors import GarmentError, MocapflowError
 from mocapflow.scene import Scene
+from mocapflow.testing import template_body
 
 BODY = legs()
 SHORTS = dict(
@@ -103,6 +104,13 @@ def test_a_measure_that_is_no_length_in_metres_is_refused(garment, measures, val
 def test_a_skirt_that_can_not_be_says_what_to_do(change, said):
     with pytest.raises(GarmentError, match=said):
         Skirt(**{**SKIRT, **change}).sew(BODY)
+
+
+def test_a_skirt_does_not_hang_from_the_shoulders():
+    body = template_body()
+    shoulders = body.positions[body.joint("shoulder_l"), 2]
+    with pytest.raises(GarmentError, match=r"it would hang from the shoulders(.|\n)*shoulders are \d\.\d\d m high"):
+        Skirt(**{**SKIRT, "waist_height_m": shoulders + 0.02, "waist_circumference_m": 1.2}).sew(body)
 
 
 @pytest.mark.parametrize(

@@ -189,7 +189,7 @@ def test_table_with_a_missing_cell_says_where(tmp_path: Path) -> None:
     with pytest.raises(Exception, match=r"t\.csv:3  1 columns; expected 2"):
         read_columns(tmp_path / "t.csv")
     (tmp_path / "t.csv").write_text("frame,knee_flexion_l\n\n\n0,x\n")
-    with pytest.raises(RecordingError, match=r"t\.csv:4  could not convert string to float: 'x'"):
+    with pytest.raises(RecordingError, match=r"t\.csv:4:\d  'x' is no number"):
         read_columns(tmp_path / "t.csv")
     (tmp_path / "t.csv").write_text(f"frame,knee_flexion_l\n0,{'1' * 200_000}\n")
     with pytest.raises(RecordingError, match=r"t\.csv:2  is no table: field larger than"):

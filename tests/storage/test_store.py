@@ -299,6 +299,16 @@ def test_an_unfinished_result_is_none(store):
     assert len(store.artifacts()) == 1
 
 
+def test_a_folder_with_other_things_becomes_no_store(tmp_path):
+    empty, papers = tmp_path / "empty", tmp_path / "papers"
+    for folder, name in ((empty, ".hidden"), (papers, "letter.txt")):
+        folder.mkdir()
+        (folder / name).write_text("")
+    Store(empty).create()
+    with pytest.raises(StoreError, match=r"this folder is no store: it holds letter.txt(.|\n)*--store .*store\.zarr"):
+        Store(papers).create()
+
+
 def test_a_store_elsewhere_on_the_net_is_refused():
     with pytest.raises(MocapflowError, match="has to be a folder") as caught:
         Store(Path("s3://bucket/store"))
