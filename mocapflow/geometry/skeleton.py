@@ -40,6 +40,13 @@ def skeleton_of(body: Body) -> Skeleton:
     return Skeleton(body.joint_names, body.parents, body.positions)
 
 
+def to_segment(points: F64, start: F64, end: F64) -> F64:
+    """Return how far (N,) m points (N, 3) are from the line between two others (3,)."""
+    along = end - start
+    share = np.clip((points - start) @ along / max(float(along @ along), 1e-12), 0.0, 1.0)
+    return np.asarray(np.linalg.norm(points - start - share[:, None] * along, axis=1))
+
+
 def body_directions(skeleton: Skeleton) -> F64:
     """Return forward, left and up of the body at rest as rows (3, 3): up is +z, left is from hip_r to hip_l.
 

@@ -9,7 +9,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from mocapflow.errors import RecordingError, alternatives
-from mocapflow.geometry.skeleton import Skeleton
+from mocapflow.geometry.skeleton import Skeleton, to_segment
 from mocapflow.records import F64
 
 WEIGHTS = "expected arrays `weights` (V, J) and, if need be, `names` (J); without the file weights are computed"
@@ -70,6 +70,4 @@ def _from_bones(point: F64, joint: int, skeleton: Skeleton) -> float:
     """Return how far (m) a point (3,) is from the bones that begin at a joint; from the joint where none does."""
     begin = skeleton.positions[joint]
     ends = skeleton.positions[np.append(np.flatnonzero(skeleton.parents == joint), joint)]
-    bones = ends - begin
-    along = np.clip(bones @ (point - begin) / np.maximum((bones**2).sum(axis=1), 1e-9), 0, 1)
-    return float(np.linalg.norm(begin + along[:, None] * bones - point, axis=1).min())
+    return min(float(to_segment(point[None], begin, end)[0]) for end in ends)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -41,8 +42,9 @@ def seal(
 
 
 def told(notes: Sequence[tuple[int, int, str]], indices: Sequence[int]) -> list[str]:
-    """Return one line per note and frame, in the order of the frames."""
-    spread = [(index, note) for first, last, note in notes for index in indices if first <= index <= last]
+    """Return one line per note and frame, in the order of the frames, whose indices ascend."""
+    frames = (indices[bisect_left(indices, first) : bisect_right(indices, last)] for first, last, _ in notes)
+    spread = [(index, note) for (_, _, note), on in zip(notes, frames, strict=True) for index in on]
     return [f"frame {index}: {note}" for index, note in sorted(spread, key=lambda told: told[0])]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mocapflow.geometry.skeleton import Skeleton
+from mocapflow.geometry.skeleton import Skeleton, to_segment
 from mocapflow.records import F64, I32
 
 KEPT = 5  # joints a vertex
@@ -38,7 +38,7 @@ def bone_distances(vertices: F64, skeleton: Skeleton) -> F64:
         if not len(ends):
             ends = (skeleton.positions[joint] + 0.5 * skeleton.bone(joint))[None]
         for end in ends:
-            distance[:, joint] = np.minimum(distance[:, joint], _to_segment(vertices, skeleton.positions[joint], end))
+            distance[:, joint] = np.minimum(distance[:, joint], to_segment(vertices, skeleton.positions[joint], end))
     return distance
 
 
@@ -50,12 +50,6 @@ def strongest(weights: F64) -> tuple[I32, F64]:
     kept = np.where(kept >= LEAST * kept.sum(axis=1, keepdims=True), kept, 0.0)
     joints = np.where(kept > 0, order, order[:, :1])
     return joints.astype(np.int32), kept / kept.sum(axis=1, keepdims=True)
-
-
-def _to_segment(points: F64, start: F64, end: F64) -> F64:
-    along = end - start
-    share = np.clip((points - start) @ along / max(float(along @ along), 1e-12), 0.0, 1.0)
-    return np.asarray(np.linalg.norm(points - start - share[:, None] * along, axis=1))
 
 
 def _laplacian(vertices: F64, faces: I32):  # type: ignore[no-untyped-def]

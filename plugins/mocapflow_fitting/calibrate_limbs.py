@@ -15,6 +15,7 @@ from mocapflow.assets import Background, Body
 from mocapflow.components import Matcher, Segmenter, Stage
 from mocapflow.data import Change, Frame, Matches, Past, Pose, Segmentation, Turn
 from mocapflow.dressing.roles import Draper
+from mocapflow.guards.answers import segmentation_of
 from mocapflow.guards.idle import idle_matchers
 from mocapflow.model import ClothedModel
 from mocapflow.pooling import pool_matches
@@ -118,7 +119,7 @@ class CalibrateLimbs(Stage):
                 pose, cloth = wanted[frame.index]
                 state = believed(pose, cloth, model.drape(pose, cloth, past))
                 passed = prepared(frame, checks, flow=None)
-                found = self.segmenter.segment(passed, state, past, model.scene, Turn(index=0))
+                found = segmentation_of(self.segmenter, passed, state, past, model.scene, Turn(index=0))
                 views.append((replace(passed, images=()), found, cloth))
         return views
 

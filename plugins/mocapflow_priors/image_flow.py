@@ -14,6 +14,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 from mocapflow.components import PoseSolver, Predictor, Prior
 from mocapflow.data import NO_CLOTH, Frame, Matches, Past, Pose, Surface, Turn
 from mocapflow.geometry.cameras import project_each
+from mocapflow.guards.answers import estimate_of, pose_of
 from mocapflow.model import ClothedModel
 from mocapflow.prediction import believed
 from mocapflow.scene import Scene
@@ -44,7 +45,7 @@ class ImageFlowPredictor(Predictor):
 
     def predict(self, frame: Frame, past: Past, scene: Scene) -> Pose:
         """Return the pose the flow leads to, or what `otherwise` predicts."""
-        guess = self.otherwise.predict(frame, past, scene)
+        guess = pose_of(self.otherwise, frame, past, scene)
         followed = self.on_skin(carried_points(frame, past, scene), past, scene)
         if len(followed.vertex) < self.least_points:
             return guess
@@ -56,7 +57,7 @@ class ImageFlowPredictor(Predictor):
             return replace(followed, weight=followed.weight * robust / self.sigma_px**2)
 
         state = believed(guess, np.empty(0), NO_CLOTH)
-        pose = self.pose_solver.solve(match, state, model, self.priors, past, Turn(index=0)).pose
+        pose = estimate_of(self.pose_solver, match, state, model, self.priors, past, Turn(index=0)).pose
         reached = distances(followed, model.surface(pose, NO_CLOTH), scene)
         return pose if np.mean(reached < self.agreeing_px) >= self.least_agreement else guess
 

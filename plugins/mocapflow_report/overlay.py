@@ -45,8 +45,8 @@ class Overlay(Stage):
         with drawing.videos(paths, recording.run_rate, self.codec) as opened:
             for frame in steadied(recording.frames(), checks):
                 if frame.index in rows:
-                    for view, video in enumerate(opened):
-                        video.write(painter.paint(frame, track, rows[frame.index], view))
+                    for video, image in zip(opened, painter.paint(frame, track, rows[frame.index]), strict=True):
+                        video.write(image)
         return Files(paths=tuple(paths))
 
 
@@ -59,15 +59,19 @@ class Painter:
         self._cloth_faces = np.empty((0, 3), np.int32) if scene.garment is None else scene.garment.faces
         self._cloth_edges = meshes.edges(self._cloth_faces)
 
-    def paint(self, frame: Frame, track: Track, row: int, view: int) -> U8:
-        """Return the image (H, W, 3) of a view, enlarged if small, with the model drawn on it."""
+    def paint(self, frame: Frame, track: Track, row: int) -> list[U8]:
+        """Return the image (H, W, 3) of each view, enlarged if small, with the model drawn on it."""
+        pose = track.pose(row)  # of all views: they share the surface that is posed so
+        return [self._painted(frame, track, row, view, pose) for view in range(len(self._cameras))]
+
+    def _painted(self, frame: Frame, track: Track, row: int, view: int, pose: Pose) -> U8:
         import cv2
 
         camera, image = self._cameras[view], np.array(frame.images[view])
         factor = -(-LEAST_HEIGHT // image.shape[0])
         if factor > 1:
             image = np.asarray(cv2.resize(image, None, fx=factor, fy=factor, interpolation=cv2.INTER_CUBIC), np.uint8)
-        self.draw(image, camera, factor, track.pose(row), track.cloth[row])
+        self.draw(image, camera, factor, pose, track.cloth[row])
         drawing.label(image, f"{camera.name}  frame {frame.index}")
         for line, text in enumerate(_remarks(frame, track, row, view)):
             drawing.label(image, text, line + 1)

@@ -25,7 +25,7 @@ def stills(
     for frame in steadied(recording.until(last).frames(), checks):
         for what, row in chosen.items():
             if track.frame[row] == frame.index:
-                wall = _side_by_side([painter.paint(frame, track, row, view) for view in range(len(scene.cameras))])
+                wall = _side_by_side(painter.paint(frame, track, row))
                 caption = f"{what}: frame {frame.index}, {_overlaps(track, row)}"
                 found[what] = (caption, cv2.imencode(".jpg", wall)[1].tobytes())
     return [found[what] for what in chosen if what in found]

@@ -63,7 +63,7 @@ def test_overlay_shows_outline_garment_and_skeleton(
     assert all(read_back(path).shape == (4, 800, 640, 3) for path in files.paths)  # small images are enlarged
     frame = next(recording.frames())
     for view in range(4):  # before compression, which blurs thin coloured lines
-        image = Painter(scene).paint(frame, track, 0, view)
+        image = Painter(scene).paint(frame, track, 0)[view]
         for colour in (drawing.BODY, drawing.CLOTH, drawing.BONE):
             assert near(image, colour) > 200
 
@@ -101,7 +101,7 @@ def test_overlay_of_an_odd_frame_says_so(
     scene: Scene, track: Track, recording: Recording, odd: dict[str, np.ndarray]
 ) -> None:
     frame = next(recording.frames())
-    plain, said = (Painter(scene).paint(frame, each, 0, 1) for each in (track, replace(track, **odd)))
+    plain, said = (Painter(scene).paint(frame, each, 0)[1] for each in (track, replace(track, **odd)))
     differs = np.flatnonzero(np.any(plain != said, axis=(1, 2)))
     assert 0 < len(differs) < 80  # a line of text at the top
     assert differs.max() < 160
