@@ -15,13 +15,13 @@ from mocapflow.components import Stage
 from mocapflow.geometry import twists
 from mocapflow.geometry.cameras import project
 from mocapflow.geometry.turned import homography, shift_px
-from mocapflow.recordings.paired_views import CONFIDENT
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow_fitting.detections import need_keypoints, persons, spread
 from mocapflow_fitting.triangulate import triangulate
 
 LOG = logging.getLogger("mocapflow")
+CONFIDENT = 0.3  # of a keypoint
 
 
 class AlignCameras(Stage):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, ClassVar
 
 import numpy as np
-from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat
+from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from mocapflow.assets import Background
 from mocapflow.data import Frame, FrameState, Past, Segmentation, Silhouette, Turn
@@ -26,6 +26,8 @@ from mocapflow_levelset.view import Empty, Level, Method, View, find
 CHANNELS: tuple[ChannelName, ...] = ("lab",)
 STRIDE = 2  # of the pixels that the statistics are taken from
 REFINE_STEPS = 4  # against the plate, then as many with local statistics on both sides
+HOLE_PX2 = 120  # area up to which holes are filled
+SMALLEST_PART = 0.01  # of the largest part's area; smaller parts are noise
 
 
 class BackgroundDifference(ShadowAware):
@@ -38,9 +40,7 @@ class BackgroundDifference(ShadowAware):
     needs_background: ClassVar[bool] = True
 
     smooth_px: PositiveFloat = 1.0  # of the evidence before it is cut
-    hole_px2: NonNegativeInt = 120  # holes up to this area are filled
     reach_px: NonNegativeFloat = 60.0  # parts further from the projected model than this are someone else; 0: keep all
-    smallest_part: Annotated[float, Field(ge=0, le=1)] = 0.01  # of the largest part's area; smaller parts are noise
     length_weight: NonNegativeFloat = 0.5  # of the boundary's length in the refinement
     band_px: Annotated[float, Field(ge=8)] = 12.0  # half width of the band in which the distance is computed
 
@@ -111,11 +111,11 @@ class BackgroundDifference(ShadowAware):
             away = distance_to(model > 0)
             near = np.unique(label[away <= self.reach_px])
             area[np.setdiff1d(np.arange(count), near)] = 0
-        person = (area >= max(self.smallest_part * area.max(), 1))[label]
+        person = (area >= max(SMALLEST_PART * area.max(), 1))[label]
         count, label, stats, _ = cv2.connectedComponentsWithStats((~person).astype(np.uint8), connectivity=8)
         whole = stats[:, cv2.CC_STAT_AREA]
         within = np.bincount(label.ravel(), weights=(model > 0).ravel(), minlength=count)
-        small = (whole <= self.hole_px2) | (within > 0.8 * whole)  # the model says where the body has no hole
+        small = (whole <= HOLE_PX2) | (within > 0.8 * whole)  # the model says where the body has no hole
         small[0] = False
         kept: Bool = person | small[label]
         return kept

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, ClassVar
 
 import numpy as np
-from pydantic import Field, PositiveFloat, PositiveInt
+from pydantic import Field, PositiveInt
 
 from mocapflow.components import Segmenter
 from mocapflow.data import Frame, FrameState, Past, Segmentation, Silhouette, Turn
@@ -15,6 +15,8 @@ from mocapflow.scene import Scene
 from mocapflow_levelset import crops
 from mocapflow_levelset.levelset import PERSON
 from mocapflow_levelset.redistance import redistance
+
+UNSURE_PX = 15.0  # half width of the band that is left to the cut
 
 
 class GrabCut(Segmenter):
@@ -26,14 +28,13 @@ class GrabCut(Segmenter):
     name: ClassVar[str] = "grabcut"
 
     iterations: PositiveInt = 2  # of the cut
-    unsure_px: PositiveFloat = 15.0  # half width of the band that is left to the cut
     margin_px: PositiveInt = 60  # of the crop around the model
     band_px: Annotated[float, Field(ge=8)] = 12.0  # half width of the band in which the distance is computed
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
         """Return the person's silhouette in each usable view."""
         surface = scene.surface(state.estimate.pose, state.cloth)
-        reach = max(self.band_px, self.unsure_px + 1)
+        reach = max(self.band_px, UNSURE_PX + 1)
         silhouettes = []
         for c, camera in enumerate(scene.cameras):
             if not frame.usable[c]:
@@ -55,8 +56,8 @@ class GrabCut(Segmenter):
             return distance
         near = crop.of(model)
         labels = np.where(near > 0, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
-        labels[near > self.unsure_px] = cv2.GC_FGD
-        labels[near < -self.unsure_px] = cv2.GC_BGD
+        labels[near > UNSURE_PX] = cv2.GC_FGD
+        labels[near < -UNSURE_PX] = cv2.GC_BGD
         if self._decidable(labels):
             mixtures = np.zeros((1, 65)), np.zeros((1, 65))
             cv2.setRNGSeed(0)  # the mixtures start from random clusters; a run must repeat exactly

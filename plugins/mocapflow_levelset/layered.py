@@ -17,6 +17,10 @@ from mocapflow_levelset.layers import COLOURS, gathered, layer_of, shown
 from mocapflow_levelset.levelset import PERSON, LevelSet
 from mocapflow_levelset.surround import ROOM, beside, told
 
+GRID_PX = 4  # colours are taken every so many px, so far from borders
+KEEP_MM = 5.0  # change of the body in a turn below which inner contours stay where outlines do
+INNER_SIGMA_PX = 1.0  # standard deviation of a point of an inner contour; that by the noise of the colours is added
+
 
 class Layered(LevelSet):
     """The outline as `levelset` finds it; inside it, body parts and garment are told apart by their colours.
@@ -33,15 +37,12 @@ class Layered(LevelSet):
 
     name: ClassVar[str] = "layered"
     keep: Annotated[float, Field(ge=0, lt=1)] = 0.9  # of what is known of the colours, from frame to frame
-    grid_px: PositiveInt = 4  # colours are taken every so many px, so far from borders
-    keep_mm: NonNegativeFloat = 5.0  # change of the body in a turn below which inner contours stay where outlines do
     calm_mm: PositiveFloat = 15.0  # change of the body in a turn below which the reach is the later one
     first_reach_px: PositiveInt = 24  # how far along the normal the end of a part is looked for
     later_reach_px: PositiveInt = 10  # the same once it is calm
     half_px: Annotated[int, Field(ge=2)] = 3  # on either side that colours have to agree over
     least: PositiveFloat = 1.0  # mean log ratio of colours from which on a side is told from the other
     colour_weight: NonNegativeFloat = 0.0  # of what learned colours say of person and room, beside the local statistics
-    inner_sigma_px: PositiveFloat = 1.0  # standard deviation of a point; that by the noise of the colours is added
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
         """Return the silhouettes, the inner contours, and the colours of layers for the frames to come.
@@ -49,14 +50,14 @@ class Layered(LevelSet):
         Colours are learned once, on the second turn: on the first nobody has looked yet where the surface is.
         """
         found = super().segment(frame, state, past, scene, turn)
-        if found is state.segmentation and turn.index > 1 and turn.calm(self.keep_mm):
+        if found is state.segmentation and turn.index > 1 and turn.calm(KEEP_MM):
             return found
         surface = scene.surface(state.estimate.pose, state.cloth)
         colours = dict(state.segmentation.appearance if turn.index > 1 else past.appearance)
         if turn.index == 1:
-            colours[COLOURS] = gathered(frame, found.of(PERSON), surface, scene, past, self.keep, self.grid_px)
+            colours[COLOURS] = gathered(frame, found.of(PERSON), surface, scene, past, self.keep, GRID_PX)
             if self.colour_weight:
-                colours[ROOM] = beside(frame, found.of(PERSON), past, self.keep, self.grid_px, self.margin_px)
+                colours[ROOM] = beside(frame, found.of(PERSON), past, self.keep, GRID_PX, self.margin_px)
         return replace(found, inner=self._inner(frame, found, surface, past, scene, turn), appearance=colours)
 
     def _inner(
@@ -79,4 +80,4 @@ class Layered(LevelSet):
 
     def _search(self, turn: Turn) -> Search:
         reach = self.later_reach_px if turn.calm(self.calm_mm) else self.first_reach_px
-        return Search(reach, self.half_px, self.least, self.inner_sigma_px)
+        return Search(reach, self.half_px, self.least, INNER_SIGMA_PX)

@@ -30,6 +30,8 @@ PERSON = "person"
 INNER_BAND_PX = 7.0  # while the contour moves
 REDUCED_RHO_PX = 8.0  # Gaussian window of the local statistics at reduced sizes, in px of the shrunken image
 COARSE, HALF, FULL = 4, 2, 1  # what the image is shrunk by
+RATIO_CLIP = 6.0  # bound on log p1/p2
+CONTACT_PX = 6.0  # to either side of the outline where the body meets the floor
 
 
 class LevelSet(ShadowAware):
@@ -53,14 +55,12 @@ class LevelSet(ShadowAware):
     sigma_px: PositiveFloat = 1.5  # width of the smooth step
     length_weight: NonNegativeFloat = 0.9  # nu; explicit steps are stable below 0.94
     shape_weight: NonNegativeFloat = 0.05  # lambda: 0.05 clean, 0.1 with occlusion, 0.1-0.3 in heavy noise, 0 uncoupled
-    ratio_clip: PositiveFloat = 6.0  # bound on log p1/p2
     any_colour: float = -3.0  # log density on the person, at least, of any colour, where the empty scene is known
     coarse_steps: NonNegativeInt = 32  # at most, at a quarter of the size, on the first turn
     half_steps: NonNegativeInt = 4  # at half the size
     steps: PositiveInt = 3  # at full size
     later_steps: PositiveInt = 3  # at full size on later turns, which start from the last turn's contour
     contact_steps: NonNegativeInt = 10  # by chromaticity, where the body meets the floor and both are dark; 0: none
-    contact_px: PositiveFloat = 6.0  # to either side of the outline there
     matte_px: NonNegativeInt = 2  # to either side of an edge, where pixels mix person and empty room; 0: no use of it
     keep_px: NonNegativeFloat = 2.0  # move of the model's outline in a turn up to which the contour stays; 0: none does
     statistics_every: PositiveInt = 4  # steps between estimates of the colours
@@ -140,7 +140,7 @@ class LevelSet(ShadowAware):
     def _contact(self, surface: Surface, camera: Camera) -> Contact | None:
         if not self.contact_steps:
             return None
-        zone = contact_zone(surface, camera, self.contact_px)
+        zone = contact_zone(surface, camera, CONTACT_PX)
         return Contact(zone, self._rhythm(self.contact_steps), self._window(self.rho_px))
 
     def _matte(self, scene: Scene, camera: int) -> Matte | None:
@@ -174,7 +174,7 @@ class LevelSet(ShadowAware):
                 sigma_px=self.sigma_px,
                 length=self.length_weight,
                 shape=self.shape_weight,
-                clip=self.ratio_clip,
+                clip=RATIO_CLIP,
                 any_colour=self.any_colour,
                 step=1.0,  # `length_weight` is stable with it
                 band_px=INNER_BAND_PX,

@@ -21,6 +21,8 @@ from mocapflow_matching.uncertainty import contour_sigma
 
 WORKING_SIDE = 200  # px, at most, of the distance images: they are smooth
 ON_CONTOUR = 1.0  # px from the image contour within which a target has to end
+LATER_SHARE = 0.25  # of points followed, after the turns in which shapes are registered: 0.2 to contour_icp's 0.8
+CONTOUR_SIGMA_PX = 1.0  # standard deviation of a pair of contour points on skin
 
 
 class OpticalFlow(Matcher):
@@ -38,12 +40,10 @@ class OpticalFlow(Matcher):
     between: Literal["both", "shapes", "frames"] = "both"  # model and image of a frame, two frames, or both
     first_turns: NonNegativeInt = 1  # of a frame, in which shapes are registered
     first_share: NonNegativeFloat = 2.3  # against contour_icp's in these turns: 0.7 to 0.3
-    later_share: NonNegativeFloat = 0.25  # after them: 0.2 to 0.8
     spacing_px: PositiveFloat = 4.0  # between the points of the model's contour
     smoothness: PositiveFloat = 3.0  # of the flow, against the constancy of the distance images
     band: PositiveFloat = 0.1  # half its width about the model's contour, against the longer side of the picture
     levels: NonNegativeInt = 3  # of the pyramid
-    contour_sigma_px: PositiveFloat = 1.0  # standard deviation of a pair of contour points on skin
     cloth_sigma_px_per_m: PositiveFloat = 80.0  # as for contour_icp
     image_sigma_px: PositiveFloat = 1.5  # standard deviation of a tracked point
     cloth_share: NonNegativeFloat = 0.2  # of a point on cloth against one on skin
@@ -59,7 +59,7 @@ class OpticalFlow(Matcher):
             parts.append(self.carried(frame, surface, past, scene))
         if self.between != "frames" and first:
             parts += [self.registered(silhouette, surface, scene) for silhouette in segmentation.of("person")]
-        return weighted(pool(parts), self.first_share if first else self.later_share)
+        return weighted(pool(parts), self.first_share if first else LATER_SHARE)
 
     def carried(self, frame: Frame, surface: Surface, past: Past, scene: Scene) -> Matches:
         """Return the pairs by flow between frames."""
@@ -85,7 +85,7 @@ class OpticalFlow(Matcher):
         target = _snapped(target, silhouette.distance)
         on = np.abs(_sampled(silhouette.distance, target)) < ON_CONTOUR
         away = np.linalg.norm(target - model.pixel, axis=1)
-        sigma = contour_sigma(model, surface, scene, self.contour_sigma_px, self.cloth_sigma_px_per_m)
+        sigma = contour_sigma(model, surface, scene, CONTOUR_SIGMA_PX, self.cloth_sigma_px_per_m)
         return Matches(
             camera=np.full(int(on.sum()), silhouette.camera, np.int16),
             pixel=(target - (model.pixel - model.anchor))[on],

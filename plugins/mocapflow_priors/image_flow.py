@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated
 
 import numpy as np
 from mocapflow_matching.carried import carried_points, distances
 from mocapflow_matching.robust import robust_weights
 from mocapflow_twist.solver import TwistGaussNewton
-from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
+from pydantic import NonNegativeFloat, PositiveFloat
 
 from mocapflow.components import PoseSolver, Predictor, Prior
 from mocapflow.data import NO_CLOTH, Frame, Matches, Past, Pose, Surface, Turn
@@ -21,6 +20,10 @@ from mocapflow.scene import Scene
 from mocapflow_priors.constant_velocity import ConstantVelocity
 from mocapflow_priors.joint_limits import JointLimits
 from mocapflow_priors.rest_pose import RestPose
+
+LEAST_POINTS = 30  # that are followed; fewer are not believed
+LEAST_AGREEMENT = 0.5  # share of points that come to lie within `AGREEING_PX`
+AGREEING_PX = 4.0  # distance to where it was tracked
 
 
 class ImageFlowPredictor(Predictor):
@@ -39,15 +42,12 @@ class ImageFlowPredictor(Predictor):
     scale: PositiveFloat = 2.0  # standard deviations beyond which a point pulls no harder (Huber)
     cloth_share: NonNegativeFloat = 0.2  # of a point on cloth that touches the skin; other cloth: none
     touching_mm: PositiveFloat = 20.0  # distance from the skin within which cloth touches it
-    least_points: PositiveInt = 30  # fewer are not believed
-    least_agreement: Annotated[float, Field(ge=0, le=1)] = 0.5  # share of points that come to lie within `agreeing_px`
-    agreeing_px: PositiveFloat = 4.0  # distance to where it was tracked
 
     def predict(self, frame: Frame, past: Past, scene: Scene) -> Pose:
         """Return the pose the flow leads to, or what `otherwise` predicts."""
         guess = pose_of(self.otherwise, frame, past, scene)
         followed = self.on_skin(carried_points(frame, past, scene), past, scene)
-        if len(followed.vertex) < self.least_points:
+        if len(followed.vertex) < LEAST_POINTS:
             return guess
         model = ClothedModel(scene=scene.undressed)
 
@@ -59,7 +59,7 @@ class ImageFlowPredictor(Predictor):
         state = believed(guess, np.empty(0), NO_CLOTH)
         pose = estimate_of(self.pose_solver, match, state, model, self.priors, past, Turn(index=0)).pose
         reached = distances(followed, model.surface(pose, NO_CLOTH), scene)
-        return pose if np.mean(reached < self.agreeing_px) >= self.least_agreement else guess
+        return pose if np.mean(reached < AGREEING_PX) >= LEAST_AGREEMENT else guess
 
     def on_skin(self, matches: Matches, past: Past, scene: Scene) -> Matches:
         """Return the points with those on cloth moved to the skin that it touches; other cloth is left out."""

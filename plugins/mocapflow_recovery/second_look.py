@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from pydantic import NonNegativeFloat, PositiveFloat
+from pydantic import PositiveFloat
 
 from mocapflow.assets import Background
 from mocapflow.components import Stage
@@ -26,6 +26,9 @@ from mocapflow_recovery.limb_search import LimbSearch
 LOG = logging.getLogger("mocapflow")
 HELD = 8  # pictures of each camera in memory
 LED = 4  # frames before a leap that may have to be looked at again as well, one by one
+OTHER_MM = 10.0  # of a joint, between two fits: less, and they are the same
+LEAP_WEIGHT = 0.1  # half the leap may cost 0.69 times this share more by the silhouettes
+STRAY_WEIGHT = 0.002  # share per cm² of person and skin that lie apart in the other fit
 
 
 class SecondLook(Stage):
@@ -43,9 +46,6 @@ class SecondLook(Stage):
 
     name: ClassVar[str] = "second_look"
     leap_mm: PositiveFloat = 40.0  # of a joint, from between where it is before and after: more is looked at again
-    other_mm: PositiveFloat = 10.0  # of a joint, between two fits: less, and they are the same
-    leap_weight: NonNegativeFloat = 0.1  # half the leap may cost 0.69 times this share more by the silhouettes
-    stray_weight: NonNegativeFloat = 0.002  # share per cm² of person and skin that lie apart in the other fit
 
     def run(
         self,
@@ -78,7 +78,7 @@ class SecondLook(Stage):
             past = fits.past(row, colours)
             result = sight.settled(frame, row, past, fits.between(row))
             looked[row] = True
-            same = fits.apart(row, result.state.estimate.pose) < self.other_mm / 1000
+            same = fits.apart(row, result.state.estimate.pose) < OTHER_MM / 1000
             if not same and self._preferred(result, row, fits, sight.strays(frame, row, past, result)):
                 fits.take(row, frame, result)
                 looked[[row - 1, row + 1]] = fits.other(row - 1), fits.other(row + 1)
@@ -92,7 +92,7 @@ class SecondLook(Stage):
         cost = image_cost(first.energy[row], first.energy_terms)
         dearer = (image_cost(result.energy, result.energy_terms) - cost) / max(abs(cost), 1.0)
         farther = np.log(max(fits.leap(row, pose), 1e-9) / fits.leap(row, fits.pose(row)))
-        return bool(dearer + self.leap_weight * farther + self.stray_weight * (stray[1] - stray[0]) < 0)
+        return bool(dearer + LEAP_WEIGHT * farther + STRAY_WEIGHT * (stray[1] - stray[0]) < 0)
 
 
 class Hindsight(NamedTuple):

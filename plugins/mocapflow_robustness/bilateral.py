@@ -15,6 +15,8 @@ MAGNITUDE = np.sqrt(2 / np.pi)  # the mean of a normal variable's, in standard d
 FREE = 0.1  # share of the picture's noise below which a place has none
 SIDE = 7  # px, of such a place
 ENOUGH = 0.9  # share of a blur's window that has to show the scene: beside what hides it, noise is left
+LEAST_NOISE = 8.0  # grey levels, standard deviation; cameras make less
+SPACE_PX = 4.0  # standard deviation of the filter in the picture
 
 
 class Bilateral(Restorer):
@@ -28,10 +30,8 @@ class Bilateral(Restorer):
     """
 
     name: ClassVar[str] = "bilateral"
-    least_noise: PositiveFloat = 8.0  # grey levels, standard deviation; cameras make less
     left: PositiveFloat = 16.0  # grey levels of noise that the blur may leave
     alike: PositiveFloat = 40.0  # grey levels, standard deviation of the filter in colours
-    space_px: PositiveFloat = 4.0  # standard deviation of the filter in the picture
     passes: PositiveInt = 3  # of the filter, one after the other
 
     def restore(self, image: U8) -> tuple[U8, Bool]:
@@ -40,14 +40,14 @@ class Bilateral(Restorer):
 
         rough = roughness(image)
         noise = noise_of(rough)
-        if noise < self.least_noise:
+        if noise < LEAST_NOISE:
             return image, np.zeros(rough.shape, bool)
         calm = (rough < FREE * noise).astype(np.uint8)
         hidden = np.asarray(cv2.dilate(calm, np.ones((SIDE, SIDE), np.uint8)), bool)
         smooth, share = mean_around(image, ~hidden, noise / (2 * np.sqrt(np.pi) * self.left))
         hidden |= share < ENOUGH
         for _ in range(self.passes):
-            smooth = np.asarray(cv2.bilateralFilter(smooth, -1, self.alike, self.space_px), np.float32)
+            smooth = np.asarray(cv2.bilateralFilter(smooth, -1, self.alike, SPACE_PX), np.float32)
         return unclipped(smooth, noise), hidden
 
 

@@ -21,6 +21,8 @@ from mocapflow_robustness.thumbnails import Thumbnails, thumbnail, thumbnails
 
 Factor = Annotated[float, Field(gt=1)]
 
+JOINT_JUMP = 1.3  # how much larger than the motion around it a jump is in a view that jumps with another one
+
 
 class CheckViews(Stage):
     """Looks through the whole recording for pictures that are black, repeated, of another camera or of another moment.
@@ -38,7 +40,6 @@ class CheckViews(Stage):
     extent: ClassVar[Literal["all"]] = "all"  # so that a longer run finds the same
     longest_s: PositiveFloat = 0.17  # of a burst of wrong pictures
     jump: Factor = 2.0  # how much larger than the motion around it a jump is, in the view that shows it best
-    joint_jump: Factor = 1.3  # and in a view that jumps together with that one
 
     def run(self, recording: Recording, background: Background | None = None) -> ViewChecks:
         """Return the pictures to do without, each with a reason, and when cameras were knocked."""
@@ -74,7 +75,7 @@ class CheckViews(Stage):
         old = repeated(np.where(empty | foreign, np.nan, seen.news)) | frozen(seen)
         old &= doubts.peopled(seen.grey, room, good) | (frozen_from(seen.news) == 0)  # then it is its own empty room
         settled = doubts.bridged(seen.grey, good & ~old)
-        torn = doubts.bursts(settled, self.longest(frame_rate), self.jump, self.joint_jump)
+        torn = doubts.bursts(settled, self.longest(frame_rate), self.jump, JOINT_JUMP)
         said = np.full(empty.shape, "", object)
         said[torn] = "the picture does not fit the ones before and after"
         said[old] = "the picture repeats the one before"

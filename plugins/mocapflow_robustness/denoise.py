@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numba
 import numpy as np
-from pydantic import PositiveFloat, PositiveInt
+from pydantic import PositiveInt
 
 from mocapflow.records import U8, Bool
 from mocapflow_robustness.restoring import Restorer, mean_around
@@ -16,6 +16,10 @@ BLOCK_PX = 16  # noise is everywhere alike: its share is the median over blocks 
 LEAST_NOISE = 0.02  # share of lonely pixels; fine texture makes 0.004 at most on the recordings that we have
 STRIP_PX = 3  # width of the strips that are left between things before the scene
 CHANCE = 1e-9  # that noise spares a whole neighbourhood
+RADIUS_PX = 2  # of the square of neighbours that are asked of a pixel
+COMPANY = 2  # neighbours that have to agree with a pixel
+FLAT_PX = 13  # side of a square of one colour that is not the scene's; compression makes small ones
+FILL_PX = 1.0  # standard deviation of the window a lonely pixel is filled from
 
 
 class Denoise(Restorer):
@@ -30,20 +34,16 @@ class Denoise(Restorer):
     """
 
     name: ClassVar[str] = "denoise"
-    radius_px: PositiveInt = 2  # of the square of neighbours that are asked
     alike: PositiveInt = 16  # grey levels: neighbours agree that are so near in every colour
-    company: PositiveInt = 2  # neighbours that have to agree with a pixel
-    flat_px: PositiveInt = 13  # side of a square of one colour that is not the scene's; compression makes small ones
-    fill_px: PositiveFloat = 1.0  # standard deviation of the window a lonely pixel is filled from
 
     def restore(self, image: U8) -> tuple[U8, Bool]:
         """Return an image (H, W, 3) without its noise, and where (H, W) it does not show the scene."""
-        kept = in_company(image, self.radius_px, self.alike, self.company)
+        kept = in_company(image, RADIUS_PX, self.alike, COMPANY)
         share = noise_share(kept)
         if share < LEAST_NOISE:
             return image, np.zeros(kept.shape, bool)
-        hidden = spared(kept, share) | flat(image, kept, self.flat_px, least_side(share))
-        return filled(image, kept & ~hidden, ~kept, self.fill_px), hidden
+        hidden = spared(kept, share) | flat(image, kept, FLAT_PX, least_side(share))
+        return filled(image, kept & ~hidden, ~kept, FILL_PX), hidden
 
 
 def noise_share(kept: Bool) -> float:

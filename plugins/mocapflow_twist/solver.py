@@ -22,6 +22,7 @@ from mocapflow_twist.problem import Anchor, Data, Guess, Problem, Quadratic
 
 TRIALS = 8  # times that the damping is raised before a step is given up
 LEAST_GAIN = 1e-14  # share of the energy below which a step is only rounding
+FIRST_DAMPING_PER_TURN = 0.3  # factor of the first damping at each further turn: gentle, then exact
 
 
 class TwistGaussNewton(PoseSolver):
@@ -41,7 +42,6 @@ class TwistGaussNewton(PoseSolver):
     damping: NonNegativeFloat = 1e-4  # share of the mean diagonal; ten times more after a worse step
     damping_per_turn: PositiveFloat = 1.0  # factor at each turn of the loop: above 1, exact then gentle
     first_damping: NonNegativeFloat = 0.0  # of the first frame's first turn at least: its start is far off
-    first_damping_per_turn: PositiveFloat = 0.3  # factor at each further turn: gentle, then exact
     cap_deg: PositiveFloat = 10.0  # a step, each angle
     cap_mm: PositiveFloat = 100.0  # a step, the root
     correlation_px: NonNegativeFloat = 15.0  # length over which contour errors agree; 0: independent
@@ -105,7 +105,7 @@ class TwistGaussNewton(PoseSolver):
         least = self.damping * self.damping_per_turn**turn.index
         if past.moments:
             return least
-        return max(least, self.first_damping * self.first_damping_per_turn**turn.index)
+        return max(least, self.first_damping * FIRST_DAMPING_PER_TURN**turn.index)
 
     def _precision(self, model: ClothedModel, guess: Guess) -> F64:
         """Return one over the variance of the damping of every unknown."""
