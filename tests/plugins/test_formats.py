@@ -208,6 +208,7 @@ def test_rerun_holds_everything_on_one_timeline(result: Result, tmp_path: Path) 
         assert (outline.min(0) > 0).all() and (outline.max(0) < camera.size).all()
 
 
+@pytest.mark.long
 def test_rerun_shows_pictures_of_a_knocked_camera_moved_back(result: Result, tmp_path: Path) -> None:
     first, down = np.zeros(1, np.int32), np.array([[1.0, 0, 0], [0, 1, 40], [0, 0, 1]])
     knocks = Knocks(frame=first, camera=np.ones(1, np.int16), turn=down[None])

@@ -53,6 +53,7 @@ def test_nobody_knocked_a_camera(demo, caplog):
 
 
 @pytest.mark.parametrize(("first", "degrees"), [(1, 0.15), (20, -1.2), (58, 0.15)])
+@pytest.mark.long
 def test_the_frame_and_the_turn_are_found(demo, caplog, first, degrees):
     ((frame, camera, off),) = found(demo, (first, degrees))
     assert (frame, camera) == (first, 1)
@@ -61,6 +62,7 @@ def test_the_frame_and_the_turn_are_found(demo, caplog, first, degrees):
     assert message.startswith(f"cam02 was knocked in frame {first}: its pictures are ")
 
 
+@pytest.mark.long
 def test_a_camera_that_swings_and_is_put_back(demo, monkeypatch):
     monkeypatch.setattr(knocked, "EVERY_S", 0.5)
     told = found(demo, (20, 1.2), (22, 0.6), (23, -0.3), (40, 0.0))
@@ -68,6 +70,7 @@ def test_a_camera_that_swings_and_is_put_back(demo, monkeypatch):
     assert max(off for *_, off in told) < 0.3
 
 
+@pytest.mark.long
 def test_black_pictures_do_not_tell(demo):
     told = found(demo, (20, 0.8), black=19)
     assert [(frame, camera) for frame, camera, _ in told] == [(21, 1)]  # the first one that can tell

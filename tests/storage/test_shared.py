@@ -113,6 +113,7 @@ def test_what_is_made_anew_takes_the_place_of_the_copy(tmp_path, path, url, monk
 
 
 @everywhere
+@pytest.mark.long
 def test_a_copy_that_never_arrived_is_not_seen(tmp_path, path, url, monkeypatch):
     def broken(self, path, value, **options):
         if path.endswith("zarr.json") and "track-" in path:
@@ -203,6 +204,7 @@ def test_a_copy_takes_the_place_of_a_result_that_is_damaged_here(tmp_path, path,
     assert not any("is damaged" in line for line in shared(path, tmp_path / "one", url)[1])
 
 
+@pytest.mark.long
 def test_a_copy_takes_the_place_of_frames_that_are_damaged_here(tmp_path, path, url, monkeypatch):
     monkeypatch.setenv("TINY_RAISE_AT", "7")
     with pytest.raises(ComponentFailed, match="failed at frame 7"):

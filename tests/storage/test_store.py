@@ -367,6 +367,7 @@ def test_a_damaged_group_is_set_aside_and_made_anew(tmp_path, ran, damage):
 
 
 @pytest.mark.parametrize("damage", [damage_array_json, damage_chunk, remove_chunk, remove_array])
+@pytest.mark.long
 def test_damaged_arrays_of_a_track_are_written_anew_from_its_frames(tmp_path, ran, damage):
     whole, group = the_track(tmp_path), without_smooth(tmp_path)
     damage(group)
@@ -441,6 +442,7 @@ def cut_back(group, frames):
         (None, "the appearance of frame 5 is missing in .*"),  # those of frames 10 and 11 are there
     ],
 )
+@pytest.mark.long
 def test_a_half_done_track_whose_files_are_missing_is_made_anew(tmp_path, ran, lost, told):
     whole = the_track(tmp_path)
     (group,) = (tmp_path / "store.zarr").glob("track-*")
@@ -459,6 +461,7 @@ def test_a_half_done_track_whose_files_are_missing_is_made_anew(tmp_path, ran, l
         *((done, "damaged and made anew: its description can't be read") for done in ("x", -1, True, None)),
     ],
 )
+@pytest.mark.long
 def test_a_count_of_frames_that_is_not_true(tmp_path, path, done, told):
     run_tiny(path, tmp_path, frames=4)
     (group,) = (tmp_path / "store.zarr").glob("track-*")
