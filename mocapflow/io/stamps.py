@@ -20,6 +20,7 @@ class Stamps(NamedTuple):
     rate: float  # frames a second; 0 where it does not say
     time: F64  # (N,) ms, ascending
     key: Bool  # (N,) whether a frame is decoded from nothing but itself
+    damaged: bool  # whether frames between them can't be read
 
 
 @contextmanager
@@ -34,19 +35,19 @@ def open_capture(path: Path, *options: int) -> Iterator[Any]:
         capture.release()
 
 
-def grabs(capture: Any) -> Iterator[None]:
-    """Advance frame by frame to the end; a damaged one counts as a failed attempt and is passed over."""
+def grabs(capture: Any) -> Iterator[int]:
+    """Advance frame by frame to the end, over damaged ones; yields how many attempts failed before each."""
     import cv2
 
     declared = capture.get(cv2.CAP_PROP_FRAME_COUNT)  # anything at all, in a damaged file
     patience = int(np.clip(np.nan_to_num(declared), 1000, 1_000_000))  # failed attempts at the end cost nothing
     failed = 0
     while failed < patience:
-        if capture.grab():
-            failed = 0
-            yield
-        else:
+        if not capture.grab():
             failed += 1
+            continue
+        yield failed
+        failed = 0
 
 
 def read_stamps(path: Path) -> Stamps:
@@ -56,11 +57,11 @@ def read_stamps(path: Path) -> Stamps:
     with open_capture(path, cv2.CAP_PROP_FORMAT, -1) as capture:
         declared, rate = capture.get(cv2.CAP_PROP_FRAME_COUNT), capture.get(cv2.CAP_PROP_FPS)
         what = cv2.CAP_PROP_POS_MSEC, cv2.CAP_PROP_LRF_HAS_KEY_FRAME
-        read = np.array([[capture.get(each) for each in what] for _ in grabs(capture)]).reshape(-1, 2)
+        read = np.array([[*(capture.get(each) for each in what), failed] for failed in grabs(capture)]).reshape(-1, 3)
     rate = rate if np.isfinite(rate) and 0 < rate < 1e5 else 0.0
-    stamps, keys = read[np.argsort(read[:, 0], kind="stable")].T
+    stamps, keys, failed = read[np.argsort(read[:, 0], kind="stable")].T
     known = stamps >= 0
-    return Stamps(max(0, int(declared)), rate, stamps[known], keys[known] > 0)
+    return Stamps(max(0, int(declared)), rate, stamps[known], keys[known] > 0, bool(failed.any()))
 
 
 def number_frames(stamps: F64) -> I32:

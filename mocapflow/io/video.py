@@ -40,7 +40,7 @@ class Video:
     stamps: F64 = array("N", unit="ms, time of each frame in the file, ascending; counted for images")
     numbers: I32 = array("N", unit="frame number of each stamp")
     keys: Bool = array("N", unit="True for frames that are decoded from nothing but themselves")
-    gaps_tear: bool = False  # frames that are missing are damaged ones; else the camera has left them out
+    gaps_tear: bool = False  # frames between these are damaged, which others are decoded from; else left out at once
     first: int = 0  # number in the name of frame 0's image
     late: int = 0  # frames by which its pictures come after those of the other cameras
 
@@ -64,7 +64,7 @@ def open_video(path: Path) -> Video:
     if not os.access(path, os.R_OK):  # ffmpeg would only say that it can't be decoded
         hint = "let yourself read it, or copy it to a place of yours"
         raise RecordingError("this video may not be read: permission denied", where=str(path), hint=hint)
-    declared, rate, stamps, keys = read_stamps(path)
+    declared, rate, stamps, keys, damaged = read_stamps(path)
     with open_capture(path) as capture:
         first = next((image for _ in grabs(capture) if (image := capture.retrieve()[1]) is not None), None)
     if first is None or not len(stamps):
@@ -86,7 +86,7 @@ def open_video(path: Path) -> Video:
         stamps=stamps,
         numbers=numbers,
         keys=keys,
-        gaps_tear=declared > len(stamps),
+        gaps_tear=damaged,
     )
 
 
@@ -152,9 +152,17 @@ def _decoded(capture: Any, video: Video) -> Iterator[tuple[int, bool]]:
         if count == 0 and now != video.stamps[0] and video.path.suffix.lower() == ".avi":
             by_count = True  # AVI keeps no times of display: with reordered frames only their order is known
         row = count if by_count else int(np.abs(video.stamps - now).argmin())
-        lost = row > before + 1 or (video.gaps_tear and row > 0 and video.numbers[row] > video.numbers[row - 1] + 1)
-        before, torn = row, bool((torn or lost) and not video.keys[row])
+        torn = (torn or _lost_between(video, before, row)) and not video.keys[row]
+        before = row
         yield int(video.numbers[row]), torn
+
+
+def _lost_between(video: Video, before: int, row: int) -> bool:
+    """Return whether a frame was lost between two that are decoded one after the other; -1: before the first."""
+    since = np.searchsorted(video.stamps, video.stamps[before], "right") if before >= 0 else 0
+    if since < np.searchsorted(video.stamps, video.stamps[row]):  # of frames with one time one alone is told
+        return True
+    return video.gaps_tear and row > 0 and bool(video.numbers[row] > video.numbers[row - 1] + 1)
 
 
 def _open_folder(path: Path) -> Video:

@@ -66,11 +66,20 @@ def test_what_is_decoded_from_a_damaged_frame_is_lost_up_to_the_next_key_frame(t
     assert [number_of(image) for image, _ in rows[key:]] == list(range(key, 30))
 
 
-def test_what_a_camera_left_out_damages_nothing(tmp_path):
+@pytest.mark.parametrize(("unreadable", "lost"), [(False, [5]), (True, list(range(5, 13)))])
+def test_a_frame_that_is_missing_damages_others_only_if_it_was_there(tmp_path, unreadable, lost):
+    """A camera may have left it out; key frames are 0 and the one after the twelfth."""
     video = open_video(write_video(tmp_path / "a.mp4", FRAMES))
-    late = np.arange(FRAMES) + (np.arange(FRAMES) >= 5)  # frame 5 was never written
-    video = replace(video, numbers=late.astype(np.int32))
-    assert [index for index, (image, _) in enumerate(read_frames(video, range(FRAMES + 1))) if image is None] == [5]
+    later = np.arange(FRAMES) + (np.arange(FRAMES) >= 5)
+    video = replace(video, numbers=later.astype(np.int32), gaps_tear=unreadable)
+    assert [index for index, (image, _) in enumerate(read_frames(video, range(FRAMES + 1))) if image is None] == lost
+
+
+def test_of_frames_with_one_time_none_counts_as_lost(tmp_path):
+    video = open_video(write_video(tmp_path / "a.mp4", FRAMES))
+    stamps = np.maximum(video.stamps, video.stamps[6])
+    video = replace(video, stamps=stamps)
+    assert not any("damaged" in why for _, why in read_frames(video, range(FRAMES)))
 
 
 def test_a_truncated_video_has_placeholders_to_the_end(tmp_path):
