@@ -20,7 +20,7 @@ class Stamps(NamedTuple):
     rate: float  # frames a second; 0 where it does not say
     time: F64  # (N,) ms, ascending
     key: Bool  # (N,) whether a frame is decoded from nothing but itself
-    damaged: bool  # whether frames between them can't be read
+    torn: Bool  # (N,) whether what the file has before a frame can't be read
 
 
 @contextmanager
@@ -61,7 +61,7 @@ def read_stamps(path: Path) -> Stamps:
     rate = rate if np.isfinite(rate) and 0 < rate < 1e5 else 0.0
     stamps, keys, failed = read[np.argsort(read[:, 0], kind="stable")].T
     known = stamps >= 0
-    return Stamps(max(0, int(declared)), rate, stamps[known], keys[known] > 0, bool(failed.any()))
+    return Stamps(max(0, int(declared)), rate, stamps[known], keys[known] > 0, failed[known] > 0)
 
 
 def number_frames(stamps: F64) -> I32:

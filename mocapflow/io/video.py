@@ -1,9 +1,10 @@
 """The one video decoder: frames exactly in order, a placeholder with a reason where one is lost.
 
 The number of a frame comes from its time stamp, so a frame that the file lacks, or that can't be decoded, leaves
-a gap and does not shift the rest. What is decoded from a damaged frame is lost, too. All stamps are read once, without
-decoding, when a video is opened. Decoding always starts at the first frame: seeking lands on the wrong picture in some
-files, and a resumed run must see the same pixels.
+a gap and does not shift the rest (but in an AVI with reordered frames, which has no times of display). What comes
+between a frame that can't be decoded and the next key frame is lost, too; damage that the decoder paints over is not
+told. All stamps are read once, without decoding, when a video is opened. Decoding always starts at the first frame:
+seeking lands on the wrong picture in some files, and a resumed run must see the same pixels.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ class Video:
     stamps: F64 = array("N", unit="ms, time of each frame in the file, ascending; counted for images")
     numbers: I32 = array("N", unit="frame number of each stamp")
     keys: Bool = array("N", unit="True for frames that are decoded from nothing but themselves")
-    gaps_tear: bool = False  # frames between these are damaged, which others are decoded from; else left out at once
+    torn: Bool = array("N", unit="True for frames before which the file can't be read; else a gap was left out at once")
     first: int = 0  # number in the name of frame 0's image
     late: int = 0  # frames by which its pictures come after those of the other cameras
 
@@ -64,7 +65,7 @@ def open_video(path: Path) -> Video:
     if not os.access(path, os.R_OK):  # ffmpeg would only say that it can't be decoded
         hint = "let yourself read it, or copy it to a place of yours"
         raise RecordingError("this video may not be read: permission denied", where=str(path), hint=hint)
-    declared, rate, stamps, keys, damaged = read_stamps(path)
+    declared, rate, stamps, keys, torn = read_stamps(path)
     with open_capture(path) as capture:
         first = next((image for _ in grabs(capture) if (image := capture.retrieve()[1]) is not None), None)
     if first is None or not len(stamps):
@@ -86,7 +87,7 @@ def open_video(path: Path) -> Video:
         stamps=stamps,
         numbers=numbers,
         keys=keys,
-        gaps_tear=damaged,
+        torn=torn,
     )
 
 
@@ -160,9 +161,8 @@ def _decoded(capture: Any, video: Video) -> Iterator[tuple[int, bool]]:
 def _lost_between(video: Video, before: int, row: int) -> bool:
     """Return whether a frame was lost between two that are decoded one after the other; -1: before the first."""
     since = np.searchsorted(video.stamps, video.stamps[before], "right") if before >= 0 else 0
-    if since < np.searchsorted(video.stamps, video.stamps[row]):  # of frames with one time one alone is told
-        return True
-    return video.gaps_tear and row > 0 and bool(video.numbers[row] > video.numbers[row - 1] + 1)
+    skipped = since < np.searchsorted(video.stamps, video.stamps[row])  # of frames with one time one alone is told
+    return bool(skipped or video.torn[row])
 
 
 def _open_folder(path: Path) -> Video:
@@ -188,6 +188,7 @@ def _open_folder(path: Path) -> Video:
         stamps=np.arange(len(numbers), dtype=np.float64),
         numbers=numbers,
         keys=np.ones(len(numbers), bool),
+        torn=np.zeros(len(numbers), bool),
     )
 
 

@@ -97,19 +97,21 @@ def _garment(folder: Path, registry: Registry) -> list[Finding]:
     try:
         garment = measures.recorded_garment(folder, registry)
         return [] if garment is None else _sewn(garment, folder, registry)
-    except UnknownComponent as problem:  # its plugin may be on another machine, unless it is misspelt
-        severe = error if "did you mean" in problem.hint else warning
-        return [severe(problem.message, problem.hint, problem.where)]
+    except UnknownComponent as problem:  # its plugin may be on another machine
+        return [warning(problem.message, problem.hint, problem.where)]
     except MocapflowError as problem:
         return [error(problem.message, problem.hint, problem.where or folder / measures.FILE)]
 
 
 def _compared(folder: Path, registry: Registry) -> list[Finding]:
     """Return why what a run would be compared with can't be read; the evaluation alone opens it."""
-    evaluate: Any = registry.get("stage", "evaluate")
-    findings: list[Finding] = []
-    attempt(lambda: evaluate().need(open_recording(folder)), findings)
-    return findings
+    try:
+        evaluate: Any = registry.get("stage", "evaluate")
+        evaluate().need(open_recording(folder))
+    except MocapflowError as problem:
+        hint = "\n".join(filter(None, [problem.hint, "a run with the stage `evaluate` does not begin"]))
+        return [warning(problem.message, hint, problem.where)]
+    return []
 
 
 def _sewn(garment: Garment, folder: Path, registry: Registry) -> list[Finding]:

@@ -91,8 +91,7 @@ class Store:
         Raises:
             StoreError: it can't be written, or holds other things.
         """
-        known = self.state.exists() or (self.path / "zarr.json").exists()
-        if strangers := [] if known else sorted(path.name for path in self.path.glob("[!.]*")):
+        if strangers := self._strangers():
             hint = f"give stored results a folder of their own: --store {self.path / 'store.zarr'}"
             raise StoreError(f"this folder is no store: it holds {strangers[0]}", where=str(self.path), hint=hint)
         about = {"unit": "1", "about": "locks, digests and damaged results of mocapflow; no data"}
@@ -102,6 +101,12 @@ class Store:
                 folder.mkdir(parents=True, exist_ok=True)
                 if _kind(folder) != meta["node_type"]:  # not there yet, or damaged
                     write_json(folder / "zarr.json", meta)
+
+    def _strangers(self) -> list[str]:
+        """Return what lies in a folder that is no store; a store may have lost its description."""
+        found = sorted(self.path.glob("[!.]*"))  # first: another process may just make it a store
+        known = self.state.exists() or any(path.name == "zarr.json" or (path / "zarr.json").exists() for path in found)
+        return [] if known else [path.name for path in found if path.name != "lost+found"]  # of a fresh drive
 
     def artifacts(self) -> list[Artifact]:
         """Return what is in the store, oldest first; what can't be read is left out."""

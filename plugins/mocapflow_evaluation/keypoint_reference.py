@@ -34,7 +34,7 @@ def write_triangulated(
         place: folder of keypoints, like keypoints/ of a recording.
         cameras: pinhole cameras of the run, which may have been corrected since they were calibrated.
         run_folder: of the run.
-        checks: of the pictures: where cameras were knocked, keypoints are moved back.
+        checks: of the pictures: keypoints of knocked cameras are moved back, those of wrong views left out.
 
     Raises:
         RecordingError: there are no keypoints of two cameras, or in no frame two cameras see the same person.

@@ -48,7 +48,7 @@ def waistband(garment: str, body: Body, height: float, around: float) -> tuple[F
     """Return the torso's outline (N, 2) m at a height and how far outside it a band of a given length lies.
 
     Raises:
-        GarmentError: there is no body at that height only legs or shoulders, or the band is far too wide to stay up.
+        GarmentError: no body is at that height, or only legs or shoulders, or the band is far too wide to stay up.
     """
     outlines = sections.outlines(body, sections.level(height))
     if not outlines:

@@ -107,7 +107,7 @@ class Hindsight(NamedTuple):
         return self.loop.settled(frame, past, self.model, begin, self.fits.cloth(row).parameters)
 
     def colours(self, frame: Frame, row: int) -> Mapping[str, F64]:
-        """Return what a frame shows of the person's colours, and of feet; a track keeps only those of its end."""
+        """Return what a frame shows of the person's colours and of feet like the floor; a track does not keep it."""
         past, finder = self.fits.past(row, {}), self.loop.recovery
         result = self.settled(frame, row, past, self.fits.pose(row))
         if isinstance(finder, LimbSearch):

@@ -12,8 +12,9 @@ from mocapflow.periodic import falls_due
 
 VAIN = "searches in vain"  # of Segmentation.appearance: (2,) a `Vain`
 SOON = 3  # such searches in a row, after which the next one waits
-LONGEST = 64  # frames that it waits, at most
+LONGEST_S = 1.0  # that it waits, at most
 ALIKE = 1.5  # times as much, or as little, may stray of a doubt that is still the same
+MORE = 300.0  # cm² that may stray more: a limb that is lost before a room that has changed has more
 
 
 class Vain(NamedTuple):
@@ -26,11 +27,14 @@ class Vain(NamedTuple):
         """Return whether a fit of which so much strays (cm²) is searched now.
 
         After a few searches one frame of `every` is; the wait doubles with each search that finds nothing better of a
-        doubt that stays the same.
+        doubt that stays the same, unless `every` is 1.
         """
         if self.searches < SOON:
             return True
-        wait = min(every << (self.searches - SOON), max(LONGEST, every)) if self.alike(strays) else every
+        wait = every
+        if self.alike(strays) and every > 1 and past.moments:
+            longest = round(LONGEST_S / (time - past.moments[-1].time))
+            wait = max(every, min(every << (self.searches - SOON), longest))
         return in_turn(wait, time, past)
 
     def after(self, strays: float, helped: bool) -> Vain:
@@ -40,7 +44,7 @@ class Vain(NamedTuple):
 
     def alike(self, strays: float) -> bool:
         """Return whether so much (cm²) is about what strayed before."""
-        return self.strayed < ALIKE * strays and strays < ALIKE * self.strayed
+        return self.strayed / ALIKE < strays < min(ALIKE * self.strayed, self.strayed + MORE)
 
 
 def in_turn(every: int, time: float, past: Past) -> bool:

@@ -3,7 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-from mocapflow_recovery.vain import LONGEST, VAIN, counted, forgotten, vain_before
+import pytest
+from mocapflow_recovery.vain import VAIN, counted, forgotten, vain_before
 
 from mocapflow.data import FrameResult, Past
 from mocapflow.testing import pictures, scenes
@@ -21,12 +22,12 @@ def before(frame: int, appearance) -> Past:
     return replace(past, moments=(replace(past.moments[0], time=(frame - 1) / 30),), appearance=appearance)
 
 
-def searched(strays, found: FrameResult = FITTED) -> list[int]:
+def searched(strays, found: FrameResult = FITTED, every: int = 4) -> list[int]:
     """Return the frames that are searched if so much (cm²) strays in each, and they stay doubted."""
     appearance, frames = {}, []
     for frame, strayed in enumerate(strays):
         past = before(frame, appearance)
-        if vain_before(past).due(strayed, frame / 30, past, every=4):
+        if vain_before(past).due(strayed, frame / 30, past, every):
             frames.append(frame)
             result = counted(replace(found, doubted=True), FITTED, strayed, past)
             appearance = result.state.segmentation.appearance
@@ -34,14 +35,17 @@ def searched(strays, found: FrameResult = FITTED) -> list[int]:
 
 
 def test_searches_in_vain_of_a_doubt_that_stays_grow_rare():
-    frames = searched(np.random.default_rng(0).uniform(7000, 9000, 3000))
-    assert frames[:7] == [0, 1, 2, 4, 8, 16, 32]
-    assert max(np.diff(frames)) == LONGEST and len(frames) < 3000 / LONGEST + 8
+    frames = searched(np.random.default_rng(0).uniform(7000, 7200, 3000))
+    assert frames[:7] == [0, 1, 2, 4, 8, 16, 30]
+    assert max(np.diff(frames)) == 30 and len(frames) < 3000 / 30 + 8
+    assert searched([7000.0] * 20, every=1) == list(range(20))
 
 
-def test_a_doubt_that_changes_is_looked_into_soon():
-    frames = searched([7000.0] * 101 + [200.0] * 20)
-    assert frames[-4:] == [64, 104, 108, 112]
+@pytest.mark.parametrize("later", [200.0, 8200.0])
+def test_a_doubt_that_changes_is_looked_into_soon(later):
+    """A limb is lost while a door is open, or the door is shut."""
+    frames = searched([7000.0] * 101 + [later] * 20)
+    assert frames[-4:] == [90, 104, 108, 112]
 
 
 def test_searches_that_help_stay_as_frequent_though_the_fit_is_still_doubted():
