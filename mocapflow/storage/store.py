@@ -103,10 +103,9 @@ class Store:
                     write_json(folder / "zarr.json", meta)
 
     def _strangers(self) -> list[str]:
-        """Return what lies in a folder that is no store; a store may have lost its description."""
-        found = sorted(self.path.glob("[!.]*"))  # first: another process may just make it a store
-        known = self.state.exists() or any(path.name == "zarr.json" or (path / "zarr.json").exists() for path in found)
-        return [] if known else [path.name for path in found if path.name != "lost+found"]  # of a fresh drive
+        """Return the files that lie in a folder that is no store; among folders there may be one of runs."""
+        files = sorted(path.name for path in self.path.glob("[!.]*") if path.is_file())
+        return [] if "zarr.json" in files or self.state.exists() else files
 
     def artifacts(self) -> list[Artifact]:
         """Return what is in the store, oldest first; what can't be read is left out."""
