@@ -28,7 +28,8 @@ class AlignCameras(Stage):
     """Turns each camera about its centre so that all cameras agree on the person's keypoints, over many frames.
 
     Wherever keypoints lie, they must lie on one point in space: views that disagree by a constant shift show that a
-    camera has turned. Corrections too small to tell from the habits of a pose estimator are not made.
+    camera has turned. Corrections too small to tell from the habits of a pose estimator are not made. It stands before
+    `check_views`, so a camera that was knocked while it filmed is turned by something in between.
     """
 
     name: ClassVar[str] = "align_cameras"

@@ -19,7 +19,8 @@ class StartFromKeypoints(Stage):
     """Finds the person whose detections reproject best, and the pose of the body that explains them.
 
     Only the first frame is used; where keypoints of fewer than two cameras agree, or show too little of what the body
-    has, the next one of the first ten.
+    has, the next one of the first ten. Keypoints are taken as they are: not moved back in a run that begins after a
+    camera was knocked.
     """
 
     name: ClassVar[str] = "start_from_keypoints"
