@@ -17,9 +17,10 @@ def effective_share(matches: Matches, correlation_px: float) -> F64:
 
     Errors along a contour are correlated over `correlation_px`. With matches of weight w in square cells of that
     size, a view holds (sum w)^2 / sum over cells (sum of w in the cell)^2 independent measurements: all of them
-    where they lie apart, the contour's length over the cell's (to a third) where they lie dense. The mean of four
-    grids, half a cell apart, makes it independent of where the contour lies. Summed over matches it counts those, too,
-    that a robust loss has all but dropped.
+    where they lie apart, the contour's length over the cell's where they lie dense (to 20 %; up to twice as much along
+    the rows of pixels on a border of cells). The mean of two grids, half a cell apart to the right, makes it
+    independent of where upright contours lie. Summed over matches it counts those, too, that a
+    robust loss has all but dropped.
     """
     used = matches.weight > 0
     if correlation_px <= 0 or not used.any():

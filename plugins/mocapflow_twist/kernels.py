@@ -182,24 +182,22 @@ def _image_plane(pixel, dx, dy, matrix, plane, divisor):  # type: ignore[no-unty
 
 @numba.njit(cache=True)
 def clustering(camera, pixel, weight, size, cells):  # type: ignore[no-untyped-def]
-    """Return per view (V,) the sum of squared weights, and of squared sums in square cells, the mean of four grids.
+    """Return per view (V,) the sum of squared weights, and of squared sums in square cells, the mean of two grids.
 
-    These are shifted by half a cell along either axis or both: a contour on the borders of one is not in others. There
-    are `cells` of `size` px along an axis of a grid, then they repeat.
+    There are `cells` of `size` px along an axis of a grid, then they repeat.
     """
     views = camera.max() + 1 if len(camera) else 0
     alone, clustered = np.zeros(views), np.zeros(views)
-    for grid in range(4):
-        right, down = 0.5 * (grid % 2), 0.5 * (grid // 2)
+    for shift in (0.0, 0.5):
         sums = np.zeros((views, cells, cells))
         for m in range(len(camera)):
             view, here = camera[m], weight[m]
-            column = math.floor(pixel[m, 0] / size + right) % cells
-            row = math.floor(pixel[m, 1] / size + down) % cells
+            column = math.floor(pixel[m, 0] / size + shift) % cells
+            row = math.floor(pixel[m, 1] / size) % cells
             before = sums[view, row, column]
             sums[view, row, column] = before + here
-            clustered[view] += 0.25 * here * (2.0 * before + here)  # a quarter of what the square grows by
-            alone[view] += 0.25 * here * here
+            clustered[view] += 0.5 * here * (2.0 * before + here)  # half of what the square grows by
+            alone[view] += 0.5 * here * here
     return alone, clustered
 
 
