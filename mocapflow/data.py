@@ -253,7 +253,6 @@ class Moment:
     pose: Pose
     cloth: Cloth
     observed: F64 | None = array("D", unit="1, as in Estimate; None: not known", default=None)
-    doubted: bool = False  # see FrameResult
 
     @property
     def blind(self) -> bool:

@@ -34,7 +34,7 @@ def turn_between(before: U8, after: U8, shown: Bool, camera: Camera) -> F64 | No
     """
     import cv2
 
-    here, there = (points.astype(float) for points in _corners(_grey(before), _grey(after), shown))
+    here, there = (points.astype(float) for points in _followed_corners(_grey(before), _grey(after), shown))
     if len(here) < FEWEST:
         return None
     _, agree = cv2.findHomography(here, there, cv2.RANSAC, AGREE_PX)
@@ -106,7 +106,7 @@ def _grey(picture: U8) -> U8:
     return np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY))
 
 
-def _corners(before: U8, after: U8, shown: Bool) -> tuple[F32, F32]:
+def _followed_corners(before: U8, after: U8, shown: Bool) -> tuple[F32, F32]:
     """Return corners (N, 2) of a grey picture and where another one has them."""
     import cv2
 

@@ -20,7 +20,7 @@ class Stamps(NamedTuple):
     rate: float  # frames a second; 0 where it does not say
     time: F64  # (N,) ms, ascending
     key: Bool  # (N,) whether a frame is decoded from nothing but itself
-    torn: Bool  # (N,) whether what the file has before a frame can't be read
+    after_damage: Bool  # (N,) whether what the file has right before a frame can't be read
 
 
 @contextmanager

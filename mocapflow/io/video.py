@@ -41,7 +41,7 @@ class Video:
     stamps: F64 = array("N", unit="ms, time of each frame in the file, ascending; counted for images")
     numbers: I32 = array("N", unit="frame number of each stamp")
     keys: Bool = array("N", unit="True for frames that are decoded from nothing but themselves")
-    torn: Bool = array("N", unit="True for frames before which the file can't be read; else a gap was left out at once")
+    after_damage: Bool = array("N", unit="True for frames right before which the file can't be read")
     first: int = 0  # number in the name of frame 0's image
     late: int = 0  # frames by which its pictures come after those of the other cameras
 
@@ -65,7 +65,7 @@ def open_video(path: Path) -> Video:
     if not os.access(path, os.R_OK):  # ffmpeg would only say that it can't be decoded
         hint = "let yourself read it, or copy it to a place of yours"
         raise RecordingError("this video may not be read: permission denied", where=str(path), hint=hint)
-    declared, rate, stamps, keys, torn = read_stamps(path)
+    declared, rate, stamps, keys, after_damage = read_stamps(path)
     with open_capture(path) as capture:
         first = next((image for _ in grabs(capture) if (image := capture.retrieve()[1]) is not None), None)
     if first is None or not len(stamps):
@@ -87,7 +87,7 @@ def open_video(path: Path) -> Video:
         stamps=stamps,
         numbers=numbers,
         keys=keys,
-        torn=torn,
+        after_damage=after_damage,
     )
 
 
@@ -159,10 +159,13 @@ def _decoded(capture: Any, video: Video) -> Iterator[tuple[int, bool]]:
 
 
 def _lost_between(video: Video, before: int, row: int) -> bool:
-    """Return whether a frame was lost between two that are decoded one after the other; -1: before the first."""
+    """Return whether a frame was lost between two that are decoded one after the other; -1: before the first.
+
+    What a camera left out at once, so that times jump, is no loss.
+    """
     since = np.searchsorted(video.stamps, video.stamps[before], "right") if before >= 0 else 0
     skipped = since < np.searchsorted(video.stamps, video.stamps[row])  # of frames with one time one alone is told
-    return bool(skipped or video.torn[row])
+    return bool(skipped or video.after_damage[row])
 
 
 def _open_folder(path: Path) -> Video:
@@ -188,7 +191,7 @@ def _open_folder(path: Path) -> Video:
         stamps=np.arange(len(numbers), dtype=np.float64),
         numbers=numbers,
         keys=np.ones(len(numbers), bool),
-        torn=np.zeros(len(numbers), bool),
+        after_damage=np.zeros(len(numbers), bool),
     )
 
 

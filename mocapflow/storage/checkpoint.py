@@ -197,9 +197,8 @@ class Checkpoint:
         pose = Pose(root=column(self._columns, numbers, "root"), angles=column(self._columns, numbers, "angles"))
         parameters = column(self._columns, numbers, "cloth_parameters")
         time = float(column(self._columns, numbers, "time"))
-        observed, doubted = (column(self._columns, numbers, name) for name in ("observed", "doubted"))
-        cloth = Cloth(vertices=vertices, parameters=parameters)
-        return Moment(time=time, pose=pose, cloth=cloth, observed=observed, doubted=bool(doubted))
+        observed = column(self._columns, numbers, "observed")
+        return Moment(time=time, pose=pose, cloth=Cloth(vertices=vertices, parameters=parameters), observed=observed)
 
     def _cloth(self, row: int) -> F64:
         return self._growing.cloth(row) if self._attributes["cloth_vertices"] else _copy(NO_CLOTH.vertices)

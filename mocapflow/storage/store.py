@@ -89,7 +89,7 @@ class Store:
         """Make the folder, if there is none.
 
         Raises:
-            StoreError: it can't be written, or holds other things.
+            StoreError: it can't be written, or holds files of others.
         """
         if strangers := self._strangers():
             hint = f"give stored results a folder of their own: --store {self.path / 'store.zarr'}"

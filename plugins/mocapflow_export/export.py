@@ -36,7 +36,11 @@ class WriteFormats(Stage):
     ) -> Files:
         """Write the files and return their paths."""
         result = Result(track=track, scene=scene, recording=recording, checks=checks)
-        return Files(paths=tuple(path for name in self.formats for path in written(name, result, run_folder.path)))
+        return Files(paths=tuple(self.write(result, run_folder)))
+
+    def write(self, result: Result, run_folder: RunFolder) -> list[Path]:
+        """Write the files of a track and return their paths."""
+        return [path for name in self.formats for path in written(name, result, run_folder.path)]
 
 
 class Export(WriteFormats):
@@ -51,22 +55,15 @@ class Export(WriteFormats):
 
     name: ClassVar[str] = "export"
 
-    def run(
-        self,
-        track: Track,
-        scene: Scene,
-        recording: Recording,
-        run_folder: RunFolder,
-        checks: ViewChecks | None = None,
-    ) -> Files:
-        """Write the files and return their paths."""
-        files = super().run(track, scene, recording, run_folder, checks)
+    def write(self, result: Result, run_folder: RunFolder) -> list[Path]:
+        """Write the files of a track and return their paths."""
+        paths, track, scene = super().write(result, run_folder), result.track, result.scene
         doubts = misgivings(track, [camera.name for camera in scene.cameras])
         for doubt in doubts:
             LOG.warning(doubt)
-        warnings = (*recording.warnings, *scene.warnings, *doubts)
+        warnings = (*result.recording.warnings, *scene.warnings, *doubts)
         content = runjson.summary(track, measured(track, scene), run_folder, warnings)
-        return Files(paths=(*files.paths, runjson.write(layout.place(run_folder.path, layout.RUN), content)))
+        return [*paths, runjson.write(layout.place(run_folder.path, layout.RUN), content)]
 
 
 def written(name: str, result: Result, folder: Path) -> list[Path]:

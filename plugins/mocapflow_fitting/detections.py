@@ -42,7 +42,7 @@ def need_keypoints(recording: Recording) -> None:
 def person_at(
     recording: Recording, index: int, cameras: Sequence[Camera], checks: ViewChecks | None = None
 ) -> Person | None:
-    """Return the person in a frame; None where too few keypoints can be triangulated."""
+    """Return the person in a frame, by keypoints as checks pass them; None where too few can be triangulated."""
     people = recording.people(index)
     person = find_person(people if checks is None else checks.people(index, people), cameras)
     found = 0 if person is None else np.isfinite(person.points.position).all(axis=1).sum()
@@ -58,7 +58,7 @@ def spread(indices: range, count: int) -> list[int]:
 def persons(
     recording: Recording, indices: Sequence[int], cameras: Sequence[Camera], checks: ViewChecks | None = None
 ) -> dict[int, Person]:
-    """Return the person in each frame where there is one.
+    """Return the person in each frame where there is one, by keypoints as checks pass them.
 
     Raises:
         RecordingError: there are no keypoints, or nobody is found in any frame.

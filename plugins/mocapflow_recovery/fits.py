@@ -114,8 +114,7 @@ class Fits:
     def _moment(self, row: int) -> Moment:
         track, other = self.before, self._found.get(row)
         observed = other["observed"] if other else track.observed[row].copy()
-        time, doubted = float(track.time[row]), bool(track.doubted[row])
-        return Moment(time=time, pose=self.pose(row), cloth=self.cloth(row), observed=observed, doubted=doubted)
+        return Moment(time=float(track.time[row]), pose=self.pose(row), cloth=self.cloth(row), observed=observed)
 
 
 def _frame_of(note: str) -> int:

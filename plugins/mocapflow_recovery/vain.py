@@ -29,10 +29,10 @@ class Vain(NamedTuple):
         After a few searches one frame of `every` is; the wait doubles with each search that finds nothing better of a
         doubt that stays the same, unless `every` is 1.
         """
-        if self.searches < SOON:
+        if self.searches < SOON or not past.moments:
             return True
         wait = every
-        if self.alike(strays) and every > 1 and past.moments:
+        if self.alike(strays) and every > 1:
             longest = round(LONGEST_S / (time - past.moments[-1].time))
             wait = max(every, min(every << (self.searches - SOON), longest))
         return in_turn(wait, time, past)
@@ -48,9 +48,7 @@ class Vain(NamedTuple):
 
 
 def in_turn(every: int, time: float, past: Past) -> bool:
-    """Return whether this is the one frame of so many, or the first after a gap; by time, as frames may be left out."""
-    if not past.moments:
-        return True
+    """Return whether this is the one frame of so many; by time, as frames may be left out."""
     last = past.moments[-1].time
     return falls_due(last, time, every * (time - last))
 

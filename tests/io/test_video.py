@@ -71,7 +71,7 @@ def test_a_frame_that_is_missing_damages_others_only_if_it_was_there(tmp_path, u
     """A camera may have left it out; key frames are 0 and the one after the twelfth."""
     video = open_video(write_video(tmp_path / "a.mp4", FRAMES))
     later = np.arange(FRAMES) + (np.arange(FRAMES) >= 5)
-    video = replace(video, numbers=later.astype(np.int32), torn=unreadable & (np.arange(FRAMES) == 5))
+    video = replace(video, numbers=later.astype(np.int32), after_damage=unreadable & (np.arange(FRAMES) == 5))
     assert [index for index, (image, _) in enumerate(read_frames(video, range(FRAMES + 1))) if image is None] == lost
 
 

@@ -311,11 +311,8 @@ def test_doubts_that_last_are_looked_into_now_and_then(index, every, vain, looke
         calls.append(pose)
         return settled(pictures.tiny_state(SCENE, POSE, POSE))
 
-    search, model, lost = (
-        LimbSearch(vain_every=4),
-        scenes.tiny_model(SCENE),
-        pictures.tiny_state(SCENE, astray(0.9), POSE),
-    )
+    search, model = LimbSearch(vain_every=4), scenes.tiny_model(SCENE)
+    lost = pictures.tiny_state(SCENE, astray(0.9), POSE)
     frame, past = at(index, scenes.tiny_past(SCENE, POSE, POSE, POSE), every)
     area = stray_of(surface(astray(0.9)), SCENE, search.views(frame, surface(astray(0.9)), past, SCENE)).area
     past = replace(past, appearance={VAIN: np.array([vain, area])})
