@@ -23,6 +23,7 @@ from mocapflow_draping.forces import remaining_length, thickness, tilts, wind
 from mocapflow_draping.frames import along_limbs, riding, standing, standing_out
 from mocapflow_draping.laying import distinct, follow, lay, moving
 from mocapflow_draping.parts import posed_parts, rates
+from mocapflow_draping.pushes import free_roots, free_strands
 from mocapflow_draping.strands import Strands, roots, strands_of
 
 LOWER = 0.002  # m, step of a cloth that nothing holds
@@ -41,12 +42,13 @@ class Kinematic(Draper):
     """Lays a garment by geometry alone: no mass, no time, no history.
 
     What touches the skin slides along it while rings close; by the literal rule it and what is taut above stay.
+    Particles lie on the outer side of the cloth, where it is seen: its whole thickness off the skin.
 
     Source: Rosenhahn 2008, section 12.3
     """
 
     name: ClassVar[str] = "kinematic"
-    skin_m: NonNegativeFloat = 0.005  # room between skin and cloth of no thickness
+    skin_m: NonNegativeFloat = 0.005  # room between skin and cloth
     voxel_m: PositiveFloat = 0.010  # edge of a voxel of the body's distance fields
     start_deg: Annotated[float, Field(gt=0, lt=180)] = 95.0  # hanging: from straight down, as it begins to fall
     rule: Literal["contact", "literal"] = "contact"  # from contact to contact; or in steps, as printed, a wind alone
@@ -68,7 +70,7 @@ class Kinematic(Draper):
             raise PluginError("the draper has no garment to drape", hint="name a garment in the pipeline's scene")
         fitting = self.fitting(garment, scene.body)
         strands = fitting.strands
-        skin = self.skin_m + thickness(garment, parameters) / 2
+        skin = self.skin_m + thickness(garment, parameters)
         length = remaining_length(garment, parameters)
         kept, source = distinct(poses, skin, length)
         chain, skin = chain_batch(scene.body, PoseBatch(root=poses.root[kept], angles=poses.angles[kept])), skin[kept]
@@ -80,6 +82,7 @@ class Kinematic(Draper):
             grid, first = self._step(fitting, chain, source, parameters, garment, skin, links, parts)
         elif strands.rides:
             grid = riding(strands, chain[source], links[source], *winds)
+            free_roots(grid, strands.first, strands.last, parts[source], fitting.fields.values, None)
         else:
             where = roots(strands, chain), standing_out(strands, chain), links
             grid = lay(strands, fitting.fields, where, winds, source, skin, parts, math.radians(self.start_deg)).grid
@@ -99,7 +102,7 @@ class Kinematic(Draper):
         strands = fitting.strands
         chain = chain_batch(scene.body, poses)
         parts = posed_parts(fitting.fields, chain[-1:])
-        skin = self.skin_m + thickness(garment, values) / 2
+        skin = self.skin_m + thickness(garment, values)
         length = remaining_length(garment, values)
         links = length[:, None, None] * strands.links
         moved = moving(fitting.fields, chain, skin, length, steps)
@@ -113,8 +116,10 @@ class Kinematic(Draper):
             alone, start = np.zeros(1, np.int32), math.radians(self.start_deg)
             laid = lay(strands, fitting.fields, here, still, alone, skin[-1:], parts, start)
             grid, rate = laid.grid, follow(strands, fitting.fields, near, winds, laid, parts, moved)
+        motion = Motion(rate, np.zeros_like(rate), moved.carry, moved.swell, moved.grow)
+        if strands.rides:
+            free_roots(grid, strands.first, strands.last, parts, fitting.fields.values, motion)
         if self.sweeps:
-            motion = Motion(rate, np.zeros_like(rate), moved.carry, moved.swell, moved.grow)
             self._close(fitting, grid, strands.first[None], links[-1:], chain[-1:], skin[-1:], parts, motion)
         row, unknowns = strands.place[vertices], 6 + len(pose.angles) + len(parameters)
         return all_columns(grid.reshape(-1, 3)[row], rate.reshape(-1, 3, len(steps))[row], tried, pose, unknowns)
@@ -153,6 +158,9 @@ class Kinematic(Draper):
 
         strands, values = fitting.strands, fitting.fields.values
         grid = standing(strands, chain, links)
+        if strands.rides:
+            free_roots(grid, strands.first, strands.last, parts, values, None)
+            free_strands(grid, links, strands.first, strands.last, skin, parts, values)
         fixed = np.zeros(grid.shape[:3], bool)
         fixed[:, np.arange(len(strands.first)), strands.first] = True
         step, in_space = math.radians(self.step_deg), self.pivot == "space"

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 import numba
+import numpy as np
 
 from mocapflow_draping.distance import body_distance, outwards
 from mocapflow_draping.following import follow_length, follow_move, lack
@@ -19,6 +20,59 @@ LIES = 0.003  # m, so near to contact a particle lies on the body
 LEVEL = 0.7  # of its normal that points up where the body holds it as well as a floor
 PUSHES = 5  # out of the body and back to the bar's length
 TURNS = 12  # of a bar that pushing did not free, towards straight out of the body
+
+
+@numba.njit(cache=True, error_model="numpy")
+def free_roots(grid, first, last, parts, values, motion):  # type: ignore[no-untyped-def]
+    """Move strands (B, N, L, 3) whose pinned particle is inside the body out of it, in place, as they are.
+
+    A seam is pinned to skin that another limb may press into: a crotch between thighs.
+
+    Args:
+        grid: m; overwritten.
+        first: (N,) row of the pinned particle of each strand.
+        last: (N,) row of the last one.
+        parts: (B, P, COLUMNS), the bodies, see `parts`.
+        values: their voxels.
+        motion: None or, for one body, the `Motion` that is brought along.
+    """
+    for b in range(grid.shape[0]):
+        for n in range(grid.shape[1]):
+            for _ in range(PUSHES):
+                x, y, z = grid[b, n, first[n], 0], grid[b, n, first[n], 1], grid[b, n, first[n], 2]
+                d, part = body_distance(x, y, z, 0, parts[b], values)
+                if d >= 0.0:
+                    break
+                out = outwards(x, y, z, part, parts[b], values)
+                if motion is not None:
+                    amount = lack(out, (x, y, z), motion.rate[n, first[n]], motion.carry[part], 0.0 * motion.swell)
+                for row in range(first[n], last[n] + 1):
+                    move(grid[b], n, row, CLEAR - d, out)
+                    if motion is not None:
+                        follow_move(motion.rate, n, row, amount, out)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def free_strands(grid, links, first, last, skin, parts, values):  # type: ignore[no-untyped-def]
+    """Move particles of strands (B, N, L, 3) that are inside the body out of it, in place; bars keep their lengths.
+
+    Args:
+        grid: m; overwritten.
+        links: (B, N, L - 1) m, lengths of the bars.
+        first: (N,) row of the pinned particle of each strand.
+        last: (N,) row of the last one.
+        skin: (B,) m, contact distance.
+        parts: (B, P, COLUMNS), the bodies, see `parts`.
+        values: their voxels.
+    """
+    bodies, strands = grid.shape[:2]
+    for b in range(bodies):
+        seen, room, near = grid[b, :, 0].copy(), np.full(strands, -1.0), np.zeros(strands, np.int64)
+        for n in range(strands):
+            before = grid[b, n].copy()
+            for row in range(first[n] + 1, last[n] + 1):
+                grid[b, n, row] = grid[b, n, row - 1] + before[row] - before[row - 1]
+                push_out(grid[b], n, row, links[b, n, row - 1], skin[b], seen, room, near, parts[b], values, None)
 
 
 @numba.njit(cache=True, error_model="numpy", forceinline=True)

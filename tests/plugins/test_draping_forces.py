@@ -21,8 +21,10 @@ from mocapflow_draping.forces import thickness, tilts
 from mocapflow_draping.frames import tilted
 from mocapflow_draping.literal import blow_in_steps
 
-from mocapflow.data import Past, PoseBatch
+from mocapflow.assets import Camera
+from mocapflow.data import Cloth, Past, Pose, PoseBatch
 from mocapflow.errors import PluginError
+from mocapflow.geometry import silhouettes
 
 DOWN = np.array([0.0, 0.0, -1.0])
 
@@ -39,6 +41,17 @@ def parameters(garment, **values):
 
 def standing():
     return PoseBatch(root=np.eye(4)[None], angles=np.zeros((1, 4)))
+
+
+def from_the_front(scene, cloth):
+    """Return the silhouette of who stands there, as a camera far away sees it: a millimetre a pixel below the knees."""
+    camera = Camera(
+        name="front", size=np.array([900, 900], np.int32), distortion=np.zeros(5),
+        intrinsics=np.array([[40000.0, 0, 450], [0, 40000.0, 450], [0, 0, 1]]),
+        camera_from_world=np.array([[1.0, 0, 0, 0], [0, 0, -1, 0.75], [0, 1, 0, 40], [0, 0, 0, 1]]),
+    )  # fmt: skip
+    surface = scene.surface(Pose(root=np.eye(4), angles=np.zeros(4)), cloth)
+    return silhouettes.mask(silhouettes.outline(surface, camera), camera)
 
 
 def blown(body, grid, force, degrees, fixed=(0,)):
@@ -162,21 +175,18 @@ def test_winds_of_one_drape_are_its_winds_one_by_one(draper):
     assert np.linalg.norm(together - alone, axis=-1).max() < 1e-3
 
 
-def test_thickness_is_found_again():
-    """T-CL7: the error has one minimum, at the true thickness."""
-    cylinder = lying_cylinder(0.1)
-    garment_thickness = np.linspace(0, 0.010, 6)
-
-    def drape(h):
-        laid, _ = swing(cylinder, [[0.0, 0.0, 0.1 + SKIN + h / 2]], [1.0, 0, 0], 33, 0.01)
-        return laid[0, 0] + [h / 2, 0, 0]
-
-    seen = drape(0.006)
-    errors = np.array([np.abs(drape(h) - seen)[:, 0].mean() for h in garment_thickness])
-    best = int(errors.argmin())
-    assert abs(garment_thickness[best] - 0.006) <= 0.002
-    assert (np.diff(errors[: best + 1]) < 0).all()
-    assert (np.diff(errors[best:]) > 0).all()
+def test_the_silhouette_grows_by_the_thickness_on_either_side(draper):
+    """T-CL7: so of silhouettes of thin and thick cloth the true thickness alone fits, and others fit the less."""
+    scene, amounts = skirted(), np.linspace(0, 0.010, 6)
+    thick = np.concatenate([parameters(scene.garment, thickness_m=h) for h in (*amounts, 0.006)])
+    poses = PoseBatch(root=np.tile(np.eye(4), (len(thick), 1, 1)), angles=np.zeros((len(thick), 4)))
+    drapes = draper.drape(poses, thick, Past(), scene)
+    *tried, seen = [from_the_front(scene, Cloth(vertices=v, parameters=p)) for v, p in zip(drapes, thick, strict=True)]
+    hem = [np.flatnonzero(mask[650]) for mask in tried]
+    assert np.ptp(hem[-1]) - np.ptp(hem[0]) == pytest.approx(20, abs=2)
+    off = np.array([np.count_nonzero(mask != seen) for mask in tried])
+    assert off.argmin() == 3 and off[3] == 0
+    assert (np.diff(off[:4]) < 0).all() and (np.diff(off[3:]) > 0).all()
 
 
 def test_thick_cloth_keeps_farther_from_the_skin(draper):
@@ -184,7 +194,7 @@ def test_thick_cloth_keeps_farther_from_the_skin(draper):
     thick = draper.drape(standing(), parameters(scene.garment, thickness_m=0.010), Past(), scene)
     free = np.setdiff1d(np.arange(thick.shape[1]), scene.garment.pinned)
     nearest = distances(scene.body, thick[:, free], standing()).min()
-    assert nearest == pytest.approx(draper.skin_m + 0.010 / 2, abs=4e-4)  # half of it lies on either side
+    assert nearest == pytest.approx(draper.skin_m + 0.010, abs=4e-4)
     two = np.repeat(parameters(scene.garment, thickness_m=0.003), 2, axis=0)
     np.testing.assert_array_equal(thickness(scene.garment, two), [0.003, 0.003])
 
