@@ -11,7 +11,6 @@ from drape_bodies import (
     check_whole_and_outside,
     distances,
     leg_poses,
-    lying_cylinder,
     prepared,
     skirted,
     swing,
