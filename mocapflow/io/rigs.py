@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from mocapflow.assets import Camera
-from mocapflow.geometry.cameras import centre, directions, pinhole, project, undistort
+from mocapflow.geometry.cameras import centre, directions, magnification, pinhole, project, undistort
 from mocapflow.io.findings import Finding, note, warning
 from mocapflow.io.findings import error as problem
 from mocapflow.records import F64, Bool
@@ -18,6 +18,7 @@ NEAREST, FARTHEST = 0.3, 30.0  # m from a camera, where something to be filmed m
 DEPTHS = np.geomspace(NEAREST, FARTHEST, 40)  # m
 SAME_PLACE, SAME_TURN = 0.02, 1.0  # m and deg, within which two cameras are one
 RAYS = 9  # per side of an image
+AMPLE, LARGE = 350, 600  # px a metre where the person stands: what angles need, and from where on less is as good
 PLACE = (
     "is its place in metres, in the world of the calibration? is rotation camera-from-world, and translation not\n"
     "the camera's position? has each camera its own name?"
@@ -49,6 +50,14 @@ def examine_view(cameras: Sequence[Camera], point: F64, what: str) -> Iterator[F
         yield problem(f"no camera sees {what}", PLACE)
     elif blind:
         yield warning(f"{', '.join(blind)} {'do' if len(blind) > 1 else 'does'} not see {what}", PLACE)
+
+
+def examine_size(cameras: Sequence[Camera], point: F64) -> Iterator[Finding]:
+    """Yield that images show a person at a point (3,) m larger than is of use."""
+    shown = float(np.median([magnification(camera, point) for camera in cameras]))
+    if shown > LARGE:
+        hint = f"with scale: {1 / round(shown / AMPLE):.2g} in the pipeline a frame takes half the time or less"
+        yield note(f"the person is large in the images, {shown:.0f} px a metre: {AMPLE} measure as well", hint)
 
 
 def _doubles(cameras: Sequence[Camera]) -> Iterator[Finding]:

@@ -15,7 +15,7 @@ from mocapflow.io import first_pose
 from mocapflow.io.cameras import find_calibration, read_cameras
 from mocapflow.io.findings import Finding, attempt, error, note, warning
 from mocapflow.io.lateness import TIMING, late_frames, timing_text, write_late_frames
-from mocapflow.io.rigs import examine_view
+from mocapflow.io.rigs import examine_size, examine_view
 from mocapflow.io.subjects import examine_subject
 from mocapflow.recordings.first_look import examine_first_frame
 from mocapflow.recordings.recording import open_recording
@@ -138,15 +138,20 @@ def _sewn(garment: Garment, folder: Path, registry: Registry) -> list[Finding]:
 
 
 def _start(folder: Path, calibration: Path) -> list[Finding]:
-    """Return which cameras don't see where the person is said to begin; what can't be read is told elsewhere."""
+    """Return which cameras don't see where the person is said to begin, or show too much of it.
+
+    What can't be read is told elsewhere.
+    """
     pose = folder / first_pose.FILE
     try:
         cameras = [camera for camera in read_cameras(calibration) if camera.size.all()]
         root = first_pose.read_first_pose(pose, ()).position if pose.exists() else None
     except MocapflowError:
         return []
-    found = [] if root is None else examine_view(cameras, root, "the root joint of the first pose")
-    return [replace(finding, where=str(pose)) for finding in found]
+    if root is None:
+        return []
+    found = list(examine_view(cameras, root, "the root joint of the first pose"))
+    return [replace(finding, where=str(pose)) for finding in found] or list(examine_size(cameras, root))
 
 
 def _missing(folder: Path) -> Iterator[Finding]:

@@ -11,6 +11,8 @@ import pytest
 from mocapflow_garments.shorts import Shorts
 
 from mocapflow.geometry import twists
+from mocapflow.geometry.cameras import magnification
+from mocapflow.io import rigs
 from mocapflow.io.cameras import write_cameras
 from mocapflow.recordings.doctor import examine, examine_timing
 from tests.fixtures.recordings import avi_frames, look_at, ring, write_recording, write_video
@@ -442,6 +444,16 @@ def test_a_first_pose_that_cameras_do_not_see(good):
     cameras[1] = look_at("cam02", np.array([4.0, 0, 1.5]), target=(4, 4, 1.0))
     write_cameras(good / "cameras.toml", cameras)
     assert "cam02 does not see the root joint of the first pose" in messages(good, "warning")
+
+
+def test_a_person_larger_in_the_images_than_is_of_use(good, monkeypatch):
+    assert messages(good, "note") == []
+    shown = [magnification(camera, np.array([0, 0, 1.0])) for camera in ring()]
+    monkeypatch.setattr(rigs, "LARGE", np.median(shown) - 1)
+    monkeypatch.setattr(rigs, "AMPLE", round(np.median(shown) / 2))
+    (finding,) = examine(good)
+    assert finding.message.startswith(f"the person is large in the images, {np.median(shown):.0f} px a metre")
+    assert "scale: 0.5 in the pipeline" in finding.hint
 
 
 def test_a_video_copied_twice(good):
