@@ -38,7 +38,7 @@ def free_roots(grid, first, last, parts, values, motion):  # type: ignore[no-unt
     """
     for b in range(grid.shape[0]):
         for n in range(grid.shape[1]):
-            for _ in range(PUSHES):
+            for _ in range(40):
                 x, y, z = grid[b, n, first[n], 0], grid[b, n, first[n], 1], grid[b, n, first[n], 2]
                 d, part = body_distance(x, y, z, 0, parts[b], values)
                 if d >= 0.0:
