@@ -19,6 +19,7 @@ CLEAR = 2e-4  # m beyond contact to which a particle is pushed, so that it need 
 LIES = 0.003  # m, so near to contact a particle lies on the body
 LEVEL = 0.7  # of its normal that points up where the body holds it as well as a floor
 PUSHES = 5  # out of the body and back to the bar's length
+ROOT_PUSHES = 40  # of a pinned particle, out of one part of the body and then another
 TURNS = 12  # of a bar that pushing did not free, towards straight out of the body
 
 
@@ -38,7 +39,7 @@ def free_roots(grid, first, last, parts, values, motion):  # type: ignore[no-unt
     """
     for b in range(grid.shape[0]):
         for n in range(grid.shape[1]):
-            for _ in range(40):
+            for _ in range(ROOT_PUSHES):
                 x, y, z = grid[b, n, first[n], 0], grid[b, n, first[n], 1], grid[b, n, first[n], 2]
                 d, part = body_distance(x, y, z, 0, parts[b], values)
                 if d >= 0.0:
