@@ -41,6 +41,7 @@ def fall_batch(roots, facing, start, skin, links, first, last, parts, values, gr
     rows, down = links.shape[2] + 1, np.array([0.0, 0.0, -1.0])
     room, near, fresh = np.empty(rows), np.zeros(rows, np.int64), np.empty(rows, np.bool_)
     for b in range(len(roots)):
+        near[:] = 0  # as if it were the only one: the part that is tried first decides in the last digits
         for n in range(roots.shape[1]):
             held[b, n], grid[b, n, first[n]] = 0, roots[b, n]
             room[:], fresh[:] = 0.0, False
