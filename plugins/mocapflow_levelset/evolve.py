@@ -100,9 +100,8 @@ def costs(settled: Settled, prior: F32, weights: Weights) -> Costs:
     """Return the terms of the energy where the descent ended.
 
     The data term of (12.1) is -sum of H log p1 + (1 - H) log p2, over the whole picture. Here it is without -sum of
-    log p2, by the clipped ratio, over the last runs alone. So the data of two turns compare only where p2 and the runs
-    are the same: nearly so beside a known empty scene, not where p2 is a local estimate, as in the chapter. There
-    `steady.energy_share` sees the estimate change, too.
+    log p2, by the clipped ratio, over the last runs alone. So the data of two turns compare only as far as p2 and the
+    runs stay the same, and p2 is estimated anew around each contour: `steady.energy_share` sees that change, too.
     """
     table, sigma, band = step_table(), np.float32(weights.sigma_px), np.float32(weights.band_px)
     data, length, shape = kernels.terms(settled.level, settled.ratio, prior, settled.runs, table, sigma, band)
