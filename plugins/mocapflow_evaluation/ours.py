@@ -70,7 +70,9 @@ def of_folder(folder: Path) -> Ours:
 def _flagged_share(path: Path) -> float:
     if not path.is_file():
         return np.nan
-    frames = json.loads(path.read_text(encoding="utf-8"))["frames"]
+    frames = json.loads(path.read_text(encoding="utf-8")).get("frames", {})
+    if not {"lost", "doubted", "not_at_rest", "count"} <= frames.keys():  # of an earlier version, or of another plugin
+        return np.nan
     flagged = {*frames["lost"], *frames["doubted"], *frames["not_at_rest"]}
     return len(flagged) / int(frames["count"])
 

@@ -189,6 +189,8 @@ def test_the_share_of_frames_in_doubt_is_told_by_a_track_and_by_its_files(tmp_pa
     assert of_folder(tmp_path).flagged_share == wanted
     evaluate_run(tmp_path, DEMO / "truth" / "angles.csv")
     assert json.loads((tmp_path / layout.FINDINGS).read_text())["flagged_share"] == wanted
+    (tmp_path / layout.RUN).write_text("{}")
+    assert np.isnan(of_folder(tmp_path).flagged_share)
     (tmp_path / layout.RUN).unlink()
     assert np.isnan(of_folder(tmp_path).flagged_share)
 
