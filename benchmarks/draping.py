@@ -26,6 +26,7 @@ from mocapflow.scene import Scene
 
 ROUNDS = 7
 POSES = 40
+RATIOS = (("one wind", "25 winds of one pose, all of them"), ("one wind, with rings", "25 winds, with rings"))
 
 
 def main() -> None:
@@ -54,6 +55,8 @@ def report(scene: Scene, title: str) -> None:
         "literal, 50 x 2 degrees": (lambda: steps.drape(poses, free, Past(), scene), POSES),
         "one wind": (lambda: fall.drape(one, winds[-1:], Past(), scene), 1),
         "25 winds of one pose, all of them": (lambda: fall.drape(same, winds, Past(), scene), 1),
+        "one wind, with rings": (lambda: closed.drape(one, winds[-1:], Past(), scene), 1),
+        "25 winds, with rings": (lambda: closed.drape(same, winds, Past(), scene), 1),
         "25 winds, literal": (lambda: steps.drape(same, winds, Past(), scene), 1),
         "rates of all unknowns, carried along": (lambda: closed.velocity(*asked), 1),
         "the same by differences": (lambda: Draper.velocity(closed, *asked), 1),
@@ -65,8 +68,11 @@ def report(scene: Scene, title: str) -> None:
         jobs["newton XPBD, 0.6 s from rest, one alone"] = (lambda: simulated.drape(one, free[:1], Past(), scene), 1)
         jobs["newton XPBD, eight together"] = (lambda: simulated.drape(few, free[:8], Past(), scene), 8)
     print(f"\n{title}")
-    for name, ms in cpu_ms({name: job for name, (job, _) in jobs.items()}, ROUNDS).items():
+    spent = cpu_ms({name: job for name, (job, _) in jobs.items()}, ROUNDS)
+    for name, ms in spent.items():
         print(f"  {name:42s} {ms / jobs[name][1]:8.3f} ms")
+    for one, many in RATIOS:
+        print(f"  {many} / {one}: {spent[many] / spent[one]:.2f}")
 
 
 def walking(scene: Scene, count: int) -> PoseBatch:

@@ -1,4 +1,4 @@
-"""A person who turns once around, before four cameras that do not see the legs for half of the time."""
+"""A person who turns once around and swings the legs, which four cameras do not see for half of the time."""
 
 import numpy as np
 
@@ -16,7 +16,8 @@ UNSEEN = range(15, 45)
 WALL, CLOTHES, BOX = 90, 200, 0  # grey levels
 BEYOND = 8.0  # px around the legs
 LEGS = [f"{joint}_{side}" for joint in ("hip", "knee", "ankle", "toe") for side in "lr"]
-BENT = {"hip_l.abduction": 12.0, "hip_r.abduction": 12.0, "knee_l.flexion": 15.0, "knee_r.flexion": 15.0}  # degrees
+SWING = 40  # frames: legs that vanish in mid-swing come back at its end
+KNEE, HIP, APART = (25.0, 16.0), (10.0, 12.0), (8.0, 0.0)  # degrees, the middle of the swing and how far it goes
 
 
 def camera(index, azimuth):
@@ -43,10 +44,13 @@ def scene():
 
 
 def pose(body, index, axis):
-    """The pose of a frame: turned about the middle of the body, legs apart and knees bent."""
+    """The pose of a frame: turned about the middle of the body, legs apart, swinging against each other."""
+    swing = np.sin(2 * np.pi * (index - UNSEEN.start) / SWING)
     angles = np.zeros(len(body.screw_names))
-    for name, value in BENT.items():
-        angles[body.screw_names.index(name)] = np.radians(value)
+    for side, ahead in (("l", -swing), ("r", swing)):
+        bent = {"knee_{}.flexion": KNEE, "hip_{}.flexion": HIP, "hip_{}.abduction": APART}
+        for name, (middle, reach) in bent.items():
+            angles[body.screw_names.index(name.format(side))] = np.radians(middle + reach * ahead)
     root = twists.exp(np.concatenate([2 * np.pi * index / FRAMES * np.asarray(axis), np.zeros(3)]))
     root[:3, 3] = MIDDLE - root[:3, :3] @ body.positions[0]
     return Pose(root=root, angles=angles)

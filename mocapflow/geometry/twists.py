@@ -44,10 +44,12 @@ def _coefficients(angle: F64) -> tuple[F64, F64, F64]:
 
 
 def exp(twist: F64) -> F64:
-    """Return the rigid motion that a twist generates.
+    """Return the rigid motion that a twist generates: the exponential of its matrix [[hat(omega), v], [0, 0]].
+
+    The equation gives the twist; the closed form is that of Murray, Li, Sastry.
 
     Args:
-        twist: (..., 6) rad and m.
+        twist: (..., 6) rad and m, (omega, v).
 
     Returns:
         (..., 4, 4).

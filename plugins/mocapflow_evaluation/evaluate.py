@@ -18,7 +18,7 @@ from mocapflow.scene import Scene
 from mocapflow_evaluation import compare, comparison_plots, cycles, findings, ours
 from mocapflow_evaluation.alignment import align, at_our_frames
 from mocapflow_evaluation.cycles import Cycle
-from mocapflow_evaluation.keypoint_reference import write_triangulated
+from mocapflow_evaluation.keypoint_reference import low_pass, write_triangulated
 from mocapflow_evaluation.ours import Ours
 from mocapflow_evaluation.references import SUFFIXES, read_reference
 from mocapflow_evaluation.rigs import COMMON_POINTS, compare_rigs
@@ -34,8 +34,10 @@ class Evaluate(Stage):
     landmarks (relative to the recording), or a folder of 2D keypoints like keypoints/, which are triangulated with the
     cameras of the run (`keypoint_reference`). Rows with frame numbers are matched by them, others interpolated at our
     times.
-    Failures are not left out. A lag up to `longest_lag_s` that all angles share, and curves that count the other way,
-    are reported; `rms_aligned_deg` alone is without them and without the mean offset.
+    Failures are not left out: evaluation.json tells the share of the frames that are lost, doubted or not at rest.
+    A lag up to `longest_lag_s` that all angles share, and curves that count the other way, are reported;
+    `rms_aligned_deg` alone is without them and without the mean offset. `rms_lowpassed_deg` is by our unsmoothed curve
+    without what is faster than 6 Hz, as reference curves are filtered; NaN where a take is too short or too slow.
     Writes results/evaluation.csv and .json and, frame by frame, errors.csv; cycles.csv where somebody walks; and
     against joint centres or markers joint_distances.csv and the reference's stick model.
     """
@@ -112,7 +114,8 @@ def evaluate(own: Ours, path: Path, folder: Path, longest_lag_s: float = LONGEST
     layout.forget_comparison(folder, but=layout.KEYPOINTS)  # it may be what is compared with, and can be again
     notes += findings.said(own, reference, alignment, strides, longest_lag_s)
     _write_tables(folder, own.columns, known, rows, strides)
-    found = {"reference": str(path), "lag_frames": alignment.lag, "signs": alignment.signs, "notes": notes}
+    found = {"reference": str(path), "lag_frames": alignment.lag, "signs": alignment.signs}
+    found |= {"flagged_share": own.flagged_share, "notes": notes}
     runjson.write(layout.place(folder, layout.FINDINGS), {**found, "registration": rigs.figures})
     written = rigs.write(folder, own.frame_rate, float(own.columns["time"][0]))
     pictures = [*comparison_plots.draw(own.columns, known, strides, folder), *written]
@@ -140,6 +143,7 @@ def _row(own: Ours, name: str, known: F64, aligned: F64, strides: Sequence[Cycle
         "angle": name,
         **compare.figures(curve, known, sd, frame, own.frame_rate),
         "rms_unsmoothed_deg": compare.rms(raw - known),
+        "rms_lowpassed_deg": compare.rms(low_pass(raw, own.frame_rate, filtered_alone=True) - known),
         "rms_aligned_deg": compare.rms(error - np.mean(error)) if len(error) else np.nan,
         "cycles": len(cycles.own(strides, name)),
         "cmc_cycles": cycles.across(strides, curve, known, name),

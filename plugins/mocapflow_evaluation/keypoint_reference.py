@@ -57,15 +57,16 @@ def write_triangulated(
     return path
 
 
-def low_pass(values: F64, rate: float) -> F64:
+def low_pass(values: F64, rate: float, filtered_alone: bool = False) -> F64:
     """Return values (T, ...) without what is faster than 6 Hz: a zero-lag Butterworth filter, as Pose2Sim has it.
 
-    Each stretch without a gap is filtered on its own; one shorter than the filter's reach stays as it is.
+    Each stretch without a gap is filtered on its own; one shorter than the filter's reach stays as it is, and so does
+    everything at too low a rate. With `filtered_alone` these are NaN.
     """
     from scipy.signal import butter, filtfilt
 
     if rate <= 2 * CUT_OFF_HZ:
-        return values
+        return np.full_like(values, np.nan) if filtered_alone else values
     b, a = butter(ORDER // 2, CUT_OFF_HZ, fs=rate)
     columns = values.reshape(len(values), -1).copy()
     for column in columns.T:
@@ -73,4 +74,6 @@ def low_pass(values: F64, rate: float) -> F64:
         for stretch in np.split(known, np.flatnonzero(np.diff(known) > 1) + 1):
             if len(stretch) > 3 * len(b):
                 column[stretch] = filtfilt(b, a, column[stretch])
+            elif filtered_alone:
+                column[stretch] = np.nan
     return columns.reshape(values.shape)

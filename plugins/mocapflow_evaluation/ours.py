@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -28,6 +29,7 @@ class Ours:
     columns: Mapping[str, F64]  # of angles.csv, and the signed angles of the knees
     raw: Mapping[str, F64]  # the same before smoothing
     stick: Stick
+    flagged_share: float = np.nan  # of the frames, those lost, doubted or not at rest; NaN where no run tells
 
     @property
     def frame_rate(self) -> float:
@@ -39,7 +41,9 @@ def of_track(track: Track, scene: Scene) -> Ours:
     """Return what a track has."""
     places = kinematics.joint_centres(scene.body, track.root, track.angles)
     columns, raw = (_columns(each, scene) for each in (track, track.before_smoothing))
-    return Ours(columns=columns, raw=raw, stick=Stick(names=scene.body.joint_names, places=places))
+    flagged = track.lost | track.doubted | ~track.steady
+    stick = Stick(names=scene.body.joint_names, places=places)
+    return Ours(columns=columns, raw=raw, stick=stick, flagged_share=float(np.mean(flagged)))
 
 
 def of_folder(folder: Path) -> Ours:
@@ -59,7 +63,18 @@ def of_folder(folder: Path) -> Ours:
         columns=columns | {name: motion[name] for name in SIGNED if name in motion},
         raw=read_columns(raw) if raw.is_file() else columns,
         stick=_stick(folder / layout.JOINTS, len(columns["frame"])),
+        flagged_share=_flagged_share(folder / layout.RUN),
     )
+
+
+def _flagged_share(path: Path) -> float:
+    if not path.is_file():
+        return np.nan
+    frames = json.loads(path.read_text(encoding="utf-8")).get("frames", {})
+    if not {"lost", "doubted", "not_at_rest", "count"} <= frames.keys():  # of an earlier version, or of another plugin
+        return np.nan
+    flagged = {*frames["lost"], *frames["doubted"], *frames["not_at_rest"]}
+    return len(flagged) / int(frames["count"])
 
 
 def _columns(track: Track, scene: Scene) -> dict[str, F64]:

@@ -48,7 +48,7 @@ class Settled(NamedTuple):
 
 
 class Costs(NamedTuple):
-    """The terms of the energy near the contour."""
+    """The terms of the energy near the contour, the data up to a sum that depends on the outside alone."""
 
     data: float  # -sum of H log(p1 / p2)
     length: float
@@ -97,7 +97,12 @@ def settle(level: F32, prior: F32, evidence: Evidence, window: Window, weights: 
 
 
 def costs(settled: Settled, prior: F32, weights: Weights) -> Costs:
-    """Return the terms of the energy where the descent ended."""
+    """Return the terms of the energy where the descent ended.
+
+    The data term of (12.1) is -sum of H log p1 + (1 - H) log p2, over the whole picture. Here it is without -sum of
+    log p2, by the clipped ratio, over the last runs alone. So the data of two turns compare only as far as p2 and the
+    runs stay the same, and p2 is estimated anew around each contour: `steady.energy_share` sees that change, too.
+    """
     table, sigma, band = step_table(), np.float32(weights.sigma_px), np.float32(weights.band_px)
     data, length, shape = kernels.terms(settled.level, settled.ratio, prior, settled.runs, table, sigma, band)
     return Costs(float(data), weights.length * float(length), weights.shape * float(shape))

@@ -131,7 +131,7 @@ def advance(level, ratio, prior, runs, change, sigma, nu, shape, tau, band):  # 
 
 @numba.njit(cache=True, error_model="numpy")
 def terms(level, ratio, prior, runs, table, sigma, band):  # type: ignore[no-untyped-def]
-    """Return data, length and shape terms without their weights, summed along the runs."""
+    """Return data, length and shape terms without their weights, summed along the runs; the data by the ratio alone."""
     height, width = level.shape
     data, length, shape = 0.0, 0.0, 0.0
     reach = np.float32(STEP_RANGE) * sigma

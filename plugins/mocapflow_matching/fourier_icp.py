@@ -26,6 +26,9 @@ class FourierIcp(ContourIcp):
     Low-passed, a contour has no thin limb that could take the wrong neighbour. Outer contours alone are low-passed
     where the holes differ in number; where the components do, or where the contours are near each other already, a
     view is matched in full.
+
+    Alone it does not find more: of 60 poses of the tests' body 20° off (1 sigma), 29 to 2° at both knees, 32 with
+    harmonics 3, 6 and 12, and `contour_icp` 31.
     """
 
     name = "fourier_icp"

@@ -64,12 +64,12 @@ def image_rows(matches: Matches, cameras: Sequence[Camera]) -> Rows:
 
 
 def line_rows(matches: Matches, cameras: Sequence[Camera], sigma: float) -> Rows:
-    """Return the components of X x n - m for the projection ray (n, m) of every match, all weighted alike.
+    """Return the components of X x n - m for the projection ray (n, m) of every match, in metres at any depth.
 
     Args:
-        matches: M matches in undistorted pixels; only those with a weight above zero count.
+        matches: M matches in undistorted pixels; their weights count relative to that of a match known to one pixel.
         cameras: the pinhole cameras.
-        sigma: standard deviation given to every error, m.
+        sigma: standard deviation given to the error of a match known to one pixel, m.
 
     Returns:
         Three rows per match; errors in m.
@@ -86,6 +86,6 @@ def line_rows(matches: Matches, cameras: Sequence[Camera], sigma: float) -> Rows
         plane=np.concatenate([cross, -rays[:, 3:, None]], axis=2).reshape(-1, 4),
         divisor=np.tile([0.0, 0.0, 0.0, 1.0], (len(match), 1)),
         vertex=matches.vertex[match],
-        weight=(matches.weight[match] > 0) / sigma**2,
+        weight=matches.weight[match] / sigma**2,
         match=match,
     )

@@ -38,7 +38,7 @@ class TwistGaussNewton(PoseSolver):
     far_iterations: NonNegativeInt = 0  # the same, if it is more, in a frame that begins far off
     steps_per_match: PositiveInt = 1  # steps with the same pairs
     residual: Literal["image", "line"] = "image"  # pixels, or distance to projection rays in space
-    line_sigma_mm: PositiveFloat = 3.0  # standard deviation of every distance to a ray
+    line_sigma_mm: PositiveFloat = 3.0  # standard deviation of the distance to a ray, of a match known to 1 px
     damping: NonNegativeFloat = 1e-4  # share of the mean diagonal; ten times more after a worse step
     damping_per_turn: PositiveFloat = 1.0  # factor at each turn of the loop: above 1, exact then gentle
     first_damping: NonNegativeFloat = 0.0  # of the first frame's first turn at least: its start is far off

@@ -52,6 +52,18 @@ def test_at_the_true_pose_nothing_has_to_move(truth):
     assert len(matches.vertex) == pytest.approx(2 * contour_px / 4.0, rel=0.1)  # both ways, every 4 px
 
 
+def test_the_chapters_pairs_weigh_one_or_nothing():
+    """By the settings of pipelines/paper.yaml: skin and cloth alike, stray points out."""
+    body = tiny_pose(DRESSED)
+    surface = matching_scenes.surface_at(body, DRESSED)
+    chapters = ContourIcp(
+        residual="point", first_loss="zhang", later_loss="zhang", scale=6.0, cloth_sigma_px_per_m=0.0, hem_guard_px=0.0
+    )
+    matches = match(chapters, surface, cluttered(seen(surface, DRESSED), 0.25, 0), scene=DRESSED)
+    assert surface.cloth[matches.vertex].any() and not surface.cloth[matches.vertex].all()
+    assert set(matches.weight) == {0.0, 1.0}
+
+
 @pytest.mark.parametrize("residual", ["normal", "point"])
 def test_a_shift_is_asked_for_along_the_normals(truth, residual):
     """The image shows the person 3 cm higher: 4 px; only contours that look up or down can tell."""

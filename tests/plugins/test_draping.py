@@ -24,11 +24,13 @@ from mocapflow_draping.distance import outwards
 from mocapflow_draping.kinematic import Kinematic
 from mocapflow_draping.literal import settle_in_steps
 from mocapflow_draping.strands import strands_of
+from mocapflow_draping.swing import TOUCH
 from mocapflow_draping.voxels import signed_distance
 from mocapflow_garments.shorts import Shorts
 from mocapflow_garments.skirt import Skirt
+from scipy.optimize import brentq
 
-from mocapflow.data import Past, PoseBatch
+from mocapflow.data import Past, Pose, PoseBatch
 from mocapflow.errors import PluginError
 from mocapflow.geometry import kinematics, sewing
 from mocapflow.scene import Scene
@@ -98,14 +100,26 @@ def test_a_flat_cloth_lies_on_a_plane_undeformed():
 
 
 def test_an_overhang_hangs_straight_down_and_keeps_its_length():
-    """T-CL2."""
-    table = box([-0.3, -0.3, -0.1], [0.105, 0.3, 0.0])
+    """T-CL2: where a taut string of such bars would hang, as far as `TOUCH` early counts as touching."""
+    table, edge = box([-0.3, -0.3, -0.1], [0.105, 0.3, 0.0]), 0.105
     ((laid,),), ((supported,),) = swing(table, [[0.0, 0.0, SKIN]], [1.0, 0.0, 0.0], 31, 0.01)
     assert 11 <= supported <= 22
     straight = laid[supported] - np.outer(0.01 * np.arange(31 - supported), [0, 0, 1])
     assert np.abs(laid[supported:] - straight).max() < 1e-4
-    assert SKIN <= laid[-1, 0] - 0.105 < SKIN + 5e-4
     assert np.abs(np.linalg.norm(np.diff(laid, axis=0), axis=1) - 0.01).max() < 1e-12
+
+    def around(away):
+        """How high a bar from the last particle on top, at x = 0.1, ends so far from the edge."""
+
+        def off(angle):
+            x, z = 0.1 + 0.01 * np.cos(angle) - edge, SKIN - 0.01 * np.sin(angle)
+            return np.hypot(x, max(z, 0.0)) - away
+
+        return SKIN - 0.01 * np.sin(brentq(off, 0.0, np.pi / 3))
+
+    assert SKIN - 1e-6 <= laid[-1, 0] - edge < SKIN + TOUCH
+    assert laid[-1, 1] == 0
+    assert around(SKIN) - 1e-6 <= laid[-1, 2] + 0.01 * 19 < around(SKIN + TOUCH) + 1e-6
 
 
 def test_without_the_limit_it_swings_by_no_more_than_a_step():
@@ -200,6 +214,26 @@ def test_a_skirt_keeps_its_strands_and_stays_outside():
     scene, poses = skirted(), leg_poses()
     draped = draper(sweeps=0).drape(poses, calm(scene, 4), Past(), scene)
     check_whole_and_outside(scene, draped, poses)
+    free = np.setdiff1d(np.arange(draped.shape[1]), scene.garment.pinned)
+    nearest = [exact_distances(scene.body, *each).min() for each in zip(draped[:, free], each_of(poses), strict=True)]
+    assert min(nearest) > SKIN - 2.5e-4  # 0.1 mm by its own field, whose voxels of 5 mm read up to 0.2 mm too far
+
+
+def each_of(poses):
+    return [Pose(root=root, angles=angles) for root, angles in zip(poses.root, poses.angles, strict=True)]
+
+
+def exact_distances(body, points, pose):
+    """Return the signed distances of points (N, 3) to the triangles of a body, each part of which is closed."""
+    import open3d
+
+    skin = kinematics.skin(body, kinematics.chain(body, pose)[0], pose.angles).astype("f4")
+    owner, away = body.skin_joint[body.faces[:, 0], 0], []
+    for part in range(len(body.joint_names)):
+        rays = open3d.t.geometry.RaycastingScene()
+        rays.add_triangles(skin, body.faces[owner == part].astype("u4"))
+        away.append(rays.compute_signed_distance(points.astype("f4")).numpy())
+    return np.min(away, axis=0)
 
 
 def test_the_chapters_steps_end_near_the_taut_drape():

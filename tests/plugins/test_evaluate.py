@@ -1,4 +1,6 @@
+import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from statistics import NormalDist
 from types import SimpleNamespace
@@ -7,10 +9,11 @@ import numpy as np
 import pytest
 from mocapflow_evaluation import compare, comparison_plots
 from mocapflow_evaluation.evaluate import Evaluate, evaluate, evaluate_run
-from mocapflow_evaluation.ours import Ours
+from mocapflow_evaluation.ours import Ours, of_folder, of_track
 from mocapflow_evaluation.references import read_reference
 from mocapflow_evaluation.stick import Stick, constant
 from mocapflow_export import layout, tables
+from mocapflow_export.export import Export
 from results_scene import DEMO, demo_scene, stepping
 from scipy.signal import lfilter
 
@@ -152,6 +155,44 @@ def test_frames_are_matched_by_number(tmp_path: Path) -> None:
     got = evaluate(columns_only(ours), tmp_path / "t.csv", tmp_path).rows[0]
     assert (got["frames"], got["rms_deg"]) == (2, 1.0)
     assert (tmp_path / layout.EVALUATION).read_text().startswith("angle,frames,rms_deg")
+
+
+@pytest.mark.usefixtures("unrendered")
+def test_our_unsmoothed_curve_is_filtered_as_references_are(tmp_path: Path) -> None:
+    """Of two waves that we add, the one of 14 Hz is filtered out; of 4 frames, or 10 a second, nothing can be told."""
+    for count, rate, wanted in ((240, 60.0, np.sqrt(3**2 / 2)), (4, 60.0, np.nan), (240, 10.0, np.nan)):
+        time = np.arange(count) / rate
+        clock, truth = {"frame": np.arange(float(count)), "time": time}, 30 + 20 * np.sin(2 * np.pi * 0.5 * time)
+        ours = truth + 3 * np.sin(2 * np.pi * time) + 5 * np.sin(2 * np.pi * 14 * time)
+        tables.write_columns(tmp_path / "t.csv", clock | {"knee_flexion_l": truth})
+        nothing = Stick(names=(), places=np.empty((count, 0, 3)))
+        smoothed, raw = clock | {"knee_flexion_l": truth}, clock | {"knee_flexion_l": ours}
+        (got,) = evaluate(Ours(columns=smoothed, raw=raw, stick=nothing), tmp_path / "t.csv", tmp_path).rows
+        assert got["rms_lowpassed_deg"] == pytest.approx(wanted, rel=0.02, nan_ok=True)
+        assert got["rms_deg"] < 1e-3 and got["rms_unsmoothed_deg"] > 3
+
+
+@pytest.mark.usefixtures("unrendered")
+def test_the_share_of_frames_in_doubt_is_told_by_a_track_and_by_its_files(tmp_path: Path) -> None:
+    scene = demo_scene()
+    track = stepping(scene.body)
+    count = len(track.frame)
+    number = np.arange(count)
+    doubtful = replace(
+        track,
+        steady=number % 2 == 1, doubted=number < 3, iterations=np.where(number == 5, 0, track.iterations).astype("i2"),
+    )  # fmt: skip
+    wanted = len({*range(0, count, 2), 1, 5}) / count
+    own = of_track(doubtful, scene)
+    assert own.flagged_share == wanted
+    Export().run(track=doubtful, scene=scene, recording=open_recording(DEMO), run_folder=run_folder(tmp_path))
+    assert of_folder(tmp_path).flagged_share == wanted
+    evaluate_run(tmp_path, DEMO / "truth" / "angles.csv")
+    assert json.loads((tmp_path / layout.FINDINGS).read_text())["flagged_share"] == wanted
+    (tmp_path / layout.RUN).write_text("{}")
+    assert np.isnan(of_folder(tmp_path).flagged_share)
+    (tmp_path / layout.RUN).unlink()
+    assert np.isnan(of_folder(tmp_path).flagged_share)
 
 
 @pytest.mark.usefixtures("unrendered")

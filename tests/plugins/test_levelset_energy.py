@@ -101,7 +101,8 @@ def test_a_prior_beyond_the_band_pulls_no_harder_than_at_its_edge():
     assert far.shape == near_by.shape > 0
 
 
-def test_the_logged_costs_are_those_of_the_equation():
+def test_the_logged_costs_are_those_of_the_equation_but_for_what_is_outside_alone():
+    """With an even p2: another one adds the same to the equation's data whatever the contour, and nothing here."""
     random = np.random.default_rng(3)
     level, prior = (np.clip(circle(r, 48, x, 23), -7, 7).astype(np.float32) for r, x in ((14, 24), (15, 26)))
     ratio = random.uniform(-2, 6, level.shape).astype(np.float32)

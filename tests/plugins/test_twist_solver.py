@@ -126,6 +126,21 @@ def test_the_chapters_literal_settings_reach_the_pose() -> None:
     assert largest_error_deg(solve(literal, scene, start_from(truth, 1), matches).pose, truth) < 0.01
 
 
+@pytest.mark.parametrize("residual", ["image", "line"])
+def test_pairs_of_little_weight_pull_little(residual: str) -> None:
+    """As a robust loss leaves them: every fifth lies 100 px aside."""
+    scene, truth = make_scene(), make_pose(1)
+    matches = exact_matches(scene, truth, np.arange(0, 300, 3), directed=False)
+    stray = np.arange(len(matches.weight)) % 5 == 0
+    wrong = replace(matches, pixel=matches.pixel + 100.0 * stray[:, None])
+    off = []
+    for weight in (1.0, 1e-3):
+        doubted = replace(wrong, weight=np.where(stray, weight, 1.0))
+        pose = solve(TwistGaussNewton(residual=residual, **EXACT), scene, truth, doubted).pose
+        off.append(largest_error_deg(pose, truth))
+    assert off[1] < 0.01 * off[0]
+
+
 def test_the_scanned_person_is_found_again() -> None:
     body = Scanned().load(DEMO)
     scene = replace(make_scene(), body=body)

@@ -104,22 +104,22 @@ def test_the_damping_pulls_about_the_root_as_its_energy_says() -> None:
     assert prior.hessian == pytest.approx(np.diag(sd**-2))
 
 
-def test_unweighted_equations_count_every_pair_once() -> None:
-    """The chapter's: a pair is there or not, whatever its weight; of its three components two are independent."""
+def test_distances_to_rays_count_by_the_weight_of_their_pair() -> None:
+    """The chapter's pairs weigh one or nothing; of the three components of each, two are independent."""
     matches = exact_matches(SCENE, TRUTH, np.arange(0, 300, 9), directed=False)
     weight = np.where(np.arange(len(matches.weight)) % 4, np.linspace(0.1, 9, len(matches.weight)), 0.0)
     matches = replace(matches, weight=weight)
     rows = line_rows(matches, SCENE.cameras, 0.003)
-    np.testing.assert_allclose(rows.weight, np.repeat(weight > 0, 3) / 0.003**2)
+    np.testing.assert_allclose(rows.weight, np.repeat(weight, 3) / 0.003**2)
     np.testing.assert_array_equal(effective_share(matches, 0.0), np.ones(len(weight)))
     literal = TwistGaussNewton(residual="line", correlation_px=0.0)._data(matches, MODEL)
     assert literal.measurements == pytest.approx(2 * np.count_nonzero(weight))
-    assert literal.body.weight == pytest.approx(1 / 0.003**2)
+    assert literal.body.weight == pytest.approx(np.repeat(weight[weight > 0], 3) / 0.003**2)
     correlated = TwistGaussNewton(residual="line", correlation_px=30.0)._data(matches, MODEL)
     share = effective_share(matches, 30.0)[weight > 0]
     assert share.max() < 1
     assert correlated.measurements == pytest.approx(2 * share.sum())
-    assert correlated.body.weight == pytest.approx(np.repeat(share, 3) / 0.003**2)
+    assert correlated.body.weight == pytest.approx(np.repeat(weight[weight > 0] * share, 3) / 0.003**2)
 
 
 def test_balanced_views_pull_alike_and_together_as_hard_as_before() -> None:
