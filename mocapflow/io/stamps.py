@@ -1,72 +1,142 @@
-"""Time stamps of the frames of a video file, read without decoding it."""
+"""What a video file holds: its packets, in the order of decoding, and which frames they are."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from mocapflow.errors import RecordingError
 from mocapflow.io.paths import for_opencv
-from mocapflow.records import F64, I32, Bool
+from mocapflow.records import F64, I32, U8, Bool
+
+if TYPE_CHECKING:
+    from av import Packet, VideoFrame, VideoStream
+
+HIDDEN = -1  # the number of a packet that players do not show
+FEW = 1 / 16  # share of the packets of an AVI: if fewer are shown before the one before them, their times are wrong
+PATIENCE = 10_000  # so often something in a file can't be read; then it is over
 
 
 class Stamps(NamedTuple):
     """What a video file says of its frames."""
 
+    size: tuple[int, int]  # px: width, height
     declared: int  # frames
     rate: float  # frames a second; 0 where it does not say
-    time: F64  # (N,) ms, ascending
-    key: Bool  # (N,) whether a frame is decoded from nothing but itself
-    after_damage: Bool  # (N,) whether what the file has right before a frame can't be read
+    numbers: I32  # (N,) frame number of each packet, or HIDDEN
+    starts: I32  # (N,) packet of the key frame from which each is decoded
 
 
 @contextmanager
-def open_capture(path: Path, *options: int) -> Iterator[Any]:
-    """Open a video file with one thread; options are pairs of cv2.CAP_PROP_* and value."""
-    import cv2
+def open_stream(path: Path) -> Iterator[VideoStream]:
+    """Open the video in a file; it is decoded with one thread.
 
-    capture = cv2.VideoCapture(for_opencv(path), cv2.CAP_FFMPEG, [cv2.CAP_PROP_N_THREADS, 1, *options])
+    Raises:
+        RecordingError: there is none that can be decoded.
+    """
+    import av
+
     try:
-        yield capture
-    finally:
-        capture.release()
+        container = av.open(for_opencv(path), metadata_errors="replace")  # some titles are no UTF-8
+    except av.FFmpegError:
+        raise undecodable(path) from None
+    with container:
+        stream = container.streams.best("video")  # not the cover
+        if not isinstance(stream, av.VideoStream) or stream.codec_context is None:
+            raise undecodable(path)
+        stream.codec_context.thread_count = 1
+        yield stream
 
 
-def grabs(capture: Any) -> Iterator[int]:
-    """Advance frame by frame to the end, over damaged ones; yields how many attempts failed before each."""
-    import cv2
+def undecodable(path: Path) -> RecordingError:
+    """Return the error that nothing in a file can be decoded."""
+    hint = "the file is cut off, damaged or no video; copy it again from the camera"
+    return RecordingError("this video can't be decoded", where=str(path), hint=hint)
 
-    declared = capture.get(cv2.CAP_PROP_FRAME_COUNT)  # anything at all, in a damaged file
-    patience = int(np.clip(np.nan_to_num(declared), 1000, 1_000_000))  # failed attempts at the end cost nothing
-    failed = 0
-    while failed < patience:
-        if not capture.grab():
-            failed += 1
-            continue
-        yield failed
-        failed = 0
+
+def packets(stream: VideoStream) -> Iterator[Packet[Any] | None]:
+    """Yield the packets of a video, None where the file can't be read, and an empty one at the end."""
+    import av
+
+    container: Any = stream.container
+    for _ in range(PATIENCE):
+        try:
+            yield from (packet for packet in container.demux(stream) if packet.size or packet.dts is None)
+            return
+        except av.FFmpegError:
+            yield None
+
+
+def decode(packet: Packet[Any] | None) -> tuple[list[VideoFrame], bool]:
+    """Return which pictures are ready after a packet, and whether it is whole."""
+    import av
+
+    try:
+        return (packet.decode(), not packet.is_corrupt) if packet is not None else ([], False)
+    except av.FFmpegError:
+        return [], False
+
+
+def picture(frame: VideoFrame) -> U8:
+    """Return a frame (H, W, 3) BGR, turned as players do; bicubic as in OpenCV, where colours are stored coarser."""
+    image = frame.to_ndarray(format="bgr24", interpolation="BICUBIC", threads=1)
+    return np.ascontiguousarray(np.rot90(image, 0 if frame.rotation % 90 else frame.rotation // 90))
 
 
 def read_stamps(path: Path) -> Stamps:
-    """Return the time stamps of a video file; nothing is decoded."""
-    import cv2
+    """Return what a video file says of its frames; only the first picture is decoded.
 
-    with open_capture(path, cv2.CAP_PROP_FORMAT, -1) as capture:
-        declared, rate = capture.get(cv2.CAP_PROP_FRAME_COUNT), capture.get(cv2.CAP_PROP_FPS)
-        what = cv2.CAP_PROP_POS_MSEC, cv2.CAP_PROP_LRF_HAS_KEY_FRAME
-        read = np.array([[*(capture.get(each) for each in what), failed] for failed in grabs(capture)]).reshape(-1, 3)
-    rate = rate if np.isfinite(rate) and 0 < rate < 1e5 else 0.0
-    stamps, keys, failed = read[np.argsort(read[:, 0], kind="stable")].T
-    known = stamps >= 0
-    return Stamps(max(0, int(declared)), rate, stamps[known], keys[known] > 0, failed[known] > 0)
+    Raises:
+        RecordingError: nothing in it can be decoded.
+    """
+    first: list[VideoFrame] = []
+    rows = []
+    with open_stream(path) as stream:
+        for packet in packets(stream):
+            first = first or decode(packet)[0]
+            if packet is None or packet.size:
+                rows.append([getattr(packet, name, None) for name in ("pts", "dts", "is_keyframe", "is_discard")])
+        shown_at, decoded_at, keys, hidden = np.array(rows, np.float64).reshape(-1, 4).T
+        shown_at = np.where(np.isnan(shown_at), decoded_at, shown_at)
+        container: Any = stream.container
+        guessed = container.format.name == "avi" and np.mean(np.diff(shown_at) < 0) < FEW
+        times = decoded_at if guessed else shown_at
+        shown = ~np.isnan(times) & (hidden == 0)
+        if not first or not shown.any():
+            raise undecodable(path)
+        numbers = np.full(len(times), HIDDEN, np.int32)
+        numbers[shown] = number_frames(times[shown])
+        frames = int(numbers.max()) + 1
+        rate = float(stream.average_rate or stream.guessed_rate or 0)
+        declared = (stream.frames or round((container.duration or 0) * rate / 1e6)) - int(np.sum(hidden == 1))
+        if frames > shown.sum():  # with gaps that rate is the average
+            rate = (frames - 1) / float(np.ptp(times[shown]) * (stream.time_base or 0))
+    height, width = picture(first[0]).shape[:2]
+    return Stamps((width, height), max(declared, frames), rate, numbers, find_starts(shown_at, keys == 1))
 
 
-def number_frames(stamps: F64) -> I32:
-    """Return the frame number (N,) of each stamp (N,) ms: a gap of k periods is k - 1 lost frames."""
-    gaps = np.diff(stamps)
+def number_frames(times: F64) -> I32:
+    """Return the frame number (N,) at each time (N,), in any unit and order: a gap of k periods is k - 1 lost frames.
+
+    What has one time, such as what VP8 never shows, has one number.
+    """
+    order = np.argsort(times, kind="stable")
+    gaps = np.diff(times[order])
     period = np.median(gaps) if len(gaps) else 0.0
-    steps = np.maximum(1, np.round(gaps / period)) if period > 0 else np.ones(len(gaps))
-    return np.concatenate([[0], np.cumsum(steps)]).astype(np.int32)
+    steps = np.maximum(gaps > 0, np.round(gaps / period)) if period > 0 else np.ones(len(gaps))
+    numbers = np.empty(len(times), np.int32)
+    numbers[order] = np.concatenate([[0], np.cumsum(steps)])
+    return numbers
+
+
+def find_starts(times: F64, keys: Bool) -> I32:
+    """Return the packet (N,) of the key frame from which each, shown at its time (N,), is decoded.
+
+    What follows a key frame in the file but is shown before it is made from what came before, too.
+    """
+    key = np.maximum.accumulate(np.where(keys, np.arange(len(keys)), 0))
+    return np.where(times < times[key], key[np.maximum(key - 1, 0)], key).astype(np.int32)
