@@ -16,19 +16,21 @@ from mocapflow.records import F64, I32, U8, Bool
 if TYPE_CHECKING:
     from av import Packet, VideoFrame, VideoStream
 
-HIDDEN = -1  # the number of a packet that players do not show
-FEW = 1 / 16  # share of the packets of an AVI: if fewer are shown before the one before them, their times are wrong
-PATIENCE = 10_000  # so often something in a file can't be read; then it is over
+HIDDEN = np.iinfo(np.int32).min  # the number of a packet that players do not show
+FASTEST = 1e5  # frames a second; what a file says beyond is nonsense
+FEW = 1 / 16  # of an AVI's packets: if fewer are shown before the one before them, their times are guessed wrong
+PATIENCE = 10_000  # failed attempts to read on; then the file is over
 
 
 class Stamps(NamedTuple):
-    """What a video file says of its frames."""
+    """What a video file says of its frames: the fields of a `Video`."""
 
-    size: tuple[int, int]  # px: width, height
-    declared: int  # frames
-    rate: float  # frames a second; 0 where it does not say
-    numbers: I32  # (N,) frame number of each packet, or HIDDEN
-    starts: I32  # (N,) packet of the key frame from which each is decoded
+    width: int
+    height: int
+    frame_rate: float
+    declared: int
+    numbers: I32
+    starts: I32
 
 
 @contextmanager
@@ -96,27 +98,29 @@ def read_stamps(path: Path) -> Stamps:
     first: list[VideoFrame] = []
     rows = []
     with open_stream(path) as stream:
+        container: Any = stream.container
         for packet in packets(stream):
             first = first or decode(packet)[0]
             if packet is None or packet.size:
                 rows.append([getattr(packet, name, None) for name in ("pts", "dts", "is_keyframe", "is_discard")])
-        shown_at, decoded_at, keys, hidden = np.array(rows, np.float64).reshape(-1, 4).T
-        shown_at = np.where(np.isnan(shown_at), decoded_at, shown_at)
-        container: Any = stream.container
-        guessed = container.format.name == "avi" and np.mean(np.diff(shown_at) < 0) < FEW
-        times = decoded_at if guessed else shown_at
+        times, decoded_at, keys, hidden = np.array(rows, np.float64).reshape(-1, 4).T
+        times = np.where(np.isnan(times), decoded_at, times)
+        starts = find_starts(times, keys == 1)
+        if container.format.name == "avi" and np.mean(np.diff(times) < 0) < FEW:
+            times = decoded_at  # AVI has no times of display
         shown = ~np.isnan(times) & (hidden == 0)
         if not first or not shown.any():
             raise undecodable(path)
         numbers = np.full(len(times), HIDDEN, np.int32)
         numbers[shown] = number_frames(times[shown])
         frames = int(numbers.max()) + 1
-        rate = float(stream.average_rate or stream.guessed_rate or 0)
+        rate = float(stream.average_rate or 0)
+        rate = rate if rate < FASTEST else 0.0
         declared = (stream.frames or round((container.duration or 0) * rate / 1e6)) - int(np.sum(hidden == 1))
         if frames > shown.sum():  # with gaps that rate is the average
             rate = (frames - 1) / float(np.ptp(times[shown]) * (stream.time_base or 0))
-    height, width = picture(first[0]).shape[:2]
-    return Stamps((width, height), max(declared, frames), rate, numbers, find_starts(shown_at, keys == 1))
+        height, width, _ = picture(first[0]).shape
+    return Stamps(width, height, rate, max(declared, frames), numbers, starts)
 
 
 def number_frames(times: F64) -> I32:

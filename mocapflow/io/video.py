@@ -2,8 +2,8 @@
 
 The number of a frame comes from its time stamp, so a frame that the file lacks, or that can't be decoded, leaves
 a gap and does not shift the rest. What is made from a frame that can't be decoded, or over whose damage the decoder
-painted, is lost, too; decoders of H.264 and MPEG-4 tell that they painted. All stamps are read once, without decoding,
-when a video is opened. Decoding always starts at the first frame: seeking lands on the wrong picture in some files, and
+painted, is lost, too; those of H.264 and MPEG-4 tell that they do. All stamps are read once, without decoding, when a
+video is opened. Decoding always starts at the first frame: seeking lands on the wrong picture in some files, and
 a resumed run must see the same pixels.
 """
 
@@ -43,8 +43,8 @@ class Video:
     height: int  # px
     frame_rate: float  # per second; 0 where nothing says it
     declared: int  # frames, as the file says; more than `frames` where it breaks off
-    numbers: I32 = array("N", unit="frame number of each packet of the file, in its order, -1 where none is shown")
-    starts: I32 = array("N", unit="index of the packet, a key frame, from which each is decoded")
+    numbers: I32 = array("N", unit="frame number of each packet, in the order of the file; HIDDEN where none is shown")
+    starts: I32 = array("N", unit="packet of the key frame from which each is decoded")
     first: int = 0  # number in the name of frame 0's image
     late: int = 0  # frames by which its pictures come after those of the other cameras
 
@@ -68,10 +68,7 @@ def open_video(path: Path) -> Video:
     if not os.access(path, os.R_OK):  # ffmpeg would only say that it can't be decoded
         hint = "let yourself read it, or copy it to a place of yours"
         raise RecordingError("this video may not be read: permission denied", where=str(path), hint=hint)
-    (width, height), declared, rate, numbers, starts = read_stamps(path)
-    return Video(
-        path=path, width=width, height=height, frame_rate=rate, declared=declared, numbers=numbers, starts=starts
-    )
+    return Video(path=path, **read_stamps(path)._asdict())
 
 
 def count_from_first(videos: Sequence[Video]) -> tuple[Video, ...]:
@@ -136,8 +133,8 @@ def _judged(stream: VideoStream, video: Video) -> Iterator[tuple[int, VideoFrame
     for decoded in chain(_numbered(stream, video.numbers, damaged), [None]):
         while waiting and (decoded is None or latest[waiting[0][1]] <= decoded[0]):
             number, place, frame = waiting.popleft()
-            start = video.starts[place]
-            torn = (damaged[start:place] & (video.starts[start:place] >= start)).any()
+            start, starts = video.starts[place], video.starts[video.starts[place] : place]
+            torn = damaged[start:place][starts >= start].any()  # what is shown before a key frame is not used after it
             yield number, frame, DAMAGED if damaged[place] else TORN if torn else ""
         if decoded is not None:
             waiting.append(decoded)

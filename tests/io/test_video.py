@@ -3,14 +3,16 @@
 import os
 import wave
 from dataclasses import replace
+from types import SimpleNamespace
 
+import av
 import cv2
 import numpy as np
 import pytest
 
 from mocapflow.errors import RecordingError
 from mocapflow.io.images import name_frames, numbered
-from mocapflow.io.stamps import number_frames, packets
+from mocapflow.io.stamps import decode, number_frames, packets
 from mocapflow.io.video import DAMAGED, TORN, open_video, read_frames
 from tests.fixtures.recordings import avi_frames, mp4_frames, number_of, picture, write_reordered, write_video
 
@@ -92,6 +94,19 @@ def test_frames_that_the_decoder_passes_over_damage_others(tmp_path):
     """The file lacks 15, so nothing comes of 13 and 14."""
     video = open_video(write_reordered(tmp_path / "a.mp4", 30, without=[13]))
     assert numbers(video) == [*range(13), *[None] * 11, *range(24, 30)]
+    assert video.frame_rate == pytest.approx(25)
+
+
+def test_what_a_decoder_swallows_of_an_avi_shifts_frames_up_to_the_next_key_frame(tmp_path, monkeypatch):
+    """It keeps no times of display, so reordered frames are counted; key frames are 0, 12 and 24."""
+
+    def swallow(packet):
+        frames, whole = decode(packet)
+        return [frame for frame in frames if frame.pts != 3], whole
+
+    video = open_video(write_reordered(tmp_path / "a.avi", 30, "libx264"))
+    monkeypatch.setattr("mocapflow.io.video.decode", swallow)
+    assert numbers(video)[12:] == list(range(12, 30))
 
 
 def test_a_part_that_can_not_be_read_damages_what_follows(tmp_path, monkeypatch):
@@ -112,6 +127,17 @@ def test_a_frame_that_a_camera_left_out_damages_no_others(tmp_path):
     later = np.arange(FRAMES) + (np.arange(FRAMES) >= 5)
     video = replace(video, numbers=later.astype(np.int32))
     assert [index for index, (image, _) in enumerate(read_frames(video, range(FRAMES + 1))) if image is None] == [5]
+
+
+def test_reading_goes_on_after_an_error():
+    def demux(_):
+        yield from parts.pop(0)
+        if parts:
+            raise av.error.OSError(5, "Input/output error")
+
+    parts = [[SimpleNamespace(size=1)], [], [SimpleNamespace(size=2)]]
+    read = packets(SimpleNamespace(container=SimpleNamespace(demux=demux)))
+    assert [packet and packet.size for packet in read] == [1, None, None, 2]
 
 
 def test_packets_with_one_time_are_one_frame(tmp_path):
@@ -135,7 +161,7 @@ def test_players_do_not_show_what_is_cut_off_without_encoding_again(tmp_path):
 
 @pytest.mark.parametrize(("matrix", "turns"), [((0, 1, -1, 0), 1), ((-1, 0, 0, -1), 2), ((0, -1, 1, 0), 3)])
 def test_pictures_are_turned_as_players_do(tmp_path, matrix, turns):
-    upright = write_video(tmp_path / "a.mp4", 1)
+    upright = write_video(tmp_path / "a.mp4", 6)
     content = bytearray(upright.read_bytes())
     at = content.index(b"tkhd") + 44
     for place, number in zip((0, 4, 12, 16), matrix, strict=True):
@@ -143,18 +169,25 @@ def test_pictures_are_turned_as_players_do(tmp_path, matrix, turns):
     (tmp_path / "b.mp4").write_bytes(content)
     video = open_video(tmp_path / "b.mp4")
     assert (video.width, video.height) == ((48, 64) if turns % 2 else (64, 48))
-    ((expected, _),), ((image, _),) = read_frames(open_video(upright), range(1)), read_frames(video, range(1))
-    np.testing.assert_array_equal(image, cv2.VideoCapture(str(video.path)).read()[1])
-    np.testing.assert_array_equal(np.rot90(image, turns), expected)
-
-
-@pytest.mark.parametrize("size", [(64, 48), (63, 47)])
-def test_pictures_are_those_of_opencv(tmp_path, size):
-    """Where a size is odd, colours are scaled by a filter."""
-    path = write_video(tmp_path / "a.mp4", 5, size)
-    capture = cv2.VideoCapture(str(path))
-    for image, _ in read_frames(open_video(path), range(5)):
+    capture = cv2.VideoCapture(str(video.path))
+    for (image, _), (before, _) in zip(
+        read_frames(video, range(6)), read_frames(open_video(upright), range(6)), strict=True
+    ):
         np.testing.assert_array_equal(image, capture.read()[1])
+        np.testing.assert_array_equal(np.rot90(image, turns), before)
+
+
+@pytest.mark.parametrize("kind", ["yuv420p", "yuv420p10le", "gray", "bgr0"])
+def test_pictures_are_those_of_opencv(tmp_path, kind):
+    """Those of ten bits are scaled by a filter."""
+    path = str(tmp_path / "a.mkv")
+    with av.open(path, "w") as file:
+        stream = file.add_stream("ffv1", rate=25)
+        stream.width, stream.height, stream.pix_fmt = 62, 46, kind
+        noise = np.random.default_rng(0).integers(0, 256, (46, 62, 3), np.uint8)
+        file.mux(stream.encode(av.VideoFrame.from_ndarray(noise, "bgr24")) + stream.encode(None))
+    ((image, _),) = read_frames(open_video(tmp_path / "a.mkv"), range(1))
+    np.testing.assert_array_equal(image, cv2.VideoCapture(path).read()[1])
 
 
 def test_a_title_that_is_no_utf8(tmp_path):
@@ -166,12 +199,14 @@ def test_a_title_that_is_no_utf8(tmp_path):
 def test_a_truncated_video_has_placeholders_to_the_end(tmp_path):
     path = write_video(tmp_path / "a.avi", FRAMES, codec="MJPG")
     content = path.read_bytes()
-    path.write_bytes(content[: avi_frames(content)[12][0] + 4])
+    offset, length = avi_frames(content)[12]
+    path.write_bytes(content[: offset + length - 8])
     video = open_video(path)
     assert video.declared == FRAMES
     rows = list(read_frames(video, range(FRAMES)))
     assert [number_of(image) for image, _ in rows[:12]] == list(range(12))
     assert {image is None for image, _ in rows[12:]} == {True}
+    assert rows[12][1] == DAMAGED
     assert rows[-1][1] == f"the video breaks off after frame {video.frames - 1}"
 
 
@@ -207,6 +242,7 @@ def test_gaps_in_the_time_stamps_are_lost_frames():
     assert number_frames(np.round(np.arange(3000) * period)).tolist() == list(range(3000))  # times in whole ms
     assert number_frames(np.zeros(4)).tolist() == [0, 1, 2, 3]
     assert number_frames(np.zeros(1)).tolist() == [0]
+    assert number_frames(np.array([0.0, 3, 1, 1, 2])).tolist() == [0, 3, 1, 1, 2]
 
 
 def test_frames_of_another_size_are_lost(tmp_path):
