@@ -9,7 +9,7 @@ from mocapflow.errors import MocapflowError
 
 
 def for_opencv(path: Path) -> str:
-    """Return a path that OpenCV can open: absolute, for it takes the `take:` of `take:1` for a protocol.
+    """Return a path that OpenCV and ffmpeg can open: absolute, for they take the `take:` of `take:1` for a protocol.
 
     Raises:
         MocapflowError: the path is not UTF-8, at which OpenCV kills the process.

@@ -1,72 +1,146 @@
-"""Time stamps of the frames of a video file, read without decoding it."""
+"""What a video file holds: its packets, in the order of decoding, and which frames they are."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from mocapflow.errors import RecordingError
 from mocapflow.io.paths import for_opencv
-from mocapflow.records import F64, I32, Bool
+from mocapflow.records import F64, I32, U8, Bool
+
+if TYPE_CHECKING:
+    from av import Packet, VideoFrame, VideoStream
+
+HIDDEN = np.iinfo(np.int32).min  # the number of a packet that players do not show
+FASTEST = 1e5  # frames a second; what a file says beyond is nonsense
+FEW = 1 / 16  # of an AVI's packets: if fewer are shown before the one before them, their times are guessed wrong
+PATIENCE = 10_000  # failed attempts to read on; then the file is over
 
 
 class Stamps(NamedTuple):
-    """What a video file says of its frames."""
+    """What a video file says of its frames: the fields of a `Video`."""
 
-    declared: int  # frames
-    rate: float  # frames a second; 0 where it does not say
-    time: F64  # (N,) ms, ascending
-    key: Bool  # (N,) whether a frame is decoded from nothing but itself
-    after_damage: Bool  # (N,) whether what the file has right before a frame can't be read
+    width: int
+    height: int
+    frame_rate: float
+    declared: int
+    numbers: I32
+    starts: I32
 
 
 @contextmanager
-def open_capture(path: Path, *options: int) -> Iterator[Any]:
-    """Open a video file with one thread; options are pairs of cv2.CAP_PROP_* and value."""
-    import cv2
+def open_stream(path: Path) -> Iterator[VideoStream]:
+    """Open the video in a file; it is decoded with one thread.
 
-    capture = cv2.VideoCapture(for_opencv(path), cv2.CAP_FFMPEG, [cv2.CAP_PROP_N_THREADS, 1, *options])
+    Raises:
+        RecordingError: there is none that can be decoded.
+    """
+    import av
+
     try:
-        yield capture
-    finally:
-        capture.release()
+        container = av.open(for_opencv(path), metadata_errors="replace")  # some titles are no UTF-8
+    except av.FFmpegError:
+        raise undecodable(path) from None
+    with container:
+        stream = container.streams.best("video")  # not the cover
+        if not isinstance(stream, av.VideoStream) or stream.codec_context is None:
+            raise undecodable(path)
+        stream.codec_context.thread_count = 1
+        yield stream
 
 
-def grabs(capture: Any) -> Iterator[int]:
-    """Advance frame by frame to the end, over damaged ones; yields how many attempts failed before each."""
-    import cv2
+def undecodable(path: Path) -> RecordingError:
+    """Return the error that nothing in a file can be decoded."""
+    hint = "the file is cut off, damaged or no video; copy it again from the camera"
+    return RecordingError("this video can't be decoded", where=str(path), hint=hint)
 
-    declared = capture.get(cv2.CAP_PROP_FRAME_COUNT)  # anything at all, in a damaged file
-    patience = int(np.clip(np.nan_to_num(declared), 1000, 1_000_000))  # failed attempts at the end cost nothing
-    failed = 0
-    while failed < patience:
-        if not capture.grab():
-            failed += 1
-            continue
-        yield failed
-        failed = 0
+
+def packets(stream: VideoStream) -> Iterator[Packet[Any] | None]:
+    """Yield the packets of a video, None where the file can't be read, and an empty one at the end."""
+    import av
+
+    container: Any = stream.container
+    for _ in range(PATIENCE):
+        try:
+            yield from (packet for packet in container.demux(stream) if packet.size or packet.dts is None)
+            return
+        except av.FFmpegError:
+            yield None
+
+
+def decode(packet: Packet[Any] | None) -> tuple[list[VideoFrame], bool]:
+    """Return which pictures are ready after a packet, and whether it is whole."""
+    import av
+
+    try:
+        return (packet.decode(), not packet.is_corrupt) if packet is not None else ([], False)
+    except av.FFmpegError:
+        return [], False
+
+
+def picture(frame: VideoFrame) -> U8:
+    """Return a frame (H, W, 3) BGR, turned as players do; bicubic as in OpenCV, where colours are stored coarser."""
+    image = frame.to_ndarray(format="bgr24", interpolation="BICUBIC", threads=1)
+    return np.ascontiguousarray(np.rot90(image, 0 if frame.rotation % 90 else frame.rotation // 90))
 
 
 def read_stamps(path: Path) -> Stamps:
-    """Return the time stamps of a video file; nothing is decoded."""
-    import cv2
+    """Return what a video file says of its frames; only the first picture is decoded.
 
-    with open_capture(path, cv2.CAP_PROP_FORMAT, -1) as capture:
-        declared, rate = capture.get(cv2.CAP_PROP_FRAME_COUNT), capture.get(cv2.CAP_PROP_FPS)
-        what = cv2.CAP_PROP_POS_MSEC, cv2.CAP_PROP_LRF_HAS_KEY_FRAME
-        read = np.array([[*(capture.get(each) for each in what), failed] for failed in grabs(capture)]).reshape(-1, 3)
-    rate = rate if np.isfinite(rate) and 0 < rate < 1e5 else 0.0
-    stamps, keys, failed = read[np.argsort(read[:, 0], kind="stable")].T
-    known = stamps >= 0
-    return Stamps(max(0, int(declared)), rate, stamps[known], keys[known] > 0, failed[known] > 0)
+    Raises:
+        RecordingError: nothing in it can be decoded.
+    """
+    first: list[VideoFrame] = []
+    rows = []
+    with open_stream(path) as stream:
+        container: Any = stream.container
+        for packet in packets(stream):
+            first = first or decode(packet)[0]
+            if packet is None or packet.size:
+                rows.append([getattr(packet, name, None) for name in ("pts", "dts", "is_keyframe", "is_discard")])
+        times, decoded_at, keys, hidden = np.array(rows, np.float64).reshape(-1, 4).T
+        times = np.where(np.isnan(times), decoded_at, times)
+        starts = find_starts(times, keys == 1)
+        if container.format.name == "avi" and np.mean(np.diff(times) < 0) < FEW:
+            times = decoded_at  # AVI has no times of display
+        shown = ~np.isnan(times) & (hidden == 0)
+        if not first or not shown.any():
+            raise undecodable(path)
+        numbers = np.full(len(times), HIDDEN, np.int32)
+        numbers[shown] = number_frames(times[shown])
+        frames = int(numbers.max()) + 1
+        rate = float(stream.average_rate or 0)
+        rate = rate if rate < FASTEST else 0.0
+        declared = (stream.frames or round((container.duration or 0) * rate / 1e6)) - int(np.sum(hidden == 1))
+        if frames > shown.sum():  # with gaps that rate is the average
+            rate = (frames - 1) / float(np.ptp(times[shown]) * (stream.time_base or 0))
+        height, width, _ = picture(first[0]).shape
+    return Stamps(width, height, rate, max(declared, frames), numbers, starts)
 
 
-def number_frames(stamps: F64) -> I32:
-    """Return the frame number (N,) of each stamp (N,) ms: a gap of k periods is k - 1 lost frames."""
-    gaps = np.diff(stamps)
+def number_frames(times: F64) -> I32:
+    """Return the frame number (N,) at each time (N,), in any unit and order: a gap of k periods is k - 1 lost frames.
+
+    What has one time, such as what VP8 never shows, has one number.
+    """
+    order = np.argsort(times, kind="stable")
+    gaps = np.diff(times[order])
     period = np.median(gaps) if len(gaps) else 0.0
-    steps = np.maximum(1, np.round(gaps / period)) if period > 0 else np.ones(len(gaps))
-    return np.concatenate([[0], np.cumsum(steps)]).astype(np.int32)
+    steps = np.maximum(gaps > 0, np.round(gaps / period)) if period > 0 else np.ones(len(gaps))
+    numbers = np.empty(len(times), np.int32)
+    numbers[order] = np.concatenate([[0], np.cumsum(steps)])
+    return numbers
+
+
+def find_starts(times: F64, keys: Bool) -> I32:
+    """Return the packet (N,) of the key frame from which each, shown at its time (N,), is decoded.
+
+    What follows a key frame in the file but is shown before it is made from what came before, too.
+    """
+    key = np.maximum.accumulate(np.where(keys, np.arange(len(keys)), 0))
+    return np.where(times < times[key], key[np.maximum(key - 1, 0)], key).astype(np.int32)

@@ -1,31 +1,36 @@
 """The one video decoder: frames exactly in order, a placeholder with a reason where one is lost.
 
 The number of a frame comes from its time stamp, so a frame that the file lacks, or that can't be decoded, leaves
-a gap and does not shift the rest (but in an AVI with reordered frames, which has no times of display). What comes
-between a frame that can't be decoded and the next key frame is lost, too; damage that the decoder paints over is not
-told. All stamps are read once, without decoding, when a video is opened. Decoding always starts at the first frame:
-seeking lands on the wrong picture in some files, and a resumed run must see the same pixels.
+a gap and does not shift the rest. What is made from a frame that can't be decoded, or over whose damage the decoder
+painted, is lost, too; those of H.264 and MPEG-4 tell that they do. All stamps are read once, without decoding, when a
+video is opened. Decoding always starts at the first frame: seeking lands on the wrong picture in some files, and
+a resumed run must see the same pixels.
 """
 
 from __future__ import annotations
 
 import os
 import sys
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import chain, islice
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mocapflow.errors import RecordingError
 from mocapflow.io.images import IMAGES, check_depth, check_numbers, numbered, read_image
 from mocapflow.io.paths import led_nowhere
-from mocapflow.io.stamps import grabs, number_frames, open_capture, read_stamps
-from mocapflow.records import F64, I32, U8, Bool, array, record
+from mocapflow.io.stamps import HIDDEN, decode, open_stream, packets, picture, read_stamps
+from mocapflow.records import I32, U8, Bool, array, record
 
-NO_MORE = (sys.maxsize, False)  # the number after those of all frames
-TORN = "the frame is decoded from damaged ones"
+if TYPE_CHECKING:
+    from av import VideoFrame, VideoStream
+
+NO_MORE = (sys.maxsize, None, "")  # what comes after all frames
+DAMAGED, TORN = "the frame is damaged", "the frame is decoded from damaged ones"
 VIDEOS = (".mp4", ".avi", ".mov", ".mkv", ".m4v", ".webm", ".mpg")
 
 
@@ -38,17 +43,15 @@ class Video:
     height: int  # px
     frame_rate: float  # per second; 0 where nothing says it
     declared: int  # frames, as the file says; more than `frames` where it breaks off
-    stamps: F64 = array("N", unit="ms, time of each frame in the file, ascending; counted for images")
-    numbers: I32 = array("N", unit="frame number of each stamp")
-    keys: Bool = array("N", unit="True for frames that are decoded from nothing but themselves")
-    after_damage: Bool = array("N", unit="True for frames right before which the file can't be read")
+    numbers: I32 = array("N", unit="frame number of each packet, in the order of the file; HIDDEN where none is shown")
+    starts: I32 = array("N", unit="packet of the key frame from which each is decoded")
     first: int = 0  # number in the name of frame 0's image
     late: int = 0  # frames by which its pictures come after those of the other cameras
 
     @property
     def frames(self) -> int:
         """Frames up to the last one in the file, gaps included."""
-        return int(self.numbers[-1]) + 1 if len(self.numbers) else 0
+        return int(self.numbers.max()) + 1
 
 
 def open_video(path: Path) -> Video:
@@ -65,30 +68,7 @@ def open_video(path: Path) -> Video:
     if not os.access(path, os.R_OK):  # ffmpeg would only say that it can't be decoded
         hint = "let yourself read it, or copy it to a place of yours"
         raise RecordingError("this video may not be read: permission denied", where=str(path), hint=hint)
-    declared, rate, stamps, keys, after_damage = read_stamps(path)
-    with open_capture(path) as capture:
-        first = next((image for _ in grabs(capture) if (image := capture.retrieve()[1]) is not None), None)
-    if first is None or not len(stamps):
-        raise RecordingError(
-            "this video can't be decoded",
-            where=str(path),
-            hint="the file is cut off, damaged or no video; copy it again from the camera",
-        )
-    numbers = number_frames(stamps)
-    if numbers[-1] >= len(numbers):  # with gaps the declared rate is the average
-        rate = 1000 * float(numbers[-1]) / float(stamps[-1] - stamps[0])
-    height, width = first.shape[:2]
-    return Video(
-        path=path,
-        width=width,
-        height=height,
-        frame_rate=rate,
-        declared=max(declared, int(numbers[-1]) + 1),
-        stamps=stamps,
-        numbers=numbers,
-        keys=keys,
-        after_damage=after_damage,
-    )
+    return Video(path=path, **read_stamps(path)._asdict())
 
 
 def count_from_first(videos: Sequence[Video]) -> tuple[Video, ...]:
@@ -119,14 +99,16 @@ def read_frames(video: Video, indices: range) -> Iterator[tuple[U8 | None, str]]
 
 
 def _file_pictures(video: Video, indices: range) -> Iterator[tuple[U8 | None, str]]:
-    with open_capture(video.path) as capture:
-        decoded = _decoded(capture, video)
-        current, torn = next(decoded, NO_MORE)
+    with open_stream(video.path) as stream:
+        judged = _judged(stream, video)
+        current, frame, flaw = next(judged, NO_MORE)
         for index in indices:
             while current < index:
-                current, torn = next(decoded, NO_MORE)
-            done, image = capture.retrieve() if current == index and not torn else (False, None)
-            yield (image, "") if done else (None, TORN if current == index and torn else _why(video, index))
+                current, frame, flaw = next(judged, NO_MORE)
+            if frame is None or current > index:
+                yield None, _why(video, index)
+            else:
+                yield (None, flaw) if flaw else (picture(frame), "")
 
 
 def _why(video: Video, index: int) -> str:
@@ -139,33 +121,50 @@ def _why(video: Video, index: int) -> str:
     return "the frame can't be decoded"
 
 
-def _decoded(capture: Any, video: Video) -> Iterator[tuple[int, bool]]:
-    """Yield the number of each frame as it is decoded, and whether that is from frames that could not be.
+def _judged(stream: VideoStream, video: Video) -> Iterator[tuple[int, VideoFrame, str]]:
+    """Yield the number of each frame, its picture, and what is wrong with it.
 
-    A decoder goes on after a damaged frame with the differences from it, up to the next key frame.
+    A decoder goes on after a damaged frame with the differences from it, up to the next key frame. That it painted
+    over damage it tells with the picture, so a frame waits for those, shown later, that it may be made from.
     """
-    import cv2
+    damaged = np.zeros(len(video.numbers) + 1, bool)
+    latest = np.maximum.accumulate(video.numbers)
+    waiting: deque[tuple[int, int, VideoFrame]] = deque()
+    for decoded in chain(_numbered(stream, video.numbers, damaged), [None]):
+        while waiting and (decoded is None or latest[waiting[0][1]] <= decoded[0]):
+            number, place, frame = waiting.popleft()
+            start, starts = video.starts[place], video.starts[video.starts[place] : place]
+            torn = damaged[start:place][starts >= start].any()  # what is shown before a key frame is not used after it
+            yield number, frame, DAMAGED if damaged[place] else TORN if torn else ""
+        if decoded is not None:
+            waiting.append(decoded)
 
-    by_count = video.stamps[0] == video.stamps[-1]
-    before, torn = -1, False
-    for count, _ in enumerate(grabs(capture)):
-        now = capture.get(cv2.CAP_PROP_POS_MSEC)
-        if count == 0 and now != video.stamps[0] and video.path.suffix.lower() == ".avi":
-            by_count = True  # AVI keeps no times of display: with reordered frames only their order is known
-        row = count if by_count else int(np.abs(video.stamps - now).argmin())
-        torn = (torn or _lost_between(video, before, row)) and not video.keys[row]
-        before = row
-        yield int(video.numbers[row]), torn
 
+def _numbered(stream: VideoStream, numbers: I32, damaged: Bool) -> Iterator[tuple[int, int, VideoFrame]]:
+    """Yield number, packet and picture of each frame as it is decoded, in the order of display; marks damaged packets.
 
-def _lost_between(video: Video, before: int, row: int) -> bool:
-    """Return whether a frame was lost between two that are decoded one after the other; -1: before the first.
-
-    What a camera left out at once, so that times jump, is no loss.
+    Some files keep no times of display: their frames, if reordered, are numbered in the order in which they come.
     """
-    since = np.searchsorted(video.stamps, video.stamps[before], "right") if before >= 0 else 0
-    skipped = since < np.searchsorted(video.stamps, video.stamps[row])  # of frames with one time one alone is told
-    return bool(skipped or video.after_damage[row])
+    from av.video.frame import PictureType
+
+    timeless, reordered = bool((np.diff(numbers[numbers != HIDDEN]) > 0).all()), False
+    due: list[int] = []  # packets whose pictures are to come
+    for place, packet in enumerate(islice(packets(stream), len(damaged))):
+        if packet is not None:
+            packet.pts = place  # its picture gets it, too
+        frames, whole = decode(packet)
+        damaged[place] |= not whole
+        if whole and place < len(numbers) and numbers[place] != HIDDEN:
+            due.append(place)
+        for frame in frames:
+            own = int(frame.pts or 0)
+            damaged[own] |= frame.is_corrupt
+            reordered |= timeless and frame.pict_type == PictureType.B
+            turns = (each for each in due if reordered and (each >= own or not frame.key_frame))
+            number = int(numbers[min(turns, default=own)])
+            damaged[[each for each in due if numbers[each] < number]] = True  # passed over without a word
+            due = [each for each in due if numbers[each] > number]
+            yield number, own, frame
 
 
 def _open_folder(path: Path) -> Video:
@@ -188,10 +187,8 @@ def _open_folder(path: Path) -> Video:
         height=height,
         frame_rate=0.0,
         declared=max(files) + 1,
-        stamps=np.arange(len(numbers), dtype=np.float64),
         numbers=numbers,
-        keys=np.ones(len(numbers), bool),
-        after_damage=np.zeros(len(numbers), bool),
+        starts=np.arange(len(numbers), dtype=np.int32),
     )
 
 

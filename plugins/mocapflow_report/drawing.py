@@ -12,7 +12,6 @@ import numpy as np
 from mocapflow.errors import StoreError
 from mocapflow.io.atomic import atomic_write
 from mocapflow.io.paths import for_opencv
-from mocapflow.io.stamps import open_capture
 from mocapflow.records import F64, U8
 
 Colour = tuple[int, int, int]  # BGR
@@ -107,12 +106,12 @@ class Video:
         Raises:
             StoreError: it can't.
         """
+        import cv2
+
         self.close()
         if self._writer is None:
             return
-        with open_capture(self._path) as video:
-            whole = video.isOpened()
-        if not whole:
+        if not cv2.VideoCapture(for_opencv(self._path)).isOpened():
             where = str(self._path.parent)
             raise StoreError("a video is not whole after it was written", where=where, hint="is the drive full?")
 

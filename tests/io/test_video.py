@@ -1,17 +1,20 @@
 """Frames in order, and gaps that stay gaps."""
 
 import os
+import wave
 from dataclasses import replace
+from types import SimpleNamespace
 
+import av
 import cv2
 import numpy as np
 import pytest
 
 from mocapflow.errors import RecordingError
 from mocapflow.io.images import name_frames, numbered
-from mocapflow.io.stamps import number_frames
-from mocapflow.io.video import open_video, read_frames
-from tests.fixtures.recordings import avi_frames, mp4_frames, number_of, picture, write_video
+from mocapflow.io.stamps import decode, number_frames, packets
+from mocapflow.io.video import DAMAGED, TORN, open_video, read_frames
+from tests.fixtures.recordings import avi_frames, mp4_frames, number_of, picture, write_reordered, write_video
 
 FRAMES = 20
 
@@ -66,31 +69,144 @@ def test_what_is_decoded_from_a_damaged_frame_is_lost_up_to_the_next_key_frame(t
     assert [number_of(image) for image, _ in rows[key:]] == list(range(key, 30))
 
 
-@pytest.mark.parametrize(("unreadable", "lost"), [(False, [5]), (True, list(range(5, 13)))])
-def test_a_frame_that_is_missing_damages_others_only_if_it_was_there(tmp_path, unreadable, lost):
-    """A camera may have left it out; key frames are 0 and the one after the twelfth."""
+@pytest.mark.parametrize(
+    ("codec", "bad", "frame", "lost"),
+    [("libx264", 13, 15, range(13, 24)), ("mpeg4", 4, 6, range(4, 12)), ("mpeg4", 11, 10, range(10, 12))],
+)
+def test_what_is_made_from_a_frame_painted_over_is_lost(tmp_path, capfd, codec, bad, frame, lost):
+    """Key frames are 0, 12 and 24. The files have 15 before 13 and 14, and that of MPEG-4 has 12 before 10 and 11.
+
+    A decoder tells that it has painted over 15 when it has shown 13 and 14.
+    """
+    path = write_reordered(tmp_path / "a.mp4", 30, codec)
+    content = bytearray(path.read_bytes())
+    offset, length = mp4_frames(content)[bad]
+    content[offset + 8 : offset + length] = np.random.default_rng(0).bytes(length - 8)
+    path.write_bytes(content)
+    rows = list(read_frames(open_video(path), range(30)))
+    assert [i for i, (image, _) in enumerate(rows) if image is None] == list(lost)
+    assert (rows[frame][1], rows[lost[-1]][1]) == (DAMAGED, TORN)
+    assert all(number_of(image) == i for i, (image, _) in enumerate(rows) if image is not None)
+    assert capfd.readouterr().err == ""  # ffmpeg would tell, too
+
+
+def test_frames_that_the_decoder_passes_over_damage_others(tmp_path):
+    """The file lacks 15, so nothing comes of 13 and 14."""
+    video = open_video(write_reordered(tmp_path / "a.mp4", 30, without=[13]))
+    assert numbers(video) == [*range(13), *[None] * 11, *range(24, 30)]
+    assert video.frame_rate == pytest.approx(25)
+
+
+def test_what_a_decoder_swallows_of_an_avi_shifts_frames_up_to_the_next_key_frame(tmp_path, monkeypatch):
+    """It keeps no times of display, so reordered frames are counted; key frames are 0, 12 and 24."""
+
+    def swallow(packet):
+        frames, whole = decode(packet)
+        return [frame for frame in frames if frame.pts != 3], whole
+
+    video = open_video(write_reordered(tmp_path / "a.avi", 30, "libx264"))
+    monkeypatch.setattr("mocapflow.io.video.decode", swallow)
+    assert numbers(video)[12:] == list(range(12, 30))
+
+
+def test_a_part_that_can_not_be_read_damages_what_follows(tmp_path, monkeypatch):
+    """Key frames are 0 and 12."""
+    path = write_video(tmp_path / "a.mp4", FRAMES)
+
+    def with_hole(stream):
+        for place, packet in enumerate(packets(stream)):
+            yield from (None, packet) if place == 5 else (packet,)
+
+    monkeypatch.setattr("mocapflow.io.stamps.packets", with_hole)
+    monkeypatch.setattr("mocapflow.io.video.packets", with_hole)
+    assert numbers(open_video(path)) == [*range(5), *[None] * 7, *range(12, FRAMES)]
+
+
+def test_a_frame_that_a_camera_left_out_damages_no_others(tmp_path):
     video = open_video(write_video(tmp_path / "a.mp4", FRAMES))
     later = np.arange(FRAMES) + (np.arange(FRAMES) >= 5)
-    video = replace(video, numbers=later.astype(np.int32), after_damage=unreadable & (np.arange(FRAMES) == 5))
-    assert [index for index, (image, _) in enumerate(read_frames(video, range(FRAMES + 1))) if image is None] == lost
+    video = replace(video, numbers=later.astype(np.int32))
+    assert [index for index, (image, _) in enumerate(read_frames(video, range(FRAMES + 1))) if image is None] == [5]
 
 
-def test_of_frames_with_one_time_none_counts_as_lost(tmp_path):
+def test_reading_goes_on_after_an_error():
+    def demux(_):
+        yield from parts.pop(0)
+        if parts:
+            raise av.error.OSError(5, "Input/output error")
+
+    parts = [[SimpleNamespace(size=1)], [], [SimpleNamespace(size=2)]]
+    read = packets(SimpleNamespace(container=SimpleNamespace(demux=demux)))
+    assert [packet and packet.size for packet in read] == [1, None, None, 2]
+
+
+def test_packets_with_one_time_are_one_frame(tmp_path):
+    """VP8 has some that nobody sees, with the time of the next."""
     video = open_video(write_video(tmp_path / "a.mp4", FRAMES))
-    stamps = np.maximum(video.stamps, video.stamps[6])
-    video = replace(video, stamps=stamps)
-    assert not any("damaged" in why for _, why in read_frames(video, range(FRAMES)))
+    video = replace(video, numbers=np.maximum(np.arange(FRAMES) - 6, 0).astype(np.int32))
+    assert numbers(video) == [0, *range(7, FRAMES)]
+
+
+@pytest.mark.parametrize("codec", ["mpeg4", "libx264"])
+@pytest.mark.parametrize("ending", ["mp4", "avi", "mkv"])
+def test_reordered_frames(tmp_path, ending, codec):
+    assert numbers(open_video(write_reordered(tmp_path / f"a.{ending}", 30, codec))) == list(range(30))
+
+
+def test_players_do_not_show_what_is_cut_off_without_encoding_again(tmp_path):
+    video = open_video(write_reordered(tmp_path / "a.mp4", 30, hidden=5))
+    assert (video.frames, video.declared, video.frame_rate) == (25, 25, 25.0)
+    assert numbers(video) == list(range(5, 30))
+
+
+@pytest.mark.parametrize(("matrix", "turns"), [((0, 1, -1, 0), 1), ((-1, 0, 0, -1), 2), ((0, -1, 1, 0), 3)])
+def test_pictures_are_turned_as_players_do(tmp_path, matrix, turns):
+    upright = write_video(tmp_path / "a.mp4", 6)
+    content = bytearray(upright.read_bytes())
+    at = content.index(b"tkhd") + 44
+    for place, number in zip((0, 4, 12, 16), matrix, strict=True):
+        content[at + place : at + place + 4] = (number * 65536).to_bytes(4, "big", signed=True)
+    (tmp_path / "b.mp4").write_bytes(content)
+    video = open_video(tmp_path / "b.mp4")
+    assert (video.width, video.height) == ((48, 64) if turns % 2 else (64, 48))
+    capture = cv2.VideoCapture(str(video.path))
+    for (image, _), (before, _) in zip(
+        read_frames(video, range(6)), read_frames(open_video(upright), range(6)), strict=True
+    ):
+        np.testing.assert_array_equal(image, capture.read()[1])
+        np.testing.assert_array_equal(np.rot90(image, turns), before)
+
+
+@pytest.mark.parametrize("kind", ["yuv420p", "yuv420p10le", "gray", "bgr0"])
+def test_pictures_are_those_of_opencv(tmp_path, kind):
+    """Those of ten bits are scaled by a filter."""
+    path = str(tmp_path / "a.mkv")
+    with av.open(path, "w") as file:
+        stream = file.add_stream("ffv1", rate=25)
+        stream.width, stream.height, stream.pix_fmt = 62, 46, kind
+        noise = np.random.default_rng(0).integers(0, 256, (46, 62, 3), np.uint8)
+        file.mux(stream.encode(av.VideoFrame.from_ndarray(noise, "bgr24")) + stream.encode(None))
+    ((image, _),) = read_frames(open_video(tmp_path / "a.mkv"), range(1))
+    np.testing.assert_array_equal(image, cv2.VideoCapture(path).read()[1])
+
+
+def test_a_title_that_is_no_utf8(tmp_path):
+    path = write_video(tmp_path / "a.mp4", 3)
+    path.write_bytes(path.read_bytes().replace(b"Lavf", b"L\xe4vf"))
+    assert numbers(open_video(path)) == [0, 1, 2]
 
 
 def test_a_truncated_video_has_placeholders_to_the_end(tmp_path):
     path = write_video(tmp_path / "a.avi", FRAMES, codec="MJPG")
     content = path.read_bytes()
-    path.write_bytes(content[: avi_frames(content)[12][0] + 4])
+    offset, length = avi_frames(content)[12]
+    path.write_bytes(content[: offset + length - 8])
     video = open_video(path)
     assert video.declared == FRAMES
     rows = list(read_frames(video, range(FRAMES)))
     assert [number_of(image) for image, _ in rows[:12]] == list(range(12))
     assert {image is None for image, _ in rows[12:]} == {True}
+    assert rows[12][1] == DAMAGED
     assert rows[-1][1] == f"the video breaks off after frame {video.frames - 1}"
 
 
@@ -126,6 +242,7 @@ def test_gaps_in_the_time_stamps_are_lost_frames():
     assert number_frames(np.round(np.arange(3000) * period)).tolist() == list(range(3000))  # times in whole ms
     assert number_frames(np.zeros(4)).tolist() == [0, 1, 2, 3]
     assert number_frames(np.zeros(1)).tolist() == [0]
+    assert number_frames(np.array([0.0, 3, 1, 1, 2])).tolist() == [0, 3, 1, 1, 2]
 
 
 def test_frames_of_another_size_are_lost(tmp_path):
@@ -183,8 +300,12 @@ def test_hidden_files_are_no_images(tmp_path):
 
 def test_what_is_no_video(tmp_path):
     (tmp_path / "a.mp4").write_text("hello")
-    with pytest.raises(RecordingError, match="this video can't be decoded"):
-        open_video(tmp_path / "a.mp4")
+    with wave.open(str(tmp_path / "b.mp4"), "wb") as sound:
+        sound.setparams((1, 2, 8000, 0, "NONE", ""))
+        sound.writeframes(bytes(8000))
+    for name in ("a.mp4", "b.mp4", "gone.mp4"):
+        with pytest.raises(RecordingError, match="this video can't be decoded|may not be read"):
+            open_video(tmp_path / name)
     (tmp_path / "cam01").mkdir()
     with pytest.raises(RecordingError, match=r"no image in this folder can be read\n.*000000\.png"):
         open_video(tmp_path / "cam01")
