@@ -160,8 +160,10 @@ def _numbered(stream: VideoStream, numbers: I32, damaged: Bool) -> Iterator[tupl
             own = int(frame.pts or 0)
             damaged[own] |= frame.is_corrupt
             reordered |= timeless and frame.pict_type == PictureType.B
-            turns = (each for each in due if reordered and (each >= own or not frame.key_frame))
-            number = int(numbers[min(turns, default=own)])
+            turn = own
+            if reordered:  # times are those of decoding: each picture takes the first that is due
+                turn = min((each for each in due if each >= own or not frame.key_frame), default=own)
+            number = int(numbers[turn])
             damaged[[each for each in due if numbers[each] < number]] = True  # passed over without a word
             due = [each for each in due if numbers[each] > number]
             yield number, own, frame
