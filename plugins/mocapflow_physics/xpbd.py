@@ -32,7 +32,7 @@ class Xpbd(Draper):
     """
 
     name: ClassVar[str] = "xpbd"
-    skin_m: NonNegativeFloat = 0.005  # room between skin and cloth
+    skin_m: NonNegativeFloat = 0.005  # room between skin and cloth of no thickness
     rate_hz: Annotated[float, Field(ge=60)] = 1920.0  # steps of the solver per second
     move_s: PositiveFloat = 0.3  # in which the body comes from its last pose, or from rest
     rest_s: NonNegativeFloat = 0.3  # in which the cloth comes to rest
@@ -63,7 +63,7 @@ class Xpbd(Draper):
             [pins_at(strands, chain) for chain in chains] + [pins_at(strands, chains[-1])] * resting,
             parts + [parts[-1]] * resting,
             fitting.fields.values,
-            self.skin_m + thickness(garment, parameters),
+            self.skin_m + thickness(garment, parameters) / 2,
             pull_of(strands, garment, parameters, chains[-1]),
             drawn_in(garment, remaining_length(garment, parameters)),
             EVERY,
