@@ -95,32 +95,49 @@ def read_stamps(path: Path) -> Stamps:
     Raises:
         RecordingError: nothing in it can be decoded.
     """
-    first: list[VideoFrame] = []
-    rows = []
     with open_stream(path) as stream:
         container: Any = stream.container
-        for packet in packets(stream):
-            first = first or decode(packet)[0]
-            if packet is None or packet.size:
-                rows.append([getattr(packet, name, None) for name in ("pts", "dts", "is_keyframe", "is_discard")])
-        times, decoded_at, keys, hidden = np.array(rows, np.float64).reshape(-1, 4).T
-        times = np.where(np.isnan(times), decoded_at, times)
-        starts = find_starts(times, keys == 1)
+        first, found = _found(stream)
+        times = np.where(np.isnan(found.shown_at), found.decoded_at, found.shown_at)
+        starts = find_starts(times, found.key)
         if container.format.name == "avi" and np.mean(np.diff(times) < 0) < FEW:
-            times = decoded_at  # AVI has no times of display
-        shown = ~np.isnan(times) & (hidden == 0)
-        if not first or not shown.any():
+            times = found.decoded_at  # AVI has no times of display
+        shown = ~np.isnan(times) & ~found.hidden
+        if first is None or not shown.any():
             raise undecodable(path)
         numbers = np.full(len(times), HIDDEN, np.int32)
         numbers[shown] = number_frames(times[shown])
         frames = int(numbers.max()) + 1
         rate = float(stream.average_rate or 0)
         rate = rate if rate < FASTEST else 0.0
-        declared = (stream.frames or round((container.duration or 0) * rate / 1e6)) - int(np.sum(hidden == 1))
+        declared = (stream.frames or round((container.duration or 0) * rate / 1e6)) - int(found.hidden.sum())
         if frames > shown.sum():  # with gaps that rate is the average
             rate = (frames - 1) / float(np.ptp(times[shown]) * (stream.time_base or 0))
-        height, width, _ = picture(first[0]).shape
+        height, width, _ = picture(first).shape
     return Stamps(width, height, rate, max(declared, frames), numbers, starts)
+
+
+class Packets(NamedTuple):
+    """What the packets (N,) of a video say; times in its own unit, NaN where they are not known."""
+
+    shown_at: F64
+    decoded_at: F64
+    key: Bool
+    hidden: Bool
+
+
+def _found(stream: VideoStream) -> tuple[VideoFrame | None, Packets]:
+    """Return the first picture that can be decoded, None if there is none, and what all packets say."""
+    first: list[VideoFrame] = []
+    rows: list[tuple[float | None, float | None, bool, bool]] = []
+    for packet in packets(stream):
+        first = first or decode(packet)[0]
+        if packet is None:
+            rows.append((None, None, False, False))
+        elif packet.size:
+            rows.append((packet.pts, packet.dts, packet.is_keyframe, packet.is_discard))
+    shown_at, decoded_at, key, hidden = np.array(rows, np.float64).reshape(-1, 4).T
+    return (first[0] if first else None), Packets(shown_at, decoded_at, key > 0, hidden > 0)
 
 
 def number_frames(times: F64) -> I32:

@@ -133,8 +133,9 @@ def _judged(stream: VideoStream, video: Video) -> Iterator[tuple[int, VideoFrame
     for decoded in chain(_numbered(stream, video.numbers, damaged), [None]):
         while waiting and (decoded is None or latest[waiting[0][1]] <= decoded[0]):
             number, place, frame = waiting.popleft()
-            start, starts = video.starts[place], video.starts[video.starts[place] : place]
-            torn = damaged[start:place][starts >= start].any()  # what is shown before a key frame is not used after it
+            since = slice(video.starts[place], place)
+            used = video.starts[since] >= since.start  # what is shown before a key frame is not used after it
+            torn = damaged[since][used].any()
             yield number, frame, DAMAGED if damaged[place] else TORN if torn else ""
         if decoded is not None:
             waiting.append(decoded)

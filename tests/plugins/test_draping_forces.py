@@ -43,7 +43,7 @@ def standing():
 
 
 def from_the_front(scene, cloth):
-    """Return the silhouette of who stands there, as a camera far away sees it: a millimetre a pixel below the knees."""
+    """Return the silhouette of who stands there, as a camera far away sees it: a millimetre a pixel."""
     camera = Camera(
         name="front", size=np.array([900, 900], np.int32), distortion=np.zeros(5),
         intrinsics=np.array([[40000.0, 0, 450], [0, 40000.0, 450], [0, 0, 1]]),
