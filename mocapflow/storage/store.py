@@ -30,7 +30,7 @@ from mocapflow.storage.locks import Lock, acquire, looking
 from mocapflow.storage.rows import Corrupted, array_meta, flush_all, read_json, write_json
 
 SHORT = 12  # digits of the key in a group's name
-LIBRARIES = ("mocapflow", "numpy", "scipy", "opencv-python-headless", "numba")
+LIBRARIES = ("mocapflow", "numpy", "scipy", "opencv-python-headless", "av", "numba")
 Report = Callable[[str], None]
 
 
