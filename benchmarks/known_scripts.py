@@ -238,6 +238,26 @@ def akimbo(body: Body, t: np.ndarray) -> dict[str, np.ndarray]:
     return turn
 
 
+def scissors(body: Body, t: np.ndarray) -> dict[str, np.ndarray]:
+    """Return rotation vectors (T,3) per joint of legs that change places, one before the other behind, as scissors do.
+
+    Arms go against them; the trunk stays upright. Every 0.6 s a leg that was behind is before, its knee bent on the way.
+    """
+    turn = {name: np.zeros((len(t), 3)) for name in body.names}
+    apart = np.sin(np.pi * t / 0.6)
+    passing = np.cos(np.pi * t / 0.6)  # positive while the left leg comes forward
+    turn["pelvis"] = np.stack([0.04 + 0 * t, 0.02 * passing, 0.08 * apart], axis=1)
+    turn["spine"], turn["chest"] = np.outer(apart, [0, 0, -0.07]), np.outer(apart, [0, 0, -0.08])
+    for side, sign in (("_l", 1), ("_r", -1)):
+        lift = np.clip(sign * passing, 0, 1) ** 2
+        turn["hip" + side] = np.stack([-0.08 - sign * 0.5 * apart - 0.35 * lift, -sign * 0.04 + 0 * t, 0 * t], axis=1)
+        turn["knee" + side][:, 0] = 0.22 + 0.75 * lift
+        turn["ankle" + side][:, 0] = -0.12 + 0.3 * sign * apart
+        turn["shoulder" + side] = _reach(body, side, [[sign * 0.25, sign * 0.8 * a, -1] for a in apart])
+        turn["elbow" + side] = np.stack([-0.25 + 0 * t, 0 * t, sign * (0.45 - 0.15 * sign * apart)], axis=1)
+    return turn
+
+
 SCRIPTS = {
     "squat": squat,
     "dance": dance,
@@ -253,6 +273,7 @@ SCRIPTS = {
     "grapevine": grapevine,
     "sit": sit,
     "akimbo": akimbo,
+    "scissors": scissors,
 }
 
 

@@ -132,6 +132,8 @@ TAKES = {
     "swing_B_skirt": Take("B", "skirt", "swing", 131, GREEN, frames=60),
     "bow_A_skirt": Take("A", "skirt", "bow", 132, PURPLE, frames=60),
     "plie_B_shorts": Take("B", "shorts", "plie", 133, GREY),
+    "scissors_B_shorts": Take("B", "shorts", "scissors", 141, PURPLE),
+    "scissors_A_skirt": Take("A", "skirt", "scissors", 142, GREEN),
     "sit_B_skirt": Take("B", "skirt", "sit", 134, PURPLE, frames=60),
     # other rooms: white, and of the colour of skin
     "walk_A_studio": Take("A", "skirt", "walk_A", 121, GREEN, start=150, frames=40, room="studio"),
