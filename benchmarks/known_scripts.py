@@ -241,7 +241,7 @@ def akimbo(body: Body, t: np.ndarray) -> dict[str, np.ndarray]:
 def scissors(body: Body, t: np.ndarray) -> dict[str, np.ndarray]:
     """Return rotation vectors (T,3) per joint of legs that change places, one before the other behind, as scissors do.
 
-    Arms go against them; the trunk stays upright. Every 0.6 s a leg that was behind is before, its knee bent on the way.
+    Arms go against them; the trunk stays upright. Every 0.6 s a leg from behind is before, its knee bent on the way.
     """
     turn = {name: np.zeros((len(t), 3)) for name in body.names}
     apart = np.sin(np.pi * t / 0.6)

@@ -163,6 +163,6 @@ def _missing(folder: Path) -> Iterator[Finding]:
         )
     if not (folder / first_pose.FILE).exists() and not (folder / "keypoints").is_dir():
         yield note(
-            "there is neither init.json nor keypoints/: nothing tells the pose of the first frame",
-            "a run needs one of them: the stage start_from_file or start_from_keypoints",
+            "there is neither init.json nor keypoints/: silhouettes have to tell the pose of the first frame",
+            "use the stage start_from_silhouettes, which needs clean plates, or write init.json",
         )

@@ -66,7 +66,7 @@ class StartFromFile(Stage):
         if own.is_file() or path.is_file():
             return own if own.is_file() else path
         there = ", ".join(sorted(p.name for p in recording.folder.iterdir()))
-        hint = f"the recording has: {there}\nwithout a start pose, use the stage start_from_keypoints"
+        hint = f"the recording has: {there}\nelse use the stage start_from_silhouettes or start_from_keypoints"
         raise RecordingError("there is no file with the first pose", where=str(path), hint=hint)
 
 

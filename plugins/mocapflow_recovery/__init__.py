@@ -16,7 +16,8 @@ def mocapflow_recoveries() -> list[type[Recovery]]:
 
 @hookimpl
 def mocapflow_stages() -> list[type[Stage]]:
-    """Return the stage that looks at a finished track again."""
+    """Return the stages that find the person in the first frame, and that look at a finished track again."""
     from mocapflow_recovery.second_look import SecondLook
+    from mocapflow_recovery.start_from_silhouettes import StartFromSilhouettes
 
-    return [SecondLook]
+    return [StartFromSilhouettes, SecondLook]

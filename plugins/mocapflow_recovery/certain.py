@@ -99,6 +99,12 @@ def views(
     return found
 
 
+def changes(frame: Frame, number: int, room: Room) -> Bool:
+    """Return where (h, w) a small view differs from the empty room, the shadows of whoever is there included."""
+    small = crops.shrink(frame.images[number], room.factors[number])
+    return _compared(small, room.plates[number], np.zeros(small.shape[:2], bool))[0]
+
+
 def _compared(image: U8, plate: Plate, floor: Bool) -> tuple[Bool, Bool]:
     """Return where an image (h, w, 3) is not the empty room, lit or shaded, and where it looks just like it.
 

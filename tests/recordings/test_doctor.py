@@ -91,7 +91,7 @@ def test_a_good_recording_is_healthy(good):
 def test_no_first_pose_is_told_before_a_run_asks_for_it(good):
     (good / "init.json").unlink()
     assert messages(good, "note") == [
-        "there is neither init.json nor keypoints/: nothing tells the pose of the first frame"
+        "there is neither init.json nor keypoints/: silhouettes have to tell the pose of the first frame"
     ]
     (good / "keypoints").mkdir()
     assert messages(good, "note") == []

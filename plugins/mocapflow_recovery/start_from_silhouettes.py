@@ -1,0 +1,192 @@
+"""Stage `start_from_silhouettes`: the first pose from what differs from the empty room; no file, no keypoints."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from functools import cached_property, partial
+from typing import Annotated, ClassVar, NamedTuple
+
+import numpy as np
+from mocapflow_fitting.triangulate import triangulate
+from mocapflow_priors.density import Density, Poses, read
+from mocapflow_priors.parzen import SHIPPED
+from pydantic import Field, PositiveFloat, PositiveInt
+
+from mocapflow.assets import Body, Camera
+from mocapflow.components import Stage
+from mocapflow.data import NO_CLOTH, Frame, Pose, Start
+from mocapflow.errors import RecordingError
+from mocapflow.geometry.silhouettes import covered
+from mocapflow.io.plates import plate_files
+from mocapflow.recordings.recording import Recording
+from mocapflow.records import F64, Bool
+from mocapflow.scene import Scene
+from mocapflow_recovery.certain import Room, View, changes, small_room, views
+from mocapflow_recovery.disagreement import distance
+from mocapflow_recovery.judge import CAP_M
+from mocapflow_recovery.sampling import Cost, Plan, Spread, search
+
+LOG = logging.getLogger("mocapflow")
+NEAR_M = 0.6  # what differs from the room farther from somebody who stands upright there is somebody else
+SPREAD = Spread(angle=np.radians(25.0), turn=np.radians(12.0), shift=0.06)  # of the first samples
+SHARES = (1.0, 0.6, 0.4, 0.25, 0.12)  # of it, round by round
+SAMPLES, SEEN_SAMPLES = 40, 60  # of each part in a round, and of each limb as it was seen
+OTHERWISE = np.radians(60.0)  # between two directions that a person looks in
+ALIKE = 1.5  # times the least cost: so little worse, and another direction may be the right one
+
+
+class Seen(NamedTuple):
+    """What poses are compared with."""
+
+    bare: Scene  # the body alone, with few faces
+    views: Sequence[View]
+    middle: F64  # (3,) m, where the rays through the middles of the silhouettes meet
+
+
+class StartFromSilhouettes(Stage):
+    """Finds the pose of the first frame by what differs from the clean plates: the person, and nobody else.
+
+    Poses that people were seen in are put where the rays through the middles of the silhouettes meet, and turned all
+    ways. The best of some directions are searched part by part, as `limb_search` does; the one that ends nearest to the
+    silhouettes is taken. The farther a pose is from all that were seen the farther it counts: what silhouettes do not
+    tell, such as how an arm before the trunk is turned, stays natural. Clothes are left out.
+    """
+
+    name: ClassVar[str] = "start_from_silhouettes"
+    rows: Annotated[int, Field(ge=50)] = 160  # images are shrunk to about this height
+    faces: Annotated[int, Field(ge=200)] = 2600  # of the body that is compared
+    poses: Poses = SHIPPED  # that people were seen in, made by `mocapflow prior fit`
+    tried: PositiveInt = 24  # of these, as unlike each other as can be; standing upright is the first
+    directions: Annotated[int, Field(ge=4)] = 16  # in which each of them is turned
+    searches: PositiveInt = 4  # from the best pose of as many directions
+    natural_deg: PositiveFloat = 20.0  # a pose so far in each angle from all that were seen counts as twice as far off
+
+    def need(self, recording: Recording) -> None:
+        """Raise if there are no clean plates."""
+        if not plate_files(recording.folder, recording.views):
+            raise RecordingError(
+                "without clean plates silhouettes can't tell the first pose",
+                where=str(recording.folder / "background"),
+                hint="put a picture of the empty room per camera there, or use start_from_file or start_from_keypoints",
+            )
+
+    def run(self, recording: Recording, scene: Scene) -> Start:
+        """Return the pose of the first frame; the cloth starts without forces.
+
+        Raises:
+            RecordingError: there are no clean plates, or fewer than two cameras see a person in the first frame.
+        """
+        self.need(recording)
+        seen, density = self._seen(recording, scene), self._density
+        cost = partial(costs, seen=seen, known=density.on(scene.body.screw_names), natural=np.radians(self.natural_deg))
+        plan = Plan(SPREAD, SHARES, SAMPLES, density.on(scene.body.screw_names), SEEN_SAMPLES)
+        ends = [
+            search(cost, begin, scene.body, plan, np.random.default_rng(number))
+            for number, begin in enumerate(self._begins(scene.body, seen, cost))
+        ]
+        off = cost(ends)
+        best = int(off.argmin())
+        LOG.info("first pose: %.1f mm off the silhouettes in the mean", 1000 * off[best])
+        others = [value for value, end in zip(off, ends, strict=True) if apart(end, ends[best]) > OTHERWISE]
+        if min(others, default=np.inf) < ALIKE * off[best]:
+            LOG.warning("silhouettes of the first frame hardly tell which way the person looks: see the overlay")
+        return Start(pose=ends[best], parameters=scene.calm)
+
+    def _seen(self, recording: Recording, scene: Scene) -> Seen:
+        frame, background = recording.frame(recording.indices[0]), recording.background()
+        assert background is not None
+        room, bare = small_room(background, scene.cameras, self.rows), scene.undressed.simplified(self.faces)
+        upright = placed(bare, 0.0, np.zeros(len(bare.body.twists)), meeting(*largest_changes(frame, room)))
+        found = [view for view in views(frame, bare.surface(upright, NO_CLOTH), room, NEAR_M) if view.shown]
+        if len(found) < 2:
+            raise RecordingError(
+                f"frame {frame.index}: {len(found)} cameras show a person who is not in their clean plates",
+                where=str(recording.folder),
+                hint="begin where two cameras see all of the person; do plates and videos show the same room?",
+            )
+        return Seen(bare, found, meeting([view.person for view in found], [view.camera for view in found]))
+
+    def _begins(self, body: Body, seen: Seen, cost: Cost) -> list[Pose]:
+        """Return the best poses of some directions, best first."""
+        turns = np.linspace(0, 2 * np.pi, self.directions, endpoint=False)
+        angles = unlike(np.nan_to_num(self._density.on(body.screw_names)), self.tried)
+        poses = [[centred(placed(seen.bare, turn, each, seen.middle), seen) for each in angles] for turn in turns]
+        off = np.array([cost(those) for those in poses])
+        best = np.argsort(off.min(axis=1))[: self.searches]
+        return [poses[turn][int(off[turn].argmin())] for turn in best]
+
+    @cached_property
+    def _density(self) -> Density:
+        return read(self.poses)
+
+
+def costs(poses: Sequence[Pose], seen: Seen, known: F64, natural: float) -> F64:
+    """Return how far poses (B,) are from the silhouettes, m per unit of the person's area, more if nobody was seen so.
+
+    Args:
+        poses: to compare.
+        seen: what the views show.
+        known: (N, D) rad, poses that people were seen in; NaN where an angle is not known.
+        natural: rad, so far from all of these in each angle a pose counts twice.
+    """
+    surfaces = [seen.bare.surface(pose, NO_CLOTH) for pose in poses]
+    off = np.array([distance(surface, surface, seen.views, CAP_M) for surface in surfaces])
+    known = np.concatenate([np.zeros((1, known.shape[1])), np.nan_to_num(known)])
+    strange = [np.sqrt(((known - pose.angles) ** 2).mean(axis=1).min()) for pose in poses]
+    return np.asarray(off * (1 + np.array(strange) / natural))
+
+
+def apart(one: Pose, other: Pose) -> float:
+    """Return the angle (rad) between the directions in which two poses look."""
+    forward = one.root[:2, 1], other.root[:2, 1]
+    return float(np.arccos(np.clip(np.dot(*forward) / np.prod(np.linalg.norm(forward, axis=1)), -1, 1)))
+
+
+def unlike(poses: F64, count: int) -> list[F64]:
+    """Return the rest pose and those of N poses (N, D) that are farthest from it and each other."""
+    chosen, away = [np.zeros(poses.shape[1])], np.full(len(poses), np.inf)
+    while len(chosen) < min(count, len(poses) + 1):
+        away = np.minimum(away, ((poses - chosen[-1]) ** 2).sum(axis=1))
+        chosen.append(poses[int(away.argmax())])
+    return chosen
+
+
+def placed(bare: Scene, turn: float, angles: F64, middle: F64) -> Pose:
+    """Return a pose turned (rad) about the vertical, the box around the body in the middle (3) m."""
+    root = np.eye(4)
+    root[:2, :2] = [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]
+    vertices = bare.surface(Pose(root=root.copy(), angles=angles), NO_CLOTH).vertices
+    root[:3, 3] = middle - (vertices.max(axis=0) + vertices.min(axis=0)) / 2
+    return Pose(root=root, angles=angles)
+
+
+def centred(pose: Pose, seen: Seen) -> Pose:
+    """Return a pose moved so that its silhouettes and the person's have the same middle."""
+    surface = seen.bare.surface(pose, NO_CLOTH)
+    cameras = [view.camera for view in seen.views]
+    root = pose.root.copy()
+    root[:3, 3] += seen.middle - meeting([covered(surface, camera) for camera in cameras], cameras)
+    return Pose(root=root, angles=pose.angles)
+
+
+def meeting(masks: Sequence[Bool], cameras: Sequence[Camera]) -> F64:
+    """Return where (3) m the rays through the middles of masks (h, w) meet best."""
+    middles = [np.argwhere(mask).mean(axis=0)[::-1] if mask.any() else np.full(2, np.nan) for mask in masks]
+    position: F64 = triangulate(np.array(middles)[:, None], np.ones((len(masks), 1)), cameras).position[0]
+    return position
+
+
+def largest_changes(frame: Frame, room: Room) -> tuple[list[Bool], list[Camera]]:
+    """Return the largest part (h, w) of each usable view that differs from the room, and the views' cameras."""
+    import cv2
+
+    masks, cameras = [], []
+    for number in np.flatnonzero(frame.usable):
+        changed = changes(frame, int(number), room)
+        opened = cv2.morphologyEx(changed.view(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+        _, label, stats, _ = cv2.connectedComponentsWithStats(opened, connectivity=8)
+        stats[0, cv2.CC_STAT_AREA] = 0
+        masks.append((label == stats[:, cv2.CC_STAT_AREA].argmax()) & (opened > 0))
+        cameras.append(room.cameras[number])
+    return masks, cameras
