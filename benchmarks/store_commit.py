@@ -44,7 +44,7 @@ SIZE = (640, 800)  # px, width and height
 CLIP = Path(__file__).parents[1] / "examples" / "data" / "skirt_steps"
 ANGLES, CLOTH, MATCHES, BAND = 33, 1152, 1200, 12.0
 TERMS = tuple(f"term {k}" for k in range(20))  # of the functional
-STEPS = ("decode", "predict", "drape", "segment", "solve", "cloth", "match")
+STEPS = ("decode", "predict", "drape", "segment", "solve", "cloth", "energy")
 
 
 def main(count: int = 40) -> None:

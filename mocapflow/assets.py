@@ -57,7 +57,7 @@ class Body:
         """Refuse what points beyond the body: kernels look up unchecked.
 
         Raises:
-            ShapeError: an index is not that of a vertex or joint.
+            ShapeError: an index is not that of a vertex, joint or screw, or joints or screws are out of order.
         """
         if (stray := _stray(self.faces, len(self.vertices), 0)) is not None:
             raise ShapeError(f"Body: a face names vertex {stray} of {len(self.vertices)}")
@@ -66,6 +66,11 @@ class Body:
         for what, (index, least) in {"the skin": skin, "a screw": screws, "a parent": parents}.items():
             if (stray := _stray(index, count, least)) is not None:
                 raise ShapeError(f"Body: {what} names joint {stray} of {count}")
+        if (self.parents >= np.arange(count)).any() or (np.diff(self.screw_joint) < 0).any():
+            raise ShapeError("Body: parents have to stand before their children, and screws in the order of the joints")
+        start, stop = self.morph_range
+        if self.morph_offset is not None and (start == stop or not 0 <= self.morph_screw < len(self.twists)):
+            raise ShapeError("Body: its morph is driven by no angle, or over no range")
 
     @cached_property
     def main_joint(self) -> I32:

@@ -19,7 +19,7 @@ from mocapflow.records import record
 from mocapflow.steady import Shown, Steady, measure_change
 from mocapflow.timing import Stopwatch
 
-LAPS = ("segment", "solve", "cloth", "match")  # of a turn, timed
+LAPS = ("segment", "solve", "cloth", "energy")  # of a turn, timed
 
 
 @record
@@ -58,7 +58,7 @@ def settle(
         shown.append(now)
         if index == 0 and steady.far(change):
             far, steady = True, steady.beginning
-        watch.lap("match")
+        watch.lap("energy")
         observe(frame.index, turn, state)
         calm = calm + 1 if steady.holds(change, index + 1) and steady.even(last_cost, cost) else 0
         if calm >= steady.turns or index + 1 >= steady.max_turns:

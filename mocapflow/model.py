@@ -35,7 +35,7 @@ class ClothedModel:
 
     def drapes(self, pose: Pose, parameters: F64, past: Past) -> F64:
         """Return the garment's vertices (B, W, 3) laid on one pose with parameters (B, Q)."""
-        if self.draper is None:
+        if self.draper is None or self.scene.garment is None:
             return np.empty((len(parameters), 0, 3))
         count = len(parameters)
         poses = PoseBatch(
@@ -49,7 +49,7 @@ class ClothedModel:
 
     def velocity(self, pose: Pose, cloth: Cloth, vertices: I32, past: Past) -> F64:
         """Return the velocities (M, 3, 6 + D + Q) of cloth vertices (M,), numbered within the garment."""
-        if self.draper is None:
+        if self.draper is None or self.scene.garment is None:
             return np.zeros((len(vertices), 3, 6 + len(pose.angles)))
         return velocity_of(self.draper, pose, cloth.parameters, vertices, past, self.scene)
 
@@ -64,7 +64,7 @@ def _laid(pose: Pose, parameters: tuple[float, ...], past: ref[Past], model: Clo
 
 def increment_between(one: Pose, other: Pose) -> F64:
     """Return the increment (6 + D,) that leads from one pose to another; see `moved`."""
-    return np.concatenate([twists.log(other.root @ np.linalg.inv(one.root)), other.angles - one.angles])
+    return np.concatenate([twists.log(other.root @ twists.inverse(one.root)), other.angles - one.angles])
 
 
 def moved(pose: Pose, increment: F64) -> Pose:

@@ -31,8 +31,8 @@ Record = TypeVar("Record")
 Watch = Callable[[int, int], None]  # told how many frames are done, of how many
 
 
-def unwatched(done: int, of: int) -> None:
-    """Watch nothing."""
+def silent(*_: Any) -> None:
+    """Tell nobody."""
 
 
 class Axes(NamedTuple):
@@ -66,6 +66,8 @@ def _axes(field: dataclasses.Field[Any]) -> Axes:
     if not isinstance(field.type, str):
         raise ShapeError(f"{field.name}: begin the module of a record with `from __future__ import annotations`")
     name, _, rest = str(field.type).partition(" | ")
+    if name not in DTYPES:
+        raise ShapeError(f"{field.name}: the type of an array is one of {', '.join(DTYPES)}, not {name}")
     return Axes(field.metadata["axes"], field.metadata["unit"], np.dtype(DTYPES[name]), rest == "None", name == "Wide")
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from mocapflow.data import Flow, Frame, FrameResult, Pose, blind
 from mocapflow.knocks import Knocks
-from mocapflow.records import F32, F64, I16, I32, Bool, Watch, array, record, unwatched
+from mocapflow.records import F32, F64, I16, I32, Bool, Watch, array, record, silent
 from mocapflow.series import Wide
 
 
@@ -153,7 +153,7 @@ class RunFolder:
 
     path: Path
     recipe: Mapping[str, Any]  # pipeline, settings, versions, and per finished stage: key, cached, seconds, warnings
-    watch: Watch = unwatched  # to be told how many frames are written, of how many
+    watch: Watch = silent  # to be told how many frames are written, of how many
 
 
 @record

@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 from mocapflow.assets import Background
 from mocapflow.caching.keys import FREE
 from mocapflow.components import ClothFitter, Matcher, Observe, PoseSolver, Predictor, Prior, Recovery, Segmenter, Stage
-from mocapflow.data import Frame, FrameResult, FrameState, Past, Pose, Start, Turn
+from mocapflow.data import Frame, FrameResult, FrameState, Past, Pose, Start
 from mocapflow.dressing.roles import Draper
 from mocapflow.errors import ComponentFailed, PipelineError, noting
 from mocapflow.functional import image_cost
@@ -24,7 +24,7 @@ from mocapflow.loop import LAPS, Steps, settle
 from mocapflow.model import ClothedModel
 from mocapflow.prediction import believed, lost, notes_on, seen
 from mocapflow.recordings.recording import Recording
-from mocapflow.records import F64
+from mocapflow.records import F64, silent
 from mocapflow.results import ImageFlow, Track, ViewChecks
 from mocapflow.scene import Scene
 from mocapflow.steady import Steady
@@ -179,12 +179,12 @@ class CoupledLoop(Stage):
         if self.first_segmenter is None:
             return state
         steps = replace(self.steps, segmenter=self.first_segmenter)
-        near = settle(frame, state, past, steps, model, unobserved).state
+        near = settle(frame, state, past, steps, model, silent).state
         begins = (state, believed(near.estimate.pose, near.cloth.parameters, near.cloth))
         once = replace(self.steps, steady=Steady(max_turns=1))
 
         def costs(begin: FrameState) -> float:
-            result = settle(frame, begin, past, once, model, unobserved)
+            result = settle(frame, begin, past, once, model, silent)
             return image_cost(result.energy, result.energy_terms)
 
         return min(begins, key=costs)
@@ -203,7 +203,7 @@ class CoupledLoop(Stage):
         """Return the result of the loop from a pose and cloth parameters; nobody looks on."""
         with noting(f"frame {frame.index}"):
             begun = believed(pose, parameters, model.drape(pose, parameters, past))
-            return settle(frame, begun, past, self.steps, model, unobserved)
+            return settle(frame, begun, past, self.steps, model, silent)
 
     def complain(self, frame: Frame, result: FrameResult) -> None:
         """Stop at a frame that did not settle, if that is wanted."""
@@ -224,7 +224,3 @@ def prepared(frame: Frame, checks: ViewChecks | None, flow: ImageFlow | None) ->
     """Return a frame as it is tracked: without wrong views, with the flow into it."""
     passed = checks.passed(frame) if checks else frame
     return replace(passed, flow=flow.into(frame.index)) if flow else passed
-
-
-def unobserved(frame: int, turn: Turn, state: FrameState) -> None:
-    """Look on at no turn."""

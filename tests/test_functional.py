@@ -115,5 +115,5 @@ def test_two_priors_of_one_name_are_told_apart():
 
 def test_images_cost_what_the_last_turn_left_of_data_and_length():
     terms = ("cam01.data", "cam01.length", "cam02.data", "cam01.shape", "cam01.contour", "parzen")
-    assert image_cost(np.array([[1.0] * 6, [2.0, 1.0, np.nan, 4, 8, 16], [np.nan] * 6]), terms) == 3
+    assert image_cost(np.array([[5.0] * 6, [2.0, 1.0, np.nan, 4, 8, 16], [np.nan] * 6]), terms) == 3
     assert image_cost(np.full((2, 6), np.nan), terms) == 0  # of a lost frame

@@ -146,4 +146,4 @@ def test_the_change_is_the_largest_move_of_the_surface(frame):
 
 
 def test_cpu_seconds_of_every_step_are_measured(frame):
-    assert set(go(frame, 1.0).seconds) == {"segment", "solve", "cloth", "match"}
+    assert set(go(frame, 1.0).seconds) == {"segment", "solve", "cloth", "energy"}

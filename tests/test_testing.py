@@ -71,9 +71,13 @@ def test_impure_steps_are_found():
         (lambda body: {"skin_joint": body.skin_joint - 1}, "the skin names joint -1 of"),
         (lambda body: {"screw_joint": body.screw_joint + 9}, "a screw names joint"),
         (lambda body: {"parents": body.parents + 2}, "a parent names joint"),
+        (lambda body: {"parents": np.where(body.parents < 0, 1, body.parents)}, "parents have to stand before"),
+        (lambda body: {"screw_joint": body.screw_joint[::-1].copy()}, "parents have to stand before"),
+        (lambda body: {"morph_offset": body.vertices, "morph_screw": -1, "morph_range": (0.0, 1.0)}, "its morph"),
+        (lambda body: {"morph_offset": body.vertices, "morph_screw": 0, "morph_range": (1.0, 1.0)}, "its morph"),
     ],
 )
-def test_a_body_that_points_beyond_itself_is_refused_when_it_is_made(change, said):
+def test_a_body_that_contradicts_itself_is_refused_when_it_is_made(change, said):
     body = tiny_body()
     with pytest.raises(ShapeError, match=f"Body: {said}"):
         replace(body, **change(body))

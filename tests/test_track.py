@@ -34,7 +34,7 @@ def test_a_track_has_every_frame_and_says_how_it_went(tmp_path):
     assert track.cloth.shape == (12, 4, 3)
     assert track.cloth_parameters.shape == (12, 1)
     assert track.covariance.shape == (12, 8, 8)
-    assert track.step_names == ("decode", "predict", "drape", "segment", "solve", "cloth", "match", "recover")
+    assert track.step_names == ("decode", "predict", "drape", "segment", "solve", "cloth", "energy", "recover")
     assert track.seconds.shape == (12, 8)
     assert (track.seconds.sum(axis=1) > 0).all()
     assert set(track.iterations) <= {2, 3, 4}

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from mocapflow.errors import PipelineError, alternatives
 
-Steps = tuple[str | int, ...]  # the way to a value: keys of mappings, indices of lists
+KeyPath = tuple[str | int, ...]  # the way to a value: keys of mappings, indices of lists
 GROUPS = {"frames", "parts"}  # of plain settings, which a file may leave out
-STAGES: Steps = ("stages",)  # names in there are free: a wrong one would be a new one
+STAGES: KeyPath = ("stages",)  # names in there are free: a wrong one would be a new one
 BEFORE = " before "  # between a path and the name that its value is put before
 
 
@@ -28,9 +29,9 @@ class Document:
     """The values of a file with the place of each."""
 
     values: dict[str, Any]
-    places: Mapping[Steps, Place]
+    places: Mapping[KeyPath, Place]
 
-    def place(self, steps: Steps) -> Place:
+    def place(self, steps: KeyPath) -> Place:
         """Return where a value stands, or what a change has put in it, or the nearest one that contains it."""
         inside = (place for at, place in self.places.items() if at[: len(steps)] == steps)
         if steps not in self.places and (found := next(inside, None)):
@@ -40,7 +41,7 @@ class Document:
         return self.places[steps]
 
 
-def dotted(steps: Steps) -> str:
+def dotted(steps: KeyPath) -> str:
     """Return the path of a value as people write it."""
     return ".".join(map(str, steps))
 
@@ -58,8 +59,9 @@ def changed(document: Document, target: str, new: Document) -> Document:
     """
     path, _, successor = target.partition(BEFORE)
     parts = path.split(".")
-    values = holder = _copy(document.values)
-    steps: Steps = ()
+    values: Any = deepcopy(document.values)
+    holder = values
+    steps: KeyPath = ()
     for part in parts:
         if steps:
             holder = _opened(holder, steps[-1])
@@ -104,9 +106,3 @@ def _may_hold(holder: Any, key: str | int, last: bool) -> bool:
     if isinstance(holder, list):
         return isinstance(key, int) and key < len(holder)
     return isinstance(holder, dict) and (key in holder or last or "use" in holder or key in GROUPS)
-
-
-def _copy(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _copy(inner) for key, inner in value.items()}
-    return [_copy(inner) for inner in value] if isinstance(value, list) else value

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from mocapflow.config.documents import BEFORE, Document, Steps
+from mocapflow.config.documents import BEFORE, Document, KeyPath
 from mocapflow.errors import PipelineError
 
 ELSEWHERE = "recording"  # of a pipeline: an experiment says in `recordings` what it runs on
@@ -29,7 +29,7 @@ class Level(NamedTuple):
     where: str
 
 
-def changes_at(said: Mapping[str, Any] | None, steps: Steps, document: Document) -> dict[str, Change]:
+def changes_at(said: Mapping[str, Any] | None, steps: KeyPath, document: Document) -> dict[str, Change]:
     """Return what is said at a place of the file as changes, each with where it is written.
 
     Raises:
@@ -42,7 +42,7 @@ def changes_at(said: Mapping[str, Any] | None, steps: Steps, document: Document)
     return changes
 
 
-def levels_at(said: Mapping[str, Mapping[str, Any] | None], steps: Steps, document: Document) -> list[Level]:
+def levels_at(said: Mapping[str, Mapping[str, Any] | None], steps: KeyPath, document: Document) -> list[Level]:
     """Return the levels of the factor that is said at a place of the file.
 
     Raises:

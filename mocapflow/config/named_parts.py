@@ -16,7 +16,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from mocapflow.config.documents import Steps
+from mocapflow.config.documents import KeyPath
 from mocapflow.config.resolve import Resolver
 from mocapflow.errors import PipelineError, RecordingError, alternatives
 from mocapflow.io.cameras import YAML, calibration_files, find_calibration
@@ -104,7 +104,7 @@ def _links(part: str, value: Any, resolver: Resolver) -> Iterator[tuple[str, Pat
         raise resolver.located(PipelineError("no part of a recording", hint=alternatives(part, known)), steps)
 
 
-def _inside(part: str, value: Any, steps: Steps, resolver: Resolver) -> Iterator[tuple[str, Path]]:
+def _inside(part: str, value: Any, steps: KeyPath, resolver: Resolver) -> Iterator[tuple[str, Path]]:
     """Yield a folder as a whole, or what it is to hold."""
     if not isinstance(value, dict):
         path = _there(value, steps, resolver, folder=None if part in ALONE else True)
@@ -129,7 +129,7 @@ def _calibration(path: Path) -> Iterator[tuple[str, Path]]:
         yield "cameras.toml" if path.suffix == ".toml" else "cameras.qca.txt", path
 
 
-def _there(value: Any, steps: Steps, resolver: Resolver, folder: bool | None = None) -> Path:
+def _there(value: Any, steps: KeyPath, resolver: Resolver, folder: bool | None = None) -> Path:
     """Return a path that the file names, after a look; `folder` says what it has to be, None: either."""
     if not isinstance(value, str):
         raise resolver.located(PipelineError(f"a path is expected, not {value!r}"), steps)

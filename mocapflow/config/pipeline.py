@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, PositiveInt
 
 from mocapflow.components import Stage
-from mocapflow.config.documents import Document, Place, Steps, changed
+from mocapflow.config.documents import Document, KeyPath, Place, changed
 from mocapflow.config.frames import Frames, frames_of
 from mocapflow.config.measures import garment_of, place_of
 from mocapflow.config.named_parts import folder_of
@@ -179,7 +179,7 @@ def _with_frames(document: Document, part: slice) -> Document:
     before, place = document.values.get("frames"), document.place(("frames",))
     if isinstance(before, str) and (step := frames_of(before, place.text).step) is not None:
         before = {"step": step}
-    places: dict[Steps, Place] = {(): Place(f"--frames {written.removesuffix(':')}", Path())}
+    places: dict[KeyPath, Place] = {(): Place(f"--frames {written.removesuffix(':')}", Path())}
     if part.step is None and isinstance(before, dict) and "step" in before:
         said["step"], places["step",] = before["step"], document.place(("frames", "step"))
     return changed(document, "frames", Document(said, places))

@@ -10,7 +10,7 @@ from typing import Any, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic.errors import PydanticUserError
 
-from mocapflow.config.documents import Document, Steps, dotted
+from mocapflow.config.documents import Document, KeyPath, dotted
 from mocapflow.errors import MocapflowError, PipelineError, guess
 from mocapflow.registry import Registry
 from mocapflow.settings import Component, plain_parts
@@ -25,7 +25,7 @@ class Resolver:
     def __init__(self, document: Document, registry: Registry) -> None:
         self._document, self.registry = document, registry
 
-    def component(self, role: str, value: Any, steps: Steps, defaults: Mapping[str, Any] | None = None) -> Any:
+    def component(self, role: str, value: Any, steps: KeyPath, defaults: Mapping[str, Any] | None = None) -> Any:
         """Return the component written at `steps` as a name or as {use: name, setting: value}.
 
         Args:
@@ -47,7 +47,7 @@ class Resolver:
                     for key, inner in given.items()}  # fmt: skip
         return self.build(cls, {**(defaults or {}), **settings}, steps)
 
-    def build(self, cls: type[BaseModel], settings: Mapping[str, Any], steps: Steps) -> BaseModel:
+    def build(self, cls: type[BaseModel], settings: Mapping[str, Any], steps: KeyPath) -> BaseModel:
         """Return an instance of a pydantic model, its validation error told by line."""
         try:
             return cls(**settings)
@@ -58,20 +58,20 @@ class Resolver:
             hint = "import the types of its settings when the module is imported, not under TYPE_CHECKING"
             raise self.located(PipelineError(message, hint=hint), steps) from None
 
-    def place(self, steps: Steps) -> str:
+    def place(self, steps: KeyPath) -> str:
         """Return where a value is written, as file:line:column."""
         return self._document.place(steps).text
 
-    def located(self, error: MocapflowError, steps: Steps) -> MocapflowError:
+    def located(self, error: MocapflowError, steps: KeyPath) -> MocapflowError:
         """Return an error told with the place and the path of a value."""
         message = f"{dotted(steps)}: {error.message}" if steps else error.message
         return type(error)(message, where=self.place(steps), hint=error.hint)
 
-    def file(self, value: str, steps: Steps) -> Path:
+    def file(self, value: str, steps: KeyPath) -> Path:
         """Return a path written in the file; a relative one starts at the folder of the file."""
         return Path(os.path.normpath(self._document.place(steps).folder / os.path.expanduser(value)))
 
-    def _name_and_settings(self, role: str, value: Any, steps: Steps) -> tuple[str, dict[str, Any]]:
+    def _name_and_settings(self, role: str, value: Any, steps: KeyPath) -> tuple[str, dict[str, Any]]:
         if isinstance(value, str):
             return value, {}
         if isinstance(value, dict) and isinstance(value.get("use"), str):
@@ -80,7 +80,7 @@ class Resolver:
         message = f"name a {role}, as `name` or as {{use: name, setting: value}}"
         raise self.located(PipelineError(message, hint=hint), steps)
 
-    def _setting(self, annotation: Any, value: Any, steps: Steps) -> Any:
+    def _setting(self, annotation: Any, value: Any, steps: KeyPath) -> Any:
         """Return a value of the file as the model takes it: nested components built, paths made absolute."""
         base = _component_base(annotation)
         if value is None:
@@ -97,7 +97,7 @@ class Resolver:
             return (self.component(base.role, value, steps),)
         return tuple(self.component(base.role, item, (*steps, index)) for index, item in enumerate(value))
 
-    def _wrong_setting(self, cls: type[BaseModel], error: ValidationError, steps: Steps) -> MocapflowError:
+    def _wrong_setting(self, cls: type[BaseModel], error: ValidationError, steps: KeyPath) -> MocapflowError:
         errors = error.errors(include_url=False)
         first = errors[0]
         if first["type"] == "missing":  # it may be there, misspelt
@@ -122,7 +122,7 @@ class Resolver:
         message = reason if first["type"] == "value_error" else reason[:1].lower() + reason[1:] + got
         return self.located(PipelineError(message), (*steps, *location))
 
-    def _is_setting(self, cls: type[BaseModel], location: tuple[str | int, ...], steps: Steps) -> bool:
+    def _is_setting(self, cls: type[BaseModel], location: tuple[str | int, ...], steps: KeyPath) -> bool:
         return (*steps, *location) in self._document.places or location[-1] in _model_at(
             cls, location[:-1]
         ).model_fields

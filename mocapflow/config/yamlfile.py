@@ -10,7 +10,7 @@ from typing import Any
 
 import yaml
 
-from mocapflow.config.documents import Document, Place, Steps, changed, dotted
+from mocapflow.config.documents import Document, KeyPath, Place, changed, dotted
 from mocapflow.errors import PipelineError, alternatives
 
 LEADING_ZERO = re.compile(r"[-+]?0[0-9_]")  # 0x10 and 0b10 say themselves what they are
@@ -76,7 +76,7 @@ class _Built:
     """Values of YAML nodes, and where each was written."""
 
     def __init__(self, file: str, path: Path | None) -> None:
-        self.places: dict[Steps, Place] = {}
+        self.places: dict[KeyPath, Place] = {}
         self.folder = path.parent if path else Path()
         self._file, self._lines = file, path is not None
 
@@ -84,7 +84,7 @@ class _Built:
         """Return a place for people."""
         return f"{self._file}:{mark.line + 1}:{mark.column + 1}" if self._lines else self._file
 
-    def value(self, node: yaml.Node, steps: Steps, loader: yaml.SafeLoader) -> Any:
+    def value(self, node: yaml.Node, steps: KeyPath, loader: yaml.SafeLoader) -> Any:
         """Return the value of a node, which is found in the document by these steps.
 
         Raises:
@@ -101,7 +101,7 @@ class _Built:
             return [self.value(item, (*steps, index), loader) for index, item in enumerate(node.value)]
         return self._plain(node, loader)
 
-    def _key(self, node: yaml.Node, steps: Steps, loader: yaml.SafeLoader) -> str:
+    def _key(self, node: yaml.Node, steps: KeyPath, loader: yaml.SafeLoader) -> str:
         key: Hashable = self._plain(node, loader)
         where = self.where(node.start_mark)
         if not isinstance(key, str):
@@ -158,6 +158,6 @@ def _extended(child: Document, path: Path) -> Document:
     return base
 
 
-def _places(document: Document, steps: Steps) -> dict[Steps, Place]:
+def _places(document: Document, steps: KeyPath) -> dict[KeyPath, Place]:
     """Return the places of a value and of what is in it, by the way from there."""
     return {at[len(steps) :]: place for at, place in document.places.items() if at[: len(steps)] == steps}

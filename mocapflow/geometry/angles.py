@@ -119,7 +119,6 @@ def measure(
         joints, screws = kinematics.chain(body, Pose(root=root[row].copy(), angles=angles[row].copy()))
         places = kinematics.joint_positions(body, joints)
         moves = _velocities(places, screws, below)
-        spread = None if covariance is None else covariance[row]
         for column, (wish, index) in enumerate(zip(wanted, indices, strict=True)):
             if len(index) == 3:
                 value[row, column] = three_point(places[index]) + wish.offset
@@ -131,8 +130,8 @@ def measure(
                 value[row, column], gradient = _flexion(places[index], moves[index], seen_from, turn)
             if np.abs(gradient[6:]).max(initial=0.0) < UNMOVED:
                 continue
-            if spread is not None:
-                variance = float(gradient @ spread @ gradient)
+            if covariance is not None:
+                variance = float(gradient @ covariance[row] @ gradient)
                 sd[row, column] = np.degrees(np.sqrt(max(variance, 0.0)))
             if observed is not None:
                 share[row, column] = np.average(observed[row], weights=gradient[6:] ** 2)

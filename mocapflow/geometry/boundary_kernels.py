@@ -109,7 +109,7 @@ def paint_distance(ends, first, spans, band, distance):  # type: ignore[no-untyp
 
 @numba.njit(cache=True)
 def _reached(places, band, size):  # type: ignore[no-untyped-def]
-    """Return the first and last-but-one pixel of `size` within the band around places (B, 2) along an axis."""
+    """Return the first of `size` pixels in the band around places (B, 2) along an axis, and the one after the last."""
     low = min(max(math.floor(max(places.min() - band, 0.0)), 0), size)
     return low, max(math.ceil(min(places.max() + band + 1.0, size)), low)
 

@@ -9,7 +9,7 @@ import numpy as np
 from mocapflow.records import F32, U8, Bool
 
 
-class Steps(NamedTuple):
+class LucasKanade(NamedTuple):
     """How points are followed."""
 
     window_px: int  # edge of the square that is compared
@@ -19,14 +19,14 @@ class Steps(NamedTuple):
     round_trip_px: float  # how near a point has to come to where it was
 
 
-def followed(old: U8, new: U8, points: F32, steps: Steps) -> tuple[F32, Bool]:
+def followed(old: U8, new: U8, points: F32, steps: LucasKanade) -> tuple[F32, Bool]:
     """Return where points (N, 2) px of a grey picture (H, W) are in another, and which come back from there."""
     there, found = _step(old, new, points, steps)
     back, refound = _step(new, old, there, steps)
     return there, found & refound & (np.linalg.norm(back - points, axis=1) < steps.round_trip_px)
 
 
-def _step(old: U8, new: U8, points: F32, steps: Steps) -> tuple[F32, Bool]:
+def _step(old: U8, new: U8, points: F32, steps: LucasKanade) -> tuple[F32, Bool]:
     import cv2
 
     window = (steps.window_px, steps.window_px)

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from mocapflow.assets import Body
 from mocapflow.data import Pose, PoseBatch
+from mocapflow.errors import ShapeError
 from mocapflow.geometry.twists import hat
 from mocapflow.records import F64, I32, Bool
 
@@ -25,6 +26,8 @@ def chain(body: Body, pose: Pose) -> tuple[F64, F64]:
 
     Source: Rosenhahn 2008, Eq. (12.8)
     """
+    if len(pose.angles) != len(body.twists):
+        raise ShapeError(f"a pose of {len(pose.angles)} angles; the body has {len(body.twists)}")
     joints = np.empty((len(body.parents), 4, 4))
     screws = np.empty((len(body.twists), 6))
     _chain(pose.root, pose.angles, body.twists, body.screw_joint, body.parents, joints, screws)
@@ -68,7 +71,7 @@ def rest_shape(body: Body, angles: F64) -> F64:
 def morph_rate(body: Body, angles: F64) -> F64 | None:
     """Return how the vertices at rest change with the angle that drives the morph: (V, 3) m/rad; None outside it."""
     start, stop = body.morph_range
-    if body.morph_offset is None or not start < angles[body.morph_screw] < stop:
+    if body.morph_offset is None or not min(start, stop) < angles[body.morph_screw] < max(start, stop):
         return None
     return body.morph_offset / (stop - start)
 

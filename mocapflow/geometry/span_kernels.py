@@ -40,7 +40,7 @@ def crossings(ends, size):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True)
 def _rows(one, other, height):  # type: ignore[no-untyped-def]
-    """Return the first and last-but-one row of an image between two heights."""
+    """Return the first row of an image between two heights, and the one after the last."""
     return max(math.ceil(min(one, other)), 0), min(math.ceil(max(one, other)), height)
 
 

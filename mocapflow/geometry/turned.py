@@ -7,13 +7,13 @@ from typing import TypeVar
 import numpy as np
 
 from mocapflow.assets import Camera
-from mocapflow.geometry.following import Steps, followed
+from mocapflow.geometry.following import LucasKanade, followed
 from mocapflow.records import F32, F64, U8, Bool
 
 Picture = TypeVar("Picture", U8, F32)
 
 CORNERS, STRENGTH, SPACING_PX = 200, 0.005, 8.0  # at most; share of the strongest one's strength; apart
-STEPS = Steps(window_px=21, levels=3, most=30, rest_px=0.01, round_trip_px=0.3)
+STEPS = LucasKanade(window_px=21, levels=3, most=30, rest_px=0.01, round_trip_px=0.3)
 AGREE_PX = 1.0  # a corner off the common motion belongs to the person, or to what was moved in the room
 FEWEST, SHARE = 12, 0.6  # of corners that have to agree
 LEAST_PX, CLEAR = 0.5, 2.0  # by which corners of the room move, root mean square; times what the motion leaves of it

@@ -34,7 +34,7 @@ def examine_rig(cameras: Sequence[Camera]) -> Iterator[Finding]:
     yield from _common_view(cameras)
     yield from _world_up(cameras)
     yield from _doubles(cameras)
-    for (a, va), (b, vb) in combinations([(camera.name, _forward(camera)) for camera in cameras], 2):
+    for (a, va), (b, vb) in combinations([(camera.name, camera.camera_from_world[2, :3]) for camera in cameras], 2):
         angle = np.degrees(np.arccos(np.clip(va @ vb, -1, 1)))
         if angle > OPPOSED:
             yield note(
@@ -98,11 +98,6 @@ def _sees(camera: Camera, points: F64) -> Bool:
     near = np.linalg.norm(points - centre(camera), axis=1) < FARTHEST
     seen: Bool = inside[:, 0] & inside[:, 1] & near
     return seen
-
-
-def _forward(camera: Camera) -> F64:
-    forward: F64 = camera.camera_from_world[2, :3]
-    return forward
 
 
 def _world_up(cameras: Sequence[Camera]) -> Iterator[Finding]:

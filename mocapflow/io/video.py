@@ -115,7 +115,8 @@ def _why(video: Video, index: int) -> str:
     if index < 0:
         return "the video starts later"
     if index >= video.frames:
-        return f"the video breaks off after frame {video.frames - 1}"
+        broken = video.frames < video.declared
+        return f"the video breaks off after frame {video.frames - 1}" if broken else "the video ends earlier"
     if index not in video.numbers:
         return "the frame is missing in the video: its time stamps jump"
     return "the frame can't be decoded"

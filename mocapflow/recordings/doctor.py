@@ -68,7 +68,9 @@ def examine_timing(folder: Path, write: bool = False) -> list[Finding]:
         return findings
     findings.append(note(", ".join(f"{m.camera} {m.frames:+.1f} ± {m.sd:.1f}" for m in measured) + " frames late"))
     known = late_frames(folder, [m.camera for m in measured])
-    late = {m.camera: before + m.frames for m, before in zip(measured, known, strict=True) if before or m.sure}
+    total = [before + m.frames * m.sure for m, before in zip(measured, known, strict=True)]
+    least = min(total, key=abs) if min(total) > 0 or max(total) < 0 else 0  # not every camera can be late
+    late = {m.camera: frames - least for m, frames in zip(measured, total, strict=True) if frames != least}
     if not any(m.sure for m in measured):
         return findings
     if write:

@@ -21,7 +21,7 @@ from mocapflow.io.lenses import View
 from mocapflow.io.occluders import occluder
 from mocapflow.io.plates import background
 from mocapflow.io.video import Video, read_frames
-from mocapflow.records import F64, Bool, Watch, record, unwatched
+from mocapflow.records import F64, Bool, Watch, record, silent
 
 LEAST_PX = 8  # from side to side; nobody is seen in fewer
 
@@ -50,7 +50,7 @@ class Recording:
     length: int  # frames in the videos
     warnings: tuple[str, ...] = ()  # what a user should know; also in run.json
     changes: tuple[FrameChange, ...] = ()  # to the frames as they are read, one after another
-    watch: Watch = unwatched  # told as `frames` goes on
+    watch: Watch = silent  # told as `frames` goes on
 
     @cached_property
     def cameras(self) -> tuple[Camera, ...]:
@@ -130,7 +130,7 @@ class Recording:
         }
 
     def _read(self, indices: range) -> Iterator[Frame]:
-        source = replace(self, changes=self.changes[:-1], watch=unwatched)
+        source = replace(self, changes=self.changes[:-1], watch=silent)
         frames = self.changes[-1].frames(source, indices) if self.changes else self._decode(indices)
         for done, frame in enumerate(frames, 1):
             yield frame

@@ -18,7 +18,7 @@ from mocapflow.dressing.roles import Garment
 from mocapflow.errors import GarmentError
 from mocapflow.interrupts import check
 from mocapflow.recordings.recording import Recording
-from mocapflow.records import unwatched
+from mocapflow.records import silent
 from mocapflow.results import RunFolder
 from mocapflow.running.blame import LOG, blaming
 from mocapflow.running.progress import Progress
@@ -177,8 +177,8 @@ class Execution:
         return Made(value, [*told, *mixed], time.process_time() - cpu, time.perf_counter() - wall)
 
     def _input(self, step: Step, source: Source, checkpoint: Checkpoint | None) -> Any:
-        silent = checkpoint is not None or step.passes_frames
-        watch = unwatched if silent else Progress(step.label, self._report, brief=True).tell
+        quiet = checkpoint is not None or step.passes_frames
+        watch = silent if quiet else Progress(step.label, self._report, brief=True).tell
         given: Any = None
         match source:
             case tuple():
@@ -263,8 +263,9 @@ class Execution:
         now, frames, first, said = versions(), step.recording.indices, 0, list[str]()
         for last, made in artifact.made_with:
             other = [f"{name} {was}, now {now.get(name)}" for name, was in made.items() if now.get(name) != was]
-            if other:
-                begin, end = (frames.start + frames.step * count for count in (first, last - 1))
+            wanted = min(last, step.frames)
+            if other and (first < wanted or not step.chain):
+                begin, end = (frames.start + frames.step * count for count in (first, wanted - 1))
                 what = f"frames {begin}–{end} of {step.label}" if step.chain else step.label
                 said.append(f"{what} were made with {'; '.join(other)}")
                 self._report(f"warning: {said[-1]}")

@@ -11,17 +11,16 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 
 from mocapflow.caching.keys import explain
+from mocapflow.config.named_parts import FOLDERS, WHOLE
 from mocapflow.config.pipeline import Pipeline
 from mocapflow.errors import MocapflowError, PipelineError, no_run_folder
 from mocapflow.io.paths import for_opencv
+from mocapflow.records import silent
 from mocapflow.running.execution import Execution, find_hit, is_hit
 from mocapflow.running.recipes import Step, steps_of
 from mocapflow.running.wiring import SUPPLIED, Source
 from mocapflow.storage.shared import open_store
 from mocapflow.storage.store import Report, Store
-
-# what a recording holds; files of a run in there would be taken for its own
-INPUTS = ("videos", "background", "occluders", "subject", "keypoints", "static", "truth", "reference")
 
 
 @dataclass(frozen=True)
@@ -83,9 +82,7 @@ class Prepared:
         self.store.create()
         self.store.digests.save()
 
-    def run(
-        self, out: Path, *, fresh: bool = False, only: str | None = None, report: Report = lambda line: None
-    ) -> RunSummary:
+    def run(self, out: Path, *, fresh: bool = False, only: str | None = None, report: Report = silent) -> RunSummary:
         """Make what is not in the store yet and return what was done; see `run`."""
         try:
             out.mkdir(parents=True, exist_ok=True)
@@ -141,7 +138,7 @@ def run(
     url: str | None = None,
     fresh: bool = False,
     only: str | None = None,
-    report: Report = lambda line: None,
+    report: Report = silent,
 ) -> RunSummary:
     """Run a pipeline and return what was done.
 
@@ -173,7 +170,7 @@ def check_apart(out: Path, store: Path, recording: Path) -> None:
         PipelineError: the run folder or the store is the recording folder, or lies in one of its folders.
     """
     folder = recording.resolve()
-    inside = [(folder / name).resolve() for name in INPUTS]  # links, where a pipeline names each part
+    inside = [(folder / name).resolve() for name in (*FOLDERS, WHOLE)]  # links, where a pipeline names each part
     for what, path, option in (("results", out, "--out"), ("stored results", store, "--store")):
         if path.resolve() == folder or any(path.resolve().is_relative_to(place) for place in inside):
             hint = f"give {what} a folder of their own: {option} {Path('runs') / folder.name}"

@@ -85,7 +85,7 @@ def save_array(group: zarr.Group, name: str, values: Any, axes: list[str], unit:
 
     chunks = tuple(max(1, min(BLOCK, n) if axes[:1] == ["T"] and not i else n) for i, n in enumerate(values.shape))
     made = group.create_array(
-        name, shape=values.shape, chunks=chunks or (), dtype=values.dtype, dimension_names=axes,
+        name, shape=values.shape, chunks=chunks, dtype=values.dtype, dimension_names=axes,
         compressors=[ZstdCodec(level=1, checksum=True)], attributes={"unit": unit} if unit else {},
         config={"write_empty_chunks": True},  # so that a chunk that lacks is damage, and no zeros
     )  # fmt: skip
@@ -114,7 +114,7 @@ def _is_nested(value: Any) -> bool:
     return is_dataclass(value)
 
 
-def _save_nested(group: zarr.Group, value: Any, axes: tuple[str, ...] = (), unit: str = "") -> None:
+def _save_nested(group: zarr.Group, value: Any, axes: tuple[str, ...], unit: str) -> None:
     if is_dataclass(value):
         save_record(group, value)
         return

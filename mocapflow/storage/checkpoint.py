@@ -27,7 +27,7 @@ from mocapflow.data import (
 )
 from mocapflow.interrupts import check
 from mocapflow.io.atomic import forget_parts
-from mocapflow.records import F64
+from mocapflow.records import F64, silent
 from mocapflow.results import Track
 from mocapflow.storage import packing
 from mocapflow.storage.growing import CLOTH, NUMBERS, Growing
@@ -36,10 +36,6 @@ from mocapflow.storage.packing import column
 from mocapflow.storage.rows import write_json
 from mocapflow.storage.sealing import seal
 from mocapflow.storage.store import Artifact, Store, group_meta, writing
-
-
-def silent(*_: Any) -> None:
-    """Tell nobody."""
 
 
 class Checkpoint:

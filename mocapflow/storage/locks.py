@@ -25,8 +25,8 @@ POLL = 0.2  # s between looks at a lock that another run holds
 class Lock:
     """A lock that was acquired; `check` before each write notices that another run took it over."""
 
-    def __init__(self, path: Path, said: str) -> None:
-        self._path, self._said = path, said
+    def __init__(self, path: Path, said: str, name: str) -> None:
+        self._path, self._said, self._name = path, said, name
         self._done = threading.Event()
         self._thread = threading.Thread(target=self._beat, name=f"heartbeat of {path.name}", daemon=True)
         self._thread.start()
@@ -42,7 +42,7 @@ class Lock:
             raise StoreError(f"the store {self._path.parents[1]} is gone", hint=hint)
         if not self._ours():
             hint = "this run stood still for too long; without --fresh the same command continues from what is saved"
-            raise StoreError(f"another run took over {self._path.stem}", hint=hint)
+            raise StoreError(f"another run took over {self._name}", hint=hint)
 
     def release(self) -> None:
         """Give the lock back."""
@@ -82,7 +82,7 @@ def acquire(path: Path, name: str, report: Callable[[str], None]) -> Lock:
                 except OSError:  # the drive is full: nobody holds it
                     path.unlink(missing_ok=True)
                     raise
-                return Lock(path, said)
+                return Lock(path, said, name)
         if not told:
             report(f"{name}: waiting for {who(holder)}, which is making it")
             told = True

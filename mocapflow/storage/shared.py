@@ -16,6 +16,7 @@ from typing import Any
 from uuid import uuid4
 
 from mocapflow.errors import StoreError
+from mocapflow.records import silent
 from mocapflow.storage.copies import META, Copies, Copy, further
 from mocapflow.storage.locks import Lock
 from mocapflow.storage.rows import Corrupted, flush_all
@@ -47,7 +48,7 @@ class SharedStore(Store):
     def load(self, artifact: Artifact, frames: int | None = None) -> Any:
         """Return the record of an artifact, fetched first if it is not here; see `Store.load`."""
         if self._is_further(artifact):
-            with super().writer(artifact.key, artifact.path.name, lambda _: None):
+            with super().writer(artifact.key, artifact.path.name, silent):
                 self._fetch(artifact.key)
             if self._is_further(artifact):
                 raise Corrupted(f"the copy of {artifact.path.name} is gone")

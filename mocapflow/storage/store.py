@@ -78,7 +78,7 @@ class Store:
     """A folder of artifacts."""
 
     def __init__(self, path: Path) -> None:
-        if "://" in str(path) or ":/" in str(path):
+        if ":/" in str(path):
             hint = "a URL is for --store of run, plan and compare"
             raise MocapflowError(f"the store has to be a folder, not {path}", hint=hint)
         self.path = path

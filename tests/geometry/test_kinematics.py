@@ -9,6 +9,7 @@ from mocapflow_bodies.scanned import Scanned
 from scipy.linalg import expm
 
 from mocapflow.data import Pose, PoseBatch
+from mocapflow.errors import ShapeError
 from mocapflow.geometry import kinematics, twists
 from mocapflow.geometry.joints import angles_from_rotations, decompose
 from mocapflow.model import moved
@@ -86,14 +87,14 @@ def test_morph_changes_the_shape_with_its_angle(body, pose):
         np.testing.assert_allclose(kinematics.skin(morphing, joints, angles), expected, atol=1e-12)
 
 
-@pytest.mark.parametrize("morphing", [False, True])
-def test_velocities_are_the_derivative_of_the_skin(body, pose, morphing):
+@pytest.mark.parametrize("morphs", [(), (-0.3, 0.5), (0.5, -0.3)])
+def test_velocities_are_the_derivative_of_the_skin(body, pose, morphs):
     step, some = 1e-6, np.arange(0, len(body.vertices), 97, np.int32)
-    if morphing:
+    if morphs:
         screw = body.screw_names.index("knee_l.flexion")
         offset = np.random.default_rng(2).normal(scale=0.02, size=body.vertices.shape)
         near = pose.angles[screw]
-        body = replace(body, morph_offset=offset, morph_screw=screw, morph_range=(near - 0.3, near + 0.5))
+        body = replace(body, morph_offset=offset, morph_screw=screw, morph_range=tuple(near + off for off in morphs))
 
     def places(shift):
         at = moved(pose, shift)
@@ -102,6 +103,11 @@ def test_velocities_are_the_derivative_of_the_skin(body, pose, morphing):
     found = kinematics.skin_velocities(body, *kinematics.chain(body, pose), pose.angles, some)
     numeric = [(places(step * way) - places(-step * way)) / (2 * step) for way in np.eye(found.shape[2])]
     np.testing.assert_allclose(found, np.stack(numeric, axis=2), atol=1e-8)
+
+
+def test_a_pose_of_another_body_is_refused(body, pose):
+    with pytest.raises(ShapeError, match=f"a pose of 3 angles; the body has {len(body.twists)}"):
+        kinematics.chain(body, replace(pose, angles=pose.angles[:3]))
 
 
 def test_three_screws_reach_any_rotation_exactly(body):

@@ -210,6 +210,12 @@ def test_a_truncated_video_has_placeholders_to_the_end(tmp_path):
     assert rows[-1][1] == f"the video breaks off after frame {video.frames - 1}"
 
 
+def test_a_late_video_ends_earlier_and_is_not_broken(tmp_path):
+    video = replace(open_video(write_video(tmp_path / "a.avi", FRAMES)), late=3)
+    rows = list(read_frames(video, range(FRAMES)))
+    assert [reason for image, reason in rows if image is None] == ["the video ends earlier"] * 3
+
+
 def test_a_truncated_mp4_can_not_be_decoded(tmp_path):
     path = write_video(tmp_path / "a.mp4", FRAMES)
     path.write_bytes(path.read_bytes()[:2000])

@@ -10,7 +10,7 @@ from mocapflow.errors import RecordingError
 from mocapflow.geometry.cameras import project
 from mocapflow.geometry.pencils import pencil_axes, plane_angles
 from mocapflow.io.cameras import write_cameras
-from mocapflow.recordings import paired_views, synchrony
+from mocapflow.recordings import doctor, paired_views, synchrony
 from mocapflow.recordings.doctor import examine_timing
 from mocapflow.recordings.recording import open_recording
 from tests.fixtures.recordings import look_at
@@ -109,6 +109,25 @@ def test_keypoints_tell_too(tmp_path):
     assert signals(0, 1)[0].shape == (FRAMES, 3)
     late = {m.camera: m.frames for m in synchrony.measure(open_recording(folder))}
     assert late == pytest.approx({"cam01": 0, "cam02": 0, "cam03": 3}, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("before", "found", "after"),
+    [
+        ({"cam01": 3}, [0, 4, 0], {"cam01": 3, "cam02": 4}),
+        ({"cam01": 3, "cam03": 4}, [0, 4, 0], {"cam02": 1, "cam03": 1}),  # not every camera can be late
+        ({"cam01": -3, "cam03": -4}, [0, -4, 0], {"cam02": -1, "cam03": -1}),
+        ({"cam01": 3}, [0.8, 4, 0], {"cam01": 3, "cam02": 4}),  # the first is not sure
+    ],
+)
+def test_what_is_found_comes_on_top_of_what_is_known(tmp_path, monkeypatch, before, found, after):
+    folder = write(tmp_path / "clip", {})
+    (folder / "recording.json").write_text(json.dumps({"late_frames": before}))
+    measured = [synchrony.Lateness(camera=name, frames=frames, sd=0.5) for name, frames in zip(NAMES, found, strict=True)]
+    monkeypatch.setattr(doctor, "_measured", lambda folder: measured)
+    assert examine_timing(folder, write=True)[-1].message.startswith("written")
+    assert json.loads((folder / "recording.json").read_text())["late_frames"] == after
+    open_recording(folder)  # and every run takes it
 
 
 @pytest.mark.parametrize(

@@ -686,7 +686,7 @@ def test_a_lock_that_was_taken_over_is_noticed_before_the_next_write(tmp_path):
     lock = locks.acquire(tmp_path / "x.lock", "track-12", print)
     lock.check()
     (tmp_path / "x.lock").write_text("another")
-    with pytest.raises(StoreError, match="another run took over"):
+    with pytest.raises(StoreError, match="another run took over track-12"):
         lock.check()
     lock.release()
     assert (tmp_path / "x.lock").exists()  # it is not ours
@@ -705,6 +705,7 @@ def test_the_heartbeat_keeps_a_lock_fresh(tmp_path, monkeypatch):
     until = time.monotonic() + 5
     while (tmp_path / "x.lock").stat().st_mtime < 2 and time.monotonic() < until:
         time.sleep(0.01)
+    assert (tmp_path / "x.lock").stat().st_mtime > 2
     lock.release()
     assert not (tmp_path / "x.lock").exists()
 
@@ -734,3 +735,7 @@ def test_other_versions_are_told(tmp_path, path, monkeypatch):
         monkeypatch.setattr(module, "versions", lambda: real | {"numpy": "10"})
     _, lines = run_tiny(path, tmp_path)
     assert "warning: frames 5–11 of track were made with numpy 9.9, now 10" in lines
+    _, lines = run_tiny(path, tmp_path, frames=3)  # what is not asked for is no matter
+    assert [line for line in lines if "of track were made" in line] == [
+        f"warning: frames 0–2 of track were made with numpy {real['numpy']}, now 10"
+    ]
