@@ -123,7 +123,9 @@ def test_keypoints_tell_too(tmp_path):
 def test_what_is_found_comes_on_top_of_what_is_known(tmp_path, monkeypatch, before, found, after):
     folder = write(tmp_path / "clip", {})
     (folder / "recording.json").write_text(json.dumps({"late_frames": before}))
-    measured = [synchrony.Lateness(camera=name, frames=frames, sd=0.5) for name, frames in zip(NAMES, found, strict=True)]
+    measured = [
+        synchrony.Lateness(camera=name, frames=frames, sd=0.5) for name, frames in zip(NAMES, found, strict=True)
+    ]
     monkeypatch.setattr(doctor, "_measured", lambda folder: measured)
     assert examine_timing(folder, write=True)[-1].message.startswith("written")
     assert json.loads((folder / "recording.json").read_text())["late_frames"] == after
