@@ -52,7 +52,8 @@ def hidden_legs(surface: Surface, seen: Sequence[View], body: Body) -> dict[str,
         seen: what the views surely show.
         body: whose vertices come first in the surface.
     """
-    near = np.array([_seen_by(view, view.away * view.pixel_m < NEAR_M, surface, True) for view in seen])
+    near = np.array([_seen_by(view, view.away * view.pixel_m < NEAR_M, surface, True) for view in seen], bool)
+    near = near.reshape(len(seen), len(surface.vertices))  # where no view shows anything surely, too
     below, found = descendants(body.parents), dict[str, list[str]]()
     for joint in (number for number, name in enumerate(body.joint_names) if name.rpartition("_")[0] == BEGIN[0]):
         shares = near[:, : len(body.vertices)][:, below[joint][body.main_joint]].mean(axis=1)
