@@ -16,7 +16,7 @@ from results_scene import DEMO, demo_scene, stepping
 from scipy.spatial.transform import Rotation
 
 from mocapflow.errors import PipelineError
-from mocapflow.geometry import angles
+from mocapflow.geometry import angles, silhouettes, twists
 from mocapflow.io import markers
 from mocapflow.knocks import Knocks
 from mocapflow.recordings.recording import open_recording
@@ -65,6 +65,22 @@ def test_joint_centres_come_back(name: str, result: Result, tmp_path: Path) -> N
     assert set(names) == set(result.scene.body.joint_names)
     order = [names.index(joint) for joint in result.scene.body.joint_names]
     np.testing.assert_allclose(places[:, order], result.places, atol=NEAR)
+
+
+def test_bvh_turns_on_past_a_half_turn(result: Result, tmp_path: Path) -> None:
+    """Programs draw between frames: from 170 to -170 degrees they would turn the person round the other way."""
+    from bvh import Bvh
+
+    body, turns = result.scene.body, np.zeros((25, 6))
+    track = stepping(body, 25)
+    turns[:, 2] = np.radians(30) * np.arange(25)
+    turned = replace(result, track=replace(track, root=twists.exp(turns) @ track.root))
+    path = write("bvh", turned, tmp_path)
+    frames = np.array(Bvh(path.read_text()).frames, float)
+    assert np.abs(np.diff(frames[:, 3:], axis=0)).max() < 40
+    names, places = readers.bvh(path)
+    order = [names.index(name) for name in body.joint_names]
+    np.testing.assert_allclose(places[:, order], turned.places, atol=NEAR)
 
 
 def test_files_of_every_second_frame_have_half_the_rate(result: Result, tmp_path: Path) -> None:
