@@ -223,11 +223,23 @@ def test_rerun_holds_everything_on_one_timeline(result: Result, tmp_path: Path) 
         np.testing.assert_allclose(np.ravel(logged[f"/angles/{name}"]["Scalars:scalars"]), series.value[:, column])
     for camera in result.scene.cameras:
         (lens,) = logged[f"/world/{camera.name}"]["Pinhole:image_from_camera"]
-        np.testing.assert_allclose(np.reshape(lens, (3, 3)).T, camera.intrinsics, rtol=1e-6)
+        half = np.array([[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]])  # px; there pixels begin at whole numbers
+        np.testing.assert_allclose(np.reshape(lens, (3, 3)).T, camera.intrinsics + half, rtol=1e-6)
         image = np.array(logged[f"/world/{camera.name}/image"]["EncodedImage:blob"][3][0], np.uint8)
         assert cv2.imdecode(image, cv2.IMREAD_COLOR).shape == (*camera.size[::-1], 3)
         outline = np.concatenate(logged[f"/world/{camera.name}/outline"]["LineStrips2D:strips"][3])
-        assert (outline.min(0) > 0).all() and (outline.max(0) < camera.size).all()
+        expected = np.concatenate(silhouettes.outline(result.surface(3), camera).pixel) + 0.5
+        np.testing.assert_allclose(outline, expected, rtol=1e-6)
+
+
+def test_rerun_takes_cameras_whatever_they_are_called(
+    result: Result, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    first, *others = result.scene.cameras
+    scene = replace(result.scene, cameras=(replace(first, name="left hall: 1"), *others))
+    logged = readers.rerun_entities(write("rrd", replace(result, scene=scene), tmp_path))
+    assert {f"/world/left\\ hall\\:\\ 1{part}" for part in ("", "/image", "/outline")} <= set(logged)
+    assert "WARN" not in capfd.readouterr().err
 
 
 @pytest.mark.long
