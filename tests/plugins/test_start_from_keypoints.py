@@ -82,7 +82,8 @@ def test_the_person_is_who_reprojects_best(body, pose, cameras):
         detections[c].insert(c % 2, keypoints(body, bystander_of(pose), cameras[c], rng, 1.0, 0.7))
     detections[2][0][4] = (5.0, 5.0, 0.9)  # one gross error
     person = find_person([np.array(people) for people in detections], cameras)
-    assert person.chosen == (1, 0, 0, 0)
+    expected = [people[row][:, :2] for people, row in zip(detections, (1, 0, 0, 0), strict=True)]
+    np.testing.assert_array_equal(person.pixels, expected)
     with pytest.raises(RecordingError, match="cameras list 25 and 26 keypoints"):
         find_person([np.ones((1, 25, 3)), np.ones((1, 26, 3)), *(np.empty((0, 0, 3)),) * 2], cameras)
     assert find_person([np.array(detections[0]), *(np.empty((0, 0, 3)),) * 3], cameras) is None
