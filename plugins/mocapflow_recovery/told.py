@@ -32,7 +32,8 @@ def untold(surface: Surface, seen: Sequence[View], body: Body) -> dict[str, floa
     """
     person = _told(surface, seen, body)
     below = descendants(body.parents)
-    limbs = {name: below[joint][body.main_joint] for joint, name in enumerate(body.joint_names) if _begins(name)}
+    begin = {name: joint for joint, name in enumerate(body.joint_names) if name.rpartition("_")[0] in BEGIN}
+    limbs = {name: below[joint][body.main_joint] for name, joint in begin.items()}
     shares = {name: float(person[limb].mean()) for name, limb in limbs.items() if limb.any()}
     return {name: share for name, share in shares.items() if share < LEAST}
 
@@ -62,10 +63,6 @@ def hidden_legs(surface: Surface, seen: Sequence[View], body: Body) -> dict[str,
             for view in lost.tolist():
                 found.setdefault(seen[view].camera.name, []).append(body.joint_names[joint])
     return found
-
-
-def _begins(name: str) -> bool:
-    return name.rpartition("_")[0] in BEGIN
 
 
 def _told(surface: Surface, seen: Sequence[View], body: Body) -> F64:
