@@ -50,7 +50,7 @@ def fallen(body: Body, sheet: GarmentMesh, steps: int) -> F64:
     grid = sheet.vertices[sheet.strands][None].copy()
     first, last = np.zeros(COUNT, np.int32), np.full(COUNT, COUNT - 1, np.int32)
     fixed, skin = np.zeros(grid.shape[:3], bool), np.array([SKIN])
-    settle_in_steps(grid, fixed, first, last, skin, np.radians(2), steps, True, True, 0.002, parts, fields.values)
+    settle_in_steps(grid, fixed, first, last, skin, np.radians(2), steps, True, True, parts, fields.values)
     vertices: F64 = grid.reshape(-1, 3)
     return vertices
 

@@ -20,6 +20,7 @@ import numpy as np
 from mocapflow.records import F32, F64, I16, I32, U8, Bool, array, record
 
 BODY, CLOTH = 0, 1  # values of Surface.layer
+UNKNOWN = np.pi**2  # rad^2 and m^2, the variance where nothing was seen
 REMEMBERED = 3  # frames that later ones may know: a pose, its velocity, its acceleration
 LAYERS = ("person", "garment", "skin")  # values of Silhouette.layer
 BORDER = 3  # px along the image border where a silhouette is cut, not occluding

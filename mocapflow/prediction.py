@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mocapflow.data import (
+    UNKNOWN,
     Change,
     Cloth,
     Estimate,
@@ -26,7 +27,6 @@ from mocapflow.records import F64
 from mocapflow.scene import Scene
 
 VIEWS = 2  # fewer than these do not fix a pose in space
-UNKNOWN = np.pi**2  # rad^2 and m^2, the variance where nothing was seen
 
 
 def seen(frame: Frame) -> bool:

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mocapflow.data import Flow, Frame, FrameResult, Pose, blind
+from mocapflow.data import UNKNOWN, Flow, Frame, FrameResult, Pose, blind
 from mocapflow.knocks import Knocks
 from mocapflow.records import F32, F64, I16, I32, Bool, Watch, array, record, silent
-from mocapflow.series import Wide
+from mocapflow.series import Numbers, Wide, changed
 
 
 @record
@@ -112,14 +112,20 @@ class Track:
 
     @property
     def before_smoothing(self) -> Track:
-        """The track as the loop left it."""
+        """The track as the loop left it: of lost frames nothing was known before they were bridged."""
         if self.raw_root is None or self.raw_angles is None:
             return self
-        return replace(self, root=self.raw_root, angles=self.raw_angles)
+        covariance = changed(self.covariance, partial(_unknown, self.lost))
+        return replace(self, root=self.raw_root, angles=self.raw_angles, covariance=covariance)
 
     def pose(self, row: int) -> Pose:
         """Return the pose of one row."""
         return Pose(root=self.root[row].copy(), angles=self.angles[row].copy())
+
+
+def _unknown(lost: Bool, covariance: F64, rows: Numbers) -> F64:
+    """Return the covariances of rows (K,), of lost frames those of a pose that nobody has seen."""
+    return np.where(lost[rows, None, None], UNKNOWN * np.eye(covariance.shape[1]), covariance)
 
 
 def values_of(frame: Frame, result: FrameResult, steps: Sequence[str]) -> dict[str, Any]:

@@ -1,4 +1,6 @@
-"""Poses as OpenSim names and signs them (full-body gait models such as gait2392 and Rajagopal 2016).
+"""Poses as OpenSim names and signs them, as Rajagopal 2016 does.
+
+gait2392 has the same names without arms, and counts knees the other way.
 
 Ground: x = world y, y = world z (up), z = world x (`mocapflow.io.markers`); pelvis_tilt and pelvis_list are turns
 about the ground's own z and x, so they read as such for a person who faces the ground's x. Segments: x forward,

@@ -26,7 +26,6 @@ from mocapflow_draping.parts import posed_parts, rates
 from mocapflow_draping.pushes import free_roots, free_strands
 from mocapflow_draping.strands import Strands, roots, strands_of
 
-LOWER = 0.002  # m, step of a cloth that nothing holds
 TINY = 1e-6  # rad, and share of a parameter's range: what the drape starts from is differentiated by steps
 
 
@@ -164,10 +163,8 @@ class Kinematic(Draper):
         fixed = np.zeros(grid.shape[:3], bool)
         fixed[:, np.arange(len(strands.first)), strands.first] = True
         step, in_space = math.radians(self.step_deg), self.pivot == "space"
-        settle_in_steps(
-            grid, fixed, strands.first, strands.last, skin, step, self.iterations, self.limited, in_space,
-            LOWER, parts, values,
-        )  # fmt: skip
+        turns = step, self.iterations, self.limited, in_space
+        settle_in_steps(grid, fixed, strands.first, strands.last, skin, *turns, parts, values)
         grid, fixed = grid[source], fixed[source]
         force, amount = wind(garment, parameters, chain[source, strands.carrier[0], :3, :3])
         blown = strands.first, strands.last, skin[source], force, amount, parts[source], values

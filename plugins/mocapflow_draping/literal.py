@@ -12,13 +12,14 @@ import numpy as np
 
 from mocapflow_draping.distance import body_distance
 
+LOWER = 0.002  # m, how far a cloth that nothing holds sinks at a time
 FLOOR = -10.0  # m: what falls past everything stops here
 STEP = math.radians(2.0)  # of a wind, so that it blows no tail past what it would touch
 HALVINGS = 8  # of a step that would touch, before the tail is left where it is
 
 
 @numba.njit(cache=True)
-def settle_in_steps(grid, fixed, first, last, skin, step, iterations, limited, in_space, lower, parts, values):  # type: ignore[no-untyped-def]
+def settle_in_steps(grid, fixed, first, last, skin, step, iterations, limited, in_space, parts, values):  # type: ignore[no-untyped-def]
     """Lay B grids of particles on posed bodies, in place.
 
     What lies between two fixed particles of a strand is taut, and stays.
@@ -33,7 +34,6 @@ def settle_in_steps(grid, fixed, first, last, skin, step, iterations, limited, i
         iterations: number of turns.
         limited: True: never beyond straight down; False: it swings back in the next turn, as printed.
         in_space: True: the nearest fixed point anywhere; False: along the strand.
-        lower: m, how far all particles sink at a time while none is fixed.
         parts: (B, P, COLUMNS), the bodies, see `parts`.
         values: their voxels.
 
@@ -41,7 +41,7 @@ def settle_in_steps(grid, fixed, first, last, skin, step, iterations, limited, i
     """
     for b in range(len(grid)):
         while not fixed[b].any() and grid[b, :, :, 2].max() > FLOOR:
-            grid[b, :, :, 2] -= lower
+            grid[b, :, :, 2] -= LOWER
             _touch(grid[b], fixed[b], first, last, skin[b], parts[b], values)
         for _ in range(iterations):
             _turn(grid[b], fixed[b], first, last, step, limited, in_space)

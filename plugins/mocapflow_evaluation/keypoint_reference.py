@@ -25,7 +25,7 @@ MARGIN_S = 1.0  # s, looked at on both sides of the wanted frames: there the fil
 
 
 def write_triangulated(
-    recording: Recording, place: Path, cameras: Sequence[Camera], run_folder: Path, checks: ViewChecks | None = None
+    recording: Recording, place: Path, cameras: Sequence[Camera], run_folder: Path, checks: ViewChecks | None
 ) -> Path:
     """Write the person's keypoints in space into a run folder; return the .trc.
 

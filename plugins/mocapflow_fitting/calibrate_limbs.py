@@ -93,7 +93,7 @@ class CalibrateLimbs(Stage):
 
     def _from_track(self, track: Track) -> tuple[list[int], list[Pose], list[F64]]:
         good = np.flatnonzero(track.usable.all(axis=1) & track.steady & ~track.doubted)
-        good = good if len(good) >= self.frames else np.arange(len(track.frame))
+        good = good if len(good) else np.arange(len(track.frame))
         rows = good[np.unique(np.linspace(0, len(good) - 1, self.frames).round().astype(int))]
         clothes = [track.cloth_parameters[r].copy() for r in rows]
         return [int(track.frame[r]) for r in rows], [track.pose(int(r)) for r in rows], clothes

@@ -20,7 +20,6 @@ LEAST_HALVING_PX = 2.0
 class Person:
     """One person's detections over the cameras, and the points they give."""
 
-    chosen: tuple[int, ...]  # per camera the row of the detection, -1 where the person is not seen
     pixels: F64 = array("C", "K", 2, unit="px")
     confidence: F64 = array("C", "K", unit="1, zero where unseen")
     points: Points
@@ -85,9 +84,7 @@ def _person(detections: Sequence[F64], cameras: Sequence[Camera], chosen: tuple[
     points = triangulate(rows[..., :2], rows[..., 2], cameras, scale)
     found = np.isfinite(points.position).all(axis=1)
     support = float(points.weight[:, found].sum())
-    return Person(
-        chosen=chosen, pixels=rows[..., :2].copy(), confidence=rows[..., 2].copy(), points=points, support=support
-    )
+    return Person(pixels=rows[..., :2].copy(), confidence=rows[..., 2].copy(), points=points, support=support)
 
 
 def halving_px(points: F64) -> float:

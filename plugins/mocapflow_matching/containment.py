@@ -14,7 +14,6 @@ from mocapflow.data import Frame, Matches, Past, Segmentation, Silhouette, Surfa
 from mocapflow.geometry.contours import at_nearest, nearest_compatible
 from mocapflow.geometry.silhouettes import occluding_contour
 from mocapflow.pooling import pool
-from mocapflow.records import F64
 from mocapflow.scene import Scene
 from mocapflow_matching.camouflage import told_from_the_room
 from mocapflow_matching.robust import robust_weights
@@ -45,7 +44,7 @@ class Containment(Matcher):
     def match_view(self, camera: Camera, silhouette: Silhouette, surface: Surface) -> Matches:
         """Return the pairs of one view."""
         model = occluding_contour(surface, camera, self.spacing_px, skin=True)
-        inside = inside_px(silhouette, model.pixel)
+        inside = at_nearest(silhouette.distance, model.pixel)  # px, a smooth field
         stray, target, direction, distance = strays(
             inside, model.pixel, model.normal, model.anchor, *silhouette.zero_level, self.margin_px, self.reach_px
         )
@@ -56,12 +55,6 @@ class Containment(Matcher):
             vertex=model.vertex.take(stray),
             weight=robust_weights(distance / self.sigma_px, "huber", self.scale) / self.sigma_px**2,
         )
-
-
-def inside_px(silhouette: Silhouette, pixels: F64) -> F64:
-    """Return the signed distance (K,) px at the pixels nearest to (K, 2), a smooth field."""
-    inside: F64 = at_nearest(silhouette.distance, pixels)
-    return inside
 
 
 @numba.njit(cache=True)

@@ -9,11 +9,10 @@ from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
 
 from mocapflow.data import Silhouette, Surface, Turn
 from mocapflow.geometry import silhouettes
-from mocapflow.geometry.contours import nearest_compatible
+from mocapflow.geometry.contours import at_nearest, nearest_compatible
 from mocapflow.records import F64, Bool, joined_rows
 from mocapflow.scene import Scene
 from mocapflow_matching.closed_curves import Curve, closed_contours, low_passed
-from mocapflow_matching.containment import inside_px
 from mocapflow_matching.contour_icp import ContourIcp, ImageContour, ModelContour
 from mocapflow_matching.uncertainty import ANY_DIRECTION
 
@@ -44,7 +43,7 @@ class FourierIcp(ContourIcp):
         image, model = super().contours(silhouette, surface, scene, turn)
         if turn.index >= len(self.harmonics) or not len(model.contour.pixel):
             return image, model
-        if np.median(np.abs(inside_px(silhouette, model.contour.pixel))) < self.near_px:
+        if np.median(np.abs(at_nearest(silhouette.distance, model.contour.pixel))) < self.near_px:
             return image, model
         camera = scene.cameras[silhouette.camera]
         covered = silhouettes.mask(silhouettes.outline(surface, camera), camera)

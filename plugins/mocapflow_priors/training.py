@@ -22,6 +22,7 @@ from mocapflow_priors.density import Density, bandwidth
 Angles = Mapping[str, F64]  # by screw: (T,) rad, zero in the rest pose
 FREE = ("hip", "knee.flexion", "ankle.dorsiflexion", "shoulder", "elbow.flexion")  # what no other prior holds
 BENDS = np.radians(np.linspace(-60, 170, 461))  # of any joint, to look up what they show
+BACKWARDS_DEG = -5.0  # of a knee in the middle of a motion: no knee is stretched further for so long
 DEGREES = "an angles.csv has degrees; a motion has some angle that bends further"
 COLUMNS = {  # of angles.csv: the screw that makes nearly all of each
     "hip_flexion": "hip.flexion",
@@ -148,7 +149,7 @@ def from_columns(degrees: Mapping[str, F64], body: Body) -> Angles:
     shown = angles.measure(body, np.tile(np.eye(4), (len(BENDS), 1, 1)), poses)
     found = {}
     for name, screw in screws.items():
-        curve = shown.value[:, shown.names.index(name)]
+        curve = np.degrees(np.unwrap(np.radians(shown.value[:, shown.names.index(name)])))  # a thigh passes straight up
         bent = slice(int(curve.argmin()), int(curve.argmax()) + 1)  # a limb bent backwards shows the same
         found[screw] = np.interp(degrees[name], curve[bent], BENDS[bent])
     return found
@@ -159,8 +160,22 @@ def from_opensim(path: Path, body: Body) -> Angles:
     columns, _ = markers.read_mot(path)
     rest = opensim_at_rest(body)
     angles_only = {name: values for name, values in columns.items() if name[:-2] in COORDINATES and name in rest}
-    degrees = possible(angles_only, path)
+    degrees = bent_forwards(possible(angles_only, path), path)
     return named({name: values - rest[name] for name, values in degrees.items()}, COORDINATES)
+
+
+def bent_forwards(degrees: Mapping[str, F64], path: Path) -> Mapping[str, F64]:
+    """Return the columns (T,) of a file, in which knees bend as they do.
+
+    Raises:
+        RecordingError: a knee bends backwards.
+    """
+    for name, values in degrees.items():
+        known = values[np.isfinite(values)]
+        if name.startswith("knee_angle") and len(known) and np.median(known) < BACKWARDS_DEG:
+            message = f"{name} bends backwards: its model counts the knee the other way"
+            raise RecordingError(message, where=str(path), hint="turn its sign round in the file, as that of gait2392")
+    return degrees
 
 
 def opensim_at_rest(body: Body) -> Mapping[str, float]:

@@ -32,7 +32,8 @@ def untold(surface: Surface, seen: Sequence[View], body: Body) -> dict[str, floa
     """
     person = _told(surface, seen, body)
     below = descendants(body.parents)
-    limbs = {name: below[joint][body.main_joint] for joint, name in enumerate(body.joint_names) if _begins(name)}
+    begin = {name: joint for joint, name in enumerate(body.joint_names) if name.rpartition("_")[0] in BEGIN}
+    limbs = {name: below[joint][body.main_joint] for name, joint in begin.items()}
     shares = {name: float(person[limb].mean()) for name, limb in limbs.items() if limb.any()}
     return {name: share for name, share in shares.items() if share < LEAST}
 
@@ -52,7 +53,8 @@ def hidden_legs(surface: Surface, seen: Sequence[View], body: Body) -> dict[str,
         seen: what the views surely show.
         body: whose vertices come first in the surface.
     """
-    near = np.array([_seen_by(view, view.away * view.pixel_m < NEAR_M, surface, True) for view in seen])
+    near = np.array([_seen_by(view, view.away * view.pixel_m < NEAR_M, surface, True) for view in seen], bool)
+    near = near.reshape(len(seen), len(surface.vertices))  # where no view shows anything surely, too
     below, found = descendants(body.parents), dict[str, list[str]]()
     for joint in (number for number, name in enumerate(body.joint_names) if name.rpartition("_")[0] == BEGIN[0]):
         shares = near[:, : len(body.vertices)][:, below[joint][body.main_joint]].mean(axis=1)
@@ -61,10 +63,6 @@ def hidden_legs(surface: Surface, seen: Sequence[View], body: Body) -> dict[str,
             for view in lost.tolist():
                 found.setdefault(seen[view].camera.name, []).append(body.joint_names[joint])
     return found
-
-
-def _begins(name: str) -> bool:
-    return name.rpartition("_")[0] in BEGIN
 
 
 def _told(surface: Surface, seen: Sequence[View], body: Body) -> F64:

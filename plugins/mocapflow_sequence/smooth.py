@@ -52,7 +52,7 @@ class Smooth(Stage):
         turned[:, :3, :3] = twists.exp(np.pad(change[:, :3], ((0, 0), (0, 3))))[:, :3, :3] @ placed[:, :3, :3]
         turned[:, :3, 3] += change[:, 3:6]
         root = turned @ twists.inverse(joint)
-        back = np.linalg.inv(_about(placed[lost, :3, 3], spread.shape[1]))
+        back = np.linalg.inv(_about(turned[lost, :3, 3], spread.shape[1]))
         bridged = back @ bridged @ np.swapaxes(back, 1, 2)
         return replace(
             track, root=root, angles=track.angles + change[:, 6:],

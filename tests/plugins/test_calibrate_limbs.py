@@ -114,6 +114,14 @@ def test_views_that_were_found_wrong_do_not_count(body, poses):
     np.testing.assert_array_equal(seen, [[True] * 4, [True, True, False, True]])
 
 
+@pytest.mark.parametrize(("good", "looked"), [([1, 4], [1, 4]), ([], [0, 2, 5])])
+def test_few_good_frames_are_better_than_bad_ones(body, poses, good, looked):
+    track = make_track(np.tile(poses[0].root, (6, 1, 1)), np.tile(poses[0].angles, (6, 1)))
+    track = replace(track, doubted=~np.isin(track.frame, good))
+    stage = CalibrateLimbs(segmenter=masks_of(body, poses), matchers=(ContourIcp(),), frames=3)
+    assert stage._from_track(track)[0] == looked
+
+
 def test_velocities_of_skin(body, poses):
     some = np.arange(0, len(body.vertices), 331)
     part = replace(

@@ -6,11 +6,12 @@ import matching_scenes
 import numpy as np
 import pytest
 from matching_scenes import FIRST, FRAME, seen
-from mocapflow_matching.containment import Containment, inside_px
+from mocapflow_matching.containment import Containment
 from mocapflow_matching.robust import robust_weights
 
 from mocapflow.data import CLOTH, NO_CLOTH, Past
 from mocapflow.geometry.cameras import project
+from mocapflow.geometry.contours import at_nearest
 from mocapflow.geometry.silhouettes import occluding_contour
 from mocapflow.testing import tiny_pose, tiny_scene
 
@@ -52,8 +53,8 @@ def test_a_leg_within_the_cloth_is_not_drawn_to_it(truth):
     for camera in range(4):
         view = SCENE.cameras[camera]
         contour = occluding_contour(bare, view, 6.0)
-        inside = contour.vertex[inside_px(shown.silhouettes[camera], contour.pixel) > 2]
-        out = contour.vertex[inside_px(shown.silhouettes[camera], contour.pixel) <= 2]
+        depth = at_nearest(shown.silhouettes[camera].distance, contour.pixel)
+        inside, out = contour.vertex[depth > 2], contour.vertex[depth <= 2]
         touched = set(matches.vertex[matches.camera == camera].tolist())
         assert len(inside) > 10
         assert not touched & (set(inside.tolist()) - set(out.tolist()))

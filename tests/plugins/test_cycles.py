@@ -44,6 +44,16 @@ def test_knees_raised_on_the_spot_are_no_strides() -> None:
     assert gait_cycles([str(name) for name in found["names"]], found["positions"], 30.0) == []
 
 
+def test_a_leg_that_is_raised_where_it_is_ahead_takes_no_strides() -> None:
+    """It swings as far forward and back as that of somebody who walks."""
+    places = walking(0.0)
+    assert gait_cycles(NAMES, places, RATE)
+    ahead = np.maximum(0, np.sin(2 * np.pi * np.arange(len(places)) / RATE))  # of the left leg
+    for side, share in (("l", ahead), ("r", np.roll(ahead, int(RATE) // 2))):
+        places[:, NAMES.index(f"ankle_{side}"), 2] += 0.3 * share  # m
+    assert gait_cycles(NAMES, places, RATE) == []
+
+
 def test_joints_that_are_not_there_have_no_strides() -> None:
     assert gait_cycles(("hip_l",), np.zeros((5, 1, 3)), RATE) == []
 

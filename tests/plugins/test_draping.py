@@ -42,8 +42,8 @@ def literal(body, grid, fixed, step=2.0, iterations=50, limited=True, in_space=F
     values, parts = prepared(body)
     grid, fixed = grid[None].copy(), fixed[None].copy()
     first, last = np.zeros(grid.shape[1], np.int32), np.full(grid.shape[1], grid.shape[2] - 1, np.int32)
-    settle_in_steps(grid, fixed, first, last, np.array([SKIN]), np.radians(step), iterations, limited, in_space, 0.002,
-                 parts, values)  # fmt: skip
+    turns = np.radians(step), iterations, limited, in_space
+    settle_in_steps(grid, fixed, first, last, np.array([SKIN]), *turns, parts, values)
     return grid[0], fixed[0]
 
 

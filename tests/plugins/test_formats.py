@@ -16,7 +16,7 @@ from results_scene import DEMO, demo_scene, stepping
 from scipy.spatial.transform import Rotation
 
 from mocapflow.errors import PipelineError
-from mocapflow.geometry import angles
+from mocapflow.geometry import angles, silhouettes, twists
 from mocapflow.io import markers
 from mocapflow.knocks import Knocks
 from mocapflow.recordings.recording import open_recording
@@ -65,6 +65,22 @@ def test_joint_centres_come_back(name: str, result: Result, tmp_path: Path) -> N
     assert set(names) == set(result.scene.body.joint_names)
     order = [names.index(joint) for joint in result.scene.body.joint_names]
     np.testing.assert_allclose(places[:, order], result.places, atol=NEAR)
+
+
+def test_bvh_turns_on_past_a_half_turn(result: Result, tmp_path: Path) -> None:
+    """Programs draw between frames: from 170 to -170 degrees they would turn the person round the other way."""
+    from bvh import Bvh
+
+    body, turns = result.scene.body, np.zeros((25, 6))
+    track = stepping(body, 25)
+    turns[:, 2] = np.radians(30) * np.arange(25)
+    turned = replace(result, track=replace(track, root=twists.exp(turns) @ track.root))
+    path = write("bvh", turned, tmp_path)
+    frames = np.array(Bvh(path.read_text()).frames, float)
+    assert np.abs(np.diff(frames[:, 3:], axis=0)).max() < 40
+    names, places = readers.bvh(path)
+    order = [names.index(name) for name in body.joint_names]
+    np.testing.assert_allclose(places[:, order], turned.places, atol=NEAR)
 
 
 def test_files_of_every_second_frame_have_half_the_rate(result: Result, tmp_path: Path) -> None:
@@ -116,10 +132,15 @@ def test_c3d_has_the_times_of_the_track(result: Result, tmp_path: Path, first: i
         assert c3d.Reader(file).first_frame == first + 1  # the format counts from 1
 
 
+@pytest.mark.filterwarnings("ignore:No analog data")
 def test_c3d_says_what_it_can_not_count(result: Result, tmp_path: Path) -> None:
-    track = replace(result.track, frame=result.track.frame + 65536)
-    with pytest.raises(PipelineError, match="C3D can't say that a track begins at frame 65536"):
-        write("c3d", replace(result, track=track), tmp_path)
+    import c3d
+
+    last, beyond = (replace(result.track, frame=result.track.frame + first) for first in (65534, 65535))
+    with write("c3d", replace(result, track=last), tmp_path).open("rb") as file:
+        assert c3d.Reader(file).first_frame == 65535
+    with pytest.raises(PipelineError, match="C3D can't say that a track begins at frame 65535"):
+        write("c3d", replace(result, track=beyond), tmp_path)
 
 
 def test_parquet(result: Result, tmp_path: Path) -> None:
@@ -171,7 +192,8 @@ def test_usd_opens_and_moves_body_and_garment(result: Result, tmp_path: Path) ->
 
     stage = Usd.Stage.Open(str(write("usd", result, tmp_path)))
     assert (UsdGeom.GetStageUpAxis(stage), UsdGeom.GetStageMetersPerUnit(stage)) == ("Z", 1.0)
-    assert stage.GetTimeCodesPerSecond() == pytest.approx(result.track.frame_rate)
+    for rate in (stage.GetTimeCodesPerSecond(), stage.GetFramesPerSecond()):
+        assert rate == pytest.approx(result.track.frame_rate)
     garment = UsdGeom.Mesh(stage.GetPrimAtPath("/World/Garment")).GetPointsAttr()
     np.testing.assert_allclose(garment.Get(3), result.track.cloth[3], atol=NEAR)
     assert UsdSkel.BakeSkinning(UsdSkel.Root(stage.GetPrimAtPath("/World/Person")))
@@ -201,11 +223,23 @@ def test_rerun_holds_everything_on_one_timeline(result: Result, tmp_path: Path) 
         np.testing.assert_allclose(np.ravel(logged[f"/angles/{name}"]["Scalars:scalars"]), series.value[:, column])
     for camera in result.scene.cameras:
         (lens,) = logged[f"/world/{camera.name}"]["Pinhole:image_from_camera"]
-        np.testing.assert_allclose(np.reshape(lens, (3, 3)).T, camera.intrinsics, rtol=1e-6)
+        half = np.array([[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]])  # px; there pixels begin at whole numbers
+        np.testing.assert_allclose(np.reshape(lens, (3, 3)).T, camera.intrinsics + half, rtol=1e-6)
         image = np.array(logged[f"/world/{camera.name}/image"]["EncodedImage:blob"][3][0], np.uint8)
         assert cv2.imdecode(image, cv2.IMREAD_COLOR).shape == (*camera.size[::-1], 3)
         outline = np.concatenate(logged[f"/world/{camera.name}/outline"]["LineStrips2D:strips"][3])
-        assert (outline.min(0) > 0).all() and (outline.max(0) < camera.size).all()
+        expected = np.concatenate(silhouettes.outline(result.surface(3), camera).pixel) + 0.5
+        np.testing.assert_allclose(outline, expected, rtol=1e-6)
+
+
+def test_rerun_takes_cameras_whatever_they_are_called(
+    result: Result, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    first, *others = result.scene.cameras
+    scene = replace(result.scene, cameras=(replace(first, name="left hall: 1"), *others))
+    logged = readers.rerun_entities(write("rrd", replace(result, scene=scene), tmp_path))
+    assert {f"/world/left\\ hall\\:\\ 1{part}" for part in ("", "/image", "/outline")} <= set(logged)
+    assert "WARN" not in capfd.readouterr().err
 
 
 @pytest.mark.long

@@ -198,6 +198,7 @@ def test_a_person_outside_a_view_gives_an_empty_silhouette(scene, pose):
     frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, away, pose)
     for segmenter in (LevelSet(), GrabCut()):
         found = segmenter.segment(frame, state, Past(), scene, FIRST)
+        assert len(found.silhouettes) == len(scene.cameras)
         assert all((s.distance == -12).all() for s in found.silhouettes)
 
 

@@ -91,7 +91,7 @@ def test_a_shadow_is_neither() -> None:
     shadowed = tuple(np.where(spot[..., None], (0.75 * image).astype(np.uint8), image) for image in dark.images)
     lit, dim = seen(), seen(replace(FRAME, images=shadowed))
     part = spot[::2, ::2]
-    for before, after in zip(lit, dim, strict=True):
+    for before, after, _ in zip(lit, dim, SCENE.cameras, strict=True):
         assert np.mean(after.person[part]) < 0.05  # not the person
         assert np.mean(after.away[part] == 0) > np.mean(before.away[part] == 0) + 0.5  # nor surely the room
 
@@ -102,7 +102,7 @@ def test_where_nobody_knows_the_room_it_is_neither() -> None:
     for part in spread:
         part[:, :160] = np.inf
     room = small_room(replace(background, spread=spread), SCENE.cameras, 120)
-    for view in views(FRAME, surface(POSE), room, 0.35):
+    for view, _ in zip(views(FRAME, surface(POSE), room, 0.35), SCENE.cameras, strict=True):
         assert not view.person[:, :80].any()
         assert not view.away[:, :80].any()
         assert view.person[:, 80:].any()
@@ -112,7 +112,7 @@ def test_a_room_shrunk_by_more_than_it_is_wide_then_is_compared() -> None:
     """An image 320 wide is 11 wide if shrunk by 27, but 11 goes 29 times into 320."""
     room = small_room(SCENE.background, SCENE.cameras, 9)
     assert room.factors == (27,) * len(SCENE.cameras)
-    for view in views(FRAME, surface(POSE), room, 0.35):
+    for view, _ in zip(views(FRAME, surface(POSE), room, 0.35), SCENE.cameras, strict=True):
         assert view.person.shape == tuple(view.camera.size[::-1])
 
 
@@ -120,7 +120,7 @@ def test_what_hides_the_person_is_neither() -> None:
     bar = np.zeros(FRAME.images[0].shape[:2], bool)
     bar[100:130] = True
     images = tuple(np.where(bar[..., None], np.uint8(0), image) for image in FRAME.images)
-    for view in seen(replace(FRAME, images=images, hidden=(bar,) * len(images))):
+    for view, _ in zip(seen(replace(FRAME, images=images, hidden=(bar,) * len(images))), SCENE.cameras, strict=True):
         assert not view.person[50:65].any()
         assert not view.away[50:65].any()
 
@@ -129,7 +129,7 @@ def test_somebody_far_away_is_not_the_person() -> None:
     other = tuple(image.copy() for image in FRAME.images)
     for image in other:
         image[60:200, 5:30] = 240
-    for view in seen(replace(FRAME, images=other)):
+    for view, _ in zip(seen(replace(FRAME, images=other)), SCENE.cameras, strict=True):
         assert not view.person[30:100, 3:15].any()
 
 

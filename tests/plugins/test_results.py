@@ -79,6 +79,16 @@ def test_raw_angles_are_those_before_smoothing(folder: Path) -> None:
     assert jitter[0] < jitter[1]
 
 
+def test_before_smoothing_nothing_is_known_of_a_lost_frame(scene: Scene, recording: Recording, tmp_path: Path) -> None:
+    """Smoothing bridges it, and knows it as well as its neighbours allow."""
+    track = stepping(scene.body, 12)
+    lost = replace(track, iterations=np.where(track.frame == 6, 0, track.iterations).astype(np.int16))
+    exported(Smooth().run(track=lost, scene=scene), scene, recording, tmp_path, formats=("csv",))
+    smooth, raw = (read_columns(tmp_path / part)["knee_flexion_l_sd"] for part in (layout.ANGLES, layout.RAW_ANGLES))
+    assert raw[6] > 150 and smooth[6] < 10  # deg
+    np.testing.assert_allclose(np.delete(raw, 6), np.delete(smooth, 6), atol=1e-3)
+
+
 def test_energy_has_a_row_per_frame_and_turn(folder: Path) -> None:
     columns = read_columns(folder / layout.ENERGY)
     assert list(columns) == ["frame", "turn", "cam01.data", "rest_pose"]

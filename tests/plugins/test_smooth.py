@@ -121,6 +121,17 @@ def test_a_bridge_is_as_unsure_wherever_the_world_has_its_origin() -> None:
     np.testing.assert_allclose(*spreads, atol=1e-12)
 
 
+def test_a_bridge_is_as_unsure_wherever_the_frame_was_wrongly_believed() -> None:
+    track = stepping(ball_body())
+    turns = np.where(track.frame == 10, 0, 3).astype(np.int16)
+    spreads = []
+    for shift in (0.0, 0.5):
+        root = track.root.copy()
+        root[10, :3, 3] += shift
+        spreads.append(smoothed_by_default(replace(track, root=root, iterations=turns)).covariance[10])
+    np.testing.assert_allclose(*spreads, atol=1e-7)
+
+
 def test_weights_by_covariance() -> None:
     track = make_track(np.tile(np.eye(4), (30, 1, 1)), np.zeros((30, 2)), sd=np.radians(0.5), fps=100)
     spiked, covariance = track.angles.copy(), track.covariance.copy()

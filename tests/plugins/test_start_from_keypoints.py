@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from keypoint_recording import DEMO, NAMES, bystander_of, copy_demo, keypoints, write
 from mocapflow_bodies.template import Template
-from mocapflow_fitting.detections import frames_seen
+from mocapflow_fitting.detections import frames_seen, person_at
 from mocapflow_fitting.keypoint_layouts import LAYOUTS, layout_of
 from mocapflow_fitting.landmarks import landmarks
 from mocapflow_fitting.person import find_person
@@ -82,11 +82,26 @@ def test_the_person_is_who_reprojects_best(body, pose, cameras):
         detections[c].insert(c % 2, keypoints(body, bystander_of(pose), cameras[c], rng, 1.0, 0.7))
     detections[2][0][4] = (5.0, 5.0, 0.9)  # one gross error
     person = find_person([np.array(people) for people in detections], cameras)
-    assert person.chosen == (1, 0, 0, 0)
+    expected = [people[row][:, :2] for people, row in zip(detections, (1, 0, 0, 0), strict=True)]
+    np.testing.assert_array_equal(person.pixels, expected)
     with pytest.raises(RecordingError, match="cameras list 25 and 26 keypoints"):
         find_person([np.ones((1, 25, 3)), np.ones((1, 26, 3)), *(np.empty((0, 0, 3)),) * 2], cameras)
     assert find_person([np.array(detections[0]), *(np.empty((0, 0, 3)),) * 3], cameras) is None
     assert find_person([np.zeros((1, 25, 3))] * 4, cameras) is None  # as a detector lists whom it hardly sees
+
+
+@pytest.mark.parametrize(("count", "usable"), [(7, False), (8, True)])
+def test_a_frame_needs_eight_keypoints_that_two_cameras_see(body, pose, cameras, tmp_path, count, usable):
+    rng, folder = np.random.default_rng(4), copy_demo(tmp_path / "recording")
+    marked = [NAMES.index(name) for name in landmarks(body).names if name in NAMES]
+    for camera in cameras[:2]:
+        points = keypoints(body, pose, camera, rng, 0.5)
+        points[marked[count:]] = 0
+        person = {"pose_keypoints_2d": points.ravel().tolist()}
+        path = folder / "keypoints" / f"{camera.name}_json" / f"{camera.name}.0000.json"
+        path.parent.mkdir(parents=True)
+        path.write_text(json.dumps({"people": [person]}))
+    assert (person_at(open_recording(folder), 0, cameras) is not None) == usable
 
 
 def test_landmarks_lie_where_their_names_say(body):

@@ -103,6 +103,10 @@ def test_legs_are_told_that_some_views_show_nothing_of_though_others_do(views, t
     assert found == {camera: legs for camera in told}
 
 
+def test_where_no_view_shows_anything_surely_no_leg_is_told():
+    assert hidden_legs(SURFACE, [], SCENE.body) == {}
+
+
 def test_the_search_warns_of_furniture_before_legs_in_the_first_frame(caplog):
     state, images = pictures.tiny_state(SCENE, POSE, POSE), list(FRAME.images)
     images[1] = without_feet().images[1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -143,6 +144,33 @@ def test_an_opensim_motion(body: Body, motion: np.ndarray, tmp_path: Path) -> No
     columns = opensim.coordinates(body, np.tile(np.eye(4), (12, 1, 1)), motion)
     markers.write_mot(tmp_path / "angles.mot", columns, np.arange(12) / 30)
     assert_same(training.read_angles(tmp_path / "angles.mot", body), motion, body, atol_deg=2.5)
+
+
+def test_an_opensim_motion_of_a_model_that_counts_knees_the_other_way(body: Body, tmp_path: Path) -> None:
+    """As gait2392 does; a knee that is stretched too far now and then is none."""
+    bend = np.linspace(-2, 60, 12)
+    markers.write_mot(tmp_path / "ours.mot", {"knee_angle_r": bend, "knee_angle_l": bend - 10}, np.arange(12) / 30)
+    assert set(training.read_angles(tmp_path / "ours.mot", body)) == {"knee_r.flexion", "knee_l.flexion"}
+    unseen = np.where(np.arange(12) < 9, np.nan, -bend)
+    for name, values in (("other", -bend), ("gaps", unseen)):
+        columns = {"knee_angle_r": bend, "knee_angle_l": values}
+        markers.write_mot(tmp_path / f"{name}.mot", columns, np.arange(12) / 30)
+        with pytest.raises(RecordingError, match=rf"{name}\.mot  knee_angle_l bends backwards: its model counts"):
+            training.read_angles(tmp_path / f"{name}.mot", body)
+
+
+def test_a_hip_of_a_body_whose_thighs_point_ahead_at_rest(body: Body) -> None:
+    """By 14 degrees: bent by 170 a thigh would point past straight up, which is shown as -176."""
+    positions = body.positions.copy()
+    knee, hip = body.joint("knee_l"), body.joint("hip_l")
+    positions[knee, 1] -= 0.25 * (positions[hip, 2] - positions[knee, 2])
+    ahead = replace(body, positions=positions)
+    poses = np.zeros((9, len(body.twists)))
+    poses[:, body.screw_names.index("hip_l.flexion")] = bends = np.radians(np.linspace(-30, 120, 9))
+    series = angles.measure(ahead, np.tile(np.eye(4), (9, 1, 1)), poses)
+    shown = {"hip_flexion_l": series.value[:, series.names.index("hip_flexion_l")]}
+    assert shown["hip_flexion_l"][-1] > 130
+    np.testing.assert_allclose(training.from_columns(shown, ahead)["hip_l.flexion"], bends, atol=1e-3)
 
 
 def test_a_bvh_motion(tmp_path: Path) -> None:

@@ -83,6 +83,19 @@ def test_the_covariance_is_that_of_repeated_noise(promised: float) -> None:
     assert np.mean(squared) == pytest.approx(18.0, rel=0.1)
 
 
+def test_a_distance_to_a_ray_counts_as_two_measurements() -> None:
+    """It has three components, of which two are independent: else the noise would seem less than it is in pixels."""
+    scene, ratios = make_scene(), []
+    for seed in range(12):
+        truth, rng = make_pose(seed), np.random.default_rng(seed)
+        exact = exact_matches(scene, truth, np.arange(0, 300, 9), directed=False)
+        noisy = replace(exact, pixel=exact.pixel + 2 * rng.normal(size=exact.pixel.shape))
+        solvers = (TwistGaussNewton(residual=kind, correlation_px=0.0, **FREE) for kind in ("image", "line"))
+        image, line = (solve(solver, scene, truth, noisy).covariance for solver in solvers)
+        ratios.append(np.sqrt(np.diag(line) / np.diag(image)))
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.08)
+
+
 def test_the_observed_share_is_the_resolution_where_priors_do_not_link_the_unknowns() -> None:
     rng = np.random.default_rng(1)
     rows = rng.normal(size=(5, 8)) * np.logspace(-3, 3, 8)  # five measurements of eight unknowns

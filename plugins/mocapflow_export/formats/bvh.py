@@ -26,6 +26,7 @@ def write(result: Result, path: Path) -> None:
     turns = Y_UP @ result.turns @ Y_UP.T
     angles = Rotation.from_matrix(turns.reshape(-1, 3, 3)).as_euler("ZXY", degrees=True)
     angles = angles.reshape(*turns.shape[:2], 3)[:, order].reshape(len(turns), -1)
+    angles = np.unwrap(angles, axis=0, period=360)  # what is drawn between frames does not spin round
     place = CM * result.places[:, order[0]] @ Y_UP.T
     lines += [" ".join(f"{x:.6f}" for x in row) for row in np.hstack([place, angles])]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -9,7 +9,7 @@ import numpy as np
 from mocapflow.errors import PipelineError
 from mocapflow_export.formats.result import Result, library
 
-LAST = 65535  # frame that the header can name
+LAST = 65534  # frame that the header can name: it counts from 1, in 16 bits
 
 
 def write(result: Result, path: Path) -> None:

@@ -20,7 +20,10 @@ COLOURS = {"body": [0.78, 0.6, 0.5, 1.0], "garment": [0.2, 0.45, 0.5, 1.0]}
 
 
 def write(result: Result, path: Path) -> None:
-    """Write a binary glTF file with one animation: a rotation per joint, and the garment as a series of shapes."""
+    """Write a binary glTF file with one animation: a rotation per joint, and the garment as a series of shapes.
+
+    The second shape that a body may have (`morph`) is not written.
+    """
     Author(result).scene().save_binary(str(path))
 
 

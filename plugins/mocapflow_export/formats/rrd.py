@@ -14,6 +14,7 @@ from mocapflow_export.formats.result import Result, library
 BODY, GARMENT, OUTLINE = (200, 160, 135), (60, 120, 130), (255, 200, 0)
 QUALITY = 80  # of the images, per cent
 DOT = 0.012  # m, radius of a joint
+CENTRE = 0.5  # px, where Rerun has the centre of the first pixel; ours are at whole numbers
 
 
 def write(result: Result, path: Path) -> None:
@@ -38,11 +39,12 @@ def log_cameras(rr: Any, stream: Any, result: Result) -> None:
     for camera in result.scene.cameras:
         world_from_camera = np.linalg.inv(camera.camera_from_world)
         place = rr.Transform3D(translation=world_from_camera[:3, 3], mat3x3=world_from_camera[:3, :3])
-        stream.log(f"world/{camera.name}", place, static=True)
-        lens = rr.Pinhole(
-            image_from_camera=camera.intrinsics, resolution=camera.size, camera_xyz=rr.ViewCoordinates.RDF
-        )
-        stream.log(f"world/{camera.name}", lens, static=True)
+        entity = rr.new_entity_path(["world", camera.name])
+        stream.log(entity, place, static=True)
+        matrix = camera.intrinsics.copy()
+        matrix[:2, 2] += CENTRE
+        lens = rr.Pinhole(image_from_camera=matrix, resolution=camera.size, camera_xyz=rr.ViewCoordinates.RDF)
+        stream.log(entity, lens, static=True)
 
 
 def log_model(rr: Any, stream: Any, result: Result, row: int) -> None:
@@ -79,6 +81,6 @@ def log_images(rr: Any, stream: Any, result: Result, row: int, images: Any) -> N
         if usable:
             _, encoded = cv2.imencode(".jpg", np.asarray(image), [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
             shown = rr.EncodedImage(contents=encoded.tobytes(), media_type="image/jpeg")
-        stream.log(f"world/{camera.name}/image", shown)
-        outline = silhouettes.outline(surface, camera).pixel
-        stream.log(f"world/{camera.name}/outline", rr.LineStrips2D(outline, colors=[OUTLINE]))
+        stream.log(rr.new_entity_path(["world", camera.name, "image"]), shown)
+        outline = silhouettes.outline(surface, camera).pixel + CENTRE
+        stream.log(rr.new_entity_path(["world", camera.name, "outline"]), rr.LineStrips2D(outline, colors=[OUTLINE]))

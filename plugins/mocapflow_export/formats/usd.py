@@ -17,7 +17,10 @@ SKIN, CLOTH = (0.78, 0.6, 0.5), (0.2, 0.45, 0.5)  # RGB
 
 
 def write(result: Result, path: Path) -> None:
-    """Write a binary stage: a skeleton with a rotation per joint and frame, its skin, and the garment's points."""
+    """Write a binary stage: a skeleton with a rotation per joint and frame, its skin, and the garment's points.
+
+    The second shape that a body may have (`morph`) is not written.
+    """
     Author(result, path).save()
 
 
@@ -44,7 +47,9 @@ class Author:
         stage, geom = self._stage, self._geom
         geom.SetStageUpAxis(stage, geom.Tokens.z)
         geom.SetStageMetersPerUnit(stage, 1.0)
-        stage.SetTimeCodesPerSecond(self._result.recording.frame_rate)  # codes are frames of the videos
+        rate = self._result.recording.frame_rate
+        stage.SetTimeCodesPerSecond(rate)  # codes are frames of the videos
+        stage.SetFramesPerSecond(rate)
         stage.SetStartTimeCode(self._frames[0])
         stage.SetEndTimeCode(self._frames[-1])
         stage.SetDefaultPrim(geom.Xform.Define(stage, "/World").GetPrim())
