@@ -111,6 +111,16 @@ def test_keypoints_tell_too(tmp_path):
     assert late == pytest.approx({"cam01": 0, "cam02": 0, "cam03": 3}, abs=0.1)
 
 
+def test_outlines_tell_where_keypoints_are_sparse(tmp_path):
+    folder = write(tmp_path / "clip", {"cam02": 3})
+    for name in NAMES:
+        place = folder / "keypoints" / f"{name}_json"
+        place.mkdir(parents=True)
+        (place / "000000.json").write_text(json.dumps({"people": [{"pose_keypoints_2d": [80.0, 60.0, 1.0]}]}))
+    measured = {m.camera: m.frames for m in synchrony.measure(open_recording(folder))}
+    assert measured["cam02"] == pytest.approx(3, abs=0.3)
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
