@@ -209,7 +209,7 @@ def test_what_a_run_is_writing_is_not_pruned(call, monkeypatch):
         (("plan", "start.yaml", "--frames", "3"),
          "error: --frames 3  frames are written A:B or A:B:STEP; either end may be left out\n"),
         (("plan", "start.yaml", "--recording", "nowhere"),
-         "error: nowhere  there is no such folder\n       --recording DIR names another\n"),
+         "error: nowhere  there is no such folder\n       --recording DIR of run, plan and compare names another\n"),
         (("status", "nowhere"), "error: nowhere  this is no run folder\n"
          "       a run folder is what `mocapflow run` writes; it holds command.json\n"),
         (("evaluate", "nowhere"), "error: nowhere  this is no run folder\n"
