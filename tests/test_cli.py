@@ -24,6 +24,7 @@ from mocapflow.commands import cache, pictures, results
 from mocapflow.commands.invocation import FILE, Invocation, remember
 from mocapflow.commands.progress import reporter
 from mocapflow.help.shipped import shipped
+from mocapflow.io import markers
 from mocapflow.io.columns import read_columns
 from mocapflow.recordings import doctor
 from mocapflow.running import runner
@@ -378,9 +379,6 @@ def test_a_run_is_evaluated_and_exported(call):
     assert "track: from the store" in exported.stderr
     assert "overlay" not in exported.stderr
     assert Path("runs/bare/results/joints.trc").exists()
-    missing = call("evaluate", "runs/bare", "--truth", "nowhere.csv")
-    assert missing.exit_code == 2
-    assert missing.stderr.startswith("error: nowhere.csv  there is nothing to compare with\n")
 
 
 def test_what_the_pipeline_compares_with_is_compared_with_again(call, tmp_path):
@@ -388,7 +386,17 @@ def test_what_the_pipeline_compares_with_is_compared_with_again(call, tmp_path):
     remember(Invocation(str(shipped("pipelines", "bare.yaml")), str(CLIP), changes, None, "store"), tmp_path, {})
     missing = call("evaluate", str(tmp_path))
     assert missing.stderr.startswith(f"error: {CLIP / 'truth'}  there is nothing to compare with\n")
-    assert "--set stages.evaluate.reference=keypoints" in missing.stderr
+    assert "keypoints are compared in a run: run its pipeline again\n" in missing.stderr
+    given = call("evaluate", str(tmp_path), "--truth", str(CLIP))
+    assert "--set stages.evaluate.reference=keypoints" in given.stderr
+    ours = {"frame": np.arange(9.0), "time": np.arange(9) / 30, "knee_flexion_l": np.arange(9.0)}
+    tables.write_columns(layout.place(tmp_path, layout.ANGLES), ours)
+    lost = call("evaluate", str(tmp_path), "--truth", "nowhere.csv")
+    assert (lost.exit_code, lost.stderr) == (2, "error: nowhere.csv  no such reference\n")
+    joints = np.random.default_rng(0).uniform(size=(9, 3, 3))
+    markers.write_trc(tmp_path / layout.KEYPOINTS, ["hip_l", "knee_l", "ankle_l"], joints, 30.0)
+    again = call("evaluate", str(tmp_path))
+    assert again.stdout.startswith(f"compared with {tmp_path / layout.KEYPOINTS}\n"), again.output
 
 
 def test_an_export_leaves_what_the_run_folder_remembers(call, tmp_path):
