@@ -59,7 +59,8 @@ def test_a_run_is_made_once_and_then_found(call):
     assert "start: from the store" in call("run", "start.yaml").stderr
     assert "start: running" in call("run", "start.yaml", "--fresh").stderr
     assert " hit " in call("plan", "start.yaml").stdout
-    assert " hit " in call("status", "runs/start").stdout
+    told = call("status", "runs/start").stdout.splitlines()
+    assert " hit " in told[0] and told[-1].startswith("finished at 20")
     assert " run " in call("plan", "start.yaml", "--store", "elsewhere.zarr").stdout
 
 
@@ -244,6 +245,16 @@ def test_days_that_are_no_age_prune_nothing(call, days):
     assert "a number of days" in call("cache", "prune", "--days", days).stderr
     assert call("cache", "list").stdout.startswith("start-")
     assert "0 results" in call("cache", "prune", "--days", "inf").stdout
+
+
+def test_a_run_that_fails_is_not_said_to_be_finished(call, monkeypatch):
+    def fails(*_, **__):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "run.json")
+
+    assert call("run", "start.yaml").exit_code == 0
+    monkeypatch.setattr(runner.Prepared, "run", fails)
+    assert call("run", "start.yaml").exit_code == 1
+    assert "finished" not in call("status", "runs/start").stdout
 
 
 def test_a_viewer_that_can_not_open_is_told(call, monkeypatch):
