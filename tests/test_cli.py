@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from mocapflow_bodies.scanned import Scanned
 from mocapflow_export import layout, tables
+from mocapflow_export.export import WriteFormats
 from mocapflow_garments.skirt import Skirt
 from typer.testing import CliRunner
 
@@ -245,6 +246,23 @@ def test_days_that_are_no_age_prune_nothing(call, days):
     assert "a number of days" in call("cache", "prune", "--days", days).stderr
     assert call("cache", "list").stdout.startswith("start-")
     assert "0 results" in call("cache", "prune", "--days", "inf").stdout
+
+
+def test_a_run_that_does_not_begin_leaves_no_folder(call):
+    assert call("run", "start.yaml", "--frames", "90:100").exit_code == 2
+    assert not Path("runs/start").exists()
+
+
+def test_an_export_into_a_folder_that_may_not_be_written(call, tmp_path, monkeypatch):
+    def refused(self, result, run_folder):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(run_folder.path / "results"))
+
+    path = write_pipeline(tmp_path, write_recording(tmp_path / "clip", 3), stages={**STAGES, "export": "export"})
+    assert call("run", path.name, "--out", "out").exit_code == 0
+    monkeypatch.setattr(WriteFormats, "write", refused)
+    told = call("export", "out", "--format", "trc")
+    assert told.stderr.endswith("error: out/results  can't be written or read: Permission denied\n")
+    assert told.exit_code == 1
 
 
 def test_a_run_that_fails_is_not_said_to_be_finished(call, monkeypatch):

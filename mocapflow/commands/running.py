@@ -145,11 +145,10 @@ def execute(
     invocation: Invocation, out: Path, fresh: bool = False, workers: int = 1, scheduler: str | None = None
 ) -> RunSummary:
     """Run what an invocation says, have the run folder remember it, and return the summary."""
-    pipeline = _loaded(invocation, out)
-    with alone(out):
-        prepared = prepare(pipeline, invocation)
-        prepared.check(out, fresh)
-        parts = parts_of(prepared.steps) if workers > 1 or scheduler is not None else []
+    prepared = prepare(_loaded(invocation, out), invocation)
+    prepared.check(out, fresh)
+    parts = parts_of(prepared.steps) if workers > 1 or scheduler is not None else []
+    with alone(out):  # from here on there is something to write
         begin(invocation, out, prepared.steps)
         if parts:
             make_parts(parts, invocation, out, workers, scheduler)
