@@ -288,12 +288,13 @@ def test_a_viewer_that_can_not_open_is_told(call, monkeypatch):
 
 def test_a_prior_that_can_not_be_written(call):
     angles = str(CLIP / "truth/angles.csv")
-    made = call("prior", "fit", angles, "--out", "nowhere/mine.npz")
+    made = call("prior", "fit", angles, "--out", "start.yaml/new/mine.npz")
     assert made.exit_code == 1
     assert made.stderr == (
-        "error: nowhere/mine.npz  can't be written: No such file or directory\n"
-        "       --out names a .npz, in a folder that is there\n"
+        "error: start.yaml/new/mine.npz  can't be written: Not a directory\n"
+        "       --out names a .npz, in a folder that may be written\n"
     )
+    assert call("prior", "fit", angles, "--out", "new/mine.npz").exit_code == 0 and Path("new/mine.npz").is_file()
 
 
 def test_a_store_that_is_not_there_ends_with_2(call):
@@ -609,7 +610,7 @@ def test_a_garment_or_a_body_that_a_run_would_refuse_is_not_drawn(call, monkeypa
     assert refused.exit_code == 2 and "body 'scanned' returned vertices that are not finite" in refused.stderr
 
 
-@pytest.mark.parametrize("out", ["nowhere/skirt.png", "skirt.doc"])
+@pytest.mark.parametrize("out", ["start.yaml/skirt.png", "skirt.doc"])
 def test_a_picture_that_can_not_be_written(call, monkeypatch, out):
     monkeypatch.setattr(pictures, "poster", lambda *_: np.zeros((8, 8, 3), np.uint8))  # which takes two seconds to draw
     shown = call("show", "garment", "skirt", "--out", out)
@@ -623,6 +624,14 @@ def test_a_picture_that_can_not_be_written(call, monkeypatch, out):
 def test_a_draper_that_can_not_be_made_is_told(call, monkeypatch, draper, message):
     monkeypatch.setattr("mocapflow_physics.xpbd.find_spec", lambda name: None)
     shown = call("show", "garment", "skirt", "--draper", draper, "--out", "garment.png")
+def test_a_picture_makes_its_folder_and_asks_for_that_of_the_recording(call, monkeypatch):
+    monkeypatch.setattr(pictures, "poster", lambda *_: np.zeros((8, 8, 3), np.uint8))  # which takes two seconds to draw
+    show = ("show", "garment", "skirt", "--out", "new/skirt.png")
+    lost = call(*show, "--recording", "nowhere")
+    assert (lost.exit_code, lost.stderr) == (2, "error: nowhere  no such recording folder\n")
+    assert call(*show).exit_code == 0 and Path("new/skirt.png").is_file()
+
+
     assert shown.exit_code == 2
     assert f"error: show garment skirt  {message}" in shown.stderr
 
