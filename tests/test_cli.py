@@ -521,6 +521,11 @@ def test_show(call):
 
 
 def test_equations(call):
+@pytest.mark.parametrize("words", [(), ("run",), ("cache", "list")])
+def test_help_has_a_short_name(call, words):
+    assert call(*words, "-h").stdout == call(*words, "--help").stdout != ""
+
+
     shown = call("equations", "12.8").stdout
     assert shown.split()[:3] == ["12.8", "kinematic", "chain"]
     assert "geometry/kinematics.py:" in shown
