@@ -126,11 +126,11 @@ def test_outlines_tell_where_keypoints_are_sparse(tmp_path):
     [
         ("{", "recording.json:1:2  not JSON: "),
         ("{}", "does not say how late the cameras are: KeyError"),
-        ('{"late": {}}', "recording.json:1:3  there is no 'late'"),
+        ('{"late": {}}', "recording.json:1:3  unknown setting 'late'"),
         ('{"late_frames": {"cam01": "much"}}', "does not say how late the cameras are: ValueError"),
         ('{"late_frames": {"cam01": true}}', "does not say how late the cameras are: TypeError"),
         ('{"late_frames": {"cam1": 3}}', "there is no camera 'cam1'"),
-        ('{"late_frames": {}, "late_frame": {"cam01": 3}}', "there is no 'late_frame'"),
+        ('{"late_frames": {}, "late_frame": {"cam01": 3}}', "unknown setting 'late_frame'"),
         (
             '{"late_frames": {"cam01": 4, "cam02": 5, "cam03": 6}}',
             "every camera is said to be late.*\n *cameras.* 4 off",
