@@ -301,6 +301,7 @@ def test_a_store_that_is_not_there_ends_with_2(call):
     result = call("cache", "list")
     assert result.stderr.startswith("error: runs/store.zarr  there is no store here\n       a store is what ")
     assert result.exit_code == 2
+    assert "not s3://mine/store.zarr\n" in call("cache", "list", "--store", "s3://mine/store.zarr").stderr
 
 
 @pytest.mark.parametrize("more", [[], ["--all"]])
@@ -520,12 +521,12 @@ def test_show(call):
     assert missing.stderr.endswith("did you mean 'joint_limits'?\n")
 
 
-def test_equations(call):
 @pytest.mark.parametrize("words", [(), ("run",), ("cache", "list")])
 def test_help_has_a_short_name(call, words):
     assert call(*words, "-h").stdout == call(*words, "--help").stdout != ""
 
 
+def test_equations(call):
     shown = call("equations", "12.8").stdout
     assert shown.split()[:3] == ["12.8", "kinematic", "chain"]
     assert "geometry/kinematics.py:" in shown
@@ -623,12 +624,6 @@ def test_a_picture_that_can_not_be_written(call, monkeypatch, out):
     assert f"error: {out}  the picture can't be written" in shown.stderr
 
 
-@pytest.mark.parametrize(
-    ("draper", "message"), [("xpbd", "draper xpbd needs the simulator newton"), ("xpdb", "no draper named 'xpdb'")]
-)
-def test_a_draper_that_can_not_be_made_is_told(call, monkeypatch, draper, message):
-    monkeypatch.setattr("mocapflow_physics.xpbd.find_spec", lambda name: None)
-    shown = call("show", "garment", "skirt", "--draper", draper, "--out", "garment.png")
 def test_a_picture_makes_its_folder_and_asks_for_that_of_the_recording(call, monkeypatch):
     monkeypatch.setattr(pictures, "poster", lambda *_: np.zeros((8, 8, 3), np.uint8))  # which takes two seconds to draw
     show = ("show", "garment", "skirt", "--out", "new/skirt.png")
@@ -637,6 +632,12 @@ def test_a_picture_makes_its_folder_and_asks_for_that_of_the_recording(call, mon
     assert call(*show).exit_code == 0 and Path("new/skirt.png").is_file()
 
 
+@pytest.mark.parametrize(
+    ("draper", "message"), [("xpbd", "draper xpbd needs the simulator newton"), ("xpdb", "no draper named 'xpdb'")]
+)
+def test_a_draper_that_can_not_be_made_is_told(call, monkeypatch, draper, message):
+    monkeypatch.setattr("mocapflow_physics.xpbd.find_spec", lambda name: None)
+    shown = call("show", "garment", "skirt", "--draper", draper, "--out", "garment.png")
     assert shown.exit_code == 2
     assert f"error: show garment skirt  {message}" in shown.stderr
 
