@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from mocapflow_bodies.scanned import Scanned
 from mocapflow_export import layout, tables
+from mocapflow_export.export import WriteFormats
 from mocapflow_garments.skirt import Skirt
 from typer.testing import CliRunner
 
@@ -24,6 +25,7 @@ from mocapflow.commands import cache, pictures, results
 from mocapflow.commands.invocation import FILE, Invocation, remember
 from mocapflow.commands.progress import reporter
 from mocapflow.help.shipped import shipped
+from mocapflow.io import markers
 from mocapflow.io.columns import read_columns
 from mocapflow.recordings import doctor
 from mocapflow.running import runner
@@ -58,7 +60,8 @@ def test_a_run_is_made_once_and_then_found(call):
     assert "start: from the store" in call("run", "start.yaml").stderr
     assert "start: running" in call("run", "start.yaml", "--fresh").stderr
     assert " hit " in call("plan", "start.yaml").stdout
-    assert " hit " in call("status", "runs/start").stdout
+    told = call("status", "runs/start").stdout.splitlines()
+    assert " hit " in told[0] and told[-1].startswith("finished at 20")
     assert " run " in call("plan", "start.yaml", "--store", "elsewhere.zarr").stdout
 
 
@@ -209,7 +212,7 @@ def test_what_a_run_is_writing_is_not_pruned(call, monkeypatch):
         (("plan", "start.yaml", "--frames", "3"),
          "error: --frames 3  frames are written A:B or A:B:STEP; either end may be left out\n"),
         (("plan", "start.yaml", "--recording", "nowhere"),
-         "error: nowhere  there is no such folder\n       --recording DIR names another\n"),
+         "error: nowhere  there is no such folder\n       --recording DIR of run, plan and compare names another\n"),
         (("status", "nowhere"), "error: nowhere  this is no run folder\n"
          "       a run folder is what `mocapflow run` writes; it holds command.json\n"),
         (("evaluate", "nowhere"), "error: nowhere  this is no run folder\n"
@@ -245,6 +248,33 @@ def test_days_that_are_no_age_prune_nothing(call, days):
     assert "0 results" in call("cache", "prune", "--days", "inf").stdout
 
 
+def test_a_run_that_does_not_begin_leaves_no_folder(call):
+    assert call("run", "start.yaml", "--frames", "90:100").exit_code == 2
+    assert not Path("runs/start").exists()
+
+
+def test_an_export_into_a_folder_that_may_not_be_written(call, tmp_path, monkeypatch):
+    def refused(self, result, run_folder):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(run_folder.path / "results"))
+
+    path = write_pipeline(tmp_path, write_recording(tmp_path / "clip", 3), stages={**STAGES, "export": "export"})
+    assert call("run", path.name, "--out", "out").exit_code == 0
+    monkeypatch.setattr(WriteFormats, "write", refused)
+    told = call("export", "out", "--format", "trc")
+    assert told.stderr.endswith("error: out/results  can't be written or read: Permission denied\n")
+    assert told.exit_code == 1
+
+
+def test_a_run_that_fails_is_not_said_to_be_finished(call, monkeypatch):
+    def fails(*_, **__):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "run.json")
+
+    assert call("run", "start.yaml").exit_code == 0
+    monkeypatch.setattr(runner.Prepared, "run", fails)
+    assert call("run", "start.yaml").exit_code == 1
+    assert "finished" not in call("status", "runs/start").stdout
+
+
 def test_a_viewer_that_can_not_open_is_told(call, monkeypatch):
     monkeypatch.setattr(results, "export", lambda run, formats: None)
     monkeypatch.setattr(sys, "executable", "false")
@@ -258,18 +288,20 @@ def test_a_viewer_that_can_not_open_is_told(call, monkeypatch):
 
 def test_a_prior_that_can_not_be_written(call):
     angles = str(CLIP / "truth/angles.csv")
-    made = call("prior", "fit", angles, "--out", "nowhere/mine.npz")
+    made = call("prior", "fit", angles, "--out", "start.yaml/new/mine.npz")
     assert made.exit_code == 1
     assert made.stderr == (
-        "error: nowhere/mine.npz  can't be written: No such file or directory\n"
-        "       --out names a .npz, in a folder that is there\n"
+        "error: start.yaml/new/mine.npz  can't be written: Not a directory\n"
+        "       --out names a .npz, in a folder that may be written\n"
     )
+    assert call("prior", "fit", angles, "--out", "new/mine.npz").exit_code == 0 and Path("new/mine.npz").is_file()
 
 
 def test_a_store_that_is_not_there_ends_with_2(call):
     result = call("cache", "list")
     assert result.stderr.startswith("error: runs/store.zarr  there is no store here\n       a store is what ")
     assert result.exit_code == 2
+    assert "not s3://mine/store.zarr\n" in call("cache", "list", "--store", "s3://mine/store.zarr").stderr
 
 
 @pytest.mark.parametrize("more", [[], ["--all"]])
@@ -378,9 +410,6 @@ def test_a_run_is_evaluated_and_exported(call):
     assert "track: from the store" in exported.stderr
     assert "overlay" not in exported.stderr
     assert Path("runs/bare/results/joints.trc").exists()
-    missing = call("evaluate", "runs/bare", "--truth", "nowhere.csv")
-    assert missing.exit_code == 2
-    assert missing.stderr.startswith("error: nowhere.csv  there is nothing to compare with\n")
 
 
 def test_what_the_pipeline_compares_with_is_compared_with_again(call, tmp_path):
@@ -388,7 +417,17 @@ def test_what_the_pipeline_compares_with_is_compared_with_again(call, tmp_path):
     remember(Invocation(str(shipped("pipelines", "bare.yaml")), str(CLIP), changes, None, "store"), tmp_path, {})
     missing = call("evaluate", str(tmp_path))
     assert missing.stderr.startswith(f"error: {CLIP / 'truth'}  there is nothing to compare with\n")
-    assert "--set stages.evaluate.reference=keypoints" in missing.stderr
+    assert "keypoints are compared in a run: run its pipeline again\n" in missing.stderr
+    given = call("evaluate", str(tmp_path), "--truth", str(CLIP))
+    assert "--set stages.evaluate.reference=keypoints" in given.stderr
+    ours = {"frame": np.arange(9.0), "time": np.arange(9) / 30, "knee_flexion_l": np.arange(9.0)}
+    tables.write_columns(layout.place(tmp_path, layout.ANGLES), ours)
+    lost = call("evaluate", str(tmp_path), "--truth", "nowhere.csv")
+    assert (lost.exit_code, lost.stderr) == (2, "error: nowhere.csv  no such reference\n")
+    joints = np.random.default_rng(0).uniform(size=(9, 3, 3))
+    markers.write_trc(tmp_path / layout.KEYPOINTS, ["hip_l", "knee_l", "ankle_l"], joints, 30.0)
+    again = call("evaluate", str(tmp_path))
+    assert again.stdout.startswith(f"compared with {tmp_path / layout.KEYPOINTS}\n"), again.output
 
 
 def test_an_export_leaves_what_the_run_folder_remembers(call, tmp_path):
@@ -482,6 +521,11 @@ def test_show(call):
     assert missing.stderr.endswith("did you mean 'joint_limits'?\n")
 
 
+@pytest.mark.parametrize("words", [(), ("run",), ("cache", "list")])
+def test_help_has_a_short_name(call, words):
+    assert call(*words, "-h").stdout == call(*words, "--help").stdout != ""
+
+
 def test_equations(call):
     shown = call("equations", "12.8").stdout
     assert shown.split()[:3] == ["12.8", "kinematic", "chain"]
@@ -572,12 +616,20 @@ def test_a_garment_or_a_body_that_a_run_would_refuse_is_not_drawn(call, monkeypa
     assert refused.exit_code == 2 and "body 'scanned' returned vertices that are not finite" in refused.stderr
 
 
-@pytest.mark.parametrize("out", ["nowhere/skirt.png", "skirt.doc"])
+@pytest.mark.parametrize("out", ["start.yaml/skirt.png", "skirt.doc"])
 def test_a_picture_that_can_not_be_written(call, monkeypatch, out):
     monkeypatch.setattr(pictures, "poster", lambda *_: np.zeros((8, 8, 3), np.uint8))  # which takes two seconds to draw
     shown = call("show", "garment", "skirt", "--out", out)
     assert shown.exit_code == 1
     assert f"error: {out}  the picture can't be written" in shown.stderr
+
+
+def test_a_picture_makes_its_folder_and_asks_for_that_of_the_recording(call, monkeypatch):
+    monkeypatch.setattr(pictures, "poster", lambda *_: np.zeros((8, 8, 3), np.uint8))  # which takes two seconds to draw
+    show = ("show", "garment", "skirt", "--out", "new/skirt.png")
+    lost = call(*show, "--recording", "nowhere")
+    assert (lost.exit_code, lost.stderr) == (2, "error: nowhere  no such recording folder\n")
+    assert call(*show).exit_code == 0 and Path("new/skirt.png").is_file()
 
 
 @pytest.mark.parametrize(

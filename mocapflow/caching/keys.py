@@ -25,6 +25,7 @@ from mocapflow.settings import Component
 
 FORMAT = 3  # of recipes and groups: another number makes everything anew
 CODE = frozenset({"format", "core", "code", "reader", "key"})  # what is of code in a recipe
+ANEW = "was made anew"
 Recipe = Mapping[str, Any]
 
 
@@ -109,10 +110,15 @@ def _unnamed(value: Any) -> Any:
 
 
 def explain(old: Recipe, new: Recipe) -> str:
-    """Return what changed between two recipes, in words: `draper kinematic → xpbd`."""
-    changes = list(dict.fromkeys(_changes(old, new, "")))
+    """Return what changed between two recipes, in words: `draper kinematic → xpbd`; the first four changes."""
+    changes = all_changes(old, new)
     more = f" and {len(changes) - 4} more" if len(changes) > 4 else ""
     return "; ".join(changes[:4]) + more
+
+
+def all_changes(old: Recipe, new: Recipe) -> list[str]:
+    """Return all that changed between two recipes; inputs that were made anew come after what is of their own."""
+    return sorted(dict.fromkeys(_changes(old, new, "")), key=lambda change: change.endswith(ANEW))
 
 
 def _changes(old: Any, new: Any, path: str) -> Iterator[str]:
@@ -139,7 +145,7 @@ def _change(old: Any, new: Any, path: str) -> str:
     if path.endswith(".frames") and isinstance(old, int) and isinstance(new, int):
         return f"{path.removesuffix('.frames')} {'grew' if new > old else 'shrank'} from {old} to {new} frames"
     if path.endswith(".key"):
-        return f"{path.removesuffix('.key')} was made anew"
+        return f"{path.removesuffix('.key')} {ANEW}"
     return f"{path} {_words(old)} → {_words(new)}"
 
 

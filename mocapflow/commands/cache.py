@@ -48,13 +48,13 @@ def explain(
     store: Where = DEFAULT,
 ) -> None:
     """Say what a result was made from, or how two differ."""
-    from mocapflow.caching.keys import explain as differences
+    from mocapflow.caching.keys import all_changes
 
     one = _find(name, store)
     if other is None:
         typer.echo(json.dumps({**one.recipe, "versions": one.attributes.get("versions")}, indent=1, ensure_ascii=False))
     else:
-        typer.echo(differences(one.recipe, _find(other, store).recipe) or "made from the same")
+        typer.echo("\n".join(all_changes(one.recipe, _find(other, store).recipe)) or "made from the same")
 
 
 @app.command()

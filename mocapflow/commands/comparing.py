@@ -86,9 +86,13 @@ def show(folder: Path, cells: Sequence[Cell], failed: Mapping[Cell, str]) -> Non
 
     runs = [(cell.variant, cell.name, failed.get(cell) or place(folder, cell)) for cell in cells]
     rows = [{name: row[name] for name in SHOWN} for row in variants.compare(runs, folder)]
+    compared = {(row["variant"], row["recording"]) for row in rows}
+    alone = [f"{c.variant}/{c.name}" for c in cells if c not in failed and (c.variant, c.name) not in compared]
     rows += [{**dict.fromkeys(SHOWN, ""), "recording": c.name, "variant": c.variant, "angle": "failed"} for c in failed]
     if rows:
         typer.echo(table(rows))
+    if alone:
+        typer.echo(f"not compared, for they lack a truth or reference, or a stage evaluate: {', '.join(alone)}")
     for cell, message in failed.items():
         typer.echo(f"failed: {cell.variant} on {cell.name}: {message}")
     typer.echo(f"all figures: {folder}/{', '.join(name for name in FILES if (folder / name).is_file())}")

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 FILE = "command.json"
 KEYS = ("keys", "contents")  # of what the stages make; without and with what code makes of it left out
+FINISHED = "finished"  # when the run was, missing until then
 
 
 @dataclass(frozen=True)
@@ -92,7 +94,21 @@ def remember(
     invocation: Invocation, out: Path, keys: Mapping[str, str], contents: Mapping[str, str] | None = None
 ) -> None:
     """Write an invocation into its run folder, with the keys of what its stages make, and those whatever the code."""
-    said = {**asdict(invocation.absolute()), **dict(zip(KEYS, (keys, contents or {}), strict=True))}
+    _write(out, {**asdict(invocation.absolute()), **dict(zip(KEYS, (keys, contents or {}), strict=True))})
+
+
+def finish(out: Path) -> None:
+    """Note in a run folder that its run is finished."""
+    said = json.loads((out / FILE).read_text(encoding="utf-8"))
+    _write(out, {**said, FINISHED: datetime.now().astimezone().isoformat(" ", "seconds")})
+
+
+def finished_at(out: Path) -> str:
+    """Return when the run of a run folder was finished, "" where it is not."""
+    return str(json.loads((out / FILE).read_text(encoding="utf-8")).get(FINISHED, ""))
+
+
+def _write(out: Path, said: Mapping[str, object]) -> None:
     try:
         with atomic_write(out / FILE) as part:
             part.write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
@@ -104,7 +120,7 @@ def recall(out: Path) -> Invocation:
     """Return the invocation a run folder was made by."""
     try:
         said = json.loads((out / FILE).read_text(encoding="utf-8"))
-        known = {name: value for name, value in said.items() if name not in KEYS}
+        known = {name: value for name, value in said.items() if name not in (*KEYS, FINISHED)}
         return Invocation(**{**known, "changes": tuple(said["changes"])})
     except (FileNotFoundError, NotADirectoryError):
         hint = f"a run folder is what `mocapflow run` writes; it holds {FILE}"

@@ -69,7 +69,6 @@ def _drawn(registry: Registry, name: str, recording: Path | None, draper: str, o
     if out is not None:
         return draw_garment(registry, name, recording, draper, out)
     try:
-        PICTURES.mkdir(exist_ok=True)
         return draw_garment(registry, name, recording, draper, PICTURES / f"{name}.png")
     except (MocapflowError, OSError) as error:
         return [f"no picture: {error}"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -27,4 +28,4 @@ def plugin(
     folder = out or Path(f"mocapflow-{name}")
     for path in scaffold.write_plugin(name, role, folder):
         typer.echo(path)
-    typer.echo(f"to go on: pip install -e '{folder}[test]' && pytest {folder}")
+    typer.echo(f"to go on: pip install -e {shlex.quote(f'{folder}[test]')} && pytest {shlex.quote(str(folder))}")

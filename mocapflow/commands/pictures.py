@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from mocapflow.config.resolve import Resolver
 from mocapflow.data import Past, Pose
 from mocapflow.dressing.guards import body_of, mesh_of
 from mocapflow.dressing.roles import Draper, Garment
-from mocapflow.errors import StoreError
+from mocapflow.errors import RecordingError, StoreError
 from mocapflow.help.shipped import shipped
 from mocapflow.io.paths import for_opencv
 from mocapflow.model import ClothedModel
@@ -30,13 +31,15 @@ def draw_garment(registry: Registry, name: str, recording: Path | None, draper: 
     """Write the picture of a garment on the person of a recording and return lines to print.
 
     Raises:
-        MocapflowError: the garment needs measures that the recording does not have, or can't be sewn from them; or the
-            draper can't be made.
+        MocapflowError: the recording is not there, the garment needs measures that it does not have, or can't be sewn
+            from them; or the draper can't be made.
         StoreError: the picture can't be written.
     """
     import cv2
 
     recording = recording or _example(name)
+    if not recording.is_dir():
+        raise RecordingError("no such recording folder", where=str(recording))
     resolver = Resolver(Document({}, {(): Place(f"show garment {name}", Path())}), registry)
     garment: Any = garment_of(name, recording, resolver)
     scanned: Any = registry.get("body", "scanned")
@@ -44,8 +47,10 @@ def draw_garment(registry: Registry, name: str, recording: Path | None, draper: 
     scene = Scene(cameras=(), body=body, garment=mesh_of(garment, body))
     image = poster(scene, garment, resolver.component("draper", draper, ()))
     file = for_opencv(out)
+    with suppress(OSError):
+        out.parent.mkdir(parents=True, exist_ok=True)
     if not (out.parent.is_dir() and cv2.haveImageWriter(file) and cv2.imwrite(file, image)):
-        hint = "--out names a .png, in a folder that is there"
+        hint = "--out names a .png, in a folder that may be written"
         raise StoreError("the picture can't be written", where=str(out), hint=hint)
     assert scene.garment is not None
     count, strands = len(scene.garment.vertices), len(scene.garment.strands)

@@ -41,9 +41,10 @@ def fit(
         raise PipelineError("--out names the file to write, a .npz that is none of FILES", where=str(out), hint=hint)
     learned = training.fit(files, Template().load(Path()), angles or training.FREE, percentile)
     try:
+        out.parent.mkdir(parents=True, exist_ok=True)
         density.write(out, learned)
     except OSError as error:
-        hint = "--out names a .npz, in a folder that is there"
+        hint = "--out names a .npz, in a folder that may be written"
         raise StoreError(f"can't be written: {error.strerror}", where=str(out), hint=hint) from None
     typer.echo(f"{out}: {len(learned.poses)} poses, bandwidth {np.degrees(learned.bandwidth):.1f}°")
     typer.echo(f"angles: {', '.join(learned.names)}")

@@ -38,10 +38,10 @@ def evaluate(run: Run, truth: Truth = None) -> None:
     from mocapflow_evaluation.evaluate import evaluate_run
 
     reference, missing, longest_lag_s = _comparison(run, truth)
-    if reference is None or not reference.is_file():
-        folder = "keypoints are compared in a run: --set stages.evaluate.reference=keypoints"
-        known = reference is not None and reference.is_dir()
-        hint = missing or (folder if known else "name a file of known angles with --truth")
+    if reference is None or reference.is_dir():
+        again = "run its pipeline again" if truth is None else "--set stages.evaluate.reference=keypoints"
+        named = f"{missing}\nname a file of known angles with --truth"
+        hint = named if reference is None else f"keypoints are compared in a run: {again}"
         raise RecordingError("there is nothing to compare with", where=str(reference or run), hint=hint)
     evaluation = evaluate_run(run, reference, longest_lag_s)
     if not evaluation.rows:
@@ -56,6 +56,7 @@ def evaluate(run: Run, truth: Truth = None) -> None:
 def _comparison(run: Path, truth: Path | None) -> tuple[Path | None, str, float]:
     """Return what a run is compared with, or why there is nothing, and the longest lag to look for (s)."""
     from mocapflow_evaluation.evaluate import LONGEST_LAG_S, Evaluate, chosen
+    from mocapflow_export import layout
 
     try:
         pipeline = recall(run).load()
@@ -66,6 +67,8 @@ def _comparison(run: Path, truth: Path | None) -> tuple[Path | None, str, float]
         return truth, "", LONGEST_LAG_S
     stage = next((named.stage for named in pipeline.stages if isinstance(named.stage, Evaluate)), Evaluate())
     reference, missing = (truth, "") if truth else chosen(pipeline.recording, stage.reference)
+    if truth is None and reference is not None and reference.is_dir() and (run / layout.KEYPOINTS).is_file():
+        reference = run / layout.KEYPOINTS  # which the run has triangulated
     return reference, missing, stage.longest_lag_s
 
 

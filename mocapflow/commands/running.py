@@ -10,7 +10,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mocapflow.commands.former import check_store, differing, holds_results, set_aside
-from mocapflow.commands.invocation import Invocation, alone, placed, recall, recalled_keys, remember
+from mocapflow.commands.invocation import (
+    Invocation,
+    alone,
+    finish,
+    finished_at,
+    placed,
+    recall,
+    recalled_keys,
+    remember,
+)
 from mocapflow.commands.progress import last_word, noted, reporter
 from mocapflow.commands.workers import Scheduler, Workers, finished
 from mocapflow.errors import PipelineError
@@ -76,7 +85,8 @@ def plan(
 def status(run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")]) -> None:
     """Say how far a run is."""
     _print_plan(recall(run_folder))
-    if said := last_word(run_folder):
+    when = finished_at(run_folder)
+    if said := last_word(run_folder) or (when and f"finished at {when}"):
         typer.echo(said)
 
 
@@ -135,15 +145,16 @@ def execute(
     invocation: Invocation, out: Path, fresh: bool = False, workers: int = 1, scheduler: str | None = None
 ) -> RunSummary:
     """Run what an invocation says, have the run folder remember it, and return the summary."""
-    pipeline = _loaded(invocation, out)
-    with alone(out):
-        prepared = prepare(pipeline, invocation)
-        prepared.check(out, fresh)
-        parts = parts_of(prepared.steps) if workers > 1 or scheduler is not None else []
+    prepared = prepare(_loaded(invocation, out), invocation)
+    prepared.check(out, fresh)
+    parts = parts_of(prepared.steps) if workers > 1 or scheduler is not None else []
+    with alone(out):  # from here on there is something to write
         begin(invocation, out, prepared.steps)
         if parts:
             make_parts(parts, invocation, out, workers, scheduler)
-        return carry_out(prepared, out, fresh)
+        summary = carry_out(prepared, out, fresh)
+        finish(out)
+        return summary
 
 
 def prepare(pipeline: Pipeline, invocation: Invocation) -> Prepared:

@@ -128,7 +128,8 @@ def load_pipeline(
     recording = Path(recording) if recording else _recording(said, Path(path).stem, resolver)
     if not recording.is_dir():
         what = f"there is no such folder{f': {recording}' if written else ''}"
-        hint = "\n".join(filter(None, [led_nowhere(recording), "--recording DIR names another"]))
+        option = "--recording DIR of run, plan and compare names another"
+        hint = "\n".join(filter(None, [led_nowhere(recording), option]))
         raise RecordingError(what, where=written or str(recording), hint=hint)
     if all(value is None for value in said.stages.values()):
         raise PipelineError("a pipeline needs stages", where=resolver.place(("stages",)))

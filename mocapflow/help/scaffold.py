@@ -41,9 +41,11 @@ def write_plugin(name: str, role: str, folder: Path) -> list[Path]:
     """Write a plugin package into a new folder and return its files.
 
     Raises:
-        PluginError: the name can't be one, nobody wrote templates for the role, the package or the folder is there
-            already, or the folder can't be written.
+        PluginError: the name can't be one, nobody wrote templates for the role, the package, one of this role and name
+            or the folder is there already, or the folder can't be written.
     """
+    from mocapflow.registry import load_registry
+
     if role not in KINDS:
         raise PluginError(f"there are no templates for a {role}", hint=alternatives(role, KINDS))
     if not NAME.fullmatch(name):
@@ -51,9 +53,12 @@ def write_plugin(name: str, role: str, folder: Path) -> list[Path]:
         raise PluginError(f"'{name}' can't be the name of a package", hint=hint)
     if find_spec(package := f"mocapflow_{name.replace('-', '_')}"):
         raise PluginError(f"there is a package {package} already", hint="plugins of one name hide each other")
+    if (module := name.replace("-", "_")) in load_registry().provided(role):
+        hint = "no pipeline could name either of the two; choose another name"
+        raise PluginError(f"there is a {role} '{module}' already", hint=hint)
     if folder.exists():
         raise PluginError("there is something already", where=str(folder), hint="name another folder with --out")
-    module, kind = name.replace("-", "_"), KINDS[role]
+    kind = KINDS[role]
     words = {
         "name": name,
         "module": module,

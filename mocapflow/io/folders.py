@@ -11,7 +11,7 @@ from mocapflow.errors import RecordingError
 from mocapflow.io import agreement
 from mocapflow.io.cameras import find_calibration, read_cameras
 from mocapflow.io.images import IMAGES
-from mocapflow.io.keypoints import odd_keypoints
+from mocapflow.io.keypoints import first_numbers, odd_keypoints
 from mocapflow.io.lateness import late_frames
 from mocapflow.io.video import VIDEOS, Video, count_from_first, open_video
 from mocapflow.records import record
@@ -154,13 +154,22 @@ def keypoint_folder(place: Path, camera: str) -> Path | None:
     return next((place for place in places if place.is_dir()), None)
 
 
-def keypoint_warnings(folder: Path, cameras: Sequence[Camera], length: int, first: int) -> list[str]:
+def keypoint_numbers(folder: Path, cameras: Sequence[Camera], length: int, image: int) -> list[str]:
+    """Say which files are taken for the keypoints of frame 0, where its image has another number than 0."""
+    places = [keypoint_folder(folder / KEYPOINTS, camera.name) for camera in cameras]
+    numbers = zip(cameras, places, first_numbers(places, image, length), strict=True)
+    found = [f"{number} of {camera.name}" for camera, place, number in numbers if image and place]
+    return [f"the keypoints of frame 0 are numbered {', '.join(found)}"] if found else []
+
+
+def keypoint_warnings(folder: Path, cameras: Sequence[Camera], length: int, image: int) -> list[str]:
     """Say what is odd about the keypoints of all cameras, for images from a number on; nothing where there are none."""
     places = [keypoint_folder(folder / KEYPOINTS, camera.name) for camera in cameras]
     unused = [path.name for path in _entries(folder / KEYPOINTS) if path.is_dir() and path not in places]
     names = f"folders are named after their cameras: {cameras[0].name}{KEYPOINT_ENDINGS[0]}"
     said = [f"not used from {KEYPOINTS}/: {', '.join(unused)}; {names}"] if unused else []
-    for camera, place in zip(cameras, places, strict=True) if any(places) else ():
+    numbers = first_numbers(places, image, length)
+    for camera, place, first in zip(cameras, places, numbers, strict=True) if any(places) else ():
         missing = [f"{camera.name}: no keypoints, though others have them"]
         said += odd_keypoints(camera.name, place, length, first) if place else missing
     return said

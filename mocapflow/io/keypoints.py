@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,14 +20,43 @@ def keypoint_files(folder: Path, first: int = 0) -> dict[int, Path]:
 
     Args:
         folder: of one camera.
-        first: number of frame 0's image, which files that are named after images count from, too.
+        first: number of frame 0's file, see `first_numbers`.
 
     Raises:
         RecordingError: two files have one number.
     """
-    files = numbered(folder, (".json",))
-    begin = first if files and min(files) >= first else 0
-    return {number - begin: path for number, path in files.items()}
+    return {number - first: path for number, path in numbered(folder, (".json",)).items()}
+
+
+def first_numbers(folders: Sequence[Path | None], image: int, length: int) -> list[int]:
+    """Return the number of frame 0's file in each folder: that of its image, which it may be named after, or 0.
+
+    A number below that of the first image, or beyond the last frame, tells. For a camera without one the others tell;
+    where they don't, or contradict each other, files that end with the last frame count from 0.
+
+    Args:
+        folders: of all cameras; None: one without keypoints.
+        image: number of frame 0's image.
+        length: frames of the videos.
+
+    Raises:
+        RecordingError: two files of a camera have one number.
+    """
+    if not image:
+        return [0] * len(folders)
+    files = [[] if folder is None else list(numbered(folder, (".json",))) for folder in folders]
+    told = [_told(numbers, image, length) for numbers in files]
+    known = {number for number in told if number is not None}
+    ends = {max(numbers) for numbers, number in zip(files, told, strict=True) if numbers and number is None}
+    others = known.pop() if len(known) == 1 else 0 if length - 1 in ends else image
+    return [others if number is None else number for number in told]
+
+
+def _told(numbers: Sequence[int], image: int, length: int) -> int | None:
+    """Return what a camera's own numbers tell of frame 0's, None where they may count from either."""
+    if not numbers or image <= min(numbers) <= max(numbers) < length:
+        return None
+    return 0 if min(numbers) < image else image
 
 
 def read_keypoints(path: Path) -> F64:
@@ -62,7 +91,10 @@ def people_at(files: Mapping[int, Path] | None, index: int) -> F64:
 
 
 def odd_keypoints(camera: str, folder: Path, length: int, first: int = 0) -> list[str]:
-    """Say what is odd about the keypoints of a camera with `length` frames; every file is read (60 us each)."""
+    """Say what is odd about the keypoints of a camera with `length` frames; every file is read (60 us each).
+
+    `first` is the number of frame 0's file.
+    """
     files = keypoint_files(folder, first)
     broken, gaps, counts, farthest = [], [], set(), 0.0
     for index, path in files.items():

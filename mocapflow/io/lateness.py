@@ -26,7 +26,7 @@ def late_frames(folder: Path, names: Sequence[str]) -> tuple[int, ...]:
         return (0,) * len(names)
     content = read_json(path, FORM)
     if isinstance(content, dict) and (strange := sorted(content.keys() - {"late_frames"})):
-        raise RecordingError(f"there is no '{strange[0]}'", where=place(path, strange[0]), hint=FORM)
+        raise RecordingError(f"unknown setting '{strange[0]}'", where=place(path, strange[0]), hint=FORM)
     try:
         late = {name: _rounded(frames) for name, frames in content["late_frames"].items()}
     except (ValueError, TypeError, KeyError, AttributeError, OverflowError) as error:

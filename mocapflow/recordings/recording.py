@@ -15,7 +15,7 @@ from mocapflow.data import Frame
 from mocapflow.errors import RecordingError
 from mocapflow.io import folders
 from mocapflow.io.cameras import calibration_files
-from mocapflow.io.keypoints import keypoint_files, people_at
+from mocapflow.io.keypoints import first_numbers, keypoint_files, people_at
 from mocapflow.io.lateness import TIMING
 from mocapflow.io.lenses import View
 from mocapflow.io.occluders import occluder
@@ -113,8 +113,9 @@ class Recording:
 
     @cached_property
     def _keypoint_files(self) -> tuple[dict[int, Path] | None, ...]:
-        places = zip(self.keypoint_folders, self.videos, strict=True)
-        return tuple(None if place is None else keypoint_files(place, video.first) for place, video in places)
+        numbers = first_numbers(self.keypoint_folders, self.videos[0].first, self.length)
+        places = zip(self.keypoint_folders, numbers, strict=True)
+        return tuple(None if place is None else keypoint_files(place, first) for place, first in places)
 
     @cached_property
     def content(self) -> Mapping[str, Path]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
 
@@ -41,7 +42,7 @@ class Lateness:
 def measure(whole: Recording) -> list[Lateness]:
     """Return how late each camera of a recording is, on top of what its recording.json says.
 
-    Keypoints tell where there are any, else the person's outlines.
+    Keypoints tell, where two cameras have enough of them, else the person's outlines.
 
     Raises:
         RecordingError: too little is seen by two cameras at once.
@@ -49,9 +50,11 @@ def measure(whole: Recording) -> list[Lateness]:
     scale = min(1.0, WIDTH / max(int(lens.size[0]) for lens in whole.lenses))
     views = tuple(View(lens=lens, scale=scale) for lens in whole.lenses)
     recording = replace(whole, views=views, indices=whole.indices[:FRAMES])
-    signals = keypoint_signals if sum(place is not None for place in whole.keypoint_folders) > 1 else outline_signals
+    names = [camera.name for camera in recording.cameras]
     reach = max(min(round(SECONDS * whole.frame_rate), len(recording.indices) // 3), 2)
-    return lateness([camera.name for camera in recording.cameras], signals(recording), reach)
+    with suppress(RecordingError):
+        return lateness(names, keypoint_signals(recording), reach)
+    return lateness(names, outline_signals(recording), reach)
 
 
 def lateness(names: Sequence[str], signals: Signals, reach: int) -> list[Lateness]:

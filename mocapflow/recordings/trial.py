@@ -58,6 +58,8 @@ def examine_trial(folder: Path, calibration: Path, rig: bool = True) -> list[Fin
         delayed = [replace(video, late=frames) for video, frames in zip(whole, late, strict=True)]
         attempt(lambda: agreement.check_lateness(cameras, delayed, length, folder), findings)
     odd = attempt(lambda: folders.keypoint_warnings(folder, cameras, length, whole[0].first), findings)
+    numbers = [] if odd is None else folders.keypoint_numbers(folder, cameras, length, whole[0].first)
+    findings += [note(text, where=folder) for text in numbers]
     unused = attempt(lambda: folders.unused_pictures(folder, cameras), findings)
     findings += [warning(text, where=folder) for text in (*(odd or ()), *(unused or ()))]
     if fitted is not None and unused is not None:

@@ -50,9 +50,15 @@ def blaming(component: Component, registry: Registry, kept: Callable[[], str], l
             if not isinstance(error, StoreError):
                 error.where = error.where or _met(error, component, registry)
             raise
-        if isinstance(error, OSError) and error.errno in {*FULL, errno.EROFS} and (said := unwritable(error)):
-            raise said from error  # no component's fault
+        if isinstance(error, OSError) and _nobodys(error, log.parent) and (said := unwritable(error)):
+            raise said from error
         raise _failure(error, component, registry, kept(), log) from error
+
+
+def _nobodys(error: OSError, out: Path) -> bool:
+    """Return whether it is no component's fault: a drive is full, or the run folder can't be written."""
+    inside = error.filename and Path(str(error.filename)).absolute().is_relative_to(out.absolute())
+    return error.errno in {*FULL, errno.EROFS} or bool(inside)
 
 
 def _failure(error: BaseException, stage: Component, registry: Registry, saved: str, log: Path) -> ComponentFailed:

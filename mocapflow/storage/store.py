@@ -80,7 +80,7 @@ class Store:
     def __init__(self, path: Path) -> None:
         if ":/" in str(path):
             hint = "a URL is for --store of run, plan and compare"
-            raise MocapflowError(f"the store has to be a folder, not {path}", hint=hint)
+            raise MocapflowError(f"the store has to be a folder, not {str(path).replace(':/', '://')}", hint=hint)
         self.path = path
         self.state = path / ".state"  # what is no result
         self.digests = Digests(self.state / "digests.json")

@@ -13,6 +13,8 @@ from mocapflow_evaluation.references import Reference
 
 MOST = 10  # names in a note
 BENT = 20.0  # deg that some angle of a person who moves exceeds
+LARGER = 20.0  # times, that our angles are larger than a reference in radians at least: 57 where both agree
+ALIKE = 0.01  # by which two frame rates may differ that are the same
 
 
 def said(
@@ -27,9 +29,9 @@ def said(
         notes.append(f"reference at {1 / reference.step:.4g} per second, interpolated at our {own.frame_rate:.4g}")
     theirs, most = (
         max((float(np.nanmax(np.abs(curve), initial=0.0)) for curve in curves), default=0.0)
-        for curves in (reference.curves.values(), [own.columns[name] for name in found.signs])
+        for curves in ([known[name] for name in found.signs] for known in (reference.curves, own.columns))
     )
-    if theirs <= np.pi and most > BENT:
+    if theirs <= np.pi and most > min(BENT, LARGER * theirs):
         notes.append(f"no angle of the reference is above {theirs:.1f}, ours reach {most:.0f}: is it in radians?")
     if np.isnan(found.lag):
         notes.append(f"no lag within {longest_lag_s:g} s fits best; see longest_lag_s of stage evaluate")
@@ -54,7 +56,11 @@ def apart_in_time(own: Ours, reference: Reference) -> list[str]:
     _, ours, theirs = np.intersect1d(frame, reference.at, return_indices=True)
     if not reference.by_frame or reference.time is None or not len(ours) or len(frame) < 2:
         return []
-    late = float(np.median(reference.time[theirs] - time[ours]))
-    if abs(late) * np.median(np.diff(frame) / np.diff(time)) > HALF:
+    late, rate = float(np.median(reference.time[theirs] - time[ours])), float(np.median(np.diff(frame) / np.diff(time)))
+    lasts = float(np.median(np.diff(reference.time) / np.diff(reference.at))) if len(reference.at) > 1 else 0.0
+    if lasts > 0 and abs(lasts * rate - 1) > ALIKE:
+        said = f"the reference has {1 / lasts:.4g} frames per second, ours {rate:.4g}"
+        return [f"frames are matched by number, but {said}: without its column frame it is matched by time"]
+    if abs(late) * rate > HALF:
         return [f"frames are matched by number, but the reference's time is off by {late:.4f} s: does it count from 1?"]
     return []

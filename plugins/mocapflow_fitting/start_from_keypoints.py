@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from typing import ClassVar, Literal
 
 from mocapflow.components import Stage
@@ -13,6 +14,8 @@ from mocapflow_fitting.detections import layout, need_keypoints, person_at, seen
 from mocapflow_fitting.keypoint_fit import fit
 from mocapflow_fitting.keypoint_layouts import Layout
 from mocapflow_fitting.landmarks import landmarks
+
+LOG = logging.getLogger("mocapflow")
 
 
 class StartFromKeypoints(Stage):
@@ -38,18 +41,22 @@ class StartFromKeypoints(Stage):
             RecordingError: there are no keypoints, or no frame in which two cameras see enough of the same person.
         """
         need_keypoints(recording)
-        names = landmarks(scene.body).names
+        names, first, last = landmarks(scene.body).names, recording.indices[0], recording.indices[-1]
         for index in recording.indices:
             person = person_at(recording, index, scene.cameras)
             if person is None:
                 continue
             points = seen(person, layout(recording, [index], self.layout), names)
             if tells_pose(points):
+                if index > first:
+                    LOG.warning("keypoints of frame %d tell no pose: that of frame %d is taken for it", first, index)
                 _, (pose,) = fit(scene.body, [points], scene.cameras)
                 return Start(pose=pose, parameters=scene.calm)
-        first, last = recording.indices[0], recording.indices[-1]
+        later = range(last + recording.indices.step, recording.length, recording.indices.step)
+        usable = next((index for index in later if person_at(recording, index, scene.cameras)), None)
+        begin = "" if usable is None else f"they do in frame {usable}: begin there, with --frames {usable}:\nor "
         raise RecordingError(
             f"in frames {first} to {last} no two cameras see enough of the same person",
             where=str(recording.folder / "keypoints"),
-            hint="check that keypoints and cameras belong together (`mocapflow doctor`), or write init.json",
+            hint=f"{begin}check that keypoints and cameras belong together (`mocapflow doctor`), or write init.json",
         )

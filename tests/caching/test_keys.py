@@ -12,7 +12,7 @@ import pytest
 
 from mocapflow.caching import digests, sources
 from mocapflow.caching.digests import Digests
-from mocapflow.caching.keys import _plain, explain, key_of
+from mocapflow.caching.keys import _plain, all_changes, explain, key_of
 from mocapflow.data import Start
 from mocapflow.running import recipes
 from mocapflow.running.recipes import steps_of
@@ -354,6 +354,12 @@ def test_explanations_name_the_change():
     grown = explain({"inputs": {"track": {"frames": 200}}}, {"inputs": {"track": {"frames": 400}}})
     assert grown == "track grew from 200 to 400 frames"
     assert explain(old, old) == ""
+    before, after = (
+        {"settings": dict.fromkeys("vwxyz", n), "inputs": {name: {"key": n} for name in "abcde"}} for n in (0, 1)
+    )
+    told = [*(f"{name} 0 → 1" for name in "vwxyz"), *(f"{name} was made anew" for name in "abcde")]
+    assert all_changes(before, after) == told
+    assert explain(before, after) == "; ".join(told[:4]) + " and 6 more"
 
 
 def test_names_in_digests_are_for_people_only():

@@ -7,9 +7,12 @@ from pathlib import Path
 
 import pytest
 import yaml
+from mocapflow_evaluation import variants
 from typer.testing import CliRunner
 
 from mocapflow import cli
+from mocapflow.commands import comparing
+from mocapflow.config.experiment import Cell
 from tests.fixtures.stores import PLUGIN, STAGES, write_pipeline, write_recording
 
 
@@ -57,6 +60,17 @@ def test_a_cell_that_fails_does_not_end_the_others(compare, monkeypatch):
     monkeypatch.delenv("TINY_RAISE_AT")
     assert compare().exit_code == 0
     assert runs()["one", "long"] == (7, "")
+
+
+def test_runs_without_anything_to_compare_with_are_told(tmp_path, monkeypatch, capsys):
+    place = tmp_path / "grid.yaml"
+    cells = [Cell(variant=v, name=n, recording=tmp_path / n, pipeline=place, folder=tmp_path, changes=(), places=(),
+                  frames=None) for v in ("one", "other") for n in ("known", "new", "broken")]  # fmt: skip
+    rows = [{**dict.fromkeys(comparing.SHOWN, 0.0), "variant": v, "recording": "known"} for v in ("one", "other")]
+    monkeypatch.setattr(variants, "compare", lambda runs, folder: rows)
+    comparing.show(tmp_path, cells, {cell: "why" for cell in cells if cell.name == "broken"})
+    (told,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("not compared")]
+    assert told.endswith("lack a truth or reference, or a stage evaluate: one/new, other/new")
 
 
 def test_paths_of_changes_start_at_the_folder_of_the_file(compare, tmp_path):

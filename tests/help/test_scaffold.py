@@ -78,6 +78,12 @@ def test_a_new_matcher_leaves_silhouettes_of_other_layers_alone(tmp_path: Path) 
     assert same(found, matcher.match(frame, seen, *asked))
 
 
+def test_the_command_to_go_on_with_can_be_typed(tmp_path: Path) -> None:
+    folder = tmp_path / "my own"
+    said = CliRunner().invoke(app, ["new", "plugin", "my-own", "--out", str(folder)])
+    assert said.stdout.endswith(f"to go on: pip install -e '{folder}[test]' && pytest '{folder}'\n")
+
+
 def test_errors(tmp_path: Path) -> None:
     with pytest.raises(PluginError, match=r"'My Dress' can't be the name of a package\n.*a letter first: my-dress"):
         write_plugin("My Dress", "garment", tmp_path / "new")
@@ -85,5 +91,7 @@ def test_errors(tmp_path: Path) -> None:
         write_plugin("dress", "garment", tmp_path)
     with pytest.raises(PluginError, match=r"there is a package mocapflow_levelset already\n"):
         write_plugin("levelset", "matcher", tmp_path / "other")
+    with pytest.raises(PluginError, match=r"there is a garment 'skirt' already\n.*another name"):
+        write_plugin("skirt", "garment", tmp_path / "other")
     with pytest.raises(PluginError, match=r"there are no templates for a stage\n.*garment"):
         write_plugin("dress", "stage", tmp_path / "new")

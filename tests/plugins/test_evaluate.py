@@ -267,6 +267,29 @@ def test_a_comparison_forgets_what_another_reference_left_but_the_keypoints(tmp_
     ]
 
 
+@pytest.mark.usefixtures("unrendered")
+def test_small_angles_in_radians_beside_a_column_of_something_else_are_told(tmp_path: Path) -> None:
+    ours = {"frame": np.arange(60.0), "time": np.arange(60) / 30, "knee_flexion_l": 7 + 5 * np.sin(np.arange(60) / 5)}
+    for unit, told in ((1.0, False), (np.pi / 180, True)):
+        theirs = {**ours, "knee_flexion_l": unit * ours["knee_flexion_l"], "phase": np.linspace(0, 100, 60)}
+        tables.write_columns(tmp_path / "t.csv", theirs)
+        notes = evaluate(columns_only(ours), tmp_path / "t.csv", tmp_path).notes
+        assert ("no angle of the reference is above 0.2, ours reach 12: is it in radians?" in notes) == told
+        assert any("radians" in note for note in notes) == told
+
+
+@pytest.mark.usefixtures("unrendered")
+def test_a_reference_with_frame_numbers_of_another_rate_is_told(tmp_path: Path) -> None:
+    ours = {"frame": np.arange(60.0), "time": np.arange(60) / 30, "knee_flexion_l": np.sin(np.arange(60) / 5)}
+    many = np.arange(240.0)
+    theirs = {"frame": many, "time": many / 120, "knee_flexion_l": np.sin(many / 20)}
+    tables.write_columns(tmp_path / "t.csv", theirs)
+    (told,) = [n for n in evaluate(columns_only(ours), tmp_path / "t.csv", tmp_path).notes if "by number" in n]
+    assert "the reference has 120 frames per second, ours 30: without its column frame it is matched by time" in told
+    tables.write_columns(tmp_path / "t.csv", {name: column for name, column in theirs.items() if name != "frame"})
+    assert evaluate(columns_only(ours), tmp_path / "t.csv", tmp_path).rows[0]["rms_deg"] < 1e-4
+
+
 @pytest.mark.long
 def test_a_reference_in_radians_or_out_of_order_is_told(tmp_path: Path) -> None:
     columns = read_columns(DEMO / "truth" / "angles.csv")

@@ -152,7 +152,7 @@ def test_a_turned_person_is_found_too(body, pose, cameras, tmp_path):
     assert facing < 8
 
 
-def test_frames_without_people_are_passed_over(body, pose, recording, tmp_path):
+def test_frames_without_people_are_passed_over_with_a_warning(body, pose, recording, tmp_path, caplog):
     folder = copy_demo(tmp_path / "recording")
     write(folder, body, [pose, pose], recording.cameras)
     for path in folder.glob("keypoints/*/*.0000.json"):
@@ -160,7 +160,9 @@ def test_frames_without_people_are_passed_over(body, pose, recording, tmp_path):
     scene = Scene(cameras=recording.cameras, body=body)
     start = StartFromKeypoints().run(open_recording(folder), scene)
     assert np.linalg.norm(start.pose.root[:3, 3] - pose.root[:3, 3]) < 0.1
-    with pytest.raises(RecordingError, match="in frames 0 to 0 no two cameras see enough of the same person"):
+    assert caplog.messages == ["keypoints of frame 0 tell no pose: that of frame 1 is taken for it"]
+    refused = "in frames 0 to 0 no two cameras see enough of the same person\n *they do in frame 1: .* --frames 1:\n"
+    with pytest.raises(RecordingError, match=refused):
         StartFromKeypoints().run(open_recording(folder, stop=1), scene)
 
 

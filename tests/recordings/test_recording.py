@@ -12,6 +12,7 @@ import pytest
 
 from mocapflow.errors import RecordingError
 from mocapflow.io.cameras import write_cameras
+from mocapflow.recordings.doctor import examine
 from mocapflow.recordings.recording import open_recording
 from tests.fixtures.recordings import NAMES, avi_frames, number_of, picture, ring, write_recording, write_video
 from tests.io.test_calibrations import write_easymocap
@@ -275,6 +276,37 @@ def test_frame_0_is_the_first_image_that_any_camera_has(tmp_path, first):
     assert number_of(frames[1].images[1]) == 1
     assert [[people.shape[0] for people in frame.keypoints] for frame in frames] == [[1, 1, 1]] * 4
     np.testing.assert_allclose([frame.keypoints[1][0, 0, 0] for frame in frames], [10, 11, 12, 13])
+
+
+@pytest.mark.parametrize(
+    ("numbers", "lost"),
+    [
+        (range(4), {"cam02": [0]}),
+        (range(4), {"cam01": [0], "cam02": [0, 3], "cam03": [0]}),
+        (range(1, 5), {"cam02": [4]}),
+    ],
+)
+def test_a_camera_without_keypoints_of_an_end_is_not_moved_by_a_frame(tmp_path, numbers, lost):
+    write_cameras(tmp_path / "cameras.toml", ring())
+    for name in NAMES:
+        (tmp_path / "videos" / name).mkdir(parents=True)
+        for number in range(4):
+            cv2.imwrite(str(tmp_path / "videos" / name / f"{1 + number}.png"), picture(number))
+        place = tmp_path / "keypoints" / f"{name}_json"
+        place.mkdir(parents=True)
+        for frame, number in enumerate(numbers):
+            if number not in lost.get(name, []):
+                people = [{"pose_keypoints_2d": [10.0 + frame, 20, 0.9]}]
+                (place / f"{number}.json").write_text(json.dumps({"people": people}))
+    frames = list(open_recording(tmp_path).frames())
+    seen = np.array([[people[0, 0, 0] if len(people) else np.nan for people in frame.keypoints] for frame in frames])
+    expected = np.full((4, 3), np.arange(10.0, 14)[:, None])
+    for name, gone in lost.items():
+        expected[[list(numbers).index(number) for number in gone], NAMES.index(name)] = np.nan
+    np.testing.assert_array_equal(seen, expected)
+    said = [finding.message for finding in examine(tmp_path) if finding.severity == "note"]
+    first = numbers[0]
+    assert f"the keypoints of frame 0 are numbered {first} of cam01, {first} of cam02, {first} of cam03" in said
 
 
 @pytest.mark.parametrize("rate", ["'thirty'", "0", "-30.0", "nan", "true", "1e9", "1e-3"])

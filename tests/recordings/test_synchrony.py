@@ -111,6 +111,16 @@ def test_keypoints_tell_too(tmp_path):
     assert late == pytest.approx({"cam01": 0, "cam02": 0, "cam03": 3}, abs=0.1)
 
 
+def test_outlines_tell_where_keypoints_are_sparse(tmp_path):
+    folder = write(tmp_path / "clip", {"cam02": 3})
+    for name in NAMES:
+        place = folder / "keypoints" / f"{name}_json"
+        place.mkdir(parents=True)
+        (place / "000000.json").write_text(json.dumps({"people": [{"pose_keypoints_2d": [80.0, 60.0, 1.0]}]}))
+    measured = {m.camera: m.frames for m in synchrony.measure(open_recording(folder))}
+    assert measured["cam02"] == pytest.approx(3, abs=0.3)
+
+
 @pytest.mark.parametrize(
     ("before", "found", "after"),
     [
@@ -137,11 +147,11 @@ def test_what_is_found_comes_on_top_of_what_is_known(tmp_path, monkeypatch, befo
     [
         ("{", "recording.json:1:2  not JSON: "),
         ("{}", "does not say how late the cameras are: KeyError"),
-        ('{"late": {}}', "recording.json:1:3  there is no 'late'"),
+        ('{"late": {}}', "recording.json:1:3  unknown setting 'late'"),
         ('{"late_frames": {"cam01": "much"}}', "does not say how late the cameras are: ValueError"),
         ('{"late_frames": {"cam01": true}}', "does not say how late the cameras are: TypeError"),
         ('{"late_frames": {"cam1": 3}}', "there is no camera 'cam1'"),
-        ('{"late_frames": {}, "late_frame": {"cam01": 3}}', "there is no 'late_frame'"),
+        ('{"late_frames": {}, "late_frame": {"cam01": 3}}', "unknown setting 'late_frame'"),
         (
             '{"late_frames": {"cam01": 4, "cam02": 5, "cam03": 6}}',
             "every camera is said to be late.*\n *cameras.* 4 off",
