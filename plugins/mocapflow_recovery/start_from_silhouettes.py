@@ -8,23 +8,21 @@ from functools import cached_property, partial
 from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
-from mocapflow_fitting.triangulate import triangulate
 from mocapflow_priors.density import Density, Poses, read
 from mocapflow_priors.parzen import SHIPPED
 from pydantic import Field, PositiveFloat, PositiveInt
 
-from mocapflow.assets import Body, Camera
 from mocapflow.components import Stage
-from mocapflow.data import NO_CLOTH, Frame, Pose, Start
+from mocapflow.data import NO_CLOTH, Pose, Start
 from mocapflow.errors import RecordingError
-from mocapflow.geometry.silhouettes import covered
 from mocapflow.io.plates import plate_files
 from mocapflow.recordings.recording import Recording
-from mocapflow.records import F64, Bool
+from mocapflow.records import F64
 from mocapflow.scene import Scene
-from mocapflow_recovery.certain import Room, View, changes, small_room, views
+from mocapflow_recovery.certain import View, small_room, views
 from mocapflow_recovery.disagreement import distance
 from mocapflow_recovery.judge import CAP_M
+from mocapflow_recovery.placing import apart, centred, largest_changes, meeting, placed
 from mocapflow_recovery.sampling import Cost, Plan, Spread, search
 
 LOG = logging.getLogger("mocapflow")
@@ -50,7 +48,8 @@ class StartFromSilhouettes(Stage):
     Poses that people were seen in are put where the rays through the middles of the silhouettes meet, and turned all
     ways. The best of some directions are searched part by part, as `limb_search` does; the one that ends nearest to the
     silhouettes is taken. The farther a pose is from all that were seen the farther it counts: what silhouettes do not
-    tell, such as how an arm before the trunk is turned, stays natural. Clothes are left out.
+    tell, such as how an arm before the trunk is turned, stays natural. Clothes are left out. It is some 10° off in each
+    joint; the first frame of a track that has `first_segmenter` and `recovery` mends that.
     """
 
     name: ClassVar[str] = "start_from_silhouettes"
@@ -78,12 +77,12 @@ class StartFromSilhouettes(Stage):
             RecordingError: there are no clean plates, or fewer than two cameras see a person in the first frame.
         """
         self.need(recording)
-        seen, density = self._seen(recording, scene), self._density
-        cost = partial(costs, seen=seen, known=density.on(scene.body.screw_names), natural=np.radians(self.natural_deg))
-        plan = Plan(SPREAD, SHARES, SAMPLES, density.on(scene.body.screw_names), SEEN_SAMPLES)
+        seen, known = self._seen(recording, scene), self._density.on(scene.body.screw_names)
+        cost = partial(costs, seen=seen, known=known, natural=np.radians(self.natural_deg))
+        plan = Plan(SPREAD, SHARES, SAMPLES, known, SEEN_SAMPLES)
         ends = [
             search(cost, begin, scene.body, plan, np.random.default_rng(number))
-            for number, begin in enumerate(self._begins(scene.body, seen, cost))
+            for number, begin in enumerate(self._begins(seen, known, cost))
         ]
         off = cost(ends)
         best = int(off.argmin())
@@ -107,11 +106,16 @@ class StartFromSilhouettes(Stage):
             )
         return Seen(bare, found, meeting([view.person for view in found], [view.camera for view in found]))
 
-    def _begins(self, body: Body, seen: Seen, cost: Cost) -> list[Pose]:
+    def _begins(self, seen: Seen, known: F64, cost: Cost) -> list[Pose]:
         """Return the best poses of some directions, best first."""
         turns = np.linspace(0, 2 * np.pi, self.directions, endpoint=False)
-        angles = unlike(np.nan_to_num(self._density.on(body.screw_names)), self.tried)
-        poses = [[centred(placed(seen.bare, turn, each, seen.middle), seen) for each in angles] for turn in turns]
+        angles = unlike(np.nan_to_num(known), self.tried)
+        cameras = [view.camera for view in seen.views]
+
+        def there(turn: float, bent: F64) -> Pose:
+            return centred(placed(seen.bare, turn, bent, seen.middle), seen.bare, seen.middle, cameras)
+
+        poses = [[there(turn, bent) for bent in angles] for turn in turns]
         off = np.array([cost(those) for those in poses])
         best = np.argsort(off.min(axis=1))[: self.searches]
         return [poses[turn][int(off[turn].argmin())] for turn in best]
@@ -137,12 +141,6 @@ def costs(poses: Sequence[Pose], seen: Seen, known: F64, natural: float) -> F64:
     return np.asarray(off * (1 + np.array(strange) / natural))
 
 
-def apart(one: Pose, other: Pose) -> float:
-    """Return the angle (rad) between the directions in which two poses look."""
-    forward = one.root[:2, 1], other.root[:2, 1]
-    return float(np.arccos(np.clip(np.dot(*forward) / np.prod(np.linalg.norm(forward, axis=1)), -1, 1)))
-
-
 def unlike(poses: F64, count: int) -> list[F64]:
     """Return the rest pose and those of N poses (N, D) that are farthest from it and each other."""
     chosen, away = [np.zeros(poses.shape[1])], np.full(len(poses), np.inf)
@@ -150,43 +148,3 @@ def unlike(poses: F64, count: int) -> list[F64]:
         away = np.minimum(away, ((poses - chosen[-1]) ** 2).sum(axis=1))
         chosen.append(poses[int(away.argmax())])
     return chosen
-
-
-def placed(bare: Scene, turn: float, angles: F64, middle: F64) -> Pose:
-    """Return a pose turned (rad) about the vertical, the box around the body in the middle (3) m."""
-    root = np.eye(4)
-    root[:2, :2] = [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]
-    vertices = bare.surface(Pose(root=root.copy(), angles=angles), NO_CLOTH).vertices
-    root[:3, 3] = middle - (vertices.max(axis=0) + vertices.min(axis=0)) / 2
-    return Pose(root=root, angles=angles)
-
-
-def centred(pose: Pose, seen: Seen) -> Pose:
-    """Return a pose moved so that its silhouettes and the person's have the same middle."""
-    surface = seen.bare.surface(pose, NO_CLOTH)
-    cameras = [view.camera for view in seen.views]
-    root = pose.root.copy()
-    root[:3, 3] += seen.middle - meeting([covered(surface, camera) for camera in cameras], cameras)
-    return Pose(root=root, angles=pose.angles)
-
-
-def meeting(masks: Sequence[Bool], cameras: Sequence[Camera]) -> F64:
-    """Return where (3) m the rays through the middles of masks (h, w) meet best."""
-    middles = [np.argwhere(mask).mean(axis=0)[::-1] if mask.any() else np.full(2, np.nan) for mask in masks]
-    position: F64 = triangulate(np.array(middles)[:, None], np.ones((len(masks), 1)), cameras).position[0]
-    return position
-
-
-def largest_changes(frame: Frame, room: Room) -> tuple[list[Bool], list[Camera]]:
-    """Return the largest part (h, w) of each usable view that differs from the room, and the views' cameras."""
-    import cv2
-
-    masks, cameras = [], []
-    for number in np.flatnonzero(frame.usable):
-        changed = changes(frame, int(number), room)
-        opened = cv2.morphologyEx(changed.view(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
-        _, label, stats, _ = cv2.connectedComponentsWithStats(opened, connectivity=8)
-        stats[0, cv2.CC_STAT_AREA] = 0
-        masks.append((label == stats[:, cv2.CC_STAT_AREA].argmax()) & (opened > 0))
-        cameras.append(room.cameras[number])
-    return masks, cameras

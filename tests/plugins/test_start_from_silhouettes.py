@@ -7,7 +7,8 @@ import pytest
 from mocapflow_bodies.scanned import Scanned
 from mocapflow_bodies.template import Template
 from mocapflow_fitting.start_from_file import read_pose
-from mocapflow_recovery.start_from_silhouettes import StartFromSilhouettes, apart, meeting, placed, unlike
+from mocapflow_recovery.placing import apart, centred, meeting, placed
+from mocapflow_recovery.start_from_silhouettes import StartFromSilhouettes, unlike
 
 from mocapflow.data import NO_CLOTH, Pose
 from mocapflow.errors import RecordingError
@@ -44,6 +45,17 @@ def test_rays_through_the_middles_of_silhouettes_meet_in_the_middle_of_a_person(
                    angles=pose.angles)  # fmt: skip
     there = meeting([covered(bare.surface(shifted, NO_CLOTH), camera) for camera in bare.cameras], bare.cameras)
     np.testing.assert_allclose(there - found, [0.3, -0.2, 0.1], atol=0.02)
+
+
+def test_a_pose_out_of_sight_stays_where_it_is(bare):
+    away = placed(bare, 0.0, np.zeros(len(bare.body.twists)), np.array([0.0, 0.0, 90.0]))
+    np.testing.assert_array_equal(centred(away, bare, np.zeros(3), bare.cameras).root, away.root)
+    here = placed(bare, 0.0, away.angles, np.array([0.2, 0.0, 1.0]))
+    goal = np.array([0.0, 0.1, 0.9])
+    moved = bare.surface(centred(here, bare, goal, bare.cameras), NO_CLOTH)
+    np.testing.assert_allclose(
+        meeting([covered(moved, camera) for camera in bare.cameras], bare.cameras), goal, atol=0.02
+    )
 
 
 def test_the_poses_that_are_tried_are_unlike_each_other():
