@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from mocapflow.assets import Body
-from mocapflow.errors import RecordingError
+from mocapflow.errors import PipelineError, RecordingError, alternatives
 from mocapflow.geometry.meshes import edges
 from mocapflow.geometry.skeleton import Skeleton, unsided
 from mocapflow.records import F64, I32, Bool
@@ -31,26 +32,40 @@ class Cut(NamedTuple):
     rim: Bool  # (V,)
 
 
+class SecondShape(NamedTuple):
+    """Another shape of a mesh, which an angle drives."""
+
+    offset: F64  # (V, 3) m, from the first one
+    angle: str
+    between: tuple[float, float]  # rad, where it is the first shape alone, and the second
+
+
 def assemble(
-    vertices: F64, faces: I32, skeleton: Skeleton, weights: F64, part: Part, offset: F64 | None = None
+    vertices: F64, faces: I32, skeleton: Skeleton, weights: F64, part: Part, second: SecondShape | None = None
 ) -> Body:
     """Return the body of a mesh (V, 3) m, (F, 3), a skeleton and weights (V, J), or a part of it.
 
-    `offset` (V, 3) m leads to a second shape of the mesh; the caller says which angle drives it.
+    Raises:
+        PipelineError: the second shape names an angle the body lacks.
     """
-    rim = np.zeros(len(vertices), bool)
+    rim, used = np.zeros(len(vertices), bool), np.arange(len(vertices), dtype=np.int32)
     if part != "full":
         used, faces, skeleton, weights, rim = cut_out(faces, skeleton, weights, KEPT_JOINTS[part])
-        vertices, offset = vertices[used], None if offset is None else offset[used]
     skin_joint, skin_weight = strongest(weights)
     chain = screws(skeleton)
-    return Body(
-        vertices=np.array(vertices, np.float64), faces=np.array(faces, np.int32),
+    body = Body(
+        vertices=np.array(vertices[used], np.float64), faces=np.array(faces, np.int32),
         joint_names=skeleton.names, parents=skeleton.parents, positions=skeleton.positions,
         screw_names=chain.names, twists=chain.twists, screw_joint=chain.joint, limits=chain.limits,
         rest_spread=chain.rest_spread, skin_joint=skin_joint, skin_weight=skin_weight, cut=rim,
-        morph_offset=offset,
     )  # fmt: skip
+    if second is None:
+        return body
+    if second.angle not in chain.names:
+        hint = alternatives(second.angle, chain.names)
+        raise PipelineError(f"the body has no angle '{second.angle}'", where="body.morph.angle", hint=hint)
+    driving = chain.names.index(second.angle)
+    return replace(body, morph_offset=second.offset[used], morph_screw=driving, morph_range=second.between)
 
 
 def cut_out(faces: I32, skeleton: Skeleton, weights: F64, kept: tuple[str, ...]) -> Cut:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
 
@@ -12,13 +11,13 @@ from pydantic import model_validator
 
 from mocapflow.assets import Body
 from mocapflow.dressing.roles import BodyModel
-from mocapflow.errors import PipelineError, RecordingError, alternatives
+from mocapflow.errors import RecordingError
 from mocapflow.io.meshes import check_winding, read_mesh
 from mocapflow.io.scans import check_size, read_skeleton
 from mocapflow.io.weights import read_weights
 from mocapflow.records import F64
 from mocapflow.settings import Settings
-from mocapflow_bodies.assemble import Part, assemble
+from mocapflow_bodies.assemble import Part, SecondShape, assemble
 from mocapflow_bodies.weights import heat_weights
 
 
@@ -79,12 +78,9 @@ class Scanned(BodyModel):
         if self.morph is None:
             return assemble(vertices, faces, skeleton, weights, self.part)
         offset = self._second_shape(folder, vertices, self.morph) - vertices
-        body = assemble(vertices, faces, skeleton, weights, self.part, offset)
-        if self.morph.angle not in body.screw_names:
-            hint = alternatives(self.morph.angle, body.screw_names)
-            raise PipelineError(f"the body has no angle '{self.morph.angle}'", where="body.morph.angle", hint=hint)
         between = (math.radians(self.morph.from_deg), math.radians(self.morph.to_deg))
-        return replace(body, morph_screw=body.screw_names.index(self.morph.angle), morph_range=between)
+        second = SecondShape(offset, self.morph.angle, between)
+        return assemble(vertices, faces, skeleton, weights, self.part, second)
 
     @staticmethod
     def _second_shape(folder: Path, vertices: F64, morph: Morph) -> F64:
