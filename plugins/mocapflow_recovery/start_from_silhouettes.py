@@ -8,20 +8,23 @@ from functools import cached_property, partial
 from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
+from mocapflow_draping.kinematic import Kinematic
 from mocapflow_priors.density import Density, Poses, read
 from mocapflow_priors.parzen import SHIPPED
-from pydantic import Field, PositiveFloat, PositiveInt
+from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt
 
 from mocapflow.components import Stage
-from mocapflow.data import NO_CLOTH, Pose, Start
+from mocapflow.data import NO_CLOTH, Past, Pose, Start
+from mocapflow.dressing.roles import Draper
 from mocapflow.errors import RecordingError
 from mocapflow.io.plates import plate_files
+from mocapflow.model import ClothedModel
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow.scene import Scene
 from mocapflow_recovery.certain import View, small_room, views
-from mocapflow_recovery.disagreement import distance
-from mocapflow_recovery.judge import CAP_M
+from mocapflow_recovery.disagreement import HANGS
+from mocapflow_recovery.judge import Judge
 from mocapflow_recovery.placing import apart, centred, largest_changes, meeting, placed
 from mocapflow_recovery.sampling import Cost, Plan, Spread, search
 
@@ -31,12 +34,14 @@ SPREAD = Spread(angle=np.radians(25.0), turn=np.radians(12.0), shift=0.06)  # of
 SHARES = (1.0, 0.6, 0.4, 0.25, 0.12)  # of it, round by round
 SAMPLES, SEEN_SAMPLES = 40, 60  # of each part in a round, and of each limb as it was seen
 OTHERWISE = np.radians(60.0)  # between two directions that a person looks in
+ENOUGH = 0.95  # times the cost before: a search that gains less is the last
 ALIKE = 1.5  # times the least cost: so little worse, and another direction may be the right one
 
 
 class Seen(NamedTuple):
     """What poses are compared with."""
 
+    judge: Judge  # of the clothed person
     bare: Scene  # the body alone, with few faces
     views: Sequence[View]
     middle: F64  # (3,) m, where the rays through the middles of the silhouettes meet
@@ -46,10 +51,11 @@ class StartFromSilhouettes(Stage):
     """Finds the pose of the first frame by what differs from the clean plates: the person, and nobody else.
 
     Poses that people were seen in are put where the rays through the middles of the silhouettes meet, and turned all
-    ways. The best of some directions are searched part by part, as `limb_search` does; the one that ends nearest to the
-    silhouettes is taken. The farther a pose is from all that were seen the farther it counts: what silhouettes do not
-    tell, such as how an arm before the trunk is turned, stays natural. Clothes are left out. It is some 10° off in each
-    joint; the first frame of a track that has `first_segmenter` and `recovery` mends that.
+    ways. The best of some directions are searched part by part, as `limb_search` does, and the one that ends nearest to
+    the silhouettes again, as long as that helps. The garment is draped on each: bare legs would spread to fill a skirt.
+    The farther a pose is from all that were seen the farther it counts: what silhouettes do not tell, such as how an
+    arm before the trunk is turned, stays natural. It is some 10° off in each joint; the first frame of a track that has
+    `first_segmenter` and `recovery` mends that.
     """
 
     name: ClassVar[str] = "start_from_silhouettes"
@@ -59,6 +65,8 @@ class StartFromSilhouettes(Stage):
     tried: PositiveInt = 24  # of these, as unlike each other as can be; standing upright is the first
     directions: Annotated[int, Field(ge=4)] = 16  # in which each of them is turned
     searches: PositiveInt = 4  # from the best pose of as many directions
+    repeats: NonNegativeInt = 4  # of the best one, as far as that helps
+    draper: Draper | None = Kinematic(sweeps=4)  # of the garment; null: clothes are left out
     natural_deg: PositiveFloat = 20.0  # a pose so far in each angle from all that were seen counts as twice as far off
 
     def need(self, recording: Recording) -> None:
@@ -85,12 +93,17 @@ class StartFromSilhouettes(Stage):
             for number, begin in enumerate(self._begins(seen, known, cost))
         ]
         off = cost(ends)
-        best = int(off.argmin())
-        LOG.info("first pose: %.1f mm off the silhouettes in the mean", 1000 * off[best])
-        others = [value for value, end in zip(off, ends, strict=True) if apart(end, ends[best]) > OTHERWISE]
-        if min(others, default=np.inf) < ALIKE * off[best]:
+        best, least = ends[int(off.argmin())], float(off.min())
+        for again in range(self.repeats):
+            best = search(cost, best, scene.body, plan, np.random.default_rng(len(ends) + again))
+            before, least = least, float(cost([best])[0])
+            if least > ENOUGH * before:
+                break
+        LOG.info("first pose: %.1f mm off the silhouettes in the mean", 1000 * least)
+        others = [value for value, end in zip(off, ends, strict=True) if apart(end, best) > OTHERWISE]
+        if min(others, default=np.inf) < ALIKE * off.min():
             LOG.warning("silhouettes of the first frame hardly tell which way the person looks: see the overlay")
-        return Start(pose=ends[best], parameters=scene.calm)
+        return Start(pose=best, parameters=scene.calm)
 
     def _seen(self, recording: Recording, scene: Scene) -> Seen:
         frame, background = recording.frame(recording.indices[0]), recording.background()
@@ -104,7 +117,9 @@ class StartFromSilhouettes(Stage):
                 where=str(recording.folder),
                 hint="begin where two cameras see all of the person; do plates and videos show the same room?",
             )
-        return Seen(bare, found, meeting([view.person for view in found], [view.camera for view in found]))
+        model = ClothedModel(scene=scene, draper=self.draper) if self.draper else ClothedModel(scene=scene.undressed)
+        judge = Judge(model, model.scene.simplified(self.faces), found, scene.calm, Past(), given=None, cloth=HANGS)
+        return Seen(judge, bare, found, meeting([view.person for view in found], [view.camera for view in found]))
 
     def _begins(self, seen: Seen, known: F64, cost: Cost) -> list[Pose]:
         """Return the best poses of some directions, best first."""
@@ -117,8 +132,7 @@ class StartFromSilhouettes(Stage):
 
         poses = [[there(turn, bent) for bent in angles] for turn in turns]
         off = np.array([cost(those) for those in poses])
-        best = np.argsort(off.min(axis=1))[: self.searches]
-        return [poses[turn][int(off[turn].argmin())] for turn in best]
+        return [poses[turn][int(off[turn].argmin())] for turn in scattered(off.min(axis=1), self.searches)]
 
     @cached_property
     def _density(self) -> Density:
@@ -134,11 +148,19 @@ def costs(poses: Sequence[Pose], seen: Seen, known: F64, natural: float) -> F64:
         known: (N, D) rad, poses that people were seen in; NaN where an angle is not known.
         natural: rad, so far from all of these in each angle a pose counts twice.
     """
-    surfaces = [seen.bare.surface(pose, NO_CLOTH) for pose in poses]
-    off = np.array([distance(surface, surface, seen.views, CAP_M) for surface in surfaces])
+    off = seen.judge.apart(poses)
     known = np.concatenate([np.zeros((1, known.shape[1])), np.nan_to_num(known)])
     strange = [np.sqrt(((known - pose.angles) ** 2).mean(axis=1).min()) for pose in poses]
     return np.asarray(off * (1 + np.array(strange) / natural))
+
+
+def scattered(off: F64, count: int) -> list[int]:
+    """Return the directions, of N around a circle (N,), of least cost, best first; none beside a better one."""
+    chosen: list[int] = []
+    for turn in np.argsort(off):
+        if all(abs(int(turn) - other) not in (1, len(off) - 1) for other in chosen):
+            chosen.append(int(turn))
+    return chosen[:count]
 
 
 def unlike(poses: F64, count: int) -> list[F64]:

@@ -4,16 +4,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mocapflow_bodies.scanned import Scanned
 from mocapflow_bodies.template import Template
 from mocapflow_fitting.start_from_file import read_pose
 from mocapflow_recovery.placing import apart, centred, meeting, placed
-from mocapflow_recovery.start_from_silhouettes import StartFromSilhouettes, unlike
+from mocapflow_recovery.start_from_silhouettes import StartFromSilhouettes, scattered, unlike
 
+from mocapflow.config.pipeline import load_pipeline
 from mocapflow.data import NO_CLOTH, Pose
 from mocapflow.errors import RecordingError
 from mocapflow.geometry.angles import measure
 from mocapflow.geometry.silhouettes import covered
+from mocapflow.help.shipped import shipped
 from mocapflow.recordings.recording import open_recording
 from mocapflow.scene import Scene
 
@@ -85,14 +86,21 @@ def test_an_empty_room_is_an_error(tmp_path):
         StartFromSilhouettes().run(recording, scene)
 
 
+def test_directions_that_are_searched_lie_apart():
+    off = np.array([3.0, 1.0, 2.0, 9.0, 9.0, 4.0, 9.0, 1.5])
+    assert scattered(off, 3) == [1, 7, 5]  # 2 and 0 lie beside better ones
+    assert scattered(off, 9) == [1, 7, 5, 3]
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("clip", ["skirt_steps", "shorts_steps"])
 @pytest.mark.parametrize("frame", [0, 30])
 def test_a_person_is_found_without_any_hint(clip, frame):
     """As near as a track needs: it looks the right way, and no joint is far off (a knee 28° at most)."""
-    recording = open_recording(DATA / clip, start=frame)
-    body = Scanned().load(DATA / clip)
-    start = StartFromSilhouettes().run(recording, Scene(cameras=recording.cameras, body=body))
+    pipeline = load_pipeline(shipped("pipelines", "skirt.yaml"), recording=DATA / clip)
+    recording, body = open_recording(DATA / clip, start=frame), pipeline.body.load(DATA / clip)
+    scene = Scene(cameras=recording.cameras, body=body, garment=pipeline.garment.sew(body))
+    start = StartFromSilhouettes().run(recording, scene)
     given = read_pose(DATA / clip / "init.json", body)
     assert np.degrees(apart(start.pose, given)) < 30  # they hardly turn
     found = measure(body, start.pose.root[None], start.pose.angles[None])
