@@ -22,7 +22,7 @@ from mocapflow.model import ClothedModel
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow.scene import Scene
-from mocapflow_recovery.certain import View, small_room, views
+from mocapflow_recovery.certain import small_room, views
 from mocapflow_recovery.disagreement import HANGS
 from mocapflow_recovery.judge import Judge
 from mocapflow_recovery.placing import apart, centred, largest_changes, meeting, placed
@@ -41,9 +41,7 @@ ALIKE = 1.5  # times the least cost: so little worse, and another direction may 
 class Seen(NamedTuple):
     """What poses are compared with."""
 
-    judge: Judge  # of the clothed person
-    bare: Scene  # the body alone, with few faces
-    views: Sequence[View]
+    judge: Judge  # of the clothed person, by the views
     middle: F64  # (3,) m, where the rays through the middles of the silhouettes meet
 
 
@@ -108,7 +106,9 @@ class StartFromSilhouettes(Stage):
     def _seen(self, recording: Recording, scene: Scene) -> Seen:
         frame, background = recording.frame(recording.indices[0]), recording.background()
         assert background is not None
-        room, bare = small_room(background, scene.cameras, self.rows), scene.undressed.simplified(self.faces)
+        dressed, room = scene if self.draper else scene.undressed, small_room(background, scene.cameras, self.rows)
+        coarse = dressed.simplified(self.faces)
+        bare = coarse.undressed
         upright = placed(bare, 0.0, np.zeros(len(bare.body.twists)), meeting(*largest_changes(frame, room)))
         found = [view for view in views(frame, bare.surface(upright, NO_CLOTH), room, NEAR_M) if view.shown]
         if len(found) < 2:
@@ -117,18 +117,18 @@ class StartFromSilhouettes(Stage):
                 where=str(recording.folder),
                 hint="begin where two cameras see all of the person; do plates and videos show the same room?",
             )
-        model = ClothedModel(scene=scene, draper=self.draper) if self.draper else ClothedModel(scene=scene.undressed)
-        judge = Judge(model, model.scene.simplified(self.faces), found, scene.calm, Past(), given=None, cloth=HANGS)
-        return Seen(judge, bare, found, meeting([view.person for view in found], [view.camera for view in found]))
+        model = ClothedModel(scene=dressed, draper=self.draper)
+        judge = Judge(model, coarse, found, scene.calm, Past(), given=None, cloth=HANGS)
+        return Seen(judge, meeting([view.person for view in found], [view.camera for view in found]))
 
     def _begins(self, seen: Seen, known: F64, cost: Cost) -> list[Pose]:
         """Return the best poses of some directions, best first."""
         turns = np.linspace(0, 2 * np.pi, self.directions, endpoint=False)
         angles = unlike(np.nan_to_num(known), self.tried)
-        cameras = [view.camera for view in seen.views]
+        bare, cameras = seen.judge.coarse.undressed, [view.camera for view in seen.judge.seen]
 
         def there(turn: float, bent: F64) -> Pose:
-            return centred(placed(seen.bare, turn, bent, seen.middle), seen.bare, seen.middle, cameras)
+            return centred(placed(bare, turn, bent, seen.middle), bare, seen.middle, cameras)
 
         poses = [[there(turn, bent) for bent in angles] for turn in turns]
         off = np.array([cost(those) for those in poses])
