@@ -98,13 +98,18 @@ app.add_typer(new.app, name="new")
 
 
 def main() -> None:
-    """Run the command line; warnings go to stderr, one line each."""
+    """Run the command line; warnings and what stages found go to stderr, one line each."""
     for variable, level in QUIET.items():
         os.environ.setdefault(variable, level)
     warnings.showwarning = _show_warning
     warned = logging.StreamHandler(sys.stderr)
     warned.setLevel(logging.WARNING)  # of the handler: libraries lower that of their own loggers
     logging.basicConfig(format="warning: %(message)s", handlers=[warned])
+    told = logging.StreamHandler(sys.stderr)  # of ours alone
+    told.addFilter(lambda record: record.levelno < logging.WARNING)
+    ours = logging.getLogger("mocapflow")
+    ours.addHandler(told)
+    ours.setLevel(logging.INFO)
     Interrupts().install()
     try:
         app(prog_name="mocapflow")

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from mocapflow.assets import Body
 from mocapflow.records import F64, I32
+
+SEGMENTS = {  # the joints they begin and end at
+    "thigh": ("hip", "knee"), "shank": ("knee", "ankle"), "upper_arm": ("shoulder", "elbow"),
+    "forearm": ("elbow", "wrist"),
+}  # fmt: skip
 
 
 class Skeleton(NamedTuple):
@@ -38,6 +44,13 @@ def unsided(name: str) -> str:
 def skeleton_of(body: Body) -> Skeleton:
     """Return the skeleton of a body."""
     return Skeleton(body.joint_names, body.parents, body.positions)
+
+
+def segment_lengths(body: Body) -> Mapping[str, float]:
+    """Return the length (m) of each limb segment that a body has, by its name and side, as `thigh_l`."""
+    at = dict(zip(body.joint_names, body.positions, strict=True))
+    ends = {f"{name}_{side}": (f"{a}_{side}", f"{b}_{side}") for name, (a, b) in SEGMENTS.items() for side in "lr"}
+    return {name: float(np.linalg.norm(at[a] - at[b])) for name, (a, b) in ends.items() if a in at and b in at}
 
 
 def to_segment(points: F64, start: F64, end: F64) -> F64:

@@ -10,6 +10,7 @@ import numpy as np
 
 from mocapflow.errors import RecordingError, alternatives
 from mocapflow.geometry.skeleton import Skeleton, body_directions
+from mocapflow.io.meshes import UNSCANNED
 from mocapflow.io.typed import place, read_json
 from mocapflow.records import F64
 
@@ -31,7 +32,7 @@ def read_skeleton(path: Path) -> Skeleton:
     if not path.is_file():
         raise RecordingError(
             "there is no skeleton for the mesh", where=str(path),
-            hint=f"{FORM}; or use `body: template` with the stage fit_subject",
+            hint=f"{FORM}; or, without a scan, {UNSCANNED}",
         )  # fmt: skip
     content = read_json(path, FORM)
     try:

@@ -161,7 +161,8 @@ def _missing(folder: Path) -> Iterator[Finding]:
     if not (folder / "subject" / "body.obj").exists() and not (folder / "static").is_dir():
         yield note(
             "there is neither subject/body.obj nor a static trial",
-            "a body model has to be fitted to the person; a standing trial with keypoints makes that more exact",
+            "a template has to be fitted: by silhouettes as in pipelines/unscanned.yaml, or to keypoints, which a "
+            "standing trial makes more exact",
         )
     if not (folder / first_pose.FILE).exists() and not (folder / "keypoints").is_dir():
         yield note(

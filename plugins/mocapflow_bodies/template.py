@@ -1,4 +1,4 @@
-"""Body `template`: an average person to start from where there is no scan; the stage fit_subject scales it."""
+"""Body `template`: an average person to start from where there is no scan; stages fit it to the person."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ class Export(WriteFormats):
         for doubt in doubts:
             LOG.warning(doubt)
         warnings = (*result.recording.warnings, *scene.warnings, *doubts)
-        content = runjson.summary(track, measured(track, scene), run_folder, warnings)
+        content = runjson.summary(track, scene.body, measured(track, scene), run_folder, warnings)
         return [*paths, runjson.write(layout.place(run_folder.path, layout.RUN), content)]
 
 

@@ -11,8 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from mocapflow.assets import Body
 from mocapflow.data import unseen
 from mocapflow.geometry.angles import AngleSeries
+from mocapflow.geometry.skeleton import segment_lengths
 from mocapflow.io.atomic import atomic_write
 from mocapflow.results import RunFolder, Track
 from mocapflow_export.misgivings import overlap_medians
@@ -20,7 +22,9 @@ from mocapflow_export.misgivings import overlap_medians
 FRAME = re.compile(r"^frame (\d+): ?(.*)$")
 
 
-def summary(track: Track, series: AngleSeries, run_folder: RunFolder, warnings: tuple[str, ...]) -> dict[str, Any]:
+def summary(
+    track: Track, body: Body, series: AngleSeries, run_folder: RunFolder, warnings: tuple[str, ...]
+) -> dict[str, Any]:
     """Return what run.json says: versions, settings, recipe, seconds per step, and what happened frame by frame."""
     seconds = track.seconds
     lost, said = track.lost, by_frame(track.notes)
@@ -29,6 +33,7 @@ def summary(track: Track, series: AngleSeries, run_folder: RunFolder, warnings: 
         **made,
         "recipe": {name: value for name, value in run_folder.recipe.items() if name not in made},
         "warnings": [*warnings, *said_by_stages(run_folder.recipe)],
+        "body_m": measures(body),
         "frames": {
             "count": len(track.frame),
             "first": int(track.frame[0]),
@@ -49,6 +54,11 @@ def summary(track: Track, series: AngleSeries, run_folder: RunFolder, warnings: 
         "notes": list(track.notes),
         "per_frame": [_frame(track, row, bool(lost[row]), said) for row in range(len(track.frame))],
     }
+
+
+def measures(body: Body) -> Mapping[str, float]:
+    """Return the height (m) of a body at rest, and the lengths of its limbs: what a stage has fitted shows here."""
+    return {"height": float(np.ptp(body.vertices[:, 2])), **segment_lengths(body)}
 
 
 def said_by_stages(recipe: Mapping[str, Any]) -> list[str]:

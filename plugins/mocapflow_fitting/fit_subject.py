@@ -12,6 +12,7 @@ from pydantic import PositiveInt
 from mocapflow.assets import Body, Camera
 from mocapflow.components import Stage
 from mocapflow.errors import RecordingError
+from mocapflow.geometry.skeleton import SEGMENTS
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow.scene import Scene
@@ -27,9 +28,7 @@ SPREADS: Mapping[str, float] = {
     "stature": 0.2, "trunk": 0.04, "shoulder_width": 0.06, "hip_width": 0.03, "head": 0.05,
     "thigh": 0.04, "shank": 0.04, "foot": 0.08, "upper_arm": 0.04, "forearm": 0.04,
 }  # fmt: skip
-LIMBS = tuple((f"{a}_{s}", f"{b}_{s}") for s in "lr" for a, b in (
-    ("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "shoulder"),
-))  # fmt: skip
+LIMBS = tuple((f"{a}_{s}", f"{b}_{s}") for s in "lr" for a, b in (*SEGMENTS.values(), ("hip", "shoulder")))
 DIFFERENT = 0.04  # median difference of limb lengths beyond which the standing trial shows another person
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from mocapflow.assets import Body
 from mocapflow.geometry import twists
-from mocapflow.geometry.skeleton import body_directions, skeleton_of, unsided
+from mocapflow.geometry.skeleton import SEGMENTS, body_directions, skeleton_of, unsided
 from mocapflow.records import F64
 
 # What can be stretched; `stature` multiplies all, `girth` what lies across the limbs and the depth of the trunk.
@@ -19,7 +19,7 @@ Proportion = Literal[
     "thigh", "shank", "foot", "upper_arm", "forearm",
 ]  # fmt: skip
 PROPORTIONS: tuple[str, ...] = get_args(Proportion)
-LIMBS = {"hip": "thigh", "knee": "shank", "shoulder": "upper_arm", "elbow": "forearm"}
+LIMBS = {start: segment for segment, (start, _) in SEGMENTS.items()}
 WHOLE = {"neck": "head", "head": "head", "ankle": "foot", "toe": "foot", "wrist": "forearm"}
 
 

@@ -61,6 +61,7 @@ class Report(Stage):
         sections = [
             ("At a glance", page.listing(report_rows.glance(track, names, evaluation))),
             ("Angles", _shown([curves]) + page.table(report_rows.ranges(columns))),
+            ("Body", page.listing([report_rows.body(scene)])),
             ("Gait cycle", _shown(strides)),
             ("Deviation from the reference", _deviations(evaluation)),
             ("Overlay", "\n".join(page.picture(jpeg, "jpeg", said) for said, jpeg in shown)),

@@ -15,6 +15,7 @@ from mocapflow_export.misgivings import misgivings
 from mocapflow.data import unseen
 from mocapflow.records import F64, Bool
 from mocapflow.results import Evaluation, Track
+from mocapflow.scene import Scene
 from mocapflow_report import plots
 
 DEVIATIONS = {  # column of evaluation.csv: its heading
@@ -64,6 +65,13 @@ def deviations(evaluation: Evaluation) -> list[dict[str, Any]]:
 def against(evaluation: Evaluation) -> list[str]:
     """Return what the deviations are from."""
     return [f"compared with {Path(evaluation.reference).name}; all frames count, failures too", *evaluation.notes]
+
+
+def body(scene: Scene) -> str:
+    """Return the height and the lengths of the limbs of the body that was tracked."""
+    return "; ".join(
+        f"{name.replace('_', ' ')} {100 * value:.1f} cm" for name, value in runjson.measures(scene.body).items()
+    )
 
 
 def mishaps(track: Track, held: Mapping[str, int]) -> list[str]:

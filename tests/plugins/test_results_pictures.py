@@ -92,6 +92,12 @@ def test_the_report_says_at_once_which_frames_the_images_contradict(track: Track
     assert swings == "frames that swing between two states: 2–3"
 
 
+def test_the_report_says_how_long_the_limbs_of_the_body_are(scene: Scene) -> None:
+    names = [item.rsplit(" ", 2)[0] for item in report_rows.body(scene).split("; ")]
+    limbs = ("thigh", "shank", "upper arm", "forearm")
+    assert names == ["height", *(f"{limb} {side}" for limb in limbs for side in "lr")]
+
+
 @pytest.mark.parametrize(
     "odd",
     [{"doubted": np.ones(4, bool)}, {"usable": np.tile([True, False, True, True], (4, 1))}],
