@@ -78,7 +78,7 @@ def numbers(value: Any, shape: tuple[int, ...], field: str, name: str, where: Pa
     """
     try:
         found = np.array(value, np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise bad(name, where, f"has no numbers in {field}: {value!r}") from None
     if found.size != int(np.prod(shape)):
         raise bad(name, where, f"has {found.size} numbers in {field}; expected {int(np.prod(shape))}")

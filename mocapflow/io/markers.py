@@ -147,7 +147,8 @@ def read_c3d(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
     Times count from the start of the measurement, of which a file may hold a part.
 
     Raises:
-        RecordingError: ezc3d is not installed, the file can't be read or is cut off, or its unit is unknown.
+        RecordingError: ezc3d is not installed, the file can't be read or is cut off, its unit is unknown, or it has no
+            rate.
     """
     try:
         import ezc3d
@@ -158,7 +159,7 @@ def read_c3d(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
             hint = "copy or export it again"
             raise RecordingError("this C3D file is cut off", where=str(path), hint=hint)
         content = ezc3d.c3d(str(path))
-    except (OSError, ValueError) as error:  # the latter of one that ends before its first frame
+    except (OSError, ValueError, RuntimeError) as error:  # ezc3d raises each of them for damaged files
         raise RecordingError(f"this C3D file can't be read: {error}", where=str(path)) from error
     point = content["parameters"]["POINT"]
     names = tuple(str(name) for name in point["LABELS"]["value"])
@@ -166,6 +167,8 @@ def read_c3d(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
     if unit not in METRES:
         raise RecordingError(f"unknown unit '{unit}'", where=str(path), hint=f"known: {', '.join(METRES)}")
     rate = float(point["RATE"]["value"][0])
+    if not rate > 0:
+        raise RecordingError("no POINT:RATE above zero", where=str(path), hint="it is in frames per second")
     positions = np.moveaxis(content["data"]["points"][:3], 0, -1).swapaxes(0, 1)[:, : len(names)] * METRES[unit]
     first = int(content["header"]["points"]["first_frame"])
     return names, _seen(positions), (first + np.arange(len(positions))) / rate, rate

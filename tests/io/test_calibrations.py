@@ -176,6 +176,7 @@ def test_nan(tmp_path):
     ("old", "new", "message"),
     [
         ("size = [64, 48]", "size = [64]", "has 1 numbers in size; expected 2"),
+        ("size = [64, 48]", f"size = [1{'0' * 400}, 48]", "has no numbers in size"),
         ("size = [64, 48]", "size = [-64, 48]", "has the size -64 x 48"),
         ("size = [64, 48]", 'size = ["big", 48]', r"has no numbers in size: \['big', 48\]"),
         ("rotation = [", "rotation = [[1.0, 0.0], [0.0, 1.0, 0.0]] # [", "has no numbers in rotation"),

@@ -189,6 +189,7 @@ def test_mesh_without_skeleton(recording):
         (lambda joints: joints[3].update(name="knee_l"), "joint 'knee_l' is listed twice"),
         (lambda joints: joints[3].update(parent=None), "one joint must have no parent"),
         (lambda joints: joints[3].update(position=[0, float("nan"), 0]), "positions are not all numbers"),
+        (lambda joints: joints[3].update(position=[0, 10**400, 0]), "this is not a skeleton: OverflowError"),
         (lambda joints: joints[3].pop("position"), "this is not a skeleton"),
         (
             lambda joints: joints[3].update(position=joints[2]["position"]),
