@@ -152,6 +152,15 @@ def test_content_of_files(tmp_path, clip, name, expected):
     assert bool(after) == bool(expected)
 
 
+def test_the_name_of_a_file_counts_that_a_stage_may_read_by_its_name(tmp_path, clip):
+    stages = STAGES | {"start": "start_from_file"}
+    for name in ("init.json", "init_000001.json"):
+        (clip / name).write_text("{}")
+    before = keys(tmp_path, clip, stages=stages)
+    (clip / "init_000001.json").rename(clip / "init_000002.json")
+    assert changed(before, keys(tmp_path, clip, stages=stages)) == {"start", "track", "smooth", "export"}
+
+
 def test_a_touched_file_is_the_same(tmp_path, clip):
     before = keys(tmp_path, clip)
     os.utime(clip / "subject.txt")
