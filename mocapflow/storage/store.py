@@ -30,6 +30,7 @@ from mocapflow.storage.locks import Lock, acquire, looking
 from mocapflow.storage.rows import Corrupted, array_meta, flush_all, read_json, write_json
 
 SHORT = 12  # digits of the key in a group's name
+ASIDE = "damaged-"  # begins the name, in `.state`, of a group that is no use any more
 LIBRARIES = ("mocapflow", "numpy", "scipy", "opencv-python-headless", "av", "numba")
 Report = Callable[[str], None]
 
@@ -191,7 +192,7 @@ class Store:
 
     def set_aside(self, path: Path) -> Path:
         """Move a damaged group out of the way and return its new name."""
-        aside = self.state / f"damaged-{path.name}-{time.time_ns()}"
+        aside = self.state / f"{ASIDE}{path.name}-{time.time_ns()}"
         with writing(self.path):
             path.rename(aside)
         return aside
@@ -206,8 +207,8 @@ class Store:
         return not busy
 
     def aside(self) -> list[Path]:
-        """Return the groups that were damaged and set aside."""
-        return sorted(self.state.glob("damaged-*"))
+        """Return the groups that were damaged and set aside, and parts of copies whose fetching was cut off."""
+        return sorted(self.state.glob(f"{ASIDE}*"))
 
     def discard(self, artifact: Artifact) -> None:
         """Remove an artifact that is to be made anew."""
