@@ -8,6 +8,7 @@ import shlex
 import sys
 import warnings
 from collections.abc import Callable
+from io import TextIOWrapper
 from typing import Annotated, Any
 
 import typer
@@ -35,8 +36,7 @@ class Commands(typer.core.TyperGroup):
             said = unwritable(error) if isinstance(error, OSError) else uncompilable(error) or error
             if not isinstance(said, MocapflowError):
                 raise
-            shown = str(said).encode("utf-8", "backslashreplace").decode()  # it may quote what nobody can print
-            typer.echo(f"error: {shown}", err=True)
+            typer.echo(f"error: {said}", err=True)
             raise typer.Exit(said.exit_status) from None
 
 
@@ -99,6 +99,9 @@ app.add_typer(new.app, name="new")
 
 def main() -> None:
     """Run the command line; warnings go to stderr, one line each."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):  # what a terminal's encoding lacks, or no encoding has, is escaped
+            stream.reconfigure(errors="backslashreplace")
     for variable, level in QUIET.items():
         os.environ.setdefault(variable, level)
     warnings.showwarning = _show_warning

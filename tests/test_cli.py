@@ -52,6 +52,12 @@ def test_an_error_about_what_nobody_can_print_is_printed(call):
     assert done.exit_code == 2 and done.stderr.startswith("error: \\udcff.yaml  there is no such file")
 
 
+def test_a_terminal_whose_encoding_lacks_a_letter_shows_its_number():
+    words = [sys.executable, "-m", "mocapflow", "show", "stage", "coupled_loop"]
+    done = subprocess.run(words, env={**os.environ, "PYTHONIOENCODING": "latin-1"}, capture_output=True, check=True)
+    assert rb"int (\u2265 2000) = 12000" in done.stdout
+
+
 def test_a_run_is_made_once_and_then_found(call):
     first = call("run", "start.yaml")
     assert first.exit_code == 0, first.output
