@@ -97,7 +97,7 @@ def remember(
     _write(out, {**asdict(invocation.absolute()), **dict(zip(KEYS, (keys, contents or {}), strict=True))})
 
 
-def finish(out: Path) -> None:
+def note_finished(out: Path) -> None:
     """Note in a run folder that its run is finished."""
     said = json.loads((out / FILE).read_text(encoding="utf-8"))
     _write(out, {**said, FINISHED: datetime.now().astimezone().isoformat(" ", "seconds")})

@@ -13,6 +13,7 @@ import numpy as np
 
 from mocapflow.errors import RecordingError
 from mocapflow.io.atomic import atomic_write
+from mocapflow.io.columns import row_of_numbers
 from mocapflow.records import F64
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
@@ -81,12 +82,12 @@ def read_trc(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
     unit = header.get("Units", "").strip()
     if unit not in METRES:
         raise RecordingError(f"unknown unit '{unit}'", where=str(path), hint=f"known: {', '.join(METRES)}")
-    (rate,) = numbers([header.get("DataRate", "")], 1, f"{path}:3")
+    (rate,) = row_of_numbers([header.get("DataRate", "")], 1, f"{path}:3")
     if not rate > 0:
         raise RecordingError("no DataRate above zero", where=f"{path}:3", hint="it is in rows per second")
     width = 2 + 3 * len(names)
     rows = [
-        numbers(_fitted(line.split("\t"), width), width, f"{path}:{number}")
+        row_of_numbers(_fitted(line.split("\t"), width), width, f"{path}:{number}")
         for number, line in enumerate(lines[5:], 6)
         if line.strip()
     ]
@@ -130,7 +131,7 @@ def read_mot(path: Path) -> tuple[dict[str, F64], F64]:
     if "time" not in names:
         raise RecordingError("no column 'time'", where=f"{path}:{end + 2}", hint=f"the columns are: {', '.join(names)}")
     rows = [
-        numbers(line.split(), len(names), f"{path}:{number}")
+        row_of_numbers(line.split(), len(names), f"{path}:{number}")
         for number, line in enumerate(lines[end + 2 :], end + 3)
         if line.strip()
     ]
@@ -206,17 +207,3 @@ def _fitted(cells: Sequence[str], width: int) -> Sequence[str]:
     while kept > width and not cells[kept - 1].strip():
         kept -= 1
     return [*cells[:kept], *[""] * (width - kept)]
-
-
-def numbers(cells: Sequence[str], width: int, where: str) -> list[float]:
-    """Return the numbers of a row; an empty cell is NaN."""
-    if len(cells) != width:
-        raise RecordingError(f"{len(cells)} columns; expected {width}", where=where)
-    return [_number(cell, f"{where}:{column}") if cell.strip() else np.nan for column, cell in enumerate(cells, 1)]
-
-
-def _number(cell: str, where: str) -> float:
-    try:
-        return float(cell)
-    except ValueError:
-        raise RecordingError(f"'{cell.strip()}' is no number", where=where) from None
