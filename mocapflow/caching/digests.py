@@ -45,7 +45,7 @@ CORE = (
     "track",
     "wrong_answer",
 )
-PYTHON = f" {sys.version_info.major}.{sys.version_info.minor}"  # another minor version writes syntax trees otherwise
+PYTHON = f" {sys.version_info.major}.{sys.version_info.minor}"  # syntax trees differ between minor versions
 
 
 def digest(data: bytes | memoryview, name: str = "") -> str:
@@ -86,7 +86,7 @@ class Digests:
         return f"{found} {name}".rstrip()
 
     def check_inputs(self) -> None:
-        """Check that files are as they were when `file` was asked for them; in a folder, that it lists what it did.
+        """Check that files are as they were when `file` was asked for them, and that folders still list the same.
 
         Raises:
             RecordingError: one is not.
@@ -97,7 +97,7 @@ class Digests:
                 raise RecordingError("this has changed since the run began", where=str(path), hint=hint)
 
     def save(self) -> None:
-        """Remember the digests for the next run; a folder that can't be written is no matter."""
+        """Remember the digests for the next run; where the folder can't be written, they are computed again."""
         if self._memory is None or self._known == _read(self._memory):
             return
         with suppress(OSError), atomic_write(self._memory) as part:

@@ -21,8 +21,8 @@ from mocapflow.running.parts import in_parts
 from mocapflow.running.wiring import Source, latest, makes, wire
 from mocapflow.wrong_answer import WrongAnswer
 
-BEGINNING = 10  # frames
-SEEN = {Start: "first", Background: "all", Rig: "all", Body: "all", Recording: "all"}  # of a stage that says none
+BEGINNING = 10  # frames of the extent "beginning"
+SEEN = {Start: "first", Background: "all", Rig: "all", Body: "all", Recording: "all"}  # where a stage names no extent
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Step:
 
     @property
     def content(self) -> str:
-        """A key of what pipeline and recording say of this stage and what it reads, whatever code makes of it."""
+        """A key of this stage and its inputs by pipeline and recording alone, whatever the code."""
         read = {"from": self.sources, "body": self.body, "rig": self.rig}
         return key_of({**without_code(self.recipe), "read": read})
 

@@ -85,7 +85,7 @@ def _source(named: NamedStage, parameter: str, hint: Any, earlier: Sequence[Name
 
 
 def _itself(named: NamedStage, parameter: str, wanted: type[Stage], earlier: Sequence[NamedStage]) -> Itself:
-    """Return the last stage of a class, or the one that `from` names; all parts of a track have the same settings."""
+    """Return the last stage of a class, or the one that `from` names; all parts of a track are set alike."""
     labels = [other.label for other in earlier if isinstance(other.stage, wanted)]
     chosen = [label for label in labels if label == named.wiring.get(parameter, label)]
     if not chosen:
