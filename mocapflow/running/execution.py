@@ -27,10 +27,11 @@ from mocapflow.running.warned import warnings_logged
 from mocapflow.running.wiring import Itself, Source, made_by
 from mocapflow.scene import Scene
 from mocapflow.settings import Component
+from mocapflow.storage.artifacts import Artifact, made_otherwise, versions, with_versions
 from mocapflow.storage.checkpoint import Checkpoint
 from mocapflow.storage.locks import Lock
 from mocapflow.storage.rows import Corrupted
-from mocapflow.storage.store import Artifact, Report, Store, versions, with_versions
+from mocapflow.storage.store import Report, Store
 from mocapflow.wrong_answer import of_kind
 
 
@@ -260,16 +261,14 @@ class Execution:
 
     def _warned_of_versions(self, step: Step, artifact: Artifact) -> list[str]:
         """Report, and return, which result or which frames of it were made with other versions."""
-        now, frames, first, said = versions(), step.recording.indices, 0, list[str]()
-        for last, made in artifact.made_with:
-            other = [f"{name} {was}, now {now.get(name)}" for name, was in made.items() if now.get(name) != was]
-            wanted = min(last, step.frames)
-            if other and (first < wanted or not step.chain):
-                begin, end = (frames.start + frames.step * count for count in (first, wanted - 1))
-                what = f"frames {begin}–{end} of {step.label}" if step.chain else step.label
-                said.append(f"{what} were made with {'; '.join(other)}")
-                self._report(f"warning: {said[-1]}")
-            first = last
+        indices, said = step.recording.indices, list[str]()
+        for first, last, how in made_otherwise(artifact):
+            own = indices[first:last]
+            if own or not step.chain:
+                what = f"frames {own[0]}–{own[-1]} of {step.label}" if step.chain else step.label
+                said.append(f"{what} were made with {how}")
+        for warning in said:
+            self._report(f"warning: {warning}")
         return said
 
     def _set_aside(self, step: Step, path: Path, error: Corrupted) -> Artifact | None:

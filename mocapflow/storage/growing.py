@@ -22,8 +22,7 @@ from mocapflow.data import Matches, Pose, Silhouette
 from mocapflow.records import F64
 from mocapflow.storage import packing
 from mocapflow.storage.packing import Columns, column
-from mocapflow.storage.rows import Corrupted, Rows, flush_all, write_json
-from mocapflow.storage.store import group_meta
+from mocapflow.storage.rows import Corrupted, Rows, flush_all, group_meta, write_json
 
 NUMBERS, CLOTH = "live/rows", "cloth"
 SEEN = ("silhouettes", "matches", "trace")

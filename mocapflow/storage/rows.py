@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -133,6 +133,11 @@ def array_meta(
         ],
         "dimension_names": list(axes), "attributes": attributes, "storage_transformers": [],
     }  # fmt: skip
+
+
+def group_meta(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the metadata of a zarr group."""
+    return {"attributes": attributes, "zarr_format": 3, "node_type": "group"}
 
 
 def read_json(path: Path) -> dict[str, Any]:

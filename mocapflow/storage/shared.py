@@ -16,10 +16,11 @@ from typing import Any
 
 from mocapflow.errors import StoreError
 from mocapflow.records import silent
+from mocapflow.storage.artifacts import SHORT, Artifact, writing
 from mocapflow.storage.copies import META, Copies, Copy, further
 from mocapflow.storage.locks import Lock
 from mocapflow.storage.rows import Corrupted, flush_all
-from mocapflow.storage.store import ASIDE, SHORT, Artifact, Report, Store, writing
+from mocapflow.storage.store import ASIDE, Report, Store
 
 
 def open_store(path: Path, url: str | None) -> Store:
