@@ -17,7 +17,7 @@ from mocapflow.errors import FULL, StoreError, folder_error
 from mocapflow.storage.rows import read_json
 
 SHORT = 12  # digits of the key in a group's name
-LIBRARIES = ("mocapflow", "numpy", "scipy", "opencv-python-headless", "av", "numba")
+LIBRARIES = ("mocapflow", "numpy", "scipy", "opencv-python-headless", "av", "open3d", "numba")
 
 
 @dataclass(frozen=True)
