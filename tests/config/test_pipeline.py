@@ -235,6 +235,9 @@ def test_a_recording_without_measures(folder):
         "skirt.yaml:2:1  garment: skirt needs waist_height_m, waist_circumference_m, hem_circumference_m, length_m\n"
         f"       measures, in metres, come from {file}, which does not exist; a value in the pipeline overrides them"
     )
+    with pytest.raises(MocapflowError, match="^clip  no calibration file"):  # a wrong folder is told as such
+        load("garment=from_recording")
+    Path("clip/cameras.toml").touch()
     with pytest.raises(MocapflowError, match="clip/subject/garment.json  the pipeline takes the garment from the rec"):
         load("garment=from_recording")
 
