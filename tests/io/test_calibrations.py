@@ -254,7 +254,7 @@ def test_incomplete_qualisys(tmp_path, old, new, message):
         read_cameras(path)
 
 
-@pytest.mark.parametrize("content", ["", "hello\n", "%YAML:1.0\n---\nnames: [ 1"])
+@pytest.mark.parametrize("content", ["", "hello\n", "%YAML:1.0\n---\nnames: [ 1", "%YAML:1.0\n---\n- 1\n"])
 def test_not_opencv_yaml(tmp_path, content):
     write_easymocap(tmp_path, ring())
     (tmp_path / "intri.yml").write_text(content)
@@ -278,7 +278,17 @@ def test_easymocap_lacks_a_matrix(tmp_path):
         read_cameras(tmp_path)
 
 
-@pytest.mark.parametrize(("old", "new"), [("rows: 3", "rows: 4"), ("dt: d", "dt: q")])
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("rows: 3", "rows: 4"),
+        ("rows: 3", "rows: -3"),
+        ("dt: d", "dt: q"),
+        ("   cols: 3\n", ""),  # at which OpenCV itself writes beyond its memory
+        ("data: [", "data: x # ["),
+        ("data: [ ", "data: [ x, "),
+    ],
+)
 def test_easymocap_with_no_matrix_where_one_should_be(tmp_path, old, new):
     write_easymocap(tmp_path, ring())
     path = tmp_path / "intri.yml"
