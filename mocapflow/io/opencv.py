@@ -78,12 +78,9 @@ def _numbers(node: Any) -> F64 | None:
     rows, columns, kind, data = (node.getNode(part) for part in ("rows", "cols", "dt", "data"))
     if not (rows.isInt() and columns.isInt() and data.isSeq() and kind.isString() and kind.string() in KINDS):
         return None
-    values = [data.at(k) for k in range(data.size())]
     shape = int(rows.real()), int(columns.real())
-    if (
-        min(shape) < 1
-        or len(values) != shape[0] * shape[1]
-        or not all(value.isReal() or value.isInt() for value in values)
-    ):
+    values = [data.at(k) for k in range(data.size())]
+    numbers = [value.real() for value in values if value.isReal() or value.isInt()]
+    if min(shape) < 1 or not shape[0] * shape[1] == len(numbers) == len(values):
         return None
-    return np.array([value.real() for value in values]).reshape(shape)
+    return np.array(numbers).reshape(shape)
