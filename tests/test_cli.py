@@ -319,6 +319,13 @@ def test_a_folder_that_is_no_store_is_not_pruned(call, more):
     assert mine.is_dir()
 
 
+def test_a_run_folder_within_a_store_is_no_damaged_result(call):
+    call("run", "start.yaml", "--store", "kept", "--out", "kept/my-run")
+    assert "damaged" not in call("cache", "list", "--store", "kept").stdout
+    assert "1 results" in call("cache", "prune", "--all", "--store", "kept").stdout
+    assert Path("kept/my-run/command.json").is_file()
+
+
 def test_the_version_is_that_of_the_package(call):
     assert call("--version").stdout == f"mocapflow {version('mocapflow')}\n"
 

@@ -10,6 +10,7 @@ whoever shares the folder has to share the locks.
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -25,6 +26,7 @@ from mocapflow.storage.artifacts import SHORT, Artifact, open_artifact, remove, 
 from mocapflow.storage.locks import Lock, acquire, looking
 from mocapflow.storage.rows import Corrupted, array_meta, flush_all, group_meta, read_json, write_json
 
+GROUP = re.compile(rf"[\w-]+-[0-9a-f]{{{SHORT}}}")  # names of groups: label and key
 ASIDE = "damaged-"  # begins the name, in `.state`, of a group that is no use any more
 Report = Callable[[str], None]
 
@@ -178,7 +180,8 @@ class Store:
         return filter(None, map(open_artifact, self._groups(pattern)))
 
     def _groups(self, pattern: str) -> list[Path]:
-        return sorted(p for p in self.path.glob(pattern) if p.is_dir() and not p.name.startswith("."))
+        """Return the groups by their names; other folders, such as a run folder in here, belong to others."""
+        return sorted(p for p in self.path.glob(pattern) if p.is_dir() and GROUP.fullmatch(p.name))
 
 
 def _kind(folder: Path) -> str | None:
