@@ -144,7 +144,7 @@ class Recording:
 
 def decoded(views: Sequence[View], videos: Sequence[Video], indices: range, frame_rate: float) -> Iterator[Frame]:
     """Yield what videos show in frames of these numbers, as their cameras' views have it."""
-    pictures, hidden = zip(*(read_frames(video, indices) for video in videos), strict=True), hidden_in(views)
+    pictures, hidden = zip(*(read_frames(video, indices) for video in videos), strict=True), _hidden(views)
     for index, row in zip(indices, pictures, strict=True):
         usable = np.array([image is not None for image, _ in row])
         yield Frame(
@@ -157,7 +157,7 @@ def decoded(views: Sequence[View], videos: Sequence[Video], indices: range, fram
         )
 
 
-def hidden_in(views: Sequence[View]) -> tuple[Bool, ...]:
+def _hidden(views: Sequence[View]) -> tuple[Bool, ...]:
     """Return where (H, W) occluders stand in each view; () where none is known in any."""
     if all(view.hidden is None for view in views):
         return ()
