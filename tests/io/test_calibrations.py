@@ -1,6 +1,8 @@
 """Calibration files of every format, and what is said of bad ones."""
 
 import re
+import subprocess
+import sys
 from dataclasses import replace
 
 import cv2
@@ -284,7 +286,6 @@ def test_easymocap_lacks_a_matrix(tmp_path):
         ("rows: 3", "rows: 4"),
         ("rows: 3", "rows: -3"),
         ("dt: d", "dt: q"),
-        ("   cols: 3\n", ""),  # at which OpenCV itself writes beyond its memory
         ("data: [", "data: x # ["),
         ("data: [ ", "data: [ x, "),
     ],
@@ -297,6 +298,17 @@ def test_easymocap_with_no_matrix_where_one_should_be(tmp_path, old, new):
     path.write_text(text.replace(old, new, 1))
     with pytest.raises(RecordingError, match=r"intri\.yml:\d+:1  camera 'cam01' has no matrix in K_cam01\n.*as many"):
         read_cameras(tmp_path)
+
+
+def test_easymocap_whose_matrix_does_not_say_its_columns(tmp_path):
+    """In a process of its own: OpenCV's way to read it would write beyond its memory, and that may kill."""
+    write_easymocap(tmp_path, ring())
+    path = tmp_path / "extri.yml"
+    path.write_text(path.read_text().replace("   cols: 1\n", ""))
+    words = [sys.executable, "-m", "mocapflow", "doctor", str(tmp_path)]
+    done = subprocess.run(words, capture_output=True, check=False, text=True)
+    assert done.returncode == 2, done.stderr
+    assert "camera 'cam01' has no matrix in" in done.stdout
 
 
 def test_one_name_twice(tmp_path):

@@ -238,6 +238,14 @@ def test_names_of_weights_that_name_no_columns(recording, names, message):
         Scanned().load(recording)
 
 
+def test_weights_whose_description_is_damaged(recording):
+    path = recording / "subject" / "weights.npz"
+    np.savez(path, weights=np.ones((13348, 3)))
+    path.write_bytes(path.read_bytes().replace(b"), }", b"), ("))
+    with pytest.raises(RecordingError, match=r"weights\.npz  this is no .npz file of numbers and names\n"):
+        Scanned().load(recording)
+
+
 def test_weights_in_a_npy_by_another_name(recording):
     with (recording / "subject" / "weights.npz").open("wb") as file:
         np.save(file, np.ones((13348, 19)))

@@ -410,10 +410,8 @@ def test_weights_of_another_mesh(good):
     assert errors(good) == ["weights for 'tail', which is no joint of the skeleton"]
     np.savez(path, weights=weights[:, 2:], names=names[2:])
     assert errors(good) == [f"no weights for {names[0]}, {names[1]}"]
-    whole = path.read_bytes()
-    for damaged in (b"nothing", whole.replace(b"), }", b"), (")):
-        path.write_bytes(damaged)
-        assert errors(good) == ["this is no .npz file of numbers and names"]
+    path.write_bytes(b"nothing")
+    assert errors(good) == ["this is no .npz file of numbers and names"]
     np.savez(path, weights=weights)  # without names: in the order of the skeleton
     assert errors(good) == []
     np.savez(path, weights=weights[:, ::-1])
