@@ -8,20 +8,19 @@ from functools import cached_property
 from pathlib import Path
 from typing import Protocol
 
-import numpy as np
-
 from mocapflow.assets import Background, Camera
 from mocapflow.data import Frame
 from mocapflow.errors import RecordingError
 from mocapflow.io import agreement, folders
 from mocapflow.io.cameras import calibration_files, find_calibration, read_cameras
+from mocapflow.io.decoding import decoded
 from mocapflow.io.keypoints import first_numbers, keypoint_files, people_at
 from mocapflow.io.lateness import TIMING, late_frames
 from mocapflow.io.lenses import View
 from mocapflow.io.occluders import occluder
 from mocapflow.io.plates import background
-from mocapflow.io.video import Video, count_from_first, open_video, read_frames
-from mocapflow.records import F64, Bool, Watch, record, silent
+from mocapflow.io.video import Video, count_from_first, open_video
+from mocapflow.records import F64, Watch, record, silent
 
 LEAST_PX = 8  # from side to side; nobody is seen in fewer
 
@@ -140,29 +139,6 @@ class Recording:
     def _decode(self, indices: range) -> Iterator[Frame]:
         for frame in decoded(self.views, self.videos, indices, self.frame_rate):
             yield replace(frame, keypoints=self.people(frame.index)) if any(self.keypoint_folders) else frame
-
-
-def decoded(views: Sequence[View], videos: Sequence[Video], indices: range, frame_rate: float) -> Iterator[Frame]:
-    """Yield what videos show in frames of these numbers, as their cameras' views have it."""
-    pictures, hidden = zip(*(read_frames(video, indices) for video in videos), strict=True), _hidden(views)
-    for index, row in zip(indices, pictures, strict=True):
-        usable = np.array([image is not None for image, _ in row])
-        yield Frame(
-            index=index,
-            time=index / frame_rate,
-            images=tuple(view.image(image) for view, (image, _) in zip(views, row, strict=True)),
-            usable=usable,
-            reasons=() if usable.all() else tuple(reason for _, reason in row),
-            hidden=hidden,
-        )
-
-
-def _hidden(views: Sequence[View]) -> tuple[Bool, ...]:
-    """Return where (H, W) occluders stand in each view; () where none is known in any."""
-    if all(view.hidden is None for view in views):
-        return ()
-    nowhere = (np.zeros(view.camera.size[::-1], bool) for view in views)
-    return tuple(none if view.hidden is None else view.hidden for view, none in zip(views, nowhere, strict=True))
 
 
 def open_recording(
