@@ -24,7 +24,8 @@ import numpy as np
 
 from mocapflow.help.shipped import shipped
 from mocapflow.results import Track
-from mocapflow.storage.store import Artifact, Store
+from mocapflow.storage.artifacts import Artifact
+from mocapflow.storage.store import Store
 
 MOCAPFLOW = Path(sys.executable).with_name("mocapflow")
 KILLED_AT = (60, 140)  # frames

@@ -8,6 +8,7 @@ import shlex
 import sys
 import warnings
 from collections.abc import Callable
+from io import TextIOWrapper
 from typing import Annotated, Any
 
 import typer
@@ -35,8 +36,7 @@ class Commands(typer.core.TyperGroup):
             said = unwritable(error) if isinstance(error, OSError) else uncompilable(error) or error
             if not isinstance(said, MocapflowError):
                 raise
-            shown = str(said).encode("utf-8", "backslashreplace").decode()  # it may quote what nobody can print
-            typer.echo(f"error: {shown}", err=True)
+            typer.echo(f"error: {said}", err=True)
             raise typer.Exit(said.exit_status) from None
 
 
@@ -99,17 +99,13 @@ app.add_typer(new.app, name="new")
 
 def main() -> None:
     """Run the command line; warnings and what stages found go to stderr, one line each."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):  # what a terminal's encoding lacks, or no encoding has, is escaped
+            stream.reconfigure(errors="backslashreplace")
     for variable, level in QUIET.items():
         os.environ.setdefault(variable, level)
     warnings.showwarning = _show_warning
-    warned = logging.StreamHandler(sys.stderr)
-    warned.setLevel(logging.WARNING)  # of the handler: libraries lower that of their own loggers
-    logging.basicConfig(format="warning: %(message)s", handlers=[warned])
-    told = logging.StreamHandler(sys.stderr)  # of ours alone
-    told.addFilter(lambda record: record.levelno < logging.WARNING)
-    ours = logging.getLogger("mocapflow")
-    ours.addHandler(told)
-    ours.setLevel(logging.INFO)
+    _tell_on_stderr()
     Interrupts().install()
     try:
         app(prog_name="mocapflow")
@@ -119,6 +115,18 @@ def main() -> None:
             sys.stderr.flush()
             os._exit(INTERRUPTED)  # libraries that were cut off in the middle may crash on their way out
         raise
+
+
+def _tell_on_stderr() -> None:
+    """Print warnings of all libraries, and what our stages found, one line each."""
+    warned = logging.StreamHandler(sys.stderr)
+    warned.setLevel(logging.WARNING)  # of the handler: libraries lower that of their own loggers
+    logging.basicConfig(format="warning: %(message)s", handlers=[warned])
+    told = logging.StreamHandler(sys.stderr)
+    told.addFilter(lambda record: record.levelno < logging.WARNING)
+    ours = logging.getLogger("mocapflow")
+    ours.addHandler(told)
+    ours.setLevel(logging.INFO)
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:

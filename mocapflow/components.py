@@ -71,7 +71,7 @@ class Matcher(Component):
         """Return pairs of image points and vertices of the posed surface."""
 
     def need(self, recording: Recording) -> None:
-        """Raise if there is nothing in a recording that it could ever match: asked before a run computes anything."""
+        """Raise if nothing in a recording could ever be matched; called before a run begins."""
 
 
 class PoseSolver(Component):
@@ -169,15 +169,15 @@ class Stage(Component):
         return ()
 
     def need(self, recording: Recording) -> None:
-        """Raise what `run` would for want of an input: asked by `plan`, and before a run computes anything."""
+        """Raise the error that `run` would for lack of an input; called by `plan`, and before a run begins."""
 
     @property
     def looks_back(self) -> bool:
-        """True where `look_back` has to see a result that comes from the store."""
+        """True where `look_back` has to check a result that comes from the store."""
         return False
 
     def look_back(self, made: Any) -> None:
-        """Raise what `run` would have raised of a result; settings outside its key may be others since it was made."""
+        """Raise what `run` would have raised about a stored result: settings outside its key may have changed since."""
 
 
 Observe = Callable[[int, Turn, FrameState], None]

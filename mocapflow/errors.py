@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
 
-FULL = frozenset({errno.ENOSPC, errno.EDQUOT})  # what the system says of a drive that is
+FULL = frozenset({errno.ENOSPC, errno.EDQUOT})  # errors of a full drive
 MOST = 30  # names that a hint lists
 
 
@@ -63,18 +63,18 @@ class StoreError(MocapflowError):
 
 
 def folder_error(error: OSError) -> type[MocapflowError]:
-    """Return as what it counts that a folder can't be made or written: where there is a file, its name is wrong."""
+    """Return the class of error for a folder that can't be made or written: wrong input where a file has its name."""
     return MocapflowError if isinstance(error, FileExistsError | NotADirectoryError) else StoreError
 
 
 def no_run_folder(out: Path, error: OSError) -> MocapflowError:
-    """Return what is said where a run folder can't be made or written."""
+    """Return the error for a run folder that can't be made or written."""
     hint = "name another folder, or make it writable"
     return folder_error(error)(f"can't write the run folder: {error.strerror}", where=str(out), hint=hint)
 
 
 def unwritable(error: OSError) -> StoreError | None:
-    """Return what is said of a full drive, or of a file that may not be written or read; None for other errors."""
+    """Return the error for a full drive, or a file that may not be written or read; None for other causes."""
     if error.errno not in {*FULL, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM} or not error.strerror:
         return None
     hint = "free some space, then run the same command" if error.errno in FULL else ""
@@ -83,7 +83,7 @@ def unwritable(error: OSError) -> StoreError | None:
 
 
 def uncompilable(error: BaseException) -> MocapflowError | None:
-    """Return what is said where numba finds no place for compiled code; None for other errors."""
+    """Return the error to tell where numba finds no place for compiled code; None for other causes."""
     if not isinstance(error, RuntimeError) or "no locator available" not in str(error):
         return None
     hint = "NUMBA_CACHE_DIR names a folder of yours for it"

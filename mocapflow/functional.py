@@ -143,6 +143,6 @@ def halfway(one: Pose, other: Pose) -> Pose:
 
 
 def told_apart(names: Sequence[str]) -> tuple[str, ...]:
-    """Return names of which each that stands there again has its number: parzen, parzen_2."""
+    """Return the names, each that was there before with its number: parzen, parzen_2."""
     counts = [names[: at + 1].count(name) for at, name in enumerate(names)]
     return tuple(name if count == 1 else f"{name}_{count}" for name, count in zip(names, counts, strict=True))

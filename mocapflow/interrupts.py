@@ -27,7 +27,7 @@ class Interrupts:
 
 
 def check() -> None:
-    """Raise KeyboardInterrupt where somebody asked for it and it came to nothing."""
+    """Raise KeyboardInterrupt if a signal has asked for it and compiled code has swallowed it."""
     if _asked():
         raise KeyboardInterrupt
 

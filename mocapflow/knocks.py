@@ -23,8 +23,8 @@ class Knocks:
     def undone(self, frame: Frame) -> Frame:
         """Return a frame as cameras that still stand as in the beginning would have seen it.
 
-        What is said to be hidden is hidden in both places: moved back with what covers the lens now, and where painted
-        furniture stood in the beginning.
+        Hidden pixels stay hidden in both places: moved back with the picture, as what covers the lens is, and where
+        they were, as furniture that was painted at the beginning is.
         """
         ways = self._back(frame.index)
         if not ways:

@@ -18,7 +18,7 @@ import pluggy
 from mocapflow import components, hookspecs
 from mocapflow.dressing import roles
 from mocapflow.errors import MocapflowError, PluginError, UnknownComponent, alternatives
-from mocapflow.guards.vetting import check_hooks, import_file, provided
+from mocapflow.guards.vetting import check_hooks, import_file, vetted
 from mocapflow.observers import Observers
 from mocapflow.settings import Component
 
@@ -147,7 +147,7 @@ class Registry:
             impl.function for impl in getattr(self._manager.hook, hook).get_hookimpls() if impl.plugin is plugin
         ]
         try:
-            classes = [cls for provide in providers for cls in provided(provide(), base, hook)]
+            classes = [cls for provide in providers for cls in vetted(provide(), base, hook)]
         except Exception as error:
             self._failures.append(Failure(origin, error, role))
             return

@@ -148,7 +148,7 @@ def frame_rate_of(time: F64) -> float:
 
 
 def notes_of(frames: I32, notes: Iterable[str]) -> tuple[str, ...]:
-    """Return those of the notes of a track that are on some frames (K,)."""
+    """Return the notes of a track that are about given frames (K,)."""
     heads = {f"frame {frame}" for frame in frames.tolist()}
     return tuple(note for note in notes if note.partition(":")[0] in heads)
 

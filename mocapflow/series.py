@@ -1,4 +1,4 @@
-"""What every frame has and a whole recording has too much of: rows that are made when they are asked for."""
+"""Arrays that are too large for memory over a whole recording: rows are made when they are asked for."""
 
 from __future__ import annotations
 

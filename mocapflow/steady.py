@@ -16,7 +16,7 @@ from mocapflow.settings import PositiveOrInf, Settings
 class Steady(Settings):
     """When the loop counts as at rest, how long it may go on, and how it is kept from getting worse.
 
-    Turns beyond the last of `sigmas` are held against the last one; a frame that begins far off against none.
+    A turn beyond the last of `sigmas` is compared with that one; a frame that begins far off with none of them.
     """
 
     surface_mm: PositiveFloat = 0.5  # largest move of a body vertex from turn to turn, RMS move of the cloth
@@ -65,8 +65,8 @@ class Shown(NamedTuple):
 def measure_change(old: Shown, new: Shown, covariance: F64) -> Change:
     """Return how far body, cloth and joint angles moved between two poses.
 
-    In standard deviations of the pose, by its covariance (S, S), a direction that no image shows counts little however
-    far it moves, and one that all show counts as soon as it moves.
+    The covariance (S, S) weighs the move in `sigmas`: along a direction that no image shows even a long way counts
+    little, along one that all images show even a short way counts.
     """
     shift = new.surface.vertices - old.surface.vertices
     squared = np.einsum("va,va->v", shift, shift)

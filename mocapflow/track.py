@@ -109,7 +109,7 @@ class CoupledLoop(Stage):
         return ClothedModel(scene=scene.with_background(background).simplified(self.body_faces), draper=self.draper)
 
     def without_scene(self) -> CoupledLoop:
-        """Return the loop without those parts that need the empty scene, which nobody has made; they are told."""
+        """Return the loop without the parts that need the empty scene, which no stage has made; warn of each."""
         parts = {"first_segmenter": self.first_segmenter, "recovery": self.recovery}
         idle = {role: part for role, part in parts.items() if part and part.needs_background}
         for role, part in idle.items():
@@ -118,7 +118,7 @@ class CoupledLoop(Stage):
 
     @property
     def looks_back(self) -> bool:
-        """True where frames of earlier runs count, too: they may have gone on after one that did not come to rest."""
+        """True where a stored track is checked, too: an earlier run may have gone on after an unsteady frame."""
         return self.on_unsteady == "stop"
 
     def look_back(self, made: Track) -> None:
@@ -144,7 +144,7 @@ class CoupledLoop(Stage):
     def fit(
         self, frame: Frame, past: Past, start: Start, model: ClothedModel, observe: Observe, watch: Stopwatch
     ) -> FrameResult:
-        """Return what is found of one frame: begun where it is believed, settled, and looked for if it was lost."""
+        """Return the result of one frame: predicted, settled by the loop, and recovered if the loop was lost."""
         known, begun = past.believable(), self.begin(frame, past, start, model, watch)
         if seen(frame):
             near = begun if len(known.moments) >= MOVING else self.approach(frame, begun, known, model)
@@ -172,9 +172,9 @@ class CoupledLoop(Stage):
     def approach(self, frame: Frame, state: FrameState, past: Past, model: ClothedModel) -> FrameState:
         """Return a first or second frame's state moved near the person by the first segmenter, if there is one.
 
-        Of the second it is not known yet how the person moves: somebody may run. A limb that looks like the room
-        behind leads a segmenter astray that knows no more than the room: unless the images then fit better, the state
-        stays.
+        At the second frame it is not known yet how the person moves: they may run. A segmenter that knows only the
+        empty room is misled by a limb that looks like what is behind it, so the state moves only if the images then
+        fit better.
         """
         if self.first_segmenter is None:
             return state
@@ -214,7 +214,7 @@ class CoupledLoop(Stage):
 
     @staticmethod
     def _refuse(rests: Iterable[tuple[int, int, bool]]) -> None:
-        """Raise for the first of some saved frames, with their turns, that did not come to rest; see `complain`."""
+        """Raise for the first saved frame (index, turns, came to rest) that did not come to rest; see `complain`."""
         for frame, turns, steady in rests:
             if turns and not steady:
                 raise ComponentFailed(f"frame {frame} did not come to rest in {turns} turns", hint=GO_ON)

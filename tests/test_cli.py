@@ -52,6 +52,12 @@ def test_an_error_about_what_nobody_can_print_is_printed(call):
     assert done.exit_code == 2 and done.stderr.startswith("error: \\udcff.yaml  there is no such file")
 
 
+def test_a_terminal_whose_encoding_lacks_a_letter_shows_its_number():
+    words = [sys.executable, "-m", "mocapflow", "show", "stage", "coupled_loop"]
+    done = subprocess.run(words, env={**os.environ, "PYTHONIOENCODING": "latin-1"}, capture_output=True, check=True)
+    assert rb"int (\u2265 2000) = 12000" in done.stdout
+
+
 def test_a_run_is_made_once_and_then_found(call):
     first = call("run", "start.yaml")
     assert first.exit_code == 0, first.output
@@ -311,6 +317,13 @@ def test_a_folder_that_is_no_store_is_not_pruned(call, more):
     refused = call("cache", "prune", "--store", "runs", *more)
     assert refused.exit_code == 2 and "runs  there is no store here" in refused.stderr
     assert mine.is_dir()
+
+
+def test_a_run_folder_within_a_store_is_no_damaged_result(call):
+    call("run", "start.yaml", "--store", "kept", "--out", "kept/my-run")
+    assert "damaged" not in call("cache", "list", "--store", "kept").stdout
+    assert "1 results" in call("cache", "prune", "--all", "--store", "kept").stdout
+    assert Path("kept/my-run/command.json").is_file()
 
 
 def test_the_version_is_that_of_the_package(call):

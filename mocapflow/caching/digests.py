@@ -9,6 +9,7 @@ import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
+from importlib.machinery import ModuleSpec
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mocapflow.caching import sources
-from mocapflow.errors import RecordingError
+from mocapflow.errors import PluginError, RecordingError
 from mocapflow.io.atomic import atomic_write
 
 PARSER = threading.Lock()  # CPython 3.11 counts the parser's recursion across threads (python/cpython#106905)
@@ -45,7 +46,8 @@ CORE = (
     "track",
     "wrong_answer",
 )
-PYTHON = f" {sys.version_info.major}.{sys.version_info.minor}"  # another minor version writes syntax trees otherwise
+FIRST: dict[str, tuple[ModuleSpec, str]] = {}  # loaded modules, each with its code when this process first looked
+PYTHON = f" {sys.version_info.major}.{sys.version_info.minor}"  # syntax trees differ between minor versions
 
 
 def digest(data: bytes | memoryview, name: str = "") -> str:
@@ -86,7 +88,7 @@ class Digests:
         return f"{found} {name}".rstrip()
 
     def check_inputs(self) -> None:
-        """Check that files are as they were when `file` was asked for them; in a folder, that it lists what it did.
+        """Check that files are as they were when `file` was asked for them, and that folders still list the same.
 
         Raises:
             RecordingError: one is not.
@@ -97,7 +99,7 @@ class Digests:
                 raise RecordingError("this has changed since the run began", where=str(path), hint=hint)
 
     def save(self) -> None:
-        """Remember the digests for the next run; a folder that can't be written is no matter."""
+        """Remember the digests for the next run; where the folder can't be written, they are computed again."""
         if self._memory is None or self._known == _read(self._memory):
             return
         with suppress(OSError), atomic_write(self._memory) as part:
@@ -115,7 +117,7 @@ class Digests:
         open_modules = {first}
         while open_modules:
             unit = open_modules.pop()
-            files = {name: self._source(path) for name, path in sources.python_files(unit)}
+            files = {name: self._loaded(name, path) for name, path in sources.python_files(unit)}
             found.update({name: code for name, (code, _) in files.items()})
             found.update({f"{unit}/{name}": self._content(path) for name, path in sources.data_files(unit)})
             imported = {name for _, imports in files.values() for name in imports}
@@ -126,7 +128,9 @@ class Digests:
     def core(self) -> str:
         """Return the digest of the framework code that every result depends on."""
         found = {
-            name: self._source(path)[0] for part in CORE for name, path in sources.python_files(f"mocapflow.{part}")
+            name: self._loaded(name, path)[0]
+            for part in CORE
+            for name, path in sources.python_files(f"mocapflow.{part}")
         }
         return digest(json.dumps(found, sort_keys=True).encode(), "code of mocapflow")
 
@@ -139,6 +143,23 @@ class Digests:
             return str(self._remembered(path, "", read)[0])
         except OSError as error:
             raise RecordingError(f"can't read {path}: {error.strerror}", where=str(path)) from error
+
+    def _loaded(self, name: str, path: Path) -> tuple[str, list[str]]:
+        """Return `_source` of a module, if that is what runs: else old code would make results under a new key.
+
+        Raises:
+            PluginError: the file has changed since this process, such as a worker that stays, has loaded it.
+        """
+        code, imports = self._source(path)
+        spec = getattr(sys.modules.get(name), "__spec__", None)
+        if spec is not None and spec.origin == str(path):
+            loaded, before = FIRST.setdefault(name, (spec, code))
+            if loaded is not spec:  # reloaded
+                FIRST[name] = spec, code
+            elif before != code:
+                hint = "start this program again; with --scheduler, the workers"
+                raise PluginError("this code has changed since it was loaded", where=str(path), hint=hint)
+        return code, imports
 
     def _source(self, path: Path) -> tuple[str, list[str]]:
         def read() -> list[Any]:

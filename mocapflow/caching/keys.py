@@ -24,7 +24,7 @@ from mocapflow.registry import Registry
 from mocapflow.settings import Component
 
 FORMAT = 3  # of recipes and groups: another number makes everything anew
-CODE = frozenset({"format", "core", "code", "reader", "key"})  # what is of code in a recipe
+CODE = frozenset({"format", "core", "code", "reader", "key"})  # entries of a recipe that depend on code
 ANEW = "was made anew"
 Recipe = Mapping[str, Any]
 
@@ -96,9 +96,9 @@ def _plain(value: Any, where: str, registry: Registry, digests: Digests) -> Any:
 
 
 def _unnamed(value: Any) -> Any:
-    """Return what counts of a recipe: digests without their names, for it is no matter where content lies.
+    """Return the part of a recipe that counts: digests without their names, for it does not matter where content lies.
 
-    Fractions are text, as they were in all keys before recipes had them as numbers.
+    Floats are text, as they were in all keys before recipes had them as numbers.
     """
     if isinstance(value, float):
         return repr(value)

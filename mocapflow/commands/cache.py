@@ -12,7 +12,7 @@ import typer
 from mocapflow.errors import MocapflowError, alternatives
 
 if TYPE_CHECKING:
-    from mocapflow.storage.store import Artifact
+    from mocapflow.storage.artifacts import Artifact
 
 app = typer.Typer(help="List, explain and prune cached results.", no_args_is_help=True)
 Where = Annotated[Path, typer.Option("--store", help="The store.")]

@@ -43,10 +43,10 @@ def compare(
     folder = out or Path("runs") / experiment.stem
     cells = load_experiment(experiment, recordings or (), frames)
     kept, url = placed(store, folder.parent / "store.zarr")
-    invocations = {cell: invocation(cell, kept, url) for cell in cells}
+    invocations = {cell: invocation_of(cell, kept, url) for cell in cells}
     for cell, each in invocations.items():
-        check(cell, each)  # all of them before the first one runs
-    tasks = {cell: partial(finish, each, place(folder, cell).absolute()) for cell, each in invocations.items()}
+        check_cell(cell, each)  # all of them before the first one runs
+    tasks = {cell: partial(run_cell, each, run_folder(folder, cell).absolute()) for cell, each in invocations.items()}
     failed = {}
     for number, (cell, result) in enumerate(finished(tasks, workers, scheduler), 1):
         try:
@@ -59,7 +59,7 @@ def compare(
         raise typer.Exit(1)
 
 
-def check(cell: Cell, invocation: Invocation) -> None:
+def check_cell(cell: Cell, invocation: Invocation) -> None:
     """Check that a cell can run and will leave what is compared.
 
     Raises:
@@ -84,7 +84,7 @@ def show(folder: Path, cells: Sequence[Cell], failed: Mapping[Cell, str]) -> Non
 
     from mocapflow.config.levels import FILES
 
-    runs = [(cell.variant, cell.name, failed.get(cell) or place(folder, cell)) for cell in cells]
+    runs = [(cell.variant, cell.name, failed.get(cell) or run_folder(folder, cell)) for cell in cells]
     rows = [{name: row[name] for name in SHOWN} for row in variants.compare(runs, folder)]
     compared = {(row["variant"], row["recording"]) for row in rows}
     alone = [f"{c.variant}/{c.name}" for c in cells if c not in failed and (c.variant, c.name) not in compared]
@@ -98,12 +98,12 @@ def show(folder: Path, cells: Sequence[Cell], failed: Mapping[Cell, str]) -> Non
     typer.echo(f"all figures: {folder}/{', '.join(name for name in FILES if (folder / name).is_file())}")
 
 
-def place(folder: Path, cell: Cell) -> Path:
+def run_folder(folder: Path, cell: Cell) -> Path:
     """Return the run folder of a cell."""
     return folder / cell.variant / cell.name
 
 
-def invocation(cell: Cell, store: str, url: str | None) -> Invocation:
+def invocation_of(cell: Cell, store: str, url: str | None) -> Invocation:
     """Return a cell as the command that runs it."""
     return Invocation(
         pipeline=str(cell.pipeline),
@@ -116,7 +116,7 @@ def invocation(cell: Cell, store: str, url: str | None) -> Invocation:
     ).absolute()
 
 
-def finish(invocation: Invocation, out: Path) -> str:
+def run_cell(invocation: Invocation, out: Path) -> str:
     """Run one cell and say which stages were computed."""
     summary = execute(invocation, out, fresh=False)
     computed = [stage["label"] for stage in summary.stages if not stage["cached"]]

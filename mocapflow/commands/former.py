@@ -1,4 +1,4 @@
-"""What a run folder holds of a former run: no figure may pass for one of another run."""
+"""Results of a former run in a run folder: set aside, so that no figure passes for one of the new run."""
 
 from __future__ import annotations
 

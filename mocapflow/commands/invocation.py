@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from mocapflow.config.pipeline import Pipeline
 
 FILE = "command.json"
-KEYS = ("keys", "contents")  # of what the stages make; without and with what code makes of it left out
+KEYS = ("keys", "contents")  # of the stages: with their code, and by pipeline and recording alone
 FINISHED = "finished"  # when the run was, missing until then
 
 
@@ -97,7 +97,7 @@ def remember(
     _write(out, {**asdict(invocation.absolute()), **dict(zip(KEYS, (keys, contents or {}), strict=True))})
 
 
-def finish(out: Path) -> None:
+def note_finished(out: Path) -> None:
     """Note in a run folder that its run is finished."""
     said = json.loads((out / FILE).read_text(encoding="utf-8"))
     _write(out, {**said, FINISHED: datetime.now().astimezone().isoformat(" ", "seconds")})
@@ -130,11 +130,11 @@ def recall(out: Path) -> Invocation:
 
 
 def recalled_keys(out: Path, kind: str = "keys") -> dict[str, str] | None:
-    """Return the keys of what the stages of a run folder's command make, none if unknown; None: it is no run folder.
+    """Return the keys of the stages of a run folder's command, {} if unknown; None: it is no run folder.
 
     Args:
         out: the run folder.
-        kind: `contents` are those of pipeline and recording alone, whatever the code.
+        kind: "keys", or "contents": those of pipeline and recording alone, whatever the code.
     """
     try:
         keys = json.loads((out / FILE).read_text(encoding="utf-8"))[kind]

@@ -13,8 +13,8 @@ from mocapflow.commands.former import check_store, differing, holds_results, set
 from mocapflow.commands.invocation import (
     Invocation,
     alone,
-    finish,
     finished_at,
+    note_finished,
     placed,
     recall,
     recalled_keys,
@@ -153,7 +153,7 @@ def execute(
         if parts:
             make_parts(parts, invocation, out, workers, scheduler)
         summary = carry_out(prepared, out, fresh)
-        finish(out)
+        note_finished(out)
         return summary
 
 

@@ -14,7 +14,7 @@ FILES = ("compare.csv", "runs.csv", "compare.png")  # that stand beside the fold
 LONGEST = 255  # bytes of the name of a folder
 
 
-class Change(NamedTuple):
+class Override(NamedTuple):
     """A value that a variant sets."""
 
     value: Any
@@ -25,17 +25,17 @@ class Level(NamedTuple):
     """One level of a factor."""
 
     name: str
-    changes: Mapping[str, Change]  # by path, as in --set
+    changes: Mapping[str, Override]  # by path, as in --set
     where: str
 
 
-def changes_at(said: Mapping[str, Any] | None, steps: KeyPath, document: Document) -> dict[str, Change]:
+def changes_at(said: Mapping[str, Any] | None, steps: KeyPath, document: Document) -> dict[str, Override]:
     """Return what is said at a place of the file as changes, each with where it is written.
 
     Raises:
         PipelineError: one would name a recording.
     """
-    changes = {path: Change(value, document.place((*steps, path)).text) for path, value in (said or {}).items()}
+    changes = {path: Override(value, document.place((*steps, path)).text) for path, value in (said or {}).items()}
     if ELSEWHERE in changes:
         hint = "write the folder under `recordings`: every variant runs on each of them"
         raise PipelineError(f"a variant can't change '{ELSEWHERE}'", where=changes[ELSEWHERE].where, hint=hint)

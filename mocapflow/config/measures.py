@@ -9,6 +9,7 @@ from mocapflow.config.documents import Document, Place
 from mocapflow.config.resolve import Resolver
 from mocapflow.dressing.roles import Garment
 from mocapflow.errors import MocapflowError, PluginError, RecordingError, UnknownComponent, guess
+from mocapflow.io.cameras import find_calibration
 from mocapflow.io.typed import place, read_json
 from mocapflow.registry import Registry
 
@@ -36,6 +37,7 @@ def garment_of(value: Any, recording: Path, resolver: Resolver) -> Garment | Non
     recorded = named == FROM_RECORDING and not (isinstance(value, dict) and len(value) > 1)  # by the file alone
     if named == FROM_RECORDING:
         if kind is None:
+            find_calibration(recording)  # without one it is no recording: that comes first
             raise _no_garment(file)
         named, value = kind, {**value, "use": kind} if isinstance(value, dict) else kind
     elif named != kind:

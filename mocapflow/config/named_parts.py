@@ -25,7 +25,7 @@ from mocapflow.io.lateness import TIMING
 FILES = {"cameras": "cameras.toml", "init": "init.json", "late_frames": TIMING}
 SUBJECT = {"body": "body.obj", "skeleton": "skeleton.json", "weights": "weights.npz", "garment": "garment.json"}
 TRUTH = {"angles": "angles.csv", "joints": "joints.npz", "cloth": "cloth.npz", "body": "body.npz"}
-FREE: Mapping[str, str] = {}  # names are those of cameras, or anybody's
+FREE: Mapping[str, str] = {}  # any name: those of cameras, or of files
 FOLDERS = {
     **dict.fromkeys(("videos", "background", "occluders", "keypoints", "reference"), FREE),
     "subject": SUBJECT,

@@ -34,7 +34,7 @@ class BodyModel(Component):
         return ()
 
     def need(self, folder: Path) -> None:
-        """Raise what `load` would for want of a file: asked by `plan`, and before a run computes anything."""
+        """Raise the error that `load` would for lack of a file; called by `plan`, and before a run begins."""
 
 
 class Garment(Component):

@@ -25,18 +25,18 @@ def projection(camera: Camera) -> F64:
 def project(points: F64, camera: Camera) -> F64:
     """Return undistorted pixels (M, 2) of world points (M, 3) in m; NaN for points behind the camera."""
     matrix = projection(camera)
-    homogeneous = points @ matrix[:, :3].T + matrix[:, 3]
-    depth = np.where(homogeneous[:, 2:] > 0, homogeneous[:, 2:], np.nan)
-    pixels: F64 = homogeneous[:, :2] / depth
-    return pixels
+    return _divided(points @ matrix[:, :3].T + matrix[:, 3])
 
 
 def project_each(points: F64, view: I16, cameras: Sequence[Camera]) -> F64:
     """Return undistorted pixels (M, 2) of world points (M, 3) in m, each in its own view (M,)."""
     matrix = np.stack([projection(camera) for camera in cameras]).take(view, axis=0)
-    homogeneous = np.einsum("mab,mb->ma", matrix[..., :3], points) + matrix[..., 3]
-    depth = np.where(homogeneous[:, 2:] > 0, homogeneous[:, 2:], np.nan)
-    pixels: F64 = homogeneous[:, :2] / depth
+    return _divided(np.einsum("mab,mb->ma", matrix[..., :3], points) + matrix[..., 3])
+
+
+def _divided(homogeneous: F64) -> F64:
+    """Return the pixels (M, 2) of homogeneous ones (M, 3); NaN for those behind the camera."""
+    pixels: F64 = homogeneous[:, :2] / np.where(homogeneous[:, 2:] > 0, homogeneous[:, 2:], np.nan)
     return pixels
 
 

@@ -59,8 +59,8 @@ def check_hooks(plugin: Any) -> None:
         raise PluginError("it has no hook, such as mocapflow_priors, that returns its components")
 
 
-def provided(answer: Any, base: type[Component], hook: str) -> list[type[Component]]:
-    """Return the classes that a hook provides, if they can play the role `base`.
+def vetted(answer: Any, base: type[Component], hook: str) -> list[type[Component]]:
+    """Return the classes that a hook has answered with, if all of them can play the role `base`.
 
     Raises:
         PluginError: it is no list, or one of them has another base, no name, or lacks a method.

@@ -31,11 +31,11 @@ def make_camera(
         RecordingError: an array has the wrong length, or the rotation is none, or in degrees.
     """
     motion = np.eye(4)
-    motion[:3, 3] = numbers(translation, (3,), "translation", name, where)
+    motion[:3, 3] = _numbers(translation, (3,), "translation", name, where)
     if _count(rotation) == 9:
-        motion[:3, :3] = numbers(rotation, (3, 3), "rotation", name, where)
+        motion[:3, :3] = _numbers(rotation, (3, 3), "rotation", name, where)
     else:
-        vector = numbers(rotation, (3,), "rotation", name, where)
+        vector = _numbers(rotation, (3,), "rotation", name, where)
         if (turn := float(np.linalg.norm(vector))) > 2 * np.pi:
             hint = "rotation is a Rodrigues vector in radians, camera from world"
             raise bad(name, where, f"turns by {turn:.1f} rad, more than once around: it looks like degrees", hint)
@@ -43,8 +43,8 @@ def make_camera(
     coefficients = _coefficients(distortion, fisheye, name, where)
     return Camera(
         name=name,
-        size=numbers(size, (2,), "size", name, where).astype(np.int32),
-        intrinsics=numbers(intrinsics, (3, 3), "matrix", name, where),
+        size=_numbers(size, (2,), "size", name, where).astype(np.int32),
+        intrinsics=_numbers(intrinsics, (3, 3), "matrix", name, where),
         distortion=np.pad(coefficients, (0, 5 - len(coefficients))),
         camera_from_world=motion,
         fisheye=fisheye,
@@ -53,7 +53,7 @@ def make_camera(
 
 def _coefficients(distortion: Any, fisheye: bool, name: str, where: Path) -> F64:
     """Return at most 5 coefficients of a lens, without the zeros behind those that are known."""
-    found = numbers(distortion, (_count(distortion),), "distortions", name, where)
+    found = _numbers(distortion, (_count(distortion),), "distortions", name, where)
     known = 4 if fisheye else 5
     # three may be k1 k2 k3 or k1 k2 p1: OpenCV has no such list
     if found[known:].any() or (len(found) == 3 and found[2]):
@@ -70,7 +70,7 @@ def _count(value: Any) -> int:
         return 0
 
 
-def numbers(value: Any, shape: tuple[int, ...], field: str, name: str, where: Path) -> F64:
+def _numbers(value: Any, shape: tuple[int, ...], field: str, name: str, where: Path) -> F64:
     """Return a field's numbers in the shape it must have.
 
     Raises:
@@ -78,7 +78,7 @@ def numbers(value: Any, shape: tuple[int, ...], field: str, name: str, where: Pa
     """
     try:
         found = np.array(value, np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise bad(name, where, f"has no numbers in {field}: {value!r}") from None
     if found.size != int(np.prod(shape)):
         raise bad(name, where, f"has {found.size} numbers in {field}; expected {int(np.prod(shape))}")

@@ -104,7 +104,7 @@ def _odd_vector(key: str, value: Any) -> Iterator[Finding]:
     """Yield what is wrong with a vector: lengths and turns that no person has are in other units."""
     try:
         vector = np.array(value, np.float64)
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, OverflowError):  # the last of a whole number of hundreds of digits
         vector = np.empty(0)
     size = float(np.linalg.norm(vector))
     if vector.shape != (3,) or not np.isfinite(size):

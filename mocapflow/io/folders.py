@@ -1,69 +1,18 @@
-"""What a recording folder holds, and where."""
+"""Where the parts of a recording lie in its folder, and what of it nobody uses."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
-from mocapflow.io import agreement
-from mocapflow.io.cameras import find_calibration, read_cameras
 from mocapflow.io.images import IMAGES
 from mocapflow.io.keypoints import first_numbers, odd_keypoints
-from mocapflow.io.lateness import late_frames
-from mocapflow.io.video import VIDEOS, Video, count_from_first, open_video
-from mocapflow.records import record
+from mocapflow.io.video import VIDEOS
 
 KEYPOINTS, OCCLUDERS = "keypoints", "occluders"
 KEYPOINT_ENDINGS = ("_json", "")
-
-
-@record
-class Parts:
-    """The parts of a recording folder, in the order of the calibration."""
-
-    lenses: tuple[Camera, ...]  # of the videos' real size
-    videos: tuple[Video, ...]
-    keypoint_folders: tuple[Path | None, ...]
-    calibration: Path
-    frame_rate: float  # per second
-    length: int  # frames
-    warnings: tuple[str, ...]
-
-
-def gather(folder: Path, calibration: Path | None) -> Parts:
-    """Read what a recording folder holds and check that it agrees.
-
-    Raises:
-        RecordingError: a part is missing, can't be read, or contradicts another.
-    """
-    if not folder.is_dir():
-        raise RecordingError("no such recording folder", where=str(folder))
-    if calibration is None or (folder / "cameras.toml").exists():
-        calibration = find_calibration(folder)
-    cameras = read_cameras(calibration)
-    paths = match_videos(folder, [camera.name for camera in cameras], calibration)
-    late = late_frames(folder, [camera.name for camera in cameras])
-    opened = count_from_first([open_video(path) for path in paths])
-    videos = tuple(replace(video, late=frames) for video, frames in zip(opened, late, strict=True))
-    lenses, cut = agreement.fit_sizes(cameras, videos, calibration)
-    length, broken = agreement.agree_on_length(cameras, videos, folder)
-    agreement.check_lateness(cameras, videos, length, folder)
-    gaps = [*agreement.first_warnings(videos), *agreement.gap_warnings(cameras, videos)]
-    rate, assumed = agreement.common_rate(cameras, videos, calibration)
-    keypoints = tuple(keypoint_folder(folder / KEYPOINTS, camera.name) for camera in cameras)
-    odd = keypoint_warnings(folder, cameras, length, videos[0].first)
-    return Parts(
-        lenses=lenses,
-        videos=videos,
-        keypoint_folders=keypoints,
-        calibration=calibration,
-        frame_rate=rate,
-        length=length,
-        warnings=(*cut, *broken, *gaps, *assumed, *odd, *unused_pictures(folder, cameras)),
-    )
 
 
 def video_paths(folder: Path) -> dict[str, Path]:

@@ -53,13 +53,13 @@ def read_image(path: Path) -> U8 | None:
 
 
 def check_numbers(files: Mapping[int, Path], folder: Path) -> None:
-    """Check that the images of a folder, by number, are not numbered by their time: every frame that lacks is told.
+    """Check that the images of a folder are numbered by frame and not by time.
 
     Raises:
         RecordingError: they are.
     """
     last = max(files)
-    if last > SPARSE * (len(files) + NAMED):  # every frame that lacks would be told, one by one
+    if last > SPARSE * (len(files) + NAMED):  # else every missing frame would be named
         raise RecordingError(
             f"{len(files)} images, and {files[last].name} would be frame {last}",
             where=str(folder),

@@ -71,7 +71,7 @@ def read_keypoints(path: Path) -> F64:
     try:
         rows = [np.array(person["pose_keypoints_2d"], np.float64).reshape(-1, 3) for person in content["people"]]
         return np.stack(rows) if rows else np.empty((0, 0, 3))
-    except (ValueError, TypeError, KeyError) as error:
+    except (ValueError, TypeError, KeyError, OverflowError) as error:
         raise RecordingError(f"not a file of keypoints: {error}", where=str(path), hint=FORM) from error
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from mocapflow.errors import RecordingError
 from mocapflow.io.atomic import atomic_write
+from mocapflow.io.columns import row_of_numbers
 from mocapflow.records import F64
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
@@ -81,12 +82,12 @@ def read_trc(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
     unit = header.get("Units", "").strip()
     if unit not in METRES:
         raise RecordingError(f"unknown unit '{unit}'", where=str(path), hint=f"known: {', '.join(METRES)}")
-    (rate,) = numbers([header.get("DataRate", "")], 1, f"{path}:3")
+    (rate,) = row_of_numbers([header.get("DataRate", "")], 1, f"{path}:3")
     if not rate > 0:
         raise RecordingError("no DataRate above zero", where=f"{path}:3", hint="it is in rows per second")
     width = 2 + 3 * len(names)
     rows = [
-        numbers(_fitted(line.split("\t"), width), width, f"{path}:{number}")
+        row_of_numbers(_fitted(line.split("\t"), width), width, f"{path}:{number}")
         for number, line in enumerate(lines[5:], 6)
         if line.strip()
     ]
@@ -130,7 +131,7 @@ def read_mot(path: Path) -> tuple[dict[str, F64], F64]:
     if "time" not in names:
         raise RecordingError("no column 'time'", where=f"{path}:{end + 2}", hint=f"the columns are: {', '.join(names)}")
     rows = [
-        numbers(line.split(), len(names), f"{path}:{number}")
+        row_of_numbers(line.split(), len(names), f"{path}:{number}")
         for number, line in enumerate(lines[end + 2 :], end + 3)
         if line.strip()
     ]
@@ -147,7 +148,8 @@ def read_c3d(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
     Times count from the start of the measurement, of which a file may hold a part.
 
     Raises:
-        RecordingError: ezc3d is not installed, the file can't be read or is cut off, or its unit is unknown.
+        RecordingError: ezc3d is not installed, the file can't be read or is cut off, its unit is unknown, or it has no
+            rate.
     """
     try:
         import ezc3d
@@ -158,7 +160,7 @@ def read_c3d(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
             hint = "copy or export it again"
             raise RecordingError("this C3D file is cut off", where=str(path), hint=hint)
         content = ezc3d.c3d(str(path))
-    except (OSError, ValueError) as error:  # the latter of one that ends before its first frame
+    except (OSError, ValueError, RuntimeError) as error:  # ezc3d raises each of them for damaged files
         raise RecordingError(f"this C3D file can't be read: {error}", where=str(path)) from error
     point = content["parameters"]["POINT"]
     names = tuple(str(name) for name in point["LABELS"]["value"])
@@ -166,6 +168,8 @@ def read_c3d(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
     if unit not in METRES:
         raise RecordingError(f"unknown unit '{unit}'", where=str(path), hint=f"known: {', '.join(METRES)}")
     rate = float(point["RATE"]["value"][0])
+    if not rate > 0:
+        raise RecordingError("no POINT:RATE above zero", where=str(path), hint="it is in frames per second")
     positions = np.moveaxis(content["data"]["points"][:3], 0, -1).swapaxes(0, 1)[:, : len(names)] * METRES[unit]
     first = int(content["header"]["points"]["first_frame"])
     return names, _seen(positions), (first + np.arange(len(positions))) / rate, rate
@@ -203,17 +207,3 @@ def _fitted(cells: Sequence[str], width: int) -> Sequence[str]:
     while kept > width and not cells[kept - 1].strip():
         kept -= 1
     return [*cells[:kept], *[""] * (width - kept)]
-
-
-def numbers(cells: Sequence[str], width: int, where: str) -> list[float]:
-    """Return the numbers of a row; an empty cell is NaN."""
-    if len(cells) != width:
-        raise RecordingError(f"{len(cells)} columns; expected {width}", where=where)
-    return [_number(cell, f"{where}:{column}") if cell.strip() else np.nan for column, cell in enumerate(cells, 1)]
-
-
-def _number(cell: str, where: str) -> float:
-    try:
-        return float(cell)
-    except ValueError:
-        raise RecordingError(f"'{cell.strip()}' is no number", where=where) from None

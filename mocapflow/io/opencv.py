@@ -14,6 +14,8 @@ from mocapflow.io.paths import for_opencv
 from mocapflow.io.typed import place
 from mocapflow.records import F64
 
+KINDS = tuple("ucwsifd")  # OpenCV's letters for kinds of numbers
+
 
 def cameras(folder: Path) -> tuple[Camera, ...]:
     """Read the pair `intri.yml` and `extri.yml` of a folder.
@@ -55,18 +57,30 @@ def _open(path: Path) -> Any:
         storage = cv2.FileStorage(for_opencv(path), cv2.FILE_STORAGE_READ)
     except (cv2.error, SystemError) as error:
         raise RecordingError("not an OpenCV YAML file", where=str(path)) from error
-    if not storage.isOpened():
+    if not storage.isOpened() or not storage.root().isMap():
         raise RecordingError("not an OpenCV YAML file", where=str(path))
     return storage
 
 
 def _matrix(node: Any, key: str, name: str, path: Path) -> F64:
-    import cv2
-
+    """Return the numbers of a matrix; `node.mat()` would write beyond its memory where `cols` is missing."""
     if node.empty():
         raise RecordingError(f"camera '{name}' lacks {key}", where=str(path))
-    try:
-        return np.asarray(node.mat(), np.float64)
-    except cv2.error:
+    found = _numbers(node) if node.isMap() else None
+    if found is None:
         hint = "expected !!opencv-matrix with rows, cols, dt, and as many numbers in data"
-        raise RecordingError(f"camera '{name}' has no matrix in {key}", where=place(path, key), hint=hint) from None
+        raise RecordingError(f"camera '{name}' has no matrix in {key}", where=place(path, key), hint=hint)
+    return found
+
+
+def _numbers(node: Any) -> F64 | None:
+    """Return what a mapping with rows, cols, dt and data holds, None where these do not go together."""
+    rows, columns, kind, data = (node.getNode(part) for part in ("rows", "cols", "dt", "data"))
+    if not (rows.isInt() and columns.isInt() and data.isSeq() and kind.isString() and kind.string() in KINDS):
+        return None
+    shape = int(rows.real()), int(columns.real())
+    values = [data.at(k) for k in range(data.size())]
+    numbers = [value.real() for value in values if value.isReal() or value.isInt()]
+    if min(shape) < 1 or not shape[0] * shape[1] == len(numbers) == len(values):
+        return None
+    return np.array(numbers).reshape(shape)

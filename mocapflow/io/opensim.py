@@ -78,7 +78,7 @@ def rest_frames(body: Body) -> Mapping[str, F64]:
     return frames
 
 
-def decompose(rotation: F64) -> F64:
+def turns_about_z_x_y(rotation: F64) -> F64:
     """Return the angles (..., 3) rad of R = Rz(a) Rx(b) Ry(c)."""
     flexion = np.arctan2(-rotation[..., 0, 1], rotation[..., 1, 1])
     tilt = np.arcsin(np.clip(rotation[..., 2, 1], -1, 1))
@@ -86,7 +86,7 @@ def decompose(rotation: F64) -> F64:
 
 
 def _add(found: dict[str, F64], names: tuple[str, ...], parent: F64, child: F64, mirror: float = 1.0) -> None:
-    turns = np.degrees(np.unwrap(decompose(np.swapaxes(parent, -1, -2) @ child), axis=0))
+    turns = np.degrees(np.unwrap(turns_about_z_x_y(np.swapaxes(parent, -1, -2) @ child), axis=0))
     for name, sign, turn in zip(names, (1.0, mirror, mirror), turns.T, strict=True):
         found[name] = sign * turn
 
@@ -98,9 +98,9 @@ def _add_leg(found: dict[str, F64], frames: Mapping[str, F64], pelvis: str, side
         names = (f"hip_flexion_{side}", f"hip_adduction_{side}", f"hip_rotation_{side}")
         _add(found, names, frames[pelvis], frames[hip], mirror)
         if ankle in frames:
-            flexion = decompose(np.swapaxes(frames[hip], -1, -2) @ frames[knee])[:, 0]
+            flexion = turns_about_z_x_y(np.swapaxes(frames[hip], -1, -2) @ frames[knee])[:, 0]
             found[f"knee_angle_{side}"] = -np.degrees(np.unwrap(flexion))
-            dorsiflexion = decompose(np.swapaxes(frames[knee], -1, -2) @ frames[ankle])[:, 0]
+            dorsiflexion = turns_about_z_x_y(np.swapaxes(frames[knee], -1, -2) @ frames[ankle])[:, 0]
             found[f"ankle_angle_{side}"] = np.degrees(np.unwrap(dorsiflexion))
 
 

@@ -37,7 +37,7 @@ def read_skeleton(path: Path) -> Skeleton:
     content = read_json(path, FORM)
     try:
         skeleton = _skeleton(content, path)
-    except (ValueError, TypeError, KeyError) as error:
+    except (ValueError, TypeError, KeyError, OverflowError) as error:
         raise RecordingError(f"this is not a skeleton: {error!r}", where=str(path), hint=FORM) from error
     _check_limbs(skeleton, path)
     return skeleton

@@ -9,7 +9,7 @@ from mocapflow.records import F64, U8, Bool
 
 STRIDE = 4  # px of a picture, where it is compared with the one before it
 NO_NEWS = 0.1  # share of the usual news in a picture that repeats the one before, give or take what a codec adds
-SOME_NEWS = 0.5  # share that half of the cameras then have at least, or the person just stands still
+SOME_NEWS = 0.5  # share that at least half of the cameras show meanwhile; else the person may just stand still
 LONG = 5  # frames with motion that a camera lets pass to the end, at least; fewer may be chance. An odd number
 
 
@@ -55,7 +55,7 @@ def _shares(news: F64) -> F64:
 
 
 def _usual(news: F64) -> F64:
-    """Return the median news (C,) of each camera while it shows any, by what is usual of all; 1 where none is known.
+    """Return the median news (C,) of each camera over frames that bring it some; 1 where nothing is known.
 
     A camera that hangs for most of the time has next to none at the median: all that a codec adds would be news.
     """

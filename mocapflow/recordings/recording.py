@@ -8,20 +8,19 @@ from functools import cached_property
 from pathlib import Path
 from typing import Protocol
 
-import numpy as np
-
 from mocapflow.assets import Background, Camera
 from mocapflow.data import Frame
 from mocapflow.errors import RecordingError
-from mocapflow.io import folders
-from mocapflow.io.cameras import calibration_files
+from mocapflow.io import agreement, folders
+from mocapflow.io.cameras import calibration_files, find_calibration, read_cameras
+from mocapflow.io.decoding import decoded
 from mocapflow.io.keypoints import first_numbers, keypoint_files, people_at
-from mocapflow.io.lateness import TIMING
+from mocapflow.io.lateness import TIMING, late_frames
 from mocapflow.io.lenses import View
 from mocapflow.io.occluders import occluder
 from mocapflow.io.plates import background
-from mocapflow.io.video import Video, read_frames
-from mocapflow.records import F64, Bool, Watch, record, silent
+from mocapflow.io.video import Video, count_from_first, open_video
+from mocapflow.records import F64, Watch, record, silent
 
 LEAST_PX = 8  # from side to side; nobody is seen in fewer
 
@@ -142,29 +141,6 @@ class Recording:
             yield replace(frame, keypoints=self.people(frame.index)) if any(self.keypoint_folders) else frame
 
 
-def decoded(views: Sequence[View], videos: Sequence[Video], indices: range, frame_rate: float) -> Iterator[Frame]:
-    """Yield what videos show in frames of these numbers, as their cameras' views have it."""
-    pictures, hidden = zip(*(read_frames(video, indices) for video in videos), strict=True), hidden_in(views)
-    for index, row in zip(indices, pictures, strict=True):
-        usable = np.array([image is not None for image, _ in row])
-        yield Frame(
-            index=index,
-            time=index / frame_rate,
-            images=tuple(view.image(image) for view, (image, _) in zip(views, row, strict=True)),
-            usable=usable,
-            reasons=() if usable.all() else tuple(reason for _, reason in row),
-            hidden=hidden,
-        )
-
-
-def hidden_in(views: Sequence[View]) -> tuple[Bool, ...]:
-    """Return where (H, W) occluders stand in each view; () where none is known in any."""
-    if all(view.hidden is None for view in views):
-        return ()
-    nowhere = (np.zeros(view.camera.size[::-1], bool) for view in views)
-    return tuple(none if view.hidden is None else view.hidden for view, none in zip(views, nowhere, strict=True))
-
-
 def open_recording(
     folder: Path,
     *,
@@ -188,28 +164,56 @@ def open_recording(
         RecordingError: a part is missing, can't be read, or contradicts another.
     """
     folder = Path(folder)
+    if not folder.is_dir():
+        raise RecordingError("no such recording folder", where=str(folder))
+    if calibration is None or (folder / "cameras.toml").exists():
+        calibration = find_calibration(folder)
+    cameras = read_cameras(calibration)
+    videos = _videos(folder, cameras, calibration)
+    lenses, cut = agreement.fit_sizes(cameras, videos, calibration)
+    length, broken = agreement.agree_on_length(cameras, videos, folder)
+    agreement.check_lateness(cameras, videos, length, folder)
+    rate, assumed = agreement.common_rate(cameras, videos, calibration)
+    gaps = [*agreement.first_warnings(videos), *agreement.gap_warnings(cameras, videos)]
+    odd = folders.keypoint_warnings(folder, cameras, length, videos[0].first)
+    _check_scale(scale, lenses)
+    return Recording(
+        folder=folder,
+        views=tuple(View(lens=lens, scale=scale, occluder=occluder(folder, lens)) for lens in lenses),
+        videos=videos,
+        keypoint_folders=tuple(folders.keypoint_folder(folder / folders.KEYPOINTS, c.name) for c in cameras),
+        calibration=calibration,
+        frame_rate=rate,
+        indices=_indices(start, stop, step, length, folder),
+        length=length,
+        warnings=(*cut, *broken, *gaps, *assumed, *odd, *folders.unused_pictures(folder, cameras)),
+    )
+
+
+def _videos(folder: Path, cameras: Sequence[Camera], calibration: Path) -> tuple[Video, ...]:
+    """Return the video of each camera, with how late it is."""
+    names = [camera.name for camera in cameras]
+    paths, late = folders.match_videos(folder, names, calibration), late_frames(folder, names)
+    opened = count_from_first([open_video(path) for path in paths])
+    return tuple(replace(video, late=frames) for video, frames in zip(opened, late, strict=True))
+
+
+def _check_scale(scale: float, lenses: Sequence[Camera]) -> None:
     if not 0 < scale <= 1:
         raise RecordingError(f"the scale is {scale:g}; expected more than 0 and at most 1")
-    parts = folders.gather(folder, calibration)
-    side = min(int(lens.size.min()) for lens in parts.lenses)
+    side = min(int(lens.size.min()) for lens in lenses)
     if scale < 1 and scale * side < LEAST_PX:
         hint = f"the smallest images have {side} pixels from side to side"
         raise RecordingError(f"the scale {scale:g} leaves images of less than {LEAST_PX} pixels", hint=hint)
-    indices = range(start, parts.length if stop is None else stop, step)
-    if not indices or start < 0 or indices[-1] >= parts.length:
+
+
+def _indices(start: int, stop: int | None, step: int, length: int, folder: Path) -> range:
+    """Return the frames from start to stop; all of them have to be in the recording."""
+    indices = range(start, length if stop is None else stop, step)
+    if not indices or start < 0 or indices[-1] >= length:
         raise RecordingError(
             f"frames {start}:{'' if stop is None else stop} are not in this recording",
             where=str(folder),
-            hint=f"it has {parts.length} frames: 0:{parts.length}",
+            hint=f"it has {length} frames: 0:{length}",
         )
-    return Recording(
-        folder=folder,
-        views=tuple(View(lens=lens, scale=scale, occluder=occluder(folder, lens)) for lens in parts.lenses),
-        videos=parts.videos,
-        keypoint_folders=parts.keypoint_folders,
-        calibration=parts.calibration,
-        frame_rate=parts.frame_rate,
-        indices=indices,
-        length=parts.length,
-        warnings=parts.warnings,
-    )
+    return indices

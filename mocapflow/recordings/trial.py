@@ -14,6 +14,7 @@ import numpy as np
 from mocapflow.assets import Camera
 from mocapflow.io import agreement, folders
 from mocapflow.io.cameras import read_cameras
+from mocapflow.io.decoding import decoded
 from mocapflow.io.findings import Finding, attempt, note, warning
 from mocapflow.io.images import name_frames
 from mocapflow.io.lateness import late_frames
@@ -23,7 +24,6 @@ from mocapflow.io.plates import background
 from mocapflow.io.rigs import examine_rig
 from mocapflow.io.video import Video, count_from_first, open_video, read_frames
 from mocapflow.recordings.freezing import difference, frozen_from
-from mocapflow.recordings.recording import decoded
 from mocapflow.records import F64
 
 

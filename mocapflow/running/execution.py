@@ -1,4 +1,4 @@
-"""One run in progress: results are loaded or made when somebody asks for them."""
+"""One run in progress: results are loaded or made when they are asked for."""
 
 from __future__ import annotations
 
@@ -27,10 +27,11 @@ from mocapflow.running.warned import warnings_logged
 from mocapflow.running.wiring import Itself, Source, made_by
 from mocapflow.scene import Scene
 from mocapflow.settings import Component
+from mocapflow.storage.artifacts import Artifact, made_otherwise, versions, with_versions
 from mocapflow.storage.checkpoint import Checkpoint
 from mocapflow.storage.locks import Lock
 from mocapflow.storage.rows import Corrupted
-from mocapflow.storage.store import Artifact, Report, Store, versions, with_versions
+from mocapflow.storage.store import Report, Store
 from mocapflow.wrong_answer import of_kind
 
 
@@ -68,7 +69,7 @@ class Execution:
         self.entries: dict[str, Mapping[str, Any]] = {}  # per finished stage
 
     def finish(self, step: Step) -> None:
-        """See to it that the result of a stage exists; a cached one is mostly not even read."""
+        """Make sure that the result of a stage exists; a cached one is usually not even read."""
         if step.label in self.entries:
             return
         found = self._find(step)
@@ -123,7 +124,7 @@ class Execution:
         return started
 
     def _mended(self, step: Step, made: Artifact, error: Corrupted) -> Artifact | None:
-        """Return what is left of a result that can't be read: of a track its frames, its arrays are made of them."""
+        """Return what is left of a result that can't be read: of a track its frames, to write its arrays from again."""
         if not step.chain:
             return self._set_aside(step, made.path, error)
         self._report(f"warning: {made.path.name} is damaged and written anew from its frames: {error.message}")
@@ -154,7 +155,7 @@ class Execution:
         progress = Progress(step.label, self._report)
 
         def frame_done(frame: int, result: FrameResult) -> None:
-            end = "at rest" if result.steady else "left"  # as it is: `max_turns` are spent
+            end = "at rest" if result.steady else "left"  # as it is: it has had its `max_turns`
             progress.tell(indices.index(frame) + 1, len(indices), f"{end} after {result.iterations} turns")
             observers.frame_done(frame, result)
 
@@ -259,21 +260,19 @@ class Execution:
         }
 
     def _warned_of_versions(self, step: Step, artifact: Artifact) -> list[str]:
-        """Return what is reported of results, or parts of them, that other versions have made."""
-        now, frames, first, said = versions(), step.recording.indices, 0, list[str]()
-        for last, made in artifact.made_with:
-            other = [f"{name} {was}, now {now.get(name)}" for name, was in made.items() if now.get(name) != was]
-            wanted = min(last, step.frames)
-            if other and (first < wanted or not step.chain):
-                begin, end = (frames.start + frames.step * count for count in (first, wanted - 1))
-                what = f"frames {begin}–{end} of {step.label}" if step.chain else step.label
-                said.append(f"{what} were made with {'; '.join(other)}")
-                self._report(f"warning: {said[-1]}")
-            first = last
+        """Report, and return, which result or which frames of it were made with other versions."""
+        indices, said = step.recording.indices, list[str]()
+        for first, last, how in made_otherwise(artifact):
+            own = indices[first:last]
+            if own or not step.chain:
+                what = f"frames {own[0]}–{own[-1]} of {step.label}" if step.chain else step.label
+                said.append(f"{what} were made with {how}")
+        for warning in said:
+            self._report(f"warning: {warning}")
         return said
 
     def _set_aside(self, step: Step, path: Path, error: Corrupted) -> Artifact | None:
-        """Return what takes the place of what is damaged: its copy, from a store that is shared."""
+        """Move a damaged result away and return what takes its place: its copy, where the store is shared."""
         kept = self._store.set_aside(path).relative_to(path.parent)
         copy = self._store.find(step.key)
         what = "made anew" if copy is None else "replaced by its copy"

@@ -9,8 +9,9 @@ from mocapflow.errors import PipelineError
 from mocapflow.running.execution import is_hit
 from mocapflow.running.recipes import Step
 from mocapflow.running.runner import Prepared
+from mocapflow.storage.artifacts import Artifact
 from mocapflow.storage.rows import Corrupted
-from mocapflow.storage.store import Artifact, Report, Store
+from mocapflow.storage.store import Report, Store
 
 
 def as_made(prepared: Prepared, keys: Mapping[str, str], report: Report) -> Prepared:

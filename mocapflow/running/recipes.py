@@ -21,8 +21,8 @@ from mocapflow.running.parts import in_parts
 from mocapflow.running.wiring import Source, latest, makes, wire
 from mocapflow.wrong_answer import WrongAnswer
 
-BEGINNING = 10  # frames
-SEEN = {Start: "first", Background: "all", Rig: "all", Body: "all", Recording: "all"}  # of a stage that says none
+BEGINNING = 10  # frames of the extent "beginning"
+SEEN = {Start: "first", Background: "all", Rig: "all", Body: "all", Recording: "all"}  # where a stage names no extent
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Step:
 
     @property
     def content(self) -> str:
-        """A key of what pipeline and recording say of this stage and what it reads, whatever code makes of it."""
+        """A key of this stage and its inputs by pipeline and recording alone, whatever the code."""
         read = {"from": self.sources, "body": self.body, "rig": self.rig}
         return key_of({**without_code(self.recipe), "read": read})
 
@@ -161,11 +161,16 @@ def _asset(pipeline: Pipeline, digests: Digests) -> dict[str, Any]:
     return component_recipe(pipeline.body, pipeline.registry, digests) | {"files": files}
 
 
-def _files(component: BodyModel | Stage, recording: Path, digests: Digests) -> list[str]:
+def _files(component: BodyModel | Stage, recording: Path, digests: Digests) -> dict[str, list[str]]:
+    """Return the digests of the files that a component reads besides the frames, by their names: these may matter."""
     paths = component.inputs(recording)
-    if isinstance(paths, str) or not all(isinstance(path, Path) for path in paths):
+    if not isinstance(paths, list | tuple) or not all(isinstance(path, Path) for path in paths):
         raise WrongAnswer(component, f"the inputs {paths!r}, which are no list of Path")
-    return [digests.file(path, path.name) for path in paths if path.exists()]
+    found: dict[str, list[str]] = {}
+    for path in filter(Path.exists, paths):
+        name = path.relative_to(recording).as_posix() if path.is_relative_to(recording) else path.name
+        found.setdefault(name, []).append(digests.file(path, path.name))
+    return found
 
 
 def _camera(camera: Camera) -> list[str]:

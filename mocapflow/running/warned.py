@@ -1,4 +1,4 @@
-"""What a stage warns of while it runs, kept: on the terminal it is gone with the next line."""
+"""Keeps what a stage warns of while it runs: on a terminal it is soon out of sight."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ class _Keeper(logging.Handler):
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
         self.said: list[str] = []
-        self._thread = threading.get_ident()  # another run, in another thread, warns of what is its own
+        self._thread = threading.get_ident()  # another thread may be running another pipeline
 
     def emit(self, record: logging.LogRecord) -> None:
-        if record.name != LOG.name and record.thread == self._thread:  # what becomes of them is no matter of the result
+        if record.name != LOG.name and record.thread == self._thread:  # observers change no result
             self.said.append(record.getMessage())
 
 

@@ -85,7 +85,7 @@ def _source(named: NamedStage, parameter: str, hint: Any, earlier: Sequence[Name
 
 
 def _itself(named: NamedStage, parameter: str, wanted: type[Stage], earlier: Sequence[NamedStage]) -> Itself:
-    """Return the last stage of a class, or the one that `from` names; all parts of a track have the same settings."""
+    """Return the last stage of a class, or the one that `from` names; all parts of a track are set alike."""
     labels = [other.label for other in earlier if isinstance(other.stage, wanted)]
     chosen = [label for label in labels if label == named.wiring.get(parameter, label)]
     if not chosen:
@@ -119,11 +119,12 @@ def _chosen(named: NamedStage, parameter: str, wanted: type, earlier: Sequence[N
     return label
 
 
-def _without_none(hint: Any) -> tuple[type, bool]:
-    if get_origin(hint) in {Union, UnionType}:
-        kinds = [kind for kind in get_args(hint) if kind is not NoneType]
-        return kinds[0], len(kinds) < len(get_args(hint))
-    return hint, False
+def _without_none(hint: Any) -> tuple[Any, bool]:
+    """Return X of a hint X or X | None, and whether None is allowed."""
+    if get_origin(hint) not in {Union, UnionType}:
+        return hint, False
+    kinds = [kind for kind in get_args(hint) if kind is not NoneType]
+    return (kinds[0] if len(kinds) == 1 else hint), len(kinds) < len(get_args(hint))
 
 
 def _hints(named: NamedStage) -> Mapping[str, Any]:
@@ -141,4 +142,15 @@ def _hints(named: NamedStage) -> Mapping[str, Any]:
         hint = "put what it makes into a dataclass of its own; return Files, with their paths, if it writes files"
         said = inspect.formatannotation(hints["return"])
         raise PluginError(f"{who}: run returns {said}, which the store can't keep", where=named.where, hint=hint)
+    for name in parameters:
+        if not _can_be_wired(hints[name]):
+            said = inspect.formatannotation(hints[name])
+            hint = "it takes X, `X | None`, or `tuple[X, ...]` for all of that type, where X is the type of a result"
+            raise PluginError(f"{who}: run takes {name} as {said}, which no stage makes", where=named.where, hint=hint)
     return {name: hints[name] for name in [*parameters, "return"]}
+
+
+def _can_be_wired(hint: Any) -> bool:
+    """True for X, X | None and tuple[X, ...], where X is a class."""
+    wanted = get_args(hint)[0] if get_origin(hint) is tuple else _without_none(hint)[0]
+    return isinstance(wanted, type)

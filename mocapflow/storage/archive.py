@@ -1,7 +1,7 @@
 """Records in zarr groups: arrays with dimension names and units, everything else as attributes.
 
 What goes in comes back: fields are arrays, records, tuples and mappings of these; or text, numbers, paths, tuples and
-mappings of those. Only lists come back as tuples, and in a field whose type names paths, text as paths.
+mappings of those. Two exceptions: lists come back as tuples, and text as paths where the field's type names Path.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def save_array(group: zarr.Group, name: str, values: Any, axes: list[str], unit:
     made = group.create_array(
         name, shape=values.shape, chunks=chunks, dtype=values.dtype, dimension_names=axes,
         compressors=[ZstdCodec(level=1, checksum=True)], attributes={"unit": unit} if unit else {},
-        config={"write_empty_chunks": True},  # so that a chunk that lacks is damage, and no zeros
+        config={"write_empty_chunks": True},  # so that a missing chunk is damage, not zeros
     )  # fmt: skip
     if isinstance(values, Series):
         for part in blocks(len(values)):

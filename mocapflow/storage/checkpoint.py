@@ -30,12 +30,13 @@ from mocapflow.io.atomic import forget_parts
 from mocapflow.records import F64, silent
 from mocapflow.results import Track
 from mocapflow.storage import packing
+from mocapflow.storage.artifacts import Artifact, writing
 from mocapflow.storage.growing import CLOTH, NUMBERS, Growing
 from mocapflow.storage.locks import Lock
 from mocapflow.storage.packing import column
-from mocapflow.storage.rows import write_json
+from mocapflow.storage.rows import group_meta, write_json
 from mocapflow.storage.sealing import seal
-from mocapflow.storage.store import Artifact, Store, group_meta, writing
+from mocapflow.storage.store import Store
 
 
 class Checkpoint:

@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from mocapflow.errors import MocapflowError, StoreError
-from mocapflow.storage.store import SHORT, group_meta
+from mocapflow.storage.artifacts import SHORT
+from mocapflow.storage.rows import group_meta
 
 META = "zarr.json"
 

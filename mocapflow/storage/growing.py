@@ -4,7 +4,8 @@
 padded row per frame, `silhouettes/<layer>/<camera>` int8 at 1/8 px, `trace` the poses of a frame's turns where they are
 kept, and `live/appearance-<size>` the last two appearances in turns, each behind the number of its frame.
 
-No run goes on from what was seen (`SEEN`): it is sure to be on the drive once the track is finished, the rest at once.
+A resumed run does not read what was seen (`SEEN`): that is flushed to the drive when the track is finished, all else
+at once.
 """
 
 from __future__ import annotations
@@ -21,8 +22,7 @@ from mocapflow.data import Matches, Pose, Silhouette
 from mocapflow.records import F64
 from mocapflow.storage import packing
 from mocapflow.storage.packing import Columns, column
-from mocapflow.storage.rows import Corrupted, Rows, flush_all, write_json
-from mocapflow.storage.store import group_meta
+from mocapflow.storage.rows import Corrupted, Rows, flush_all, group_meta, write_json
 
 NUMBERS, CLOTH = "live/rows", "cloth"
 SEEN = ("silhouettes", "matches", "trace")

@@ -14,8 +14,7 @@ from mocapflow.results import Track
 from mocapflow.series import BLOCK
 from mocapflow.storage.archive import PLAIN, axis_names
 from mocapflow.storage.packing import UNITS, Columns, column
-from mocapflow.storage.rows import Corrupted, Rows, write_json
-from mocapflow.storage.store import group_meta
+from mocapflow.storage.rows import Corrupted, Rows, group_meta, write_json
 
 
 def seal(

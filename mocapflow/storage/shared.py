@@ -13,14 +13,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
-from uuid import uuid4
 
 from mocapflow.errors import StoreError
 from mocapflow.records import silent
+from mocapflow.storage.artifacts import SHORT, Artifact, writing
 from mocapflow.storage.copies import META, Copies, Copy, further
 from mocapflow.storage.locks import Lock
 from mocapflow.storage.rows import Corrupted, flush_all
-from mocapflow.storage.store import SHORT, Artifact, Report, Store, writing
+from mocapflow.storage.store import ASIDE, Report, Store
 
 
 def open_store(path: Path, url: str | None) -> Store:
@@ -102,7 +102,8 @@ class SharedStore(Store):
         there = self._ahead(key, super().find(key))
         if there is None:
             return
-        part = self.state / uuid4().hex
+        part = self.state / f"{ASIDE}{there.group}"  # `cache prune` removes what a run leaves here that is killed
+        shutil.rmtree(part, ignore_errors=True)
         try:
             self._copies.fetch(there, part)
             if not (part / META).is_file():  # dropped meanwhile for one that is further: what is here stays

@@ -10,14 +10,10 @@ whoever shares the folder has to share the locks.
 
 from __future__ import annotations
 
-import importlib.metadata
-import platform
-import shutil
+import re
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -25,53 +21,14 @@ import numpy as np
 
 from mocapflow.caching.digests import Digests
 from mocapflow.caching.keys import Recipe
-from mocapflow.errors import FULL, MocapflowError, StoreError, folder_error
+from mocapflow.errors import MocapflowError, StoreError
+from mocapflow.storage.artifacts import SHORT, Artifact, open_artifact, remove, versions, writing
 from mocapflow.storage.locks import Lock, acquire, looking
-from mocapflow.storage.rows import Corrupted, array_meta, flush_all, read_json, write_json
+from mocapflow.storage.rows import Corrupted, array_meta, flush_all, group_meta, read_json, write_json
 
-SHORT = 12  # digits of the key in a group's name
-LIBRARIES = ("mocapflow", "numpy", "scipy", "opencv-python-headless", "av", "numba")
+GROUP = re.compile(rf"[\w-]+-[0-9a-f]{{{SHORT}}}")  # names of groups: label and key
+ASIDE = "damaged-"  # begins the name, in `.state`, of a group that is no use any more
 Report = Callable[[str], None]
-
-
-@dataclass(frozen=True)
-class Artifact:
-    """One group of the store and its attributes."""
-
-    path: Path
-    attributes: Mapping[str, Any]
-
-    @property
-    def key(self) -> str:
-        """The key it was made under."""
-        return str(self.attributes.get("key", ""))
-
-    @property
-    def recipe(self) -> Recipe:
-        """What it was made from."""
-        return dict(self.attributes.get("recipe", {}))
-
-    @property
-    def complete(self) -> bool:
-        """True where it was written to its end."""
-        return bool(self.attributes.get("complete", False))
-
-    @property
-    def frames(self) -> int:
-        """How many frames are committed; 0 for a result that is no chain of frames."""
-        done: int = self.attributes.get("frames_done", 0)
-        return done
-
-    @property
-    def warnings(self) -> list[str]:
-        """What was warned of while it was made."""
-        return [str(said) for said in self.attributes.get("warnings", [])]
-
-    @property
-    def made_with(self) -> list[tuple[int, dict[str, str]]]:
-        """With which versions it was made: (count of frames, versions), earliest first."""
-        earlier = [(int(count), dict(made)) for count, made in self.attributes.get("earlier_versions", [])]
-        return [*earlier, (self.frames, dict(self.attributes.get("versions", {})))]
 
 
 class Store:
@@ -109,12 +66,11 @@ class Store:
 
     def artifacts(self) -> list[Artifact]:
         """Return what is in the store, oldest first; what can't be read is left out."""
-        found = [a for path in self._groups("*") if (a := _open(path)) is not None]
-        return sorted(found, key=lambda a: str(a.attributes.get("created", "")))
+        return sorted(self._found("*"), key=lambda a: str(a.attributes.get("created", "")))
 
     def find(self, key: str) -> Artifact | None:
         """Return the artifact made under a key, finished or not."""
-        return next((a for p in self._groups(f"*-{key[:SHORT]}") if (a := _open(p)) is not None and a.key == key), None)
+        return next((a for a in self._found(f"*-{key[:SHORT]}") if a.key == key), None)
 
     def nearest(self, label: str, recipe: Recipe, but: str) -> Artifact | None:
         """Return the newest artifact of the same stage with another key, to say what is different now."""
@@ -191,7 +147,7 @@ class Store:
 
     def set_aside(self, path: Path) -> Path:
         """Move a damaged group out of the way and return its new name."""
-        aside = self.state / f"damaged-{path.name}-{time.time_ns()}"
+        aside = self.state / f"{ASIDE}{path.name}-{time.time_ns()}"
         with writing(self.path):
             path.rename(aside)
         return aside
@@ -206,8 +162,8 @@ class Store:
         return not busy
 
     def aside(self) -> list[Path]:
-        """Return the groups that were damaged and set aside."""
-        return sorted(self.state.glob("damaged-*"))
+        """Return the groups that were damaged and set aside, and parts of copies whose fetching was cut off."""
+        return sorted(self.state.glob(f"{ASIDE}*"))
 
     def discard(self, artifact: Artifact) -> None:
         """Remove an artifact that is to be made anew."""
@@ -215,66 +171,17 @@ class Store:
 
     def damaged(self, key: str = "") -> list[Path]:
         """Return the groups of which not even the attributes can be read, all or those of a key."""
-        return [path for path in self._groups(f"*-{key[:SHORT] or '*'}") if _open(path) is None]
+        return [path for path in self._groups(f"*-{key[:SHORT] or '*'}") if open_artifact(path) is None]
 
     def _lock(self, key: str) -> Path:
         return self.state / f"{key[:SHORT]}.lock"
 
+    def _found(self, pattern: str) -> Iterator[Artifact]:
+        return filter(None, map(open_artifact, self._groups(pattern)))
+
     def _groups(self, pattern: str) -> list[Path]:
-        return sorted(p for p in self.path.glob(pattern) if p.is_dir() and not p.name.startswith("."))
-
-
-def group_meta(attributes: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the metadata of a zarr group."""
-    return {"attributes": attributes, "zarr_format": 3, "node_type": "group"}
-
-
-def with_versions(artifact: Artifact) -> Artifact:
-    """Return a chain as it is when it goes on under the versions of now; the next commit writes them down."""
-    now, (count, made) = versions(), artifact.made_with[-1]
-    if made == now:
-        return artifact
-    earlier = [*artifact.attributes.get("earlier_versions", []), [count, made]]
-    return Artifact(artifact.path, {**artifact.attributes, "versions": now, "earlier_versions": earlier})
-
-
-def remove(path: Path) -> None:
-    """Remove a group; its attributes go first, so that a half-removed one never looks whole."""
-    with writing(path.parent):
-        (path / "zarr.json").unlink(missing_ok=True)
-        shutil.rmtree(path)
-
-
-@cache
-def versions() -> Mapping[str, str]:
-    """Return the versions a result depends on."""
-    found = {"python": platform.python_version()}
-    for library in LIBRARIES:
-        try:
-            found[library] = importlib.metadata.version(library)
-        except importlib.metadata.PackageNotFoundError:
-            found[library] = "not installed"
-    return found
-
-
-@contextmanager
-def writing(where: Path, saved: str = "") -> Iterator[None]:
-    """Turn what the system says about writing into an error for people.
-
-    Args:
-        where: the store.
-        saved: what is kept in spite of the failure.
-    """
-    try:
-        yield
-    except OSError as error:
-        full = error.errno in FULL
-        message = (
-            f"the store {where} is full" if full else f"can't write to the store {where}: {error.strerror or error}"
-        )
-        todo = "free some space" if full else "make it writable"
-        hint = "\n".join(filter(None, [f"{todo}, or name another store", saved]))
-        raise folder_error(error)(message, hint=hint) from error
+        """Return the groups by their names; other folders, such as a run folder in here, belong to others."""
+        return sorted(p for p in self.path.glob(pattern) if p.is_dir() and GROUP.fullmatch(p.name))
 
 
 def _kind(folder: Path) -> str | None:
@@ -283,17 +190,3 @@ def _kind(folder: Path) -> str | None:
         return str(read_json(folder / "zarr.json").get("node_type"))
     except StoreError:
         return None
-
-
-def _open(path: Path) -> Artifact | None:
-    try:
-        attributes = read_json(path / "zarr.json").get("attributes")
-    except StoreError:
-        return None
-    if not isinstance(attributes, dict) or "key" not in attributes or not _counts(attributes.get("frames_done", 0)):
-        return None
-    return Artifact(path, attributes)
-
-
-def _counts(done: Any) -> bool:
-    return type(done) is int and done >= 0  # true is no number of frames

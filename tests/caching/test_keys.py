@@ -1,6 +1,7 @@
 """A table of edits, each of which must or must not change a key; and what a miss says about its reason."""
 
 import ast
+import importlib
 import json
 import os
 import shutil
@@ -14,6 +15,7 @@ from mocapflow.caching import digests, sources
 from mocapflow.caching.digests import Digests
 from mocapflow.caching.keys import _plain, all_changes, explain, key_of
 from mocapflow.data import Start
+from mocapflow.errors import PluginError
 from mocapflow.running import recipes
 from mocapflow.running.recipes import steps_of
 from tests.fixtures.stores import PLUGIN, STAGES, load, write_pipeline, write_recording
@@ -152,6 +154,15 @@ def test_content_of_files(tmp_path, clip, name, expected):
     assert bool(after) == bool(expected)
 
 
+def test_the_name_of_a_file_counts_that_a_stage_may_read_by_its_name(tmp_path, clip):
+    stages = STAGES | {"start": "start_from_file"}
+    for name in ("init.json", "init_000001.json"):
+        (clip / name).write_text("{}")
+    before = keys(tmp_path, clip, stages=stages)
+    (clip / "init_000001.json").rename(clip / "init_000002.json")
+    assert changed(before, keys(tmp_path, clip, stages=stages)) == {"start", "track", "smooth", "export"}
+
+
 def test_a_touched_file_is_the_same(tmp_path, clip):
     before = keys(tmp_path, clip)
     os.utime(clip / "subject.txt")
@@ -214,8 +225,29 @@ def test_code_that_a_plugin_imports_counts(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     assert made(1) == made(1) != made(2)
     before = made(1)
+    monkeypatch.setattr(digests, "FIRST", {})
     monkeypatch.setattr(digests.sources, "meaning", lambda tree: "")  # all else is alike: mocapflow.io counted too
     assert made(1) != before
+
+
+def test_code_that_changes_after_it_was_loaded_makes_no_results(tmp_path, monkeypatch):
+    (tmp_path / "mocapflow_edited").mkdir()
+    (tmp_path / "mocapflow_edited" / "__init__.py").write_text("")
+    file = tmp_path / "mocapflow_edited" / "inner.py"
+    file.write_text(CODE)
+    monkeypatch.syspath_prepend(tmp_path)
+    module = importlib.import_module("mocapflow_edited.inner")
+    before = Digests().package("mocapflow_edited")
+    file.write_text(CODE.replace("# one more", "# another comment"))
+    assert Digests().package("mocapflow_edited") == before
+    file.write_text(CODE.replace("x + 1", "x + 2  # two"))
+    with pytest.raises(PluginError, match="inner.py  this code has changed since it was loaded\n.*the workers"):
+        Digests().package("mocapflow_edited")
+    importlib.invalidate_caches()
+    assert importlib.reload(module).f(1) == 3
+    assert Digests().package("mocapflow_edited") != before
+    for name in ("mocapflow_edited.inner", "mocapflow_edited"):
+        del sys.modules[name]
 
 
 def test_modules_of_an_author_count_however_they_are_called(tmp_path, monkeypatch):

@@ -13,7 +13,7 @@ from functools import partial
 
 import pytest
 
-from mocapflow.commands.comparing import finish
+from mocapflow.commands.comparing import run_cell
 from mocapflow.commands.invocation import Invocation
 from mocapflow.commands.workers import finished
 from mocapflow.errors import PipelineError
@@ -44,7 +44,7 @@ def grid(folder, store):
                 )
                 cell = Invocation(str(pipeline), str(folder / clip), changes, None, str(folder / store))
                 out = folder / store / "runs" / f"{draper}-{gain}" / clip
-                tasks[out] = partial(finish, cell, out)
+                tasks[out] = partial(run_cell, cell, out)
     return tasks
 
 

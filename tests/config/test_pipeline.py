@@ -235,6 +235,9 @@ def test_a_recording_without_measures(folder):
         "skirt.yaml:2:1  garment: skirt needs waist_height_m, waist_circumference_m, hem_circumference_m, length_m\n"
         f"       measures, in metres, come from {file}, which does not exist; a value in the pipeline overrides them"
     )
+    with pytest.raises(MocapflowError, match="^clip  no calibration file"):  # a wrong folder is told as such
+        load("garment=from_recording")
+    Path("clip/cameras.toml").touch()
     with pytest.raises(MocapflowError, match="clip/subject/garment.json  the pipeline takes the garment from the rec"):
         load("garment=from_recording")
 
@@ -371,6 +374,15 @@ def test_a_stage_that_makes_a_body_replaces_it_for_later_stages(folder):
          "stage 'export' needs a stage coupled_loop before it\n"
          "       available: track"),
         ("stages.export=untyped", "--set stages.export=untyped  stage 'export': untyped: run needs a type for track"),
+        ("stages.export=listed",
+         "--set stages.export=listed  "
+         "stage 'export': listed: run takes tracks as list[mocapflow.results.Track], which no stage makes\n"
+         "       it takes X, `X | None`, or `tuple[X, ...]` for all of that type, where X is the type of a result"),
+        ("stages.export=either",
+         "--set stages.export=either  "
+         "stage 'export': either: run takes found as mocapflow.results.Track | mocapflow.data.Start, "
+         "which no stage makes\n"
+         "       it takes X, `X | None`, or `tuple[X, ...]` for all of that type, where X is the type of a result"),
         ("stages.export=unkept",
          "--set stages.export=unkept  "
          "stage 'export': unkept: run returns dict[str, float], which the store can't keep\n"

@@ -104,6 +104,14 @@ def test_scaled_camera_keeps_pixel_centres_on_integers(factor):
     assert np.abs(cameras.project(points, small) - wanted).max() < 1e-9
 
 
+def test_pixels_of_a_shrunk_camera_are_squares_of_whole_ones_whatever_is_left_over():
+    view = replace(camera(), size=np.array([1090, 1923], np.int32))
+    small = cameras.shrunk(view, 4)
+    assert small.size.tolist() == [272, 480]
+    points = cameras.centre(view) + 3 * lines.through(pixels(), view)[:, :3]
+    np.testing.assert_allclose(cameras.project(points, small), (pixels() + 0.5) / 4 - 0.5, atol=1e-9)
+
+
 def test_pinhole_only_drops_the_distortion():
     view = camera(*LENSES["fisheye"])
     plain = cameras.pinhole(view)

@@ -1,6 +1,8 @@
 """Calibration files of every format, and what is said of bad ones."""
 
 import re
+import subprocess
+import sys
 from dataclasses import replace
 
 import cv2
@@ -176,6 +178,7 @@ def test_nan(tmp_path):
     ("old", "new", "message"),
     [
         ("size = [64, 48]", "size = [64]", "has 1 numbers in size; expected 2"),
+        ("size = [64, 48]", f"size = [1{'0' * 400}, 48]", "has no numbers in size"),
         ("size = [64, 48]", "size = [-64, 48]", "has the size -64 x 48"),
         ("size = [64, 48]", 'size = ["big", 48]', r"has no numbers in size: \['big', 48\]"),
         ("rotation = [", "rotation = [[1.0, 0.0], [0.0, 1.0, 0.0]] # [", "has no numbers in rotation"),
@@ -253,7 +256,7 @@ def test_incomplete_qualisys(tmp_path, old, new, message):
         read_cameras(path)
 
 
-@pytest.mark.parametrize("content", ["", "hello\n", "%YAML:1.0\n---\nnames: [ 1"])
+@pytest.mark.parametrize("content", ["", "hello\n", "%YAML:1.0\n---\nnames: [ 1", "%YAML:1.0\n---\n- 1\n"])
 def test_not_opencv_yaml(tmp_path, content):
     write_easymocap(tmp_path, ring())
     (tmp_path / "intri.yml").write_text(content)
@@ -277,7 +280,16 @@ def test_easymocap_lacks_a_matrix(tmp_path):
         read_cameras(tmp_path)
 
 
-@pytest.mark.parametrize(("old", "new"), [("rows: 3", "rows: 4"), ("dt: d", "dt: q")])
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("rows: 3", "rows: 4"),
+        ("rows: 3", "rows: -3"),
+        ("dt: d", "dt: q"),
+        ("data: [", "data: x # ["),
+        ("data: [ ", "data: [ x, "),
+    ],
+)
 def test_easymocap_with_no_matrix_where_one_should_be(tmp_path, old, new):
     write_easymocap(tmp_path, ring())
     path = tmp_path / "intri.yml"
@@ -286,6 +298,17 @@ def test_easymocap_with_no_matrix_where_one_should_be(tmp_path, old, new):
     path.write_text(text.replace(old, new, 1))
     with pytest.raises(RecordingError, match=r"intri\.yml:\d+:1  camera 'cam01' has no matrix in K_cam01\n.*as many"):
         read_cameras(tmp_path)
+
+
+def test_easymocap_whose_matrix_does_not_say_its_columns(tmp_path):
+    """In a process of its own: OpenCV's way to read it would write beyond its memory, and that may kill."""
+    write_easymocap(tmp_path, ring())
+    path = tmp_path / "extri.yml"
+    path.write_text(path.read_text().replace("   cols: 1\n", ""))
+    words = [sys.executable, "-m", "mocapflow", "doctor", str(tmp_path)]
+    done = subprocess.run(words, capture_output=True, check=False, text=True)
+    assert done.returncode == 2, done.stderr
+    assert "camera 'cam01' has no matrix in" in done.stdout
 
 
 def test_one_name_twice(tmp_path):

@@ -52,7 +52,10 @@ def test_missing_and_broken_files_show_nobody(tmp_path):
     assert people_at(files, 0).shape == people_at(files, 1).shape == people_at(None, 0).shape == (0, 0, 3)
 
 
-@pytest.mark.parametrize("text", ["[]", '{"people": 3}', '{"people": [{"pose_keypoints_2d": [1, 2]}]}', "{}"])
+HUGE = f'{{"people": [{{"pose_keypoints_2d": [1{"0" * 400}, 2, 1]}}]}}'  # beyond any float
+
+
+@pytest.mark.parametrize("text", ["[]", '{"people": 3}', '{"people": [{"pose_keypoints_2d": [1, 2]}]}', "{}", HUGE])
 def test_not_openpose(tmp_path, text):
     (tmp_path / "a.0.json").write_text(text)
     with pytest.raises(

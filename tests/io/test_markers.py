@@ -1,5 +1,7 @@
 """Marker and motion files there and back, and what is said of bad ones."""
 
+import struct
+
 import numpy as np
 import pytest
 
@@ -153,6 +155,12 @@ def test_c3d(tmp_path):
         path.write_bytes(content)
         with pytest.raises(RecordingError, match=f"this C3D file {said}"):
             read_c3d(path)
+    path.write_bytes(whole[:515] + b"\0" + whole[516:])  # the processor that wrote it
+    with pytest.raises(RecordingError, match="this C3D file can't be read: Could not read the processor type"):
+        read_c3d(path)
+    path.write_bytes(whole.replace(struct.pack("<f", 100), bytes(4)))
+    with pytest.raises(RecordingError, match=r"a\.c3d  no POINT:RATE above zero"):
+        read_c3d(path)
     made["parameters"]["POINT"]["UNITS"]["value"] = []
     made.write(str(path))
     with pytest.raises(RecordingError, match=r"a\.c3d  unknown unit ''\n.*known: m, cm, mm"):

@@ -189,6 +189,7 @@ def test_mesh_without_skeleton(recording):
         (lambda joints: joints[3].update(name="knee_l"), "joint 'knee_l' is listed twice"),
         (lambda joints: joints[3].update(parent=None), "one joint must have no parent"),
         (lambda joints: joints[3].update(position=[0, float("nan"), 0]), "positions are not all numbers"),
+        (lambda joints: joints[3].update(position=[0, 10**400, 0]), "this is not a skeleton: OverflowError"),
         (lambda joints: joints[3].pop("position"), "this is not a skeleton"),
         (
             lambda joints: joints[3].update(position=joints[2]["position"]),
@@ -234,6 +235,14 @@ def test_weights_of_another_mesh(recording):
 def test_names_of_weights_that_name_no_columns(recording, names, message):
     np.savez(recording / "subject" / "weights.npz", weights=np.ones((13348, 3)), names=np.array(names))
     with pytest.raises(RecordingError, match=rf"weights\.npz  {message}\n"):
+        Scanned().load(recording)
+
+
+def test_weights_whose_description_is_damaged(recording):
+    path = recording / "subject" / "weights.npz"
+    np.savez(path, weights=np.ones((13348, 3)))
+    path.write_bytes(path.read_bytes().replace(b"), }", b"), ("))
+    with pytest.raises(RecordingError, match=r"weights\.npz  this is no .npz file of numbers and names\n"):
         Scanned().load(recording)
 
 

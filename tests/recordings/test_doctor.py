@@ -367,6 +367,7 @@ def test_a_garment_that_is_mended(good):
         (lambda p: p["joint_rotations"].update(kne_l=[0, 0, 0]),
          "the body has no joint 'kne_l'", "did you mean 'knee_l'?"),
         (lambda p: p.update(root_rotation=[0, 1]), "'root_rotation' is [0, 1]", "expected three finite numbers"),
+        (lambda p: p.update(root_rotation=[0, 0, 10**400]), f"'root_rotation' is [0, 0, {10**400}]", "three finite"),
         (lambda p: p.pop("root_translation"), "'root_translation' is missing", 'expected {"root_rotation": [3]'),
         (lambda p: p.update(rotation=[0, 0, 0]), "unknown key 'rotation'", "did you mean 'root_rotation'?"),
     ],

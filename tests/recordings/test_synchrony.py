@@ -1,15 +1,17 @@
 """Cameras that are late against the others: measured, written down, heeded."""
 
 import json
+from dataclasses import replace
 
 import cv2
 import numpy as np
 import pytest
 
 from mocapflow.errors import RecordingError
-from mocapflow.geometry.cameras import project
+from mocapflow.geometry.cameras import centre, project
 from mocapflow.geometry.pencils import pencil_axes, plane_angles
 from mocapflow.io.cameras import write_cameras
+from mocapflow.io.lateness import late_frames, write_late_frames
 from mocapflow.recordings import doctor, paired_views, synchrony
 from mocapflow.recordings.doctor import examine_timing
 from mocapflow.recordings.recording import open_recording
@@ -73,6 +75,34 @@ def test_a_lag_between_signals_is_found_between_frames(lag):
     assert found == pytest.approx(lag, abs=0.2)
     assert information > 1
     assert synchrony.best_lag(np.ones((80, 1)), np.ones((80, 1)), 10)[1] == 0  # nothing moves
+
+
+def test_one_wild_error_does_not_move_the_lag():
+    moments = np.arange(80)[:, None]
+    one, other = np.sin(moments / [7, 11]), np.sin(moments / [7, 11]) + 0.01 * np.cos(moments)
+    one[-1] += 3.0  # that a lag of a frame would leave out
+    assert synchrony.best_lag(one, other, 10)[0] == pytest.approx(0, abs=0.1)
+
+
+def test_a_constant_difference_is_the_calibration_s_in_every_signal_by_itself():
+    nan = np.nan
+    one = np.array([[0.0, 0.0, nan], [1.0, 0.2, nan], [4.0, nan, nan]])
+    other = np.array([[1.0, 0.5, nan], [1.5, 0.5, nan], [1.0, 0.5, nan]])
+    centred = synchrony._centred(one, other)  # their medians are -0.5 and -0.4
+    np.testing.assert_allclose(centred, [[-0.5, -0.1, nan], [0.0, 0.1, nan], [3.5, nan, nan]])
+
+
+def test_an_outline_around_the_other_camera_touches_no_plane():
+    one, other, _ = cameras()
+    to_other = project(centre(other)[None], one)[0]
+    turn = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+    ring = 5 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    wide = replace(one, size=np.array([10_000, 10_000], np.int32))  # so that no outline is cut at the border
+    assert np.all((to_other > 20) & (to_other < 9_000))
+    found = paired_views._touching(
+        [to_other + ring, to_other + ring + 8, np.empty((0, 2))], wide, pencil_axes(one, other)
+    )
+    assert np.isnan(found).tolist() == [[True, True], [False, False], [True, True]]
 
 
 @pytest.mark.long
@@ -140,6 +170,13 @@ def test_what_is_found_comes_on_top_of_what_is_known(tmp_path, monkeypatch, befo
     assert examine_timing(folder, write=True)[-1].message.startswith("written")
     assert json.loads((folder / "recording.json").read_text())["late_frames"] == after
     open_recording(folder)  # and every run takes it
+
+
+def test_frames_are_late_by_whole_ones_and_written_to_a_tenth(tmp_path):
+    write_late_frames(tmp_path, {"cam01": 2.84, "cam02": -2.84, "cam03": 0.44})
+    said = json.loads((tmp_path / "recording.json").read_text())
+    assert said == {"late_frames": {"cam01": 2.8, "cam02": -2.8, "cam03": 0.4}}
+    assert late_frames(tmp_path, [*NAMES, "cam04"]) == (3, -3, 0, 0)
 
 
 @pytest.mark.parametrize(

@@ -246,10 +246,11 @@ def test_a_result_that_can_not_be_kept_is_not_told_as_done(tmp_path, path, monke
     assert told == []
 
 
-def test_inputs_that_are_no_paths_name_the_body(tmp_path, path, monkeypatch):
+@pytest.mark.parametrize("inputs", ["subject.txt", ["subject.txt"], None, iter([Path("subject.txt")])])
+def test_inputs_that_are_no_paths_name_the_body(tmp_path, path, monkeypatch, inputs):
     pipeline = load(path)
-    monkeypatch.setattr(type(pipeline.body), "inputs", lambda self, folder: "subject.txt")
-    with pytest.raises(PluginError, match="'tiny_body' returned the inputs 'subject.txt', which are no list of Path"):
+    monkeypatch.setattr(type(pipeline.body), "inputs", lambda self, folder: inputs)
+    with pytest.raises(PluginError, match=r"'tiny_body' returned the inputs .*, which are no list of Path"):
         plan(pipeline, store=tmp_path / "store.zarr")
 
 

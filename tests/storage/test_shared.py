@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import zarr
 
+from mocapflow.assets import Background
 from mocapflow.commands.invocation import placed
 from mocapflow.errors import ComponentFailed, MocapflowError, StoreError
 from mocapflow.running.runner import plan, run
@@ -160,6 +161,32 @@ def test_a_copy_that_breaks_off_leaves_what_is_here(tmp_path, path, url, monkeyp
     assert [p.name for p in state.iterdir() if p.is_dir()] == []
     shared(path, tmp_path / "two", url, "stages.smooth={use: tiny_smooth, width: 5}")
     assert same(the_track(tmp_path / "one"), the_track(tmp_path / "two"))
+
+
+def test_what_a_run_had_fetched_when_it_was_killed_can_be_pruned(tmp_path, url, monkeypatch):
+    key = "0123456789abcdef"
+    there, here = Store(tmp_path / "one"), open_store(tmp_path / "two", url)
+    for store in (there, here):
+        store.create()
+    made = there.begin("track", key, {})
+    there.save(made, Background(mean=(), spread=()))
+    Copies(url).send(made.path)
+    found, kept = Copies.fetch, []
+
+    def fetch(copies, copy, folder):
+        found(copies, copy, folder)
+        kept.append([here.drop(part) for part in here.aside()])  # meanwhile
+        raise SystemExit("killed")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Copies, "fetch", fetch)
+        patch.setattr("mocapflow.storage.shared.shutil.rmtree", lambda *_, **__: None)
+        with pytest.raises(SystemExit):
+            here.load(here.find(key))
+    assert kept == [[False]]
+    (part,) = here.aside()
+    assert here.drop(part) and here.aside() == []
+    assert here.load(here.find(key)).mean == ()
 
 
 @pytest.mark.long

@@ -25,10 +25,11 @@ from mocapflow.records import F64, record
 from mocapflow.running.execution import Execution
 from mocapflow.series import Series
 from mocapflow.storage import locks, rows
+from mocapflow.storage.artifacts import remove
 from mocapflow.storage.growing import SEEN
 from mocapflow.storage.packing import FINE, match_row, quantised
 from mocapflow.storage.rows import Corrupted, Rows
-from mocapflow.storage.store import Store, remove
+from mocapflow.storage.store import Store
 from tests.fixtures.stores import actions, run_tiny, same, the_track
 from tests.fixtures.tiny_plugin import TinyMatcher, tiny_body
 
@@ -717,25 +718,26 @@ def test_a_failed_run_gives_its_lock_back(tmp_path, path, monkeypatch):
     assert not list((tmp_path / "store.zarr" / ".state").glob("*.lock"))
 
 
-def test_other_versions_are_told(tmp_path, path, monkeypatch):
+@pytest.mark.parametrize("library", ["numpy", "open3d"])  # the latter makes the body of fewer faces
+def test_other_versions_are_told(tmp_path, path, monkeypatch, library):
     from mocapflow.running import execution
-    from mocapflow.storage import store
+    from mocapflow.storage import artifacts
 
-    real = store.versions()
+    real = artifacts.versions()
     run_tiny(path, tmp_path, frames=5)
-    for module in (store, execution):
-        monkeypatch.setattr(module, "versions", lambda: real | {"numpy": "9.9"})
-    said = f"frames 0–4 of track were made with numpy {real['numpy']}, now 9.9"
+    for module in (artifacts, execution):
+        monkeypatch.setattr(module, "versions", lambda: real | {library: "9.9"})
+    said = f"frames 0–4 of track were made with {library} {real[library]}, now 9.9"
     for _ in range(2):  # gone on with, then all done: the mixture is still told
         summary, lines = run_tiny(path, tmp_path)
         assert f"warning: {said}" in lines
         (track,) = [stage for stage in summary.stages if stage["label"] == "track"]
         assert track["warnings"] == [said]  # in run.json, too
-    for module in (store, execution):
-        monkeypatch.setattr(module, "versions", lambda: real | {"numpy": "10"})
+    for module in (artifacts, execution):
+        monkeypatch.setattr(module, "versions", lambda: real | {library: "10"})
     _, lines = run_tiny(path, tmp_path)
-    assert "warning: frames 5–11 of track were made with numpy 9.9, now 10" in lines
+    assert f"warning: frames 5–11 of track were made with {library} 9.9, now 10" in lines
     _, lines = run_tiny(path, tmp_path, frames=3)  # what is not asked for is no matter
     assert [line for line in lines if "of track were made" in line] == [
-        f"warning: frames 0–2 of track were made with numpy {real['numpy']}, now 10"
+        f"warning: frames 0–2 of track were made with {library} {real[library]}, now 10"
     ]

@@ -1,0 +1,48 @@
+"""What is said of a frame without a look at it."""
+
+import numpy as np
+import pytest
+
+from mocapflow.data import UNKNOWN, Cloth, Frame, Past
+from mocapflow.loop import Steps
+from mocapflow.model import ClothedModel
+from mocapflow.prediction import believed, lost, notes_on, seen
+from mocapflow.steady import Steady
+from mocapflow.testing import tiny_pose, tiny_scene
+
+
+def frame(*usable):
+    image = np.zeros((240, 320, 3), np.uint8)
+    return Frame(index=7, time=0.2, images=(image,) * len(usable), usable=np.array(usable))
+
+
+@pytest.mark.parametrize(
+    ("usable", "enough"),
+    [
+        ((True,), True),
+        ((False,), False),
+        ((True, True), True),
+        ((True, False), False),
+        ((True, False, True), True),
+        ((False, False, True, False), False),
+    ],
+)
+def test_two_views_fix_a_pose_or_the_only_one_there_is(usable, enough):
+    assert seen(frame(*usable)) is enough
+
+
+def test_a_lost_frame_keeps_what_was_believed_and_says_which_views_were_missing():
+    scene = tiny_scene(cameras=2)
+    begun = believed(tiny_pose(scene), np.zeros(1), Cloth(vertices=np.zeros((3, 3)), parameters=np.zeros(1)))
+    np.testing.assert_array_equal(begun.estimate.covariance, UNKNOWN * np.eye(7 + len(begun.estimate.pose.angles)))
+    assert not begun.estimate.observed.any() and not begun.segmentation.silhouettes and not len(begun.matches.weight)
+    steady = Steady(max_turns=3)
+    steps = Steps(segmenter=None, matchers=(), pose_solver=None, cloth_fitter=None, priors=(), steady=steady)
+    result = lost(frame(True, False), begun, steps, ClothedModel(scene=scene))
+    assert result.state is begun
+    assert (result.iterations, result.steady, result.oscillating) == (0, False, False)
+    assert result.energy.shape == (3, len(result.energy_terms)) and np.isnan(result.energy).all()
+    assert np.isnan(result.overlap).tolist() == [True, True]
+    assert notes_on(frame(True, False), scene, Past(), result) == [
+        "cam02 not usable: no image", "lost, fewer than 2 views; the prediction is kept",
+    ]  # fmt: skip
