@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from mocapflow_matching.carried import carried_points, distances
 from mocapflow_matching.robust import robust_weights
-from mocapflow_twist.solver import TwistGaussNewton
+from mocapflow_twist.twist_gauss_newton import TwistGaussNewton
 from pydantic import NonNegativeFloat, PositiveFloat
 
 from mocapflow.components import PoseSolver, Predictor, Prior

@@ -28,7 +28,7 @@ from mocapflow.geometry.sewing import TAKE_UP, THICKNESS
 from mocapflow.model import ClothedModel
 from mocapflow.pooling import pool
 from mocapflow.records import F64, Bool
-from mocapflow_twist import solve
+from mocapflow_twist import steps
 from mocapflow_twist.constraint import image_rows
 from mocapflow_twist.normal_equations import Equations, dense_equations
 
@@ -66,9 +66,9 @@ class GaussNewton(ClothFitter):
                 trial = task.moved(before, equations, damping)
                 reached = task.energy(trial)
                 if reached < energy:
-                    cloth, energy, damping = trial, reached, solve.LOWERED * damping
+                    cloth, energy, damping = trial, reached, steps.LOWERED * damping
                     break
-                damping *= solve.RAISED
+                damping *= steps.RAISED
             if cloth is before:
                 break
         return cloth
@@ -117,12 +117,12 @@ class Task(NamedTuple):
         """Return the cloth after one damped step, its parameters within their bounds."""
         low, high = self.garment.parameter_bounds.T
         parameters, downhill = cloth.parameters, -equations.gradient
-        free = ~solve.at_bound(parameters, downhill, low, high) & self._fitted
+        free = ~steps.at_bound(parameters, downhill, low, high) & self._fitted
         if not free.any():  # the garment knows no forces, or each stands at a bound
             return cloth
         part = Equations(equations.hessian[np.ix_(free, free)], equations.gradient[free], equations.energy)
         increment = np.zeros(len(parameters))
-        increment[free] = solve.step(part, solve.CLOTH_LEVER / (high - low)[free], damping)
+        increment[free] = steps.step(part, steps.CLOTH_LEVER / (high - low)[free], damping)
         return self.model.drape(self.estimate.pose, np.clip(parameters + increment, low, high), self.past)
 
     @property

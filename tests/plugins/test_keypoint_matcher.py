@@ -10,7 +10,7 @@ from mocapflow_bodies.scanned import Scanned
 from mocapflow_fitting.landmarks import landmarks
 from mocapflow_fitting.start_from_file import read_pose
 from mocapflow_matching.keypoints import Keypoints, _median_error, marks_on
-from mocapflow_twist.solver import TwistGaussNewton
+from mocapflow_twist.twist_gauss_newton import TwistGaussNewton
 
 from mocapflow.data import NO_CLOTH, Frame, Past, Segmentation, Turn
 from mocapflow.geometry import kinematics

@@ -13,7 +13,7 @@ from mocapflow.components import PoseSolver, Prior
 from mocapflow.data import Estimate, FrameState, Matches, Past, Pose, Residual, Surface, Turn
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
-from mocapflow_twist import solve
+from mocapflow_twist import steps
 from mocapflow_twist.constraint import image_rows, line_rows
 from mocapflow_twist.covariance import covariance, effective_share, observed, view_balance
 from mocapflow_twist.motion import ClothMotion
@@ -123,23 +123,23 @@ class TwistGaussNewton(PoseSolver):
         equations = motion.within_bounds(equations, guess)
         angles = len(guess.pose.angles)
         ranges = parameter_ranges(problem.model) if problem.unknowns > 6 + angles else np.empty(0)
-        lever = solve.levers(angles, ranges)
+        lever = steps.levers(angles, ranges)
         least = max(LEAST_GAIN * equations.energy, 0.5 * problem.unknowns * self.stop_sigmas**2)
         for _ in range(TRIALS):
-            increment = solve.step(equations, lever, damping)
-            increment = solve.capped(increment, angles, np.radians(self.cap_deg), self.cap_mm / 1000)
-            if solve.gain(equations, increment) <= least:
+            increment = steps.step(equations, lever, damping)
+            increment = steps.capped(increment, angles, np.radians(self.cap_deg), self.cap_mm / 1000)
+            if steps.gain(equations, increment) <= least:
                 return guess, damping
-            trial = motion.moved(guess, solve.about_origin(problem.centre(guess), len(increment)) @ increment)
+            trial = motion.moved(guess, steps.about_origin(problem.centre(guess), len(increment)) @ increment)
             if sum(problem.energies(trial).values()) <= equations.energy:
-                return trial, solve.LOWERED * damping
-            damping = max(solve.RAISED * damping, 1e-6)
+                return trial, steps.LOWERED * damping
+            damping = max(steps.RAISED * damping, 1e-6)
         return guess, damping
 
     def _estimate(self, problem: Problem, guess: Guess, found: Quadratic, matches: Matches) -> Estimate:
         data, prior = found
         about_root = covariance(data.hessian, prior.hessian, data.energy, problem.data.measurements)
-        to_origin = solve.about_origin(problem.centre(guess), problem.unknowns)
+        to_origin = steps.about_origin(problem.centre(guess), problem.unknowns)
         return Estimate(
             pose=guess.pose,
             parameters=np.array(guess.cloth.parameters),
