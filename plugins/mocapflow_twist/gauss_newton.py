@@ -110,8 +110,9 @@ class Task(NamedTuple):
         rows = image_rows(matches, cameras)
         worn = rows.part(rows.vertex >= first, rows.weight, first)
         hessian, gradient, energy = dense_equations(worn, cloth.vertices, self._velocity(cloth))
-        pull = self.precision * self._from_calm(cloth)
-        return Equations(hessian + np.diag(self.precision), gradient + pull, energy)
+        off = self._from_calm(cloth)
+        pull = self.precision * off
+        return Equations(hessian + np.diag(self.precision), gradient + pull, energy + 0.5 * float(pull @ off))
 
     def moved(self, cloth: Cloth, equations: Equations, damping: float) -> Cloth:
         """Return the cloth after one damped step, its parameters within their bounds."""
