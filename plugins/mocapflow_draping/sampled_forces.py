@@ -18,6 +18,7 @@ from mocapflow_draping import samples
 from mocapflow_draping.outline import OutlineFitter
 
 FIRST_FRAMES = 2  # in which every direction is tried
+THICKNESS_STEP = 0.001  # m, of the refinement; half as much each round
 
 
 class SampledForces(OutlineFitter):
@@ -35,7 +36,6 @@ class SampledForces(OutlineFitter):
     directions: Annotated[int, Field(ge=2)] = 8  # tried of a force that has two components
     amounts_deg: tuple[PositiveFloat, ...] = (5.0, 10.0, 20.0)  # tried in each direction
     step_deg: PositiveFloat = 5.0  # of the refinement; half as much each round
-    step_mm: PositiveFloat = 1.0  # of the thickness, likewise
     rounds: NonNegativeInt = 3  # of the refinement
     least_gain: Annotated[float, Field(ge=0, lt=1)] = 0.01  # share of the error that another force has to save
     force_sd_deg: PositiveFloat = 6.0  # standard deviation of each force about none
@@ -80,4 +80,4 @@ class SampledForces(OutlineFitter):
                 yield partial(samples.beside, garment, columns=columns, step=np.radians(self.step_deg) / 2**k)
             if first and THICKNESS in garment.parameter_names:
                 column = garment.parameter_names.index(THICKNESS)
-                yield partial(samples.beside, garment, columns=[column], step=self.step_mm / 1000 / 2**k)
+                yield partial(samples.beside, garment, columns=[column], step=THICKNESS_STEP / 2**k)

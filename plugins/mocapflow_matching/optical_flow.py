@@ -14,7 +14,7 @@ from mocapflow.geometry import silhouettes
 from mocapflow.pooling import pool, weighted
 from mocapflow.records import F32, F64, Bool
 from mocapflow.scene import Scene
-from mocapflow_matching.carried import carried_points, distances
+from mocapflow_matching.carried import CLOTH_SHARE, carried_points, distances
 from mocapflow_matching.robust import robust_weights
 from mocapflow_matching.shape_flow import register
 from mocapflow_matching.uncertainty import contour_sigma
@@ -46,7 +46,6 @@ class OpticalFlow(Matcher):
     levels: NonNegativeInt = 3  # of the pyramid
     cloth_sigma_px_per_m: PositiveFloat = 80.0  # as for contour_icp
     image_sigma_px: PositiveFloat = 1.5  # standard deviation of a tracked point
-    cloth_share: NonNegativeFloat = 0.2  # of a point on cloth against one on skin
     scale: PositiveFloat = 2.0  # standard deviations beyond which a pair pulls no harder (Huber)
 
     def match(
@@ -66,7 +65,7 @@ class OpticalFlow(Matcher):
         matches = carried_points(frame, past, scene)
         away = distances(matches, surface, scene)
         weight = self._robust(away, np.full(len(away), self.image_sigma_px))
-        return replace(matches, weight=weight * np.where(surface.cloth[matches.vertex], self.cloth_share, 1.0))
+        return replace(matches, weight=weight * np.where(surface.cloth[matches.vertex], CLOTH_SHARE, 1.0))
 
     def registered(self, silhouette: Silhouette, surface: Surface, scene: Scene) -> Matches:
         """Return the pairs of one view by flow between distance images."""
