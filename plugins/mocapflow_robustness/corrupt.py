@@ -48,18 +48,22 @@ class Corrupt(Stage):
             raise ValueError("rectangles: [at least, at most]")
         return self
 
-    def run(self, recording: Recording) -> Recording:
-        """Return the recording as it looks when disturbed.
-
-        Raises:
-            RecordingError: an event names a camera that is not there, or wants another one where there is one.
-        """
+    def need(self, recording: Recording) -> None:
+        """Raise if an event names a camera that is not there, or wants another one where there is one."""
         names = [view.lens.name for view in recording.views]
         for view in (view for event in self.events for view in event.views):
             if view not in names:
                 raise RecordingError(f"corrupt: there is no camera '{view}'", hint=alternatives(view, names))
         if len(names) < 2 and any(event.what == "other_camera" for event in self.events):
             raise RecordingError("corrupt: there is no other camera to show", hint="choose `what: other_time`")
+
+    def run(self, recording: Recording) -> Recording:
+        """Return the recording as it looks when disturbed.
+
+        Raises:
+            RecordingError: a camera is missing, see `need`.
+        """
+        self.need(recording)
         return replace(recording, changes=(*recording.changes, Corruption(self, recording)))
 
 
