@@ -33,11 +33,11 @@ class SampledForces(OutlineFitter):
     """
 
     name: ClassVar[str] = "sampled_forces"
-    directions: Annotated[int, Field(ge=2)] = 8  # tried of a force that has two components
-    amounts_deg: tuple[PositiveFloat, ...] = (5.0, 10.0, 20.0)  # tried in each direction
-    step_deg: PositiveFloat = 5.0  # of the refinement; half as much each round
-    rounds: NonNegativeInt = 3  # of the refinement
-    least_gain: Annotated[float, Field(ge=0, lt=1)] = 0.01  # share of the error that another force has to save
+    directions: Annotated[int, Field(ge=2)] = 8  # directions that are tried of a force with two components
+    amounts_deg: tuple[PositiveFloat, ...] = (5.0, 10.0, 20.0)  # amounts that are tried in each direction
+    step_deg: PositiveFloat = 5.0  # first step of the refinement; half as much each round
+    rounds: NonNegativeInt = 3  # rounds of the refinement
+    least_gain: Annotated[float, Field(ge=0, lt=1)] = 0.01  # share of the error that other forces have to save
     force_sd_deg: PositiveFloat = 6.0  # standard deviation of each force about none
 
     def fit(

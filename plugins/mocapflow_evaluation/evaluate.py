@@ -45,7 +45,7 @@ class Evaluate(Stage):
 
     name: ClassVar[str] = "evaluate"
     reference: str = ""  # from the folder of the recording; empty: truth/angles.csv, or the one in reference/
-    longest_lag_s: PositiveFloat = LONGEST_LAG_S  # of one system behind the other, that is looked for
+    longest_lag_s: PositiveFloat = LONGEST_LAG_S  # longest lag of one system behind the other that is looked for
 
     def need(self, recording: Recording) -> None:
         """Raise if what the track will be compared with is not there, or can't be read, points of both rigs too."""

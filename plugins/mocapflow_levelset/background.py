@@ -41,7 +41,7 @@ class BackgroundDifference(ShadowAware):
     needs_background: ClassVar[bool] = True
 
     reach_px: NonNegativeFloat = 60.0  # parts further from the projected model than this are someone else; 0: keep all
-    length_weight: NonNegativeFloat = 0.5  # of the boundary's length in the refinement
+    length_weight: NonNegativeFloat = 0.5  # weight of the boundary's length in the refinement
     band_px: Annotated[float, Field(ge=8)] = 12.0  # half width of the band in which the distance is computed
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:

@@ -35,12 +35,12 @@ class Layered(LevelSet):
     """
 
     name: ClassVar[str] = "layered"
-    keep: Annotated[float, Field(ge=0, lt=1)] = 0.9  # of what is known of the colours, from frame to frame
-    calm_mm: PositiveFloat = 15.0  # change of the body in a turn below which the reach is the later one
-    first_reach_px: PositiveInt = 24  # how far along the normal the end of a part is looked for
-    later_reach_px: PositiveInt = 10  # the same once it is calm
-    least: PositiveFloat = 1.0  # mean log ratio of colours from which on a side is told from the other
-    colour_weight: NonNegativeFloat = 0.0  # of what learned colours say of person and room, beside the local statistics
+    keep: Annotated[float, Field(ge=0, lt=1)] = 0.9  # share of what is known of the colours that a frame keeps
+    calm_mm: PositiveFloat = 15.0  # change of the body in a turn below which `later_reach_px` holds
+    first_reach_px: PositiveInt = 24  # how far along the normal the end of a part is looked for at first
+    later_reach_px: PositiveInt = 10  # how far it is looked for once the body is calm
+    least: PositiveFloat = 1.0  # mean log ratio of colours from which on one side is told from the other
+    colour_weight: NonNegativeFloat = 0.0  # weight of what learned colours say, over that of the local statistics
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
         """Return the silhouettes, the inner contours, and the colours of layers for the frames to come.

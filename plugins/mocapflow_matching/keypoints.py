@@ -38,8 +38,8 @@ class Keypoints(Matcher):
 
     name = "keypoints"
     layout: Layout | None = None  # order of the keypoints; null: told by their number
-    sigma_px: PositiveFloat = 5.0  # of the estimator, where fewer than three views tell
-    least_sigma_px: PositiveFloat = 1.0  # however well the keypoints agree
+    sigma_px: PositiveFloat = 5.0  # standard deviation of a keypoint where fewer than three views tell it
+    least_sigma_px: PositiveFloat = 1.0  # least standard deviation of a keypoint, however well the views agree
     scale: PositiveFloat = 2.0  # standard deviations beyond which a keypoint pulls no harder (Huber)
 
     def need(self, recording: Recording) -> None:

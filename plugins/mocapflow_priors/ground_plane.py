@@ -19,7 +19,7 @@ class GroundPlane(Prior):
     """A soft floor at one height: the lowest point of each part of the feet is pushed up from under it."""
 
     name: ClassVar[str] = "ground_plane"
-    height_m: float = 0.0  # of the floor, world z
+    height_m: float = 0.0  # height of the floor, world z
     sd_mm: PositiveFloat = 10.0  # standard deviation of a point under the floor
     parts: tuple[str, ...] = FEET  # joints that carry the soles
 

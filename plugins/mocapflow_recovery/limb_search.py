@@ -78,28 +78,28 @@ class LimbSearch(Recovery):
 
     name: ClassVar[str] = "limb_search"
     needs_background: ClassVar[bool] = True
-    uncovered_cm2: PositiveFloat = 30.0  # of the person off the model, in all views: more, and the fit is doubted
-    floating_cm2: PositiveFloat = 30.0  # likewise, of skin in empty space
-    hint_cm2: PositiveOrInf = inf  # of the person off it by 3 cm: more, and limbs are looked for; noise has it, too
-    beginnings: bool = True  # limbs are looked for in the first frame, and in the first one after a gap
-    leap_deg: PositiveOrInf = 20.0  # from what was believed and from all `poses`: a limb so far from both is looked for
-    overbent_deg: PositiveOrInf = 5.0  # of a joint, beyond its limits: they are soft, and what is lost goes there
-    least_known: Annotated[float, Field(ge=0, le=1)] = 0.4  # of the room behind the model, mean of the views
+    uncovered_cm2: PositiveFloat = 30.0  # area of the person off the model, all views, above which the fit is doubted
+    floating_cm2: PositiveFloat = 30.0  # area of skin in empty space above which the fit is doubted
+    hint_cm2: PositiveOrInf = inf  # area of the person 3 cm off it above which limbs are looked for; noise has some
+    beginnings: bool = True  # look for limbs in the first frame, and in the first one after a gap
+    leap_deg: PositiveOrInf = 20.0  # a limb so far from what was believed and from all `poses` is looked for
+    overbent_deg: PositiveOrInf = 5.0  # a joint so far beyond its soft limits is looked for: lost limbs go there
+    least_known: Annotated[float, Field(ge=0, le=1)] = 0.4  # of the room behind the model to be known, mean of views
     gain: Annotated[float, Field(ge=0, lt=1)] = 0.1  # share that each part mends, and a fit that cures no doubt
-    tolerance: NonNegativeFloat = 0.03  # by which share a part may be farther that stays as it was fitted
+    tolerance: NonNegativeFloat = 0.03  # share by which the error may grow for parts to stay as they were fitted
     rows: Annotated[int, Field(ge=50)] = 160  # images are shrunk to about this height
-    faces: Annotated[int, Field(ge=200)] = 2600  # of the body that is searched with
+    faces: Annotated[int, Field(ge=200)] = 2600  # faces of the body that is searched with, about
     near_m: PositiveFloat = 0.35  # changes further than this from the model are somebody else
-    samples: PositiveInt = 40  # of each part in a round
-    poses: Poses = SHIPPED  # that people were seen in, made by `mocapflow prior fit`: limbs are tried as they are there
-    seen_samples: NonNegativeInt = 100  # of each limb in the first round, from `poses`
+    samples: PositiveInt = 40  # samples of each part in a round
+    poses: Poses = SHIPPED  # poses that people were seen in, made by `mocapflow prior fit`: limbs are tried as there
+    seen_samples: NonNegativeInt = 100  # samples of each limb from `poses`, in the first round
     shares: Annotated[tuple[PositiveFloat, ...], Field(min_length=1)] = (1.0, 0.6, 0.4, 0.25, 0.12)  # of the spread
-    first_looks: PositiveInt = 2  # of the first frame where its fit is doubted: each search is repeated so often
+    first_looks: PositiveInt = 2  # times that each search is repeated in a first frame whose fit is doubted
     vain_every: PositiveInt = 4  # after three searches in vain, or overbent frames, one of so many is searched at first
-    start_deg: PositiveFloat = 6.0  # how far off, in each angle, the pose may be that the first frame starts from
-    spread_deg: PositiveFloat = 25.0  # standard deviation of the first samples; less where a joint at rest hardly bends
-    root_spread_deg: PositiveFloat = 8.0  # likewise, of the root's turn
-    root_spread_m: PositiveFloat = 0.06  # likewise, of its place
+    start_deg: PositiveFloat = 6.0  # how far off, in each angle, a given first pose may be
+    spread_deg: PositiveFloat = 25.0  # standard deviation of the first samples; less where a joint hardly bends
+    root_spread_deg: PositiveFloat = 8.0  # standard deviation of the first samples of the root's orientation
+    root_spread_m: PositiveFloat = 0.06  # standard deviation of the first samples of the root's place
 
     def recover(
         self,

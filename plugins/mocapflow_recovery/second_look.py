@@ -45,7 +45,7 @@ class SecondLook(Stage):
     """
 
     name: ClassVar[str] = "second_look"
-    leap_mm: PositiveFloat = 40.0  # of a joint, from between where it is before and after: more is looked at again
+    leap_mm: PositiveFloat = 40.0  # of a joint off where it was before and will be after: more is looked at again
 
     def run(
         self,

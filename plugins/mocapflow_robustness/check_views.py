@@ -38,7 +38,7 @@ class CheckViews(Stage):
 
     name: ClassVar[str] = "check_views"
     extent: ClassVar[Literal["all"]] = "all"  # so that a longer run finds the same
-    longest_s: PositiveFloat = 0.17  # of a burst of wrong pictures
+    longest_s: PositiveFloat = 0.17  # longest burst of wrong pictures
     jump: Factor = 2.0  # how much larger than the motion around it a jump is, in the view that shows it best
 
     def run(self, recording: Recording, background: Background | None = None) -> ViewChecks:

@@ -34,7 +34,7 @@ class Denoise(Restorer):
     """
 
     name: ClassVar[str] = "denoise"
-    alike: PositiveInt = 16  # grey levels: neighbours agree that are so near in every colour
+    alike: PositiveInt = 16  # neighbours agree that differ by no more in any colour, grey levels
 
     def restore(self, image: U8) -> tuple[U8, Bool]:
         """Return an image (H, W, 3) without its noise, and where (H, W) it does not show the scene."""

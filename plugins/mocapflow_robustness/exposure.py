@@ -39,8 +39,8 @@ class Exposure(Stage):
 
     name: ClassVar[str] = "exposure"
     bright: Annotated[float, Field(gt=0, le=255)] = 215.0  # grey level that the bright parts of a picture should have
-    least_gain: Factor = 1.25  # factor of grey levels below which they stay
-    most_gain: Factor = 5.0  # factor at most: more shows noise
+    least_gain: Factor = 1.25  # smallest factor of grey levels that is worth a correction
+    most_gain: Factor = 5.0  # largest factor: more shows noise
     tinged: Factor = 2.0  # ratio of the brightest to the darkest colour of the bright parts: more is a tinge
     tolerance: Annotated[float, Field(ge=0, lt=1)] = 0.02  # share by which a frame may be brighter or darker
 

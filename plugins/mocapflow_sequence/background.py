@@ -46,7 +46,7 @@ class EmptyScene(Stage):
     extent: ClassVar[Literal["first"]] = "first"  # that of the `Start`; pictures come from all over the recording
     source: Literal["auto", "plates", "recording"] = "auto"  # auto: the plates where there are any
     samples: Annotated[int, Field(ge=3)] = 50  # pictures of each camera that are looked at
-    least_share: Annotated[float, Field(ge=0, le=1)] = 0.06  # of them: a colour seen in fewer may be anything
+    least_share: Annotated[float, Field(ge=0, le=1)] = 0.06  # share of them that has to show a colour
 
     def need(self, recording: Recording) -> None:
         """Raise if plates are wanted and missing, or if a camera lacks one though others have theirs."""

@@ -46,9 +46,9 @@ class GaussNewton(ClothFitter):
     name: ClassVar[str] = "gauss_newton"
     iterations: PositiveInt = 3  # steps, at most
     sigma_px: PositiveFloat = 3.0  # standard deviation of the outline of cloth
-    correlation_px: PositiveFloat = 15.0  # length over which its errors agree
+    correlation_px: PositiveFloat = 15.0  # length over which the outline's errors agree
     cloth_sd: PositiveFloat = 0.15  # standard deviation of each parameter about a calm garment, share of its range
-    damping: PositiveFloat = 1e-3  # share of the mean diagonal
+    damping: PositiveFloat = 1e-3  # first damping, share of the mean diagonal
     spacing_px: PositiveFloat = 4.0  # between the points of the outline
 
     def fit(

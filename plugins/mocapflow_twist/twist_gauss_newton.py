@@ -34,24 +34,24 @@ class TwistGaussNewton(PoseSolver):
 
     name = "twist_gauss_newton"
 
-    iterations: PositiveInt = 10  # times that it matches anew, at most
-    far_iterations: NonNegativeInt = 0  # the same, if it is more, in a frame that begins far off
-    steps_per_match: PositiveInt = 1  # steps with the same pairs
-    residual: Literal["image", "line"] = "image"  # pixels, or distance to projection rays in space
-    line_sigma_mm: PositiveFloat = 3.0  # standard deviation of the distance to a ray, of a match known to 1 px
-    damping: NonNegativeFloat = 1e-4  # share of the mean diagonal; ten times more after a worse step
-    damping_per_turn: PositiveFloat = 1.0  # factor at each turn of the loop: above 1, exact then gentle
-    first_damping: NonNegativeFloat = 0.0  # of the first frame's first turn at least: its start is far off
-    cap_deg: PositiveFloat = 10.0  # a step, each angle
-    cap_mm: PositiveFloat = 100.0  # a step, the root
+    iterations: PositiveInt = 10  # times that matches are found anew, at most
+    far_iterations: NonNegativeInt = 0  # stands for iterations, if more, in a frame that begins far off
+    steps_per_match: PositiveInt = 1  # steps with the same matches
+    residual: Literal["image", "line"] = "image"  # distances in pixels, or to projection rays in space
+    line_sigma_mm: PositiveFloat = 3.0  # line: standard deviation of the distance to a ray, of a match known to 1 px
+    damping: NonNegativeFloat = 1e-4  # least damping, share of the mean diagonal; ten times more after a worse step
+    damping_per_turn: PositiveFloat = 1.0  # factor on it at each turn of the loop: above 1, first exact, then gentle
+    first_damping: NonNegativeFloat = 0.0  # least damping in the first turn of a first frame, whose start is far off
+    cap_deg: PositiveFloat = 10.0  # largest change of an angle, and turn of the root, in a step
+    cap_mm: PositiveFloat = 100.0  # largest shift of the root in a step
     correlation_px: NonNegativeFloat = 15.0  # length over which contour errors agree; 0: independent
-    balance_views: bool = False  # every view counts the same
+    balance_views: bool = False  # gives every view the same weight
     cloth_unknowns: bool = False  # also solves for the cloth parameters
-    root_sd_m: PositiveFloat = 0.1  # standard deviation about the pose that a turn of the loop begins from
-    root_sd_deg: PositiveFloat = 11.5  # likewise
-    angle_sd_deg: PositiveFloat = 60.0  # likewise, of every joint angle
+    root_sd_m: PositiveFloat = 0.1  # standard deviation of the root's place about where the turn of the loop began
+    root_sd_deg: PositiveFloat = 11.5  # standard deviation of its orientation about where the turn of the loop began
+    angle_sd_deg: PositiveFloat = 60.0  # standard deviation of joint angles about where the turn of the loop began
     cloth_sd: PositiveFloat = 0.06  # standard deviation of cloth parameters about a calm garment, share of their range
-    stop_sigmas: NonNegativeFloat = 0.02  # standard deviations, in the mean: no smaller step is taken
+    stop_sigmas: NonNegativeFloat = 0.02  # smaller steps are not taken; standard deviations, RMS over the unknowns
 
     def solve(
         self,
