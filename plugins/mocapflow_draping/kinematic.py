@@ -78,7 +78,7 @@ class Kinematic(Draper):
         winds = tilts(garment, parameters, strands.azimuth)
         first = np.broadcast_to(strands.first, (len(source), len(strands.first)))
         if self.rule == "literal":
-            grid, first = self._step(fitting, chain, source, parameters, garment, skin, links, parts)
+            grid, first = self._literal(fitting, chain, source, parameters, garment, skin, links, parts)
         elif strands.rides:
             grid = riding(strands, chain[source], links[source], *winds)
             free_roots(grid, strands.first, strands.last, parts[source], fitting.fields.values, None)
@@ -141,7 +141,7 @@ class Kinematic(Draper):
         """Return what is measured once per garment and body."""
         return _measured(body, garment, self.voxel_m)
 
-    def _step(
+    def _literal(
         self,
         fitting: Fitting,
         chain: F64,
@@ -152,7 +152,7 @@ class Kinematic(Draper):
         links: F64,
         parts: F64,
     ) -> tuple[F64, I32]:
-        """Return the particles (B, N, L, 3) m, and the rows (B, N) that the free ends of the strands hang from."""
+        """Return particles (B, N, L, 3) m as the chapter lays them, and the rows (B, N) that free ends hang from."""
         from mocapflow_draping.literal import blow_in_steps, settle_in_steps
 
         strands, values = fitting.strands, fitting.fields.values

@@ -25,7 +25,7 @@ class SampledForces(OutlineFitter):
     """Tries directions and amounts of every force and refines the best, one force after the other.
 
     Later frames try only calm cloth, so that a search that was led astray comes back, and around the last best. Each
-    force is held about none: where strands lie on the body none of them shows, and any would do. Beyond one standard
+    force is held near zero: where strands lie on the body a force does not show, and any would do. Beyond one standard
     deviation an error counts by its distance, not its square: no force lifts a hem that hangs too low, and a narrower
     skirt would pay for it. The thickness of a cloth does not change: it is searched for in the first frames and kept.
 
@@ -38,7 +38,7 @@ class SampledForces(OutlineFitter):
     step_deg: PositiveFloat = 5.0  # first step of the refinement; half as much each round
     rounds: NonNegativeInt = 3  # rounds of the refinement
     least_gain: Annotated[float, Field(ge=0, lt=1)] = 0.01  # share of the error that other forces have to save
-    force_sd_deg: PositiveFloat = 6.0  # standard deviation of each force about none
+    force_sd_deg: PositiveFloat = 6.0  # standard deviation of each force about zero
 
     def fit(
         self, frame: Frame, segmentation: Segmentation, estimate: Estimate, model: ClothedModel, past: Past, turn: Turn

@@ -75,8 +75,8 @@ class LevelSet(ShadowAware):
         """Return the person's silhouette in each usable view.
 
         The first turn starts from the projected model, later turns from the last turn's silhouettes. Where the model's
-        outline has hardly moved they would stay as they are, and are not looked at; in a frame that began far off,
-        from the third turn on: the contour may have had farther to go than its steps reached.
+        outline has hardly moved these stay as they are; in a frame that began far off only from the third turn on, for
+        the contour may have had farther to go than its steps reached.
         """
         surface = scene.surface(state.estimate.pose, state.cloth)
         # a view in which nobody was begins anew from the model, which may stand in it by now

@@ -52,28 +52,34 @@ class LimbSearch(Recovery):
     """Compares the fitted model with what the images surely show, which does not depend on the model.
 
     A level set that starts from the model can't find a limb the model has lost, so the two agree in their error.
-    Where large parts of person and model lie far apart, the best is taken of the fitted pose, the one that was believed
-    before, that of the frame before, and poses that people were seen in. Around it poses are sampled part by part, and
-    limbs as people were seen to hold them; then around that of the frame before, where trunk and legs have not yet gone
-    astray together. A part moves only if that brings what strays together: a leg must not take a new place under the
-    skirt because an arm was lost. The loop settles again from there.
+
+    Where large parts of person and model lie far apart, the search begins at the best of the fitted pose, the one that
+    was believed before, that of the frame before, and poses that people were seen in. Around it poses are sampled part
+    by part, limbs also as people were seen to hold them. A second search begins at the pose of the frame before, in
+    which trunk and legs have not yet gone astray together. A part moves only if that brings what strays together: a leg
+    must not take a new place under the skirt because an arm was lost. The loop settles again from what is found.
+
     It also looks where images need not contradict a limb that is elsewhere: in the first frame and after frames that
     did not show the person, where a leg may rest on the contour of the other one and a foot lie turned in its own;
     where a joint is bent beyond its limits; where a little of the person is off the model, if `hint_cm2` says so; and
     where a limb has leapt into a pose that nobody was seen in. There a part moves only if that brings person and model
-    together.
+    together. A joint bent too far, and a limb that leapt, are looked for alone: nothing is known against the others.
+
     The first frame starts from a pose that was given and is about right (`start_deg`). So it is searched near that one
-    first, and of two poses that fit alike the nearer one is taken: crossed legs look the same exchanged. Where its fit
-    is doubted, the pose is also tried turned round: a standing person looks much the same from behind.
-    What shows the garment's colours calls for a search where it strays, but moves no part and is no doubt: it may fly.
-    So it is searched twice, once as if cloth lay where the body holds it, which tells of legs that nobody sees, once as
-    if it flew, which leads none astray; the fit that agrees better by what is skin, and a little by cloth, is taken.
-    A joint bent too far, and a limb that leapt, are looked for alone: nothing is known against the others.
+    first, and of two poses that fit alike the nearer one is taken: crossed legs look the same when exchanged. If its
+    fit is doubted, the pose is also tried turned round: a standing person looks much the same from behind.
+
+    Cloth that strays, as its colours tell, calls for a search, but moves no part and raises no doubt: it may fly. So
+    the search is made twice: as if cloth lay where the body holds it, which tells of legs that nobody sees, and as if
+    it flew, which leads no leg astray. The fit that agrees better is taken, by skin above all.
+
     A doubt that lasts is mostly one about the room, and a joint that stays beyond its limits can be bent so far: such
-    frames are searched now and then only (`vain_every`), of a doubt that stays the same ever more rarely.
-    Where the first frame shows feet that look like a floor without colours, white socks on white, later frames do not
-    match them: the outline ends above them, and would draw them up.
-    It needs the empty scene; where little of it is known behind the person every fit is taken as it is.
+    frames are searched only now and then (`vain_every`), and ever more rarely while a doubt stays the same.
+
+    If the first frame shows feet that look like a floor without colours, such as white socks on white, later frames do
+    not match them: the outline ends above them, and would draw them up.
+
+    It needs the empty scene; where little of it is known behind the person, every fit is taken as it is.
     """
 
     name: ClassVar[str] = "limb_search"

@@ -39,7 +39,7 @@ def untold(surface: Surface, seen: Sequence[View], body: Body) -> dict[str, floa
 
 
 def like_the_floor(surface: Surface, seen: Sequence[View], body: Body) -> Bool:
-    """Return which vertices (V,) of the body move with feet that look like the room in all views: of both, or none."""
+    """Return the vertices (V,) that move with the feet of a body if both look like the room in all views, or none."""
     of_feet = np.array([name.rpartition("_")[0] in FOOT for name in body.joint_names])
     feet, moved = of_feet[body.main_joint], (of_feet[body.skin_joint] * body.skin_weight).sum(axis=1) > CARRIES
     return moved if feet.any() and _told(surface, seen, body)[feet].mean() < LEAST_OF_FEET else np.zeros_like(moved)

@@ -31,9 +31,9 @@ class CheckViews(Stage):
     and comes back within a few frames is no motion. The track goes without these pictures and says so. What stays
     unnoticed: another moment that differs little from the true one or lasts long, and a repeated picture in all views.
 
-    Of a camera that was knocked meanwhile the track sees the pictures moved back. How it stands is compared with the
-    empty scene every two seconds, and frame by frame between two of these frames that differ: one that is put back at
-    once stays unnoticed.
+    If a camera is knocked during the recording, the track sees its pictures moved back. How it stands is compared with
+    the empty scene every two seconds, and frame by frame between two such frames that differ: a camera that is put back
+    at once stays unnoticed.
     """
 
     name: ClassVar[str] = "check_views"

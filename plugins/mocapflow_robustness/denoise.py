@@ -27,9 +27,9 @@ class Denoise(Restorer):
 
     Random colours do not agree, so an intact pixel is known by its company however few are left: of 60 % noise, ten in
     a neighbourhood of 25 agree. Nothing is averaged over time or over colours that are right, so thin limbs stay sharp
-    however fast they move. Where a picture full of noise has none, it does not show the scene, nor where all that noise
-    left in a large square has one colour to the last grey level, as little but a blank wall has. What so has been
-    put before the scene (rectangles, stripes, a logo) is hidden and counts neither way. A picture without noise stays
+    however fast they move. Where a picture full of noise has none, it does not show the scene; nor where all intact
+    pixels of a large square have one colour to the last grey level, as little but a blank wall has. What is put before
+    the scene in this way (rectangles, stripes, a logo) is hidden and counts neither way. A picture without noise stays
     as it is.
     """
 

@@ -30,11 +30,11 @@ BLACK = 30  # grey level; a picture without a brighter pixel shows nothing
 class Exposure(Stage):
     """Corrects cameras that are set badly, and pictures that are not as bright as others of their camera.
 
-    What tells a person from the room is said in shares of the range of grey levels, as well exposed pictures use it.
-    So frames and plates of a camera that shows all too dark, or in one colour, have their levels multiplied, of each
-    colour by one factor in all pictures, so far as the brightest parts allow; of other cameras they stay. A frame that
-    is brighter or darker than the first ones, all over or more at one side, for the sun comes out, a lamp goes out or a
-    camera sets itself, becomes as bright as they. It has to stand before all stages that change pictures.
+    What tells a person from the room is stated in shares of the range of grey levels, which well exposed pictures fill.
+    So if a camera shows everything too dark, or tinged, the levels of each colour are multiplied by one factor in all
+    its frames and plates, as far as the brightest parts allow; other cameras keep theirs. A frame that is brighter or
+    darker than the first ones, all over or more at one side (the sun comes out, a lamp goes out, a camera adjusts
+    itself), is made as bright as they are. The stage has to stand before all stages that change pictures.
     """
 
     name: ClassVar[str] = "exposure"

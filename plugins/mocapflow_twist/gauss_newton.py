@@ -38,7 +38,7 @@ TRIALS = 4  # times that the damping is raised before a step is given up
 class GaussNewton(ClothFitter):
     """Moves the outline of the cloth onto the silhouettes by its forces.
 
-    Each force is held about none. The thickness, which moves the outline by less than a pixel, and the take-up are left
+    Each force is held near zero. The thickness, which moves the outline by less than a pixel, and the take-up are left
     as they are. `cloth_unknowns` of twist_gauss_newton solves for the same parameters together with the pose, and from
     matches; this fitter alternates with the pose, and reads the distance fields.
     """
