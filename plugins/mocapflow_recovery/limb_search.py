@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from math import inf
@@ -30,7 +30,7 @@ from mocapflow_recovery.judge import Fit, Given, Judge, stray_of, surface_of
 from mocapflow_recovery.looks import Looks
 from mocapflow_recovery.sampling import Plan, Spread
 from mocapflow_recovery.suspicion import Signs, Suspicion, suspicion
-from mocapflow_recovery.told import hidden_legs, like_the_floor, untold
+from mocapflow_recovery.told import like_the_floor, warn_of_furniture, warn_of_untold
 from mocapflow_recovery.vain import counted, forgotten, in_turn, vain_before
 
 LOG = logging.getLogger("mocapflow")
@@ -38,10 +38,6 @@ CURED = 2.0  # times as far apart may be what is doubted no more: a leg lay wher
 CLEARED = 1.1  # the same, what leaves no hint: of a foot that was lost all other limbs and the cloth tell nothing
 UNKNOWN = "too little is known of the room behind the person: limbs that are lost are not looked for"
 FEET_UNTOLD = "the feet look like the floor: outlines are not compared with them, and ankles are unsure"
-HIDDEN = (
-    "%s shows the empty room where the first pose and the other views have the leg from %s on:"
-    " if something stands before it, paint that white in occluders/%s.png; else mend the first pose"
-)
 UNSEARCHED = "fit doubted as in frames before: not searched again yet"
 UNSEEN = "fit doubted: no picture tells person from room where it lies"
 Settle = Callable[[Pose, F64], FrameResult]  # from a pose, with cloth parameters
@@ -153,8 +149,9 @@ class LimbSearch(Recovery):
         if np.mean([view.known for view in seen]) < self.least_known:
             return result if past.moments else noted(result, UNKNOWN, doubted=False)
         if not past.moments:
-            self._warn(untold(surface, seen, model.scene.body))
-            self._warn_of_furniture(frame, state, past, model.scene)
+            given = model.scene.surface(state.estimate.pose, state.cloth)
+            warn_of_untold(surface, seen, model.scene.body)
+            warn_of_furniture(given, self.views(frame, given, past, model.scene), model.scene.body)
         stray = stray_of(surface, model.scene, seen)
         fitted, believed, body = result.state.estimate.pose, state.estimate.pose, model.scene.body
         suspected = suspicion(self.signs, stray, fitted, believed, past, body, self._density)
@@ -169,15 +166,6 @@ class LimbSearch(Recovery):
         looks = Looks(judge, self._plan(body), believed, fitted, self.gain, self.tolerance)
         found = self._searched(frame.index, judge.of(result), looks, suspected, settle)
         return counted(found, result, stray.area, past)
-
-    def _warn(self, limbs: Mapping[str, float]) -> None:
-        for joint, share in limbs.items():
-            LOG.warning(f"from {joint} on only {share:.0%} differ from the room: this limb may be lost unnoticed")
-
-    def _warn_of_furniture(self, frame: Frame, state: FrameState, past: Past, scene: Scene) -> None:
-        surface = scene.surface(state.estimate.pose, state.cloth)
-        for camera, joints in hidden_legs(surface, self.views(frame, surface, past, scene), scene.body).items():
-            LOG.warning(HIDDEN, camera, " and ".join(joints), camera)
 
     def views(self, frame: Frame, surface: Surface, past: Past, scene: Scene) -> list[View]:
         """Return what the views of a frame surely show around a surface, in a scene whose empty room is known."""
