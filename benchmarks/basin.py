@@ -23,7 +23,7 @@ from mocapflow_priors.joint_limits import JointLimits
 from mocapflow_priors.rest_pose import RestPose
 from mocapflow_priors.spine_coupling import SpineCoupling
 from mocapflow_recovery.limb_search import LimbSearch
-from mocapflow_twist.solver import TwistGaussNewton
+from mocapflow_twist.twist_gauss_newton import TwistGaussNewton
 
 from mocapflow.assets import Background
 from mocapflow.components import Matcher, Recovery, Segmenter

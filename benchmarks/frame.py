@@ -25,7 +25,7 @@ from mocapflow_levelset import levelset
 from mocapflow_matching.containment import Containment
 from mocapflow_matching.contour_icp import ContourIcp
 from mocapflow_twist.problem import Problem
-from mocapflow_twist.solver import TwistGaussNewton
+from mocapflow_twist.twist_gauss_newton import TwistGaussNewton
 
 from mocapflow import hookimpl, load_pipeline, load_registry
 from mocapflow.data import FrameResult, PoseBatch

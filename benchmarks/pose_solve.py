@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 from mocapflow_bodies.scanned import Scanned
-from mocapflow_twist import normal_equations, solve
+from mocapflow_twist import normal_equations, steps
 from mocapflow_twist.constraint import Rows, image_rows
 from scipy.optimize import least_squares
 
@@ -76,7 +76,7 @@ def thirty_angles(body: Body, rigid: bool) -> Body:
 
 def apply(pose: Pose, increment: F64) -> Pose:
     """The pose after an increment about its root."""
-    return moved(pose, solve.about_origin(pose.root[:3, 3], len(increment)) @ increment)
+    return moved(pose, steps.about_origin(pose.root[:3, 3], len(increment)) @ increment)
 
 
 def errors(task: Task, pose: Pose) -> F64:
@@ -104,10 +104,10 @@ def jacobian(task: Task, pose: Pose) -> tuple[F64, F64]:
 
 def ours(task: Task) -> Callable[[Pose], F64]:
     """One step as the solver takes it: normal equations, damping, solution."""
-    lever = solve.levers(ANGLES, np.empty(0))
+    lever = steps.levers(ANGLES, np.empty(0))
 
     def step(pose: Pose) -> F64:
-        return solve.step(normal_equations.body_equations(task.rows, task.body, pose), lever, 1e-9)
+        return steps.step(normal_equations.body_equations(task.rows, task.body, pose), lever, 1e-9)
 
     return step
 
@@ -120,8 +120,8 @@ def with_numpy(task: Task) -> Callable[[Pose], F64]:
     return step
 
 
-def descend(step: Callable[[Pose], F64], start: Pose, steps: int = 12) -> Pose:
-    for _ in range(steps):
+def descend(step: Callable[[Pose], F64], start: Pose, count: int = 12) -> Pose:
+    for _ in range(count):
         start = apply(start, step(start))
     return start
 
@@ -176,12 +176,12 @@ def compare(rigid: bool) -> None:
         apart = np.abs(pose.angles - best.angles).max()
         print(f"{name:42}{ms:10.3f}{ms / slowest:10.5f}{apart:12.1e}")
     equations = normal_equations.body_equations(task.rows, task.body, task.start)
-    lever = solve.levers(ANGLES, np.empty(0))
+    lever = steps.levers(ANGLES, np.empty(0))
     few = task.rows.part(np.arange(ROWS) < 1, task.rows.weight)
     parts: dict[str, Callable[[], object]] = {
         "of which normal equations": lambda: normal_equations.body_equations(task.rows, task.body, task.start),
         "  of them with one row": lambda: normal_equations.body_equations(few, task.body, task.start),
-        "of which solution": lambda: solve.step(equations, lever, 1e-4),
+        "of which solution": lambda: steps.step(equations, lever, 1e-4),
         "energy at fixed matches": lambda: normal_equations.body_energy(task.rows, task.body, task.start),
     }
     for name, part in parts.items():

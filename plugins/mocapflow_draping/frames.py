@@ -13,7 +13,7 @@ DOWN = np.array([0.0, 0.0, -1.0])
 def standing_out(strands: Strands, chain: F64) -> F64:
     """Return the horizontal unit directions (B, N, 3) in which strands stand out, at posed joints (B, J, 4, 4).
 
-    On top of a trunk that leans far over what faces up lies along it, towards the legs.
+    Where the trunk leans so far over that a strand would face up, it lies along the trunk instead, towards the legs.
     """
     turned = chain[:, strands.carrier, :3, :3]
     facing = np.einsum("bnij,nj->bni", turned, strands.facing)

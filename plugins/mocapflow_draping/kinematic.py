@@ -49,18 +49,18 @@ class Kinematic(Draper):
     name: ClassVar[str] = "kinematic"
     skin_m: NonNegativeFloat = 0.005  # room between skin and cloth of no thickness
     voxel_m: PositiveFloat = 0.010  # edge of a voxel of the body's distance fields
-    start_deg: Annotated[float, Field(gt=0, lt=180)] = 95.0  # hanging: from straight down, as it begins to fall
+    start_deg: Annotated[float, Field(gt=0, lt=180)] = 95.0  # hanging: from straight down, before strands fall
     rule: Literal["contact", "literal"] = "contact"  # from contact to contact; or in steps, as printed, a wind alone
-    step_deg: PositiveFloat = 2.0  # literal: of one iteration
-    iterations: PositiveInt = 50  # literal
+    step_deg: PositiveFloat = 2.0  # literal: how far a particle turns in an iteration
+    iterations: PositiveInt = 50  # literal: number of iterations
     limited: bool = False  # literal: stop at straight down instead of swinging about it
     pivot: Literal["strand", "space"] = "strand"  # literal: where the nearest fixed point is looked for
-    sweeps: NonNegativeInt = 40  # of the rings, at most, per row; 0 leaves them as they fell
-    longest: Annotated[float, Field(ge=1)] = 1.0  # of a ring link, over its rest length
+    sweeps: NonNegativeInt = 40  # passes over the rings of each row, at most; 0 leaves rings as they fell
+    longest: Annotated[float, Field(ge=1)] = 1.0  # largest length of a ring link over its rest length
     stiff: Annotated[float, Field(ge=0, le=1)] = 0.3  # how much a ring resists being shortened
-    bending_m: NonNegativeFloat = 0.06  # hanging: along which a strand takes up a new direction
+    bending_m: NonNegativeFloat = 0.06  # hanging: length along which a strand takes up a new direction
     hold_deg: Annotated[float, Field(gt=0, le=180)] = 45.0  # hanging: off the limb under it, before cloth sinks
-    slips: Annotated[float, Field(gt=0, le=1)] = 0.3  # hanging: how much it gives way to what hangs beside it
+    slips: Annotated[float, Field(gt=0, le=1)] = 0.3  # hanging: how much what lies gives way to what hangs beside it
 
     def drape(self, poses: PoseBatch, parameters: F64, past: Past, scene: Scene) -> F64:
         """Return cloth vertices (B, W, 3) m in the world for B poses and parameters (B, Q)."""
@@ -78,7 +78,7 @@ class Kinematic(Draper):
         winds = tilts(garment, parameters, strands.azimuth)
         first = np.broadcast_to(strands.first, (len(source), len(strands.first)))
         if self.rule == "literal":
-            grid, first = self._step(fitting, chain, source, parameters, garment, skin, links, parts)
+            grid, first = self._literal(fitting, chain, source, parameters, garment, skin, links, parts)
         elif strands.rides:
             grid = riding(strands, chain[source], links[source], *winds)
             free_roots(grid, strands.first, strands.last, parts[source], fitting.fields.values, None)
@@ -141,7 +141,7 @@ class Kinematic(Draper):
         """Return what is measured once per garment and body."""
         return _measured(body, garment, self.voxel_m)
 
-    def _step(
+    def _literal(
         self,
         fitting: Fitting,
         chain: F64,
@@ -152,7 +152,7 @@ class Kinematic(Draper):
         links: F64,
         parts: F64,
     ) -> tuple[F64, I32]:
-        """Return the particles (B, N, L, 3) m, and the rows (B, N) that the free ends of the strands hang from."""
+        """Return particles (B, N, L, 3) m as the chapter lays them, and the rows (B, N) that free ends hang from."""
         from mocapflow_draping.literal import blow_in_steps, settle_in_steps
 
         strands, values = fitting.strands, fitting.fields.values

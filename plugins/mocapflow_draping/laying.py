@@ -36,9 +36,9 @@ class Laid(NamedTuple):
 
 
 def distinct(poses: PoseBatch, skin: F64, length: F64) -> tuple[I32, I32]:
-    """Return the rows (D,) of different neighbours in a batch of B poses with contact distances and lengths of cloth.
+    """Return which rows (D,) of a batch are unlike the row before, and the run (B,) that each row belongs to.
 
-    And which of these each is: (B,).
+    The rows of a run have the same pose, contact distance and length of cloth: strands fall once for all of them.
     """
     known = np.concatenate([poses.root.reshape(len(skin), -1), poses.angles, skin[:, None], length[:, None]], axis=1)
     new = np.append(True, np.any(known[1:] != known[:-1], axis=1))

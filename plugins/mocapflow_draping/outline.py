@@ -19,7 +19,7 @@ class OutlineFitter(ClothFitter):
     """A cloth fitter that tries other drapes at one pose: it sums up how far the outline of each is off."""
 
     sigma_mm: PositiveFloat = 15.0  # standard deviation of the outline of draped cloth
-    correlation_m: PositiveFloat = 0.3  # length over which its errors agree: half a skirt
+    correlation_m: PositiveFloat = 0.3  # length over which the outline's errors agree: half a skirt
     spacing_px: PositiveFloat = 4.0  # between the points of the outline that are compared
 
     def outline_error(

@@ -18,13 +18,14 @@ from mocapflow_draping import samples
 from mocapflow_draping.outline import OutlineFitter
 
 FIRST_FRAMES = 2  # in which every direction is tried
+THICKNESS_STEP = 0.001  # m, of the refinement; half as much each round
 
 
 class SampledForces(OutlineFitter):
     """Tries directions and amounts of every force and refines the best, one force after the other.
 
     Later frames try only calm cloth, so that a search that was led astray comes back, and around the last best. Each
-    force is held about none: where strands lie on the body none of them shows, and any would do. Beyond one standard
+    force is held near zero: where strands lie on the body a force does not show, and any would do. Beyond one standard
     deviation an error counts by its distance, not its square: no force lifts a hem that hangs too low, and a narrower
     skirt would pay for it. The thickness of a cloth does not change: it is searched for in the first frames and kept.
 
@@ -32,13 +33,12 @@ class SampledForces(OutlineFitter):
     """
 
     name: ClassVar[str] = "sampled_forces"
-    directions: Annotated[int, Field(ge=2)] = 8  # tried of a force that has two components
-    amounts_deg: tuple[PositiveFloat, ...] = (5.0, 10.0, 20.0)  # tried in each direction
-    step_deg: PositiveFloat = 5.0  # of the refinement; half as much each round
-    step_mm: PositiveFloat = 1.0  # of the thickness, likewise
-    rounds: NonNegativeInt = 3  # of the refinement
-    least_gain: Annotated[float, Field(ge=0, lt=1)] = 0.01  # share of the error that another force has to save
-    force_sd_deg: PositiveFloat = 6.0  # standard deviation of each force about none
+    directions: Annotated[int, Field(ge=2)] = 8  # directions that are tried of a force with two components
+    amounts_deg: tuple[PositiveFloat, ...] = (5.0, 10.0, 20.0)  # amounts that are tried in each direction
+    step_deg: PositiveFloat = 5.0  # first step of the refinement; half as much each round
+    rounds: NonNegativeInt = 3  # rounds of the refinement
+    least_gain: Annotated[float, Field(ge=0, lt=1)] = 0.01  # share of the error that other forces have to save
+    force_sd_deg: PositiveFloat = 6.0  # standard deviation of each force about zero
 
     def fit(
         self, frame: Frame, segmentation: Segmentation, estimate: Estimate, model: ClothedModel, past: Past, turn: Turn
@@ -80,4 +80,4 @@ class SampledForces(OutlineFitter):
                 yield partial(samples.beside, garment, columns=columns, step=np.radians(self.step_deg) / 2**k)
             if first and THICKNESS in garment.parameter_names:
                 column = garment.parameter_names.index(THICKNESS)
-                yield partial(samples.beside, garment, columns=[column], step=self.step_mm / 1000 / 2**k)
+                yield partial(samples.beside, garment, columns=[column], step=THICKNESS_STEP / 2**k)

@@ -29,8 +29,8 @@ class TakeUp(OutlineFitter):
 
     name: ClassVar[str] = "take_up"
     take_up_sd: PositiveFloat = 0.05  # standard deviation of its change in a second, share of a strand's length
-    every_s: PositiveFloat = 0.1  # between two steps; where frames are farther apart, each takes one
-    step: PositiveFloat = 0.01  # to either side, of the three drapes that are compared
+    every_s: PositiveFloat = 0.1  # time between two steps; where frames are farther apart, each takes one
+    step: PositiveFloat = 0.01  # between the three take-ups that are compared, share of a strand's length
 
     def fit(
         self, frame: Frame, segmentation: Segmentation, estimate: Estimate, model: ClothedModel, past: Past, turn: Turn

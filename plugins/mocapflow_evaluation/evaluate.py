@@ -18,10 +18,11 @@ from mocapflow.scene import Scene
 from mocapflow_evaluation import compare, comparison_plots, cycles, findings, ours
 from mocapflow_evaluation.alignment import align, at_our_frames
 from mocapflow_evaluation.cycles import Cycle
-from mocapflow_evaluation.keypoint_reference import low_pass, write_triangulated
+from mocapflow_evaluation.keypoint_reference import low_pass, with_keypoints, write_triangulated
 from mocapflow_evaluation.ours import Ours
 from mocapflow_evaluation.references import SUFFIXES, read_reference
 from mocapflow_evaluation.rigs import COMMON_POINTS, compare_rigs
+from mocapflow_evaluation.stick import between_points
 
 LONGEST_LAG_S = 0.5  # s
 Row = Mapping[str, float | str]
@@ -44,13 +45,19 @@ class Evaluate(Stage):
 
     name: ClassVar[str] = "evaluate"
     reference: str = ""  # from the folder of the recording; empty: truth/angles.csv, or the one in reference/
-    longest_lag_s: PositiveFloat = LONGEST_LAG_S  # of one system behind the other, that is looked for
+    longest_lag_s: PositiveFloat = LONGEST_LAG_S  # longest lag of one system behind the other that is looked for
 
     def need(self, recording: Recording) -> None:
-        """Raise if what the track will be compared with is not there, or can't be read."""
+        """Raise if what the track will be compared with is not there, or can't be read, points of both rigs too."""
         path, _ = chosen(recording.folder, self.reference)
-        if path is not None and not path.is_dir():
-            read_reference(path)
+        if path is None:
+            return
+        if path.is_dir():
+            with_keypoints(recording, path)
+            return
+        reference, common_points = read_reference(path), path.parent / COMMON_POINTS
+        if reference.joints is not None and common_points.is_file():
+            between_points(common_points)
 
     def run(
         self,

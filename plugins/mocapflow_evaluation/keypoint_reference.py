@@ -13,6 +13,7 @@ from mocapflow_fitting.detections import layout as names_of
 from mocapflow_fitting.detections import persons
 
 from mocapflow.assets import Camera
+from mocapflow.errors import RecordingError
 from mocapflow.io import folders, markers
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
@@ -22,6 +23,19 @@ LOG = logging.getLogger("mocapflow")
 CUT_OFF_HZ = 6.0
 ORDER = 4  # of both passes together
 MARGIN_S = 1.0  # s, looked at on both sides of the wanted frames: there the filter runs in
+
+
+def with_keypoints(recording: Recording, place: Path) -> Recording:
+    """Return a recording with the keypoints of a folder like its own keypoints/.
+
+    Raises:
+        RecordingError: there are none of two cameras.
+    """
+    found = tuple(folders.keypoint_folder(place, camera.name) for camera in recording.cameras)
+    if len(found) - found.count(None) < 2:
+        hint = f"expected {place.name}/{recording.cameras[0].name}_json/*.json as OpenPose writes them"
+        raise RecordingError("there are no 2D keypoints of two cameras or more", where=str(place), hint=hint)
+    return replace(recording, keypoint_folders=found)
 
 
 def write_triangulated(
@@ -39,8 +53,7 @@ def write_triangulated(
     Raises:
         RecordingError: there are no keypoints of two cameras, or in no frame two cameras see the same person.
     """
-    found = tuple(folders.keypoint_folder(place, camera.name) for camera in cameras)
-    recording = replace(recording, keypoint_folders=found)
+    recording = with_keypoints(recording, place)
     margin = round(MARGIN_S * recording.frame_rate)
     first, after = max(0, recording.indices[0] - margin), min(recording.length, recording.indices[-1] + 1 + margin)
     people = persons(recording, range(first, after), cameras, checks)

@@ -29,7 +29,7 @@ class Ours:
     columns: Mapping[str, F64]  # of angles.csv, and the signed angles of the knees
     raw: Mapping[str, F64]  # the same before smoothing
     stick: Stick
-    flagged_share: float = np.nan  # of the frames, those lost, doubted or not at rest; NaN where no run tells
+    flagged_share: float = np.nan  # of the frames that are lost, doubted or not at rest; NaN where no run tells
 
     @property
     def frame_rate(self) -> float:

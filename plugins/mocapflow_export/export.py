@@ -12,7 +12,7 @@ from mocapflow.recordings.recording import Recording
 from mocapflow.results import Files, RunFolder, Track, ViewChecks
 from mocapflow.scene import Scene
 from mocapflow_export import layout, runjson, tables
-from mocapflow_export.formats import Result, write
+from mocapflow_export.formats import Result, need_packages, write
 from mocapflow_export.misgivings import misgivings
 from mocapflow_export.uncertainty import measured
 
@@ -25,6 +25,11 @@ class WriteFormats(Stage):
 
     name: ClassVar[str] = "write_formats"
     formats: tuple[Format, ...] = ("csv", "mot", "trc")  # those beyond these three need their extra
+
+    def need(self, recording: Recording) -> None:
+        """Raise if a package that a format is written with is not installed."""
+        for name in self.formats:
+            need_packages(name)
 
     def run(
         self,

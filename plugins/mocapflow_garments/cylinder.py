@@ -22,9 +22,9 @@ class Cylinder(Garment):
     name: ClassVar[str] = "cylinder"
     joint: str = "hip_l"  # the joint at the upper end of the limb
     start: Annotated[float, Field(ge=0, le=1)] = 0.3  # where the tube is pinned, as a share of the limb from the joint
-    upper_circumference_m: pattern.Length = 0.60  # where it is pinned
-    lower_circumference_m: pattern.Length = 0.55  # of its hem
-    length_m: pattern.Length = 0.40  # along the cloth
+    upper_circumference_m: pattern.Length = 0.60  # length of the upper edge, where it is pinned
+    lower_circumference_m: pattern.Length = 0.55  # length of the hem
+    length_m: pattern.Length = 0.40  # from the upper edge to the hem, along the cloth
     strands: Annotated[int, Field(ge=8, le=512)] = 32  # columns of particles
     rings: Annotated[int, Field(ge=3, le=512)] = 16  # rows of particles
     force_orders: tuple[Literal[0, 1, 2, 3], ...] = (0, 1)  # harmonics of the tail angle; 1 alone is a wind

@@ -24,12 +24,12 @@ class Shorts(Garment):
     """Shorts sewn from six tape measures: two tubes joined at the hip, each carried by its thigh."""
 
     name: ClassVar[str] = "shorts"
-    waist_height_m: pattern.Length  # upper edge above the floor, rest pose
-    waist_circumference_m: pattern.Length  # of the upper edge
-    hip_circumference_m: pattern.Length  # of the cloth at its widest
-    leg_opening_circumference_m: pattern.Length  # of each hem
+    waist_height_m: pattern.Length  # height of the upper edge above the floor, rest pose
+    waist_circumference_m: pattern.Length  # length of the upper edge
+    hip_circumference_m: pattern.Length  # length around the cloth at its widest
+    leg_opening_circumference_m: pattern.Length  # length of each hem
     inseam_m: pattern.Length  # from the crotch to the hem
-    length_m: pattern.Length  # along the cloth, outside of the leg
+    length_m: pattern.Length  # from the upper edge to the hem along the outside of the leg
     strands: Annotated[int, Field(ge=8, le=512, multiple_of=4)] = 32  # columns of particles of each leg
     rings: Annotated[int, Field(ge=6, le=512)] = 20  # rows of particles
     force_orders: tuple[Literal[0, 1, 2, 3], ...] = (0, 1, 2)  # harmonics of the tail angle; 1 alone is a wind

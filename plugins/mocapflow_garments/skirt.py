@@ -20,10 +20,10 @@ class Skirt(Garment):
     """A skirt sewn from four tape measures; hangs from a waistband that follows the skin under it."""
 
     name: ClassVar[str] = "skirt"
-    waist_height_m: pattern.Length  # upper edge above the floor, rest pose
-    waist_circumference_m: pattern.Length  # of the upper edge
-    hem_circumference_m: pattern.Length  # of the lower edge
-    length_m: pattern.Length  # along the cloth
+    waist_height_m: pattern.Length  # height of the upper edge above the floor, rest pose
+    waist_circumference_m: pattern.Length  # length of the upper edge
+    hem_circumference_m: pattern.Length  # length of the lower edge
+    length_m: pattern.Length  # from the upper to the lower edge, along the cloth
     strands: Annotated[int, Field(ge=8, le=512)] = 48  # columns of particles
     rings: Annotated[int, Field(ge=3, le=512)] = 24  # rows of particles
     force_orders: tuple[Literal[0, 1, 2, 3], ...] = (0, 1, 2)  # harmonics of the tail angle; 1 alone is a wind

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, ClassVar
 
 import numpy as np
-from pydantic import Field, NonNegativeFloat, PositiveFloat
+from pydantic import Field, NonNegativeFloat
 
 from mocapflow.assets import Background
 from mocapflow.data import Frame, FrameState, Past, Segmentation, Silhouette, Turn
@@ -16,7 +16,7 @@ from mocapflow.scene import Scene
 from mocapflow_levelset.channels import ChannelName, features
 from mocapflow_levelset.evidence import calmed
 from mocapflow_levelset.evolve import Rhythm, Weights
-from mocapflow_levelset.levelset import INNER_BAND_PX, PERSON
+from mocapflow_levelset.levelset import INNER_BAND_PX, PERSON, RATIO_CLIP
 from mocapflow_levelset.masks import counted
 from mocapflow_levelset.plates import Plate, Shadow, density_image, plate_in
 from mocapflow_levelset.shadows import ShadowAware, shadowed
@@ -25,6 +25,7 @@ from mocapflow_levelset.view import Empty, Level, Method, View, find
 
 CHANNELS: tuple[ChannelName, ...] = ("lab",)
 STRIDE = 2  # of the pixels that the statistics are taken from
+SMOOTH_PX = 1.0  # of the evidence before it is cut
 REFINE_STEPS = 4  # against the plate, then as many with local statistics on both sides
 HOLE_PX2 = 120  # area up to which holes are filled
 SMALLEST_PART = 0.01  # of the largest part's area; smaller parts are noise
@@ -39,9 +40,8 @@ class BackgroundDifference(ShadowAware):
     name: ClassVar[str] = "background"
     needs_background: ClassVar[bool] = True
 
-    smooth_px: PositiveFloat = 1.0  # of the evidence before it is cut
     reach_px: NonNegativeFloat = 60.0  # parts further from the projected model than this are someone else; 0: keep all
-    length_weight: NonNegativeFloat = 0.5  # of the boundary's length in the refinement
+    length_weight: NonNegativeFloat = 0.5  # weight of the boundary's length in the refinement
     band_px: Annotated[float, Field(ge=8)] = 12.0  # half width of the band in which the distance is computed
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
@@ -90,10 +90,10 @@ class BackgroundDifference(ShadowAware):
         """Return a level set (H, W), not a distance: positive where the image is unlike the plate."""
         import cv2
 
-        calm = features(calmed(image, self.smooth_px), CHANNELS)
+        calm = features(calmed(image, SMOOTH_PX), CHANNELS)
         density = density_image(calm, plate, floor, CHANNELS, shadow)
-        unknown, bounded = np.isnan(density), np.nan_to_num(np.clip(-density, -6, 6))
-        change = cv2.GaussianBlur(bounded, (0, 0), self.smooth_px)
+        unknown, bounded = np.isnan(density), np.nan_to_num(np.clip(-density, -RATIO_CLIP, RATIO_CLIP))
+        change = cv2.GaussianBlur(bounded, (0, 0), SMOOTH_PX)
         untold = unknown if hidden is None else unknown | hidden
         change[untold] = np.clip(model[untold], -1, 1)  # nothing else tells
         kept = self._person(change > 0, model)
@@ -124,10 +124,10 @@ class BackgroundDifference(ShadowAware):
         return Method(
             channels=CHANNELS,
             weights=Weights(
-                sigma_px=1.5, length=self.length_weight, shape=0.0, clip=6.0, step=1.0, band_px=INNER_BAND_PX
+                sigma_px=1.5, length=self.length_weight, shape=0.0, clip=RATIO_CLIP, step=1.0, band_px=INNER_BAND_PX
             ),
             shadow=shadow,
-            calm_px=self.smooth_px,
+            calm_px=SMOOTH_PX,
             decorrelate=False,
             stride=STRIDE,
             margin_px=40,

@@ -27,8 +27,8 @@ class GrabCut(Segmenter):
 
     name: ClassVar[str] = "grabcut"
 
-    iterations: PositiveInt = 2  # of the cut
-    margin_px: PositiveInt = 60  # of the crop around the model
+    iterations: PositiveInt = 2  # iterations of the graph cut
+    margin_px: PositiveInt = 60  # margin of the crop around the model
     band_px: Annotated[float, Field(ge=8)] = 12.0  # half width of the band in which the distance is computed
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:

@@ -15,15 +15,15 @@ from mocapflow_levelset.inner_edges import behind_edges, inner_edges
 from mocapflow_levelset.layers import CLIP, Shown
 
 SPACING_PX = 4.0  # between the points of an edge of the model
+HALF_PX = 3  # on either side that colours have to agree over
+SIGMA_PX = 1.0  # standard deviation of a point; that by the noise of the colours is added
 
 
 class Search(NamedTuple):
     """How to look for the end of a part."""
 
     reach_px: int  # along the normal
-    half_px: int  # on either side that colours have to agree over
     least: float  # mean log ratio from which on a side is told from the other
-    sigma_px: float  # standard deviation of a point without noise
 
 
 def told_apart(scene: Scene, layers: I32, known: Shown) -> Bool:
@@ -43,16 +43,16 @@ def inner_contours(
     edges = inner_edges(surface, camera, SPACING_PX, told)
     rough = splits.split(
         image, silhouette.distance, known.ratio, layers[edges.vertex], edges.pixel, edges.normal, CLIP,
-        search.reach_px, search.half_px, search.least,
+        search.reach_px, HALF_PX, search.least,
     )  # fmt: skip
     ended = np.isfinite(rough)  # few, so that what is seen is looked up for few
     edges, rough = picked_rows(edges, ended), rough[ended]
     behind = behind_edges(surface, camera, edges)
-    offset, noise = splits.refine(image, edges.pixel, edges.normal, rough, search.half_px)
+    offset, noise = splits.refine(image, edges.pixel, edges.normal, rough, HALF_PX)
     pair = (behind >= 0) & known.apart[layers[edges.vertex], layers[behind]]
-    pair &= np.abs(offset - rough) < search.half_px
+    pair &= np.abs(offset - rough) < HALF_PX
     edges, way = picked_rows(edges, pair), offset[pair]
-    weight: F64 = 1 / (search.sigma_px**2 + noise[pair])
+    weight: F64 = 1 / (SIGMA_PX**2 + noise[pair])
     return Matches(
         camera=np.full(len(way), silhouette.camera, np.int16),
         pixel=edges.anchor + way[:, None] * edges.normal,

@@ -19,7 +19,6 @@ from mocapflow_levelset.surround import ROOM, beside, told
 
 GRID_PX = 4  # colours are taken every so many px, so far from borders
 KEEP_MM = 5.0  # change of the body in a turn below which inner contours stay where outlines do
-INNER_SIGMA_PX = 1.0  # standard deviation of a point of an inner contour; that by the noise of the colours is added
 
 
 class Layered(LevelSet):
@@ -36,13 +35,12 @@ class Layered(LevelSet):
     """
 
     name: ClassVar[str] = "layered"
-    keep: Annotated[float, Field(ge=0, lt=1)] = 0.9  # of what is known of the colours, from frame to frame
-    calm_mm: PositiveFloat = 15.0  # change of the body in a turn below which the reach is the later one
-    first_reach_px: PositiveInt = 24  # how far along the normal the end of a part is looked for
-    later_reach_px: PositiveInt = 10  # the same once it is calm
-    half_px: Annotated[int, Field(ge=2)] = 3  # on either side that colours have to agree over
-    least: PositiveFloat = 1.0  # mean log ratio of colours from which on a side is told from the other
-    colour_weight: NonNegativeFloat = 0.0  # of what learned colours say of person and room, beside the local statistics
+    keep: Annotated[float, Field(ge=0, lt=1)] = 0.9  # share of what is known of the colours that a frame keeps
+    calm_mm: PositiveFloat = 15.0  # change of the body in a turn below which `later_reach_px` holds
+    first_reach_px: PositiveInt = 24  # how far along the normal the end of a part is looked for at first
+    later_reach_px: PositiveInt = 10  # how far it is looked for once the body is calm
+    least: PositiveFloat = 1.0  # mean log ratio of colours from which on one side is told from the other
+    colour_weight: NonNegativeFloat = 0.0  # weight of what learned colours say, over that of the local statistics
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
         """Return the silhouettes, the inner contours, and the colours of layers for the frames to come.
@@ -80,4 +78,4 @@ class Layered(LevelSet):
 
     def _search(self, turn: Turn) -> Search:
         reach = self.later_reach_px if turn.calm(self.calm_mm) else self.first_reach_px
-        return Search(reach, self.half_px, self.least, INNER_SIGMA_PX)
+        return Search(reach, self.least)

@@ -49,34 +49,34 @@ class LevelSet(ShadowAware):
     channels: tuple[ChannelName, ...] = Field(("lab",), min_length=1)  # independent, their likelihoods add
     decorrelate: bool = True  # turn the channels to the image's principal axes, where the empty scene gives no density
     rho_px: PositiveOrInf = 12.0  # Gaussian window of the local statistics at full size; inf: one Gaussian per region
-    cell_px: PositiveInt = 8  # the statistics are summed over cells of this size, in whole strides
-    stride_px: PositiveInt = 4  # and taken from every so many-th pixel; 1: from all
+    cell_px: PositiveInt = 8  # size of the cells that the statistics are summed over, in whole strides
+    stride_px: PositiveInt = 4  # the statistics take every so many-th pixel; 1: all
     variance_floor: PositiveFloat = 0.03  # smallest standard deviation inside and outside, share of a channel's range
     sigma_px: PositiveFloat = 1.5  # width of the smooth step
-    length_weight: NonNegativeFloat = 0.9  # nu; explicit steps are stable below 0.94
+    length_weight: NonNegativeFloat = 0.9  # nu, weight of the contour's length; explicit steps are stable below 0.94
     shape_weight: NonNegativeFloat = 0.05  # lambda: 0.05 clean, 0.1 with occlusion, 0.1-0.3 in heavy noise, 0 uncoupled
-    any_colour: float = -3.0  # log density on the person, at least, of any colour, where the empty scene is known
-    coarse_steps: NonNegativeInt = 32  # at most, at a quarter of the size, on the first turn
-    half_steps: NonNegativeInt = 4  # at half the size
-    steps: PositiveInt = 3  # at full size
-    later_steps: PositiveInt = 3  # at full size on later turns, which start from the last turn's contour
-    contact_steps: NonNegativeInt = 10  # by chromaticity, where the body meets the floor and both are dark; 0: none
-    matte_px: NonNegativeInt = 2  # to either side of an edge, where pixels mix person and empty room; 0: no use of it
-    keep_px: NonNegativeFloat = 2.0  # move of the model's outline in a turn up to which the contour stays; 0: none does
+    any_colour: float = -3.0  # least log density of any colour on the person, where the empty scene is known
+    coarse_steps: NonNegativeInt = 32  # steps at a quarter of the size on the first turn, at most
+    half_steps: NonNegativeInt = 4  # steps at half the size
+    steps: PositiveInt = 3  # steps at full size on the first turn
+    later_steps: PositiveInt = 3  # steps at full size on later turns, which start from the last turn's contour
+    contact_steps: NonNegativeInt = 10  # steps by chromaticity where body and floor meet and both are dark; 0: none
+    matte_px: NonNegativeInt = 2  # reach about an edge in which pixels mix person and empty room; 0: they are not used
+    keep_px: NonNegativeFloat = 2.0  # move of the model's outline in a turn up to which the contour stays; 0: never
     statistics_every: PositiveInt = 4  # steps between estimates of the colours
     redistance_every: PositiveInt = 4  # steps between repairs of the distance function
     band_px: Annotated[float, Field(ge=8)] = 12.0  # half width of the band in which the distance is computed
-    border_px: NonNegativeInt = 3  # left out at the image's border
-    margin_px: PositiveInt = 40  # of the crop around the start contour
+    border_px: NonNegativeInt = 3  # border of the image that is left out
+    margin_px: PositiveInt = 40  # margin of the crop around the start contour
     use_background: bool = True  # take the outside's density from the empty scene, where it is known
-    shadow_share: Share = 0.5  # of the background; 0: shadows count as changes
+    shadow_share: Share = 0.5  # prior share of shadow on the background; 0: shadows count as changes
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
         """Return the person's silhouette in each usable view.
 
         The first turn starts from the projected model, later turns from the last turn's silhouettes. Where the model's
-        outline has hardly moved they would stay as they are, and are not looked at; in a frame that began far off,
-        from the third turn on: the contour may have had farther to go than its steps reached.
+        outline has hardly moved these stay as they are; in a frame that began far off only from the third turn on, for
+        the contour may have had farther to go than its steps reached.
         """
         surface = scene.surface(state.estimate.pose, state.cloth)
         # a view in which nobody was begins anew from the model, which may stand in it by now

@@ -29,11 +29,11 @@ class ShadowAware(Segmenter):
     """A segmenter that compares pixels with the empty scene, lit and in the person's shadow."""
 
     spread_floor: PositiveFloat = USUAL.floor  # smallest standard deviation of the empty scene, share of the range
-    shadow_share: Annotated[float, Field(ge=0, lt=1)] = USUAL.share  # of the background; 0: shadows count as changes
+    shadow_share: Annotated[float, Field(ge=0, lt=1)] = USUAL.share  # prior share of shadows; 0: they count as changes
     shadow_reach_m: PositiveFloat = REACH_M  # shadows fall on the floor within this distance of the person
-    darkest_shadow: Annotated[float, Field(gt=0, lt=1)] = USUAL.darkest  # factor of L + 16, a and b
+    darkest_shadow: Annotated[float, Field(gt=0, lt=1)] = USUAL.darkest  # least factor of a shadow on L + 16, a, b
     darkest_grey_shadow: Annotated[float, Field(gt=0, lt=1)] = 0.8  # the same in pictures without colours to tell it by
-    shadow_chroma: PositiveFloat = USUAL.chroma  # off the plate's chromaticity, share of the range
+    shadow_chroma: PositiveFloat = USUAL.chroma  # deviation of a shadow's chromaticity off the plate's, of the range
 
     def shadow(self, image: U8, background: Background | None, camera: int) -> Shadow:
         """Return what counts as background in an image (H, W, 3) of a camera, as it is set."""

@@ -80,7 +80,7 @@ class Method(NamedTuple):
 
 
 class Found(NamedTuple):
-    """The silhouette of one view and its costs; where only a part was found anew, by how much that costs more."""
+    """The silhouette of one view and its costs; where only a part was found anew, by how much they have changed."""
 
     level: F32  # (H, W) px, signed distance clipped to the band
     costs: Costs

@@ -11,6 +11,8 @@ from mocapflow.pooling import pool
 from mocapflow.records import F64, I32
 from mocapflow.scene import Scene
 
+CLOTH_SHARE = 0.2  # weight of a point on cloth, over that of one on skin: cloth slides
+
 
 def carried_points(frame: Frame, past: Past, scene: Scene) -> Matches:
     """Return the tracked points that lie on the surface of the frame before, each with unit weight.

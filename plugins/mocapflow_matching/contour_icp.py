@@ -55,22 +55,22 @@ class ContourIcp(Matcher):
     """
 
     name = "contour_icp"
-    direction: Literal["both", "forward", "backward"] = "both"  # from the image to the model, back, or both
+    direction: Literal["both", "forward", "backward"] = "both"  # image to model, model to image, or both
     residual: Literal["normal", "point"] = "normal"  # let points slide along the contour, or not (the chapter)
     spacing_px: PositiveFloat = 4.0  # between the points of a contour
     hem_guard_px: NonNegativeFloat = 12.0  # skin so near to cloth counts as cloth: a hem is uncertain
-    calm_mm: PositiveFloat = 15.0  # change of the body in a turn below which reach and loss are the later ones
-    far_calm_mm: PositiveFloat = 15.0  # the same, if less, in a frame that began far off
-    first_reach_px: PositiveFloat = 40.0  # pairs farther apart are left out
-    later_reach_px: PositiveFloat = 10.0  # the same once it is calm
+    calm_mm: PositiveFloat = 15.0  # change of the body in a turn below which `later_reach_px` and `later_loss` hold
+    far_calm_mm: PositiveFloat = 15.0  # stands for calm_mm, if less, in a frame that began far off
+    first_reach_px: PositiveFloat = 40.0  # pairs farther apart are left out at first
+    later_reach_px: PositiveFloat = 10.0  # pairs farther apart are left out once the body is calm
     cloth_reach_px: PositiveOrInf = float("inf")  # pairs on cloth reach no farther: a hem that swings turns the pelvis
-    normal_angle_deg: Annotated[float, Field(gt=0, le=180)] = 60.0  # contours that differ more make no pair
-    first_loss: Loss = "huber"  # of a pair by its distance
-    later_loss: Loss = "geman_mcclure"  # the same once it is calm
-    normal_px: NonNegativeFloat = 0.0  # px that count as far as normals at right angles, over sqrt 2
+    normal_angle_deg: Annotated[float, Field(gt=0, le=180)] = 60.0  # contours that differ by more make no pair
+    first_loss: Loss = "huber"  # loss of a pair by its distance, at first
+    later_loss: Loss = "geman_mcclure"  # loss of a pair once the body is calm
+    normal_px: NonNegativeFloat = 0.0  # weight of normals in pairing: those at right angles are sqrt 2 times this apart
     scale: PositiveFloat = 2.0  # standard deviations at which the loss begins to give way
     sigma_px: PositiveFloat = 1.0  # standard deviation of a pair on skin
-    cloth_sigma_px_per_m: NonNegativeFloat = 80.0  # the longer cloth hangs, the less it is where a draper lays it
+    cloth_sigma_px_per_m: NonNegativeFloat = 80.0  # added on cloth, per metre of it above: a drape is less sure
 
     @property
     def stride(self) -> int:

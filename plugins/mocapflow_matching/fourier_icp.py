@@ -31,10 +31,10 @@ class FourierIcp(ContourIcp):
     """
 
     name = "fourier_icp"
-    harmonics: tuple[PositiveInt, ...] = (6, 12)  # a turn each; in full from then on
-    near_px: NonNegativeFloat = 3.0  # median distance of the contours below which they are near
-    least_px: PositiveFloat = 40.0  # shorter contours are left out
-    curvature_px2: NonNegativeFloat = 0.0  # px that count as far as a curvature of one per px
+    harmonics: tuple[PositiveInt, ...] = (6, 12)  # kept in each of the first turns; later turns match in full
+    near_px: NonNegativeFloat = 3.0  # median distance of the contours below which a view is matched in full
+    least_px: PositiveFloat = 40.0  # contours shorter than this are left out
+    curvature_px2: NonNegativeFloat = 0.0  # weight of curvature in finding pairs: a difference of 1/px is so many px
 
     def contours(
         self, silhouette: Silhouette, surface: Surface, scene: Scene, turn: Turn

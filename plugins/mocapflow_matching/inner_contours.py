@@ -22,10 +22,10 @@ FEWEST = 8  # pairs of a waistband: fewer do not tell a tilt from a height
 class InnerContours(Matcher):
     """Draws edges of parts that lie before others (a forearm before the trunk) to where these parts end in the image.
 
-    The edge at which the skin holds a garment, a waistband, is such an edge too: it says how the trunk is tilted. How
-    much higher or lower than the tape measure says it sits all around does not count: its pairs are moved by that, to
-    where the surface is, and so hold the height of the guess a little. It needs segmenter `layered`, which finds the
-    ends of parts once a turn; without it there are no pairs.
+    The edge at which the skin holds a garment, a waistband, is such an edge too: it says how the trunk is tilted. If it
+    sits higher or lower all around than the tape measure says, that is no tilt: its pairs are moved back by as much, to
+    the surface, and so hold the height of the guess a little. It needs segmenter `layered`, which finds the ends of
+    parts once a turn; without it there are no pairs.
 
     Skin that the garment covers at rest is believed only where its edge is near: where the drape bares a thigh, the
     true cloth may lie over it, and what looks like its edge is a fold. `covered: far` believes it as other skin, where

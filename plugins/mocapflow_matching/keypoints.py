@@ -38,8 +38,8 @@ class Keypoints(Matcher):
 
     name = "keypoints"
     layout: Layout | None = None  # order of the keypoints; null: told by their number
-    sigma_px: PositiveFloat = 5.0  # of the estimator, where fewer than three views tell
-    least_sigma_px: PositiveFloat = 1.0  # however well the keypoints agree
+    sigma_px: PositiveFloat = 5.0  # standard deviation of a keypoint where fewer than three views tell it
+    least_sigma_px: PositiveFloat = 1.0  # least standard deviation of a keypoint, however well the views agree
     scale: PositiveFloat = 2.0  # standard deviations beyond which a keypoint pulls no harder (Huber)
 
     def need(self, recording: Recording) -> None:
@@ -66,14 +66,22 @@ class Keypoints(Matcher):
         return _pairs(camera, mark, off[camera, mark], weight[camera, mark], marks, surface, scene)
 
     def _seen(self, frame: Frame, image: F64, names: tuple[str, ...]) -> F64:
-        """Return the person's keypoints (C, L, 3) px, px, confidence in the order of the landmarks."""
+        """Return the person's keypoints (C, L, 3) px, px, confidence in the order of the landmarks.
+
+        Raises:
+            RecordingError: the keypoints are not as many as a layout has, or as the one that is set.
+        """
         assert frame.keypoints is not None
         people = [points for view in frame.keypoints for points in view]
         seen = np.zeros((len(image), len(names), 3))
         layout = self.layout or (layout_of(people) if people else None)
         if layout is None:
             return seen
-        row = rows_of(LAYOUTS[layout], names)
+        listed = LAYOUTS[layout]
+        if strange := {len(points) for points in people} - {len(listed)}:
+            what = f"a person has {strange.pop()} keypoints, in the layout {layout} {len(listed)}"
+            raise RecordingError(what, hint="set another `layout` for the matcher, or none: their number tells it")
+        row = rows_of(listed, names)
         for index, (view, projected) in enumerate(zip(frame.keypoints, image, strict=True)):
             ordered = [np.where(row[:, None] >= 0, points[row], 0.0) for points in view]
             if frame.usable[index] and ordered:

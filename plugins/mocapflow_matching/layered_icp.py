@@ -26,7 +26,7 @@ class LayeredIcp(ContourIcp):
 
     name: ClassVar[str] = "layered_icp"
     residual: Literal["normal"] = "normal"  # the direction of a pair says where its inside is, so it has to have one
-    least: PositiveFloat = 3.0  # log ratio of colours by which they are surely another part's
+    least: PositiveFloat = 3.0  # log ratio from which on colours are surely another part's
 
     def match(
         self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn

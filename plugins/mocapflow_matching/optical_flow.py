@@ -14,7 +14,7 @@ from mocapflow.geometry import silhouettes
 from mocapflow.pooling import pool, weighted
 from mocapflow.records import F32, F64, Bool
 from mocapflow.scene import Scene
-from mocapflow_matching.carried import carried_points, distances
+from mocapflow_matching.carried import CLOTH_SHARE, carried_points, distances
 from mocapflow_matching.robust import robust_weights
 from mocapflow_matching.shape_flow import register
 from mocapflow_matching.uncertainty import contour_sigma
@@ -37,16 +37,15 @@ class OpticalFlow(Matcher):
     """
 
     name = "optical_flow"
-    between: Literal["both", "shapes", "frames"] = "both"  # model and image of a frame, two frames, or both
-    first_turns: NonNegativeInt = 1  # of a frame, in which shapes are registered
-    first_share: NonNegativeFloat = 2.3  # against contour_icp's in these turns: 0.7 to 0.3
+    between: Literal["both", "shapes", "frames"] = "both"  # model and image of a frame (shapes), two frames, or both
+    first_turns: NonNegativeInt = 1  # turns at the beginning of a frame in which shapes are registered
+    first_share: NonNegativeFloat = 2.3  # weight in these turns, where contour_icp's is 1
     spacing_px: PositiveFloat = 4.0  # between the points of the model's contour
-    smoothness: PositiveFloat = 3.0  # of the flow, against the constancy of the distance images
-    band: PositiveFloat = 0.1  # half its width about the model's contour, against the longer side of the picture
-    levels: NonNegativeInt = 3  # of the pyramid
+    smoothness: PositiveFloat = 3.0  # weight of the flow's smoothness against the difference of the distance images
+    band: PositiveFloat = 0.1  # half width of the band about the model's contour, share of the picture's longer side
+    levels: NonNegativeInt = 3  # levels of the pyramid
     cloth_sigma_px_per_m: PositiveFloat = 80.0  # as for contour_icp
     image_sigma_px: PositiveFloat = 1.5  # standard deviation of a tracked point
-    cloth_share: NonNegativeFloat = 0.2  # of a point on cloth against one on skin
     scale: PositiveFloat = 2.0  # standard deviations beyond which a pair pulls no harder (Huber)
 
     def match(
@@ -66,7 +65,7 @@ class OpticalFlow(Matcher):
         matches = carried_points(frame, past, scene)
         away = distances(matches, surface, scene)
         weight = self._robust(away, np.full(len(away), self.image_sigma_px))
-        return replace(matches, weight=weight * np.where(surface.cloth[matches.vertex], self.cloth_share, 1.0))
+        return replace(matches, weight=weight * np.where(surface.cloth[matches.vertex], CLOTH_SHARE, 1.0))
 
     def registered(self, silhouette: Silhouette, surface: Surface, scene: Scene) -> Matches:
         """Return the pairs of one view by flow between distance images."""

@@ -34,9 +34,9 @@ class Xpbd(Draper):
     name: ClassVar[str] = "xpbd"
     skin_m: NonNegativeFloat = 0.005  # room between skin and cloth of no thickness
     rate_hz: Annotated[float, Field(ge=60)] = 1920.0  # steps of the solver per second
-    move_s: PositiveFloat = 0.3  # in which the body comes from its last pose, or from rest
-    rest_s: NonNegativeFloat = 0.3  # in which the cloth comes to rest
-    moves_like: Kinematic = Kinematic(sweeps=4)  # whose strands, distance fields and velocities it has
+    move_s: PositiveFloat = 0.3  # time in which the body comes from its last pose, or from rest
+    rest_s: NonNegativeFloat = 0.3  # time in which the cloth then comes to rest
+    moves_like: Kinematic = Kinematic(sweeps=4)  # draper whose strands, distance fields and velocities are used
 
     @model_validator(mode="after")
     def _simulator_is_there(self) -> Xpbd:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from mocapflow_matching.carried import carried_points, distances
+from mocapflow_matching.carried import CLOTH_SHARE, carried_points, distances
 from mocapflow_matching.robust import robust_weights
-from mocapflow_twist.solver import TwistGaussNewton
-from pydantic import NonNegativeFloat, PositiveFloat
+from mocapflow_twist.twist_gauss_newton import TwistGaussNewton
+from pydantic import PositiveFloat
 
 from mocapflow.components import PoseSolver, Predictor, Prior
 from mocapflow.data import NO_CLOTH, Frame, Matches, Past, Pose, Surface, Turn
@@ -40,8 +40,7 @@ class ImageFlowPredictor(Predictor):
     priors: tuple[Prior, ...] = (JointLimits(), RestPose())  # points on one side of a limb do not tell how it is turned
     sigma_px: PositiveFloat = 1.0  # standard deviation of a tracked point
     scale: PositiveFloat = 2.0  # standard deviations beyond which a point pulls no harder (Huber)
-    cloth_share: NonNegativeFloat = 0.2  # of a point on cloth that touches the skin; other cloth: none
-    touching_mm: PositiveFloat = 20.0  # distance from the skin within which cloth touches it
+    touching_mm: PositiveFloat = 20.0  # from the skin within which cloth touches it; points on other cloth do not count
 
     def predict(self, frame: Frame, past: Past, scene: Scene) -> Pose:
         """Return the pose the flow leads to, or what `otherwise` predicts."""
@@ -83,5 +82,5 @@ class ImageFlowPredictor(Predictor):
             pixel=(matches.pixel + on_skin - on_cloth)[touching],
             direction=matches.direction[touching],
             vertex=vertex[touching],
-            weight=(matches.weight * np.where(cloth, self.cloth_share, 1.0))[touching],
+            weight=(matches.weight * np.where(cloth, CLOTH_SHARE, 1.0))[touching],
         )

@@ -10,6 +10,8 @@ from mocapflow.data import Past, Pose, Residual
 from mocapflow.scene import Scene
 from mocapflow_priors.rows import angle_rows, soft_excess
 
+SLACK = np.radians(2.0)  # excess within which the wall is soft
+
 
 class JointLimits(Prior):
     """A soft wall at the limits of every joint: nothing inside, a linear error outside."""
@@ -17,12 +19,11 @@ class JointLimits(Prior):
     name = "joint_limits"
 
     sd_deg: PositiveFloat = 2.0  # standard deviation of an angle beyond its limits
-    slack_deg: PositiveFloat = 2.0  # excess within which the wall is soft
 
     def residual(self, pose: Pose, past: Past, scene: Scene) -> Residual:
         """Return one row per joint angle, zero within the limits."""
         low, high = scene.body.limits.T
-        slack, sd = np.radians(self.slack_deg), np.radians(self.sd_deg)
-        above, steeper = soft_excess(pose.angles - high, slack)
-        below, deeper = soft_excess(low - pose.angles, slack)
+        sd = np.radians(self.sd_deg)
+        above, steeper = soft_excess(pose.angles - high, SLACK)
+        below, deeper = soft_excess(low - pose.angles, SLACK)
         return angle_rows((above - below) / sd, (steeper + deeper) / sd, np.arange(len(low)))

@@ -29,7 +29,7 @@ class Parzen(Prior):
     """
 
     name: ClassVar[str] = "parzen"
-    poses: Poses = SHIPPED  # made by `mocapflow prior fit`; leave out the take that is tracked
+    poses: Poses = SHIPPED  # file made by `mocapflow prior fit`; leave out the take that is tracked
 
     def residual(self, pose: Pose, past: Past, scene: Scene) -> Residual:
         """Return one row for each trained angle the body has; the energy is -log p above the least it can be."""

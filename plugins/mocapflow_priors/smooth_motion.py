@@ -27,9 +27,9 @@ class SmoothMotion(Prior):
 
     name = "smooth_motion"
 
-    angle_sd_deg: PositiveFloat = 5.0  # of every joint angle
-    root_sd_deg: PositiveFloat = 3.0  # of the turn of the root
-    root_sd_mm: PositiveFloat = 10.0  # of the place of the root
+    angle_sd_deg: PositiveFloat = 5.0  # standard deviation of every joint angle
+    root_sd_deg: PositiveFloat = 3.0  # standard deviation of the root's orientation
+    root_sd_mm: PositiveFloat = 10.0  # standard deviation of the root's place
 
     def residual(self, pose: Pose, past: Past, scene: Scene) -> Residual:
         """Return three rows for the root's turn, three for its place and one per joint angle."""

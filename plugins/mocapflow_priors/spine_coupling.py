@@ -23,9 +23,9 @@ class SpineCoupling(Prior):
     """
 
     name: ClassVar[str] = "spine_coupling"
-    lower: str = "spine"  # a joint
-    upper: str = "chest"  # another joint
-    sd_deg: PositiveFloat = 3.0  # 2.5 to 2.8 in motion capture of walks, squats, kicks, jumps
+    lower: str = "spine"  # the lower joint
+    upper: str = "chest"  # the upper joint
+    sd_deg: PositiveFloat = 3.0  # standard deviation between the two; 2.5 to 2.8 in walks, squats, kicks, jumps
 
     def residual(self, pose: Pose, past: Past, scene: Scene) -> Residual:
         """Return one row for each pair of angles of the same name."""

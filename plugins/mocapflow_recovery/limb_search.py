@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from math import inf
@@ -30,7 +30,7 @@ from mocapflow_recovery.judge import Fit, Given, Judge, stray_of, surface_of
 from mocapflow_recovery.looks import Looks
 from mocapflow_recovery.sampling import Plan, Spread
 from mocapflow_recovery.suspicion import Signs, Suspicion, suspicion
-from mocapflow_recovery.told import hidden_legs, like_the_floor, untold
+from mocapflow_recovery.told import like_the_floor, warn_of_furniture, warn_of_untold
 from mocapflow_recovery.vain import counted, forgotten, in_turn, vain_before
 
 LOG = logging.getLogger("mocapflow")
@@ -38,10 +38,6 @@ CURED = 2.0  # times as far apart may be what is doubted no more: a leg lay wher
 CLEARED = 1.1  # the same, what leaves no hint: of a foot that was lost all other limbs and the cloth tell nothing
 UNKNOWN = "too little is known of the room behind the person: limbs that are lost are not looked for"
 FEET_UNTOLD = "the feet look like the floor: outlines are not compared with them, and ankles are unsure"
-HIDDEN = (
-    "%s shows the empty room where the first pose and the other views have the leg from %s on:"
-    " if something stands before it, paint that white in occluders/%s.png; else mend the first pose"
-)
 UNSEARCHED = "fit doubted as in frames before: not searched again yet"
 UNSEEN = "fit doubted: no picture tells person from room where it lies"
 Settle = Callable[[Pose, F64], FrameResult]  # from a pose, with cloth parameters
@@ -52,54 +48,60 @@ class LimbSearch(Recovery):
     """Compares the fitted model with what the images surely show, which does not depend on the model.
 
     A level set that starts from the model can't find a limb the model has lost, so the two agree in their error.
-    Where large parts of person and model lie far apart, the best is taken of the fitted pose, the one that was believed
-    before, that of the frame before, and poses that people were seen in. Around it poses are sampled part by part, and
-    limbs as people were seen to hold them; then around that of the frame before, where trunk and legs have not yet gone
-    astray together. A part moves only if that brings what strays together: a leg must not take a new place under the
-    skirt because an arm was lost. The loop settles again from there.
+
+    Where large parts of person and model lie far apart, the search begins at the best of the fitted pose, the one that
+    was believed before, that of the frame before, and poses that people were seen in. Around it poses are sampled part
+    by part, limbs also as people were seen to hold them. A second search begins at the pose of the frame before, in
+    which trunk and legs have not yet gone astray together. A part moves only if that brings what strays together: a leg
+    must not take a new place under the skirt because an arm was lost. The loop settles again from what is found.
+
     It also looks where images need not contradict a limb that is elsewhere: in the first frame and after frames that
     did not show the person, where a leg may rest on the contour of the other one and a foot lie turned in its own;
     where a joint is bent beyond its limits; where a little of the person is off the model, if `hint_cm2` says so; and
     where a limb has leapt into a pose that nobody was seen in. There a part moves only if that brings person and model
-    together.
+    together. A joint bent too far, and a limb that leapt, are looked for alone: nothing is known against the others.
+
     The first frame starts from a pose that was given and is about right (`start_deg`). So it is searched near that one
-    first, and of two poses that fit alike the nearer one is taken: crossed legs look the same exchanged. Where its fit
-    is doubted, the pose is also tried turned round: a standing person looks much the same from behind.
-    What shows the garment's colours calls for a search where it strays, but moves no part and is no doubt: it may fly.
-    So it is searched twice, once as if cloth lay where the body holds it, which tells of legs that nobody sees, once as
-    if it flew, which leads none astray; the fit that agrees better by what is skin, and a little by cloth, is taken.
-    A joint bent too far, and a limb that leapt, are looked for alone: nothing is known against the others.
+    first, and of two poses that fit alike the nearer one is taken: crossed legs look the same when exchanged. If its
+    fit is doubted, the pose is also tried turned round: a standing person looks much the same from behind.
+
+    Cloth that strays, as its colours tell, calls for a search, but moves no part and raises no doubt: it may fly. So
+    the search is made twice: as if cloth lay where the body holds it, which tells of legs that nobody sees, and as if
+    it flew, which leads no leg astray. The fit that agrees better is taken, by skin above all.
+
     A doubt that lasts is mostly one about the room, and a joint that stays beyond its limits can be bent so far: such
-    frames are searched now and then only (`vain_every`), of a doubt that stays the same ever more rarely.
-    Where the first frame shows feet that look like a floor without colours, white socks on white, later frames do not
-    match them: the outline ends above them, and would draw them up.
-    It needs the empty scene; where little of it is known behind the person every fit is taken as it is.
+    frames are searched only now and then (`vain_every`), and ever more rarely while a doubt stays the same.
+
+    If the first frame shows feet that look like a floor without colours, such as white socks on white, later frames do
+    not match them: the outline ends above them, and would draw them up.
+
+    It needs the empty scene; where little of it is known behind the person, every fit is taken as it is.
     """
 
     name: ClassVar[str] = "limb_search"
     needs_background: ClassVar[bool] = True
-    uncovered_cm2: PositiveFloat = 30.0  # of the person off the model, in all views: more, and the fit is doubted
-    floating_cm2: PositiveFloat = 30.0  # likewise, of skin in empty space
-    hint_cm2: PositiveOrInf = inf  # of the person off it by 3 cm: more, and limbs are looked for; noise has it, too
-    beginnings: bool = True  # limbs are looked for in the first frame, and in the first one after a gap
-    leap_deg: PositiveOrInf = 20.0  # from what was believed and from all `poses`: a limb so far from both is looked for
-    overbent_deg: PositiveOrInf = 5.0  # of a joint, beyond its limits: they are soft, and what is lost goes there
-    least_known: Annotated[float, Field(ge=0, le=1)] = 0.4  # of the room behind the model, mean of the views
+    uncovered_cm2: PositiveFloat = 30.0  # area of the person off the model, all views, above which the fit is doubted
+    floating_cm2: PositiveFloat = 30.0  # area of skin in empty space above which the fit is doubted
+    hint_cm2: PositiveOrInf = inf  # area of the person 3 cm off it above which limbs are looked for; noise has some
+    beginnings: bool = True  # look for limbs in the first frame, and in the first one after a gap
+    leap_deg: PositiveOrInf = 20.0  # a limb so far from what was believed and from all `poses` is looked for
+    overbent_deg: PositiveOrInf = 5.0  # a joint so far beyond its soft limits is looked for: lost limbs go there
+    least_known: Annotated[float, Field(ge=0, le=1)] = 0.4  # of the room behind the model to be known, mean of views
     gain: Annotated[float, Field(ge=0, lt=1)] = 0.1  # share that each part mends, and a fit that cures no doubt
-    tolerance: NonNegativeFloat = 0.03  # by which share a part may be farther that stays as it was fitted
+    tolerance: NonNegativeFloat = 0.03  # share by which the error may grow for parts to stay as they were fitted
     rows: Annotated[int, Field(ge=50)] = 160  # images are shrunk to about this height
-    faces: Annotated[int, Field(ge=200)] = 2600  # of the body that is searched with
+    faces: Annotated[int, Field(ge=200)] = 2600  # faces of the body that is searched with, about
     near_m: PositiveFloat = 0.35  # changes further than this from the model are somebody else
-    samples: PositiveInt = 40  # of each part in a round
-    poses: Poses = SHIPPED  # that people were seen in, made by `mocapflow prior fit`: limbs are tried as they are there
-    seen_samples: NonNegativeInt = 100  # of each limb in the first round, from `poses`
+    samples: PositiveInt = 40  # samples of each part in a round
+    poses: Poses = SHIPPED  # poses that people were seen in, made by `mocapflow prior fit`: limbs are tried as there
+    seen_samples: NonNegativeInt = 100  # samples of each limb from `poses`, in the first round
     shares: Annotated[tuple[PositiveFloat, ...], Field(min_length=1)] = (1.0, 0.6, 0.4, 0.25, 0.12)  # of the spread
-    first_looks: PositiveInt = 2  # of the first frame where its fit is doubted: each search is repeated so often
+    first_looks: PositiveInt = 2  # times that each search is repeated in a first frame whose fit is doubted
     vain_every: PositiveInt = 4  # after three searches in vain, or overbent frames, one of so many is searched at first
-    start_deg: PositiveFloat = 6.0  # how far off, in each angle, the pose may be that the first frame starts from
-    spread_deg: PositiveFloat = 25.0  # standard deviation of the first samples; less where a joint at rest hardly bends
-    root_spread_deg: PositiveFloat = 8.0  # likewise, of the root's turn
-    root_spread_m: PositiveFloat = 0.06  # likewise, of its place
+    start_deg: PositiveFloat = 6.0  # how far off, in each angle, a given first pose may be
+    spread_deg: PositiveFloat = 25.0  # standard deviation of the first samples; less where a joint hardly bends
+    root_spread_deg: PositiveFloat = 8.0  # standard deviation of the first samples of the root's orientation
+    root_spread_m: PositiveFloat = 0.06  # standard deviation of the first samples of the root's place
 
     def recover(
         self,
@@ -147,8 +149,9 @@ class LimbSearch(Recovery):
         if np.mean([view.known for view in seen]) < self.least_known:
             return result if past.moments else noted(result, UNKNOWN, doubted=False)
         if not past.moments:
-            self._warn(untold(surface, seen, model.scene.body))
-            self._warn_of_furniture(frame, state, past, model.scene)
+            given = model.scene.surface(state.estimate.pose, state.cloth)
+            warn_of_untold(surface, seen, model.scene.body)
+            warn_of_furniture(given, self.views(frame, given, past, model.scene), model.scene.body)
         stray = stray_of(surface, model.scene, seen)
         fitted, believed, body = result.state.estimate.pose, state.estimate.pose, model.scene.body
         suspected = suspicion(self.signs, stray, fitted, believed, past, body, self._density)
@@ -163,15 +166,6 @@ class LimbSearch(Recovery):
         looks = Looks(judge, self._plan(body), believed, fitted, self.gain, self.tolerance)
         found = self._searched(frame.index, judge.of(result), looks, suspected, settle)
         return counted(found, result, stray.area, past)
-
-    def _warn(self, limbs: Mapping[str, float]) -> None:
-        for joint, share in limbs.items():
-            LOG.warning(f"from {joint} on only {share:.0%} differ from the room: this limb may be lost unnoticed")
-
-    def _warn_of_furniture(self, frame: Frame, state: FrameState, past: Past, scene: Scene) -> None:
-        surface = scene.surface(state.estimate.pose, state.cloth)
-        for camera, joints in hidden_legs(surface, self.views(frame, surface, past, scene), scene.body).items():
-            LOG.warning(HIDDEN, camera, " and ".join(joints), camera)
 
     def views(self, frame: Frame, surface: Surface, past: Past, scene: Scene) -> list[View]:
         """Return what the views of a frame surely show around a surface, in a scene whose empty room is known."""

@@ -81,7 +81,7 @@ class Looks(NamedTuple):
         return [moment.pose for moment in self.judge.past.moments[-1:]]
 
     def _tidied(self, found: Pose, measure: Cost) -> Pose:
-        """Return a pose that was found with those parts as they were that need not have moved."""
+        """Return a found pose in which the parts that need not have moved are as they were."""
         found = without_idle_parts(measure, found, self.fitted, self.body, self.gain)
         return put_back(self.judge.apart, found, [self.fitted, self.believed], self.body, self.tolerance)
 

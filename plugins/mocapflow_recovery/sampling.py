@@ -71,7 +71,7 @@ def search(cost: Cost, pose: Pose, body: Body, plan: Plan, rng: np.random.Genera
 
 
 def without_idle_parts(stray: Cost, found: Pose, fitted: Pose, body: Body, share: float) -> Pose:
-    """Return a pose that was found with those parts as they were fitted that bring next to nothing of what strays.
+    """Return a found pose in which the parts that mend next to nothing of what strays are as they were fitted.
 
     A search fits every part, also to what no pose explains, such as cloth that flies.
 
@@ -91,7 +91,7 @@ def without_idle_parts(stray: Cost, found: Pose, fitted: Pose, body: Body, share
 
 
 def put_back(cost: Cost, found: Pose, poses: Sequence[Pose], body: Body, tolerance: float) -> Pose:
-    """Return a pose that was found with those parts of others that fit about as well: what is hidden stays as it was.
+    """Return a found pose with parts of other poses put back that fit about as well: what is hidden stays as it was.
 
     After the parts each joint is tried alone: a foot must not turn because its leg was found.
 

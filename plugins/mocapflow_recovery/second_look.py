@@ -45,7 +45,7 @@ class SecondLook(Stage):
     """
 
     name: ClassVar[str] = "second_look"
-    leap_mm: PositiveFloat = 40.0  # of a joint, from between where it is before and after: more is looked at again
+    leap_mm: PositiveFloat = 40.0  # of a joint off where it was before and will be after: more is looked at again
 
     def run(
         self,
@@ -69,7 +69,7 @@ class SecondLook(Stage):
         return sight.fits.track()
 
     def _look(self, rows: I32, frames: Sequence[Frame], looked: Bool, sight: Hindsight) -> None:
-        """Look at those rows of a window that leap, but the last one; again where a neighbour has another fit now."""
+        """Fit again the rows of a window that leap, but the last; neighbours of one that changes are due again."""
         fits, colours = sight.fits, None
         for row, frame, after in reversed(list(zip(rows.tolist(), frames, frames[1:], strict=False))):
             if looked[row] or not self._leaping(fits)[row]:

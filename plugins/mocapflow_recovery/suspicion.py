@@ -15,7 +15,7 @@ from mocapflow_recovery.leaps import leaping, overbent
 
 
 class Signs(NamedTuple):
-    """What of a fit is odd: more than this."""
+    """Thresholds above which something about a fit is odd."""
 
     uncovered: float  # cm² of the person off the model
     floating: float  # cm² of skin in empty space

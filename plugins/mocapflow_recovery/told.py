@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,6 +14,7 @@ from mocapflow.geometry.kinematics import descendants
 from mocapflow.records import F64, Bool
 from mocapflow_recovery.certain import View
 
+LOG = logging.getLogger("mocapflow")
 BEGIN = ("knee", "elbow")  # joints that limbs begin at, on either side
 FOOT = ("ankle", "toe")  # joints that move a foot, on either side
 LEAST = 0.1  # share of a limb that has to be told; of shanks and feet well lit pictures tell 0.37 to 0.81
@@ -20,6 +22,24 @@ CARRIES = 0.25  # share of its motion from which on a point of a shank tells of 
 NEAR_M = 0.06  # from what may be the person: a first pose is about as far off
 UNSHOWN, UNSURE = 0.4, 0.7  # shares of a leg: of less the room is shown, more than the other is shown
 LEAST_OF_FEET = 0.35  # of both; 0.20 to 0.28 are told on white floors, 0.1 in grey pictures, else 0.42 to 0.81
+
+UNTOLD = "from %s on only %.0f%% differ from the room: this limb may be lost unnoticed"
+HIDDEN = (
+    "%s shows the empty room where the first pose and the other views have the leg from %s on:"
+    " if something stands before it, paint that white in occluders/%s.png; else mend the first pose"
+)
+
+
+def warn_of_untold(surface: Surface, seen: Sequence[View], body: Body) -> None:
+    """Warn of limbs that look like the room; see `untold`."""
+    for joint, share in untold(surface, seen, body).items():
+        LOG.warning(UNTOLD, joint, 100 * share)
+
+
+def warn_of_furniture(surface: Surface, seen: Sequence[View], body: Body) -> None:
+    """Warn of cameras that show the room where the others show a leg; see `hidden_legs`."""
+    for camera, joints in hidden_legs(surface, seen, body).items():
+        LOG.warning(HIDDEN, camera, " and ".join(joints), camera)
 
 
 def untold(surface: Surface, seen: Sequence[View], body: Body) -> dict[str, float]:
@@ -39,7 +59,7 @@ def untold(surface: Surface, seen: Sequence[View], body: Body) -> dict[str, floa
 
 
 def like_the_floor(surface: Surface, seen: Sequence[View], body: Body) -> Bool:
-    """Return which vertices (V,) of the body move with feet that look like the room in all views: of both, or none."""
+    """Return the vertices (V,) that move with the feet of a body if both look like the room in all views, or none."""
     of_feet = np.array([name.rpartition("_")[0] in FOOT for name in body.joint_names])
     feet, moved = of_feet[body.main_joint], (of_feet[body.skin_joint] * body.skin_weight).sum(axis=1) > CARRIES
     return moved if feet.any() and _told(surface, seen, body)[feet].mean() < LEAST_OF_FEET else np.zeros_like(moved)

@@ -22,8 +22,8 @@ class Virtual(Stage):
     """
 
     name: ClassVar[str] = "virtual"
-    width_px: Annotated[int, Field(ge=64, multiple_of=2)] = 640  # of the video
-    height_px: Annotated[int, Field(ge=64, multiple_of=2)] = 480  # of the video
+    width_px: Annotated[int, Field(ge=64, multiple_of=2)] = 640  # width of the video
+    height_px: Annotated[int, Field(ge=64, multiple_of=2)] = 480  # height of the video
     every: PositiveInt = 1  # takes every so many-th frame
     codec: Literal["mp4v", "vp09"] = "mp4v"  # vp09 plays in browsers, mp4v is fast
 

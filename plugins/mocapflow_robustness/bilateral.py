@@ -31,8 +31,8 @@ class Bilateral(Restorer):
 
     name: ClassVar[str] = "bilateral"
     left: PositiveFloat = 16.0  # grey levels of noise that the blur may leave
-    alike: PositiveFloat = 40.0  # grey levels, standard deviation of the filter in colours
-    passes: PositiveInt = 3  # of the filter, one after the other
+    alike: PositiveFloat = 40.0  # standard deviation of the filter in colours, grey levels
+    passes: PositiveInt = 3  # passes of the filter, one after the other
 
     def restore(self, image: U8) -> tuple[U8, Bool]:
         """Return an image (H, W, 3) without its noise, and where (H, W) it does not show the scene."""

@@ -31,14 +31,14 @@ class CheckViews(Stage):
     and comes back within a few frames is no motion. The track goes without these pictures and says so. What stays
     unnoticed: another moment that differs little from the true one or lasts long, and a repeated picture in all views.
 
-    Of a camera that was knocked meanwhile the track sees the pictures moved back. How it stands is compared with the
-    empty scene every two seconds, and frame by frame between two of these frames that differ: one that is put back at
-    once stays unnoticed.
+    If a camera is knocked during the recording, the track sees its pictures moved back. How it stands is compared with
+    the empty scene every two seconds, and frame by frame between two such frames that differ: a camera that is put back
+    at once stays unnoticed.
     """
 
     name: ClassVar[str] = "check_views"
     extent: ClassVar[Literal["all"]] = "all"  # so that a longer run finds the same
-    longest_s: PositiveFloat = 0.17  # of a burst of wrong pictures
+    longest_s: PositiveFloat = 0.17  # longest burst of wrong pictures
     jump: Factor = 2.0  # how much larger than the motion around it a jump is, in the view that shows it best
 
     def run(self, recording: Recording, background: Background | None = None) -> ViewChecks:

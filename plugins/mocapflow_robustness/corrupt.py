@@ -36,11 +36,11 @@ class Corrupt(Stage):
     seed: NonNegativeInt = 0  # of the noise and of where rectangles lie
     noise: Share = 0.0  # share of the pixels that get a random colour
     noise_kind: Literal["replaced", "added"] = "replaced"  # added: noise up to that share of the range, on every pixel
-    noise_over: bool = False  # whether noise lies over rectangles and stripe, as a bad sensor's would, or under them
-    rectangles: tuple[NonNegativeInt, NonNegativeInt] = (0, 0)  # grey ones, at least and at most, on each picture
+    noise_over: bool = False  # noise lies over rectangles and stripe, as of a bad sensor, or else under them
+    rectangles: tuple[NonNegativeInt, NonNegativeInt] = (0, 0)  # grey ones on each picture, at least and at most
     stripe: Share = 0.0  # height of a black stripe, share of the picture
-    stripe_centre: Share = 0.5  # share of the picture from its top
-    events: tuple[Event, ...] = ()  # a later one goes before an earlier one
+    stripe_centre: Share = 0.5  # middle of the stripe from the top, share of the picture
+    events: tuple[Event, ...] = ()  # where two meet, the later one in this list counts
 
     @model_validator(mode="after")
     def _at_least_is_not_more_than_at_most(self) -> Corrupt:
@@ -48,18 +48,22 @@ class Corrupt(Stage):
             raise ValueError("rectangles: [at least, at most]")
         return self
 
-    def run(self, recording: Recording) -> Recording:
-        """Return the recording as it looks when disturbed.
-
-        Raises:
-            RecordingError: an event names a camera that is not there, or wants another one where there is one.
-        """
+    def need(self, recording: Recording) -> None:
+        """Raise if an event names a camera that is not there, or wants another one where there is one."""
         names = [view.lens.name for view in recording.views]
         for view in (view for event in self.events for view in event.views):
             if view not in names:
                 raise RecordingError(f"corrupt: there is no camera '{view}'", hint=alternatives(view, names))
         if len(names) < 2 and any(event.what == "other_camera" for event in self.events):
             raise RecordingError("corrupt: there is no other camera to show", hint="choose `what: other_time`")
+
+    def run(self, recording: Recording) -> Recording:
+        """Return the recording as it looks when disturbed.
+
+        Raises:
+            RecordingError: a camera is missing, see `need`.
+        """
+        self.need(recording)
         return replace(recording, changes=(*recording.changes, Corruption(self, recording)))
 
 

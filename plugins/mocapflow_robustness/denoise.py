@@ -27,14 +27,14 @@ class Denoise(Restorer):
 
     Random colours do not agree, so an intact pixel is known by its company however few are left: of 60 % noise, ten in
     a neighbourhood of 25 agree. Nothing is averaged over time or over colours that are right, so thin limbs stay sharp
-    however fast they move. Where a picture full of noise has none, it does not show the scene, nor where all that noise
-    left in a large square has one colour to the last grey level, as little but a blank wall has. What so has been
-    put before the scene (rectangles, stripes, a logo) is hidden and counts neither way. A picture without noise stays
+    however fast they move. Where a picture full of noise has none, it does not show the scene; nor where all intact
+    pixels of a large square have one colour to the last grey level, as little but a blank wall has. What is put before
+    the scene in this way (rectangles, stripes, a logo) is hidden and counts neither way. A picture without noise stays
     as it is.
     """
 
     name: ClassVar[str] = "denoise"
-    alike: PositiveInt = 16  # grey levels: neighbours agree that are so near in every colour
+    alike: PositiveInt = 16  # neighbours agree that differ by no more in any colour, grey levels
 
     def restore(self, image: U8) -> tuple[U8, Bool]:
         """Return an image (H, W, 3) without its noise, and where (H, W) it does not show the scene."""

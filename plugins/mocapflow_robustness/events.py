@@ -19,12 +19,12 @@ class Event(Settings):
     what: Literal[
         "black", "torn", "covered", "frozen", "late", "other_time", "other_camera", "dropped", "knocked"
     ]  # to the pictures
-    first: NonNegativeInt = 0  # frame
-    count: PositiveInt | None = None  # frames; none: for good
+    first: NonNegativeInt = 0  # first frame
+    count: PositiveInt | None = None  # number of frames; none: for good
     views: tuple[str, ...] = ()  # names of cameras; none: all of them
-    by: PositiveInt = 3  # late: so many frames; other_time: so many frames ahead, or back where there are none
-    turn_deg: float = 0.5  # knocked: so far the camera turns to its right
-    share: Annotated[float, Field(gt=0, le=1)] = 0.5  # covered, and known to be: the lower part of the picture
+    by: PositiveInt = 3  # late: number of frames; other_time: so many frames ahead, or back where there are none
+    turn_deg: float = 0.5  # knocked: how far the camera turns to its right
+    share: Annotated[float, Field(gt=0, le=1)] = 0.5  # covered, and known to be: the lower part, share of the height
 
     def holds(self, index: int, view: str) -> bool:
         """Return whether it happens to a frame of a view."""

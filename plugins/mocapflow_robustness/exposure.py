@@ -30,17 +30,17 @@ BLACK = 30  # grey level; a picture without a brighter pixel shows nothing
 class Exposure(Stage):
     """Corrects cameras that are set badly, and pictures that are not as bright as others of their camera.
 
-    What tells a person from the room is said in shares of the range of grey levels, as well exposed pictures use it.
-    So frames and plates of a camera that shows all too dark, or in one colour, have their levels multiplied, of each
-    colour by one factor in all pictures, so far as the brightest parts allow; of other cameras they stay. A frame that
-    is brighter or darker than the first ones, all over or more at one side, for the sun comes out, a lamp goes out or a
-    camera sets itself, becomes as bright as they. It has to stand before all stages that change pictures.
+    What tells a person from the room is stated in shares of the range of grey levels, which well exposed pictures fill.
+    So if a camera shows everything too dark, or tinged, the levels of each colour are multiplied by one factor in all
+    its frames and plates, as far as the brightest parts allow; other cameras keep theirs. A frame that is brighter or
+    darker than the first ones, all over or more at one side (the sun comes out, a lamp goes out, a camera adjusts
+    itself), is made as bright as they are. The stage has to stand before all stages that change pictures.
     """
 
     name: ClassVar[str] = "exposure"
     bright: Annotated[float, Field(gt=0, le=255)] = 215.0  # grey level that the bright parts of a picture should have
-    least_gain: Factor = 1.25  # factor of grey levels below which they stay
-    most_gain: Factor = 5.0  # factor at most: more shows noise
+    least_gain: Factor = 1.25  # smallest factor of grey levels that is worth a correction
+    most_gain: Factor = 5.0  # largest factor: more shows noise
     tinged: Factor = 2.0  # ratio of the brightest to the darkest colour of the bright parts: more is a tinge
     tolerance: Annotated[float, Field(ge=0, lt=1)] = 0.02  # share by which a frame may be brighter or darker
 

@@ -17,10 +17,10 @@ from mocapflow.records import F32, U8, Bool
 
 
 class Hysteresis(Stage):
-    """Clears the scene of what restored pictures still have of their noise, and what would be taken for the person.
+    """Clears restored pictures of what is left of their noise, which would be taken for the person.
 
-    A place stays as it is if it differs from the empty scene by several spreads and, somewhere in it, by many. All else
-    becomes the empty scene. Where nobody knows that, nothing happens.
+    A place stays as it is if all of it differs from the empty scene by `several` spreads, and some of it by `many`.
+    Everything else becomes the empty scene. Where the empty scene is not known, pictures stay as they are.
 
     Source: Canny 1986 (thresholds with hysteresis)
     """

@@ -29,9 +29,9 @@ class Probes:
     turns: dict[int, list[Moved]] = field(default_factory=dict)  # by camera, of every frame that tells
 
     def look(self, frame: Frame) -> None:
-        """Take note of how pictures lie, every few seconds and at the end, to what their cameras show in the beginning.
+        """Note how pictures lie to what their cameras show in the beginning, every few seconds and in the last frame.
 
-        Of a camera whose room is not known that is its first picture.
+        Of a camera whose empty room is not known that is its first picture.
         """
         every = max(round(EVERY_S * self.recording.frame_rate), 1)
         wanted = frame.index % every == 0 or frame.index == self.recording.length - 1
@@ -43,7 +43,7 @@ class Probes:
                 self.turns.setdefault(camera, []).append((frame.index, turn))
 
     def knocks(self) -> Knocks | None:
-        """Return when cameras have turned, of which it warns; None: they have not.
+        """Return when cameras have turned, and warn of it; None: none has.
 
         All frames between two of those looked at that differ are read again.
         """

@@ -26,7 +26,7 @@ class Thumbnails:
 
 
 def thumbnails(recording: Recording, look: Callable[[Frame], None] = lambda frame: None) -> Thumbnails:
-    """Return the thumbnails of all frames of a recording, and look at these; every video is decoded once."""
+    """Return the thumbnails of all frames of a recording; each is shown to `look`, as videos are decoded only once."""
     everything = replace(recording, indices=range(recording.length))
     grey = np.zeros((recording.length, len(recording.views), SIDE, SIDE), np.float32)
     news, there = np.full(grey.shape[:2], np.nan), np.zeros(grey.shape[:2], bool)

@@ -33,10 +33,10 @@ FLOOR_FRAMES = 4  # in which the person's shadow may tell the height of the floo
 class EmptyScene(Stage):
     """Learns what the cameras see without the person.
 
-    Without clean plates it takes, of the commonest colours of each pixel over the whole recording, that of the room: by
-    the pose of the first frame and by the colours beside the person in it, if a stage before makes a `Start`, else the
-    commonest. Nobody knows what is behind a person who stays in place throughout. Memory is bounded by `samples`
-    pictures of one camera.
+    Without clean plates it takes one of the commonest colours of each pixel over the whole recording. If a stage before
+    makes a `Start`, the pose of the first frame and the colours beside the person in it tell which is the room's; else
+    it is the commonest. Nobody knows what is behind a person who stays in place throughout. Memory is bounded by
+    `samples` pictures of one camera.
 
     Of a floor without colours it learns the height, too, if the person's shadow tells it: then views can tell grey
     clothes from shadows together (`mocapflow_levelset.one_floor`).
@@ -46,7 +46,7 @@ class EmptyScene(Stage):
     extent: ClassVar[Literal["first"]] = "first"  # that of the `Start`; pictures come from all over the recording
     source: Literal["auto", "plates", "recording"] = "auto"  # auto: the plates where there are any
     samples: Annotated[int, Field(ge=3)] = 50  # pictures of each camera that are looked at
-    least_share: Annotated[float, Field(ge=0, le=1)] = 0.06  # of them: a colour seen in fewer may be anything
+    least_share: Annotated[float, Field(ge=0, le=1)] = 0.06  # share of them that has to show a colour
 
     def need(self, recording: Recording) -> None:
         """Raise if plates are wanted and missing, or if a camera lacks one though others have theirs."""

@@ -31,12 +31,12 @@ class FollowPoints(Stage):
 
     name: ClassVar[str] = "flow"
     causal: ClassVar[bool] = True
-    points: Annotated[int, Field(ge=1, le=500)] = 500  # a view, at most
-    spacing_px: PositiveFloat = 3.0  # between points, at least
+    points: Annotated[int, Field(ge=1, le=500)] = 500  # points in a view, at most
+    spacing_px: PositiveFloat = 3.0  # distance between points, at least
     window_px: Annotated[int, Field(ge=3)] = 11  # edge of the square that is compared
-    levels: NonNegativeInt = 4  # of the pyramid: each doubles the motion that can be followed
+    levels: NonNegativeInt = 4  # levels of the pyramid: each doubles the motion that can be followed
     round_trip_px: PositiveFloat = 1.0  # how near a point has to come to where it was
-    difference: PositiveFloat = 20.0  # grey levels from the empty scene
+    difference: PositiveFloat = 20.0  # grey levels by which a pixel has to differ from the empty scene
 
     def run(
         self, recording: Recording, background: Background | None = None, checks: ViewChecks | None = None

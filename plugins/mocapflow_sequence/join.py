@@ -28,7 +28,7 @@ class Join(Stage):
     """
 
     name: ClassVar[str] = "join"
-    tolerance_mm: PositiveFloat = 20.0  # parts further apart where they are joined: a warning
+    tolerance_mm: PositiveFloat = 20.0  # parts farther apart where they are joined get a warning
 
     def run(self, parts: tuple[Track, ...], scene: Scene) -> Track:
         """Return the joined track.

@@ -30,9 +30,9 @@ class Smooth(Stage):
     """
 
     name: ClassVar[str] = "smooth"
-    angle_acceleration_deg_s2: PositiveFloat = 4000.0  # of every joint angle
-    root_acceleration_deg_s2: PositiveFloat = 2000.0  # of the turn of the root
-    root_acceleration_m_s2: PositiveFloat = 15.0  # of the root joint
+    angle_acceleration_deg_s2: PositiveFloat = 4000.0  # standard deviation for every joint angle
+    root_acceleration_deg_s2: PositiveFloat = 2000.0  # standard deviation for the turning of the root
+    root_acceleration_m_s2: PositiveFloat = 15.0  # standard deviation for the place of the root joint
 
     def run(self, track: Track, scene: Scene) -> Track:
         """Return the smoothed track, which keeps the poses it was made from.

@@ -9,7 +9,7 @@ from mocapflow.hookspecs import hookimpl
 @hookimpl
 def mocapflow_pose_solvers() -> list[type[PoseSolver]]:
     """Return the pose solvers of this plugin."""
-    from mocapflow_twist.solver import TwistGaussNewton
+    from mocapflow_twist.twist_gauss_newton import TwistGaussNewton
 
     return [TwistGaussNewton]
 

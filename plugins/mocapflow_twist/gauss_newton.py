@@ -28,7 +28,7 @@ from mocapflow.geometry.sewing import TAKE_UP, THICKNESS
 from mocapflow.model import ClothedModel
 from mocapflow.pooling import pool
 from mocapflow.records import F64, Bool
-from mocapflow_twist import solve
+from mocapflow_twist import steps
 from mocapflow_twist.constraint import image_rows
 from mocapflow_twist.normal_equations import Equations, dense_equations
 
@@ -38,7 +38,7 @@ TRIALS = 4  # times that the damping is raised before a step is given up
 class GaussNewton(ClothFitter):
     """Moves the outline of the cloth onto the silhouettes by its forces.
 
-    Each force is held about none. The thickness, which moves the outline by less than a pixel, and the take-up are left
+    Each force is held near zero. The thickness, which moves the outline by less than a pixel, and the take-up are left
     as they are. `cloth_unknowns` of twist_gauss_newton solves for the same parameters together with the pose, and from
     matches; this fitter alternates with the pose, and reads the distance fields.
     """
@@ -46,9 +46,9 @@ class GaussNewton(ClothFitter):
     name: ClassVar[str] = "gauss_newton"
     iterations: PositiveInt = 3  # steps, at most
     sigma_px: PositiveFloat = 3.0  # standard deviation of the outline of cloth
-    correlation_px: PositiveFloat = 15.0  # length over which its errors agree
+    correlation_px: PositiveFloat = 15.0  # length over which the outline's errors agree
     cloth_sd: PositiveFloat = 0.15  # standard deviation of each parameter about a calm garment, share of its range
-    damping: PositiveFloat = 1e-3  # share of the mean diagonal
+    damping: PositiveFloat = 1e-3  # first damping, share of the mean diagonal
     spacing_px: PositiveFloat = 4.0  # between the points of the outline
 
     def fit(
@@ -66,9 +66,9 @@ class GaussNewton(ClothFitter):
                 trial = task.moved(before, equations, damping)
                 reached = task.energy(trial)
                 if reached < energy:
-                    cloth, energy, damping = trial, reached, solve.LOWERED * damping
+                    cloth, energy, damping = trial, reached, steps.LOWERED * damping
                     break
-                damping *= solve.RAISED
+                damping *= steps.RAISED
             if cloth is before:
                 break
         return cloth
@@ -110,19 +110,20 @@ class Task(NamedTuple):
         rows = image_rows(matches, cameras)
         worn = rows.part(rows.vertex >= first, rows.weight, first)
         hessian, gradient, energy = dense_equations(worn, cloth.vertices, self._velocity(cloth))
-        pull = self.precision * self._from_calm(cloth)
-        return Equations(hessian + np.diag(self.precision), gradient + pull, energy)
+        off = self._from_calm(cloth)
+        pull = self.precision * off
+        return Equations(hessian + np.diag(self.precision), gradient + pull, energy + 0.5 * float(pull @ off))
 
     def moved(self, cloth: Cloth, equations: Equations, damping: float) -> Cloth:
         """Return the cloth after one damped step, its parameters within their bounds."""
         low, high = self.garment.parameter_bounds.T
         parameters, downhill = cloth.parameters, -equations.gradient
-        free = ~solve.at_bound(parameters, downhill, low, high) & self._fitted
+        free = ~steps.at_bound(parameters, downhill, low, high) & self._fitted
         if not free.any():  # the garment knows no forces, or each stands at a bound
             return cloth
         part = Equations(equations.hessian[np.ix_(free, free)], equations.gradient[free], equations.energy)
         increment = np.zeros(len(parameters))
-        increment[free] = solve.step(part, solve.CLOTH_LEVER / (high - low)[free], damping)
+        increment[free] = steps.step(part, steps.CLOTH_LEVER / (high - low)[free], damping)
         return self.model.drape(self.estimate.pose, np.clip(parameters + increment, low, high), self.past)
 
     @property

@@ -12,7 +12,7 @@ from mocapflow.model import ClothedModel, moved
 from mocapflow.records import F64, Bool
 from mocapflow_twist.normal_equations import Equations
 from mocapflow_twist.problem import Guess
-from mocapflow_twist.solve import at_bound
+from mocapflow_twist.steps import at_bound
 
 
 @dataclass

@@ -18,7 +18,7 @@ from mocapflow.records import F64
 from mocapflow_twist import normal_equations
 from mocapflow_twist.constraint import Rows
 from mocapflow_twist.normal_equations import Equations
-from mocapflow_twist.solve import about_origin
+from mocapflow_twist.steps import about_origin
 
 
 class Guess(NamedTuple):

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 from mocapflow_draping.fixed import Fixed
-from mocapflow_twist.solver import TwistGaussNewton
+from mocapflow_twist.twist_gauss_newton import TwistGaussNewton
 
 from mocapflow.components import Matcher, Prior, Segmenter
 from mocapflow.data import (

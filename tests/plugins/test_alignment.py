@@ -83,3 +83,22 @@ def test_resampled_between_samples_and_not_across_gaps() -> None:
     np.testing.assert_allclose(got, [np.nan, 0, 3, 6, np.nan, np.nan, 14, 16.5, 18, np.nan])
     assert np.isnan(resampled(at, np.full(10, np.nan), at, 1.0)).all()
     np.testing.assert_array_equal(resampled(np.array([4.0]), np.array([1.0]), np.array([3.0, 4.0]), 1.0), [np.nan, 1])
+
+
+def test_nothing_is_made_up_between_samples_that_lie_farther_apart_than_usual() -> None:
+    at = np.array([0.0, 0.1, 0.2, 0.4, 0.5])
+    found = resampled(at, 10 * at, np.array([-0.05, 0.05, 0.3, 0.398, 0.45, 0.55]), 0.1)
+    np.testing.assert_allclose(found, [np.nan, 0.5, np.nan, 3.98, 4.5, np.nan])
+
+
+@pytest.mark.parametrize(
+    ("lag", "gain", "worth"), [(3.0, 0.5, 3.0), (-3.0, 0.5, -3.0), (3.0, 0.1, 0.0), (0.3, 0.5, 0.0), (np.nan, 0.5, 0.0)]
+)
+def test_a_lag_is_taken_out_if_it_is_large_and_explains_much(lag: float, gain: float, worth: float) -> None:
+    assert Alignment(lag, {}, gain).worth == worth
+
+
+@pytest.mark.parametrize(("frames", "found"), [(50, False), (80, True)])
+def test_a_reference_of_less_than_half_of_our_frames_shows_no_lag(frames: int, found: bool) -> None:
+    theirs = {name: np.where(np.arange(120) < frames, curve, np.nan) for name, curve in motion(TIME + 3 / 30).items()}
+    assert np.isfinite(aligned(motion(TIME), theirs, TIME, longest=0.2).lag) == found

@@ -9,7 +9,7 @@ from matching_scenes import Given, seen, start_near
 from mocapflow_draping.fixed import Fixed
 from mocapflow_levelset.levelset import LevelSet
 from mocapflow_matching.contour_icp import ContourIcp
-from mocapflow_twist.solver import TwistGaussNewton
+from mocapflow_twist.twist_gauss_newton import TwistGaussNewton
 
 from mocapflow.data import Past, Turn
 from mocapflow.functional import Functional

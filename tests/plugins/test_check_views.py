@@ -9,7 +9,7 @@ import pytest
 from mocapflow_robustness import check_views
 from mocapflow_robustness.check_views import CheckViews
 from mocapflow_robustness.corrupt import Corrupt
-from mocapflow_robustness.doubts import bridged, bursts
+from mocapflow_robustness.doubts import blank, bridged, bursts
 from mocapflow_robustness.events import Event
 from mocapflow_robustness.thumbnails import thumbnails
 
@@ -166,6 +166,35 @@ def test_a_burst_is_flagged_in_every_view_that_jumps_with_it():
     grey[12:15] += np.array([20, 4, 0], np.float32)[:, None, None]
     wrong = bursts(grey, longest=5, strong=3, weak=1.3)
     assert np.argwhere(wrong).tolist() == [[row, view] for row in (12, 13, 14) for view in (0, 1)]
+
+
+def walked(*places):
+    """Thumbnails of one view that are `places` off a first one, all over."""
+    return np.broadcast_to(np.array(places, np.float32)[:, None, None, None], (len(places), 1, 20, 20)).copy()
+
+
+@pytest.mark.parametrize(
+    ("places", "wrong"),
+    [
+        ((0, 1, 2, 3, 40, 5, 6, 7, 8), [4]),
+        ((0, 1, 2, 3, 40, 41, 6, 7, 8), [4, 5]),
+        ((0, 1, 2, 3, 40, 41, 42, 7, 8), []),  # longer than a burst may be
+        ((0, 1, 2, 3, 40, 80, 81, 82, 83), []),  # it goes on from there: a step that stays
+        ((0, 1, 40, 3, 4, 5, 6), [2]),
+        ((0, 40, 2, 3, 4, 5, 6), []),  # no step before it tells how fast things move
+        ((0, 1, 2, 3, 40, 5, 6), [4]),
+        ((0, 1, 2, 3, 4, 40, 6), []),  # nor one after it
+    ],
+)
+def test_what_jumps_away_and_comes_back_is_a_burst(places, wrong):
+    assert np.flatnonzero(bursts(walked(*places), 2, 2.0, 1.3)[:, 0]).tolist() == wrong
+
+
+def test_a_picture_with_a_small_share_of_its_rooms_contrast_shows_nothing():
+    room = np.random.default_rng(0).normal(0, 60, (1, 20, 20)).astype(np.float32)
+    grey = np.stack([share * room for share in (1.0, 0.15, 0.07)])  # the last still has more than noise has
+    np.testing.assert_array_equal(blank(grey, room)[:, 0], [False, False, True])
+    np.testing.assert_array_equal(blank(grey / 60, room / 60)[:, 0], [True, True, True])
 
 
 def test_bad_thumbnails_are_interpolated():

@@ -101,6 +101,17 @@ def test_later_frames_follow_a_force_step_by_step(fitter, model):
     assert abs(found[column] - 0.12) < np.radians(2.5)
 
 
+def test_a_force_that_its_bounds_fix_stays_and_the_others_are_found(model):
+    garment = model.scene.garment
+    column, fixed = garment.parameter_names.index("flare_rad"), garment.parameter_names.index("wind_cos_rad")
+    bounds = garment.parameter_bounds.copy()
+    bounds[fixed] = 0.0
+    tied = replace(model, scene=replace(model.scene, garment=replace(garment, parameter_bounds=bounds)))
+    found = fitted(GaussNewton(), tied, parameters(tied, flare_rad=0.12), parameters(tied)).parameters
+    assert found[fixed] == 0
+    assert 0.05 < found[column] < 0.12
+
+
 def test_the_take_up_is_found_in_a_few_steps_where_the_hem_stands_out(model):
     column, past = model.scene.garment.parameter_names.index("take_up"), Past()
     truth, found = parameters(model, take_up=0.06, flare_rad=0.3), parameters(model, flare_rad=0.3)

@@ -144,9 +144,12 @@ def test_a_covered_picture_stays_hidden_where_it_was(clip):
     assert together((), rows) == tuple(rows) == together(rows, ()) and together((), ()) == ()
 
 
-def test_a_camera_that_is_not_there_is_named(clip):
+def test_a_camera_that_is_not_there_is_named_by_a_plan_too(clip):
+    event = dict(what="black", views=["cam03"])
     with pytest.raises(RecordingError, match="there is no camera 'cam03'"):
-        disturbed(clip, dict(what="black", views=["cam03"]))
+        disturbed(clip, event)
+    with pytest.raises(RecordingError, match="there is no camera 'cam03'"):
+        Corrupt(events=[event]).need(open_recording(clip))
 
 
 def test_later_stages_see_it_and_its_settings_are_in_their_keys(tmp_path):

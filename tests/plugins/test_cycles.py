@@ -28,10 +28,10 @@ def walking(speed: float, lift: float = 0.05, bearing: float = 0.0, seconds: flo
     return np.stack(places, axis=1)
 
 
-@pytest.mark.parametrize("speed", [0.0, 1.3])
-@pytest.mark.parametrize("bearing", [0.0, 2.0])
-def test_heel_strikes_on_a_treadmill_and_over_ground(speed: float, bearing: float) -> None:
-    found = gait_cycles(NAMES, walking(speed, bearing=bearing), RATE)
+@pytest.mark.parametrize("size", [0.4, 1.0, 2.5])
+@pytest.mark.parametrize(("speed", "bearing"), [(0.0, 0.0), (1.3, 0.0), (1.3, 2.0)])
+def test_heel_strikes_on_a_treadmill_and_over_ground(speed: float, bearing: float, size: float) -> None:
+    found = gait_cycles(NAMES, size * walking(speed, bearing=bearing), RATE)
     left = [cycle.first for cycle in found if cycle.side == "l"]
     right = [cycle.first for cycle in found if cycle.side == "r"]
     np.testing.assert_allclose(np.array(left) / RATE, np.arange(4) + 0.25, atol=0.02)
@@ -44,13 +44,14 @@ def test_knees_raised_on_the_spot_are_no_strides() -> None:
     assert gait_cycles([str(name) for name in found["names"]], found["positions"], 30.0) == []
 
 
-def test_a_leg_that_is_raised_where_it_is_ahead_takes_no_strides() -> None:
+@pytest.mark.parametrize("size", [0.4, 1.0, 2.5])
+def test_a_leg_that_is_raised_where_it_is_ahead_takes_no_strides(size: float) -> None:
     """It swings as far forward and back as that of somebody who walks."""
-    places = walking(0.0)
+    places = size * walking(0.0)
     assert gait_cycles(NAMES, places, RATE)
     ahead = np.maximum(0, np.sin(2 * np.pi * np.arange(len(places)) / RATE))  # of the left leg
     for side, share in (("l", ahead), ("r", np.roll(ahead, int(RATE) // 2))):
-        places[:, NAMES.index(f"ankle_{side}"), 2] += 0.3 * share  # m
+        places[:, NAMES.index(f"ankle_{side}"), 2] += 0.3 * size * share  # m
     assert gait_cycles(NAMES, places, RATE) == []
 
 

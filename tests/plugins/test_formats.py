@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import pytest
 import readers
+from mocapflow_export.export import Export
 from mocapflow_export.formats import FILES, Result, write
 from mocapflow_export.formats.gltf import the_shorter_way
 from results_scene import DEMO, demo_scene, stepping
@@ -53,6 +54,15 @@ def test_a_missing_library_is_named(
     monkeypatch.setitem(sys.modules, needed, None)
     with pytest.raises(PipelineError, match=r"this format needs .*\n.*pip install 'mocapflow\["):
         write(name, result, tmp_path)
+
+
+def test_a_format_whose_package_is_not_installed_is_told_before_the_run(
+    result: Result, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Export().need(result.recording)
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    with pytest.raises(PipelineError, match=r"this format needs rerun\n.*pip install 'mocapflow\[view\]'"):
+        Export(formats=("csv", "bvh", "rrd")).need(result.recording)
 
 
 @pytest.mark.filterwarnings("ignore::PendingDeprecationWarning", "ignore:No analog data")  # of the readers

@@ -99,7 +99,7 @@ def match(colour_of, believed, true=None, slipped_m=0.0):
     pose = kicked(60.0) if true is None else true
     frame, surface = painted(colour_of, pose, lower_m=slipped_m), surface_at(believed)
     past = Past(appearance={COLOURS: learned(frame, pose=pose)})
-    segmentation, search = tiny_segmentation(SCENE, pose), Search(24, 3, 1.0, 1.0)
+    segmentation, search = tiny_segmentation(SCENE, pose), Search(24, 1.0)
     layers, known = layer_of(SCENE), shown(past)
     told = told_apart(SCENE, layers, known)
     parts = [

@@ -10,9 +10,10 @@ from mocapflow_bodies.scanned import Scanned
 from mocapflow_fitting.landmarks import landmarks
 from mocapflow_fitting.start_from_file import read_pose
 from mocapflow_matching.keypoints import Keypoints, _median_error, marks_on
-from mocapflow_twist.solver import TwistGaussNewton
+from mocapflow_twist.twist_gauss_newton import TwistGaussNewton
 
 from mocapflow.data import NO_CLOTH, Frame, Past, Segmentation, Turn
+from mocapflow.errors import RecordingError
 from mocapflow.geometry import kinematics
 from mocapflow.geometry.cameras import centre, project
 from mocapflow.io.cameras import read_cameras
@@ -65,6 +66,12 @@ def test_landmarks_are_means_of_the_skin_around_them(by):
     off = np.linalg.norm(means - exact, axis=1)
     assert np.median(off) < 0.01
     assert off.max() < 0.04
+
+
+@pytest.mark.parametrize(("layout", "points"), [("coco_17", 17), ("halpe_26", 26)])
+def test_keypoints_that_a_layout_does_not_have_are_refused(layout, points):
+    with pytest.raises(RecordingError, match=f"a person has 25 keypoints, in the layout {layout} {points}"):
+        match(frame_of(POSE), matcher=Keypoints(layout=layout))
 
 
 def test_at_the_true_pose_nothing_has_to_move_much():

@@ -13,6 +13,7 @@ from mocapflow_fitting.align_cameras import turn
 from mocapflow_fitting.landmarks import landmarks
 from results_scene import make_track, stepping
 
+from mocapflow.errors import RecordingError
 from mocapflow.geometry import kinematics
 from mocapflow.io import markers
 from mocapflow.knocks import Knocks
@@ -59,6 +60,14 @@ def apart(evaluation: Evaluation, track: Track) -> float:
     known = np.stack([kinematics.skin(marks.body, kinematics.chain(marks.body, p)[0], p.angles) for p in poses])
     columns = [names.index(name.replace("big_toe", "toe")) for name in marks.names]
     return float(np.abs(markers.world_from_opensim(places)[:FRAMES, columns] - known).max())
+
+
+def test_a_folder_without_keypoints_of_two_cameras_is_told_before_the_run(recording: Recording, tmp_path: Path) -> None:
+    (tmp_path / "cam01_json").mkdir()
+    with pytest.raises(RecordingError, match="no 2D keypoints of two cameras") as told:
+        Evaluate(reference=str(tmp_path)).need(recording)
+    assert told.value.where == str(tmp_path)
+    Evaluate(reference="keypoints").need(recording)
 
 
 @pytest.mark.long

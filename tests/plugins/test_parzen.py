@@ -11,7 +11,7 @@ import pytest
 from mocapflow_priors.density import Density, bandwidth, log_density, read, write
 from mocapflow_priors.parzen import SHIPPED, Parzen
 from mocapflow_twist.problem import Anchor, Guess, Problem
-from mocapflow_twist.solver import TwistGaussNewton
+from mocapflow_twist.twist_gauss_newton import TwistGaussNewton
 from pydantic import ValidationError
 from twist_fixtures import exact_matches, make_pose, make_scene, make_state
 

@@ -10,7 +10,7 @@ import pytest
 from marker_take import markers_of, write_c3d
 from mocapflow_evaluation import marker_joints, ours
 from mocapflow_evaluation.alignment import at_our_frames
-from mocapflow_evaluation.evaluate import chosen, evaluate
+from mocapflow_evaluation.evaluate import Evaluate, chosen, evaluate
 from mocapflow_evaluation.marker_names import landmarks
 from mocapflow_evaluation.ours import Ours
 from mocapflow_evaluation.references import Reference, read_reference
@@ -139,6 +139,15 @@ def test_rigs_whose_metres_differ_by_more_than_a_fifth_of_a_percent_are_told(
     notes = " ".join(evaluate(own, tmp_path / "markers.c3d", tmp_path / "run").notes)
     assert f"scale {1 / scale:.3f}" in notes
     assert ("the scale is not applied: check units and calibrations of both" in notes) == told
+
+
+def test_common_points_that_can_not_be_read_are_told_before_anything_runs(tmp_path: Path) -> None:
+    markers.write_trc(tmp_path / "m.trc", LABELS, markers.opensim_from_world(PLACES), RATE)
+    recording, stage = open_recording(DEMO), Evaluate(reference=str(tmp_path / "m.trc"))
+    stage.need(recording)
+    (tmp_path / "registration.csv").write_text("x,y,z\n0,0,0\n")
+    with pytest.raises(RecordingError, match="no column marker_x"):
+        stage.need(recording)
 
 
 @pytest.mark.usefixtures("undrawn")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mocapflow_twist.constraint import image_rows
 from mocapflow_twist.normal_equations import dense_equations
-from mocapflow_twist.solver import TwistGaussNewton
+from mocapflow_twist.twist_gauss_newton import TwistGaussNewton
 from test_twist_solver import EXACT, TURN, energies_of
 from twist_fixtures import exact_matches, make_pose, make_scene, make_state
 

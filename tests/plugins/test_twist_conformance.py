@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mocapflow_twist.solver import TwistGaussNewton
+from mocapflow_twist.twist_gauss_newton import TwistGaussNewton
 
 from mocapflow.testing import PoseSolverConformance
 

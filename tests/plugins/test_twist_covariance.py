@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from mocapflow_twist.covariance import covariance, effective_share, observed, view_balance
-from mocapflow_twist.solver import TwistGaussNewton
+from mocapflow_twist.twist_gauss_newton import TwistGaussNewton
 from test_twist_solver import FREE, solve
 from twist_fixtures import exact_matches, make_pose, make_scene
 

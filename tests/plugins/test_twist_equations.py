@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mocapflow_twist import normal_equations
 from mocapflow_twist.constraint import Rows, image_rows, line_rows
-from mocapflow_twist.solve import about_origin
+from mocapflow_twist.steps import about_origin
 from twist_fixtures import exact_matches, make_pose, make_scene
 
 from mocapflow.data import Matches, Pose

@@ -13,7 +13,7 @@ from mocapflow_bodies.scanned import Scanned
 from mocapflow_priors.joint_limits import JointLimits
 from mocapflow_priors.rest_pose import RestPose
 from mocapflow_twist.problem import Anchor, Guess, Problem
-from mocapflow_twist.solver import TwistGaussNewton, calmed
+from mocapflow_twist.twist_gauss_newton import TwistGaussNewton, calmed
 from twist_fixtures import exact_matches, make_pose, make_scene, make_state
 
 from mocapflow.components import Prior

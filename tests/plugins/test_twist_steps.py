@@ -9,12 +9,12 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 from mocapflow_priors.smooth_motion import SmoothMotion
-from mocapflow_twist import solve
+from mocapflow_twist import steps
 from mocapflow_twist.constraint import line_rows
 from mocapflow_twist.covariance import effective_share
 from mocapflow_twist.motion import ClothMotion
 from mocapflow_twist.problem import Anchor, Guess, Problem
-from mocapflow_twist.solver import TwistGaussNewton
+from mocapflow_twist.twist_gauss_newton import TwistGaussNewton
 from test_twist_solver import EXACT, FREE, start_from
 from twist_fixtures import exact_matches, make_pose, make_scene, make_state
 
@@ -38,12 +38,12 @@ def test_each_kind_of_move_has_its_cap(column: int, cap: float) -> None:
     """What is too large alone shortens the whole step, and to the cap; the rest of it is small."""
     increment = np.full(UNKNOWNS, 1e-3)
     increment[column] = -5.0
-    short = solve.capped(increment, UNKNOWNS - 6, 0.1, 0.05)
+    short = steps.capped(increment, UNKNOWNS - 6, 0.1, 0.05)
     first = slice(3 * (column // 3), 3 * (column // 3) + 3) if column < 6 else [column]
     assert np.linalg.norm(short[first]) == pytest.approx(cap)
     np.testing.assert_allclose(short, increment * short[column] / increment[column])
     within = np.full(UNKNOWNS, 1e-3)
-    np.testing.assert_array_equal(solve.capped(within, UNKNOWNS - 6, 0.1, 0.05), within)
+    np.testing.assert_array_equal(steps.capped(within, UNKNOWNS - 6, 0.1, 0.05), within)
 
 
 class Grudging(NamedTuple):
@@ -79,7 +79,7 @@ def test_priors_on_the_root_pull_about_the_root_as_their_energy_says() -> None:
     prior = SmoothMotion(weight=3.0, root_sd_mm=40.0)
     solver, guess = TwistGaussNewton(**FREE), Guess(TRUTH, NO_CLOTH)
     problem = problem_of(solver, guess, (prior,), past)
-    columns = solve.about_origin(problem.centre(guess), UNKNOWNS).T
+    columns = steps.about_origin(problem.centre(guess), UNKNOWNS).T
 
     def energy(step: np.ndarray) -> float:
         return problem.energies(Guess(moved(TRUTH, step), NO_CLOTH))["smooth_motion"]
@@ -92,7 +92,7 @@ def test_priors_on_the_root_pull_about_the_root_as_their_energy_says() -> None:
 def test_the_damping_pulls_about_the_root_as_its_energy_says() -> None:
     solver = TwistGaussNewton(root_sd_deg=20.0, root_sd_m=0.05, angle_sd_deg=30.0)
     problem, guess = problem_of(solver, Guess(start_from(TRUTH, 2), NO_CLOTH)), Guess(TRUTH, NO_CLOTH)
-    columns = solve.about_origin(problem.centre(guess), UNKNOWNS).T
+    columns = steps.about_origin(problem.centre(guess), UNKNOWNS).T
 
     def energy(step: np.ndarray) -> float:
         return problem.energies(Guess(moved(TRUTH, step), NO_CLOTH))["damping"]
@@ -137,8 +137,8 @@ def test_balanced_views_pull_alike_and_together_as_hard_as_before() -> None:
 
 
 def test_damping_never_falls_below_that_of_its_turn(monkeypatch: pytest.MonkeyPatch) -> None:
-    step = Mock(side_effect=solve.step)
-    monkeypatch.setattr(solve, "step", step)
+    step = Mock(side_effect=steps.step)
+    monkeypatch.setattr(steps, "step", step)
     matches = exact_matches(SCENE, TRUTH, np.arange(0, 300, 9), directed=False)
     solver = TwistGaussNewton(**{**EXACT, "iterations": 4, "damping": 1e-3}, damping_per_turn=10.0)
     solver.solve(lambda _: matches, make_state(start_from(TRUTH, 1)), MODEL, [], Past(), Turn(index=1))

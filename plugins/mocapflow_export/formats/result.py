@@ -63,5 +63,9 @@ def library(module: str, extra: str) -> ModuleType:
     try:
         return import_module(module)
     except ImportError as error:
-        hint = f"pip install 'mocapflow[{extra}]'"
-        raise PipelineError(f"this format needs {module.partition('.')[0]}: {error}", hint=hint) from error
+        raise lacking(f"{module.partition('.')[0]}: {error}", extra) from error
+
+
+def lacking(what: str, extra: str) -> PipelineError:
+    """Return the error of a format that lacks something which an extra brings."""
+    return PipelineError(f"this format needs {what}", hint=f"pip install 'mocapflow[{extra}]'")

@@ -13,7 +13,7 @@ from mocapflow.components import PoseSolver, Prior
 from mocapflow.data import Estimate, FrameState, Matches, Past, Pose, Residual, Surface, Turn
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
-from mocapflow_twist import solve
+from mocapflow_twist import steps
 from mocapflow_twist.constraint import image_rows, line_rows
 from mocapflow_twist.covariance import covariance, effective_share, observed, view_balance
 from mocapflow_twist.motion import ClothMotion
@@ -34,24 +34,24 @@ class TwistGaussNewton(PoseSolver):
 
     name = "twist_gauss_newton"
 
-    iterations: PositiveInt = 10  # times that it matches anew, at most
-    far_iterations: NonNegativeInt = 0  # the same, if it is more, in a frame that begins far off
-    steps_per_match: PositiveInt = 1  # steps with the same pairs
-    residual: Literal["image", "line"] = "image"  # pixels, or distance to projection rays in space
-    line_sigma_mm: PositiveFloat = 3.0  # standard deviation of the distance to a ray, of a match known to 1 px
-    damping: NonNegativeFloat = 1e-4  # share of the mean diagonal; ten times more after a worse step
-    damping_per_turn: PositiveFloat = 1.0  # factor at each turn of the loop: above 1, exact then gentle
-    first_damping: NonNegativeFloat = 0.0  # of the first frame's first turn at least: its start is far off
-    cap_deg: PositiveFloat = 10.0  # a step, each angle
-    cap_mm: PositiveFloat = 100.0  # a step, the root
+    iterations: PositiveInt = 10  # times that matches are found anew, at most
+    far_iterations: NonNegativeInt = 0  # stands for iterations, if more, in a frame that begins far off
+    steps_per_match: PositiveInt = 1  # steps with the same matches
+    residual: Literal["image", "line"] = "image"  # distances in pixels, or to projection rays in space
+    line_sigma_mm: PositiveFloat = 3.0  # line: standard deviation of the distance to a ray, of a match known to 1 px
+    damping: NonNegativeFloat = 1e-4  # least damping, share of the mean diagonal; ten times more after a worse step
+    damping_per_turn: PositiveFloat = 1.0  # factor on it at each turn of the loop: above 1, first exact, then gentle
+    first_damping: NonNegativeFloat = 0.0  # least damping in the first turn of a first frame, whose start is far off
+    cap_deg: PositiveFloat = 10.0  # largest change of an angle, and turn of the root, in a step
+    cap_mm: PositiveFloat = 100.0  # largest shift of the root in a step
     correlation_px: NonNegativeFloat = 15.0  # length over which contour errors agree; 0: independent
-    balance_views: bool = False  # every view counts the same
+    balance_views: bool = False  # gives every view the same weight
     cloth_unknowns: bool = False  # also solves for the cloth parameters
-    root_sd_m: PositiveFloat = 0.1  # standard deviation about the pose that a turn of the loop begins from
-    root_sd_deg: PositiveFloat = 11.5  # likewise
-    angle_sd_deg: PositiveFloat = 60.0  # likewise, of every joint angle
+    root_sd_m: PositiveFloat = 0.1  # standard deviation of the root's place about where the turn of the loop began
+    root_sd_deg: PositiveFloat = 11.5  # standard deviation of its orientation about where the turn of the loop began
+    angle_sd_deg: PositiveFloat = 60.0  # standard deviation of joint angles about where the turn of the loop began
     cloth_sd: PositiveFloat = 0.06  # standard deviation of cloth parameters about a calm garment, share of their range
-    stop_sigmas: NonNegativeFloat = 0.02  # standard deviations, in the mean: no smaller step is taken
+    stop_sigmas: NonNegativeFloat = 0.02  # smaller steps are not taken; standard deviations, RMS over the unknowns
 
     def solve(
         self,
@@ -123,23 +123,23 @@ class TwistGaussNewton(PoseSolver):
         equations = motion.within_bounds(equations, guess)
         angles = len(guess.pose.angles)
         ranges = parameter_ranges(problem.model) if problem.unknowns > 6 + angles else np.empty(0)
-        lever = solve.levers(angles, ranges)
+        lever = steps.levers(angles, ranges)
         least = max(LEAST_GAIN * equations.energy, 0.5 * problem.unknowns * self.stop_sigmas**2)
         for _ in range(TRIALS):
-            increment = solve.step(equations, lever, damping)
-            increment = solve.capped(increment, angles, np.radians(self.cap_deg), self.cap_mm / 1000)
-            if solve.gain(equations, increment) <= least:
+            increment = steps.step(equations, lever, damping)
+            increment = steps.capped(increment, angles, np.radians(self.cap_deg), self.cap_mm / 1000)
+            if steps.gain(equations, increment) <= least:
                 return guess, damping
-            trial = motion.moved(guess, solve.about_origin(problem.centre(guess), len(increment)) @ increment)
+            trial = motion.moved(guess, steps.about_origin(problem.centre(guess), len(increment)) @ increment)
             if sum(problem.energies(trial).values()) <= equations.energy:
-                return trial, solve.LOWERED * damping
-            damping = max(solve.RAISED * damping, 1e-6)
+                return trial, steps.LOWERED * damping
+            damping = max(steps.RAISED * damping, 1e-6)
         return guess, damping
 
     def _estimate(self, problem: Problem, guess: Guess, found: Quadratic, matches: Matches) -> Estimate:
         data, prior = found
         about_root = covariance(data.hessian, prior.hessian, data.energy, problem.data.measurements)
-        to_origin = solve.about_origin(problem.centre(guess), problem.unknowns)
+        to_origin = steps.about_origin(problem.centre(guess), problem.unknowns)
         return Estimate(
             pose=guess.pose,
             parameters=np.array(guess.cloth.parameters),

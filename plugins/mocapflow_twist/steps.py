@@ -30,8 +30,9 @@ def about_origin(centre: F64, unknowns: int) -> F64:
 
 
 def at_bound(parameters: F64, downhill: F64, low: F64, high: F64) -> Bool:
-    """Return which parameters (Q,) stand at a bound and would leave it downhill."""
-    held: Bool = ((parameters <= low) & (downhill < 0)) | ((parameters >= high) & (downhill > 0))
+    """Return which parameters (Q,) stand at a bound and would leave it downhill, or have no way to go."""
+    leaving = ((parameters <= low) & (downhill < 0)) | ((parameters >= high) & (downhill > 0))
+    held: Bool = leaving | (low == high)
     return held
 
 
