@@ -527,7 +527,7 @@ def test_help_says_where_files_go_by_default(call, command, default):
 def test_show(call):
     shown = call("show", "prior", "joint_limits").stdout
     assert shown.startswith("prior joint_limits, from plugin 'priors' (mocapflow 0.1.0)\nA soft wall at the limits")
-    assert "  sd_deg     float (> 0) = 2.0  # standard deviation of an angle beyond its limits\n" in shown
+    assert "  sd_deg  float (> 0) = 2.0  # standard deviation of an angle beyond its limits\n" in shown
     missing = call("show", "prior", "joint_limit")
     assert missing.exit_code == 2
     assert missing.stderr.startswith("error: no prior named 'joint_limit'\n       available: ")
