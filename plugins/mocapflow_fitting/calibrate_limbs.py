@@ -29,7 +29,7 @@ from mocapflow_fitting.detections import frames_seen, spread
 from mocapflow_fitting.keypoint_fit import fit
 from mocapflow_fitting.landmarks import landmarks
 from mocapflow_fitting.pose_fit import Solution, Spreads
-from mocapflow_fitting.proportions import Proportion, scaled
+from mocapflow_fitting.proportions import Proportion, grown, scaled
 from mocapflow_fitting.silhouette_fit import refine
 
 LOG = logging.getLogger("mocapflow")
@@ -89,7 +89,7 @@ class CalibrateLimbs(Stage):
             solution = refine(body, matchers, solution, scene.cameras, spreads, share, self.rounds)
         factors = solution.factors(spreads)
         LOG.info("proportions: %s", ", ".join(f"{name} {factor:.3f}" for name, factor in factors.items()))
-        return scaled(body, factors)
+        return grown(body, factors)
 
     def _from_track(self, track: Track) -> tuple[list[int], list[Pose], list[F64]]:
         good = np.flatnonzero(track.usable.all(axis=1) & track.steady & ~track.doubted)
