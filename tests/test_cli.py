@@ -604,6 +604,14 @@ def test_a_garment_is_drawn(call, garment):
     assert (panels > 0.004).all(), panels
 
 
+def test_a_garment_is_drawn_on_the_template_where_there_is_no_scan(call, monkeypatch, tmp_path):
+    monkeypatch.setattr(pictures, "poster", lambda *_: np.zeros((8, 8, 3), np.uint8))
+    (tmp_path / "subject").mkdir()
+    shutil.copy(shipped("examples", "data", "skirt_steps") / "subject" / "garment.json", tmp_path / "subject")
+    shown = call("show", "garment", "skirt", "--recording", str(tmp_path))
+    assert "sewn on the template: " in shown.stdout
+
+
 def test_a_garment_is_drawn_without_being_asked_to(call, monkeypatch):
     monkeypatch.setattr(pictures, "poster", lambda *_: np.zeros((8, 8, 3), np.uint8))  # which takes two seconds to draw
     shown = call("show", "garment", "skirt")

@@ -19,6 +19,7 @@ Length = Annotated[float, Field(gt=0, lt=4)]  # m; a longer one is in cm or mm
 EASE = 0.002  # m, the least room between waistband and skin
 MEANT = 1.3  # a measure that is further below the body's own is a mistake
 LARGEST_ROOM = 0.08  # m between waistband and skin: more can't hold a garment up
+WHOSE = "is the body this person's? a template is set by body.height_m and body.shape"
 
 
 def even_links(rows: F64, link: float) -> F64:
@@ -39,7 +40,7 @@ def room(garment: str, measure: str, around: float, tape: float) -> float:
     if around * MEANT < tape:
         raise GarmentError(
             f"{garment}: {measure} is {around:.2f} m, but the body measures {tape:.2f} m there",
-            hint="check the place and the measure, and that the body is this person's",
+            hint=f"check the place and the measure; {WHOSE}",
         )
     return max((around - tape) / (2 * math.pi), EASE)
 
@@ -54,27 +55,29 @@ def waistband(garment: str, body: Body, height: float, around: float) -> tuple[F
     if not outlines:
         raise GarmentError(
             f"{garment}: there is no body at waist_height_m = {height:.2f}",
-            hint=f"the rest body ends at {body.vertices[:, 2].max():.2f} m; the height is metres above the floor",
+            hint=f"the height is metres above the floor; the rest body ends at {body.vertices[:, 2].max():.2f} m\n"
+            f"{WHOSE}",
         )
     torso = max(outlines, key=sections.perimeter)
     if not _holds_middle(torso, outlines):
         raise GarmentError(
             f"{garment}: at waist_height_m = {height:.2f} the legs have parted already",
-            hint="the height is metres above the floor, of the upper edge: above the body's crotch",
+            hint=f"the height is metres above the floor, of the upper edge: above the body's crotch\n{WHOSE}",
         )
     skeleton = skeleton_of(body)
     arms = [at[2] for name, at in zip(skeleton.names, skeleton.positions, strict=True) if unsided(name) == "shoulder"]
     if arms and height > min(arms):
         raise GarmentError(
             f"{garment}: at waist_height_m = {height:.2f} it would hang from the shoulders",
-            hint=f"the height is metres above the floor, of the upper edge; shoulders are {min(arms):.2f} m high",
+            hint=f"the height is metres above the floor, of the upper edge; shoulders are {min(arms):.2f} m high\n"
+            f"{WHOSE}",
         )
     tape = sections.perimeter(torso)
     away = (around - tape) / (2 * math.pi)
     if away > LARGEST_ROOM:
         raise GarmentError(
             f"{garment}: a waist of {around:.2f} m can't stay up on a body of {tape:.2f} m there",
-            hint="check waist_circumference_m and waist_height_m",
+            hint=f"check waist_circumference_m and waist_height_m; {WHOSE}",
         )
     return torso, room(garment, "waist_circumference_m", around, tape)
 

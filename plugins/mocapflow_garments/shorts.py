@@ -156,7 +156,7 @@ def _leg(body: Body, side: float, height: float, start: float) -> F64:
             return min(legs, key=lambda o: abs(plane.lift(o)[:, 0].mean()))
     raise GarmentError(
         f"shorts: the legs have not parted yet at {height:.2f} m, where the crotch should be",
-        hint="waist_height_m - (length_m - inseam_m) must lie below the body's crotch",
+        hint=f"waist_height_m - (length_m - inseam_m) must lie below the body's crotch\n{pattern.WHOSE}",
     )
 
 
