@@ -92,11 +92,15 @@ class CalibrateLimbs(Stage):
         return grown(body, factors)
 
     def _from_track(self, track: Track) -> tuple[list[int], list[Pose], list[F64]]:
-        good = np.flatnonzero(track.usable.all(axis=1) & track.steady & ~track.doubted)
-        good = good if len(good) else np.arange(len(track.frame))
-        rows = good[np.unique(np.linspace(0, len(good) - 1, self.frames).round().astype(int))]
+        """Return the frames that are fitted, with poses and clothes: the best, if there are enough of them."""
+        found = ~track.doubted & ~track.lost
+        whole = found & track.usable.all(axis=1)
+        for good in (whole & track.steady, whole, found):  # those of a rough track seldom come to rest
+            if good.sum() >= self.frames:
+                break
+        rows = spread(np.flatnonzero(good).tolist() or range(len(track.frame)), self.frames)
         clothes = [track.cloth_parameters[r].copy() for r in rows]
-        return [int(track.frame[r]) for r in rows], [track.pose(int(r)) for r in rows], clothes
+        return [int(track.frame[r]) for r in rows], [track.pose(r) for r in rows], clothes
 
     def _from_keypoints(self, recording: Recording, scene: Scene) -> tuple[list[int], list[Pose], list[F64]]:
         indices, names = spread(recording.indices, self.frames), landmarks(scene.body).names

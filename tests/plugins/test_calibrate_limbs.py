@@ -135,6 +135,20 @@ def test_few_good_frames_are_better_than_bad_ones(body, poses, good, looked):
     assert stage._from_track(track)[0] == looked
 
 
+@pytest.mark.parametrize(
+    ("resting", "whole", "looked"),
+    [([0, 1, 2, 5], range(6), [0, 1, 2]), ([1], range(6), [0, 2, 4]), ([], [0, 1, 3, 5], [0, 1, 3]),
+     ([1], [], [0, 2, 4])],
+)  # fmt: skip
+def test_the_best_frames_are_taken_only_where_there_are_enough(body, poses, resting, whole, looked):
+    track = make_track(np.tile(poses[0].root, (6, 1, 1)), np.tile(poses[0].angles, (6, 1)))
+    usable = track.usable.copy()
+    usable[:, 0] = np.isin(track.frame, whole)
+    track = replace(track, doubted=track.frame == 5, steady=np.isin(track.frame, resting), usable=usable)
+    stage = CalibrateLimbs(segmenter=masks_of(body, poses), matchers=(ContourIcp(),), frames=3)
+    assert stage._from_track(track)[0] == looked
+
+
 def test_velocities_of_skin(body, poses):
     some = np.arange(0, len(body.vertices), 331)
     part = replace(
