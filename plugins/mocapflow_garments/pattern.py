@@ -59,7 +59,7 @@ def waistband(garment: str, body: Body, height: float, around: float) -> tuple[F
             f"{WHOSE}",
         )
     torso = max(outlines, key=sections.perimeter)
-    if not _holds_middle(torso, outlines):
+    if not _holds(torso, middle(body)):
         raise GarmentError(
             f"{garment}: at waist_height_m = {height:.2f} the legs have parted already",
             hint=f"the height is metres above the floor, of the upper edge: above the body's crotch\n{WHOSE}",
@@ -95,17 +95,21 @@ def hip_rings(body: Body, height: float, rows: F64, around: F64, away: float) ->
     around = around.copy()
     for row, below in enumerate(rows):
         outlines = sections.outlines(body, sections.level(height - below))
-        middle = [closed for closed in outlines if _holds_middle(closed, outlines)]
-        if not middle:  # the legs have parted
+        torso = [closed for closed in outlines if _holds(closed, middle(body))]
+        if not torso:  # the legs have parted
             break
-        around[row] = max(around[row], sections.perimeter(middle[0]) + 2 * math.pi * away)
+        around[row] = max(around[row], sections.perimeter(torso[0]) + 2 * math.pi * away)
     return np.maximum.accumulate(around)
 
 
-def _holds_middle(closed: F64, outlines: list[F64]) -> bool:
-    """Return True for the outline around the middle of all, e.g. the torso between the arms."""
-    corners = np.concatenate(outlines)
-    middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
+def middle(body: Body) -> F64:
+    """Return the place (2,) m between the hips, seen from above: in the torso, and between the legs."""
+    hips = [joint for joint, name in enumerate(body.joint_names) if unsided(name) == "hip"]
+    return np.asarray(body.positions[hips or [0], :2].mean(axis=0))
+
+
+def _holds(closed: F64, point: F64) -> bool:
+    """Return True if a point (2,) lies in a convex outline (N, 2)."""
     edge = np.roll(closed, -1, axis=0) - closed
-    to = middle - closed
+    to = point - closed
     return bool(np.all(edge[:, 0] * to[:, 1] - edge[:, 1] * to[:, 0] >= 0))
