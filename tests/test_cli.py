@@ -1,6 +1,7 @@
 import errno
 import io
 import json
+import logging
 import os
 import shutil
 import subprocess
@@ -677,3 +678,19 @@ def test_the_module_runs_as_the_command_does_and_decoders_do_not_talk_besides(tm
     assert said.returncode == 2
     assert b"cam02.mp4  this video can't be decoded" in said.stdout
     assert said.stderr == b""
+
+
+def test_what_stages_find_and_warn_of_is_printed_once(capsys, monkeypatch):
+    ours = logging.getLogger("mocapflow")
+    for logger in (ours, logging.getLogger()):
+        monkeypatch.setattr(logger, "handlers", [])
+    level = ours.level
+    try:
+        cli._tell_on_stderr()
+        ours.info("first pose: 3 mm off")
+        ours.warning("frame 3 is dark")
+        ours.debug("not told")
+        logging.getLogger("of_a_library").info("not told")
+    finally:
+        ours.setLevel(level)
+    assert capsys.readouterr().err == "first pose: 3 mm off\nwarning: frame 3 is dark\n"
