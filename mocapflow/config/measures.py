@@ -98,7 +98,10 @@ def _named(value: Any) -> Any:
 
 
 def _no_garment(file: Path) -> RecordingError:
-    hint = 'write {"type": "skirt", ...} with tape measures in metres there, or name the garment in the pipeline'
+    hint = (
+        'write {"type": "skirt", ...} with tape measures in metres there, or name the garment in the pipeline;\n'
+        "tight clothes need none: garment: null"
+    )
     return RecordingError(
         "the pipeline takes the garment from the recording, which names none", where=str(file), hint=hint
     )

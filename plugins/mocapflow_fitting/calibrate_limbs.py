@@ -52,11 +52,11 @@ class CalibrateLimbs(Stage):
     proportions: tuple[Proportion, ...] = (  # those that are fitted
         "girth", "trunk", "shoulder_width", "thigh", "shank", "foot", "upper_arm", "forearm",
     )  # fmt: skip
-    spread: PositiveFloat = 0.02  # standard deviation of a log proportion about a scan's; 0.05 about a template's
+    spread: PositiveFloat = 0.02  # standard deviation of a log proportion from a scan; from a template 0.05
     frames: PositiveInt = 10  # spread over the recording
     passes: PositiveInt = 3  # times that the images are segmented; after the first, matching is calm
     rounds: PositiveInt = 3  # matchings a pass
-    independent: Annotated[float, Field(gt=0, le=1)] = 1.0  # share of a frame's contour pairs; all frames count as one
+    independent: Annotated[float, Field(gt=0, le=1)] = 1.0  # share of pairs with own errors; all frames count as one
 
     def need(self, recording: Recording) -> None:
         """Raise if no matcher would find a pair in the recording."""
