@@ -1,6 +1,7 @@
 import errno
 import io
 import json
+import logging
 import os
 import shutil
 import subprocess
@@ -604,6 +605,14 @@ def test_a_garment_is_drawn(call, garment):
     assert (panels > 0.004).all(), panels
 
 
+def test_a_garment_is_drawn_on_the_template_where_there_is_no_scan(call, monkeypatch, tmp_path):
+    monkeypatch.setattr(pictures, "poster", lambda *_: np.zeros((8, 8, 3), np.uint8))
+    (tmp_path / "subject").mkdir()
+    shutil.copy(shipped("examples", "data", "skirt_steps") / "subject" / "garment.json", tmp_path / "subject")
+    shown = call("show", "garment", "skirt", "--recording", str(tmp_path))
+    assert "sewn on the template: " in shown.stdout
+
+
 def test_a_garment_is_drawn_without_being_asked_to(call, monkeypatch):
     monkeypatch.setattr(pictures, "poster", lambda *_: np.zeros((8, 8, 3), np.uint8))  # which takes two seconds to draw
     shown = call("show", "garment", "skirt")
@@ -669,3 +678,19 @@ def test_the_module_runs_as_the_command_does_and_decoders_do_not_talk_besides(tm
     assert said.returncode == 2
     assert b"cam02.mp4  this video can't be decoded" in said.stdout
     assert said.stderr == b""
+
+
+def test_what_stages_find_and_warn_of_is_printed_once(capsys, monkeypatch):
+    ours = logging.getLogger("mocapflow")
+    for logger in (ours, logging.getLogger()):
+        monkeypatch.setattr(logger, "handlers", [])
+    level = ours.level
+    try:
+        cli._tell_on_stderr()
+        ours.info("first pose: 3 mm off")
+        ours.warning("frame 3 is dark")
+        ours.debug("not told")
+        logging.getLogger("of_a_library").info("not told")
+    finally:
+        ours.setLevel(level)
+    assert capsys.readouterr().err == "first pose: 3 mm off\nwarning: frame 3 is dark\n"

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from mocapflow.config.documents import Document, Place
-from mocapflow.config.measures import garment_of
+from mocapflow.config.measures import garment_of, wearer
 from mocapflow.config.resolve import Resolver
 from mocapflow.data import Past, Pose
-from mocapflow.dressing.guards import body_of, mesh_of
+from mocapflow.dressing.guards import mesh_of
 from mocapflow.dressing.roles import Draper, Garment
 from mocapflow.errors import RecordingError, StoreError
 from mocapflow.help.shipped import shipped
@@ -28,7 +28,7 @@ RAISED = {"hip_l.flexion": 65.0, "knee_l.flexion": 70.0}  # deg
 
 
 def draw_garment(registry: Registry, name: str, recording: Path | None, draper: str, out: Path) -> list[str]:
-    """Write the picture of a garment on the person of a recording and return lines to print.
+    """Write the picture of a garment on the person of a recording, or the template, and return lines to print.
 
     Raises:
         MocapflowError: the recording is not there, the garment needs measures that it does not have, or can't be sewn
@@ -42,8 +42,7 @@ def draw_garment(registry: Registry, name: str, recording: Path | None, draper: 
         raise RecordingError("no such recording folder", where=str(recording))
     resolver = Resolver(Document({}, {(): Place(f"show garment {name}", Path())}), registry)
     garment: Any = garment_of(name, recording, resolver)
-    scanned: Any = registry.get("body", "scanned")
-    body = body_of(scanned(), recording)
+    body, scanned = wearer(recording, registry)
     scene = Scene(cameras=(), body=body, garment=mesh_of(garment, body))
     image = poster(scene, garment, resolver.component("draper", draper, ()))
     file = for_opencv(out)
@@ -54,7 +53,8 @@ def draw_garment(registry: Registry, name: str, recording: Path | None, draper: 
         raise StoreError("the picture can't be written", where=str(out), hint=hint)
     assert scene.garment is not None
     count, strands = len(scene.garment.vertices), len(scene.garment.strands)
-    sewn = f"sewn on {recording.name}: {count} vertices in {strands} strands; picture: {out}"
+    wears = recording.name if scanned else "the template"
+    sewn = f"sewn on {wears}: {count} vertices in {strands} strands; picture: {out}"
     return [*(f"warning: {said}" for said in scene.warnings), sewn]
 
 

@@ -1,12 +1,14 @@
-"""The garment of a pipeline, its tape measures from the recording where the file gives none."""
+"""The garment of a pipeline, its tape measures from the recording where the file gives none, and who wears it."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
+from mocapflow.assets import Body
 from mocapflow.config.documents import Document, Place
 from mocapflow.config.resolve import Resolver
+from mocapflow.dressing.guards import body_of
 from mocapflow.dressing.roles import Garment
 from mocapflow.errors import MocapflowError, PluginError, RecordingError, UnknownComponent, guess
 from mocapflow.io.cameras import find_calibration
@@ -75,6 +77,17 @@ def recorded_garment(recording: Path, registry: Registry) -> Garment | None:
     return garment_of(FROM_RECORDING, recording, resolver) if file.exists() else None
 
 
+def wearer(recording: Path, registry: Registry) -> tuple[Body, bool]:
+    """Return the person of a recording, and whether it is a scan: where there is none, the template.
+
+    Raises:
+        MocapflowError: the scan can't be used.
+    """
+    scanned = any((recording / "subject" / file).exists() for file in ("body.obj", "skeleton.json"))
+    model: Any = registry.get("body", "scanned" if scanned else "template")
+    return body_of(model(), recording), scanned
+
+
 def place_of(value: Any, recording: Path, resolver: Resolver) -> str:
     """Return where the measures of a garment are written: in the recording, or as file:line:column."""
     return str(recording / FILE) if _named(value) == FROM_RECORDING else resolver.place(("garment",))
@@ -85,7 +98,10 @@ def _named(value: Any) -> Any:
 
 
 def _no_garment(file: Path) -> RecordingError:
-    hint = 'write {"type": "skirt", ...} with tape measures in metres there, or name the garment in the pipeline'
+    hint = (
+        'write {"type": "skirt", ...} with tape measures in metres there, or name the garment in the pipeline;\n'
+        "tight clothes need none: garment: null"
+    )
     return RecordingError(
         "the pipeline takes the garment from the recording, which names none", where=str(file), hint=hint
     )

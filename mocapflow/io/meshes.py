@@ -16,7 +16,6 @@ from mocapflow.geometry.libraries import load_open3d
 from mocapflow.records import F64, I32
 
 OPPOSED = 0.01  # of the edges of a mesh, that two triangles go along the same way; a scan has a few
-UNSCANNED = "`body: template`, fitted by silhouettes as in pipelines/unscanned.yaml, or to keypoints by fit_subject"
 OPEN3D_FORMATS = (".ply", ".stl", ".off", ".gltf", ".glb")
 
 
@@ -32,8 +31,7 @@ def read_mesh(path: Path) -> tuple[F64, I32]:
         hint = f"meshes are read from .obj, {', '.join(OPEN3D_FORMATS)}; .obj keeps the order of the vertices"
         raise RecordingError(f"a mesh in '{path.suffix}' can't be read", where=str(path), hint=hint)
     if not path.is_file():
-        hint = f"a person without a scan: {UNSCANNED}"
-        raise RecordingError("no such mesh", where=str(path), hint=hint)
+        raise RecordingError("no such mesh", where=str(path))
     vertices, triangles = _read_obj(path) if path.suffix.lower() == ".obj" else _read_by_open3d(path)
     return _checked(vertices, triangles, path)
 

@@ -10,11 +10,11 @@ import numpy as np
 
 from mocapflow.errors import RecordingError, alternatives
 from mocapflow.geometry.skeleton import Skeleton, body_directions
-from mocapflow.io.meshes import UNSCANNED
 from mocapflow.io.typed import place, read_json
 from mocapflow.records import F64
 
 FORM = 'expected {"joints": [{"name": "pelvis", "parent": null, "position": [x, y, z] in m}, …]}, parents first'
+UNSCANNED = "without a scan: pipelines/unscanned.yaml fits a template to silhouettes, fit_subject one to keypoints"
 TALLEST, SMALLEST = 3.0, 0.3  # m, extents of a plausible body
 SHORTEST = 0.01  # m, a bone between joints whose angle is measured, and the way from one hip to the other
 LIMBS = ("knee", "ankle", "elbow", "wrist")  # joints that end such a bone
@@ -32,7 +32,7 @@ def read_skeleton(path: Path) -> Skeleton:
     if not path.is_file():
         raise RecordingError(
             "there is no skeleton for the mesh", where=str(path),
-            hint=f"{FORM}; or, without a scan, {UNSCANNED}",
+            hint=f"{FORM}\n{UNSCANNED}",
         )  # fmt: skip
     content = read_json(path, FORM)
     try:
@@ -41,6 +41,16 @@ def read_skeleton(path: Path) -> Skeleton:
         raise RecordingError(f"this is not a skeleton: {error!r}", where=str(path), hint=FORM) from error
     _check_limbs(skeleton, path)
     return skeleton
+
+
+def need_scan(path: Path) -> None:
+    """Check that there is a scan.
+
+    Raises:
+        RecordingError: there is none.
+    """
+    if not path.is_file():
+        raise RecordingError("no such mesh", where=str(path), hint=UNSCANNED)
 
 
 def check_size(vertices: F64, skeleton: Skeleton, where: str) -> None:

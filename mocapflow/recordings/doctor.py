@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from mocapflow.config import measures
-from mocapflow.dressing.guards import body_of, mesh_of
+from mocapflow.dressing.guards import mesh_of
 from mocapflow.dressing.roles import Garment
 from mocapflow.errors import MocapflowError, RecordingError, UnknownComponent
 from mocapflow.io import first_pose
@@ -117,26 +117,28 @@ def _compared(folder: Path, registry: Registry) -> list[Finding]:
 
 
 def _sewn(garment: Garment, folder: Path, registry: Registry) -> list[Finding]:
-    """Return what was mended when a garment was sewn to the scanned person.
+    """Return what was mended when a garment was sewn to the scanned person; to the template, whether it can be.
 
     Raises:
-        GarmentError: it can't be sewn.
+        GarmentError: it can't be sewn to the scanned person.
         WrongAnswer: what is sewn is no garment of this body.
     """
-    scanned: Any = registry.get("body", "scanned")
     try:
-        body = body_of(scanned(), folder)
+        body, scanned = measures.wearer(folder, registry)
     except MocapflowError:  # told of with the subject
         return []
     try:
         mesh = mesh_of(garment, body)
-    except MocapflowError:
-        raise
+    except MocapflowError as problem:
+        if scanned:
+            raise
+        return [warning(f"on the template: {problem.message}", problem.hint, folder / measures.FILE)]
     except Exception as problem:  # a garment of somebody else's may raise anything
         return [
             error(f"{garment.name} can't be sewn: {type(problem).__name__}: {problem}", where=folder / measures.FILE)
         ]
-    return [warning(f"{mesh.name}: {said}", where=folder / measures.FILE) for said in mesh.repairs]
+    mended = mesh.repairs if scanned else ()  # a template is not as wide as the person
+    return [warning(f"{mesh.name}: {said}", where=folder / measures.FILE) for said in mended]
 
 
 def _start(folder: Path, calibration: Path) -> list[Finding]:
@@ -161,11 +163,18 @@ def _missing(folder: Path) -> Iterator[Finding]:
     if not (folder / "subject" / "body.obj").exists() and not (folder / "static").is_dir():
         yield note(
             "there is neither subject/body.obj nor a static trial",
-            "a template has to be fitted: by silhouettes as in pipelines/unscanned.yaml, or to keypoints, which a "
-            "standing trial makes more exact",
+            "a template has to be fitted: pipelines/unscanned.yaml does it by silhouettes, fit_subject to keypoints, "
+            "and more exactly with a standing trial",
         )
-    if not (folder / first_pose.FILE).exists() and not (folder / "keypoints").is_dir():
+    if (folder / first_pose.FILE).exists() or (folder / "keypoints").is_dir():
+        return
+    if (folder / "background").is_dir():
         yield note(
             "there is neither init.json nor keypoints/: silhouettes have to tell the pose of the first frame",
-            "use the stage start_from_silhouettes, which needs clean plates, or write init.json",
+            "use the stage start_from_silhouettes, as pipelines/unscanned.yaml does, or write init.json",
+        )
+    else:
+        yield note(
+            "nothing tells the pose of the first frame: there is no init.json, no keypoints/, no background/",
+            "put a picture of the empty room per camera into background/, or write init.json",
         )

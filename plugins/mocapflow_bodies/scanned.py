@@ -13,7 +13,7 @@ from mocapflow.assets import Body
 from mocapflow.dressing.roles import BodyModel
 from mocapflow.errors import RecordingError
 from mocapflow.io.meshes import check_winding, read_mesh
-from mocapflow.io.scans import check_size, read_skeleton
+from mocapflow.io.scans import check_size, need_scan, read_skeleton
 from mocapflow.io.weights import read_weights
 from mocapflow.records import F64
 from mocapflow.settings import Settings
@@ -52,12 +52,11 @@ class Scanned(BodyModel):
         return [*files, folder / self.morph.mesh] if self.morph else files
 
     def need(self, folder: Path) -> None:
-        """Raise if the mesh is missing, or no skeleton can be read."""
-        subject = folder / "subject"
-        for path in [subject / "body.obj", *([folder / self.morph.mesh] if self.morph else [])]:
-            if not path.is_file():
-                read_mesh(path)  # says what to do
-        read_skeleton(subject / "skeleton.json")
+        """Raise if a mesh is missing, or no skeleton can be read."""
+        need_scan(folder / "subject" / "body.obj")
+        if self.morph and not (folder / self.morph.mesh).is_file():
+            read_mesh(folder / self.morph.mesh)  # says so
+        read_skeleton(folder / "subject" / "skeleton.json")
 
     def load(self, folder: Path) -> Body:
         """Return the body at rest.
@@ -66,6 +65,7 @@ class Scanned(BodyModel):
             RecordingError: a file is missing, malformed, not in metres, inside out in part, or contradicts another.
             PipelineError: the morph names an angle the body lacks.
         """
+        self.need(folder)
         subject = folder / "subject"
         vertices, faces = read_mesh(subject / "body.obj")
         check_winding(faces, str(subject / "body.obj"))

@@ -57,8 +57,9 @@ def summary(
 
 
 def measures(body: Body) -> Mapping[str, float]:
-    """Return the height (m) of a body at rest, and the lengths of its limbs: what a stage has fitted shows here."""
-    return {"height": float(np.ptp(body.vertices[:, 2])), **segment_lengths(body)}
+    """Return the height (m) of a whole body at rest, and the lengths of limbs: what a stage has fitted shows here."""
+    height = {} if body.cut.any() else {"height": float(np.ptp(body.vertices[:, 2]))}
+    return {name: round(length, 4) for name, length in {**height, **segment_lengths(body)}.items()}
 
 
 def said_by_stages(recipe: Mapping[str, Any]) -> list[str]:

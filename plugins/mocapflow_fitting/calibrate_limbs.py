@@ -29,7 +29,7 @@ from mocapflow_fitting.detections import frames_seen, spread
 from mocapflow_fitting.keypoint_fit import fit
 from mocapflow_fitting.landmarks import landmarks
 from mocapflow_fitting.pose_fit import Solution, Spreads
-from mocapflow_fitting.proportions import Proportion, scaled
+from mocapflow_fitting.proportions import Proportion, grown, scaled
 from mocapflow_fitting.silhouette_fit import refine
 
 LOG = logging.getLogger("mocapflow")
@@ -52,11 +52,11 @@ class CalibrateLimbs(Stage):
     proportions: tuple[Proportion, ...] = (  # those that are fitted
         "girth", "trunk", "shoulder_width", "thigh", "shank", "foot", "upper_arm", "forearm",
     )  # fmt: skip
-    spread: PositiveFloat = 0.02  # standard deviation of a log proportion about a scan's; 0.05 about a template's
+    spread: PositiveFloat = 0.02  # standard deviation of a log proportion from a scan; from a template 0.05
     frames: PositiveInt = 10  # spread over the recording
     passes: PositiveInt = 3  # times that the images are segmented; after the first, matching is calm
     rounds: PositiveInt = 3  # matchings a pass
-    independent: Annotated[float, Field(gt=0, le=1)] = 1.0  # share of a frame's contour pairs; all frames count as one
+    independent: Annotated[float, Field(gt=0, le=1)] = 1.0  # share of pairs with own errors; all frames count as one
 
     def need(self, recording: Recording) -> None:
         """Raise if no matcher would find a pair in the recording."""
@@ -89,14 +89,18 @@ class CalibrateLimbs(Stage):
             solution = refine(body, matchers, solution, scene.cameras, spreads, share, self.rounds)
         factors = solution.factors(spreads)
         LOG.info("proportions: %s", ", ".join(f"{name} {factor:.3f}" for name, factor in factors.items()))
-        return scaled(body, factors)
+        return grown(body, factors)
 
     def _from_track(self, track: Track) -> tuple[list[int], list[Pose], list[F64]]:
-        good = np.flatnonzero(track.usable.all(axis=1) & track.steady & ~track.doubted)
-        good = good if len(good) else np.arange(len(track.frame))
-        rows = good[np.unique(np.linspace(0, len(good) - 1, self.frames).round().astype(int))]
+        """Return the frames that are fitted, with poses and clothes: the best, if there are enough of them."""
+        found = ~track.doubted & ~track.lost
+        whole = found & track.usable.all(axis=1)
+        for good in (whole & track.steady, whole, found):  # those of a rough track seldom come to rest
+            if good.sum() >= self.frames:
+                break
+        rows = spread(np.flatnonzero(good).tolist() or range(len(track.frame)), self.frames)
         clothes = [track.cloth_parameters[r].copy() for r in rows]
-        return [int(track.frame[r]) for r in rows], [track.pose(int(r)) for r in rows], clothes
+        return [int(track.frame[r]) for r in rows], [track.pose(r) for r in rows], clothes
 
     def _from_keypoints(self, recording: Recording, scene: Scene) -> tuple[list[int], list[Pose], list[F64]]:
         indices, names = spread(recording.indices, self.frames), landmarks(scene.body).names

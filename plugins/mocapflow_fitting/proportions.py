@@ -53,6 +53,20 @@ def scaled(body: Body, factors: Mapping[str, float]) -> Body:
     )  # fmt: skip
 
 
+def grown(body: Body, factors: Mapping[str, float]) -> Body:
+    """Return a body of other proportions whose soles are where they were.
+
+    `scaled` holds the root joint, so that longer legs reach below the floor; but the heights of garments count from it.
+    """
+    other = scaled(body, factors)
+    up = np.array([0.0, 0.0, body.vertices[:, 2].min() - other.vertices[:, 2].min()])
+    positions = other.positions + up
+    return replace(
+        other, vertices=other.vertices + up, positions=positions,
+        twists=twists.screw(other.twists[:, :3], positions[other.screw_joint]),
+    )  # fmt: skip
+
+
 def _stretches(body: Body, factors: Mapping[str, float]) -> F64:
     """Return the stretch (J, 3, 3) of what each joint carries."""
     unknown = set(factors) - set(PROPORTIONS)

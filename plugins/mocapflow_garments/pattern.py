@@ -19,6 +19,7 @@ Length = Annotated[float, Field(gt=0, lt=4)]  # m; a longer one is in cm or mm
 EASE = 0.002  # m, the least room between waistband and skin
 MEANT = 1.3  # a measure that is further below the body's own is a mistake
 LARGEST_ROOM = 0.08  # m between waistband and skin: more can't hold a garment up
+WHOSE = "is the body this person's? a template is set by body.height_m and body.shape"
 
 
 def even_links(rows: F64, link: float) -> F64:
@@ -39,7 +40,7 @@ def room(garment: str, measure: str, around: float, tape: float) -> float:
     if around * MEANT < tape:
         raise GarmentError(
             f"{garment}: {measure} is {around:.2f} m, but the body measures {tape:.2f} m there",
-            hint="check the place and the measure, and that the body is this person's",
+            hint=f"check the place and the measure; {WHOSE}",
         )
     return max((around - tape) / (2 * math.pi), EASE)
 
@@ -54,27 +55,29 @@ def waistband(garment: str, body: Body, height: float, around: float) -> tuple[F
     if not outlines:
         raise GarmentError(
             f"{garment}: there is no body at waist_height_m = {height:.2f}",
-            hint=f"the rest body ends at {body.vertices[:, 2].max():.2f} m; the height is metres above the floor",
+            hint=f"the height is metres above the floor; the rest body ends at {body.vertices[:, 2].max():.2f} m\n"
+            f"{WHOSE}",
         )
     torso = max(outlines, key=sections.perimeter)
-    if not _holds_middle(torso, outlines):
+    if not _holds(torso, middle(body)):
         raise GarmentError(
             f"{garment}: at waist_height_m = {height:.2f} the legs have parted already",
-            hint="the height is metres above the floor, of the upper edge: above the body's crotch",
+            hint=f"the height is metres above the floor, of the upper edge: above the body's crotch\n{WHOSE}",
         )
     skeleton = skeleton_of(body)
     arms = [at[2] for name, at in zip(skeleton.names, skeleton.positions, strict=True) if unsided(name) == "shoulder"]
     if arms and height > min(arms):
         raise GarmentError(
             f"{garment}: at waist_height_m = {height:.2f} it would hang from the shoulders",
-            hint=f"the height is metres above the floor, of the upper edge; shoulders are {min(arms):.2f} m high",
+            hint=f"the height is metres above the floor, of the upper edge; shoulders are {min(arms):.2f} m high\n"
+            f"{WHOSE}",
         )
     tape = sections.perimeter(torso)
     away = (around - tape) / (2 * math.pi)
     if away > LARGEST_ROOM:
         raise GarmentError(
             f"{garment}: a waist of {around:.2f} m can't stay up on a body of {tape:.2f} m there",
-            hint="check waist_circumference_m and waist_height_m",
+            hint=f"check waist_circumference_m and waist_height_m; {WHOSE}",
         )
     return torso, room(garment, "waist_circumference_m", around, tape)
 
@@ -92,17 +95,21 @@ def hip_rings(body: Body, height: float, rows: F64, around: F64, away: float) ->
     around = around.copy()
     for row, below in enumerate(rows):
         outlines = sections.outlines(body, sections.level(height - below))
-        middle = [closed for closed in outlines if _holds_middle(closed, outlines)]
-        if not middle:  # the legs have parted
+        torso = [closed for closed in outlines if _holds(closed, middle(body))]
+        if not torso:  # the legs have parted
             break
-        around[row] = max(around[row], sections.perimeter(middle[0]) + 2 * math.pi * away)
+        around[row] = max(around[row], sections.perimeter(torso[0]) + 2 * math.pi * away)
     return np.maximum.accumulate(around)
 
 
-def _holds_middle(closed: F64, outlines: list[F64]) -> bool:
-    """Return True for the outline around the middle of all, e.g. the torso between the arms."""
-    corners = np.concatenate(outlines)
-    middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
+def middle(body: Body) -> F64:
+    """Return the place (2,) m between the hips, seen from above: in the torso, and between the legs."""
+    hips = [joint for joint, name in enumerate(body.joint_names) if unsided(name) == "hip"]
+    return np.asarray(body.positions[hips or [0], :2].mean(axis=0))
+
+
+def _holds(closed: F64, point: F64) -> bool:
+    """Return True if a point (2,) lies in a convex outline (N, 2)."""
     edge = np.roll(closed, -1, axis=0) - closed
-    to = middle - closed
+    to = point - closed
     return bool(np.all(edge[:, 0] * to[:, 1] - edge[:, 1] * to[:, 0] >= 0))

@@ -148,15 +148,16 @@ class Shorts(Garment):
 
 def _leg(body: Body, side: float, height: float, start: float) -> F64:
     """Return the outline (N, 2) of the leg on one side; where thighs still touch, that of where they part below."""
+    middle = pattern.middle(body)[0]
     for lower in np.linspace(0.0, TOUCHING, 11):
         plane = sections.level(height - lower, start)
-        outlines = sections.outlines(body, plane)
-        legs = [o for o in outlines if side * plane.lift(o)[:, 0].mean() > 0.02 and sections.perimeter(o) > 0.2]
+        beside = [(side * (plane.lift(o)[:, 0].mean() - middle), o) for o in sections.outlines(body, plane)]
+        legs = [(away, o) for away, o in beside if away > 0.02 and sections.perimeter(o) > 0.2]
         if legs:
-            return min(legs, key=lambda o: abs(plane.lift(o)[:, 0].mean()))
+            return min(legs, key=lambda leg: leg[0])[1]
     raise GarmentError(
         f"shorts: the legs have not parted yet at {height:.2f} m, where the crotch should be",
-        hint="waist_height_m - (length_m - inseam_m) must lie below the body's crotch",
+        hint=f"waist_height_m - (length_m - inseam_m) must lie below the body's crotch\n{pattern.WHOSE}",
     )
 
 

@@ -69,9 +69,7 @@ def against(evaluation: Evaluation) -> list[str]:
 
 def body(scene: Scene) -> str:
     """Return the height and the lengths of the limbs of the body that was tracked."""
-    return "; ".join(
-        f"{name.replace('_', ' ')} {100 * value:.1f} cm" for name, value in runjson.measures(scene.body).items()
-    )
+    return "; ".join(f"{title(name)} {100 * value:.1f} cm" for name, value in runjson.measures(scene.body).items())
 
 
 def mishaps(track: Track, held: Mapping[str, int]) -> list[str]:

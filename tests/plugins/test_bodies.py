@@ -178,7 +178,7 @@ def exchange_sides(joints):
 
 def test_mesh_without_skeleton(recording):
     (recording / "subject" / "skeleton.json").unlink()
-    with pytest.raises(RecordingError, match="skeleton.json  there is no skeleton for the mesh\n.*body: template"):
+    with pytest.raises(RecordingError, match="skeleton.json  there is no skeleton for the mesh\n(.|\n)*unscanned.yaml"):
         Scanned().load(recording)
 
 
@@ -253,9 +253,15 @@ def test_weights_in_a_npy_by_another_name(recording):
         Scanned().load(recording)
 
 
-def test_missing_mesh(tmp_path):
-    with pytest.raises(RecordingError, match="body.obj"):
+def test_a_missing_scan_says_what_else_there_is(tmp_path):
+    with pytest.raises(RecordingError, match=r"body.obj  no such mesh\n.*unscanned.yaml"):
         Scanned().load(tmp_path)
+
+
+def test_a_missing_second_shape_is_no_missing_scan(recording):
+    morphing = Scanned(morph=Morph(mesh="bent.obj", angle="knee_l.flexion", from_deg=0, to_deg=90))
+    with pytest.raises(RecordingError, match=r"bent.obj  no such mesh$"):
+        morphing.need(recording)
 
 
 def test_skeleton_is_read_parents_first():

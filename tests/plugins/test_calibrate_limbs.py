@@ -114,10 +114,37 @@ def test_views_that_were_found_wrong_do_not_count(body, poses):
     np.testing.assert_array_equal(seen, [[True] * 4, [True, True, False, True]])
 
 
+def test_the_fitted_body_stands_on_the_floor(body, poses, monkeypatch):
+    def longer(body, matchers, solution, *_):
+        return solution._replace(logs=np.full_like(solution.logs, 0.05))
+
+    monkeypatch.setattr("mocapflow_fitting.calibrate_limbs.refine", longer)
+    recording = open_recording(DEMO, stop=1)
+    track = make_track(np.stack([p.root for p in poses[:1]]), np.stack([p.angles for p in poses[:1]]))
+    stage = CalibrateLimbs(segmenter=masks_of(body, poses), matchers=(ContourIcp(),), proportions=("shank",), passes=1)
+    fitted = stage.run(recording, Scene(cameras=recording.cameras, body=body), None, track)
+    assert length(fitted, "knee_l", "ankle_l") > 1.04 * length(body, "knee_l", "ankle_l")
+    assert fitted.vertices[:, 2].min() == pytest.approx(body.vertices[:, 2].min(), abs=1e-12)
+
+
 @pytest.mark.parametrize(("good", "looked"), [([1, 4], [1, 4]), ([], [0, 2, 5])])
 def test_few_good_frames_are_better_than_bad_ones(body, poses, good, looked):
     track = make_track(np.tile(poses[0].root, (6, 1, 1)), np.tile(poses[0].angles, (6, 1)))
     track = replace(track, doubted=~np.isin(track.frame, good))
+    stage = CalibrateLimbs(segmenter=masks_of(body, poses), matchers=(ContourIcp(),), frames=3)
+    assert stage._from_track(track)[0] == looked
+
+
+@pytest.mark.parametrize(
+    ("resting", "whole", "looked"),
+    [([0, 1, 2, 5], range(6), [0, 1, 2]), ([1], range(6), [0, 2, 4]), ([], [0, 1, 3, 5], [0, 1, 3]),
+     ([1], [], [0, 2, 4])],
+)  # fmt: skip
+def test_the_best_frames_are_taken_only_where_there_are_enough(body, poses, resting, whole, looked):
+    track = make_track(np.tile(poses[0].root, (6, 1, 1)), np.tile(poses[0].angles, (6, 1)))
+    usable = track.usable.copy()
+    usable[:, 0] = np.isin(track.frame, whole)
+    track = replace(track, doubted=track.frame == 5, steady=np.isin(track.frame, resting), usable=usable)
     stage = CalibrateLimbs(segmenter=masks_of(body, poses), matchers=(ContourIcp(),), frames=3)
     assert stage._from_track(track)[0] == looked
 

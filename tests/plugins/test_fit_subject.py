@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from keypoint_recording import DEMO, copy_demo, length, write
 from mocapflow_bodies.template import Template
+from mocapflow_fitting import fit_subject
 from mocapflow_fitting.fit_subject import FitSubject
-from mocapflow_fitting.proportions import PROPORTIONS, scaled
+from mocapflow_fitting.proportions import PROPORTIONS, grown, scaled
 from mocapflow_fitting.start_from_file import read_pose
 
 from mocapflow.data import Pose
 from mocapflow.geometry import angles
+from mocapflow.geometry.kinematics import chain, skin
 from mocapflow.recordings.recording import open_recording
 from mocapflow.scene import Scene
 
@@ -76,6 +78,27 @@ def test_girth_leaves_the_bones(body):
     thigh = (body.skin_joint[:, 0] == body.joint("hip_l")) & (body.skin_weight[:, 0] > 0.99)
     widths = [np.ptp(b.vertices[thigh, 0]) for b in (body, slim)]
     assert 0.75 < widths[1] / widths[0] < 0.9
+
+
+def test_longer_legs_do_not_reach_below_the_floor(body):
+    factors = {"thigh": 1.1, "shank": 1.05, "girth": 0.9}
+    loose, stood = scaled(body, factors), grown(body, factors)
+    assert loose.vertices[:, 2].min() < -0.05
+    assert stood.vertices[:, 2].min() == pytest.approx(body.vertices[:, 2].min(), abs=1e-12)
+    up = stood.positions[0] - loose.positions[0]
+    assert not up[:2].any()
+    bent = np.linspace(-0.3, 0.3, len(body.twists))
+    there = [skin(b, chain(b, Pose(root=np.eye(4), angles=bent))[0], bent) for b in (loose, stood)]
+    np.testing.assert_allclose(there[1], there[0] + up, atol=1e-12)
+
+
+def test_the_fitted_body_stands_on_the_floor(body, monkeypatch):
+    monkeypatch.setattr(FitSubject, "need", lambda *_: None)
+    monkeypatch.setattr(FitSubject, "_seen", lambda *_: [])
+    monkeypatch.setattr(fit_subject, "fit", lambda *_: ({"stature": 1.1}, ()))
+    fitted = FitSubject().run(open_recording(DEMO), Scene(cameras=(), body=body))
+    assert np.ptp(fitted.vertices[:, 2]) == pytest.approx(1.1 * np.ptp(body.vertices[:, 2]))
+    assert fitted.vertices[:, 2].min() == pytest.approx(body.vertices[:, 2].min(), abs=1e-12)
 
 
 def test_unknown_proportions(body):

@@ -148,6 +148,25 @@ def test_a_measure_inside_the_body_is_widened_and_recorded(garment, measure, sai
     assert f"{sewn.name}: {repair}" in Scene(cameras=(), body=BODY, garment=sewn).warnings
 
 
+@pytest.mark.parametrize(("garment", "measures"), [(Skirt, SKIRT), (Shorts, SHORTS)])
+def test_a_scan_may_stand_beside_the_origin(garment, measures):
+    aside = np.array([0.3, -0.2, 0.0])
+    moved = replace(BODY, vertices=BODY.vertices + aside, positions=BODY.positions + aside)
+    here, there = (garment(**measures).sew(body) for body in (BODY, moved))
+    np.testing.assert_allclose(there.vertices, here.vertices + aside, atol=1e-9)
+    np.testing.assert_array_equal(there.carried_by, here.carried_by)
+
+
+def test_hands_before_the_hips_are_no_parted_legs():
+    """A scan with its arms raised forwards: the box about all that is cut lies before the trunk."""
+    body = template_body()
+    arms = np.isin(body.skin_joint[:, 0], [body.joint(f"wrist_{side}") for side in "lr"])
+    reached = replace(body, vertices=body.vertices - 0.4 * np.eye(3)[1] * arms[:, None])
+    hands = reached.vertices[arms, 2]
+    sewn = Skirt(**{**SKIRT, "waist_height_m": float(np.median(hands)), "length_m": 0.5}).sew(reached)
+    assert np.isfinite(sewn.vertices).all()
+
+
 def test_thighs_may_touch_below_the_crotch():
     garment = Shorts(**{**SHORTS, "inseam_m": 0.43}).sew(BODY)  # 3 cm above where the legs of this body part
     assert np.isfinite(garment.vertices).all()

@@ -95,7 +95,10 @@ def test_the_report_says_at_once_which_frames_the_images_contradict(track: Track
 def test_the_report_says_how_long_the_limbs_of_the_body_are(scene: Scene) -> None:
     names = [item.rsplit(" ", 2)[0] for item in report_rows.body(scene).split("; ")]
     limbs = ("thigh", "shank", "upper arm", "forearm")
-    assert names == ["height", *(f"{limb} {side}" for limb in limbs for side in "lr")]
+    sides = [f"{limb}, {side}" for limb in limbs for side in ("left", "right")]
+    assert names == ["height", *sides]
+    legs = replace(scene, body=replace(scene.body, cut=np.arange(len(scene.body.vertices)) == 0))
+    assert report_rows.body(legs).startswith(sides[0])  # that of a part is not the person's
 
 
 @pytest.mark.parametrize(

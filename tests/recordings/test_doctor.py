@@ -93,6 +93,9 @@ def test_no_first_pose_is_told_before_a_run_asks_for_it(good):
     assert messages(good, "note") == [
         "there is neither init.json nor keypoints/: silhouettes have to tell the pose of the first frame"
     ]
+    shutil.rmtree(good / "background")
+    (told,) = messages(good, "note")
+    assert told.startswith("nothing tells the pose of the first frame") and "background/" in told
     (good / "keypoints").mkdir()
     assert messages(good, "note") == []
 
@@ -335,6 +338,20 @@ def test_a_garment_that_can_not_be_sewn(good):
     (finding,) = examine(good)
     assert finding.severity == "error" and "garment.json" in finding.where
     assert finding.message == "shorts: waist_circumference_m is 0.50 m, but the body measures 0.84 m there"
+
+
+def test_a_garment_without_a_scan_is_tried_on_the_template(good):
+    for scan in (good / "subject").glob("[!g]*"):
+        scan.unlink()
+    template = {"waist_height": 1.04, "waist_circumference": 0.88, "hip_circumference": 1.16, "inseam": 0.25,
+                "leg_opening_circumference": 0.4, "length": 0.48}  # fmt: skip
+    edit(good / "subject" / "garment.json", lambda g: g.update(template))  # tight, but for the template alone
+    assert messages(good, "warning") == messages(good, "error") == []
+    edit(good / "subject" / "garment.json", lambda g: g.update(waist_height=0.71, length=0.33, inseam=0.17))
+    (finding,) = [finding for finding in examine(good) if finding.severity != "note"]
+    assert finding.severity == "warning" and "garment.json" in finding.where
+    assert finding.message == "on the template: shorts: at waist_height_m = 0.71 the legs have parted already"
+    assert "body.height_m" in finding.hint
 
 
 def test_a_garment_that_raises_what_nobody_expects(good, monkeypatch):
