@@ -77,10 +77,10 @@ def layout(recording: Recording, indices: Sequence[int], wanted: Layout | None) 
     """Return the names of the keypoints, in the order of the files.
 
     Raises:
-        RecordingError: their number is that of no layout, or of two that these frames do not tell apart.
+        RecordingError: no layout has so many, or not the wanted one, or these frames do not tell which of two it is.
     """
     detections = [points for index in indices for view in recording.people(index) for points in view]
-    told = wanted or layout_of(detections)
+    told = layout_of(detections, wanted)
     if told is None:
         message = "25 keypoints may be BODY_25 or BODY_25B: neither hips nor shoulders are seen that would tell"
         hint = (

@@ -33,16 +33,21 @@ LAYOUTS: Mapping[Layout, tuple[str, ...]] = {
 MIDWAY = ((8, 9, 12, 0.03), (1, 2, 5, 0.05))  # of BODY_25: hips, shoulders; off by a share of the person's size
 
 
-def layout_of(detections: list[F64]) -> Layout | None:
+def layout_of(detections: list[F64], wanted: Layout | None = None) -> Layout | None:
     """Return the layout of detections, each (K, 3) px, px, confidence; None: too little is seen to tell two apart.
 
     BODY_25 and BODY_25B both have 25 points: in the first, point 8 lies midway between points 9 and 12, the hips, and
     point 1 between points 2 and 5, the shoulders.
 
     Raises:
-        RecordingError: no layout has that many points.
+        RecordingError: no layout has that many points, or not the one that is wanted.
     """
     counts = {len(points) for points in detections}
+    if wanted is not None:
+        if strange := counts - {len(LAYOUTS[wanted])}:
+            what = f"a person has {min(strange)} keypoints, in the layout {wanted} {len(LAYOUTS[wanted])}"
+            raise RecordingError(what, hint="set another `layout`, or none: their number tells it")
+        return wanted
     if counts == {25}:
         return _of_25(np.stack(detections))
     for name, points in LAYOUTS.items():

@@ -74,14 +74,10 @@ class Keypoints(Matcher):
         assert frame.keypoints is not None
         people = [points for view in frame.keypoints for points in view]
         seen = np.zeros((len(image), len(names), 3))
-        layout = self.layout or (layout_of(people) if people else None)
+        layout = layout_of(people, self.layout) if people else None
         if layout is None:
             return seen
-        listed = LAYOUTS[layout]
-        if strange := {len(points) for points in people} - {len(listed)}:
-            what = f"a person has {strange.pop()} keypoints, in the layout {layout} {len(listed)}"
-            raise RecordingError(what, hint="set another `layout` for the matcher, or none: their number tells it")
-        row = rows_of(listed, names)
+        row = rows_of(LAYOUTS[layout], names)
         for index, (view, projected) in enumerate(zip(frame.keypoints, image, strict=True)):
             ordered = [np.where(row[:, None] >= 0, points[row], 0.0) for points in view]
             if frame.usable[index] and ordered:
