@@ -157,7 +157,8 @@ def _leg(body: Body, side: float, height: float, start: float) -> F64:
             return min(legs, key=lambda leg: leg[0])[1]
     raise GarmentError(
         f"shorts: the legs have not parted yet at {height:.2f} m, where the crotch should be",
-        hint=f"waist_height_m - (length_m - inseam_m) must lie below the body's crotch\n{pattern.WHOSE}",
+        hint="waist_height_m - (length_m - inseam_m) must lie below the body's crotch, and the body look along -y\n"
+        f"{pattern.WHOSE}",
     )
 
 
