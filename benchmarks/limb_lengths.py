@@ -22,6 +22,7 @@ from mocapflow_fitting.proportions import scaled
 from mocapflow.assets import Body
 from mocapflow.config.pipeline import load_pipeline
 from mocapflow.data import Pose
+from mocapflow.geometry.skeleton import segment_lengths
 from mocapflow.recordings.recording import open_recording
 from mocapflow.results import Track
 from mocapflow.scene import Scene
@@ -29,7 +30,6 @@ from mocapflow.track import CoupledLoop
 
 WRONG = {"thigh": 1.02, "shank": 0.98}
 OFF = np.radians(1.0)  # rad, standard deviation of each angle at the start
-LIMBS = {"thigh": ("hip", "knee"), "shank": ("knee", "ankle")}
 
 
 def main() -> None:
@@ -72,18 +72,9 @@ def track_of(scene: Scene, rows: Sequence[int], truth: Sequence[Pose]) -> Track:
 
 def told(found: Body, true: Body) -> str:
     """Return by how many mm each limb is too long, left and right."""
-    off = {
-        limb: [1000 * (length(found, a, b, side) - length(true, a, b, side)) for side in "lr"]
-        for limb, (a, b) in LIMBS.items()
-    }
+    ours, theirs = segment_lengths(found), segment_lengths(true)
+    off = {limb: [1000 * (ours[f"{limb}_{side}"] - theirs[f"{limb}_{side}"]) for side in "lr"] for limb in WRONG}
     return "   ".join(f"{limb} {left:+5.1f} {right:+5.1f} mm" for limb, (left, right) in off.items())
-
-
-def length(body: Body, start: str, end: str, side: str) -> float:
-    """Return the length (m) between two joints of a side."""
-    return float(
-        np.linalg.norm(body.positions[body.joint(f"{end}_{side}")] - body.positions[body.joint(f"{start}_{side}")])
-    )
 
 
 if __name__ == "__main__":

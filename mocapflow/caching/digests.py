@@ -46,7 +46,7 @@ CORE = (
     "track",
     "wrong_answer",
 )
-FIRST: dict[str, tuple[ModuleSpec, str]] = {}  # loaded modules, each with its code when this process first looked
+LOADED: dict[str, tuple[ModuleSpec, str]] = {}  # loaded modules, each with its code when this process first looked
 PYTHON = f" {sys.version_info.major}.{sys.version_info.minor}"  # syntax trees differ between minor versions
 
 
@@ -153,9 +153,9 @@ class Digests:
         code, imports = self._source(path)
         spec = getattr(sys.modules.get(name), "__spec__", None)
         if spec is not None and spec.origin == str(path):
-            loaded, before = FIRST.setdefault(name, (spec, code))
+            loaded, before = LOADED.setdefault(name, (spec, code))
             if loaded is not spec:  # reloaded
-                FIRST[name] = spec, code
+                LOADED[name] = spec, code
             elif before != code:
                 hint = "start this program again; with --scheduler, the workers"
                 raise PluginError("this code has changed since it was loaded", where=str(path), hint=hint)

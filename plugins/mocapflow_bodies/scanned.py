@@ -65,8 +65,8 @@ class Scanned(BodyModel):
             RecordingError: a file is missing, malformed, not in metres, inside out in part, or contradicts another.
             PipelineError: the morph names an angle the body lacks.
         """
-        self.need(folder)
         subject = folder / "subject"
+        need_scan(subject / "body.obj")
         vertices, faces = read_mesh(subject / "body.obj")
         check_winding(faces, str(subject / "body.obj"))
         skeleton = read_skeleton(subject / "skeleton.json")

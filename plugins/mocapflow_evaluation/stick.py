@@ -9,13 +9,12 @@ import numpy as np
 
 from mocapflow.errors import MocapflowError, RecordingError
 from mocapflow.geometry.registration import Registration, register
+from mocapflow.geometry.skeleton import SEGMENTS
 from mocapflow.io.columns import read_columns
 from mocapflow.records import F64, array, record
 
 BONES = tuple(
-    (f"{start}_{side}", f"{end}_{side}")
-    for start, end in (("hip", "knee"), ("knee", "ankle"), ("ankle", "toe"), ("shoulder", "elbow"), ("elbow", "wrist"))
-    for side in ("l", "r")
+    (f"{start}_{side}", f"{end}_{side}") for start, end in (*SEGMENTS.values(), ("ankle", "toe")) for side in ("l", "r")
 )
 TRUNK = (("hip_l", "hip_r"), ("shoulder_l", "shoulder_r"), ("hip_l", "shoulder_l"), ("hip_r", "shoulder_r"))
 

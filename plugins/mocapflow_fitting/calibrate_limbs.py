@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -29,10 +28,9 @@ from mocapflow_fitting.detections import frames_seen, spread
 from mocapflow_fitting.keypoint_fit import fit
 from mocapflow_fitting.landmarks import landmarks
 from mocapflow_fitting.pose_fit import Solution, Spreads
-from mocapflow_fitting.proportions import Proportion, grown, scaled
+from mocapflow_fitting.proportions import Proportion, fitted, scaled
 from mocapflow_fitting.silhouette_fit import refine
 
-LOG = logging.getLogger("mocapflow")
 # near the solution matchers reach less far and give up what is off
 AT_REST = Change(body=0.0, cloth=0.0, angles=0.0, sigmas=0.0)
 
@@ -87,9 +85,7 @@ class CalibrateLimbs(Stage):
             turn = Turn(index=done, change=AT_REST if done else None)
             matchers = [partial(self._match, scene, *view, turn) for view in views]
             solution = refine(body, matchers, solution, scene.cameras, spreads, share, self.rounds)
-        factors = solution.factors(spreads)
-        LOG.info("proportions: %s", ", ".join(f"{name} {factor:.3f}" for name, factor in factors.items()))
-        return grown(body, factors)
+        return fitted(body, solution.factors(spreads))
 
     def _from_track(self, track: Track) -> tuple[list[int], list[Pose], list[F64]]:
         """Return the frames that are fitted, with poses and clothes: the best, if there are enough of them."""

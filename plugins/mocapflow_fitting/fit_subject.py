@@ -20,7 +20,7 @@ from mocapflow_fitting.detections import frames_seen, has_keypoints, need_keypoi
 from mocapflow_fitting.keypoint_fit import Seen, fit
 from mocapflow_fitting.keypoint_layouts import Layout
 from mocapflow_fitting.landmarks import landmarks
-from mocapflow_fitting.proportions import grown
+from mocapflow_fitting.proportions import fitted
 
 LOG = logging.getLogger("mocapflow")
 # Standard deviations of log proportions among adults, the widths as far as keypoints show them.
@@ -71,8 +71,7 @@ class FitSubject(Stage):
             )
             standing = []
         factors, _ = fit(scene.body, [*moving, *standing], scene.cameras, SPREADS)
-        LOG.info("proportions: %s", ", ".join(f"{name} {factor:.3f}" for name, factor in factors.items()))
-        return grown(scene.body, factors)
+        return fitted(scene.body, factors)
 
     def _seen(self, recording: Recording, names: Sequence[str], count: int, cameras: Sequence[Camera]) -> list[Seen]:
         indices = spread(recording.indices, count)

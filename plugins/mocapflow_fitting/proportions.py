@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Literal, get_args
@@ -13,6 +14,7 @@ from mocapflow.geometry import twists
 from mocapflow.geometry.skeleton import SEGMENTS, body_directions, skeleton_of, unsided
 from mocapflow.records import F64
 
+LOG = logging.getLogger("mocapflow")
 # What can be stretched; `stature` multiplies all, `girth` what lies across the limbs and the depth of the trunk.
 Proportion = Literal[
     "stature", "girth", "trunk", "shoulder_width", "hip_width", "head",
@@ -47,24 +49,24 @@ def scaled(body: Body, factors: Mapping[str, float]) -> Body:
     offset = body.morph_offset
     if offset is not None:
         offset = np.einsum("vk,vkab,vb->va", body.skin_weight, stretch[body.skin_joint], offset)
-    return replace(
-        body, vertices=vertices, positions=positions, morph_offset=offset,
-        twists=twists.screw(body.twists[:, :3], positions[body.screw_joint]),
-    )  # fmt: skip
+    return replace(_moved(body, vertices, positions), morph_offset=offset)
 
 
-def grown(body: Body, factors: Mapping[str, float]) -> Body:
-    """Return a body of other proportions whose soles are where they were.
+def fitted(body: Body, factors: Mapping[str, float]) -> Body:
+    """Return a body of the proportions that were fitted to it, and tell them; its soles are where they were.
 
     `scaled` holds the root joint, so that longer legs reach below the floor; but the heights of garments count from it.
     """
+    LOG.info("proportions: %s", ", ".join(f"{name} {factor:.3f}" for name, factor in factors.items()))
     other = scaled(body, factors)
     up = np.array([0.0, 0.0, body.vertices[:, 2].min() - other.vertices[:, 2].min()])
-    positions = other.positions + up
-    return replace(
-        other, vertices=other.vertices + up, positions=positions,
-        twists=twists.screw(other.twists[:, :3], positions[other.screw_joint]),
-    )  # fmt: skip
+    return _moved(other, other.vertices + up, other.positions + up)
+
+
+def _moved(body: Body, vertices: F64, positions: F64) -> Body:
+    """Return a body with its vertices and joints elsewhere; the axes of the joints keep their directions."""
+    screws = twists.screw(body.twists[:, :3], positions[body.screw_joint])
+    return replace(body, vertices=vertices, positions=positions, twists=screws)
 
 
 def _stretches(body: Body, factors: Mapping[str, float]) -> F64:

@@ -225,7 +225,7 @@ def test_code_that_a_plugin_imports_counts(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     assert made(1) == made(1) != made(2)
     before = made(1)
-    monkeypatch.setattr(digests, "FIRST", {})
+    monkeypatch.setattr(digests, "LOADED", {})
     monkeypatch.setattr(digests.sources, "meaning", lambda tree: "")  # all else is alike: mocapflow.io counted too
     assert made(1) != before
 

@@ -8,7 +8,7 @@ from keypoint_recording import DEMO, copy_demo, length, write
 from mocapflow_bodies.template import Template
 from mocapflow_fitting import fit_subject
 from mocapflow_fitting.fit_subject import FitSubject
-from mocapflow_fitting.proportions import PROPORTIONS, grown, scaled
+from mocapflow_fitting.proportions import PROPORTIONS, fitted, scaled
 from mocapflow_fitting.start_from_file import read_pose
 
 from mocapflow.data import Pose
@@ -82,7 +82,7 @@ def test_girth_leaves_the_bones(body):
 
 def test_longer_legs_do_not_reach_below_the_floor(body):
     factors = {"thigh": 1.1, "shank": 1.05, "girth": 0.9}
-    loose, stood = scaled(body, factors), grown(body, factors)
+    loose, stood = scaled(body, factors), fitted(body, factors)
     assert loose.vertices[:, 2].min() < -0.05
     assert stood.vertices[:, 2].min() == pytest.approx(body.vertices[:, 2].min(), abs=1e-12)
     up = stood.positions[0] - loose.positions[0]
@@ -96,9 +96,9 @@ def test_the_fitted_body_stands_on_the_floor(body, monkeypatch):
     monkeypatch.setattr(FitSubject, "need", lambda *_: None)
     monkeypatch.setattr(FitSubject, "_seen", lambda *_: [])
     monkeypatch.setattr(fit_subject, "fit", lambda *_: ({"stature": 1.1}, ()))
-    fitted = FitSubject().run(open_recording(DEMO), Scene(cameras=(), body=body))
-    assert np.ptp(fitted.vertices[:, 2]) == pytest.approx(1.1 * np.ptp(body.vertices[:, 2]))
-    assert fitted.vertices[:, 2].min() == pytest.approx(body.vertices[:, 2].min(), abs=1e-12)
+    found = FitSubject().run(open_recording(DEMO), Scene(cameras=(), body=body))
+    assert np.ptp(found.vertices[:, 2]) == pytest.approx(1.1 * np.ptp(body.vertices[:, 2]))
+    assert found.vertices[:, 2].min() == pytest.approx(body.vertices[:, 2].min(), abs=1e-12)
 
 
 def test_unknown_proportions(body):

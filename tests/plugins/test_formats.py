@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +11,7 @@ import cv2
 import numpy as np
 import pytest
 import readers
+from mocapflow_export import formats
 from mocapflow_export.export import Export
 from mocapflow_export.formats import FILES, Result, write
 from mocapflow_export.formats.gltf import the_shorter_way
@@ -54,6 +56,12 @@ def test_a_missing_library_is_named(
     monkeypatch.setitem(sys.modules, needed, None)
     with pytest.raises(PipelineError, match=r"this format needs .*\n.*pip install 'mocapflow\["):
         write(name, result, tmp_path)
+
+
+@pytest.mark.parametrize("name", formats.FILES)
+def test_all_packages_that_a_format_is_written_with_are_asked_for(name: str) -> None:
+    source = (Path(formats.__file__).parent / f"{name}.py").read_text()
+    assert set(re.findall(r'library\("(\w+)', source)) == set(formats.PACKAGES.get(name, ()))
 
 
 def test_a_format_whose_package_is_not_installed_is_told_before_the_run(
