@@ -58,8 +58,27 @@ def changed(document: Document, target: str, new: Document) -> Document:
         PipelineError: the document has no such path; with the place of the new value.
     """
     path, _, successor = target.partition(BEFORE)
-    parts = path.split(".")
-    values: Any = deepcopy(document.values)
+    where = new.place(()).text
+    values = deepcopy(document.values)
+    holder, steps = _holder_of(values, path.split("."), where)
+    key, siblings = steps[-1], steps[:-1]
+    if new.values is None and siblings == STAGES and isinstance(holder, dict) and key not in holder:
+        hint = alternatives(str(key), holder)
+        raise PipelineError(f"there is no '{dotted(steps)}' to leave out", where=where, hint=hint)
+    holder[key] = new.values
+    if successor and not _moved(holder, key, successor):
+        message = f"there is no '{dotted((*siblings, successor))}' to put '{key}' before"
+        raise PipelineError(message, where=where, hint=alternatives(successor, map(str, holder)))
+    kept = {at: place for at, place in document.places.items() if at[: len(steps)] != steps}
+    return Document(values, {**kept, **{(*steps, *at): place for at, place in new.places.items()}})
+
+
+def _holder_of(values: Any, parts: list[str], where: str) -> tuple[Any, KeyPath]:
+    """Return the mapping or list that holds the value at a path, opened to be written into, and the way to the value.
+
+    Raises:
+        PipelineError: there is no such path.
+    """
     holder = values
     steps: KeyPath = ()
     for part in parts:
@@ -67,21 +86,12 @@ def changed(document: Document, target: str, new: Document) -> Document:
             holder = _opened(holder, steps[-1])
         key = int(part) if isinstance(holder, list) and part.isdecimal() else part
         if not _may_hold(holder, key, last=len(steps) == len(parts) - 1):
-            known = (
-                holder if isinstance(holder, dict) else map(str, range(len(holder) if isinstance(holder, list) else 0))
-            )
-            hint = alternatives(part, known)
-            raise PipelineError(f"there is no '{dotted((*steps, part))}'", where=new.place(()).text, hint=hint)
+            places = range(len(holder)) if isinstance(holder, list) else ()
+            known = holder if isinstance(holder, dict) else map(str, places)
+            message = f"there is no '{dotted((*steps, part))}'"
+            raise PipelineError(message, where=where, hint=alternatives(part, known))
         steps = (*steps, key)
-    if new.values is None and steps[:-1] == STAGES and isinstance(holder, dict) and steps[-1] not in holder:
-        hint = alternatives(parts[-1], holder)
-        raise PipelineError(f"there is no '{dotted(steps)}' to leave out", where=new.place(()).text, hint=hint)
-    holder[steps[-1]] = new.values
-    if successor and not _moved(holder, steps[-1], successor):
-        message = f"there is no '{dotted((*steps[:-1], successor))}' to put '{parts[-1]}' before"
-        raise PipelineError(message, where=new.place(()).text, hint=alternatives(successor, map(str, holder)))
-    kept = {at: place for at, place in document.places.items() if at[: len(steps)] != steps}
-    return Document(values, {**kept, **{(*steps, *at): place for at, place in new.places.items()}})
+    return holder, steps
 
 
 def _moved(holder: Any, key: str | int, successor: str) -> bool:

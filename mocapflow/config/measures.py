@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from mocapflow.assets import Body
 from mocapflow.config.documents import Document, Place
@@ -19,6 +20,19 @@ FILE = Path("subject") / "garment.json"
 FROM_RECORDING = "from_recording"
 
 
+class RecordedGarment(NamedTuple):
+    """The garment that a recording describes, with its tape measures."""
+
+    file: Path
+    kind: str | None  # None: there is no such file
+    written: Mapping[str, tuple[str, Any]]  # by setting: its key and value in the file
+
+    @property
+    def measures(self) -> dict[str, Any]:
+        """The measures by setting."""
+        return {setting: value for setting, (_, value) in self.written.items()}
+
+
 def garment_of(value: Any, recording: Path, resolver: Resolver) -> Garment | None:
     """Return the garment that a pipeline names, None without one.
 
@@ -32,38 +46,28 @@ def garment_of(value: Any, recording: Path, resolver: Resolver) -> Garment | Non
     """
     if value is None:
         return None
-    file = recording / FILE
-    kind, written = _measures(file)
-    measures = {name: measure for name, (_, measure) in written.items()}
+    recorded = _read_recorded(recording / FILE)
     named = _named(value)
-    recorded = named == FROM_RECORDING and not (isinstance(value, dict) and len(value) > 1)  # by the file alone
+    by_file_alone = named == FROM_RECORDING and not (isinstance(value, dict) and len(value) > 1)
     if named == FROM_RECORDING:
-        if kind is None:
+        if recorded.kind is None:
             find_calibration(recording)  # without one it is no recording: that comes first
-            raise _no_garment(file)
-        named, value = kind, {**value, "use": kind} if isinstance(value, dict) else kind
-    elif named != kind:
-        measures = {}
+            raise _no_garment(recorded.file)
+        named, value = recorded.kind, {**value, "use": recorded.kind} if isinstance(value, dict) else recorded.kind
+    if named != recorded.kind:
+        recorded = recorded._replace(written={})  # measures of another garment
     try:
-        garment: Garment = resolver.component("garment", value, ("garment",), measures)
+        garment: Garment = resolver.component("garment", value, ("garment",), recorded.measures)
         return garment
     except UnknownComponent as error:
-        where = place(file, str(kind)) if named == kind else error.where
+        where = place(recorded.file, str(recorded.kind)) if named == recorded.kind else error.where
         raise UnknownComponent(error.message, where=where, hint=error.hint) from None
     except PluginError:  # two garments have its name, which no measure mends
         raise
     except MocapflowError as error:
         if error.where != resolver.place(("garment",)):
             raise
-        source = f"describes a {kind}" if kind else "does not exist"
-        note = f"measures, in metres, come from {file}, which {source}; a value in the pipeline overrides them"
-        wrong = next((name for name in measures if error.message.startswith(f"garment.{name}: ")), "")
-        key = written[wrong][0] if wrong else ""
-        where = place(file, key) if wrong else str(file) if recorded else error.where
-        message = error.message.replace(wrong, key, 1) if wrong else error.message
-        own = f"no measure: write it in the pipeline, garment: {{use: {FROM_RECORDING}, {key}: …}}"
-        hint = own if key and error.hint == guess(key, [key]) else error.hint
-        raise type(error)(message, where=where, hint="\n".join(filter(None, [hint, note]))) from None
+        raise _wrong_measure(error, recorded, by_file_alone) from None
 
 
 def recorded_garment(recording: Path, registry: Registry) -> Garment | None:
@@ -107,23 +111,37 @@ def _no_garment(file: Path) -> RecordingError:
     )
 
 
-def _measures(path: Path) -> tuple[str | None, dict[str, tuple[str, Any]]]:
-    """Return the garment's type and, by its settings, each key and value of a recording's tape measures.
+def _wrong_measure(error: MocapflowError, recorded: RecordedGarment, by_file_alone: bool) -> MocapflowError:
+    """Return an error of settings that the file does not give, told of the tape measures where they come from."""
+    source = f"describes a {recorded.kind}" if recorded.kind else "does not exist"
+    note = f"measures, in metres, come from {recorded.file}, which {source}; a value in the pipeline overrides them"
+    setting = next((name for name in recorded.written if error.message.startswith(f"garment.{name}: ")), "")
+    message, where, hint = error.message, str(recorded.file) if by_file_alone else error.where, error.hint
+    if setting:
+        key, _ = recorded.written[setting]
+        message, where = message.replace(setting, key, 1), place(recorded.file, key)
+        if hint == guess(key, [key]):  # a setting of that name, but no measure
+            hint = f"no measure: write it in the pipeline, garment: {{use: {FROM_RECORDING}, {key}: …}}"
+    return type(error)(message, where=where, hint="\n".join(filter(None, [hint, note])))
+
+
+def _read_recorded(path: Path) -> RecordedGarment:
+    """Return what a recording says of its garment.
 
     There the unit may be written, as in a pipeline, or left out: `length_m` is `length`.
     """
     if not path.exists():
-        return None, {}
+        return RecordedGarment(path, None, {})
     hint = 'write {"type": "skirt", "waist_height": 1.05, ...}, in metres'
     said = read_json(path, hint)
     if not isinstance(said, dict) or "type" not in said:
         raise RecordingError("it does not say its type", where=str(path), hint=hint)
-    measures: dict[str, tuple[str, Any]] = {}
+    written: dict[str, tuple[str, Any]] = {}
     for key, value in said.items():
         setting = f"{key.removesuffix('_m')}_m"
-        if setting in measures:
-            message = f"'{measures[setting][0]}' and '{key}' are one measure"
+        if setting in written:
+            message = f"'{written[setting][0]}' and '{key}' are one measure"
             raise RecordingError(message, where=place(path, key), hint="leave one of them out")
         if key != "type":
-            measures[setting] = key, value
-    return str(said["type"]), measures
+            written[setting] = key, value
+    return RecordedGarment(path, str(said["type"]), written)

@@ -124,13 +124,7 @@ def load_pipeline(
     said = plain.build(PipelineFile, document.values, ())
     assert isinstance(said, PipelineFile)
     resolver = Resolver(document, registry or _registry_with(said.plugins, plain))
-    written = "" if recording else resolver.place(("recording",))
-    recording = Path(recording) if recording else _recording(said, Path(path).stem, resolver)
-    if not recording.is_dir():
-        what = f"there is no such folder{f': {recording}' if written else ''}"
-        option = "--recording DIR of run, plan and compare names another"
-        hint = "\n".join(filter(None, [led_nowhere(recording), option]))
-        raise RecordingError(what, where=written or str(recording), hint=hint)
+    recording = _recording(said, recording, Path(path).stem, resolver)
     if all(value is None for value in said.stages.values()):
         raise PipelineError("a pipeline needs stages", where=resolver.place(("stages",)))
     part = said.frames
@@ -164,7 +158,18 @@ def _registry_with(plugins: tuple[str, ...], resolver: Resolver) -> Registry:
     return registry
 
 
-def _recording(said: PipelineFile, name: str, resolver: Resolver) -> Path:
+def _recording(said: PipelineFile, given: Path | str | None, name: str, resolver: Resolver) -> Path:
+    """Return the folder of the recording: the given one, else the one that the file says."""
+    folder = Path(given) if given else _written_recording(said, name, resolver)
+    if folder.is_dir():
+        return folder
+    what, where = ("", str(folder)) if given else (f": {folder}", resolver.place(("recording",)))
+    option = "--recording DIR of run, plan and compare names another"
+    hint = "\n".join(filter(None, [led_nowhere(folder), option]))
+    raise RecordingError(f"there is no such folder{what}", where=where, hint=hint)
+
+
+def _written_recording(said: PipelineFile, name: str, resolver: Resolver) -> Path:
     if said.recording is None:
         raise resolver.located(PipelineError("no recording: write `recording: DIR`, or give --recording DIR"), ())
     if isinstance(said.recording, dict):

@@ -82,15 +82,12 @@ class Resolver:
 
     def _setting(self, annotation: Any, value: Any, steps: KeyPath) -> Any:
         """Return a value of the file as the model takes it: nested components built, paths made absolute."""
-        base = _component_base(annotation)
         if value is None:
             return None
+        base = _component_base(annotation)
         if base is None:
-            return (
-                self.file(value, steps).absolute()
-                if isinstance(value, str) and Path in plain_parts(annotation)
-                else value
-            )
+            is_path = isinstance(value, str) and Path in plain_parts(annotation)
+            return self.file(value, steps).absolute() if is_path else value
         if not _takes_several(annotation):
             return self.component(base.role, value, steps)
         if not isinstance(value, list):
@@ -123,9 +120,8 @@ class Resolver:
         return self.located(PipelineError(message), (*steps, *location))
 
     def _is_setting(self, cls: type[BaseModel], location: tuple[str | int, ...], steps: KeyPath) -> bool:
-        return (*steps, *location) in self._document.places or location[-1] in _model_at(
-            cls, location[:-1]
-        ).model_fields
+        known = _model_at(cls, location[:-1]).model_fields
+        return (*steps, *location) in self._document.places or location[-1] in known
 
 
 def _title(cls: type[BaseModel]) -> str:

@@ -135,6 +135,19 @@ def _extended(child: Document, path: Path) -> Document:
             f"'{name}' has no place in a file that extends another: only `extends` and `change` do",
             where=child.place((name,)).text, hint=f"write it as change: {{{name}: ...}}",
         )  # fmt: skip
+    base = _base_of(child, path)
+    if "mocapflow" in child.values:
+        base = changed(base, "mocapflow", Document(child.values["mocapflow"], _places(child, ("mocapflow",))))
+    changes = child.values.get("change") or {}
+    if not isinstance(changes, dict):
+        raise PipelineError("change: write `path.to.value: new value` lines", where=child.place(("change",)).text)
+    for target, value in changes.items():
+        base = changed(base, target, Document(value, _places(child, ("change", target))))
+    return base
+
+
+def _base_of(child: Document, path: Path) -> Document:
+    """Return the file that another one, at a path, extends."""
     extended = Path(os.path.normpath(path.parent / str(child.values["extends"])))
     try:
         base = _read_file(extended)
@@ -148,13 +161,6 @@ def _extended(child: Document, path: Path) -> Document:
         root = os.path.normpath(Path(child.values["extends"]).parent / base.values["extends"])
         hint = f"extend {root} and copy what is under `change` in {extended.name}"
         raise PipelineError(message, where=child.place(("extends",)).text, hint=hint)
-    if "mocapflow" in child.values:
-        base = changed(base, "mocapflow", Document(child.values["mocapflow"], _places(child, ("mocapflow",))))
-    changes = child.values.get("change") or {}
-    if not isinstance(changes, dict):
-        raise PipelineError("change: write `path.to.value: new value` lines", where=child.place(("change",)).text)
-    for target, value in changes.items():
-        base = changed(base, target, Document(value, _places(child, ("change", target))))
     return base
 
 
