@@ -8,6 +8,7 @@ import numpy as np
 
 from mocapflow.assets import Body, GarmentMesh
 from mocapflow.data import NO_CLOTH, Past, Pose, PoseBatch
+from mocapflow.dressing.guards import body_of, drape_of, mesh_of, velocity_of
 from mocapflow.dressing.roles import BodyModel, Draper, Garment
 from mocapflow.geometry import kinematics
 from mocapflow.records import F64
@@ -29,20 +30,8 @@ class GarmentConformance(Conformance):
         return tiny_body()
 
     def sewn(self) -> GarmentMesh:
-        """Return the garment sewn on the body; it is sewn twice, to see that it is pure."""
-        return assert_pure(self.garment.sew, self.make_body())  # type: ignore[no-any-return]
-
-    def test_indices_are_in_range(self) -> None:
-        """Faces, strands, rings, pins and joints point at something."""
-        mesh, body = self.sewn(), self.make_body()
-        count = len(mesh.vertices)
-        assert np.isfinite(mesh.vertices).all()
-        for name in ("faces", "rings", "pinned"):
-            indices = getattr(mesh, name)
-            assert ((indices >= 0) & (indices < count)).all(), f"{name} points beyond the {count} vertices"
-        assert ((mesh.strands >= -1) & (mesh.strands < count)).all()
-        assert ((mesh.carried_by >= 0) & (mesh.carried_by < len(body.parents))).all()
-        assert ((mesh.pinned_to >= 0) & (mesh.pinned_to < len(body.vertices))).all()
+        """Return the garment on the body, looked at as in a run; it is sewn twice, to see that it is pure."""
+        return assert_pure(mesh_of, self.garment, self.make_body())  # type: ignore[no-any-return]
 
     def test_every_vertex_lies_on_one_strand(self) -> None:
         """Strands are what is draped; after a -1 no vertex follows."""
@@ -66,16 +55,12 @@ class GarmentConformance(Conformance):
         """A pinned vertex is within 10 cm of the skin that holds it, and pinned once."""
         mesh, body = self.sewn(), self.make_body()
         away = np.linalg.norm(mesh.vertices[mesh.pinned] - body.vertices[mesh.pinned_to], axis=1)
-        assert len(mesh.pinned) > 0
         assert len(np.unique(mesh.pinned)) == len(mesh.pinned)
         assert away.max() < 0.10, f"a pin is {away.max():.3f} m from the skin"
 
-    def test_rings_and_parameters(self) -> None:
-        """Lengths of links are positive; each parameter has a name and a range."""
-        mesh = self.sewn()
-        assert (mesh.ring_length > 0).all()
-        assert len(set(mesh.parameter_names)) == len(mesh.parameter_names) == len(mesh.parameter_bounds)
-        low, high = mesh.parameter_bounds.T
+    def test_each_parameter_has_a_range(self) -> None:
+        """No parameter is fixed."""
+        low, high = self.sewn().parameter_bounds.T
         assert (low < high).all()
 
 
@@ -93,11 +78,7 @@ class DraperConformance(Conformance):
         """B poses give (B, W, 3) finite vertices, the same as one by one, and nothing is changed."""
         scene = self.make_scene()
         poses, parameters = _batch(scene)
-        draped = assert_pure(self.draper.drape, poses, parameters, Past(), scene)
-        assert scene.garment is not None
-        assert draped.shape == (3, len(scene.garment.vertices), 3)
-        assert draped.dtype == np.float64
-        assert np.isfinite(draped).all()
+        draped = assert_pure(drape_of, self.draper, poses, parameters, Past(), scene)
         for row in range(3):
             one = PoseBatch(root=poses.root[row : row + 1].copy(), angles=poses.angles[row : row + 1].copy())
             alone = self.draper.drape(one, parameters[row : row + 1], Past(), scene)
@@ -121,9 +102,7 @@ class DraperConformance(Conformance):
         assert scene.garment is not None
         vertices = np.arange(0, len(scene.garment.vertices), 7, dtype=np.int32)
         parameters = scene.garment.parameter_bounds.mean(axis=1)
-        velocity = assert_pure(self.draper.velocity, pose, parameters, vertices, Past(), scene)
-        assert velocity.shape == (len(vertices), 3, 6 + len(pose.angles) + len(parameters))
-        assert np.isfinite(velocity).all()
+        velocity = assert_pure(velocity_of, self.draper, pose, parameters, vertices, Past(), scene)
         np.testing.assert_allclose(velocity[:, :, 3:6], np.broadcast_to(np.eye(3), (len(vertices), 3, 3)), atol=1e-4)
 
 
@@ -135,11 +114,9 @@ class BodyConformance(Conformance):
     recording: Path
 
     def test_the_chain_is_in_order(self) -> None:
-        """Parents come first, screws stand by joint and are unit twists, rest lies within the limits."""
-        body = self.body.load(self.recording)
+        """The root comes first, screws are unit twists, rest lies within the limits."""
+        body = body_of(self.body, self.recording)
         assert body.parents[0] == -1
-        assert (body.parents < np.arange(len(body.parents))).all()
-        assert (np.diff(body.screw_joint) >= 0).all()
         np.testing.assert_allclose(np.linalg.norm(body.twists[:, :3], axis=1), 1, atol=1e-9)
         pitch = (body.twists[:, :3] * body.twists[:, 3:]).sum(axis=1)
         np.testing.assert_allclose(pitch, 0, atol=1e-9)
@@ -147,10 +124,8 @@ class BodyConformance(Conformance):
         assert len(body.screw_names) == len(set(body.screw_names)) == len(body.twists)
 
     def test_the_skin(self) -> None:
-        """Weights sum to one, indices exist, and at rest the posed skin is the mesh."""
-        body = self.body.load(self.recording)
-        assert ((body.faces >= 0) & (body.faces < len(body.vertices))).all()
-        assert ((body.skin_joint >= 0) & (body.skin_joint < len(body.parents))).all()
+        """Weights sum to one, and at rest the posed skin is the mesh."""
+        body = body_of(self.body, self.recording)
         np.testing.assert_allclose(body.skin_weight.sum(axis=1), 1, atol=1e-9)
         assert (body.skin_weight >= 0).all()
         rest = Pose(root=np.eye(4), angles=np.zeros(len(body.twists)))

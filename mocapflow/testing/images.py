@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from mocapflow.components import Matcher, Predictor, Segmenter
-from mocapflow.data import Matches, Pose, Surface
+from mocapflow.data import Matches
+from mocapflow.guards.answers import matches_of, pose_of, segmentation_of
 from mocapflow.model import moved
-from mocapflow.scene import Scene
 from mocapflow.testing import pictures, scenes
 from mocapflow.testing.component import TURN, Conformance
 from mocapflow.testing.same import assert_pure
@@ -26,8 +26,7 @@ class PredictorConformance(Conformance):
         scene = scenes.tiny_scene()
         poses = [moved(scenes.tiny_pose(scene, 2), 0.02 * k * np.ones(6 + len(scene.body.limits))) for k in range(2)]
         past = scenes.tiny_past(scene, *poses[-known:])
-        guess = assert_pure(self.predictor.predict, pictures.tiny_frame(scene, poses[-1]), past, scene)
-        assert isinstance(guess, Pose)
+        guess = assert_pure(pose_of, self.predictor, pictures.tiny_frame(scene, poses[-1]), past, scene)
         np.testing.assert_allclose(guess.root[:3, :3] @ guess.root[:3, :3].T, np.eye(3), atol=1e-9)
         np.testing.assert_allclose(guess.root[3], [0, 0, 0, 1], atol=1e-12)
         assert np.abs(guess.angles - poses[-1].angles).max() < 0.5
@@ -47,11 +46,10 @@ class SegmenterConformance(Conformance):
         believed = moved(pose, np.full(6 + len(pose.angles), 0.01))
         frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, believed)
         past = scenes.tiny_past(scene, believed)
-        found = assert_pure(self.segmenter.segment, frame, state, past, scene, TURN)
+        found = assert_pure(segmentation_of, self.segmenter, frame, state, past, scene, TURN)
         persons = found.of("person")
         assert [silhouette.camera for silhouette in persons] == list(range(len(scene.cameras)))
         for silhouette, truth in zip(persons, pictures.tiny_masks(scene, pose), strict=True):
-            assert silhouette.distance.shape == truth.shape
             inside = silhouette.distance > 0
             overlap = (inside & truth).sum() / (inside | truth).sum()
             assert overlap >= self.least_overlap, f"camera {silhouette.camera}: overlap {overlap:.2f}"
@@ -72,8 +70,8 @@ class MatcherConformance(Conformance):
     role = "matcher"
     matcher: Matcher
 
-    def matches(self, clothed: bool, lost: int | None = None) -> tuple[Matches, Scene, Surface]:
-        """Return matches of a slightly wrong surface, one view lost or none."""
+    def matches(self, clothed: bool, lost: int | None = None) -> Matches:
+        """Return matches of a slightly wrong surface, looked at as in a run; one view is lost or none."""
         scene = scenes.tiny_scene(clothed=clothed)
         pose = scenes.tiny_pose(scene, 4)
         believed = moved(pose, np.full(6 + len(pose.angles), 0.01))
@@ -83,21 +81,15 @@ class MatcherConformance(Conformance):
             frame = pictures.without_view(frame, lost)
             segmentation = pictures.without_silhouette(segmentation, lost)
         past = scenes.tiny_past(scene, believed)
-        return assert_pure(self.matcher.match, frame, segmentation, surface, past, scene, TURN), scene, surface
+        return assert_pure(matches_of, self.matcher, frame, segmentation, surface, past, scene, TURN)  # type: ignore[no-any-return]
 
     @pytest.mark.parametrize("clothed", [False, True])
     def test_matches_point_at_something(self, clothed: bool) -> None:
         """Cameras, pixels and vertices exist, weights are not negative, directions are unit or zero."""
-        matches, scene, surface = self.matches(clothed)
-        assert ((matches.camera >= 0) & (matches.camera < len(scene.cameras))).all()
-        assert ((matches.vertex >= 0) & (matches.vertex < len(surface.vertices))).all()
-        assert np.isfinite(matches.pixel).all()
-        assert (np.isfinite(matches.weight) & (matches.weight >= 0)).all()
-        length = np.linalg.norm(matches.direction, axis=1)
+        length = np.linalg.norm(self.matches(clothed).direction, axis=1)
         assert (np.isclose(length, 1, atol=1e-6) | (length == 0)).all()
 
     @pytest.mark.parametrize("clothed", [False, True])
     def test_a_lost_view_has_no_matches(self, clothed: bool) -> None:
         """A view without a silhouette gives no matches."""
-        matches, _, _ = self.matches(clothed, lost=1)
-        assert 1 not in matches.camera
+        assert 1 not in self.matches(clothed, lost=1).camera
