@@ -13,6 +13,7 @@ from mocapflow.errors import MocapflowError, alternatives
 
 if TYPE_CHECKING:
     from mocapflow.storage.artifacts import Artifact
+    from mocapflow.storage.store import Store
 
 app = typer.Typer(help="List, explain and prune cached results.", no_args_is_help=True)
 Where = Annotated[Path, typer.Option("--store", help="The store.")]
@@ -26,10 +27,9 @@ def list_(
     check: Annotated[bool, typer.Option("--check", help="Read all that is complete: is any of it cut off?")] = False,
 ) -> None:
     """List what is in the store, oldest first, then what is damaged."""
-    from mocapflow.storage.store import Store
-
-    for artifact in _artifacts(store):
-        if check and artifact.complete and (odd := _odd(artifact, store)):
+    kept = _opened(store)
+    for artifact in kept.artifacts():
+        if check and artifact.complete and (odd := _damage(artifact, kept)):
             typer.echo(f"{artifact.path.name:<32} damaged; made anew where a run needs it: {odd}")
             continue
         done = "complete" if artifact.complete else "unfinished"
@@ -37,7 +37,7 @@ def list_(
         size = f"{_size(artifact.path) / 1e6:.1f} MB"
         made = str(artifact.attributes.get("created", ""))
         typer.echo(f"{artifact.path.name:<32} {done:<11} {frames:<12} {size:>10}  {made}")
-    for path in [*Store(store).damaged(), *Store(store).aside()]:
+    for path in [*kept.damaged(), *kept.aside()]:
         typer.echo(f"{path.name:<32} damaged; made anew where a run needs it, removed by `cache prune`")
 
 
@@ -66,12 +66,10 @@ def prune(
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would be removed.")] = False,
 ) -> None:
     """Remove results; damaged ones always go."""
-    from mocapflow.storage.store import Store
-
     if days is not None and not days >= 0:  # so says nan, too
         raise typer.BadParameter("a number of days, 0 or more", param_hint="--days")
-    kept, freed = Store(store), list[int]()
-    chosen = [artifact.path for artifact in _artifacts(store) if everything or _goes(artifact, days, unfinished)]
+    kept, freed = _opened(store), list[int]()
+    chosen = [artifact.path for artifact in kept.artifacts() if everything or _goes(artifact, days, unfinished)]
     for path in [*chosen, *kept.damaged(), *kept.aside()]:
         size = _size(path)
         if kept.busy(path.name.rpartition("-")[2]) if dry_run else not kept.drop(path):
@@ -91,30 +89,29 @@ def _goes(artifact: Artifact, days: float | None, unfinished: bool) -> bool:
     return (datetime.now(made.tzinfo) - made).total_seconds() > days * DAY
 
 
-def _artifacts(store: Path) -> list[Artifact]:
+def _opened(store: Path) -> Store:
     from mocapflow.storage.store import Store
 
     kept = Store(store)
     if not kept.state.is_dir():  # in another folder all would be taken for damaged results, and pruned
         hint = "a store is what `mocapflow run` keeps beside its run folders, as store.zarr; --store names it"
         raise MocapflowError("there is no store here", where=str(store), hint=hint)
-    return kept.artifacts()
+    return kept
 
 
-def _odd(artifact: Artifact, store: Path) -> str:
+def _damage(artifact: Artifact, store: Store) -> str:
     """Return why a result can't be read back, "" where it can."""
     from mocapflow.storage.rows import Corrupted
-    from mocapflow.storage.store import Store
 
     try:
-        Store(store).load(artifact)
+        store.load(artifact)
     except Corrupted as error:
         return error.message
     return ""
 
 
 def _find(name: str, store: Path) -> Artifact:
-    artifacts = _artifacts(store)
+    artifacts = _opened(store).artifacts()
     found = [a for a in artifacts if a.path.name.startswith(name) or a.key.startswith(name)]
     if len(found) != 1:
         message = f"'{name}' is {'more than one result' if found else 'no result'} of this store"

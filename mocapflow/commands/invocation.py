@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mocapflow.errors import PipelineError, no_run_folder
 from mocapflow.io.atomic import atomic_write
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from mocapflow.config.pipeline import Pipeline
 
 FILE = "command.json"
-KEYS = ("keys", "contents")  # of the stages: with their code, and by pipeline and recording alone
 FINISHED = "finished"  # when the run was, missing until then
+NO_ARGUMENTS = ("keys", "contents", FINISHED)  # what the file holds beside an `Invocation`
 
 
 @dataclass(frozen=True)
@@ -94,18 +94,21 @@ def remember(
     invocation: Invocation, out: Path, keys: Mapping[str, str], contents: Mapping[str, str] | None = None
 ) -> None:
     """Write an invocation into its run folder, with the keys of what its stages make, and those whatever the code."""
-    _write(out, {**asdict(invocation.absolute()), **dict(zip(KEYS, (keys, contents or {}), strict=True))})
+    _write(out, {**asdict(invocation.absolute()), "keys": keys, "contents": contents or {}})
 
 
 def note_finished(out: Path) -> None:
     """Note in a run folder that its run is finished."""
-    said = json.loads((out / FILE).read_text(encoding="utf-8"))
-    _write(out, {**said, FINISHED: datetime.now().astimezone().isoformat(" ", "seconds")})
+    _write(out, {**_read(out), FINISHED: datetime.now().astimezone().isoformat(" ", "seconds")})
 
 
 def finished_at(out: Path) -> str:
     """Return when the run of a run folder was finished, "" where it is not."""
-    return str(json.loads((out / FILE).read_text(encoding="utf-8")).get(FINISHED, ""))
+    return str(_read(out).get(FINISHED, ""))
+
+
+def _read(out: Path) -> Any:
+    return json.loads((out / FILE).read_text(encoding="utf-8"))
 
 
 def _write(out: Path, said: Mapping[str, object]) -> None:
@@ -119,8 +122,8 @@ def _write(out: Path, said: Mapping[str, object]) -> None:
 def recall(out: Path) -> Invocation:
     """Return the invocation a run folder was made by."""
     try:
-        said = json.loads((out / FILE).read_text(encoding="utf-8"))
-        known = {name: value for name, value in said.items() if name not in (*KEYS, FINISHED)}
+        said = _read(out)
+        known = {name: value for name, value in said.items() if name not in NO_ARGUMENTS}
         return Invocation(**{**known, "changes": tuple(said["changes"])})
     except (FileNotFoundError, NotADirectoryError):
         hint = f"a run folder is what `mocapflow run` writes; it holds {FILE}"
@@ -137,8 +140,7 @@ def recalled_keys(out: Path, kind: str = "keys") -> dict[str, str] | None:
         kind: "keys", or "contents": those of pipeline and recording alone, whatever the code.
     """
     try:
-        keys = json.loads((out / FILE).read_text(encoding="utf-8"))[kind]
-        return dict(keys)
+        return dict(_read(out)[kind])
     except FileNotFoundError:
         return None
     except (OSError, ValueError, LookupError, TypeError):

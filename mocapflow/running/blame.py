@@ -48,7 +48,7 @@ def blaming(component: Component, registry: Registry, kept: Callable[[], str], l
             raise KeyboardInterrupt from None
         if isinstance(error, MocapflowError) and not isinstance(error, ShapeError | PluginError):
             if not isinstance(error, StoreError):
-                error.where = error.where or _met(error, component, registry)
+                error.where = error.where or _named(_culprit(error, registry) or component)
             raise
         if isinstance(error, OSError) and _nobodys(error, log.parent) and (said := unwritable(error)):
             raise said from error
@@ -63,17 +63,11 @@ def _nobodys(error: OSError, out: Path) -> bool:
 
 def _failure(error: BaseException, stage: Component, registry: Registry, saved: str, log: Path) -> ComponentFailed:
     """Return the error for people: the innermost frame of the traceback in a plugin names the culprit."""
-    calls = list(_calls(error.__traceback__))
-    component = error.component if isinstance(error, WrongAnswer) else _culprit(calls, registry) or stage
+    component = error.component if isinstance(error, WrongAnswer) else _culprit(error, registry) or stage
     moment = f" at {when}" if (when := moment_of(error)) else ""
-    message = f"{_named(component)} ({registry.origin(type(component))}) failed{moment}: {_said(error)}"
-    hints = [saved, _keep(error, log)]
+    message = f"{_named(component)} ({registry.origin(type(component))}) failed{moment}: {_reason(error)}"
+    hints = [saved, _write_traceback(error, log)]
     return ComponentFailed(message, hint="\n".join(filter(None, hints)))
-
-
-def _met(error: BaseException, stage: Component, registry: Registry) -> str:
-    """Return the component in which an error was raised, for people."""
-    return _named(_culprit(list(_calls(error.__traceback__)), registry) or stage)
 
 
 def _named(component: Component) -> str:
@@ -86,8 +80,9 @@ def _calls(trace: TracebackType | None) -> Iterator[FrameType]:
         trace = trace.tb_next
 
 
-def _culprit(calls: list[FrameType], registry: Registry) -> Component | None:
+def _culprit(error: BaseException, registry: Registry) -> Component | None:
     """Return the component nearest to the innermost call in plugin code."""
+    calls = list(_calls(error.__traceback__))
     return next((call.f_locals["self"] for call in reversed(calls) if _is_known(call, registry)), None)
 
 
@@ -102,7 +97,7 @@ def _is_known(call: FrameType, registry: Registry) -> bool:
     return True
 
 
-def _said(error: BaseException) -> str:
+def _reason(error: BaseException) -> str:
     if isinstance(error, ValidationError) and (first := error.errors()[0])["type"] == "frozen_instance":
         return f"it sets '{first['loc'][0]}', but a component is frozen and keeps nothing between calls"
     if isinstance(error, WrongAnswer):
@@ -111,7 +106,8 @@ def _said(error: BaseException) -> str:
     return f"{type(error).__name__}: {text[0]}" if text else type(error).__name__
 
 
-def _keep(error: BaseException, log: Path) -> str:
+def _write_traceback(error: BaseException, log: Path) -> str:
+    """Write the traceback and return where it is, for people; "" where it can't be written."""
     try:
         log.parent.mkdir(parents=True, exist_ok=True)
         log.write_text("".join(traceback.format_exception(error)), encoding="utf-8")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
@@ -127,7 +127,7 @@ class Execution:
         """Return what is left of a result that can't be read: of a track its frames, to write its arrays from again."""
         if not step.chain:
             return self._set_aside(step, made.path, error)
-        self._report(f"warning: {made.path.name} is damaged and written anew from its frames: {error.message}")
+        self._warn([f"{made.path.name} is damaged and written anew from its frames: {error.message}"])
         kept = {name: value for name, value in made.attributes.items() if name != "sealed"}
         return Artifact(made.path, {**kept, "complete": False})
 
@@ -206,8 +206,7 @@ class Execution:
             sewn = self._sewn(self._pipeline.garment, body) if self._pipeline.garment else None
             cameras = self._result(step.rig).cameras if step.rig else step.recording.cameras
             scene = self._scenes[place] = Scene(cameras=cameras, body=body, garment=sewn)
-            for warning in scene.warnings:
-                self._report(f"warning: {warning}")
+            self._warn(scene.warnings)
         return self._scenes[place]
 
     def _body(self) -> Body:
@@ -232,8 +231,7 @@ class Execution:
             return
         self._report(f"{step.label}: from the store")
         mixed = self._warned_of_versions(step, found)
-        for warning in found.warnings:
-            self._report(f"warning: {warning}")
+        self._warn(found.warnings)
         self._enter(step, Made(None, [*found.warnings, *mixed], 0.0, 0.0), cached=True)
 
     def _enter_made(self, step: Step, made: Made) -> Any:
@@ -267,8 +265,7 @@ class Execution:
             if own or not step.chain:
                 what = f"frames {own[0]}–{own[-1]} of {step.label}" if step.chain else step.label
                 said.append(f"{what} were made with {how}")
-        for warning in said:
-            self._report(f"warning: {warning}")
+        self._warn(said)
         return said
 
     def _set_aside(self, step: Step, path: Path, error: Corrupted) -> Artifact | None:
@@ -276,5 +273,9 @@ class Execution:
         kept = self._store.set_aside(path).relative_to(path.parent)
         copy = self._store.find(step.key)
         what = "made anew" if copy is None else "replaced by its copy"
-        self._report(f"warning: {path.name} is damaged and {what}: {error.message} (kept as {kept})")
+        self._warn([f"{path.name} is damaged and {what}: {error.message} (kept as {kept})"])
         return copy
+
+    def _warn(self, warnings: Iterable[str]) -> None:
+        for warning in warnings:
+            self._report(f"warning: {warning}")

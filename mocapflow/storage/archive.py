@@ -7,7 +7,7 @@ mappings of those. Two exceptions: lists come back as tuples, and text as paths 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -56,20 +56,7 @@ def load_record(group: zarr.Group, rows: int | None = None) -> Any:
     """
     try:
         cls = _record_class(str(group.attrs["record"]))
-        attributes: Any = group.attrs.asdict()
-        plain = dict(attributes[PLAIN])
-        values: dict[str, Any] = {}
-        for field in fields(cls):
-            if field.name in plain:
-                values[field.name] = _untyped(plain[field.name], str(field.type))
-            elif field.name not in group:
-                continue  # its default holds; without one it is missed
-            elif field.name in array_fields(cls):
-                declared = array_fields(cls)[field.name]
-                read = _series if declared.wide else _array
-                values[field.name] = read(group, field.name, rows if declared.axes[:1] == ("T",) else None)
-            else:
-                values[field.name] = _load_nested(group[field.name])
+        values = dict(_field_values(group, cls, rows))
         if rows is not None and "notes" in values:
             values["notes"] = notes_of(values["frame"], values["notes"])
         return cls(**values)
@@ -77,6 +64,19 @@ def load_record(group: zarr.Group, rows: int | None = None) -> Any:
         raise
     except Exception as error:  # zarr, json, zstd and the record's own check each raise their own kind
         raise Corrupted(f"{group.path or group.store} can't be read back: {type(error).__name__}: {error}") from error
+
+
+def _field_values(group: zarr.Group, cls: type, rows: int | None) -> Iterator[tuple[str, Any]]:
+    """Yield name and value of the fields that a group has: of others the default holds, or they are missed."""
+    plain: Any = group.attrs[PLAIN]
+    for field in fields(cls):
+        if field.name in plain:
+            yield field.name, _untyped(plain[field.name], str(field.type))
+        elif field.name in group and (declared := array_fields(cls).get(field.name)):
+            read = _series if declared.wide else _array
+            yield field.name, read(group, field.name, rows if declared.axes[:1] == ("T",) else None)
+        elif field.name in group:
+            yield field.name, _load_nested(group[field.name])
 
 
 def save_array(group: zarr.Group, name: str, values: Any, axes: list[str], unit: str) -> None:

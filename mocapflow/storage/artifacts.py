@@ -66,13 +66,10 @@ def open_artifact(path: Path) -> Artifact | None:
         attributes = read_json(path / "zarr.json").get("attributes")
     except StoreError:
         return None
-    if not isinstance(attributes, dict) or "key" not in attributes or not _counts(attributes.get("frames_done", 0)):
+    if not isinstance(attributes, dict) or "key" not in attributes:
         return None
-    return Artifact(path, attributes)
-
-
-def _counts(done: Any) -> bool:
-    return type(done) is int and done >= 0  # true is no number of frames
+    done = attributes.get("frames_done", 0)
+    return Artifact(path, attributes) if type(done) is int and done >= 0 else None  # true is no number of frames
 
 
 @cache

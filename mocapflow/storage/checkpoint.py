@@ -137,22 +137,13 @@ class Checkpoint:
         """
         check()  # whether somebody wants to stop
         state, row = result.state, self.done
-        appearance = _plain(state.segmentation.appearance or past.appearance)
+        appearance = _copies(state.segmentation.appearance or past.appearance)
         if self._lock is not None:
             self._lock.check()
         self._store.digests.check_inputs()
         with writing(self._store.path, self.kept):
-            if not row:
-                self._lay_out(frame, result)
-            numbers = packing.row_of(self._columns, frame, result, self._attributes["step_names"])
-            self._growing.write_numbers(row, numbers)
-            if len(state.cloth.vertices):
-                self._growing.write_cloth(row, state.cloth.vertices)
-            self._growing.write_seen(row, state.segmentation.silhouettes, state.matches)
+            numbers = self._write_row(row, frame, result)
             self._growing.write_appearance(row, appearance)
-            if self._turns is not None:
-                self._growing.write_trace(row, self._turns, self._cap, len(state.estimate.pose.angles))
-                self._turns.clear()
             news = {
                 "notes": self._notes(frame.index, result.notes), "warnings": self.warnings,
                 "appearance": [[name, list(values.shape)] for name, values in appearance.items()],
@@ -162,6 +153,21 @@ class Checkpoint:
         self._attributes |= news
         self._frame_done(frame.index, result)
         return past.after(self._moment(numbers, _copy(state.cloth.vertices)), appearance)
+
+    def _write_row(self, row: int, frame: Frame, result: FrameResult) -> F64:
+        """Write a frame, all but its appearance, and return its numbers."""
+        state = result.state
+        if not row:
+            self._lay_out(frame, result)
+        numbers = packing.row_of(self._columns, frame, result, self._attributes["step_names"])
+        self._growing.write_numbers(row, numbers)
+        if len(state.cloth.vertices):
+            self._growing.write_cloth(row, state.cloth.vertices)
+        self._growing.write_seen(row, state.segmentation.silhouettes, state.matches)
+        if self._turns is not None:
+            self._growing.write_trace(row, self._turns, self._cap, len(state.estimate.pose.angles))
+            self._turns.clear()
+        return numbers
 
     def track(self) -> Track:
         """Return the frames so far, sealed as named arrays.
@@ -221,5 +227,5 @@ def _copy(values: npt.NDArray[Any]) -> F64:
     return np.array(values, np.float64, order="C")
 
 
-def _plain(appearance: Mapping[str, F64]) -> dict[str, F64]:
+def _copies(appearance: Mapping[str, F64]) -> dict[str, F64]:
     return {name: _copy(values) for name, values in appearance.items()}

@@ -72,21 +72,26 @@ def acquire(path: Path, name: str, report: Callable[[str], None]) -> Lock:
     while True:
         with _guard(path.parent):
             holder = _holder(path)
-            stale = holder is not None and _stale(path, holder)
-            if holder is None or stale:
-                if stale:
-                    report(f"{name}: taking over from {who(holder)}, which ended without finishing")
-                    path.unlink(missing_ok=True)
-                try:
-                    path.write_text(said)
-                except OSError:  # the drive is full: nobody holds it
-                    path.unlink(missing_ok=True)
-                    raise
-                return Lock(path, said, name)
+            if holder is None:
+                return _taken(path, said, name)
+            if _stale(path, holder):
+                report(f"{name}: taking over from {who(holder)}, which ended without finishing")
+                path.unlink(missing_ok=True)
+                return _taken(path, said, name)
         if not told:
             report(f"{name}: waiting for {who(holder)}, which is making it")
             told = True
         time.sleep(POLL)
+
+
+def _taken(path: Path, said: str, name: str) -> Lock:
+    """Return a lock that nobody holds, taken."""
+    try:
+        path.write_text(said)
+    except OSError:  # the drive is full: nobody holds it
+        path.unlink(missing_ok=True)
+        raise
+    return Lock(path, said, name)
 
 
 @contextmanager

@@ -70,15 +70,12 @@ def _quantise(distance, steps):  # type: ignore[no-untyped-def]
             steps[row, column] = nearest + np.int32((value > 0) & (nearest < 1))  # without branches it vectorises
 
 
-def match_capacity(count: int) -> int:
-    """Return the width of the array that holds `count` matches: a power of two."""
-    return max(64, 1 << (count - 1).bit_length())
-
-
 def match_row(matches: Matches) -> F32:
-    """Return matches as float32 (capacity, 7), padded with zeros."""
-    packed = np.zeros((match_capacity(len(matches.weight)), len(MATCH)), np.float32)
-    used = packed[: len(matches.weight)]
+    """Return matches as float32 (capacity, 7), padded with zeros: the capacity is a power of two."""
+    count = len(matches.weight)
+    capacity = max(64, 1 << (count - 1).bit_length())
+    packed = np.zeros((capacity, len(MATCH)), np.float32)
+    used = packed[:count]
     used[:, 0], used[:, 5], used[:, 6] = matches.camera, matches.vertex, matches.weight
     used[:, 1:3], used[:, 3:5] = matches.pixel, matches.direction
     return packed
