@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from mocapflow.errors import GarmentError, MocapflowError, ShapeError, alternatives
-from mocapflow.records import F32, F64, I32, U8, Bool, array, arrays, record
+from mocapflow.records import F32, F64, I32, U8, Bool, array, arrays, record, stray
 
 
 @record
@@ -59,13 +59,13 @@ class Body:
         Raises:
             ShapeError: an index is not that of a vertex, joint or screw, or joints or screws are out of order.
         """
-        if (stray := _stray(self.faces, len(self.vertices), 0)) is not None:
-            raise ShapeError(f"Body: a face names vertex {stray} of {len(self.vertices)}")
+        if (odd := stray(self.faces, len(self.vertices))) is not None:
+            raise ShapeError(f"Body: a face names vertex {odd} of {len(self.vertices)}")
         count = len(self.parents)
         skin, screws, parents = (self.skin_joint, 0), (self.screw_joint, 0), (self.parents, -1)
         for what, (index, least) in {"the skin": skin, "a screw": screws, "a parent": parents}.items():
-            if (stray := _stray(index, count, least)) is not None:
-                raise ShapeError(f"Body: {what} names joint {stray} of {count}")
+            if (odd := stray(index, count, least)) is not None:
+                raise ShapeError(f"Body: {what} names joint {odd} of {count}")
         if (self.parents >= np.arange(count)).any() or (np.diff(self.screw_joint) < 0).any():
             raise ShapeError("Body: parents have to stand before their children, and screws in the order of the joints")
         start, stop = self.morph_range
@@ -115,8 +115,8 @@ class GarmentMesh:
         count = len(self.vertices)
         face, strand, ring, pin = (self.faces, 0), (self.strands, -1), (self.rings, 0), (self.pinned, 0)
         for what, (index, least) in {"face": face, "strand": strand, "ring": ring, "pin": pin}.items():
-            if (stray := _stray(index, count, least)) is not None:
-                raise GarmentError(f"{self.name}: a {what} names vertex {stray} of {count}")
+            if (odd := stray(index, count, least)) is not None:
+                raise GarmentError(f"{self.name}: a {what} names vertex {odd} of {count}")
         if not np.isfinite(self.vertices).all():
             first = int(np.argwhere(~np.isfinite(self.vertices))[0, 0])
             raise GarmentError(f"{self.name}: vertex {first} is not finite", hint="check the tape measures")
@@ -147,9 +147,3 @@ class Background:
     def pictures(self) -> tuple[U8, ...]:
         """What a view shows without the person: (H, W, 3) each."""
         return tuple(np.clip(np.rint(mean), 0, 255).astype(np.uint8) for mean in self.mean)
-
-
-def _stray(index: I32, count: int, least: int) -> int | None:
-    """Return an index that is not in least ... count - 1, None where all are."""
-    low, high = int(index.min(initial=least)), int(index.max(initial=-1))
-    return low if low < least else high if high >= count else None

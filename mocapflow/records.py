@@ -132,6 +132,12 @@ def joined_rows(parts: Sequence[Record]) -> Record:
     return _each(parts[0], lambda name: np.concatenate([getattr(part, name) for part in parts]))
 
 
+def stray(index: npt.NDArray[np.signedinteger[Any]], count: int, least: int = 0) -> int | None:
+    """Return an index that is not in least ... count - 1, None where all are."""
+    low, high = int(index.min(initial=least)), int(index.max(initial=-1))
+    return low if low < least else high if high >= count else None
+
+
 def _each(rows: Record, make: Callable[[str], npt.NDArray[Any]]) -> Record:
     changed: dict[str, Any] = {name: make(name) for name in array_fields(type(rows))}  # type: ignore[arg-type]
     return dataclasses.replace(rows, **changed)  # type: ignore[type-var]  # records are dataclasses

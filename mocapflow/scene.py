@@ -9,7 +9,7 @@ import numpy as np
 
 from mocapflow.assets import Background, Body, Camera, GarmentMesh
 from mocapflow.data import BODY, CLOTH, Cloth, Pose, Surface
-from mocapflow.geometry import kinematics, meshes, simplify
+from mocapflow.geometry import kinematics, meshes, sewing, simplify
 from mocapflow.geometry.angles import unmeasured
 from mocapflow.memo import memoised
 from mocapflow.records import F64, I32, U8, Bool, record
@@ -44,10 +44,8 @@ class Scene:
             return self
         body, garment = simplify.simplified(self.body, faces), self.garment
         if garment is not None:
-            from scipy.spatial import cKDTree
-
-            nearest = cKDTree(body.vertices).query(self.body.vertices[garment.pinned_to])[1]
-            garment = replace(garment, pinned_to=np.asarray(nearest, np.int32))
+            pinned_to = sewing.nearest_skin(body, self.body.vertices[garment.pinned_to])
+            garment = replace(garment, pinned_to=pinned_to)
         return replace(self, body=body, garment=garment)
 
     @cached_property

@@ -9,7 +9,7 @@ import numpy as np
 from mocapflow.assets import Body, GarmentMesh
 from mocapflow.data import Past, Pose, PoseBatch
 from mocapflow.dressing.roles import BodyModel, Draper, Garment
-from mocapflow.records import F64, I32
+from mocapflow.records import F64, I32, stray
 from mocapflow.scene import Scene
 from mocapflow.wrong_answer import UNIT, WrongAnswer, array_of, of_kind
 
@@ -44,9 +44,8 @@ def mesh_of(garment: Garment, body: Body) -> GarmentMesh:
         ("pinned to vertex", mesh.pinned_to, len(body.vertices)),
         ("carried by joint", mesh.carried_by, len(body.parents)),
     ):
-        odd = index[(index < 0) | (index >= count)]
-        if len(odd):
-            raise WrongAnswer(garment, f"cloth {what} {odd[0]}; the body has 0 to {count - 1}")
+        if (odd := stray(index, count)) is not None:
+            raise WrongAnswer(garment, f"cloth {what} {odd}; the body has 0 to {count - 1}")
     if not len(mesh.pinned):
         raise WrongAnswer(garment, "cloth that is pinned nowhere")
     away = np.linalg.norm(mesh.vertices[mesh.pinned] - body.vertices[mesh.pinned_to], axis=1).max()

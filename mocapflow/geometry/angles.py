@@ -42,18 +42,18 @@ class AngleSeries:
 
 def definitions(joint_names: tuple[str, ...]) -> tuple[Definition, ...]:
     """Return the angles that a skeleton with these joints has, in the order of the columns."""
-    return tuple(d for d in _all() if set(d.points) <= set(joint_names))
+    return tuple(d for d in _all_definitions() if set(d.points) <= set(joint_names))
 
 
 def unmeasured(joint_names: tuple[str, ...]) -> str:
     """Say which angles a skeleton with these joints lacks, and for want of which joints; "" where it has all."""
-    lost = [d for d in _all() if not set(d.points) <= set(joint_names)]
+    lost = [d for d in _all_definitions() if not set(d.points) <= set(joint_names)]
     joints = dict.fromkeys(point for d in lost for point in d.points if point not in joint_names)
     said = f"no angles {', '.join(d.name for d in lost)}: the skeleton has no joints named {', '.join(joints)}"
     return said if lost else ""
 
 
-def _all() -> list[Definition]:
+def _all_definitions() -> list[Definition]:
     return [
         Definition(f"{name}_{side}", tuple(f"{joint}_{side}" for joint in joints), offset)
         for name, joints, offset in (
@@ -83,9 +83,9 @@ def hip_flexion(thigh: F64, pelvis: F64) -> F64:
 def between_centres(places: Mapping[str, F64]) -> dict[str, F64]:
     """Return the three-point angles (T,) in degrees that joint centres (T, 3) by name allow."""
     return {
-        wish.name: three_point(np.stack([places[point] for point in wish.points], axis=1)) + wish.offset
-        for wish in definitions(tuple(places))
-        if len(wish.points) == 3
+        angle.name: three_point(np.stack([places[point] for point in angle.points], axis=1)) + angle.offset
+        for angle in definitions(tuple(places))
+        if len(angle.points) == 3
     }
 
 
@@ -114,14 +114,14 @@ def measure(
     sd, share = np.full_like(value, np.nan), np.full_like(value, np.nan)
     axes = anatomical_axes(body)
     below = kinematics.descendants(body.parents)[body.screw_joint]  # (D, J)
-    indices = [[body.joint(name) for name in wish.points] for wish in wanted]
+    indices = [[body.joint(name) for name in angle.points] for angle in wanted]
     for row in range(len(root)):
         joints, screws = kinematics.chain(body, Pose(root=root[row].copy(), angles=angles[row].copy()))
         places = kinematics.joint_positions(body, joints)
         moves = _velocities(places, screws, below)
-        for column, (wish, index) in enumerate(zip(wanted, indices, strict=True)):
+        for column, (angle, index) in enumerate(zip(wanted, indices, strict=True)):
             if len(index) == 3:
-                value[row, column] = three_point(places[index]) + wish.offset
+                value[row, column] = three_point(places[index]) + angle.offset
                 gradient = _three_point_gradient(places[index], moves[index])
             else:
                 pelvis = int(body.parents[index[0]])

@@ -9,6 +9,7 @@ import numpy as np
 from mocapflow.assets import Body
 from mocapflow.geometry.kinematics import part_of
 from mocapflow.geometry.libraries import load_open3d
+from mocapflow.geometry.sewing import nearest_skin
 from mocapflow.memo import memoised
 
 
@@ -18,11 +19,9 @@ def simplified(body: Body, faces: int) -> Body:
 
     It is made once and forgotten with the full one.
     """
-    from scipy.spatial import cKDTree
-
     o3d = load_open3d()
     points, triangles = o3d.utility.Vector3dVector(body.vertices.copy()), o3d.utility.Vector3iVector(body.faces.copy())
     mesh = o3d.geometry.TriangleMesh(points, triangles).simplify_quadric_decimation(faces)
     vertices = np.array(mesh.vertices, np.float64)
-    nearest = np.asarray(cKDTree(body.vertices).query(vertices)[1], np.int32)
-    return replace(part_of(body, nearest), vertices=vertices, faces=np.array(mesh.triangles, np.int32))
+    simpler = part_of(body, nearest_skin(body, vertices))
+    return replace(simpler, vertices=vertices, faces=np.array(mesh.triangles, np.int32))

@@ -9,14 +9,12 @@ import numpy as np
 
 from mocapflow.assets import Camera
 from mocapflow.data import Surface
-from mocapflow.geometry.silhouette_kernels import NEAREST
+from mocapflow.geometry.silhouette_kernels import NEAREST, index
 from mocapflow.geometry.silhouettes import projected
 from mocapflow.records import F64, I32
 
 CELL = 4.0  # px, about the size of a face: points are looked up by squares of this size
 BEHIND = 1 << 24  # cell of what is behind the camera
-
-index = numba.uint64  # of an array: unsigned, so that nothing is checked for counting from the end
 
 
 def front_vertices(surface: Surface, camera: Camera, points: F64) -> tuple[I32, F64]:

@@ -23,7 +23,7 @@ from mocapflow.data import (
     Surface,
     Turn,
 )
-from mocapflow.records import F64
+from mocapflow.records import F64, stray
 from mocapflow.scene import Scene
 from mocapflow.settings import Component
 from mocapflow.wrong_answer import UNIT, WrongAnswer, array_of, finite, of_kind
@@ -110,8 +110,7 @@ def matches_of(
         ("camera", found.camera, len(scene.cameras)),
         ("vertex", found.vertex, len(surface.vertices)),
     ):
-        if index.min() < 0 or index.max() >= count:
-            odd = index[(index < 0) | (index >= count)][0]
+        if (odd := stray(index, count)) is not None:
             raise WrongAnswer(matcher, f"a pair of {name} {odd}; there are 0 to {count - 1}")
     for name in ("pixel", "direction", "weight"):
         if not finite(getattr(found, name)):
