@@ -19,6 +19,11 @@ from mocapflow.io.video import Video
 
 CUT = 0.02  # share of the width or height that a video may lack against its calibration
 USUAL_RATE = 30.0  # frames per second, where nothing says it
+TURNED = (
+    "the video is turned by a quarter, perhaps by a mark in the file that players heed and other\n"
+    "programs do not: calibrate with pictures that are turned the same way"
+)
+RESIZED = "calibrate at the size of the video, or scale size and matrix of the calibration to it"
 SLOWEST, FASTEST = 1.0, 10_000.0  # frames per second; between, somebody who moves can be filmed
 
 
@@ -30,21 +35,12 @@ def fit_sizes(
     for camera, video in zip(cameras, videos, strict=True):
         size = np.array([video.width, video.height], np.int32)
         if camera.size.any() and (size != camera.size).any():
-            wanted = f"{camera.size[0]} x {camera.size[1]}"
+            sizes = f"the video is {size[0]} x {size[1]} px, the calibration {camera.size[0]} x {camera.size[1]}"
             if (size > camera.size).any() or (size < (1 - CUT) * camera.size).any():
-                turned = (size[::-1] == camera.size).all()
-                raise RecordingError(
-                    f"camera '{camera.name}': the video is {video.width} x {video.height} px, the calibration {wanted}",
-                    where=place(calibration, camera.name),
-                    hint="the video is turned by a quarter, perhaps by a mark in the file that players heed and other\n"
-                    "programs do not: calibrate with pictures that are turned the same way"
-                    if turned
-                    else "calibrate at the size of the video, or scale size and matrix of the calibration to it",
-                )
-            warnings.append(
-                f"{camera.name}: the video is {video.width} x {video.height} px, the calibration {wanted}: "
-                "taken as cut at the right and bottom"
-            )
+                hint = TURNED if (size[::-1] == camera.size).all() else RESIZED
+                where = place(calibration, camera.name)
+                raise RecordingError(f"camera '{camera.name}': {sizes}", where=where, hint=hint)
+            warnings.append(f"{camera.name}: {sizes}: taken as cut at the right and bottom")
         lenses.append(replace(camera, size=size))
     return tuple(lenses), warnings
 
@@ -57,12 +53,9 @@ def agree_on_length(cameras: Sequence[Camera], videos: Sequence[Video], folder: 
     broken = [video.frames < video.declared for video in videos]
     lengths = {v.declared if b else v.frames for v, b in zip(videos, broken, strict=True)}
     if len(lengths) > 1:
-        raise RecordingError(
-            "the videos differ in length",
-            where=str(folder / "videos"),
-            hint=", ".join(f"{c.name}: {v.frames} frames" for c, v in zip(cameras, videos, strict=True))
-            + "\ncut them to the same moments: frame i must be the same instant in every video",
-        )
+        counts = ", ".join(f"{c.name}: {v.frames} frames" for c, v in zip(cameras, videos, strict=True))
+        hint = f"{counts}\ncut them to the same moments: frame i must be the same instant in every video"
+        raise RecordingError("the videos differ in length", where=str(folder / "videos"), hint=hint)
     length = lengths.pop()
     return length, [
         f"{camera.name}: the video breaks off after frame {video.frames - 1} of {length}; it is not used from there on"
@@ -117,10 +110,7 @@ def common_rate(cameras: Sequence[Camera], videos: Sequence[Video], calibration:
     if not rates:
         return USUAL_RATE, [f"nothing says the frame rate: {USUAL_RATE:g} frames per second assumed; write {told}"]
     if max(rates.values()) > 1.01 * min(rates.values()):
-        raise RecordingError(
-            "the videos differ in frame rate",
-            where=str(videos[0].path.parent),
-            hint=", ".join(f"{name}: {rate:g} per second" for name, rate in rates.items())
-            + f"\nrecord all cameras at one rate, or write the true {told}",
-        )
+        each = ", ".join(f"{name}: {rate:g} per second" for name, rate in rates.items())
+        hint = f"{each}\nrecord all cameras at one rate, or write the true {told}"
+        raise RecordingError("the videos differ in frame rate", where=str(videos[0].path.parent), hint=hint)
     return Counter(rates.values()).most_common(1)[0][0], []

@@ -83,9 +83,8 @@ def _numbers(value: Any, shape: tuple[int, ...], field: str, name: str, where: P
     if found.size != int(np.prod(shape)):
         raise bad(name, where, f"has {found.size} numbers in {field}; expected {int(np.prod(shape))}")
     if not np.isfinite(found).all():
-        raise bad(
-            name, where, f"has NaN or infinity in {field}", "calibrate this camera again, or mend the file by hand"
-        )
+        hint = "calibrate this camera again, or mend the file by hand"
+        raise bad(name, where, f"has NaN or infinity in {field}", hint)
     return found.reshape(shape)
 
 

@@ -132,21 +132,13 @@ def _check(camera: Camera, path: Path) -> None:
         hint = "lens distortion is corrected without skew: calibrate with a skew of 0, as OpenCV always does"
         raise bad(camera.name, path, f"has a skew of {k[0, 1]:g} px", hint)
     if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-3 or np.linalg.det(rotation) < 0:
-        raise bad(
-            camera.name,
-            path,
-            "has a matrix that is not a rotation",
-            "its rows must be orthonormal, with determinant +1",
-        )
+        hint = "its rows must be orthonormal, with determinant +1"
+        raise bad(camera.name, path, "has a matrix that is not a rotation", hint)
     distance = float(np.linalg.norm(camera.camera_from_world[:3, 3]))
     if distance > FARTHEST:
         unit, factor = ("mm", 1000) if distance > MILLIMETRES else ("cm", 100)
-        raise bad(
-            camera.name,
-            path,
-            f"stands {distance:.0f} m from the origin: the calibration is in {unit}",
-            f"lengths are in metres: divide every translation by {factor}",
-        )
+        hint = f"lengths are in metres: divide every translation by {factor}"
+        raise bad(camera.name, path, f"stands {distance:.0f} m from the origin: the calibration is in {unit}", hint)
 
 
 def _table(camera: Camera) -> str:

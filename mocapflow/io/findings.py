@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Literal, TypeVar
 
 from mocapflow.errors import MocapflowError
@@ -34,6 +34,11 @@ def warning(message: str, hint: str = "", where: object = "") -> Finding:
 def note(message: str, hint: str = "", where: object = "") -> Finding:
     """Return a finding that is good to know."""
     return Finding(severity="note", message=message, hint=hint, where=str(where))
+
+
+def has_errors(findings: Iterable[Finding]) -> bool:
+    """True where a run can't start."""
+    return any(finding.severity == "error" for finding in findings)
 
 
 def attempt(action: Callable[[], Result], findings: list[Finding]) -> Result | None:

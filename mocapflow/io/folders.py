@@ -28,9 +28,8 @@ def video_paths(folder: Path) -> dict[str, Path]:
         name = path.name if path.is_dir() else path.stem
         if (other := paths.setdefault(name, path)) != path:
             hint = "which one is meant? move the other one out of videos/"
-            raise RecordingError(
-                f"two videos of {name}: {other.name}, {path.name}", where=str(folder / "videos"), hint=hint
-            )
+            what = f"two videos of {name}: {other.name}, {path.name}"
+            raise RecordingError(what, where=str(folder / "videos"), hint=hint)
     return paths
 
 
@@ -97,15 +96,15 @@ def match_videos(folder: Path, names: Sequence[str], calibration: Path) -> tuple
     return tuple(paths[name] for name in names)
 
 
-def keypoint_folder(place: Path, camera: str) -> Path | None:
-    """Return <camera>_json (or <camera>) of a folder of keypoints, None where it is missing."""
-    places = (place / f"{camera}{ending}" for ending in KEYPOINT_ENDINGS)
-    return next((place for place in places if place.is_dir()), None)
+def keypoint_folders(place: Path, cameras: Sequence[Camera]) -> tuple[Path | None, ...]:
+    """Return <camera>_json (or <camera>) of each camera in a folder of keypoints, None where it is missing."""
+    named = ([place / f"{camera.name}{ending}" for ending in KEYPOINT_ENDINGS] for camera in cameras)
+    return tuple(next(filter(Path.is_dir, paths), None) for paths in named)
 
 
 def keypoint_numbers(folder: Path, cameras: Sequence[Camera], length: int, image: int) -> list[str]:
     """Say which files are taken for the keypoints of frame 0, where its image has another number than 0."""
-    places = [keypoint_folder(folder / KEYPOINTS, camera.name) for camera in cameras]
+    places = keypoint_folders(folder / KEYPOINTS, cameras)
     numbers = zip(cameras, places, first_numbers(places, image, length), strict=True)
     found = [f"{number} of {camera.name}" for camera, place, number in numbers if image and place]
     return [f"the keypoints of frame 0 are numbered {', '.join(found)}"] if found else []
@@ -113,7 +112,7 @@ def keypoint_numbers(folder: Path, cameras: Sequence[Camera], length: int, image
 
 def keypoint_warnings(folder: Path, cameras: Sequence[Camera], length: int, image: int) -> list[str]:
     """Say what is odd about the keypoints of all cameras, for images from a number on; nothing where there are none."""
-    places = [keypoint_folder(folder / KEYPOINTS, camera.name) for camera in cameras]
+    places = keypoint_folders(folder / KEYPOINTS, cameras)
     unused = [path.name for path in _entries(folder / KEYPOINTS) if path.is_dir() and path not in places]
     names = f"folders are named after their cameras: {cameras[0].name}{KEYPOINT_ENDINGS[0]}"
     said = [f"not used from {KEYPOINTS}/: {', '.join(unused)}; {names}"] if unused else []

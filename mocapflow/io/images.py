@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.io.paths import for_opencv
 from mocapflow.records import U8
@@ -30,12 +31,12 @@ def numbered(folder: Path, suffixes: tuple[str, ...]) -> dict[int, Path]:
         if not digits or path.suffix.lower() not in suffixes or path.name.startswith("."):
             continue
         if (other := found.setdefault(int(digits[-1]), path)) != path:
-            raise RecordingError(
-                f"two files for frame {int(digits[-1])}: {other.name}, {path.name}",
-                where=str(folder),
-                hint="the last digits of a name are its frame, as in cam01_000012.png: rename the files, "
-                "or remove those that are too many",
+            hint = (
+                "the last digits of a name are its frame, as in cam01_000012.png: rename the files, "
+                "or remove those that are too many"
             )
+            message = f"two files for frame {int(digits[-1])}: {other.name}, {path.name}"
+            raise RecordingError(message, where=str(folder), hint=hint)
     return found
 
 
@@ -52,6 +53,22 @@ def read_image(path: Path) -> U8 | None:
     return None if image is None else np.asarray(image, np.uint8)
 
 
+def read_sized(path: Path, what: str, camera: Camera, *, unread: str, resized: str) -> U8:
+    """Return a picture (H, W, 3) BGR of the size of a camera's video; `what` it is called, and hints for people.
+
+    Raises:
+        RecordingError: it can't be read, or has another size.
+    """
+    image = read_image(path)
+    if image is None:
+        raise RecordingError(f"this {what} can't be read", where=str(path), hint=unread)
+    (height, width), size = image.shape[:2], camera.size.tolist()
+    if [width, height] != size:
+        message = f"this {what} is {width} x {height} px, the video {size[0]} x {size[1]}"
+        raise RecordingError(message, where=str(path), hint=resized)
+    return image
+
+
 def check_numbers(files: Mapping[int, Path], folder: Path) -> None:
     """Check that the images of a folder are numbered by frame and not by time.
 
@@ -60,11 +77,9 @@ def check_numbers(files: Mapping[int, Path], folder: Path) -> None:
     """
     last = max(files)
     if last > SPARSE * (len(files) + NAMED):  # else every missing frame would be named
-        raise RecordingError(
-            f"{len(files)} images, and {files[last].name} would be frame {last}",
-            where=str(folder),
-            hint="the last digits of a name are its frame, not its time or date: rename to 000000.png, 000001.png",
-        )
+        hint = "the last digits of a name are its frame, not its time or date: rename to 000000.png, 000001.png"
+        message = f"{len(files)} images, and {files[last].name} would be frame {last}"
+        raise RecordingError(message, where=str(folder), hint=hint)
 
 
 def check_depth(path: Path) -> None:
@@ -77,11 +92,9 @@ def check_depth(path: Path) -> None:
 
     image = cv2.imread(for_opencv(path), cv2.IMREAD_UNCHANGED)
     if image is not None and image.dtype == np.uint16 and 0 < image.max() < DARK:
-        raise RecordingError(
-            f"a picture of 16 bits a pixel that reaches {image.max()} of 65535: as 8 bits it is nearly black",
-            where=str(path),
-            hint="save it as 8 bits, or multiply its values so that they use all 16: 12 bits by 16, 10 bits by 64",
-        )
+        hint = "save it as 8 bits, or multiply its values so that they use all 16: 12 bits by 16, 10 bits by 64"
+        message = f"a picture of 16 bits a pixel that reaches {image.max()} of 65535: as 8 bits it is nearly black"
+        raise RecordingError(message, where=str(path), hint=hint)
 
 
 def name_frames(indices: Sequence[int]) -> str:

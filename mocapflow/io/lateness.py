@@ -32,9 +32,8 @@ def late_frames(folder: Path, names: Sequence[str]) -> tuple[int, ...]:
     except (ValueError, TypeError, KeyError, AttributeError, OverflowError) as error:
         raise RecordingError(f"does not say how late the cameras are: {error!r}", where=str(path), hint=FORM) from error
     if unknown := sorted(set(late) - set(names)):
-        raise RecordingError(
-            f"there is no camera '{unknown[0]}'", where=place(path, unknown[0]), hint=alternatives(unknown[0], names)
-        )
+        name, hint = unknown[0], alternatives(unknown[0], names)
+        raise RecordingError(f"there is no camera '{name}'", where=place(path, name), hint=hint)
     counts = [late.get(name, 0) for name in names]
     if min(counts) > 0 or max(counts) < 0:
         hint = f"cameras are late after others: take {min(counts, key=abs)} off each"

@@ -9,7 +9,7 @@ import numpy as np
 from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.io.folders import occluders
-from mocapflow.io.images import read_image
+from mocapflow.io.images import read_sized
 from mocapflow.records import Bool
 
 WHITE = 128  # grey level from which on a pixel is painted: editors soften edges
@@ -30,16 +30,8 @@ def occluder(folder: Path, lens: Camera) -> Bool | None:
     if not found:
         return None
     path = found[0]
-    image = read_image(path)
-    if image is None:
-        raise RecordingError("this picture of occluders can't be read", where=str(path), hint="save it again, as PNG")
-    width, height = (int(n) for n in lens.size)
-    if image.shape[:2] != (height, width):
-        raise RecordingError(
-            f"this picture of occluders is {image.shape[1]} x {image.shape[0]} px, the video {width} x {height}",
-            where=str(path),
-            hint="paint on a frame of the video, in its full size",
-        )
+    resized = "paint on a frame of the video, in its full size"
+    image = read_sized(path, "picture of occluders", lens, unread="save it again, as PNG", resized=resized)
     hidden: Bool = image.max(axis=2) >= WHITE
     if hidden.mean() > MOST:
         hint = "white is what stands before the person, black is what the camera sees: is it the other way round?"

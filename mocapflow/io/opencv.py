@@ -48,11 +48,8 @@ def _open(path: Path) -> Any:
     import cv2
 
     if not path.is_file():
-        raise RecordingError(
-            "no such calibration file",
-            where=str(path),
-            hint="EasyMocap calibrations are a pair: intri.yml and extri.yml",
-        )
+        hint = "EasyMocap calibrations are a pair: intri.yml and extri.yml"
+        raise RecordingError("no such calibration file", where=str(path), hint=hint)
     try:
         storage = cv2.FileStorage(for_opencv(path), cv2.FILE_STORAGE_READ)
     except (cv2.error, SystemError) as error:

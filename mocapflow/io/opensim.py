@@ -21,6 +21,7 @@ Knee and ankle are the turns about the segment's z axis: signed, so a hyperexten
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 
 import numpy as np
 
@@ -31,6 +32,7 @@ from mocapflow.io import markers
 from mocapflow.records import F64
 
 OPENSIM_FROM_WORLD = markers.opensim_from_world(np.eye(3)).T
+LEG, ARM = ("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist")
 BENT = np.radians(5.0)  # rad; an arm bent at least this much at rest shows the axis of its hinge
 
 
@@ -66,15 +68,12 @@ def rest_frames(body: Body) -> Mapping[str, F64]:
     upright = angles.anatomical_axes(body).T
     frames = dict.fromkeys(body.joint_names, upright)
     for side in ("l", "r"):
-        legs, arms = (
-            [f"{j}_{side}" for j in ("hip", "knee", "ankle")],
-            [f"{j}_{side}" for j in ("shoulder", "elbow", "wrist")],
-        )
-        for start, end in zip(legs, legs[1:], strict=False):
+        for start, end in pairwise(f"{joint}_{side}" for joint in LEG):
             if {start, end} <= set(body.joint_names):
                 frames[start] = _along(_way(body, end, start), upright[:, 2])
-        if set(arms) <= set(body.joint_names):
-            frames[arms[0]] = _along(_way(body, arms[1], arms[0]), _hinge(body, arms, upright))
+        arm = [f"{joint}_{side}" for joint in ARM]
+        if set(arm) <= set(body.joint_names):
+            frames[arm[0]] = _along(_way(body, arm[1], arm[0]), _hinge(body, arm, upright))
     return frames
 
 
@@ -93,19 +92,20 @@ def _add(found: dict[str, F64], names: tuple[str, ...], parent: F64, child: F64,
 
 def _add_leg(found: dict[str, F64], frames: Mapping[str, F64], pelvis: str, side: str) -> None:
     mirror = 1.0 if side == "r" else -1.0
-    hip, knee, ankle = f"hip_{side}", f"knee_{side}", f"ankle_{side}"
-    if hip in frames and knee in frames:
-        names = (f"hip_flexion_{side}", f"hip_adduction_{side}", f"hip_rotation_{side}")
-        _add(found, names, frames[pelvis], frames[hip], mirror)
-        if ankle in frames:
-            flexion = turns_about_z_x_y(np.swapaxes(frames[hip], -1, -2) @ frames[knee])[:, 0]
-            found[f"knee_angle_{side}"] = -np.degrees(np.unwrap(flexion))
-            dorsiflexion = turns_about_z_x_y(np.swapaxes(frames[knee], -1, -2) @ frames[ankle])[:, 0]
-            found[f"ankle_angle_{side}"] = np.degrees(np.unwrap(dorsiflexion))
+    hip, knee, ankle = (f"{joint}_{side}" for joint in LEG)
+    if not {hip, knee} <= set(frames):
+        return
+    names = (f"hip_flexion_{side}", f"hip_adduction_{side}", f"hip_rotation_{side}")
+    _add(found, names, frames[pelvis], frames[hip], mirror)
+    if ankle in frames:
+        flexion = turns_about_z_x_y(np.swapaxes(frames[hip], -1, -2) @ frames[knee])[:, 0]
+        found[f"knee_angle_{side}"] = -np.degrees(np.unwrap(flexion))
+        dorsiflexion = turns_about_z_x_y(np.swapaxes(frames[knee], -1, -2) @ frames[ankle])[:, 0]
+        found[f"ankle_angle_{side}"] = np.degrees(np.unwrap(dorsiflexion))
 
 
 def _add_arm(found: dict[str, F64], frames: Mapping[str, F64], body: Body, places: F64, side: str) -> None:
-    arm = [f"{joint}_{side}" for joint in ("shoulder", "elbow", "wrist")]
+    arm = [f"{joint}_{side}" for joint in ARM]
     if not set(arm) <= set(frames):
         return
     chest = body.joint_names[body.parents[body.joint(arm[0])]]

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 
 from mocapflow.assets import Background, Camera
 from mocapflow.data import Frame
 from mocapflow.errors import RecordingError
-from mocapflow.geometry.turned import as_seen, shift_px, turn_between
+from mocapflow.geometry.turned import Picture, as_seen, shift_px, turn_between
 from mocapflow.io.folders import plates
-from mocapflow.io.images import check_depth, read_image
+from mocapflow.io.images import check_depth, read_sized
 from mocapflow.io.lenses import View
 from mocapflow.records import F32, U8, Bool
-
-Picture = TypeVar("Picture", U8, F32)
 
 LEAST_SPREAD = 1.0  # grey levels; the rounding of 8-bit pictures alone makes 0.3
 USUAL_SPREAD = 4.0  # grey levels; where no frame can be compared with the plate
@@ -53,7 +50,8 @@ def background(folder: Path, views: Sequence[View], first: Callable[[], Frame]) 
     if not found:
         return None
     frame = first()
-    rows = [_one(files, view, frame, camera) for camera, (files, view) in enumerate(zip(found, views, strict=True))]
+    pairs = enumerate(zip(found, views, strict=True))
+    rows = [_statistics(files, view, frame, camera) for camera, (files, view) in pairs]
     mean, spread, turned = zip(*rows, strict=True)
     return Background(mean=mean, spread=spread, turned_px=turned)
 
@@ -67,15 +65,12 @@ def plate_files(folder: Path, views: Sequence[View]) -> list[tuple[Path, ...]]:
     found = [plates(folder, view.lens.name) for view in views]
     missing = [view.lens.name for view, files in zip(views, found, strict=True) if not files]
     if any(found) and missing:
-        raise RecordingError(
-            f"no clean plate of {', '.join(missing)}",
-            where=str(folder / "background"),
-            hint="give every camera its plate, or remove the folder",
-        )
+        hint = "give every camera its plate, or remove the folder"
+        raise RecordingError(f"no clean plate of {', '.join(missing)}", where=str(folder / "background"), hint=hint)
     return found if any(found) else []
 
 
-def _one(files: Sequence[Path], view: View, first: Frame, camera: int) -> tuple[F32, F32, float]:
+def _statistics(files: Sequence[Path], view: View, first: Frame, camera: int) -> tuple[F32, F32, float]:
     """Return mean and spread (H, W, 3) of a camera's plates, and how far (px) it has turned since they were taken."""
     pictures = np.stack([view.image(_read(path, view)) for path in files]).astype(np.float32)
     frame, shown = first.images[camera].astype(np.float32), _shown(first, camera)
@@ -175,16 +170,8 @@ def blocks(picture: Picture, side_px: int = BLOCK) -> Picture:
 
 
 def _read(path: Path, view: View) -> U8:
-    image = read_image(path)
-    if image is None:
-        hint = "copy it again; without the folder the empty room is found from the videos"
-        raise RecordingError("this clean plate can't be read", where=str(path), hint=hint)
+    unread = "copy it again; without the folder the empty room is found from the videos"
+    resized = "take it from the same camera at the same setting"
+    image = read_sized(path, "clean plate", view.lens, unread=unread, resized=resized)
     check_depth(path)
-    width, height = (int(n) for n in view.lens.size)
-    if image.shape[:2] != (height, width):
-        raise RecordingError(
-            f"this clean plate is {image.shape[1]} x {image.shape[0]} px, the video {width} x {height}",
-            where=str(path),
-            hint="take it from the same camera at the same setting",
-        )
     return image

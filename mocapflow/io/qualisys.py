@@ -69,7 +69,5 @@ def _number(node: ElementTree.Element, key: str, name: str, path: Path) -> float
     except KeyError:
         raise RecordingError(f"camera '{name}' lacks {key} in <{node.tag}>", where=str(path)) from None
     except ValueError:
-        wrong = node.attrib[key]
-        raise RecordingError(
-            f"camera '{name}' has {key}='{wrong}' in <{node.tag}>, not a number", where=str(path)
-        ) from None
+        wrong = f"camera '{name}' has {key}='{node.attrib[key]}' in <{node.tag}>, not a number"
+        raise RecordingError(wrong, where=str(path)) from None

@@ -37,10 +37,8 @@ def examine_rig(cameras: Sequence[Camera]) -> Iterator[Finding]:
     for (a, va), (b, vb) in combinations([(camera.name, camera.camera_from_world[2, :3]) for camera in cameras], 2):
         angle = np.degrees(np.arccos(np.clip(va @ vb, -1, 1)))
         if angle > OPPOSED:
-            yield note(
-                f"{a} and {b} face each other ({angle:.0f} degrees)",
-                "they see mirrored silhouettes and add little to each other; place them more than 15 degrees off",
-            )
+            hint = "they see mirrored silhouettes and add little to each other; place them more than 15 degrees off"
+            yield note(f"{a} and {b} face each other ({angle:.0f} degrees)", hint)
 
 
 def examine_view(cameras: Sequence[Camera], point: F64, what: str) -> Iterator[Finding]:
@@ -105,14 +103,12 @@ def _world_up(cameras: Sequence[Camera]) -> Iterator[Finding]:
     up = -np.mean([camera.camera_from_world[1, :3] for camera in cameras], axis=0)
     if np.linalg.norm(up) > UPRIGHT and int(np.argmax(np.abs(up))) != 2:
         axis = "xyz"[int(np.argmax(np.abs(up)))]
-        yield warning(
-            f"the images' up is the {axis} axis of the world", "the world has to be z up: turn the calibration"
-        )
+        hint = "the world has to be z up: turn the calibration"
+        yield warning(f"the images' up is the {axis} axis of the world", hint)
     elif np.linalg.norm(up) > UPRIGHT and up[2] < 0:
         yield warning("the images' up is down in the world", "z has to point up: turn the calibration, or the videos")
     heights = [centre(camera)[2] for camera in cameras]
     if max(heights) < 0:
-        yield warning(
-            f"every camera is below the floor (heights {min(heights):.1f} to {max(heights):.1f} m)",
-            "the floor is z = 0 and z points up",
-        )
+        low, high = min(heights), max(heights)
+        hint = "the floor is z = 0 and z points up"
+        yield warning(f"every camera is below the floor (heights {low:.1f} to {high:.1f} m)", hint)

@@ -15,6 +15,7 @@ from mocapflow.records import F64
 
 FORM = 'expected {"joints": [{"name": "pelvis", "parent": null, "position": [x, y, z] in m}, …]}, parents first'
 UNSCANNED = "without a scan: pipelines/unscanned.yaml fits a template to silhouettes, fit_subject one to keypoints"
+METRES = "expected metres, z up"
 TALLEST, SMALLEST = 3.0, 0.3  # m, extents of a plausible body
 SHORTEST = 0.01  # m, a bone between joints whose angle is measured, and the way from one hip to the other
 LIMBS = ("knee", "ankle", "elbow", "wrist")  # joints that end such a bone
@@ -30,10 +31,7 @@ def read_skeleton(path: Path) -> Skeleton:
             two joints of a limb are in one place, or left and right are exchanged.
     """
     if not path.is_file():
-        raise RecordingError(
-            "there is no skeleton for the mesh", where=str(path),
-            hint=f"{FORM}\n{UNSCANNED}",
-        )  # fmt: skip
+        raise RecordingError("there is no skeleton for the mesh", where=str(path), hint=f"{FORM}\n{UNSCANNED}")
     content = read_json(path, FORM)
     try:
         skeleton = _skeleton(content, path)
@@ -63,13 +61,9 @@ def check_size(vertices: F64, skeleton: Skeleton, where: str) -> None:
     size = ", ".join(f"{extent:.4g}" for extent in extents)
     if extents.max() > TALLEST:
         guess = "in millimetres: divide by 1000" if extents.max() > 300 else "not in metres"
-        raise RecordingError(
-            f"the mesh measures {size}: it seems to be {guess}", where=where, hint="expected metres, z up"
-        )
+        raise RecordingError(f"the mesh measures {size}: it seems to be {guess}", where=where, hint=METRES)
     if extents.max() < SMALLEST:
-        raise RecordingError(
-            f"the mesh measures {size} m: too small for a person", where=where, hint="expected metres, z up"
-        )
+        raise RecordingError(f"the mesh measures {size} m: too small for a person", where=where, hint=METRES)
     if extents.argmax() == 1 and extents[1] > 1.3 * extents[2]:
         hint = "expected z up: swap (x, y, z) to (x, -z, y)"
         raise RecordingError(f"the mesh measures {size} m: it seems to stand along y", where=where, hint=hint)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mocapflow.geometry.angles import unmeasured
-from mocapflow.io.findings import Finding, attempt, error, warning
+from mocapflow.io.findings import Finding, attempt, error, has_errors, warning
 from mocapflow.io.first_pose import FILE, odd_pose
 from mocapflow.io.meshes import check_winding, read_mesh
 from mocapflow.io.scans import check_size, read_skeleton
@@ -41,6 +41,6 @@ def _examine_scan(subject: Path, findings: list[Finding]) -> Sequence[str]:
         vertices, faces = mesh
         attempt(lambda: check_winding(faces, str(body)), findings)
         attempt(lambda: check_size(vertices, skeleton, str(body)), findings)
-        if skin.exists() and not any(found.severity == "error" for found in findings):  # they would seem wrong, too
+        if skin.exists() and not has_errors(findings):  # they would seem wrong, too
             attempt(lambda: read_weights(skin, skeleton, vertices), findings)
     return skeleton.names

@@ -176,11 +176,8 @@ def _open_folder(path: Path) -> Video:
     found = ((f, i) for f in files.values() if (i := read_image(f)) is not None)
     first, image = next(found, (path, None))
     if image is None:
-        raise RecordingError(
-            "no image in this folder can be read",
-            where=str(path),
-            hint="images are named by frame: 000000.png, 000001.png",
-        )
+        hint = "images are named by frame: 000000.png, 000001.png"
+        raise RecordingError("no image in this folder can be read", where=str(path), hint=hint)
     check_depth(first)
     check_numbers(files, path)
     height, width = image.shape[:2]

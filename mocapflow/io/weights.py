@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,15 @@ def read_weights(path: Path, skeleton: Skeleton, vertices: F64) -> F64:
     if not np.isfinite(weights).all() or (weights < 0).any() or (weights.sum(axis=1) == 0).any():
         what = "skin weights have to be numbers of at least 0, one of each vertex above"
         raise RecordingError(what, where=str(path), hint=WEIGHTS)
+    _check_names(names, skeleton, path)
+    ordered = np.zeros((len(vertices), len(skeleton.names)))
+    ordered[:, [skeleton.names.index(name) for name in names]] = weights
+    _check_places(vertices, ordered, skeleton, path)
+    return ordered
+
+
+def _check_names(names: Sequence[str], skeleton: Skeleton, path: Path) -> None:
+    """Check that each joint of the skeleton is named once, and no other."""
     for name, count in Counter(names).items():
         if count > 1:
             raise RecordingError(f"weights for '{name}' are there more than once", where=str(path), hint=WEIGHTS)
@@ -44,10 +54,6 @@ def read_weights(path: Path, skeleton: Skeleton, vertices: F64) -> F64:
     if missing := [name for name in skeleton.names if name not in names]:
         hint = "add them to `names` and `weights`; a joint that moves no skin has a column of zeros"
         raise RecordingError(f"no weights for {', '.join(missing)}", where=str(path), hint=hint)
-    ordered = np.zeros((len(vertices), len(skeleton.names)))
-    ordered[:, [skeleton.names.index(name) for name in names]] = weights
-    _check_places(vertices, ordered, skeleton, path)
-    return ordered
 
 
 def _check_places(vertices: F64, weights: F64, skeleton: Skeleton, path: Path) -> None:

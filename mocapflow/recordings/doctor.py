@@ -13,7 +13,7 @@ from mocapflow.dressing.roles import Garment
 from mocapflow.errors import MocapflowError, RecordingError, UnknownComponent
 from mocapflow.io import first_pose
 from mocapflow.io.cameras import find_calibration, read_cameras
-from mocapflow.io.findings import Finding, attempt, error, note, warning
+from mocapflow.io.findings import Finding, attempt, error, has_errors, note, warning
 from mocapflow.io.lateness import TIMING, late_frames, timing_text, write_late_frames
 from mocapflow.io.rigs import examine_size, examine_view
 from mocapflow.io.subjects import examine_subject
@@ -47,7 +47,7 @@ def examine(folder: Path) -> list[Finding]:
             ]
     findings += examine_subject(folder)
     findings += [] if calibration is None else _start(folder, calibration)
-    if not any(finding.severity == "error" for finding in findings):
+    if not has_errors(findings):
         findings += examine_first_frame(folder, registry)
         findings += _compared(folder, registry)
     findings += _garment(folder, registry)
@@ -134,9 +134,8 @@ def _sewn(garment: Garment, folder: Path, registry: Registry) -> list[Finding]:
             raise
         return [warning(f"on the template: {problem.message}", problem.hint, folder / measures.FILE)]
     except Exception as problem:  # a garment of somebody else's may raise anything
-        return [
-            error(f"{garment.name} can't be sewn: {type(problem).__name__}: {problem}", where=folder / measures.FILE)
-        ]
+        said = f"{garment.name} can't be sewn: {type(problem).__name__}: {problem}"
+        return [error(said, where=folder / measures.FILE)]
     mended = mesh.repairs if scanned else ()  # a template is not as wide as the person
     return [warning(f"{mesh.name}: {said}", where=folder / measures.FILE) for said in mended]
 

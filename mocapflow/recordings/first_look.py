@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from mocapflow.errors import MocapflowError
 from mocapflow.geometry.silhouettes import covered
 from mocapflow.io import first_pose
 from mocapflow.io.findings import Finding, warning
-from mocapflow.recordings.paired_views import away
+from mocapflow.recordings.paired_views import foreground
 from mocapflow.recordings.recording import Recording, open_recording
 from mocapflow.records import Bool
 from mocapflow.registry import Registry
@@ -31,29 +31,33 @@ def examine_first_frame(folder: Path, registry: Registry) -> Iterator[Finding]:
         return
     if plates is None:
         return
-    views = zip(frame.images, plates.mean, frame.usable, strict=True)
-    somebody = [away(image, room) if usable else None for image, room, usable in views]
     names = [view.lens.name for view in recording.views]
+    views = zip(names, frame.images, plates.mean, frame.usable, strict=True)
+    somebody = {name: foreground(image, room) for name, image, room, usable in views if usable}
     for name, shift in zip(names, plates.turned_px, strict=True):
         if shift:
             hint = "the plate is laid over the first frame; calibrate again, if that is older than the plate"
             yield warning(f"{name} has moved by {shift:.1f} px since its clean plate was taken", hint, folder)
-    foreign = [name for name, seen in zip(names, somebody, strict=True) if seen is not None and seen.mean() > FOREIGN]
+    foreign = [name for name, seen in somebody.items() if seen.mean() > FOREIGN]
     if foreign:
         hint = "was the camera moved, the light changed, or the file of another camera copied here?"
         yield warning(f"the first frame of {', '.join(foreign)} is not of the room in its clean plate", hint, folder)
     elif (bodies := _bodies(recording, registry)) is not None:
         if frame.hidden:
             bodies = [body & ~hidden for body, hidden in zip(bodies, frame.hidden, strict=True)]
-        triples = zip(names, bodies, somebody, strict=True)
-        shares = {name: seen[body].mean() for name, body, seen in triples if seen is not None and body.any()}
-        odd = [name for name, share in shares.items() if share < COVERED]
-        if len(odd) > len(shares) / 2:
-            hint = "is it the pose of frame 0, in metres, in the world of the calibration?"
-            yield warning("nobody stands where the first pose says", hint, folder / first_pose.FILE)
-        elif odd:
-            hint = "are calibration and video its own, or were two cameras exchanged? the other views agree"
-            yield warning(f"nobody stands where the first pose says in {', '.join(odd)}", hint, folder)
+        yield from _nobody_there(dict(zip(names, bodies, strict=True)), somebody, folder)
+
+
+def _nobody_there(bodies: Mapping[str, Bool], somebody: Mapping[str, Bool], folder: Path) -> Iterator[Finding]:
+    """Yield in which views, by the names of their cameras, nobody is where the body (H, W) at the first pose is."""
+    shares = {name: seen[bodies[name]].mean() for name, seen in somebody.items() if bodies[name].any()}
+    odd = [name for name, share in shares.items() if share < COVERED]
+    if len(odd) > len(shares) / 2:
+        hint = "is it the pose of frame 0, in metres, in the world of the calibration?"
+        yield warning("nobody stands where the first pose says", hint, folder / first_pose.FILE)
+    elif odd:
+        hint = "are calibration and video its own, or were two cameras exchanged? the other views agree"
+        yield warning(f"nobody stands where the first pose says in {', '.join(odd)}", hint, folder)
 
 
 def _bodies(recording: Recording, registry: Registry) -> list[Bool] | None:

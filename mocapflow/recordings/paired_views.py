@@ -84,13 +84,13 @@ def _outline(image: U8, room: F32) -> F64:
     """Return the border pixels (N, 2) of the largest part of an image that differs from the empty room."""
     import cv2
 
-    borders, _ = cv2.findContours(away(image, room).view(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    borders, _ = cv2.findContours(foreground(image, room).view(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     if not borders:
         return np.empty((0, 2))
     return np.asarray(max(borders, key=cv2.contourArea), np.float64).reshape(-1, 2)
 
 
-def away(image: U8, room: F32) -> Bool:
+def foreground(image: U8, room: F32) -> Bool:
     """Return where (H, W) an image differs from the empty room, without single pixels of noise."""
     import cv2
 

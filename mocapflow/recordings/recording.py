@@ -83,9 +83,8 @@ class Recording:
             RecordingError: the videos have no such frame.
         """
         if not 0 <= index < self.length:
-            raise RecordingError(
-                f"no frame {index}: the videos have frames 0 to {self.length - 1}", where=str(self.folder)
-            )
+            message = f"no frame {index}: the videos have frames 0 to {self.length - 1}"
+            raise RecordingError(message, where=str(self.folder))
         return next(self._read(range(index, index + 1)))
 
     def seen_by(self, camera: int) -> Recording:
@@ -181,7 +180,7 @@ def open_recording(
         folder=folder,
         views=tuple(View(lens=lens, scale=scale, occluder=occluder(folder, lens)) for lens in lenses),
         videos=videos,
-        keypoint_folders=tuple(folders.keypoint_folder(folder / folders.KEYPOINTS, c.name) for c in cameras),
+        keypoint_folders=folders.keypoint_folders(folder / folders.KEYPOINTS, cameras),
         calibration=calibration,
         frame_rate=rate,
         indices=_indices(start, stop, step, length, folder),
@@ -211,9 +210,6 @@ def _indices(start: int, stop: int | None, step: int, length: int, folder: Path)
     """Return the frames from start to stop; all of them have to be in the recording."""
     indices = range(start, length if stop is None else stop, step)
     if not indices or start < 0 or indices[-1] >= length:
-        raise RecordingError(
-            f"frames {start}:{'' if stop is None else stop} are not in this recording",
-            where=str(folder),
-            hint=f"it has {length} frames: 0:{length}",
-        )
+        message = f"frames {start}:{'' if stop is None else stop} are not in this recording"
+        raise RecordingError(message, where=str(folder), hint=f"it has {length} frames: 0:{length}")
     return indices

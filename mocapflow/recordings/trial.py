@@ -40,36 +40,65 @@ def examine_trial(folder: Path, calibration: Path, rig: bool = True) -> list[Fin
     if cameras is None:
         return findings
     late = attempt(lambda: late_frames(folder, [c.name for c in cameras]), findings)
-    paths = attempt(lambda: folders.match_videos(folder, [c.name for c in cameras], calibration), findings)
-    videos = None if paths is None else [attempt(partial(open_video, path), findings) for path in paths]
-    if videos is None or any(video is None for video in videos):
+    videos = _opened(folder, cameras, calibration, findings)
+    if videos is None:
         return findings + (list(examine_rig(cameras)) if rig and all(c.size.all() for c in cameras) else [])
-    whole = count_from_first([video for video in videos if video is not None])
-    fitted = attempt(lambda: agreement.fit_sizes(cameras, whole, calibration), findings)
-    agreed = attempt(lambda: agreement.agree_on_length(cameras, whole, folder), findings)
-    rate = attempt(lambda: agreement.common_rate(cameras, whole, calibration), findings)
-    findings += [warning(text, where=folder) for part in (fitted, agreed, rate) if part is not None for text in part[1]]
-    findings += [note(text, where=folder) for text in agreement.first_warnings(whole)]
-    lenses = cameras if fitted is None else fitted[0]
-    findings += examine_rig(lenses) if rig else []
-    length = min(video.frames for video in whole) if agreed is None else agreed[0]
-    findings += [*copies(cameras, whole), *_looked_through(cameras, whole, length)]
+    lenses, length = _agreed(folder, cameras, videos, calibration, findings)
+    findings += examine_rig(cameras if lenses is None else lenses) if rig else []
+    findings += [*copies(cameras, videos), *_looked_through(cameras, videos, length)]
     if late is not None:
-        delayed = [replace(video, late=frames) for video, frames in zip(whole, late, strict=True)]
+        delayed = [replace(video, late=frames) for video, frames in zip(videos, late, strict=True)]
         attempt(lambda: agreement.check_lateness(cameras, delayed, length, folder), findings)
-    odd = attempt(lambda: folders.keypoint_warnings(folder, cameras, length, whole[0].first), findings)
-    numbers = [] if odd is None else folders.keypoint_numbers(folder, cameras, length, whole[0].first)
-    findings += [note(text, where=folder) for text in numbers]
+    _examine_keypoints(folder, cameras, length, videos[0].first, findings)
     unused = attempt(lambda: folders.unused_pictures(folder, cameras), findings)
-    findings += [warning(text, where=folder) for text in (*(odd or ()), *(unused or ()))]
-    if fitted is not None and unused is not None:
-        views = [View(lens=lens, occluder=attempt(partial(occluder, folder, lens), findings)) for lens in lenses]
-        painted = [(view.lens.name, view.occluder.mean()) for view in views if view.occluder is not None]
-        findings += [
-            note(f"{name}: {share:.0%} of its pictures are behind occluders", where=folder) for name, share in painted
-        ]
-        attempt(lambda: background(folder, views, lambda: next(decoded(views, whole, range(1), 1.0))), findings)
+    if unused is not None:
+        findings += [warning(text, where=folder) for text in unused]
+        if lenses is not None:
+            _examine_pictures(folder, lenses, videos, findings)
     return findings
+
+
+def _opened(
+    folder: Path, cameras: Sequence[Camera], calibration: Path, findings: list[Finding]
+) -> tuple[Video, ...] | None:
+    """Return the video of each camera; None where one is missing or can't be opened."""
+    paths = attempt(lambda: folders.match_videos(folder, [c.name for c in cameras], calibration), findings)
+    tried = [attempt(partial(open_video, path), findings) for path in paths or ()]
+    videos = [video for video in tried if video is not None]
+    return count_from_first(videos) if len(videos) == len(cameras) else None
+
+
+def _agreed(
+    folder: Path, cameras: Sequence[Camera], videos: Sequence[Video], calibration: Path, findings: list[Finding]
+) -> tuple[Sequence[Camera] | None, int]:
+    """Return the cameras with the size of their videos, None where that is another, and how many frames all have."""
+    fitted = attempt(lambda: agreement.fit_sizes(cameras, videos, calibration), findings)
+    agreed = attempt(lambda: agreement.agree_on_length(cameras, videos, folder), findings)
+    rate = attempt(lambda: agreement.common_rate(cameras, videos, calibration), findings)
+    findings += [warning(text, where=folder) for part in (fitted, agreed, rate) if part is not None for text in part[1]]
+    findings += [note(text, where=folder) for text in agreement.first_warnings(videos)]
+    length = min(video.frames for video in videos) if agreed is None else agreed[0]
+    return None if fitted is None else fitted[0], length
+
+
+def _examine_keypoints(
+    folder: Path, cameras: Sequence[Camera], length: int, image: int, findings: list[Finding]
+) -> None:
+    """Add what is odd about keypoints, for images from a number on."""
+    odd = attempt(lambda: folders.keypoint_warnings(folder, cameras, length, image), findings)
+    if odd is not None:
+        findings += [warning(text, where=folder) for text in odd]
+        findings += [note(text, where=folder) for text in folders.keypoint_numbers(folder, cameras, length, image)]
+
+
+def _examine_pictures(folder: Path, lenses: Sequence[Camera], videos: Sequence[Video], findings: list[Finding]) -> None:
+    """Add what is odd about occluders and clean plates."""
+    views = [View(lens=lens, occluder=attempt(partial(occluder, folder, lens), findings)) for lens in lenses]
+    for view in views:
+        if view.occluder is not None:
+            share = f"{view.occluder.mean():.0%} of its pictures are behind occluders"
+            findings.append(note(f"{view.lens.name}: {share}", where=folder))
+    attempt(lambda: background(folder, views, lambda: next(decoded(views, videos, range(1), 1.0))), findings)
 
 
 def copies(cameras: Sequence[Camera], videos: Sequence[Video]) -> Iterator[Finding]:

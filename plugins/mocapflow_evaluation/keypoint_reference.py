@@ -31,7 +31,7 @@ def with_keypoints(recording: Recording, place: Path) -> Recording:
     Raises:
         RecordingError: there are none of two cameras.
     """
-    found = tuple(folders.keypoint_folder(place, camera.name) for camera in recording.cameras)
+    found = folders.keypoint_folders(place, recording.cameras)
     if len(found) - found.count(None) < 2:
         hint = f"expected {place.name}/{recording.cameras[0].name}_json/*.json as OpenPose writes them"
         raise RecordingError("there are no 2D keypoints of two cameras or more", where=str(place), hint=hint)
