@@ -98,7 +98,7 @@ def _plain(value: Any, where: str, registry: Registry, digests: Digests) -> Any:
 def _unnamed(value: Any) -> Any:
     """Return the part of a recipe that counts: digests without their names, for it does not matter where content lies.
 
-    Floats are text, as they were in all keys before recipes had them as numbers.
+    Floats are text: keys of results that are kept have them so.
     """
     if isinstance(value, float):
         return repr(value)

@@ -11,7 +11,7 @@ import typer
 
 from mocapflow.commands.invocation import Invocation, placed
 from mocapflow.commands.results import table
-from mocapflow.commands.running import Frames, execute
+from mocapflow.commands.running import Frames, Store, execute
 from mocapflow.commands.workers import Scheduler, Workers, finished
 from mocapflow.errors import MocapflowError, PipelineError
 
@@ -28,9 +28,7 @@ def compare(
     ] = None,
     frames: Frames = None,
     out: Annotated[Path | None, typer.Option(help="Where to write.", show_default="runs/NAME_OF_EXPERIMENT")] = None,
-    store: Annotated[
-        str | None, typer.Option(help="Cached results, or a URL to share them.", show_default="store.zarr beside it")
-    ] = None,
+    store: Store = None,
     workers: Workers = 1,
     scheduler: Scheduler = None,
 ) -> None:

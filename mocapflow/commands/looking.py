@@ -94,9 +94,8 @@ def equations(
 
     found = [row for row in table() if wanted.lower() in f"{row.number} {row.what} {row.function}".lower()]
     if not found:
-        raise MocapflowError(
-            f"no equation, title or function has '{wanted}' in it", hint="without a word all are listed"
-        )
+        message = f"no equation, title or function has '{wanted}' in it"
+        raise MocapflowError(message, hint="without a word all are listed")
     for row in found:
         typer.echo(f"{row.number:<12} {row.what:<50} {row.place()}")
 
@@ -107,15 +106,16 @@ def doctor(
     write: Annotated[bool, typer.Option("--write", help="Put what --sync finds into recording.json.")] = False,
 ) -> None:
     """Check a recording folder and say what to mend."""
+    from mocapflow.io.findings import has_errors
     from mocapflow.recordings.doctor import examine, examine_timing
 
     findings = examine(recording)
-    if (sync or write) and not any(finding.severity == "error" for finding in findings):
+    if (sync or write) and not has_errors(findings):
         findings += examine_timing(recording, write)
     for finding in findings:
         place = f"{finding.where}  " if finding.where else ""
         typer.echo("\n       ".join([f"{finding.severity}: {place}{finding.message}", *finding.hint.splitlines()]))
-    if any(finding.severity == "error" for finding in findings):
+    if has_errors(findings):
         raise typer.Exit(RecordingError.exit_status)
     typer.echo(f"{recording}: {'can be used' if findings else 'nothing to mend'}")
 

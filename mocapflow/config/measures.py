@@ -106,9 +106,8 @@ def _no_garment(file: Path) -> RecordingError:
         'write {"type": "skirt", ...} with tape measures in metres there, or name the garment in the pipeline;\n'
         "tight clothes need none: garment: null"
     )
-    return RecordingError(
-        "the pipeline takes the garment from the recording, which names none", where=str(file), hint=hint
-    )
+    message = "the pipeline takes the garment from the recording, which names none"
+    return RecordingError(message, where=str(file), hint=hint)
 
 
 def _wrong_measure(error: MocapflowError, recorded: RecordedGarment, by_file_alone: bool) -> MocapflowError:

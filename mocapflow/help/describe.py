@@ -59,7 +59,8 @@ def settings(cls: type[BaseModel], group: str = "") -> Iterator[Setting]:
         if inner is not field.annotation:
             unit = ENDING.search(name)
             meaning = field.description or meanings.get(name, "")
-            yield Setting(group + name, _type(field), _default(field), UNITS[unit[1]] if unit else "", meaning)
+            kind = _written(field.annotation) + _limits(field.metadata)
+            yield Setting(group + name, kind, _default(field), UNITS[unit[1]] if unit else "", meaning)
         if inner is not None:
             yield from settings(inner, f"{group}{name}.")
 
@@ -95,10 +96,6 @@ def _group(annotation: Any) -> type[BaseModel] | None:
     kinds = [kind for kind in (annotation, *get_args(annotation)) if isinstance(kind, type)]
     groups = [kind for kind in kinds if issubclass(kind, BaseModel) and not issubclass(kind, Component)]
     return groups[0] if groups else None
-
-
-def _type(field: FieldInfo) -> str:
-    return _written(field.annotation) + _limits(field.metadata)
 
 
 def _written(annotation: Any) -> str:

@@ -44,20 +44,8 @@ def write_plugin(name: str, role: str, folder: Path) -> list[Path]:
         PluginError: the name can't be one, nobody wrote templates for the role, the package, one of this role and name
             or the folder is there already, or the folder can't be written.
     """
-    from mocapflow.registry import load_registry
-
-    if role not in KINDS:
-        raise PluginError(f"there are no templates for a {role}", hint=alternatives(role, KINDS))
-    if not NAME.fullmatch(name):
-        hint = "lower-case letters, digits and single hyphens, a letter first: my-dress"
-        raise PluginError(f"'{name}' can't be the name of a package", hint=hint)
-    if find_spec(package := f"mocapflow_{name.replace('-', '_')}"):
-        raise PluginError(f"there is a package {package} already", hint="plugins of one name hide each other")
-    if (module := name.replace("-", "_")) in load_registry().provided(role):
-        hint = "no pipeline could name either of the two; choose another name"
-        raise PluginError(f"there is a {role} '{module}' already", hint=hint)
-    if folder.exists():
-        raise PluginError("there is something already", where=str(folder), hint="name another folder with --out")
+    module = name.replace("-", "_")
+    _check(name, module, role, folder)
     kind = KINDS[role]
     words = {
         "name": name,
@@ -77,6 +65,24 @@ def write_plugin(name: str, role: str, folder: Path) -> list[Path]:
         f"tests/test_{module}.py": "test.py.txt",
     }
     return [_write(folder / path, TEMPLATES / template, words) for path, template in files.items()]
+
+
+def _check(name: str, module: str, role: str, folder: Path) -> None:
+    """Raise if such a package can't be written, or could not be used."""
+    from mocapflow.registry import load_registry
+
+    if role not in KINDS:
+        raise PluginError(f"there are no templates for a {role}", hint=alternatives(role, KINDS))
+    if not NAME.fullmatch(name):
+        hint = "lower-case letters, digits and single hyphens, a letter first: my-dress"
+        raise PluginError(f"'{name}' can't be the name of a package", hint=hint)
+    if find_spec(package := f"mocapflow_{module}"):
+        raise PluginError(f"there is a package {package} already", hint="plugins of one name hide each other")
+    if module in load_registry().provided(role):
+        hint = "no pipeline could name either of the two; choose another name"
+        raise PluginError(f"there is a {role} '{module}' already", hint=hint)
+    if folder.exists():
+        raise PluginError("there is something already", where=str(folder), hint="name another folder with --out")
 
 
 def _write(path: Path, template: Path, words: Mapping[str, str]) -> Path:
