@@ -69,7 +69,7 @@ def prune(
     if days is not None and not days >= 0:  # so says nan, too
         raise typer.BadParameter("a number of days, 0 or more", param_hint="--days")
     kept, freed = _opened(store), list[int]()
-    chosen = [artifact.path for artifact in kept.artifacts() if everything or _goes(artifact, days, unfinished)]
+    chosen = [artifact.path for artifact in kept.artifacts() if everything or _is_chosen(artifact, days, unfinished)]
     for path in [*chosen, *kept.damaged(), *kept.aside()]:
         size = _size(path)
         if kept.busy(path.name.rpartition("-")[2]) if dry_run else not kept.drop(path):
@@ -80,7 +80,7 @@ def prune(
     typer.echo(f"{len(freed)} results, {sum(freed) / 1e6:.1f} MB")
 
 
-def _goes(artifact: Artifact, days: float | None, unfinished: bool) -> bool:
+def _is_chosen(artifact: Artifact, days: float | None, unfinished: bool) -> bool:
     if unfinished and not artifact.complete:
         return True
     if days is None:

@@ -92,11 +92,11 @@ def _links(part: str, value: Any, resolver: Resolver) -> Iterator[tuple[str, Pat
     """Yield where in a recording folder a part belongs, and where it is."""
     steps = (*AT, part)
     if part == "cameras":
-        yield from _calibration(_there(value, steps, resolver))
+        yield from _calibration(_existing(value, steps, resolver))
     elif part in FILES or LATER_START.fullmatch(part):
-        yield FILES.get(part, f"{part}.json"), _there(value, steps, resolver, folder=False)
+        yield FILES.get(part, f"{part}.json"), _existing(value, steps, resolver, folder=False)
     elif part == WHOLE:
-        yield part, _there(value, steps, resolver, folder=True)
+        yield part, _existing(value, steps, resolver, folder=True)
     elif part in FOLDERS:
         yield from _inside(part, value, steps, resolver)
     else:
@@ -107,14 +107,14 @@ def _links(part: str, value: Any, resolver: Resolver) -> Iterator[tuple[str, Pat
 def _inside(part: str, value: Any, steps: KeyPath, resolver: Resolver) -> Iterator[tuple[str, Path]]:
     """Yield a folder as a whole, or what it is to hold."""
     if not isinstance(value, dict):
-        path = _there(value, steps, resolver, folder=None if part in ALONE else True)
+        path = _existing(value, steps, resolver, folder=None if part in ALONE else True)
         yield (part, path) if path.is_dir() else _entry(part, ALONE[part], path)
         return
     for name, inner in value.items():
         if FOLDERS[part] and name not in FOLDERS[part]:
             hint = f"{alternatives(str(name), FOLDERS[part])}\nfor other files name the folder: {part}: DIR"
             raise resolver.located(PipelineError(f"no part of {part}", hint=hint), (*steps, name))
-        yield _entry(part, str(name), _there(inner, (*steps, name), resolver))
+        yield _entry(part, str(name), _existing(inner, (*steps, name), resolver))
 
 
 def _entry(part: str, name: str, path: Path) -> tuple[str, Path]:
@@ -129,7 +129,7 @@ def _calibration(path: Path) -> Iterator[tuple[str, Path]]:
         yield "cameras.toml" if path.suffix == ".toml" else "cameras.qca.txt", path
 
 
-def _there(value: Any, steps: KeyPath, resolver: Resolver, folder: bool | None = None) -> Path:
+def _existing(value: Any, steps: KeyPath, resolver: Resolver, folder: bool | None = None) -> Path:
     """Return a path that the file names, after a look; `folder` says what it has to be, None: either."""
     if not isinstance(value, str):
         raise resolver.located(PipelineError(f"a path is expected, not {value!r}"), steps)

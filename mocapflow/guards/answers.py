@@ -42,7 +42,7 @@ def pose_of(predictor: Predictor, frame: Frame, past: Past, scene: Scene) -> Pos
     Raises:
         WrongAnswer: it is no pose of the body.
     """
-    return _possible(predictor, of_kind(predictor, predictor.predict(frame, past, scene), Pose), scene)
+    return _checked_pose(predictor, of_kind(predictor, predictor.predict(frame, past, scene), Pose), scene)
 
 
 def estimate_of(
@@ -60,11 +60,11 @@ def estimate_of(
         WrongAnswer: its pose is none of the body, or what it says besides has another shape or is not finite.
     """
     found = of_kind(solver, solver.solve(match, state, model, priors, past, turn), Estimate)
-    return _sound(solver, found, state.estimate, model.scene)
+    return _checked_estimate(solver, found, state.estimate, model.scene)
 
 
-def _sound(component: Component, found: Estimate, before: Estimate, scene: Scene) -> Estimate:
-    _possible(component, found.pose, scene)
+def _checked_estimate(component: Component, found: Estimate, before: Estimate, scene: Scene) -> Estimate:
+    _checked_pose(component, found.pose, scene)
     array_of(component, found.parameters, before.parameters.shape, "parameters")
     array_of(component, found.observed, found.pose.angles.shape, "observed shares")
     size = max(len(found.covariance), 6 + len(found.pose.angles))  # unknowns of the cloth may follow
@@ -78,7 +78,7 @@ def _sound(component: Component, found: Estimate, before: Estimate, scene: Scene
     return found
 
 
-def _possible(component: Component, pose: Pose, scene: Scene) -> Pose:
+def _checked_pose(component: Component, pose: Pose, scene: Scene) -> Pose:
     if len(pose.angles) != len(scene.body.twists):
         raise WrongAnswer(component, f"{len(pose.angles)} joint angles; the body has {len(scene.body.twists)}")
     if not (finite(pose.root) and finite(pose.angles)):
@@ -206,7 +206,7 @@ def result_of(recovery: Recovery, found: Any, looped: FrameResult, scene: Scene)
     result = of_kind(recovery, found, FrameResult)
     if result is looped:
         return result
-    _sound(recovery, result.state.estimate, looped.state.estimate, scene)
+    _checked_estimate(recovery, result.state.estimate, looped.state.estimate, scene)
     cloth, before = result.state.cloth, looped.state.cloth
     array_of(recovery, cloth.vertices, before.vertices.shape, "cloth")
     array_of(recovery, cloth.parameters, before.parameters.shape, "cloth parameters")

@@ -45,14 +45,14 @@ def first_numbers(folders: Sequence[Path | None], image: int, length: int) -> li
     if not image:
         return [0] * len(folders)
     files = [[] if folder is None else list(numbered(folder, (".json",))) for folder in folders]
-    told = [_told(numbers, image, length) for numbers in files]
+    told = [_own_first_number(numbers, image, length) for numbers in files]
     known = {number for number in told if number is not None}
     ends = {max(numbers) for numbers, number in zip(files, told, strict=True) if numbers and number is None}
     others = known.pop() if len(known) == 1 else 0 if length - 1 in ends else image
     return [others if number is None else number for number in told]
 
 
-def _told(numbers: Sequence[int], image: int, length: int) -> int | None:
+def _own_first_number(numbers: Sequence[int], image: int, length: int) -> int | None:
     """Return what a camera's own numbers tell of frame 0's, None where they may count from either."""
     if not numbers or image <= min(numbers) <= max(numbers) < length:
         return None

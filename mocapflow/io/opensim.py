@@ -52,12 +52,12 @@ def coordinates(body: Body, root: F64, poses: F64) -> dict[str, F64]:
     }
     pelvis = "pelvis" if "pelvis" in body.joint_names else body.joint_names[0]
     found: dict[str, F64] = {}
-    _add(found, ("pelvis_tilt", "pelvis_list", "pelvis_rotation"), np.eye(3), frames[pelvis])
+    _add_turns(found, ("pelvis_tilt", "pelvis_list", "pelvis_rotation"), np.eye(3), frames[pelvis])
     found |= {f"pelvis_t{axis}": places[:, body.joint(pelvis), k] for k, axis in enumerate("xyz")}
     for side in ("r", "l"):
         _add_leg(found, frames, pelvis, side)
     if "chest" in frames and pelvis != "chest":
-        _add(found, ("lumbar_extension", "lumbar_bending", "lumbar_rotation"), frames[pelvis], frames["chest"])
+        _add_turns(found, ("lumbar_extension", "lumbar_bending", "lumbar_rotation"), frames[pelvis], frames["chest"])
     for side in ("r", "l"):
         _add_arm(found, frames, body, places, side)
     return found
@@ -70,10 +70,10 @@ def rest_frames(body: Body) -> Mapping[str, F64]:
     for side in ("l", "r"):
         for start, end in pairwise(f"{joint}_{side}" for joint in LEG):
             if {start, end} <= set(body.joint_names):
-                frames[start] = _along(_way(body, end, start), upright[:, 2])
+                frames[start] = _axes_along(_vector(body, end, start), upright[:, 2])
         arm = [f"{joint}_{side}" for joint in ARM]
         if set(arm) <= set(body.joint_names):
-            frames[arm[0]] = _along(_way(body, arm[1], arm[0]), _hinge(body, arm, upright))
+            frames[arm[0]] = _axes_along(_vector(body, arm[1], arm[0]), _hinge(body, arm, upright))
     return frames
 
 
@@ -84,7 +84,7 @@ def turns_about_z_x_y(rotation: F64) -> F64:
     return np.stack([flexion, tilt, np.arctan2(-rotation[..., 2, 0], rotation[..., 2, 2])], axis=-1)
 
 
-def _add(found: dict[str, F64], names: tuple[str, ...], parent: F64, child: F64, mirror: float = 1.0) -> None:
+def _add_turns(found: dict[str, F64], names: tuple[str, ...], parent: F64, child: F64, mirror: float = 1.0) -> None:
     turns = np.degrees(np.unwrap(turns_about_z_x_y(np.swapaxes(parent, -1, -2) @ child), axis=0))
     for name, sign, turn in zip(names, (1.0, mirror, mirror), turns.T, strict=True):
         found[name] = sign * turn
@@ -96,7 +96,7 @@ def _add_leg(found: dict[str, F64], frames: Mapping[str, F64], pelvis: str, side
     if not {hip, knee} <= set(frames):
         return
     names = (f"hip_flexion_{side}", f"hip_adduction_{side}", f"hip_rotation_{side}")
-    _add(found, names, frames[pelvis], frames[hip], mirror)
+    _add_turns(found, names, frames[pelvis], frames[hip], mirror)
     if ankle in frames:
         flexion = turns_about_z_x_y(np.swapaxes(frames[hip], -1, -2) @ frames[knee])[:, 0]
         found[f"knee_angle_{side}"] = -np.degrees(np.unwrap(flexion))
@@ -110,25 +110,25 @@ def _add_arm(found: dict[str, F64], frames: Mapping[str, F64], body: Body, place
         return
     chest = body.joint_names[body.parents[body.joint(arm[0])]]
     names = (f"arm_flex_{side}", f"arm_add_{side}", f"arm_rot_{side}")
-    _add(found, names, frames[chest], frames[arm[0]], 1.0 if side == "r" else -1.0)
+    _add_turns(found, names, frames[chest], frames[arm[0]], 1.0 if side == "r" else -1.0)
     found[f"elbow_flex_{side}"] = angles.three_point(places[:, [body.joint(name) for name in arm]])
 
 
-def _way(body: Body, start: str, end: str) -> F64:
+def _vector(body: Body, start: str, end: str) -> F64:
     way: F64 = body.positions[body.joint(end)] - body.positions[body.joint(start)]
     return way
 
 
 def _hinge(body: Body, arm: list[str], upright: F64) -> F64:
     """Return the axis about which an elbow bends, pointing right where the arm hangs."""
-    upper, lower = _way(body, arm[0], arm[1]), _way(body, arm[1], arm[2])
+    upper, lower = _vector(body, arm[0], arm[1]), _vector(body, arm[1], arm[2])
     hinge = np.cross(upper, lower)
     if np.linalg.norm(hinge) > np.sin(BENT) * np.linalg.norm(upper) * np.linalg.norm(lower):
         return hinge
     return np.cross(upright[:, 0], -upper)
 
 
-def _along(up: F64, right: F64) -> F64:
+def _axes_along(up: F64, right: F64) -> F64:
     """Return axes (3, 3) as columns with y along `up` and z as near to `right` as that allows."""
     y = up / np.linalg.norm(up)
     z = right - (right @ y) * y

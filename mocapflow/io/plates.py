@@ -111,7 +111,7 @@ def _compared(plate: F32, frame: F32, shown: Bool, path: Path) -> tuple[F32, F32
     if not shown[::THIN, ::THIN].any():
         return plate, usual
     matched, room, seen = toned(plate, frame, shown), blocks(plate), blocks(frame)
-    if _blank(room, seen):
+    if _is_blank(room, seen):
         return matched, usual
     _check_colours(room, seen, path)
     return matched, np.abs(frame - matched)[shown]
@@ -124,7 +124,7 @@ def toned(plate: F32, frame: F32, shown: Bool) -> F32:
     """
     thin = shown[::THIN, ::THIN]
     colours = (picture[::THIN, ::THIN][thin].T for picture in (plate, frame))
-    lines = [_line(here, there) for here, there in zip(*colours, strict=True)]
+    lines = [_gain_and_offset(here, there) for here, there in zip(*colours, strict=True)]
     if any(line is None for line in lines):
         return plate
     gain, offset = np.array(lines, np.float32).T
@@ -132,7 +132,7 @@ def toned(plate: F32, frame: F32, shown: Bool) -> F32:
     return matched
 
 
-def _line(here: F32, there: F32) -> tuple[float, float] | None:
+def _gain_and_offset(here: F32, there: F32) -> tuple[float, float] | None:
     """Return gain and offset that take the room's grey levels from one picture to another, None: it is not the room.
 
     They are fitted to the pixels that agree with them, again and again; what stands before the room does not.
@@ -148,7 +148,7 @@ def _line(here: F32, there: F32) -> tuple[float, float] | None:
     return (gain, offset) if 1 / MOST_GAIN < gain < MOST_GAIN and np.median(off) < SAME_ROOM else None
 
 
-def _blank(room: F32, seen: F32) -> bool:
+def _is_blank(room: F32, seen: F32) -> bool:
     """Return whether a frame is of one grey though the room, both in blocks, is not: many a camera begins so."""
     return bool(np.ptp(seen.mean(axis=2)) < GREY and np.ptp(room.mean(axis=2)) > COLOURED)
 

@@ -97,7 +97,7 @@ def read_stamps(path: Path) -> Stamps:
     """
     with open_stream(path) as stream:
         container: Any = stream.container
-        first, found = _found(stream)
+        first, found = _read_packets(stream)
         times = np.where(np.isnan(found.shown_at), found.decoded_at, found.shown_at)
         starts = find_starts(times, found.key)
         if container.format.name == "avi" and np.mean(np.diff(times) < 0) < FEW:
@@ -126,7 +126,7 @@ class Packets(NamedTuple):
     hidden: Bool
 
 
-def _found(stream: VideoStream) -> tuple[VideoFrame | None, Packets]:
+def _read_packets(stream: VideoStream) -> tuple[VideoFrame | None, Packets]:
     """Return the first picture that can be decoded, None if there is none, and what all packets say."""
     first: list[VideoFrame] = []
     rows: list[tuple[float | None, float | None, bool, bool]] = []

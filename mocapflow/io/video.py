@@ -106,12 +106,12 @@ def _file_pictures(video: Video, indices: range) -> Iterator[tuple[U8 | None, st
             while current < index:
                 current, frame, flaw = next(judged, NO_MORE)
             if frame is None or current > index:
-                yield None, _why(video, index)
+                yield None, _why_lost(video, index)
             else:
                 yield (None, flaw) if flaw else (picture(frame), "")
 
 
-def _why(video: Video, index: int) -> str:
+def _why_lost(video: Video, index: int) -> str:
     if index < 0:
         return "the video starts later"
     if index >= video.frames:

@@ -58,7 +58,7 @@ class Copies:
     def find(self, key: str) -> Copy | None:
         """Return the copy of the artifact made under a key that is furthest."""
         with self._reaching():
-            return max(self._of(key), key=_order, default=None)
+            return max(self._copies_of(key), key=_rank, default=None)
 
     def fetch(self, copy: Copy, path: Path) -> None:
         """Bring a copy to a folder that is not there yet; if that fails, a part of it may be there."""
@@ -81,16 +81,16 @@ class Copies:
             content = (path / META).read_bytes()
             self._files.pipe_file(f"{self._root}/{META}", json.dumps(group_meta({})).encode())
             self._files.pipe_file(f"{target}/{META}", content)
-            for other in sorted(self._of(json.loads(content)["attributes"]["key"]), key=_order)[:-1]:
+            for other in sorted(self._copies_of(json.loads(content)["attributes"]["key"]), key=_rank)[:-1]:
                 self._drop(other)
 
     def remove(self, key: str) -> None:
         """Remove all copies of an artifact, named by its key or the beginning of that."""
         with self._reaching():
-            for copy in self._of(key):
+            for copy in self._copies_of(key):
                 self._drop(copy)
 
-    def _of(self, key: str) -> list[Copy]:
+    def _copies_of(self, key: str) -> list[Copy]:
         self._files.invalidate_cache()
         if not self._files.isdir(self._root):
             return []
@@ -132,6 +132,6 @@ def _progress(attributes: Mapping[str, Any]) -> tuple[int, bool]:
     return int(attributes.get("frames_done", 0)), bool(attributes.get("complete", False))
 
 
-def _order(copy: Copy) -> tuple[tuple[int, bool], str]:
+def _rank(copy: Copy) -> tuple[tuple[int, bool], str]:
     """Return a key by which any two copies are told apart, so that of equal ones all runs keep the same."""
     return _progress(copy.attributes), copy.name

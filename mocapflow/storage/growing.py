@@ -55,7 +55,7 @@ class Growing:
 
     def write_numbers(self, row: int, numbers: F64) -> None:
         """Write all numbers of a frame."""
-        self._like(NUMBERS, numbers, np.nan, "number", unit="by column: `columns` of the track").write(row, numbers)
+        self._rows_for(NUMBERS, numbers, np.nan, "number", unit="by column: `columns` of the track").write(row, numbers)
 
     def cloth(self, row: int) -> F64:
         """Return the cloth vertices (W, 3) m of a frame."""
@@ -63,19 +63,19 @@ class Growing:
 
     def write_cloth(self, row: int, vertices: F64) -> None:
         """Write the cloth vertices (W, 3) m of a frame."""
-        self._like(CLOTH, vertices, np.nan, "W", "cloth_2", unit="m").write(row, vertices)
+        self._rows_for(CLOTH, vertices, np.nan, "W", "cloth_2", unit="m").write(row, vertices)
 
     def write_seen(self, row: int, silhouettes: Sequence[Silhouette], matches: Matches) -> None:
         """Write what was found in the images of a frame."""
         for silhouette in silhouettes:
             name = f"silhouettes/{silhouette.layer}/{self._cameras[silhouette.camera]}"
             steps = packing.quantised(silhouette)
-            seen = self._like(name, steps, packing.UNSEEN, "y", "x", unit=f"1/{packing.FINE} px")
+            seen = self._rows_for(name, steps, packing.UNSEEN, "y", "x", unit=f"1/{packing.FINE} px")
             seen.write(row, steps, durable=False)
         packed = packing.match_row(matches)
         name = f"matches/{len(packed)}"
         about = {"unit": "by column", "columns": packing.MATCH}
-        self._like(name, packed, 0, f"M{len(packed)}", "match", **about).write(row, packed, durable=False)
+        self._rows_for(name, packed, 0, f"M{len(packed)}", "match", **about).write(row, packed, durable=False)
 
     def appearance(self, row: int, shapes: Shapes) -> dict[str, F64]:
         """Return what frames have shown up to this one, one of the last two.
@@ -96,7 +96,7 @@ class Growing:
         if appearance:
             flat = np.concatenate([[self._indices[row]], *(values.ravel() for values in appearance.values())])
             name, unit = f"live/appearance-{len(flat)}", "frame index, then as the segmenter has it"
-            self._like(name, flat, np.nan, f"A{len(flat)}", unit=unit).write(row % 2, flat)
+            self._rows_for(name, flat, np.nan, f"A{len(flat)}", unit=unit).write(row % 2, flat)
 
     def write_trace(self, row: int, turns: Sequence[Pose], cap: int, angles: int) -> None:
         """Write the poses of a frame's turns, at most `cap`, with so many angles each."""
@@ -104,7 +104,7 @@ class Growing:
         for turn, pose in enumerate(turns):
             poses[turn] = np.concatenate([pose.root.ravel(), pose.angles])
         unit = "root (4, 4) in m, world_from_body, then angles in rad; NaN after the last turn"
-        self._like("trace", poses, np.nan, "turn", "root_and_angles", unit=unit).write(row, poses, durable=False)
+        self._rows_for("trace", poses, np.nan, "turn", "root_and_angles", unit=unit).write(row, poses, durable=False)
 
     def flush(self) -> None:
         """Wait until what was not flushed when it was written is on the drive."""
@@ -118,7 +118,7 @@ class Growing:
             self._arrays[name].resize(max(len(self._indices), self._arrays[name].shape[0]))
         return self._arrays[name]
 
-    def _like(self, name: str, row: npt.NDArray[Any], fill: float, *axes: str, **attributes: Any) -> Rows:
+    def _rows_for(self, name: str, row: npt.NDArray[Any], fill: float, *axes: str, **attributes: Any) -> Rows:
         """Return the array that holds rows like this one, made on first use."""
         if name not in self._arrays and not (self._path / name / "zarr.json").exists():
             for parent in reversed(Path(name).parents[:-1]):
