@@ -37,10 +37,8 @@ class ClothedModel:
         """Return the garment's vertices (B, W, 3) laid on one pose with parameters (B, Q)."""
         if self.draper is None or self.scene.garment is None:
             return np.empty((len(parameters), 0, 3))
-        count = len(parameters)
-        poses = PoseBatch(
-            root=np.repeat(pose.root[None], count, axis=0), angles=np.repeat(pose.angles[None], count, axis=0)
-        )
+        root, angles = (np.repeat(part[None], len(parameters), axis=0) for part in (pose.root, pose.angles))
+        poses = PoseBatch(root=root, angles=angles)
         return drape_of(self.draper, poses, parameters, past, self.scene)
 
     def surface(self, pose: Pose, cloth: Cloth) -> Surface:

@@ -143,9 +143,8 @@ class Registry:
 
     def _call_provider(self, role: str, origin: Origin, plugin: Any) -> None:
         hook, base = PROVIDERS[role]
-        providers = [
-            impl.function for impl in getattr(self._manager.hook, hook).get_hookimpls() if impl.plugin is plugin
-        ]
+        implementations = getattr(self._manager.hook, hook).get_hookimpls()
+        providers = [each.function for each in implementations if each.plugin is plugin]
         try:
             classes = [cls for provide in providers for cls in vetted(provide(), base, hook)]
         except Exception as error:

@@ -10,15 +10,14 @@ from importlib.machinery import ModuleSpec
 from pathlib import Path
 
 INSTALLED = {"site-packages", "dist-packages"}  # folders of what does not change but with its version
+DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 SHARED = ("io", "recordings.freezing", "recordings.recording")  # counted where a component imports them
 
 
 def meaning(tree: ast.Module) -> str:
     """Return the syntax tree as text, without docstrings: comments, documentation and layout are free."""
     for node in ast.walk(tree):
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and ast.get_docstring(
-            node, clean=False
-        ):
+        if isinstance(node, DOCUMENTED) and ast.get_docstring(node, clean=False):
             node.body = node.body[1:]
     return ast.dump(tree)
 

@@ -40,17 +40,14 @@ def table() -> list[Row]:
     return [Row(*cells) for cells in rows[2:]]
 
 
-def definitions(
-    tree: ast.Module,
-) -> Iterator[tuple[str, ast.FunctionDef | ast.ClassDef]]:
+def definitions(tree: ast.Module) -> Iterator[tuple[str, ast.FunctionDef | ast.ClassDef]]:
     """Yield the functions, classes and methods of a module with their names; methods as `Class.method`."""
     for node in tree.body:
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             yield node.name, node
         if isinstance(node, ast.ClassDef):
-            yield from (
-                (f"{node.name}.{inner.name}", inner) for inner in node.body if isinstance(inner, ast.FunctionDef)
-            )
+            methods = (inner for inner in node.body if isinstance(inner, ast.FunctionDef))
+            yield from ((f"{node.name}.{method.name}", method) for method in methods)
 
 
 def _short(path: str) -> str:

@@ -37,16 +37,8 @@ def _camera(node: ElementTree.Element, path: Path) -> Camera:
         _number(lens, key, name, path) / FRACTION
         for key in ("focalLengthU", "focalLengthV", "centerPointU", "centerPointV")
     )
-    k1, k2, k3, p1, p2 = (
-        _number(lens, key, name, path)
-        for key in (
-            "radialDistortion1",
-            "radialDistortion2",
-            "radialDistortion3",
-            "tangentalDistortion1",
-            "tangentalDistortion2",
-        )
-    )
+    k1, k2, k3 = (_number(lens, f"radialDistortion{i}", name, path) for i in (1, 2, 3))
+    p1, p2 = (_number(lens, f"tangentalDistortion{i}", name, path) for i in (1, 2))
     turn = np.array([[_number(place, f"r{i}{j}", name, path) for j in (1, 2, 3)] for i in (1, 2, 3)])
     rotation = np.diag([1.0, -1.0, -1.0]) @ turn  # Qualisys cameras look along -z, with y up
     position = np.array([_number(place, key, name, path) for key in "xyz"]) / METRE

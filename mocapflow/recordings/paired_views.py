@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from mocapflow.assets import Camera
-from mocapflow.data import BORDER
+from mocapflow.data import BORDER, Frame
 from mocapflow.geometry.pencils import pencil_axes, plane_angles
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F32, F64, U8, Bool
@@ -49,13 +49,7 @@ def _keypoints(recording: Recording, camera: int) -> F64:
 def outline_signals(recording: Recording) -> Signals:
     """Return the angles of the outermost planes that touch the person's silhouette, at the frames of a recording."""
     rooms = _rooms(recording)
-    outlines = [
-        [
-            _outline(image, room) if usable else np.empty((0, 2))
-            for image, room, usable in zip(frame.images, rooms, frame.usable, strict=True)
-        ]
-        for frame in recording.frames()
-    ]
+    outlines = [_outlines(frame, rooms) for frame in recording.frames()]
 
     def signals(one: int, other: int) -> tuple[F64, F64]:
         cameras = recording.cameras
@@ -78,6 +72,12 @@ def _touching(outlines: list[F64], camera: Camera, axes: F64) -> F64:
         if angles.max() - angles.min() < np.pi:  # else the other camera stands behind the person
             found[row] = np.where(inside[ends], angles[ends], np.nan)
     return found
+
+
+def _outlines(frame: Frame, rooms: Sequence[F32]) -> list[F64]:
+    """Return the outline (N, 2) px of the person in each view; empty where a view is lost."""
+    views = zip(frame.images, rooms, frame.usable, strict=True)
+    return [_outline(image, room) if usable else np.empty((0, 2)) for image, room, usable in views]
 
 
 def _outline(image: U8, room: F32) -> F64:

@@ -222,9 +222,10 @@ class Execution:
             raise GarmentError(error.message, where=self._pipeline.garment_where, hint=error.hint) from None
 
     def _blaming(self, component: Component, checkpoint: Checkpoint | None = None) -> AbstractContextManager[None]:
-        return blaming(
-            component, self._pipeline.registry, lambda: checkpoint.kept if checkpoint else "", self._out / LOG
-        )
+        def kept() -> str:
+            return checkpoint.kept if checkpoint else ""
+
+        return blaming(component, self._pipeline.registry, kept, self._out / LOG)
 
     def _enter_found(self, step: Step, found: Artifact) -> None:
         if step.label in self.entries:

@@ -121,10 +121,9 @@ def writing(where: Path, saved: str = "") -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        full = error.errno in FULL
-        message = (
-            f"the store {where} is full" if full else f"can't write to the store {where}: {error.strerror or error}"
-        )
-        todo = "free some space" if full else "make it writable"
+        if error.errno in FULL:
+            message, todo = f"the store {where} is full", "free some space"
+        else:
+            message, todo = f"can't write to the store {where}: {error.strerror or error}", "make it writable"
         hint = "\n".join(filter(None, [f"{todo}, or name another store", saved]))
         raise folder_error(error)(message, hint=hint) from error

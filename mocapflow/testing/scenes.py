@@ -48,9 +48,8 @@ class Rigid(Draper):
         """Return the rest garment at each root, leaning with the second and third parameter."""
         assert scene.garment is not None
         rest = scene.garment.vertices
-        lean = (rest[:, 2].max() - rest[:, 2])[None, :, None] * np.pad(
-            parameters[:, None, 1:3], ((0, 0), (0, 0), (0, 1))
-        )
+        sideways = np.pad(parameters[:, None, 1:3], ((0, 0), (0, 0), (0, 1)))
+        lean = (rest[:, 2].max() - rest[:, 2])[None, :, None] * sideways
         moved: F64 = (rest + lean) @ np.swapaxes(poses.root[:, :3, :3], 1, 2) + poses.root[:, None, :3, 3]
         return moved
 
