@@ -6,7 +6,7 @@ Hip flexion is the angle of the thigh from straight down in the pelvis' own sagi
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -112,22 +112,12 @@ def measure(
     wanted = definitions(body.joint_names)
     value = np.empty((len(root), len(wanted)))
     sd, share = np.full_like(value, np.nan), np.full_like(value, np.nan)
-    axes = anatomical_axes(body)
-    below = kinematics.descendants(body.parents)[body.screw_joint]  # (D, J)
-    indices = [[body.joint(name) for name in angle.points] for angle in wanted]
+    sagittal = anatomical_axes(body)[:2]
+    below = kinematics.descendants(body.parents)[body.screw_joint]
     for row in range(len(root)):
-        joints, screws = kinematics.chain(body, Pose(root=root[row].copy(), angles=angles[row].copy()))
-        places = kinematics.joint_positions(body, joints)
-        moves = _velocities(places, screws, below)
-        for column, (angle, index) in enumerate(zip(wanted, indices, strict=True)):
-            if len(index) == 3:
-                value[row, column] = three_point(places[index]) + angle.offset
-                gradient = _three_point_gradient(places[index], moves[index])
-            else:
-                pelvis = int(body.parents[index[0]])
-                turn = np.hstack([np.eye(3), np.zeros((3, 3)), np.where(below[:, pelvis], screws[:, :3].T, 0.0)])
-                seen_from = axes[:2] @ joints[pelvis, :3, :3].T  # the pelvis' forward and up, in the world
-                value[row, column], gradient = _flexion(places[index], moves[index], seen_from, turn)
+        pose = Pose(root=root[row].copy(), angles=angles[row].copy())
+        for column, (angle, gradient) in enumerate(_angles_of(body, pose, wanted, sagittal, below)):
+            value[row, column] = angle
             if np.abs(gradient[6:]).max(initial=0.0) < UNMOVED:
                 continue
             if covariance is not None:
@@ -136,6 +126,27 @@ def measure(
             if observed is not None:
                 share[row, column] = np.average(observed[row], weights=gradient[6:] ** 2)
     return AngleSeries(names=tuple(d.name for d in wanted), value=value, sd=sd, observed=share)
+
+
+def _angles_of(
+    body: Body, pose: Pose, wanted: Sequence[Definition], sagittal: F64, below: Bool
+) -> Iterator[tuple[float, F64]]:
+    """Yield angles (degrees) of a pose, each with its gradient (6 + D,) in rad.
+
+    `sagittal` (2, 3) holds forward and up at rest; `below` (D, J) is True where a screw moves a joint.
+    """
+    joints, screws = kinematics.chain(body, pose)
+    places = kinematics.joint_positions(body, joints)
+    moves = _velocities(places, screws, below)
+    for angle in wanted:
+        index = [body.joint(name) for name in angle.points]
+        if len(index) == 3:
+            yield float(three_point(places[index])) + angle.offset, _three_point_gradient(places[index], moves[index])
+        else:
+            pelvis = int(body.parents[index[0]])
+            turn = np.hstack([np.eye(3), np.zeros((3, 3)), np.where(below[:, pelvis], screws[:, :3].T, 0.0)])
+            seen_from = sagittal @ joints[pelvis, :3, :3].T  # the pelvis' forward and up, in the world
+            yield _flexion(places[index], moves[index], seen_from, turn)
 
 
 def _velocities(places: F64, screws: F64, below: Bool) -> F64:
