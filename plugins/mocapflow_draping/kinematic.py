@@ -49,7 +49,6 @@ class Kinematic(Draper):
     name: ClassVar[str] = "kinematic"
     skin_m: NonNegativeFloat = 0.005  # room between skin and cloth of no thickness
     voxel_m: PositiveFloat = 0.010  # edge of a voxel of the body's distance fields
-    start_deg: Annotated[float, Field(gt=0, lt=180)] = 95.0  # hanging: from straight down, before strands fall
     rule: Literal["contact", "literal"] = "contact"  # from contact to contact; or in steps, as printed, a wind alone
     step_deg: PositiveFloat = 2.0  # literal: how far a particle turns in an iteration
     iterations: PositiveInt = 50  # literal: number of iterations
@@ -84,7 +83,7 @@ class Kinematic(Draper):
             free_roots(grid, strands.first, strands.last, parts[source], fitting.fields.values, None)
         else:
             where = roots(strands, chain), standing_out(strands, chain), links
-            grid = lay(strands, fitting.fields, where, winds, source, skin, parts, math.radians(self.start_deg)).grid
+            grid = lay(strands, fitting.fields, where, winds, source, skin, parts).grid
         if self.sweeps:
             self._close(fitting, grid, first, links[source], chain[source], skin[source], parts[source])
         vertices: F64 = grid.reshape(len(grid), -1, 3)[:, strands.place]
@@ -112,8 +111,7 @@ class Kinematic(Draper):
         else:
             near = roots(strands, chain), standing_out(strands, chain), links
             here, still = (near[0][-1:], near[1][-1:], links[-1:]), (winds[0][-1:], winds[1][-1:])
-            alone, start = np.zeros(1, np.int32), math.radians(self.start_deg)
-            laid = lay(strands, fitting.fields, here, still, alone, skin[-1:], parts, start)
+            laid = lay(strands, fitting.fields, here, still, np.zeros(1, np.int32), skin[-1:], parts)
             grid, rate = laid.grid, follow(strands, fitting.fields, near, winds, laid, parts, moved)
         motion = Motion(rate, np.zeros_like(rate), moved.carry, moved.swell, moved.grow)
         if strands.rides:

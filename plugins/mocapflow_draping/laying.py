@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,8 @@ from mocapflow_draping.fields import BodyFields
 from mocapflow_draping.frames import DOWN, blown
 from mocapflow_draping.parts import carried_rates, rates
 from mocapflow_draping.strands import Strands
+
+START = math.radians(95.0)  # from straight down, how far strands stand out before they fall: above level
 
 Placed = tuple[F64, F64, F64]  # per body and strand: root (B, N, 3) m, horizontal `facing` (B, N, 3), bars (B, N, K) m
 Winds = tuple[F64, F64]  # rad, per drape and strand: tilts (B, N) of its tail, outwards and to its left
@@ -59,9 +62,7 @@ def moving(fields: BodyFields, chain: F64, skin: F64, length: F64, steps: F64) -
     return Rates(steps=steps, carry=carried_rates(fields, chain, steps), swell=rates(skin, steps), grow=grow)
 
 
-def lay(
-    strands: Strands, fields: BodyFields, where: Placed, winds: Winds, source: I32, skin: F64, parts: F64, start: float
-) -> Laid:
+def lay(strands: Strands, fields: BodyFields, where: Placed, winds: Winds, source: I32, skin: F64, parts: F64) -> Laid:
     """Return B drapes on D bodies: strands fall once on each body, then winds turn the tails that are left.
 
     Args:
@@ -72,7 +73,6 @@ def lay(
         source: (B,) body of each drape.
         skin: (D,) m, contact distance.
         parts: (D, P, COLUMNS), the bodies.
-        start: rad, how far from straight down strands stand before they fall.
     """
     from mocapflow_draping.blowing import blow_batch
     from mocapflow_draping.swing import fall_batch
@@ -81,7 +81,7 @@ def lay(
     shape = strands.vertex.shape
     fallen, lying = np.empty((len(parts), *shape, 3)), np.empty((len(parts), *shape), np.int32)
     fall_batch(
-        roots, facing, start, skin, links, strands.first, strands.last, parts, fields.values,
+        roots, facing, START, skin, links, strands.first, strands.last, parts, fields.values,
         fallen, lying,
     )  # fmt: skip
     pivot = np.where(lying > 0, np.arange(shape[1], dtype=np.int32), strands.first[:, None]).max(axis=2)

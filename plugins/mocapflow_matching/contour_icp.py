@@ -30,6 +30,8 @@ from mocapflow_matching.camouflage import told_from_the_room
 from mocapflow_matching.robust import Loss, robust_weights
 from mocapflow_matching.uncertainty import contour_sigma
 
+FAR_CALM_MM = 15.0  # stands for `calm_mm`, if less, in a frame that began far off
+
 
 class ImageContour(NamedTuple):
     """Points of the image contour (K,) sorted by row: pixels, unit normals outward, curvature where it is known."""
@@ -60,7 +62,6 @@ class ContourIcp(Matcher):
     spacing_px: PositiveFloat = 4.0  # between the points of a contour
     hem_guard_px: NonNegativeFloat = 12.0  # skin so near to cloth counts as cloth: a hem is uncertain
     calm_mm: PositiveFloat = 15.0  # change of the body in a turn below which `later_reach_px` and `later_loss` hold
-    far_calm_mm: PositiveFloat = 15.0  # stands for calm_mm, if less, in a frame that began far off
     first_reach_px: PositiveFloat = 40.0  # pairs farther apart are left out at first
     later_reach_px: PositiveFloat = 10.0  # pairs farther apart are left out once the body is calm
     cloth_reach_px: PositiveOrInf = float("inf")  # pairs on cloth reach no farther: a hem that swings turns the pelvis
@@ -115,7 +116,7 @@ class ContourIcp(Matcher):
         return np.asarray((away <= self.cloth_reach_px) | ~surface.cloth.take(model.vertex.take(shown)))
 
     def _calm(self, turn: Turn) -> bool:
-        return turn.calm(min(self.calm_mm, self.far_calm_mm) if turn.far else self.calm_mm)
+        return turn.calm(min(self.calm_mm, FAR_CALM_MM) if turn.far else self.calm_mm)
 
     def contours(
         self, silhouette: Silhouette, surface: Surface, scene: Scene, turn: Turn

@@ -20,6 +20,9 @@ from mocapflow_matching.shape_flow import register
 from mocapflow_matching.uncertainty import contour_sigma
 
 WORKING_SIDE = 200  # px, at most, of the distance images: they are smooth
+SMOOTHNESS = 3.0  # weight of the flow's smoothness against the difference of the distance images
+BAND = 0.1  # half width of the band about the model's contour, share of the picture's longer side
+LEVELS = 3  # of the pyramid of distance images
 ON_CONTOUR = 1.0  # px from the image contour within which a target has to end
 LATER_SHARE = 0.25  # of points followed, after the turns in which shapes are registered: 0.2 to contour_icp's 0.8
 CONTOUR_SIGMA_PX = 1.0  # standard deviation of a pair of contour points on skin
@@ -41,9 +44,6 @@ class OpticalFlow(Matcher):
     first_turns: NonNegativeInt = 1  # turns at the beginning of a frame in which shapes are registered
     first_share: NonNegativeFloat = 2.3  # weight in these turns, where contour_icp's is 1
     spacing_px: PositiveFloat = 4.0  # between the points of the model's contour
-    smoothness: PositiveFloat = 3.0  # weight of the flow's smoothness against the difference of the distance images
-    band: PositiveFloat = 0.1  # half width of the band about the model's contour, share of the picture's longer side
-    levels: NonNegativeInt = 3  # levels of the pyramid
     cloth_sigma_px_per_m: PositiveFloat = 80.0  # as for contour_icp
     image_sigma_px: PositiveFloat = 1.5  # standard deviation of a tracked point
     scale: PositiveFloat = 2.0  # standard deviations beyond which a pair pulls no harder (Huber)
@@ -77,7 +77,7 @@ class OpticalFlow(Matcher):
         shrink = int(np.ceil(camera.size.max() / WORKING_SIDE))
         covered, shown = silhouettes.mask(boundary, camera), silhouette.distance > 0
         here, there = (silhouettes.mask_distance(_shrunk(mask, shrink)) for mask in (covered, shown))
-        flow = register(here, there, self.smoothness, self.levels, self.band * max(here.shape))
+        flow = register(here, there, SMOOTHNESS, LEVELS, BAND * max(here.shape))
         middle = (shrink - 1) / 2  # pixel centres are on integers in both sizes
         small = (model.pixel - middle) / shrink
         target = shrink * _snapped(small + _sampled(flow, small), there) + middle

@@ -20,6 +20,7 @@ from mocapflow_twist.motion import ClothMotion
 from mocapflow_twist.normal_equations import Equations
 from mocapflow_twist.problem import Anchor, Data, Guess, Problem, Quadratic
 
+LINE_SIGMA = 0.003  # m, standard deviation of the distance to a projection ray, of a match known to one pixel
 TRIALS = 8  # times that the damping is raised before a step is given up
 LEAST_GAIN = 1e-14  # share of the energy below which a step is only rounding
 FIRST_DAMPING_PER_TURN = 0.3  # factor of the first damping at each further turn: gentle, then exact
@@ -38,7 +39,6 @@ class TwistGaussNewton(PoseSolver):
     far_iterations: NonNegativeInt = 0  # stands for iterations, if more, in a frame that begins far off
     steps_per_match: PositiveInt = 1  # steps with the same matches
     residual: Literal["image", "line"] = "image"  # distances in pixels, or to projection rays in space
-    line_sigma_mm: PositiveFloat = 3.0  # line: standard deviation of the distance to a ray, of a match known to 1 px
     damping: NonNegativeFloat = 1e-4  # least damping, share of the mean diagonal; ten times more after a worse step
     damping_per_turn: PositiveFloat = 1.0  # factor on it at each turn of the loop: above 1, first exact, then gentle
     first_damping: NonNegativeFloat = 0.0  # least damping in the first turn of a first frame, whose start is far off
@@ -88,7 +88,7 @@ class TwistGaussNewton(PoseSolver):
         """Return the matches as rows, weighted by how many independent measurements they hold."""
         cameras = model.scene.cameras
         line = self.residual == "line"
-        rows = line_rows(matches, cameras, self.line_sigma_mm / 1000) if line else image_rows(matches, cameras)
+        rows = line_rows(matches, cameras, LINE_SIGMA) if line else image_rows(matches, cameras)
         share = effective_share(matches, self.correlation_px)
         balance = view_balance(matches, share) if self.balance_views else np.ones(len(share))
         weight = rows.weight * (share * balance).take(rows.match)
