@@ -13,7 +13,6 @@ from pydantic import Field, NonNegativeFloat, model_validator
 from mocapflow.assets import GarmentMesh
 from mocapflow.data import Past, Pose, PoseBatch
 from mocapflow.dressing.roles import Draper
-from mocapflow.errors import PluginError
 from mocapflow.geometry.kinematics import chain_batch
 from mocapflow.memo import memoised
 from mocapflow.records import F64, I32, Bool
@@ -47,8 +46,7 @@ class Xpbd(Draper):
     def drape(self, poses: PoseBatch, parameters: F64, past: Past, scene: Scene) -> F64:
         """Return cloth vertices (B, W, 3) m in the world for B poses and parameters (B, Q)."""
         garment = scene.garment
-        if garment is None:
-            raise PluginError("the draper has no garment to drape", hint="name a garment in the pipeline's scene")
+        assert garment is not None
         fitting = KINEMATIC.fitting(garment, scene.body)
         strands = fitting.strands
         root, centre = centred(scene, poses.root)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 
 from mocapflow.assets import Body
-from mocapflow.errors import PipelineError, RecordingError, alternatives
+from mocapflow.errors import MocapflowError, PipelineError, RecordingError, alternatives
 from mocapflow.geometry import angles
 from mocapflow.geometry.joints import angles_from_rotations
 from mocapflow.geometry.skeleton import unsided
@@ -97,7 +96,9 @@ def read_angles(path: Path, body: Body) -> Angles:
         raise RecordingError("there is no such file", where=str(path))
     try:
         return reader(path, body)
-    except (ValueError, KeyError, TypeError, IndexError, SyntaxError, BadZipFile) as error:  # as readers say so
+    except MocapflowError:
+        raise
+    except Exception as error:  # of bvhio, numpy, zipfile, zlib and tokenize
         raise RecordingError(f"cannot be read as {path.suffix}: {error}", where=str(path)) from error
 
 
