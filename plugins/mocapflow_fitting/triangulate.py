@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 
@@ -52,17 +53,17 @@ def triangulate(
 
 
 def _best_pair(pixels: F64, weight: F64, matrices: F64, scale_px: float) -> F64:
+    """Return the points (K, 3) m of the two cameras whose point all cameras support most; NaN where no two see one."""
     count, points = weight.shape
     best, support = np.full((points, 3), np.nan), np.zeros(points)
-    for a in range(count):
-        for b in range(a + 1, count):
-            pair = np.zeros_like(weight)
-            pair[[a, b]] = ((weight[a] > 0) & (weight[b] > 0)).astype(float)
-            position = _solve(pixels, pair, matrices, None)
-            error = _errors(position, pixels, matrices)
-            score = np.nansum(weight / (1 + (error / scale_px) ** 2), axis=0)
-            better = (score > support) & np.isfinite(position).all(axis=1)
-            best[better], support[better] = position[better], score[better]
+    for a, b in combinations(range(count), 2):
+        pair = np.zeros_like(weight)
+        pair[[a, b]] = ((weight[a] > 0) & (weight[b] > 0)).astype(float)
+        position = _solve(pixels, pair, matrices, None)
+        error = _errors(position, pixels, matrices)
+        score = np.nansum(weight / (1 + (error / scale_px) ** 2), axis=0)
+        better = (score > support) & np.isfinite(position).all(axis=1)
+        best[better], support[better] = position[better], score[better]
     return best
 
 

@@ -16,7 +16,7 @@ from mocapflow.geometry.silhouettes import occluding_contour
 from mocapflow.pooling import pool
 from mocapflow.scene import Scene
 from mocapflow_matching.camouflage import told_from_the_room
-from mocapflow_matching.robust import robust_weights
+from mocapflow_matching.robust import robust_precision
 from mocapflow_matching.uncertainty import ANY_DIRECTION
 
 
@@ -53,7 +53,7 @@ class Containment(Matcher):
             pixel=target,
             direction=direction,
             vertex=model.vertex.take(stray),
-            weight=robust_weights(distance / self.sigma_px, "huber", self.scale) / self.sigma_px**2,
+            weight=robust_precision(distance, self.sigma_px, "huber", self.scale),
         )
 
 

@@ -27,7 +27,7 @@ from mocapflow.records import F64, I32, Bool
 from mocapflow.scene import Scene
 from mocapflow.settings import PositiveOrInf
 from mocapflow_matching.camouflage import told_from_the_room
-from mocapflow_matching.robust import Loss, robust_weights
+from mocapflow_matching.robust import Loss, robust_precision
 from mocapflow_matching.uncertainty import contour_sigma
 
 FAR_CALM_MM = 15.0  # stands for `calm_mm`, if less, in a frame that began far off
@@ -143,7 +143,7 @@ class ContourIcp(Matcher):
             pixel=pixel,
             direction=direction,
             vertex=vertex,
-            weight=robust_weights(distance / spread, loss, self.scale) / spread**2,
+            weight=robust_precision(distance, spread, loss, self.scale),
         )
 
 

@@ -15,7 +15,7 @@ from mocapflow.pooling import pool, weighted
 from mocapflow.records import F32, F64, Bool
 from mocapflow.scene import Scene
 from mocapflow_matching.carried import CLOTH_SHARE, carried_points, distances
-from mocapflow_matching.robust import robust_weights
+from mocapflow_matching.robust import robust_precision
 from mocapflow_matching.shape_flow import register
 from mocapflow_matching.uncertainty import contour_sigma
 
@@ -64,7 +64,7 @@ class OpticalFlow(Matcher):
         """Return the pairs by flow between frames."""
         matches = carried_points(frame, past, scene)
         away = distances(matches, surface, scene)
-        weight = self._robust(away, np.full(len(away), self.image_sigma_px))
+        weight = robust_precision(away, self.image_sigma_px, "huber", self.scale)
         return replace(matches, weight=weight * np.where(surface.cloth[matches.vertex], CLOTH_SHARE, 1.0))
 
     def registered(self, silhouette: Silhouette, surface: Surface, scene: Scene) -> Matches:
@@ -90,12 +90,8 @@ class OpticalFlow(Matcher):
             pixel=(target - (model.pixel - model.anchor))[on],
             direction=np.zeros((int(on.sum()), 2)),
             vertex=model.vertex[on],
-            weight=self._robust(away, sigma)[on],
+            weight=robust_precision(away, sigma, "huber", self.scale)[on],
         )
-
-    def _robust(self, away: F64, sigma: F64) -> F64:
-        weight: F64 = robust_weights(away / sigma, "huber", self.scale) / sigma**2
-        return weight
 
 
 def _shrunk(mask: Bool, factor: int) -> Bool:

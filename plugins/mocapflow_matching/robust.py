@@ -29,6 +29,19 @@ def robust_weights(distance: F64, loss: Loss, scale: float) -> F64:
     return np.ones_like(distance)
 
 
+def robust_precision(distance: F64, sigma: F64 | float, loss: Loss, scale: float) -> F64:
+    """Return weights (M,) px^-2 of pairs `distance` (M,) px apart: one over the variance, times the robust factor.
+
+    Args:
+        distance: (M,) px, absolute.
+        sigma: px, standard deviation of each (M,), or of all.
+        loss: the loss function.
+        scale: standard deviations at which the loss begins to give way.
+    """
+    weight: F64 = robust_weights(distance / sigma, loss, scale) / sigma**2
+    return weight
+
+
 def zhang_keeps(distance: F64, good: float) -> Bool:
     """Return which pairs the statistics of their distances let pass.
 

@@ -16,7 +16,7 @@ from mocapflow.records import F64
 from mocapflow_twist import steps
 from mocapflow_twist.constraint import image_rows, line_rows
 from mocapflow_twist.covariance import covariance, effective_share, observed, view_balance
-from mocapflow_twist.motion import ClothMotion
+from mocapflow_twist.motion import ClothMotion, solved_bounds
 from mocapflow_twist.normal_equations import Equations
 from mocapflow_twist.problem import Anchor, Data, Guess, Problem, Quadratic
 
@@ -110,10 +110,9 @@ class TwistGaussNewton(PoseSolver):
     def _precision(self, model: ClothedModel, guess: Guess) -> F64:
         """Return one over the variance of the damping of every unknown."""
         turn, bend = np.radians(self.root_sd_deg), np.radians(self.angle_sd_deg)
-        spread = [np.full(3, turn), np.full(3, self.root_sd_m), np.full(len(guess.pose.angles), bend)]
-        if self.cloth_unknowns and model.clothed:
-            spread.append(np.maximum(self.cloth_sd * parameter_ranges(model), 1e-12))
-        precision: F64 = np.concatenate(spread) ** -2.0
+        pose = np.repeat([turn, self.root_sd_m, bend], [3, 3, len(guess.pose.angles)])
+        cloth = self.cloth_sd * np.ptp(solved_bounds(model, self.cloth_unknowns), axis=1)
+        precision: F64 = np.concatenate([pose, np.maximum(cloth, 1e-12)]) ** -2.0
         return precision
 
     def _descend(
@@ -122,8 +121,7 @@ class TwistGaussNewton(PoseSolver):
         """Return a guess of lower energy for the same matches, or the same guess where there is none worth a step."""
         equations = motion.within_bounds(equations, guess)
         angles = len(guess.pose.angles)
-        ranges = parameter_ranges(problem.model) if problem.unknowns > 6 + angles else np.empty(0)
-        lever = steps.levers(angles, ranges)
+        lever = steps.levers(angles, np.ptp(motion.bounds, axis=1))
         least = max(LEAST_GAIN * equations.energy, 0.5 * problem.unknowns * self.stop_sigmas**2)
         for _ in range(TRIALS):
             increment = steps.step(equations, lever, damping)
@@ -156,13 +154,4 @@ def quadratic(problem: Problem, guess: Guess, motion: ClothMotion) -> Quadratic:
 
 def calmed(guess: Guess, model: ClothedModel) -> Guess:
     """Return a guess whose garment hangs without forces: where its parameters are held, however they came about."""
-    if model.scene.garment is None:
-        return guess
     return Guess(guess.pose, replace(guess.cloth, parameters=model.scene.calm))
-
-
-def parameter_ranges(model: ClothedModel) -> F64:
-    """Return the width of the bounds of each cloth parameter: (Q,)."""
-    assert model.scene.garment is not None
-    ranges: F64 = np.ptp(model.scene.garment.parameter_bounds, axis=1)
-    return ranges
