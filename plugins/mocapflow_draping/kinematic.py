@@ -75,7 +75,8 @@ class Kinematic(Draper):
         winds = tilts(garment, parameters, strands.azimuth)
         first = np.broadcast_to(strands.first, (len(source), len(strands.first)))
         if self.rule == "literal":
-            grid, first = self._literal(fitting, chain, source, parameters, garment, skin, links, parts)
+            force = wind(garment, parameters, chain[source, strands.carrier[0], :3, :3])
+            grid, first = self._literal(fitting, chain, links, skin, parts, source, force)
         elif strands.rides:
             grid = riding(strands, chain[source], links[source], *winds)
             free_roots(grid, strands.first, strands.last, parts[source], fitting.fields.values, None)
@@ -110,7 +111,7 @@ class Kinematic(Draper):
             grid, rate = lay_moving(
                 strands, fitting.fields, placed(strands, chain, links), winds, skin[-1:], parts, moved
             )
-        motion = Motion(rate, np.zeros_like(rate), moved.carry, moved.swell, moved.grow)
+        motion = Motion(rate, np.zeros_like(rate), moved.part_rate, moved.skin_rate, moved.stretch_rate)
         if strands.rides:
             free_roots(grid, strands.first, strands.last, parts, fitting.fields.values, motion)
         if self.sweeps:
@@ -134,33 +135,23 @@ class Kinematic(Draper):
         return _measured(body, garment, self.voxel_m)
 
     def _literal(
-        self,
-        fitting: Fitting,
-        chain: F64,
-        source: I32,
-        parameters: F64,
-        garment: GarmentMesh,
-        skin: F64,
-        links: F64,
-        parts: F64,
+        self, fitting: Fitting, chain: F64, links: F64, skin: F64, parts: F64, source: I32, force: tuple[F64, F64]
     ) -> tuple[F64, I32]:
         """Return particles (B, N, L, 3) m as the chapter lays them, and the rows (B, N) that free ends hang from."""
         from mocapflow_draping.literal import blow_in_steps, settle_in_steps
 
         strands, values = fitting.strands, fitting.fields.values
+        rows = strands.first, strands.last
         grid = standing(strands, chain, links)
         if strands.rides:
-            free_roots(grid, strands.first, strands.last, parts, values, None)
-            free_strands(grid, links, strands.first, strands.last, skin, parts, values)
+            free_roots(grid, *rows, parts, values, None)
+            free_strands(grid, links, *rows, skin, parts, values)
         fixed = np.zeros(grid.shape[:3], bool)
         fixed[:, np.arange(len(strands.first)), strands.first] = True
-        step, in_space = math.radians(self.step_deg), self.pivot == "space"
-        turns = step, self.iterations, self.limited, in_space
-        settle_in_steps(grid, fixed, strands.first, strands.last, skin, *turns, parts, values)
+        turns = math.radians(self.step_deg), self.iterations, self.limited, self.pivot == "space"
+        settle_in_steps(grid, fixed, *rows, skin, *turns, parts, values)
         grid, fixed = grid[source], fixed[source]
-        force, amount = wind(garment, parameters, chain[source, strands.carrier[0], :3, :3])
-        blown = strands.first, strands.last, skin[source], force, amount, parts[source], values
-        return grid, blow_in_steps(grid, fixed, *blown)
+        return grid, blow_in_steps(grid, fixed, *rows, skin[source], *force, parts[source], values)
 
     def _close(
         self, fitting: Fitting, grid: F64, first: I32, links: F64, chain: F64, skin: F64, parts: F64,

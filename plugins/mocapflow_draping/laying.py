@@ -11,7 +11,7 @@ from mocapflow.data import PoseBatch
 from mocapflow.records import F64, I32, record
 from mocapflow_draping.fields import BodyFields
 from mocapflow_draping.frames import DOWN, blown, standing_out
-from mocapflow_draping.parts import carried_rates, rates
+from mocapflow_draping.parts import part_rates, rates
 from mocapflow_draping.strands import Strands, roots
 
 START = math.radians(95.0)  # from straight down, how far strands stand out before they fall: above level
@@ -32,9 +32,9 @@ class Rates:
     """How what a drape rests on moves, along S unknowns."""
 
     steps: F64  # (S,) by which the unknowns were changed
-    carry: F64  # (P, 3, 4, S) of the points of the body's parts, affine in their place in the world
-    swell: F64  # (S,) of the contact distance
-    grow: F64  # (S,) of the logarithm of the bars' length
+    part_rate: F64  # (P, 3, 4, S) of the points of the body's parts, affine in their place in the world
+    skin_rate: F64  # (S,) of the contact distance
+    stretch_rate: F64  # (S,) of the logarithm of the bars' length
 
 
 class Laid(NamedTuple):
@@ -65,8 +65,12 @@ def moving(fields: BodyFields, chain: F64, skin: F64, length: F64, steps: F64) -
         length: (S + 1,) of the cloth, over that as sewn.
         steps: (S,) of the unknowns.
     """
-    grow = rates(np.log(length), steps)
-    return Rates(steps=steps, carry=carried_rates(fields, chain, steps), swell=rates(skin, steps), grow=grow)
+    return Rates(
+        steps=steps,
+        part_rate=part_rates(fields, chain, steps),
+        skin_rate=rates(skin, steps),
+        stretch_rate=rates(np.log(length), steps),
+    )
 
 
 def placed(strands: Strands, chain: F64, links: F64) -> Placed:
@@ -139,8 +143,8 @@ def _follow(
         here, there = (np.ascontiguousarray(way[-1]) for way in (out, to))
         follow_swing(
             laid.grid[0], laid.held[0], here, there, begin, rates(out, moved.steps),
-            rates(to, moved.steps), links[-1], first.copy(), strands.last, parts[0], fields.values, moved.carry,
-            moved.swell, moved.grow, rate,
+            rates(to, moved.steps), links[-1], first.copy(), strands.last, parts[0], fields.values, moved.part_rate,
+            moved.skin_rate, moved.stretch_rate, rate,
         )  # fmt: skip
         begin = rate[np.arange(len(rate)), laid.pivot[0]]
     return rate

@@ -49,7 +49,7 @@ def person_at(
     return person if found >= LEAST_POINTS else None
 
 
-def spread(indices: Sequence[int], count: int) -> list[int]:
+def spaced_evenly(indices: Sequence[int], count: int) -> list[int]:
     """Return `count` frames spread evenly, or all of them if there are fewer."""
     rows = np.unique(np.linspace(0, len(indices) - 1, count).round().astype(int))
     return [indices[row] for row in rows]

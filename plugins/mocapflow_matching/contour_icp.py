@@ -26,7 +26,7 @@ from mocapflow.pooling import pool
 from mocapflow.records import F64, I32, Bool
 from mocapflow.scene import Scene
 from mocapflow.settings import PositiveOrInf
-from mocapflow_matching.camouflage import told_from_the_room
+from mocapflow_matching.camouflage import without_camouflaged
 from mocapflow_matching.robust import Loss, robust_precision
 from mocapflow_matching.uncertainty import contour_sigma
 
@@ -89,7 +89,7 @@ class ContourIcp(Matcher):
     ) -> Matches:
         """Return pairs of contour points; see the class."""
         views = [self.match_view(s, surface, scene, turn) for s in segmentation.of("person")]
-        return told_from_the_room(pool(views), past)
+        return without_camouflaged(pool(views), past)
 
     def match_view(self, silhouette: Silhouette, surface: Surface, scene: Scene, turn: Turn) -> Matches:
         """Return the pairs of one view."""

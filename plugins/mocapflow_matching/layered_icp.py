@@ -34,11 +34,11 @@ class LayeredIcp(ContourIcp):
         found = super().match(frame, segmentation, surface, past, scene, turn)
         if COLOURS not in past.appearance:
             return found
-        wrong = another_s(found, frame, shown(past), layer_of(scene), SURE)
+        wrong = of_another_layer(found, frame, shown(past), layer_of(scene), SURE)
         return replace(found, weight=np.where(wrong, 0.0, found.weight))
 
 
-def another_s(matches: Matches, frame: Frame, known: Shown, layers: I32, least: float) -> Bool:
+def of_another_layer(matches: Matches, frame: Frame, known: Shown, layers: I32, least: float) -> Bool:
     """Return which matches (M,) have, just inside the contour, colours that are surely another layer's."""
     wrong = np.zeros(len(matches.vertex), bool)
     for camera in np.unique(matches.camera):
