@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from mocapflow.assets import Camera
-from mocapflow.geometry.cameras import projection
+from mocapflow.geometry.cameras import projections
 from mocapflow.records import F64, array, record
 
 USUAL_PX = 8.0  # error of a detection that is usual at most
@@ -37,7 +37,7 @@ def triangulate(
 
     A point needs two cameras; it starts at the pair of cameras whose point the other cameras support most.
     """
-    matrices = np.stack([projection(camera) for camera in cameras])  # (C, 3, 4)
+    matrices = projections(cameras)
     weight = np.where(np.isfinite(pixels).all(axis=-1), confidence, 0.0)
     pixels = np.where(weight[..., None] > 0, pixels, 0.0)
     position = _best_pair(pixels, weight, matrices, scale_px)
