@@ -9,16 +9,7 @@ import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from mocapflow.components import Matcher
-from mocapflow.data import (
-    Contour,
-    Frame,
-    Matches,
-    Past,
-    Segmentation,
-    Silhouette,
-    Surface,
-    Turn,
-)
+from mocapflow.data import Contour, Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn
 from mocapflow.geometry.contours import pairs
 from mocapflow.geometry.silhouettes import occluding_contour
 from mocapflow.memo import memoised

@@ -30,13 +30,9 @@ def robust_weights(distance: F64, loss: Loss, scale: float) -> F64:
 
 
 def robust_precision(distance: F64, sigma: F64 | float, loss: Loss, scale: float) -> F64:
-    """Return weights (M,) px^-2 of pairs `distance` (M,) px apart: one over the variance, times the robust factor.
+    """Return the weights (M,) px^-2 of pairs so many px apart, of standard deviation `sigma` px each or all.
 
-    Args:
-        distance: (M,) px, absolute.
-        sigma: px, standard deviation of each (M,), or of all.
-        loss: the loss function.
-        scale: standard deviations at which the loss begins to give way.
+    One over the variance, times the robust factor; `scale` is in standard deviations, see `robust_weights`.
     """
     weight: F64 = robust_weights(distance / sigma, loss, scale) / sigma**2
     return weight

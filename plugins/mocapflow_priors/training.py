@@ -162,7 +162,7 @@ def from_opensim(path: Path, body: Body) -> Angles:
     rest = opensim_at_rest(body)
     angles_only = {name: values for name, values in columns.items() if name[:-2] in COORDINATES and name in rest}
     degrees = bent_forwards(possible(angles_only, path), path)
-    return named({name: values - rest[name] for name, values in degrees.items()}, COORDINATES)
+    return {screw_of(name, COORDINATES): np.radians(values - rest[name]) for name, values in degrees.items()}
 
 
 def bent_forwards(degrees: Mapping[str, F64], path: Path) -> Mapping[str, F64]:
@@ -185,11 +185,6 @@ def opensim_at_rest(body: Body) -> Mapping[str, float]:
 
     found = coordinates(body, np.eye(4)[None], np.zeros((1, len(body.twists))))
     return {name: float(value[0]) for name, value in found.items()}
-
-
-def named(degrees: Mapping[str, F64], table: Mapping[str, str]) -> Angles:
-    """Return columns in degrees by the screws that a table of names without sides gives them."""
-    return {screw: np.radians(values) for name, values in degrees.items() if (screw := screw_of(name, table))}
 
 
 def screw_of(column: str, table: Mapping[str, str]) -> str:

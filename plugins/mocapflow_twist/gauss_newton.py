@@ -27,7 +27,7 @@ from mocapflow.geometry.misfit import bilinear, dressed, misfit, outlines
 from mocapflow.geometry.sewing import TAKE_UP, THICKNESS
 from mocapflow.model import ClothedModel
 from mocapflow.pooling import pool
-from mocapflow.records import F64, Bool
+from mocapflow.records import F64
 from mocapflow_twist import steps
 from mocapflow_twist.constraint import image_rows
 from mocapflow_twist.normal_equations import Equations, dense_equations
@@ -118,17 +118,14 @@ class Task(NamedTuple):
         """Return the cloth after one damped step, its parameters within their bounds."""
         low, high = self.garment.parameter_bounds.T
         parameters, downhill = cloth.parameters, -equations.gradient
-        free = ~steps.at_bound(parameters, downhill, low, high) & self._fitted
+        forces = np.array([name not in (THICKNESS, TAKE_UP) for name in self.garment.parameter_names])
+        free = forces & ~steps.at_bound(parameters, downhill, low, high)
         if not free.any():  # the garment knows no forces, or each stands at a bound
             return cloth
         part = Equations(equations.hessian[np.ix_(free, free)], equations.gradient[free], equations.energy)
         increment = np.zeros(len(parameters))
         increment[free] = steps.step(part, steps.CLOTH_LEVER / (high - low)[free], damping)
         return self.model.drape(self.estimate.pose, np.clip(parameters + increment, low, high), self.past)
-
-    @property
-    def _fitted(self) -> Bool:
-        return np.array([name not in (THICKNESS, TAKE_UP) for name in self.garment.parameter_names])
 
     def _from_calm(self, cloth: Cloth) -> F64:
         return cloth.parameters - self.model.scene.calm
