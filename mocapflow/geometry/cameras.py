@@ -22,6 +22,11 @@ def projection(camera: Camera) -> F64:
     return camera.intrinsics @ camera.camera_from_world[:3]
 
 
+def projections(cameras: Sequence[Camera]) -> F64:
+    """Return the matrices (C, 3, 4) that map world points (m) to homogeneous pixels of undistorted views."""
+    return np.array([projection(camera) for camera in cameras]).reshape(-1, 3, 4)
+
+
 def project(points: F64, camera: Camera) -> F64:
     """Return undistorted pixels (M, 2) of world points (M, 3) in m; NaN for points behind the camera."""
     matrix = projection(camera)
@@ -30,7 +35,7 @@ def project(points: F64, camera: Camera) -> F64:
 
 def project_each(points: F64, view: I16, cameras: Sequence[Camera]) -> F64:
     """Return undistorted pixels (M, 2) of world points (M, 3) in m, each in its own view (M,)."""
-    matrix = np.stack([projection(camera) for camera in cameras]).take(view, axis=0)
+    matrix = projections(cameras).take(view, axis=0)
     return _divided(np.einsum("mab,mb->ma", matrix[..., :3], points) + matrix[..., 3])
 
 

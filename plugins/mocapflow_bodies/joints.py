@@ -85,7 +85,7 @@ def screws(skeleton: Skeleton) -> Screws:
     axes, joints, limits, spread = [], [], [], []
     for joint in np.flatnonzero(skeleton.parents >= 0):
         name, available = skeleton.names[joint], joint_axes(skeleton, int(joint))
-        for dof in table_row(name):
+        for dof in TABLE.get(unsided(name), BALL):
             axis = -available[dof.axis[1:]] if dof.axis.startswith("-") else available[dof.axis]
             from_rest = dof.name == "flexion" and unsided(name) in FROM_STRAIGHT
             bend = rest_bend(skeleton, int(joint), axis) if from_rest else 0.0
@@ -101,8 +101,3 @@ def screws(skeleton: Skeleton) -> Screws:
         limits=np.array(limits).reshape(-1, 2),
         rest_spread=np.array(spread, np.float64),
     )
-
-
-def table_row(name: str) -> tuple[Dof, ...]:
-    """Return the degrees of freedom of a joint by its name."""
-    return TABLE.get(unsided(name), BALL)

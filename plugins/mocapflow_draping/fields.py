@@ -42,6 +42,8 @@ def build_fields(body: Body, joints: I32, voxel: float) -> BodyFields:
         joints: indices of the joints whose parts are wanted.
         voxel: edge of a voxel in m.
     """
+    from mocapflow_draping.voxels import signed_distance
+
     pairs = _pairs(body, joints)
     label = _labels(body, pairs)
     kept = np.unique(label)
@@ -49,8 +51,6 @@ def build_fields(body: Body, joints: I32, voxel: float) -> BodyFields:
     inside = body.vertices[label >= 0]
     low = inside.min(axis=0) - MARGIN - 4 * voxel
     shape = tuple(int(n) for n in np.ceil((np.ptp(inside, axis=0) + 2 * MARGIN + 8 * voxel) / voxel))
-    from mocapflow_draping.voxels import signed_distance
-
     distance, nearest = signed_distance(body.vertices, body.faces, low, (shape[0], shape[1], shape[2]), voxel)
     voxel_label = label[body.faces[nearest, 0]]
     parts = [_part(distance, voxel_label == part, body.vertices[label == part], low, voxel) for part in kept]

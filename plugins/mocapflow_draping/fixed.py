@@ -15,13 +15,7 @@ class Fixed(ClothFitter):
     name: ClassVar[str] = "fixed"
 
     def fit(
-        self,
-        frame: Frame,
-        segmentation: Segmentation,
-        estimate: Estimate,
-        model: ClothedModel,
-        past: Past,
-        turn: Turn,
+        self, frame: Frame, segmentation: Segmentation, estimate: Estimate, model: ClothedModel, past: Past, turn: Turn
     ) -> Cloth:
         """Return the garment draped at the estimated pose."""
         return model.drape(estimate.pose, estimate.parameters, past)

@@ -24,15 +24,15 @@ class Motion(NamedTuple):
 
     rate: F64  # (N, L, 3, S) of the particles
     bar_rate: F64  # (N, L, 3, S) room for those of the bars, in lengths of theirs
-    carry: F64  # (P, 3, 4, S) of the points of the body's parts, affine in their place in the world
-    swell: F64  # (S,) of the contact distance
-    grow: F64  # (S,) of the logarithm of the bars' length
+    part_rate: F64  # (P, 3, 4, S) of the points of the body's parts, affine in their place in the world
+    skin_rate: F64  # (S,) of the contact distance
+    stretch_rate: F64  # (S,) of the logarithm of the bars' length
 
 
 @numba.njit(cache=True, error_model="numpy")
 def follow_swing(  # type: ignore[no-untyped-def]
-    grid, held, facing, down, roots, facing_rate, down_rate, links, first, last, parts, values, carry, swell, grow,
-    rate,
+    grid, held, facing, down, roots, facing_rate, down_rate, links, first, last, parts, values, part_rate, skin_rate,
+    stretch_rate, rate,
 ):  # fmt: skip
     """Write the rates of strands as they fell on one body.
 
@@ -49,9 +49,9 @@ def follow_swing(  # type: ignore[no-untyped-def]
         last: (N,) row of the last one.
         parts: (P, COLUMNS), the body, see `parts`.
         values: its voxels.
-        carry: (P, 3, 4, S) rates of a part's points, affine in their place in the world.
-        swell: (S,) rate of the contact distance.
-        grow: (S,) rate of the logarithm of the bars' length.
+        part_rate: (P, 3, 4, S) rates of a part's points, affine in their place in the world.
+        skin_rate: (S,) rate of the contact distance.
+        stretch_rate: (S,) rate of the logarithm of the bars' length.
         rate: (N, L, 3, S), written.
     """
     bar, reached = np.empty((2, *rate.shape[2:]))
@@ -68,23 +68,23 @@ def follow_swing(  # type: ignore[no-untyped-def]
             f, d = facing[n], down[n]
             sine, cosine = ux * f[0] + uy * f[1] + uz * f[2], ux * d[0] + uy * d[1] + uz * d[2]
             for a, u in enumerate((ux, uy, uz)):
-                for s in range(len(grow)):
-                    bar[a, s] = sine * facing_rate[n, a, s] + cosine * down_rate[n, a, s] + u * grow[s]
+                for s in range(len(stretch_rate)):
+                    bar[a, s] = sine * facing_rate[n, a, s] + cosine * down_rate[n, a, s] + u * stretch_rate[s]
                     reached[a, s] = rate[n, pivot, a, s] + arm * bar[a, s]
             if held[n, end] > 0:
                 part = held[n, end] - 1
                 g = outwards(p[0], p[1], p[2], part, parts, values)
                 tx, ty, tz = cosine * f[0] - sine * d[0], cosine * f[1] - sine * d[1], cosine * f[2] - sine * d[2]
                 slope = arm * max(g[0] * tx + g[1] * ty + g[2] * tz, GRAZING)
-                turn = lack(g, p, reached, carry[part], swell)
+                turn = contact_lag(g, p, reached, part_rate[part], skin_rate)
                 for a, t in enumerate((tx, ty, tz)):
-                    for s in range(len(grow)):
+                    for s in range(len(stretch_rate)):
                         bar[a, s] += turn[s] / slope * t
             away = 0.0
             for k in range(pivot + 1, end + 1):
                 away += links[n, k - 1]
                 for a in range(3):
-                    for s in range(len(grow)):
+                    for s in range(len(stretch_rate)):
                         rate[n, k, a, s] = rate[n, pivot, a, s] + away * bar[a, s]
             pivot = end
 
@@ -98,20 +98,20 @@ def follow_move(rate, n, row, amount, towards):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, error_model="numpy")
-def lack(normal, p, rate, carry, swell):  # type: ignore[no-untyped-def]
+def contact_lag(normal, p, rate, part_rate, skin_rate):  # type: ignore[no-untyped-def]
     """Return how much faster (S,) a particle at p with rates (3, S) would have to leave the body to stay in contact."""
     gx, gy, gz = normal
-    wanted = swell.copy()
+    wanted = skin_rate.copy()
     for s in range(len(wanted)):
-        vx = carry[0, 0, s] * p[0] + carry[0, 1, s] * p[1] + carry[0, 2, s] * p[2] + carry[0, 3, s]
-        vy = carry[1, 0, s] * p[0] + carry[1, 1, s] * p[1] + carry[1, 2, s] * p[2] + carry[1, 3, s]
-        vz = carry[2, 0, s] * p[0] + carry[2, 1, s] * p[1] + carry[2, 2, s] * p[2] + carry[2, 3, s]
+        vx = part_rate[0, 0, s] * p[0] + part_rate[0, 1, s] * p[1] + part_rate[0, 2, s] * p[2] + part_rate[0, 3, s]
+        vy = part_rate[1, 0, s] * p[0] + part_rate[1, 1, s] * p[1] + part_rate[1, 2, s] * p[2] + part_rate[1, 3, s]
+        vz = part_rate[2, 0, s] * p[0] + part_rate[2, 1, s] * p[1] + part_rate[2, 2, s] * p[2] + part_rate[2, 3, s]
         wanted[s] += gx * (vx - rate[0, s]) + gy * (vy - rate[1, s]) + gz * (vz - rate[2, s])
     return wanted
 
 
 @numba.njit(cache=True, error_model="numpy", forceinline=True)
-def follow_length(rate, n, row, bar, link, grow):  # type: ignore[no-untyped-def]
+def follow_length(rate, n, row, bar, link, stretch_rate):  # type: ignore[no-untyped-def]
     """Change the rates of a bar's lower end, in `row`, as the bar from the row above is brought to its length."""
     dx, dy, dz = bar
     r = max(math.sqrt(dx * dx + dy * dy + dz * dz), 1e-9)
@@ -119,7 +119,7 @@ def follow_length(rate, n, row, bar, link, grow):  # type: ignore[no-untyped-def
     for s in range(rate.shape[3]):
         ax, ay, az = rate[n, up, 0, s], rate[n, up, 1, s], rate[n, up, 2, s]
         ex, ey, ez = rate[n, row, 0, s] - ax, rate[n, row, 1, s] - ay, rate[n, row, 2, s] - az
-        along = ux * ex + uy * ey + uz * ez - r * grow[s]
+        along = ux * ex + uy * ey + uz * ez - r * stretch_rate[s]
         mx, my, mz = ax + scale * (ex - along * ux), ay + scale * (ey - along * uy), az + scale * (ez - along * uz)
         share = FASTEST / math.sqrt(max(mx * mx + my * my + mz * mz, FASTEST * FASTEST))
         rate[n, row, 0, s], rate[n, row, 1, s], rate[n, row, 2, s] = share * mx, share * my, share * mz
@@ -141,12 +141,12 @@ def follow_draw(rate, n, m, row, way, share, most, here, there):  # type: ignore
         there: what the other does.
     """
     dx, dy, dz = way
-    grow = (most - share) / (dx * dx + dy * dy + dz * dz)
+    growth = (most - share) / (dx * dx + dy * dy + dz * dz)
     for s in range(rate.shape[3]):
         ex = rate[m, row, 0, s] - rate[n, row, 0, s]
         ey = rate[m, row, 1, s] - rate[n, row, 1, s]
         ez = rate[m, row, 2, s] - rate[n, row, 2, s]
-        apart = grow * (dx * ex + dy * ey + dz * ez)
+        apart = growth * (dx * ex + dy * ey + dz * ez)
         mx, my, mz = share * ex + apart * dx, share * ey + apart * dy, share * ez + apart * dz
         rate[n, row, 0, s] += here * mx
         rate[n, row, 1, s] += here * my

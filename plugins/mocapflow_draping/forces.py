@@ -65,11 +65,7 @@ def wind(garment: GarmentMesh, parameters: F64, turn: F64) -> tuple[F64, F64]:
         parameters: (B, Q).
         turn: (B, 3, 3), world_from_rest rotation of what carries the garment.
     """
-    names = garment.parameter_names
-    parts = [
-        parameters[:, names.index(name)] if name in names else np.zeros(len(parameters))
-        for name in ("wind_cos_rad", "wind_sin_rad")
-    ]
+    parts = [_column(garment, parameters, name) for name in ("wind_cos_rad", "wind_sin_rad")]
     force = np.einsum("bij,bj->bi", turn[:, :, :2], np.stack(parts, axis=1))
     force[:, 2] = 0.0
     amount = np.hypot(parts[0], parts[1])
@@ -78,15 +74,16 @@ def wind(garment: GarmentMesh, parameters: F64, turn: F64) -> tuple[F64, F64]:
 
 def thickness(garment: GarmentMesh, parameters: F64) -> F64:
     """Return the cloth's thickness (B,) m; zero where the garment has no such parameter."""
-    if THICKNESS not in garment.parameter_names:
-        return np.zeros(len(parameters))
-    column: F64 = np.maximum(parameters[:, garment.parameter_names.index(THICKNESS)], 0.0)
-    return column
+    return np.maximum(_column(garment, parameters, THICKNESS), 0.0)
 
 
 def remaining_length(garment: GarmentMesh, parameters: F64) -> F64:
     """Return the share (B,) of their sewn length that strands span: what folds and gathers take up is lost."""
-    if TAKE_UP not in garment.parameter_names:
-        return np.ones(len(parameters))
-    column: F64 = 1.0 - np.maximum(parameters[:, garment.parameter_names.index(TAKE_UP)], 0.0)
-    return column
+    return 1.0 - np.maximum(_column(garment, parameters, TAKE_UP), 0.0)
+
+
+def _column(garment: GarmentMesh, parameters: F64, name: str) -> F64:
+    """Return the values (B,) of one parameter of (B, Q); zero where the garment has no such parameter."""
+    if name not in garment.parameter_names:
+        return np.zeros(len(parameters))
+    return parameters[:, garment.parameter_names.index(name)]

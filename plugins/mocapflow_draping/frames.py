@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mocapflow.records import F64
-from mocapflow_draping.strands import Strands, carried, roots
+from mocapflow_draping.strands import Strands, carried, roots, unit
 
 DOWN = np.array([0.0, 0.0, -1.0])
 
@@ -19,8 +19,7 @@ def standing_out(strands: Strands, chain: F64) -> F64:
     facing = np.einsum("bnij,nj->bni", turned, strands.facing)
     facing -= np.maximum(facing[..., 2:], 0.0) * turned[..., 2]
     facing[..., 2] = 0.0
-    level: F64 = facing / np.maximum(np.linalg.norm(facing, axis=-1, keepdims=True), 1e-9)
-    return level
+    return unit(facing)
 
 
 def along_limbs(strands: Strands, chain: F64) -> F64:
@@ -74,8 +73,7 @@ def riding(strands: Strands, chain: F64, links: F64, out: F64, aside: F64) -> F6
         aside: (B, N) rad, tilt to the left seen from there.
     """
     moved = carried(strands, chain)
-    bars = np.diff(moved, axis=2)
-    bars /= np.maximum(np.linalg.norm(bars, axis=-1, keepdims=True), 1e-9)
+    bars = unit(np.diff(moved, axis=2))
     facing = np.einsum("bnij,nj->bni", chain[:, strands.carrier, :3, :3], strands.facing)[:, :, None]
     tail = strands.tail[:, 1:]
     bars = tilted(bars, facing, out[:, :, None] * tail, aside[:, :, None] * tail)

@@ -11,7 +11,6 @@ from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, Pos
 from mocapflow.assets import Body, GarmentMesh
 from mocapflow.data import Past, Pose, PoseBatch
 from mocapflow.dressing.roles import Draper
-from mocapflow.errors import PluginError
 from mocapflow.geometry.differences import all_columns, neighbours, tried_columns
 from mocapflow.geometry.kinematics import chain_batch
 from mocapflow.memo import memoised
@@ -20,11 +19,11 @@ from mocapflow.scene import Scene
 from mocapflow_draping.fields import BodyFields, build_fields, touchable_joints
 from mocapflow_draping.following import Motion
 from mocapflow_draping.forces import remaining_length, thickness, tilts, wind
-from mocapflow_draping.frames import along_limbs, riding, standing, standing_out
-from mocapflow_draping.laying import distinct, follow, lay, moving
+from mocapflow_draping.frames import along_limbs, riding, standing
+from mocapflow_draping.laying import distinct, lay, lay_moving, moving, placed
 from mocapflow_draping.parts import posed_parts, rates
 from mocapflow_draping.pushes import free_roots, free_strands
-from mocapflow_draping.strands import Strands, roots, strands_of
+from mocapflow_draping.strands import Strands, strands_of
 
 TINY = 1e-6  # rad, and share of a parameter's range: what the drape starts from is differentiated by steps
 
@@ -49,7 +48,6 @@ class Kinematic(Draper):
     name: ClassVar[str] = "kinematic"
     skin_m: NonNegativeFloat = 0.005  # room between skin and cloth of no thickness
     voxel_m: PositiveFloat = 0.010  # edge of a voxel of the body's distance fields
-    start_deg: Annotated[float, Field(gt=0, lt=180)] = 95.0  # hanging: from straight down, before strands fall
     rule: Literal["contact", "literal"] = "contact"  # from contact to contact; or in steps, as printed, a wind alone
     step_deg: PositiveFloat = 2.0  # literal: how far a particle turns in an iteration
     iterations: PositiveInt = 50  # literal: number of iterations
@@ -65,8 +63,7 @@ class Kinematic(Draper):
     def drape(self, poses: PoseBatch, parameters: F64, past: Past, scene: Scene) -> F64:
         """Return cloth vertices (B, W, 3) m in the world for B poses and parameters (B, Q)."""
         garment = scene.garment
-        if garment is None:
-            raise PluginError("the draper has no garment to drape", hint="name a garment in the pipeline's scene")
+        assert garment is not None
         fitting = self.fitting(garment, scene.body)
         strands = fitting.strands
         skin = self.skin_m + thickness(garment, parameters) / 2
@@ -78,13 +75,13 @@ class Kinematic(Draper):
         winds = tilts(garment, parameters, strands.azimuth)
         first = np.broadcast_to(strands.first, (len(source), len(strands.first)))
         if self.rule == "literal":
-            grid, first = self._literal(fitting, chain, source, parameters, garment, skin, links, parts)
+            force = wind(garment, parameters, chain[source, strands.carrier[0], :3, :3])
+            grid, first = self._literal(fitting, chain, links, skin, parts, source, force)
         elif strands.rides:
             grid = riding(strands, chain[source], links[source], *winds)
             free_roots(grid, strands.first, strands.last, parts[source], fitting.fields.values, None)
         else:
-            where = roots(strands, chain), standing_out(strands, chain), links
-            grid = lay(strands, fitting.fields, where, winds, source, skin, parts, math.radians(self.start_deg)).grid
+            grid = lay(strands, fitting.fields, placed(strands, chain, links), winds, source, skin, parts).grid
         if self.sweeps:
             self._close(fitting, grid, first, links[source], chain[source], skin[source], parts[source])
         vertices: F64 = grid.reshape(len(grid), -1, 3)[:, strands.place]
@@ -92,9 +89,10 @@ class Kinematic(Draper):
 
     def velocity(self, pose: Pose, parameters: F64, vertices: I32, past: Past, scene: Scene) -> F64:
         """Return the velocities (M, 3, 6 + D + Q) of cloth vertices (M,); contacts and taut links stay as they are."""
-        garment = scene.garment
-        if garment is None or self.rule == "literal":
+        if self.rule == "literal":
             return super().velocity(pose, parameters, vertices, past, scene)
+        garment = scene.garment
+        assert garment is not None
         tried = tried_columns(scene.body, self.touchable(scene), len(parameters))
         poses, values, steps = neighbours(tried, garment.parameter_bounds, pose, parameters, TINY, TINY)
         fitting = self.fitting(garment, scene.body)
@@ -110,12 +108,10 @@ class Kinematic(Draper):
             ridden = riding(strands, chain, links, *winds)
             grid, rate = ridden[-1:], rates(ridden, steps)
         else:
-            near = roots(strands, chain), standing_out(strands, chain), links
-            here, still = (near[0][-1:], near[1][-1:], links[-1:]), (winds[0][-1:], winds[1][-1:])
-            alone, start = np.zeros(1, np.int32), math.radians(self.start_deg)
-            laid = lay(strands, fitting.fields, here, still, alone, skin[-1:], parts, start)
-            grid, rate = laid.grid, follow(strands, fitting.fields, near, winds, laid, parts, moved)
-        motion = Motion(rate, np.zeros_like(rate), moved.carry, moved.swell, moved.grow)
+            grid, rate = lay_moving(
+                strands, fitting.fields, placed(strands, chain, links), winds, skin[-1:], parts, moved
+            )
+        motion = Motion(rate, np.zeros_like(rate), moved.part_rate, moved.skin_rate, moved.stretch_rate)
         if strands.rides:
             free_roots(grid, strands.first, strands.last, parts, fitting.fields.values, motion)
         if self.sweeps:
@@ -125,16 +121,13 @@ class Kinematic(Draper):
 
     def touchable(self, scene: Scene) -> Bool:
         """Return which joints (J,) move what the garment hangs from or can touch."""
+        assert scene.garment is not None
+        fitting = self.fitting(scene.garment, scene.body)
+        strands = fitting.strands
         touched = np.zeros(len(scene.body.parents), bool)
-        if scene.garment is not None:
-            fitting = self.fitting(scene.garment, scene.body)
-            strands = fitting.strands
-            touched[fitting.fields.joints] = True
-            touched[strands.root_joint[strands.root_weight > 0]] = True
-            if strands.rides:
-                touched[strands.skin_joint[strands.skin_weight > 0]] = True
-            else:
-                touched[strands.carrier] = True
+        touched[fitting.fields.joints] = True
+        touched[strands.root_joint[strands.root_weight > 0]] = True
+        touched[strands.skin_joint[strands.skin_weight > 0] if strands.rides else strands.carrier] = True
         return touched
 
     def fitting(self, garment: GarmentMesh, body: Body) -> Fitting:
@@ -142,33 +135,23 @@ class Kinematic(Draper):
         return _measured(body, garment, self.voxel_m)
 
     def _literal(
-        self,
-        fitting: Fitting,
-        chain: F64,
-        source: I32,
-        parameters: F64,
-        garment: GarmentMesh,
-        skin: F64,
-        links: F64,
-        parts: F64,
+        self, fitting: Fitting, chain: F64, links: F64, skin: F64, parts: F64, source: I32, force: tuple[F64, F64]
     ) -> tuple[F64, I32]:
         """Return particles (B, N, L, 3) m as the chapter lays them, and the rows (B, N) that free ends hang from."""
         from mocapflow_draping.literal import blow_in_steps, settle_in_steps
 
         strands, values = fitting.strands, fitting.fields.values
+        rows = strands.first, strands.last
         grid = standing(strands, chain, links)
         if strands.rides:
-            free_roots(grid, strands.first, strands.last, parts, values, None)
-            free_strands(grid, links, strands.first, strands.last, skin, parts, values)
+            free_roots(grid, *rows, parts, values, None)
+            free_strands(grid, links, *rows, skin, parts, values)
         fixed = np.zeros(grid.shape[:3], bool)
         fixed[:, np.arange(len(strands.first)), strands.first] = True
-        step, in_space = math.radians(self.step_deg), self.pivot == "space"
-        turns = step, self.iterations, self.limited, in_space
-        settle_in_steps(grid, fixed, strands.first, strands.last, skin, *turns, parts, values)
+        turns = math.radians(self.step_deg), self.iterations, self.limited, self.pivot == "space"
+        settle_in_steps(grid, fixed, *rows, skin, *turns, parts, values)
         grid, fixed = grid[source], fixed[source]
-        force, amount = wind(garment, parameters, chain[source, strands.carrier[0], :3, :3])
-        blown = strands.first, strands.last, skin[source], force, amount, parts[source], values
-        return grid, blow_in_steps(grid, fixed, *blown)
+        return grid, blow_in_steps(grid, fixed, *rows, skin[source], *force, parts[source], values)
 
     def _close(
         self, fitting: Fitting, grid: F64, first: I32, links: F64, chain: F64, skin: F64, parts: F64,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -9,12 +10,21 @@ import numpy as np
 from mocapflow.data import PoseBatch
 from mocapflow.records import F64, I32, record
 from mocapflow_draping.fields import BodyFields
-from mocapflow_draping.frames import DOWN, blown
-from mocapflow_draping.parts import carried_rates, rates
-from mocapflow_draping.strands import Strands
+from mocapflow_draping.frames import DOWN, blown, standing_out
+from mocapflow_draping.parts import part_rates, rates
+from mocapflow_draping.strands import Strands, roots
 
-Placed = tuple[F64, F64, F64]  # per body and strand: root (B, N, 3) m, horizontal `facing` (B, N, 3), bars (B, N, K) m
+START = math.radians(95.0)  # from straight down, how far strands stand out before they fall: above level
+
 Winds = tuple[F64, F64]  # rad, per drape and strand: tilts (B, N) of its tail, outwards and to its left
+
+
+class Placed(NamedTuple):
+    """Where N strands begin on each of B bodies, before they fall."""
+
+    root: F64  # (B, N, 3) m
+    facing: F64  # (B, N, 3) horizontal unit direction in which each stands out
+    links: F64  # (B, N, L - 1) m, lengths of the bars
 
 
 @record
@@ -22,9 +32,9 @@ class Rates:
     """How what a drape rests on moves, along S unknowns."""
 
     steps: F64  # (S,) by which the unknowns were changed
-    carry: F64  # (P, 3, 4, S) of the points of the body's parts, affine in their place in the world
-    swell: F64  # (S,) of the contact distance
-    grow: F64  # (S,) of the logarithm of the bars' length
+    part_rate: F64  # (P, 3, 4, S) of the points of the body's parts, affine in their place in the world
+    skin_rate: F64  # (S,) of the contact distance
+    stretch_rate: F64  # (S,) of the logarithm of the bars' length
 
 
 class Laid(NamedTuple):
@@ -55,33 +65,39 @@ def moving(fields: BodyFields, chain: F64, skin: F64, length: F64, steps: F64) -
         length: (S + 1,) of the cloth, over that as sewn.
         steps: (S,) of the unknowns.
     """
-    grow = rates(np.log(length), steps)
-    return Rates(steps=steps, carry=carried_rates(fields, chain, steps), swell=rates(skin, steps), grow=grow)
+    return Rates(
+        steps=steps,
+        part_rate=part_rates(fields, chain, steps),
+        skin_rate=rates(skin, steps),
+        stretch_rate=rates(np.log(length), steps),
+    )
 
 
-def lay(
-    strands: Strands, fields: BodyFields, where: Placed, winds: Winds, source: I32, skin: F64, parts: F64, start: float
-) -> Laid:
+def placed(strands: Strands, chain: F64, links: F64) -> Placed:
+    """Return where strands with bars `links` (B, N, L - 1) m begin, at posed joints (B, J, 4, 4)."""
+    return Placed(roots(strands, chain), standing_out(strands, chain), links)
+
+
+def lay(strands: Strands, fields: BodyFields, where: Placed, winds: Winds, source: I32, skin: F64, parts: F64) -> Laid:
     """Return B drapes on D bodies: strands fall once on each body, then winds turn the tails that are left.
 
     Args:
         strands: the garment's strands.
         fields: the body's parts.
-        where: where strands begin and stand on each body, and their bars.
+        where: strands begin on each body.
         winds: of each drape.
         source: (B,) body of each drape.
         skin: (D,) m, contact distance.
         parts: (D, P, COLUMNS), the bodies.
-        start: rad, how far from straight down strands stand before they fall.
     """
     from mocapflow_draping.blowing import blow_batch
     from mocapflow_draping.swing import fall_batch
 
-    roots, facing, links = (np.ascontiguousarray(each) for each in where)  # other strides would be compiled again
+    root, facing, links = (np.ascontiguousarray(each) for each in where)  # other strides would be compiled again
     shape = strands.vertex.shape
     fallen, lying = np.empty((len(parts), *shape, 3)), np.empty((len(parts), *shape), np.int32)
     fall_batch(
-        roots, facing, start, skin, links, strands.first, strands.last, parts, fields.values,
+        root, facing, START, skin, links, strands.first, strands.last, parts, fields.values,
         fallen, lying,
     )  # fmt: skip
     pivot = np.where(lying > 0, np.arange(shape[1], dtype=np.int32), strands.first[:, None]).max(axis=2)
@@ -94,22 +110,41 @@ def lay(
     return Laid(grid, held, pivot[source])
 
 
-def follow(
+def lay_moving(
+    strands: Strands, fields: BodyFields, near: Placed, winds: Winds, skin: F64, parts: F64, moved: Rates
+) -> tuple[F64, F64]:
+    """Return one drape (1, N, L, 3) m, and its rates (N, L, 3, S).
+
+    Args:
+        strands: the garment's strands.
+        fields: the body's parts.
+        near: of S + 1 bodies, one small step along each unknown and, last, none.
+        winds: of each of them.
+        skin: (1,) m, contact distance on the last.
+        parts: (1, P, COLUMNS), the last body.
+        moved: how it moves.
+    """
+    here, still = Placed(*(each[-1:] for each in near)), (winds[0][-1:], winds[1][-1:])
+    laid = lay(strands, fields, here, still, np.zeros(1, np.int32), skin, parts)
+    return laid.grid, _follow(strands, fields, near, winds, laid, parts, moved)
+
+
+def _follow(
     strands: Strands, fields: BodyFields, near: Placed, winds: Winds, laid: Laid, parts: F64, moved: Rates
 ) -> F64:
-    """Return the rates (N, L, 3, S) of one drape: `near` and `winds` (S + 1) with a small step along each unknown."""
+    """Return the rates (N, L, 3, S) of one drape; see `lay_moving`."""
     from mocapflow_draping.following import follow_swing
 
     rate = np.zeros((*laid.grid.shape[1:], len(moved.steps)))
-    (roots, facing, links), (back, towards, _) = near, blown(near[1], *winds)
-    begin, down = rates(roots, moved.steps), np.broadcast_to(DOWN, facing.shape)
+    (root, facing, links), (back, towards, _) = near, blown(near.facing, *winds)
+    begin, down = rates(root, moved.steps), np.broadcast_to(DOWN, facing.shape)
     for first, out, to in ((strands.first, facing, down), (laid.pivot[0], back, towards)):
         # other strides, or rows that can't be written, would be compiled again
         here, there = (np.ascontiguousarray(way[-1]) for way in (out, to))
         follow_swing(
             laid.grid[0], laid.held[0], here, there, begin, rates(out, moved.steps),
-            rates(to, moved.steps), links[-1], first.copy(), strands.last, parts[0], fields.values, moved.carry,
-            moved.swell, moved.grow, rate,
+            rates(to, moved.steps), links[-1], first.copy(), strands.last, parts[0], fields.values, moved.part_rate,
+            moved.skin_rate, moved.stretch_rate, rate,
         )  # fmt: skip
         begin = rate[np.arange(len(rate)), laid.pivot[0]]
     return rate

@@ -42,7 +42,7 @@ def posed_parts(fields: BodyFields, chain: F64) -> F64:
     return parts
 
 
-def carried_rates(fields: BodyFields, chain: F64, steps: F64) -> F64:
+def part_rates(fields: BodyFields, chain: F64, steps: F64) -> F64:
     """Return how the points of each part move: (P, 3, 4, S), affine in their place in the world.
 
     Args:

@@ -13,7 +13,7 @@ import numba
 import numpy as np
 
 from mocapflow_draping.distance import body_distance, outwards
-from mocapflow_draping.following import follow_length, follow_move, lack
+from mocapflow_draping.following import contact_lag, follow_length, follow_move
 
 CLEAR = 2e-4  # m beyond contact to which a particle is pushed, so that it need not be pushed again at once
 LIES = 0.003  # m, so near to contact a particle lies on the body
@@ -46,7 +46,8 @@ def free_roots(grid, first, last, parts, values, motion):  # type: ignore[no-unt
                     break
                 out = outwards(x, y, z, part, parts[b], values)
                 if motion is not None:
-                    amount = lack(out, (x, y, z), motion.rate[n, first[n]], motion.carry[part], 0.0 * motion.swell)
+                    rate, part_rate = motion.rate[n, first[n]], motion.part_rate[part]
+                    amount = contact_lag(out, (x, y, z), rate, part_rate, 0.0 * motion.skin_rate)
                 for row in range(first[n], last[n] + 1):
                     move(grid[b], n, row, CLEAR - d, out)
                     if motion is not None:
@@ -88,7 +89,7 @@ def push_out(grid, n, row, link, skin, seen, room, near, parts, values, motion):
         p = place(grid, n, row)
         out = outwards(p[0], p[1], p[2], near[n], parts, values)
         if motion is not None:
-            amount = lack(out, p, motion.rate[n, row], motion.carry[near[n]], motion.swell)
+            amount = contact_lag(out, p, motion.rate[n, row], motion.part_rate[near[n]], motion.skin_rate)
             follow_move(motion.rate, n, row, amount, out)
         move(grid, n, row, CLEAR - room[n], out)
         to_length(grid, n, row, link, motion)
@@ -135,7 +136,7 @@ def lift(grid, first, last, beside, row, seen, room, near, between, clear, parts
             out = outwards(middle[0], middle[1], middle[2], part, parts, values)
             if motion is not None:
                 between_them = 0.5 * (motion.rate[n, row] + motion.rate[m, row])
-                amount = lack(out, middle, between_them, motion.carry[part], 0.0 * motion.swell)
+                amount = contact_lag(out, middle, between_them, motion.part_rate[part], 0.0 * motion.skin_rate)
                 if row > first[n]:
                     follow_move(motion.rate, n, row, amount, out)
                 if row > first[m]:
@@ -161,7 +162,7 @@ def to_length(grid, n, row, link, motion):  # type: ignore[no-untyped-def]
     x, y, z = place(grid, n, row - 1)
     dx, dy, dz = grid[n, row, 0] - x, grid[n, row, 1] - y, grid[n, row, 2] - z
     if motion is not None:
-        follow_length(motion.rate, n, row, (dx, dy, dz), link, motion.grow)
+        follow_length(motion.rate, n, row, (dx, dy, dz), link, motion.stretch_rate)
     scale = link / max(math.sqrt(dx * dx + dy * dy + dz * dz), 1e-9)
     grid[n, row, 0], grid[n, row, 1], grid[n, row, 2] = x + scale * dx, y + scale * dy, z + scale * dz
 

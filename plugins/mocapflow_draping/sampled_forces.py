@@ -10,18 +10,20 @@ import numpy as np
 from pydantic import Field, NonNegativeInt, PositiveFloat
 
 from mocapflow.assets import GarmentMesh
+from mocapflow.components import ClothFitter
 from mocapflow.data import Cloth, Estimate, Frame, Past, Segmentation, Turn
 from mocapflow.geometry.sewing import THICKNESS
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow_draping import samples
-from mocapflow_draping.outline import OutlineFitter
+from mocapflow_draping.outline import outline_error
 
 FIRST_FRAMES = 2  # in which every direction is tried
-THICKNESS_STEP = 0.001  # m, of the refinement; half as much each round
+STEP = np.radians(5.0)  # of a force, in the first round of the refinement; half as much each further round
+THICKNESS_STEP = 0.001  # m, likewise
 
 
-class SampledForces(OutlineFitter):
+class SampledForces(ClothFitter):
     """Tries directions and amounts of every force and refines the best, one force after the other.
 
     Later frames try only calm cloth, so that a search that was led astray comes back, and around the last best. Each
@@ -35,7 +37,6 @@ class SampledForces(OutlineFitter):
     name: ClassVar[str] = "sampled_forces"
     directions: Annotated[int, Field(ge=2)] = 8  # directions that are tried of a force with two components
     amounts_deg: tuple[PositiveFloat, ...] = (5.0, 10.0, 20.0)  # amounts that are tried in each direction
-    step_deg: PositiveFloat = 5.0  # first step of the refinement; half as much each round
     rounds: NonNegativeInt = 3  # rounds of the refinement
     least_gain: Annotated[float, Field(ge=0, lt=1)] = 0.01  # share of the error that other forces have to save
     force_sd_deg: PositiveFloat = 6.0  # standard deviation of each force about zero
@@ -47,7 +48,7 @@ class SampledForces(OutlineFitter):
         cloth, garment = model.drape(estimate.pose, estimate.parameters, past), model.scene.garment
         if garment is None or not segmentation.silhouettes:
             return cloth
-        outline = self.outline_error(estimate.pose, cloth, segmentation, model)
+        outline = outline_error(estimate.pose, cloth, segmentation, model)
         forces = sum(samples.forces(garment), [])
 
         def error(vertices: F64, parameters: F64) -> float:
@@ -77,7 +78,7 @@ class SampledForces(OutlineFitter):
             yield partial(samples.replaced, garment, columns=every, values=np.zeros((1, len(every))))
         for k in range(self.rounds):
             for columns in forces:
-                yield partial(samples.beside, garment, columns=columns, step=np.radians(self.step_deg) / 2**k)
+                yield partial(samples.beside, garment, columns=columns, step=STEP / 2**k)
             if first and THICKNESS in garment.parameter_names:
                 column = garment.parameter_names.index(THICKNESS)
                 yield partial(samples.beside, garment, columns=[column], step=THICKNESS_STEP / 2**k)

@@ -50,9 +50,7 @@ class Strands:
     @cached_property
     def way(self) -> F64:
         """(N, 3), the unit direction from each strand's root to its end, at rest."""
-        way = self.rest[:, -1] - self.rest[:, 0]
-        unit: F64 = way / np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), 1e-9)
-        return unit
+        return unit(self.rest[:, -1] - self.rest[:, 0])
 
     @cached_property
     def place(self) -> I32:
@@ -172,6 +170,12 @@ def _pinned_skin(garment: GarmentMesh, roots: I32) -> I32:
     return np.array([pin[int(v)] for v in roots], np.int32)
 
 
+def unit(vectors: F64) -> F64:
+    """Return vectors (..., 3) at length one; those without length stay as they are."""
+    scaled: F64 = vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
+    return scaled
+
+
 def carried(strands: Strands, chain: F64) -> F64:
     """Return all particles (B, N, L, 3) m moved with the skin nearest to them, at posed joints (B, J, 4, 4)."""
     moved = np.einsum("nlk,bnlkij->bnlij", strands.skin_weight, chain[:, strands.skin_joint, :3])
@@ -217,9 +221,7 @@ def _from_middle(rows: F64, beside: I32) -> F64:
     graph = coo_matrix((np.ones(linked.sum()), (np.flatnonzero(linked), beside[linked, -1])), shape=(count, count))
     _, ring = connected_components(graph, directed=False)
     middle = np.stack([np.bincount(ring, rows[:, -1, a]) / np.bincount(ring) for a in range(3)], axis=1)
-    out = (rows[:, -1] - middle[ring]) * [1.0, 1.0, 0.0]
-    away: F64 = out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
-    return away
+    return unit((rows[:, -1] - middle[ring]) * [1.0, 1.0, 0.0])
 
 
 def _beside(garment: GarmentMesh, vertex: I32, own: Bool) -> tuple[I32, F64]:

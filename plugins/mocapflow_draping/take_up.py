@@ -6,31 +6,31 @@ import math
 from typing import ClassVar
 
 import numpy as np
-from pydantic import PositiveFloat
 
+from mocapflow.components import ClothFitter
 from mocapflow.data import Cloth, Estimate, Frame, Past, Segmentation, Turn
 from mocapflow.geometry.sewing import TAKE_UP
 from mocapflow.model import ClothedModel
 from mocapflow.periodic import falls_due
 from mocapflow.records import F64
 from mocapflow_draping import samples
-from mocapflow_draping.outline import OutlineFitter
+from mocapflow_draping.outline import outline_error
 
+SPREAD = 0.05  # standard deviation of the take-up's change in a second, share of a strand's length
+EVERY = 0.1  # s between two steps of it; where frames are farther apart, each takes one
+STEP = 0.01  # between the three take-ups that are compared, share of a strand's length
 FARTHEST = 2.0  # steps from the middle of three values that their parabola is trusted
 
 
-class TakeUp(OutlineFitter):
+class TakeUp(ClothFitter):
     """Moves the take-up of a hanging garment to where the outline fits the images; all else is as estimated.
 
     Folds and gathers come and go more slowly than a leg moves, so it is a random walk that begins at none in the first
-    frame and takes a step every `every_s`, in the first turn of a frame. A garment without this parameter is
+    frame and takes a step every tenth of a second, in the first turn of a frame. A garment without this parameter is
     draped as it is.
     """
 
     name: ClassVar[str] = "take_up"
-    take_up_sd: PositiveFloat = 0.05  # standard deviation of its change in a second, share of a strand's length
-    every_s: PositiveFloat = 0.1  # time between two steps; where frames are farther apart, each takes one
-    step: PositiveFloat = 0.01  # between the three take-ups that are compared, share of a strand's length
 
     def fit(
         self, frame: Frame, segmentation: Segmentation, estimate: Estimate, model: ClothedModel, past: Past, turn: Turn
@@ -42,16 +42,16 @@ class TakeUp(OutlineFitter):
         if turn.index > 0 or not past.moments:  # in the first frame the person is only being found
             return cloth
         last = past.moments[-1]
-        if not falls_due(last.time, frame.time, self.every_s):
+        if not falls_due(last.time, frame.time, EVERY):
             return cloth
         column = garment.parameter_names.index(TAKE_UP)
         low, high = garment.parameter_bounds[column]
         before = last.cloth.parameters[column]
-        spread = self.take_up_sd * math.sqrt(max(frame.time - last.time, self.every_s))
-        middle = np.clip(estimate.parameters[column], low + self.step, high - self.step)
-        tried = middle + self.step * np.array([-1.0, 0.0, 1.0])
+        spread = SPREAD * math.sqrt(max(frame.time - last.time, EVERY))
+        middle = np.clip(estimate.parameters[column], low + STEP, high - STEP)
+        tried = middle + STEP * np.array([-1.0, 0.0, 1.0])
         trials = samples.replaced(garment, estimate.parameters, [column], tried[:, None])
-        error = self.outline_error(estimate.pose, cloth, segmentation, model)
+        error = outline_error(estimate.pose, cloth, segmentation, model)
         off = np.array([error(vertices) for vertices in model.drapes(estimate.pose, trials, past)])
         best = lowest(tried, off + ((tried - before) / spread) ** 2)
         parameters = samples.replaced(garment, estimate.parameters, [column], np.array([[best]]))[0]

@@ -9,8 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from mocapflow_export import layout
-from mocapflow_fitting.detections import layout as names_of
-from mocapflow_fitting.detections import persons
+from mocapflow_fitting.detections import names_of, persons
 
 from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError

@@ -17,7 +17,7 @@ from mocapflow.geometry.cameras import project
 from mocapflow.geometry.turned import homography, shift_px
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
-from mocapflow_fitting.detections import need_keypoints, persons, spread
+from mocapflow_fitting.detections import need_keypoints, persons, spaced_evenly
 from mocapflow_fitting.triangulate import triangulate
 
 LOG = logging.getLogger("mocapflow")
@@ -49,7 +49,7 @@ class AlignCameras(Stage):
             RecordingError: there are no keypoints, or nobody is found in any frame.
         """
         cameras = recording.cameras
-        people = persons(recording, spread(recording.indices, self.frames), cameras).values()
+        people = persons(recording, spaced_evenly(recording.indices, self.frames), cameras).values()
         pixels = np.concatenate([person.pixels for person in people], axis=1)
         confidence = np.concatenate([person.confidence for person in people], axis=1)
         shared = (confidence > CONFIDENT).sum(axis=0) >= min(3, len(cameras))  # two views nearly always agree

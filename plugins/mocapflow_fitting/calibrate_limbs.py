@@ -24,7 +24,7 @@ from mocapflow.records import F64
 from mocapflow.results import Track, ViewChecks
 from mocapflow.scene import Scene
 from mocapflow.track import prepared
-from mocapflow_fitting.detections import frames_seen, spread
+from mocapflow_fitting.detections import frames_seen, spaced_evenly
 from mocapflow_fitting.keypoint_fit import fit
 from mocapflow_fitting.landmarks import landmarks
 from mocapflow_fitting.pose_fit import Solution, Spreads
@@ -94,12 +94,12 @@ class CalibrateLimbs(Stage):
         for good in (whole & track.steady, whole, found):  # those of a rough track seldom come to rest
             if good.sum() >= self.frames:
                 break
-        rows = spread(np.flatnonzero(good).tolist() or range(len(track.frame)), self.frames)
+        rows = spaced_evenly(np.flatnonzero(good).tolist() or range(len(track.frame)), self.frames)
         clothes = [track.cloth_parameters[r].copy() for r in rows]
         return [int(track.frame[r]) for r in rows], [track.pose(r) for r in rows], clothes
 
     def _from_keypoints(self, recording: Recording, scene: Scene) -> tuple[list[int], list[Pose], list[F64]]:
-        indices, names = spread(recording.indices, self.frames), landmarks(scene.body).names
+        indices, names = spaced_evenly(recording.indices, self.frames), landmarks(scene.body).names
         found = frames_seen(recording, indices, scene.cameras, names)
         _, poses = fit(scene.body, list(found.values()), scene.cameras)
         return list(found), list(poses), [scene.calm] * len(found)

@@ -32,11 +32,16 @@ def need_keypoints(recording: Recording) -> None:
     if has_keypoints(recording):
         return
     there = ", ".join(sorted(path.name for path in recording.folder.iterdir()))
-    raise RecordingError(
-        "there are no 2D keypoints of two cameras or more", where=str(recording.folder / "keypoints"),
-        hint=f"expected keypoints/cam01_json/*.json as OpenPose writes them; the recording has: {there}\n"
-        "with a pose of the first frame in init.json, use the stage start_from_file",
-    )  # fmt: skip
+    hint = (
+        f"expected keypoints/cam01_json/*.json as OpenPose writes them; the recording has: {there}\n"
+        "with a pose of the first frame in init.json, use the stage start_from_file"
+    )
+    raise keypoint_error(recording, "there are no 2D keypoints of two cameras or more", hint)
+
+
+def keypoint_error(recording: Recording, message: str, hint: str) -> RecordingError:
+    """Return the error of a recording's keypoints, with the folder they are in."""
+    return RecordingError(message, where=str(recording.folder / "keypoints"), hint=hint)
 
 
 def person_at(
@@ -49,7 +54,7 @@ def person_at(
     return person if found >= LEAST_POINTS else None
 
 
-def spread(indices: Sequence[int], count: int) -> list[int]:
+def spaced_evenly(indices: Sequence[int], count: int) -> list[int]:
     """Return `count` frames spread evenly, or all of them if there are fewer."""
     rows = np.unique(np.linspace(0, len(indices) - 1, count).round().astype(int))
     return [indices[row] for row in rows]
@@ -68,12 +73,11 @@ def persons(
     found = {index: person for index, person in seen.items() if person is not None}
     if not found:
         hint = "check that keypoints and cameras belong together (`mocapflow doctor`)"
-        where = str(recording.folder / "keypoints")
-        raise RecordingError("in no frame two cameras see the same person", where=where, hint=hint)
+        raise keypoint_error(recording, "in no frame two cameras see the same person", hint)
     return found
 
 
-def layout(recording: Recording, indices: Sequence[int], wanted: Layout | None) -> tuple[str, ...]:
+def names_of(recording: Recording, indices: Sequence[int], wanted: Layout | None) -> tuple[str, ...]:
     """Return the names of the keypoints, in the order of the files.
 
     Raises:
@@ -86,7 +90,7 @@ def layout(recording: Recording, indices: Sequence[int], wanted: Layout | None) 
         hint = (
             "begin where one of them is seen; fit_subject, start_from_keypoints and keypoints have a setting `layout`"
         )
-        raise RecordingError(message, where=str(recording.folder / "keypoints"), hint=hint)
+        raise keypoint_error(recording, message, hint)
     return LAYOUTS[told]
 
 
@@ -100,16 +104,15 @@ def frames_seen(
     """Return the person's landmarks in each frame that tells a pose.
 
     Raises:
-        RecordingError: there are no keypoints, or they tell no pose in any frame; see `persons` and `layout`.
+        RecordingError: there are no keypoints, or they tell no pose in any frame; see `persons` and `names_of`.
     """
     found = persons(recording, indices, cameras)
-    names = layout(recording, list(found), wanted)
+    names = names_of(recording, list(found), wanted)
     frames = {index: seen(person, names, landmarks) for index, person in found.items()}
     telling = {index: frame for index, frame in frames.items() if tells_pose(frame)}
     if not telling:
         hint = f"the body has {', '.join(landmarks)}; choose one with the parts that are seen"
-        where = str(recording.folder / "keypoints")
-        raise RecordingError("the keypoints show too little of the body", where=where, hint=hint)
+        raise keypoint_error(recording, "the keypoints show too little of the body", hint)
     return telling
 
 

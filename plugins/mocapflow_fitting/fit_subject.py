@@ -16,7 +16,7 @@ from mocapflow.geometry.skeleton import SEGMENTS
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow.scene import Scene
-from mocapflow_fitting.detections import frames_seen, has_keypoints, need_keypoints, spread
+from mocapflow_fitting.detections import frames_seen, has_keypoints, need_keypoints, spaced_evenly
 from mocapflow_fitting.keypoint_fit import Seen, fit
 from mocapflow_fitting.keypoint_layouts import Layout
 from mocapflow_fitting.landmarks import landmarks
@@ -74,7 +74,7 @@ class FitSubject(Stage):
         return fitted(scene.body, factors)
 
     def _seen(self, recording: Recording, names: Sequence[str], count: int, cameras: Sequence[Camera]) -> list[Seen]:
-        indices = spread(recording.indices, count)
+        indices = spaced_evenly(recording.indices, count)
         return list(frames_seen(recording, indices, cameras, names, self.layout).values())
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from mocapflow.assets import Body, Camera
 from mocapflow.data import Pose
-from mocapflow.geometry.cameras import projection
+from mocapflow.geometry.cameras import projections
 from mocapflow.geometry.registration import rigid_motion
 from mocapflow.records import F64, array, record
 from mocapflow_fitting.landmarks import Landmarks, landmarks
@@ -60,7 +60,7 @@ def in_space(points: F64, seen: Seen, spread: F64) -> Observed:
 def in_images(points: F64, seen: Seen, spread: F64, cameras: Sequence[Camera]) -> Observed:
     """Compare projected landmarks (L, 3) with the detections; `spread` (L,) m adds to the detector's error."""
     camera, point = np.nonzero(seen.confidence > 0)
-    matrices = np.stack([projection(c) for c in cameras])[camera]
+    matrices = projections(cameras)[camera]
     focal = np.array([c.intrinsics[0, 0] for c in cameras])[camera]
     pixel, slope, depth = projected(points[point], matrices)
     precision = np.sqrt(np.clip(seen.confidence[camera, point], 0.0, 1.0)) / np.hypot(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import combinations, product
 
 import numpy as np
 
@@ -43,23 +44,21 @@ def find_person(detections: Sequence[F64], cameras: Sequence[Camera]) -> Person 
     if len(counts) > 1:
         message = f"cameras list {' and '.join(map(str, counts))} keypoints of a person"
         raise RecordingError(message, hint="use one estimator with one layout for all cameras")
-    best: Person | None = None
-    seen: set[tuple[int, ...]] = set()
-    for a in range(len(cameras)):
-        for b in range(a + 1, len(cameras)):
-            for i in range(len(detections[a])):
-                for j in range(len(detections[b])):
-                    chosen = _joined(detections, cameras, {a: i, b: j})
-                    if chosen in seen:
-                        continue
-                    seen.add(chosen)
-                    person = _person(detections, cameras, chosen)
-                    if best is None or person.support > best.support:
-                        best = person
+    chosen = dict.fromkeys(_joined(detections, cameras, pair) for pair in _pairs(detections))  # each once, in order
+    people = [_person(detections, cameras, rows) for rows in chosen]
+    best = max(people, key=lambda person: person.support, default=None)
     return best if best is not None and best.support > 0 else None
 
 
+def _pairs(detections: Sequence[F64]) -> Iterator[dict[int, int]]:
+    """Yield every two detections of two cameras, by camera."""
+    for a, b in combinations(range(len(detections)), 2):
+        for i, j in product(range(len(detections[a])), range(len(detections[b]))):
+            yield {a: i, b: j}
+
+
 def _joined(detections: Sequence[F64], cameras: Sequence[Camera], pair: dict[int, int]) -> tuple[int, ...]:
+    """Return the row of each camera's detection, -1 for none: of a pair, and of what lies closest to its points."""
     person = _person(detections, cameras, tuple(pair.get(c, -1) for c in range(len(cameras))))
     chosen = []
     for c, camera in enumerate(cameras):

@@ -9,7 +9,7 @@ import numpy as np
 
 from mocapflow.assets import Body, Camera
 from mocapflow.data import Matches, Pose
-from mocapflow.geometry.cameras import projection
+from mocapflow.geometry.cameras import projections
 from mocapflow.geometry.kinematics import part_of
 from mocapflow.records import F64, I32
 from mocapflow_fitting.pose_fit import Observed, Solution, Spreads, View, descend, projected
@@ -47,7 +47,7 @@ def paired(body: Body, matches: Matches, cameras: Sequence[Camera], independent:
     """Return matches as a view of the skin vertices that take part; those with the garment are left out."""
     own = matches.vertex < len(body.vertices)
     vertices, point = np.unique(matches.vertex[own], return_inverse=True)
-    matrices = np.stack([projection(camera) for camera in cameras])[matches.camera[own]]
+    matrices = projections(cameras)[matches.camera[own]]
     along = matches.direction[own]
     free = np.all(along == 0, axis=1).astype(np.float64)
     onto = along[:, :, None] * along[:, None, :] + free[:, None, None] * np.eye(2)

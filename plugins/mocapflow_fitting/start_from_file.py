@@ -62,9 +62,9 @@ class StartFromFile(Stage):
     def _found(self, recording: Recording) -> Path:
         """Return the file with the pose of the first frame."""
         path = recording.folder / self.file
-        own = _own(path, recording.indices[0])
-        if own.is_file() or path.is_file():
-            return own if own.is_file() else path
+        for found in (_own(path, recording.indices[0]), path):
+            if found.is_file():
+                return found
         there = ", ".join(sorted(p.name for p in recording.folder.iterdir()))
         hint = f"the recording has: {there}\nelse use the stage start_from_silhouettes or start_from_keypoints"
         raise RecordingError("there is no file with the first pose", where=str(path), hint=hint)

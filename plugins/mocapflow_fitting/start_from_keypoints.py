@@ -7,10 +7,9 @@ from typing import ClassVar, Literal
 
 from mocapflow.components import Stage
 from mocapflow.data import Start
-from mocapflow.errors import RecordingError
 from mocapflow.recordings.recording import Recording
 from mocapflow.scene import Scene
-from mocapflow_fitting.detections import layout, need_keypoints, person_at, seen, tells_pose
+from mocapflow_fitting.detections import keypoint_error, names_of, need_keypoints, person_at, seen, tells_pose
 from mocapflow_fitting.keypoint_fit import fit
 from mocapflow_fitting.keypoint_layouts import Layout
 from mocapflow_fitting.landmarks import landmarks
@@ -46,7 +45,7 @@ class StartFromKeypoints(Stage):
             person = person_at(recording, index, scene.cameras)
             if person is None:
                 continue
-            points = seen(person, layout(recording, [index], self.layout), names)
+            points = seen(person, names_of(recording, [index], self.layout), names)
             if tells_pose(points):
                 if index > first:
                     LOG.warning("keypoints of frame %d tell no pose: that of frame %d is taken for it", first, index)
@@ -55,8 +54,6 @@ class StartFromKeypoints(Stage):
         later = range(last + recording.indices.step, recording.length, recording.indices.step)
         usable = next((index for index in later if person_at(recording, index, scene.cameras)), None)
         begin = "" if usable is None else f"they do in frame {usable}: begin there, with --frames {usable}:\nor "
-        raise RecordingError(
-            f"in frames {first} to {last} no two cameras see enough of the same person",
-            where=str(recording.folder / "keypoints"),
-            hint=f"{begin}check that keypoints and cameras belong together (`mocapflow doctor`), or write init.json",
-        )
+        hint = f"{begin}check that keypoints and cameras belong together (`mocapflow doctor`), or write init.json"
+        message = f"in frames {first} to {last} no two cameras see enough of the same person"
+        raise keypoint_error(recording, message, hint)

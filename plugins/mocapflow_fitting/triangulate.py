@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 
 from mocapflow.assets import Camera
-from mocapflow.geometry.cameras import projection
+from mocapflow.geometry.cameras import projections
 from mocapflow.records import F64, array, record
 
 USUAL_PX = 8.0  # error of a detection that is usual at most
@@ -36,7 +37,7 @@ def triangulate(
 
     A point needs two cameras; it starts at the pair of cameras whose point the other cameras support most.
     """
-    matrices = np.stack([projection(camera) for camera in cameras])  # (C, 3, 4)
+    matrices = projections(cameras)
     weight = np.where(np.isfinite(pixels).all(axis=-1), confidence, 0.0)
     pixels = np.where(weight[..., None] > 0, pixels, 0.0)
     position = _best_pair(pixels, weight, matrices, scale_px)
@@ -52,17 +53,17 @@ def triangulate(
 
 
 def _best_pair(pixels: F64, weight: F64, matrices: F64, scale_px: float) -> F64:
+    """Return the points (K, 3) m of the two cameras whose point all cameras support most; NaN where no two see one."""
     count, points = weight.shape
     best, support = np.full((points, 3), np.nan), np.zeros(points)
-    for a in range(count):
-        for b in range(a + 1, count):
-            pair = np.zeros_like(weight)
-            pair[[a, b]] = ((weight[a] > 0) & (weight[b] > 0)).astype(float)
-            position = _solve(pixels, pair, matrices, None)
-            error = _errors(position, pixels, matrices)
-            score = np.nansum(weight / (1 + (error / scale_px) ** 2), axis=0)
-            better = (score > support) & np.isfinite(position).all(axis=1)
-            best[better], support[better] = position[better], score[better]
+    for a, b in combinations(range(count), 2):
+        pair = np.zeros_like(weight)
+        pair[[a, b]] = ((weight[a] > 0) & (weight[b] > 0)).astype(float)
+        position = _solve(pixels, pair, matrices, None)
+        error = _errors(position, pixels, matrices)
+        score = np.nansum(weight / (1 + (error / scale_px) ** 2), axis=0)
+        better = (score > support) & np.isfinite(position).all(axis=1)
+        best[better], support[better] = position[better], score[better]
     return best
 
 

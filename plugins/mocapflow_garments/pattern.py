@@ -51,6 +51,18 @@ def waistband(garment: str, body: Body, height: float, around: float) -> tuple[F
     Raises:
         GarmentError: no body is at that height, or only legs or shoulders, or the band is far too wide to stay up.
     """
+    torso = _torso(garment, body, height)
+    tape = sections.perimeter(torso)
+    if (around - tape) / (2 * math.pi) > LARGEST_ROOM:
+        raise GarmentError(
+            f"{garment}: a waist of {around:.2f} m can't stay up on a body of {tape:.2f} m there",
+            hint=f"check waist_circumference_m and waist_height_m; {WHOSE}",
+        )
+    return torso, room(garment, "waist_circumference_m", around, tape)
+
+
+def _torso(garment: str, body: Body, height: float) -> F64:
+    """Return the torso's outline (N, 2) m at a height; see `waistband`."""
     outlines = sections.outlines(body, sections.level(height))
     if not outlines:
         raise GarmentError(
@@ -72,14 +84,7 @@ def waistband(garment: str, body: Body, height: float, around: float) -> tuple[F
             hint=f"the height is metres above the floor, of the upper edge; shoulders are {min(arms):.2f} m high\n"
             f"{WHOSE}",
         )
-    tape = sections.perimeter(torso)
-    away = (around - tape) / (2 * math.pi)
-    if away > LARGEST_ROOM:
-        raise GarmentError(
-            f"{garment}: a waist of {around:.2f} m can't stay up on a body of {tape:.2f} m there",
-            hint=f"check waist_circumference_m and waist_height_m; {WHOSE}",
-        )
-    return torso, room(garment, "waist_circumference_m", around, tape)
+    return torso
 
 
 def hip_rings(body: Body, height: float, rows: F64, around: F64, away: float) -> F64:

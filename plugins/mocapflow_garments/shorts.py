@@ -41,14 +41,11 @@ class Shorts(Garment):
         crotch = min(max(round((self.length_m - self.inseam_m) / link), 1), self.rings - 2)  # row
         outer, inner, around = self._place(body, link, crotch)
         vertices = np.concatenate([outer.reshape(-1, 3), inner.reshape(-1, 3)])
-        long = np.arange(outer.shape[0] * self.rings, dtype=np.int32).reshape(-1, self.rings)
-        inside = inner.shape[0] * inner.shape[1]
-        short = np.arange(long.size, long.size + inside, dtype=np.int32).reshape(-1, inner.shape[1])
-        legs = self._legs(long, short, crotch)
+        long, short = np.split(np.arange(len(vertices), dtype=np.int32), [outer[..., 0].size])
+        long, short = long.reshape(outer.shape[:2]), short.reshape(inner.shape[:2])
+        legs = _legs(long, short, crotch)
         rings, ring_length = _rings(long, legs, crotch, around)
-        strands = np.full((len(long) + len(short), self.rings), -1, np.int32)
-        strands[: len(long)] = long
-        strands[len(long) :, : short.shape[1]] = short
+        strands = np.concatenate([long, np.pad(short, ((0, 0), (0, crotch)), constant_values=-1)])
         pinned = strands[:, 0].copy()
         pinned_to = sewing.nearest_skin(body, vertices[pinned])
         names, bounds = sewing.force_parameters(self.force_orders)
@@ -60,7 +57,7 @@ class Shorts(Garment):
             strands=strands,
             rings=rings,
             ring_length=ring_length,
-            carried_by=self._carried_by(body, vertices, legs, pinned_to[: len(long)]),
+            carried_by=_carried_by(body, vertices, legs, pinned_to[: len(long)]),
             pinned=pinned,
             pinned_to=pinned_to,
             parameter_names=names,
@@ -133,17 +130,19 @@ class Shorts(Garment):
             least.append(tape + 2 * math.pi * pattern.EASE)
         return np.stack(rows, axis=1), np.array(least)
 
-    def _legs(self, long: I32, short: I32, crotch: int) -> list[I32]:
-        """Return the vertices (strands, rows) of each leg's tube, round the leg."""
-        pairs = zip(np.split(long[:, crotch:], 2), np.split(short, 2), strict=True)
-        return [np.concatenate([outer, inner]) for outer, inner in pairs]
 
-    def _carried_by(self, body: Body, vertices: F64, legs: list[I32], waist_skin: I32) -> I32:
-        carried = np.full(len(vertices), sewing.carrier(body, waist_skin), np.int32)
-        for leg in legs:
-            thigh = vertices[leg[:, : leg.shape[1] // 2 + 1]].reshape(-1, 3)  # a long leg ends at the shank
-            carried[leg] = sewing.carrier(body, sewing.nearest_skin(body, thigh))
-        return carried
+def _legs(long: I32, short: I32, crotch: int) -> list[I32]:
+    """Return the vertices (strands, rows) of each leg's tube, round the leg."""
+    pairs = zip(np.split(long[:, crotch:], 2), np.split(short, 2), strict=True)
+    return [np.concatenate([outer, inner]) for outer, inner in pairs]
+
+
+def _carried_by(body: Body, vertices: F64, legs: list[I32], waist_skin: I32) -> I32:
+    carried = np.full(len(vertices), sewing.carrier(body, waist_skin), np.int32)
+    for leg in legs:
+        thigh = vertices[leg[:, : leg.shape[1] // 2 + 1]].reshape(-1, 3)  # a long leg ends at the shank
+        carried[leg] = sewing.carrier(body, sewing.nearest_skin(body, thigh))
+    return carried
 
 
 def _leg(body: Body, side: float, height: float, start: float) -> F64:

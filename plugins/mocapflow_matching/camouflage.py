@@ -17,7 +17,7 @@ def with_feet(appearance: Mapping[str, F64], vertices: Bool) -> dict[str, F64]:
     return {**appearance, FEET: vertices.astype(np.float64)}
 
 
-def told_from_the_room(matches: Matches, past: Past) -> Matches:
+def without_camouflaged(matches: Matches, past: Past) -> Matches:
     """Return matches without those of parts that look like the room: the outline of the person ends elsewhere."""
     if FEET not in past.appearance:
         return matches

@@ -15,8 +15,8 @@ from mocapflow.geometry.contours import at_nearest, nearest_compatible
 from mocapflow.geometry.silhouettes import occluding_contour
 from mocapflow.pooling import pool
 from mocapflow.scene import Scene
-from mocapflow_matching.camouflage import told_from_the_room
-from mocapflow_matching.robust import robust_weights
+from mocapflow_matching.camouflage import without_camouflaged
+from mocapflow_matching.robust import robust_precision
 from mocapflow_matching.uncertainty import ANY_DIRECTION
 
 
@@ -39,7 +39,7 @@ class Containment(Matcher):
     ) -> Matches:
         """Return the pairs of every view; see the class."""
         views = [self.match_view(scene.cameras[s.camera], s, surface) for s in segmentation.of("person")]
-        return told_from_the_room(pool(views), past)
+        return without_camouflaged(pool(views), past)
 
     def match_view(self, camera: Camera, silhouette: Silhouette, surface: Surface) -> Matches:
         """Return the pairs of one view."""
@@ -53,7 +53,7 @@ class Containment(Matcher):
             pixel=target,
             direction=direction,
             vertex=model.vertex.take(stray),
-            weight=robust_weights(distance / self.sigma_px, "huber", self.scale) / self.sigma_px**2,
+            weight=robust_precision(distance, self.sigma_px, "huber", self.scale),
         )
 
 

@@ -9,16 +9,7 @@ import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from mocapflow.components import Matcher
-from mocapflow.data import (
-    Contour,
-    Frame,
-    Matches,
-    Past,
-    Segmentation,
-    Silhouette,
-    Surface,
-    Turn,
-)
+from mocapflow.data import Contour, Frame, Matches, Past, Segmentation, Silhouette, Surface, Turn
 from mocapflow.geometry.contours import pairs
 from mocapflow.geometry.silhouettes import occluding_contour
 from mocapflow.memo import memoised
@@ -26,9 +17,11 @@ from mocapflow.pooling import pool
 from mocapflow.records import F64, I32, Bool
 from mocapflow.scene import Scene
 from mocapflow.settings import PositiveOrInf
-from mocapflow_matching.camouflage import told_from_the_room
-from mocapflow_matching.robust import Loss, robust_weights
+from mocapflow_matching.camouflage import without_camouflaged
+from mocapflow_matching.robust import Loss, robust_precision
 from mocapflow_matching.uncertainty import contour_sigma
+
+FAR_CALM_MM = 15.0  # stands for `calm_mm`, if less, in a frame that began far off
 
 
 class ImageContour(NamedTuple):
@@ -60,7 +53,6 @@ class ContourIcp(Matcher):
     spacing_px: PositiveFloat = 4.0  # between the points of a contour
     hem_guard_px: NonNegativeFloat = 12.0  # skin so near to cloth counts as cloth: a hem is uncertain
     calm_mm: PositiveFloat = 15.0  # change of the body in a turn below which `later_reach_px` and `later_loss` hold
-    far_calm_mm: PositiveFloat = 15.0  # stands for calm_mm, if less, in a frame that began far off
     first_reach_px: PositiveFloat = 40.0  # pairs farther apart are left out at first
     later_reach_px: PositiveFloat = 10.0  # pairs farther apart are left out once the body is calm
     cloth_reach_px: PositiveOrInf = float("inf")  # pairs on cloth reach no farther: a hem that swings turns the pelvis
@@ -88,7 +80,7 @@ class ContourIcp(Matcher):
     ) -> Matches:
         """Return pairs of contour points; see the class."""
         views = [self.match_view(s, surface, scene, turn) for s in segmentation.of("person")]
-        return told_from_the_room(pool(views), past)
+        return without_camouflaged(pool(views), past)
 
     def match_view(self, silhouette: Silhouette, surface: Surface, scene: Scene, turn: Turn) -> Matches:
         """Return the pairs of one view."""
@@ -115,7 +107,7 @@ class ContourIcp(Matcher):
         return np.asarray((away <= self.cloth_reach_px) | ~surface.cloth.take(model.vertex.take(shown)))
 
     def _calm(self, turn: Turn) -> bool:
-        return turn.calm(min(self.calm_mm, self.far_calm_mm) if turn.far else self.calm_mm)
+        return turn.calm(min(self.calm_mm, FAR_CALM_MM) if turn.far else self.calm_mm)
 
     def contours(
         self, silhouette: Silhouette, surface: Surface, scene: Scene, turn: Turn
@@ -142,7 +134,7 @@ class ContourIcp(Matcher):
             pixel=pixel,
             direction=direction,
             vertex=vertex,
-            weight=robust_weights(distance / spread, loss, self.scale) / spread**2,
+            weight=robust_precision(distance, spread, loss, self.scale),
         )
 
 

@@ -13,7 +13,7 @@ from mocapflow.data import Frame, Matches, Past, Segmentation, Surface, Turn, em
 from mocapflow.geometry.cameras import magnification, project_each
 from mocapflow.records import F64, Bool
 from mocapflow.scene import Scene
-from mocapflow_matching.camouflage import told_from_the_room
+from mocapflow_matching.camouflage import without_camouflaged
 from mocapflow_matching.robust import robust_weights
 
 FEWEST = 8  # pairs of a waistband: fewer do not tell a tilt from a height
@@ -43,7 +43,7 @@ class InnerContours(Matcher):
         """Return the pairs of every view, weighted by how well they fit the surface."""
         if segmentation.inner is None:
             return empty_matches()
-        inner = told_from_the_room(segmentation.inner, past)
+        inner = without_camouflaged(segmentation.inner, past)
         image = project_each(surface.vertices[inner.vertex], inner.camera, scene.cameras)
         away = np.einsum("ma,ma->m", inner.pixel - image, inner.direction)
         worn = surface.cloth[inner.vertex]

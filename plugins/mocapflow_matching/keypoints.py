@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from mocapflow_fitting.detections import keypoint_error
 from mocapflow_fitting.keypoint_layouts import LAYOUTS, Layout, layout_of, rows_of
 from mocapflow_fitting.landmarks import landmarks
 from mocapflow_fitting.person import halving_px
@@ -14,7 +15,6 @@ from pydantic import PositiveFloat
 from mocapflow.assets import Body, Camera
 from mocapflow.components import Matcher
 from mocapflow.data import Frame, Matches, Past, Segmentation, Surface, Turn, empty_matches
-from mocapflow.errors import RecordingError
 from mocapflow.geometry.cameras import centre, project, project_each
 from mocapflow.memo import memoised
 from mocapflow.recordings.recording import Recording
@@ -46,7 +46,7 @@ class Keypoints(Matcher):
         """Raise if no camera has keypoints."""
         if not any(recording.keypoint_folders):
             hint = "expected keypoints/cam01_json/*.json as OpenPose writes them; or name another matcher"
-            raise RecordingError("there are no 2D keypoints", where=str(recording.folder / "keypoints"), hint=hint)
+            raise keypoint_error(recording, "there are no 2D keypoints", hint)
 
     def match(
         self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn

@@ -8,13 +8,13 @@ from typing import ClassVar, Literal
 import numpy as np
 from mocapflow_levelset import splits
 from mocapflow_levelset.layers import COLOURS, Shown, layer_of, shown
-from pydantic import PositiveFloat
 
 from mocapflow.data import Frame, Matches, Past, Segmentation, Surface, Turn
 from mocapflow.records import I32, Bool
 from mocapflow.scene import Scene
 from mocapflow_matching.contour_icp import ContourIcp
 
+SURE = 3.0  # log ratio from which on colours are surely another part's
 INSIDE = (2, 3)  # px inside of a contour at which its colours are looked up
 
 
@@ -26,7 +26,6 @@ class LayeredIcp(ContourIcp):
 
     name: ClassVar[str] = "layered_icp"
     residual: Literal["normal"] = "normal"  # the direction of a pair says where its inside is, so it has to have one
-    least: PositiveFloat = 3.0  # log ratio from which on colours are surely another part's
 
     def match(
         self, frame: Frame, segmentation: Segmentation, surface: Surface, past: Past, scene: Scene, turn: Turn
@@ -35,11 +34,11 @@ class LayeredIcp(ContourIcp):
         found = super().match(frame, segmentation, surface, past, scene, turn)
         if COLOURS not in past.appearance:
             return found
-        wrong = another_s(found, frame, shown(past), layer_of(scene), self.least)
+        wrong = of_another_layer(found, frame, shown(past), layer_of(scene), SURE)
         return replace(found, weight=np.where(wrong, 0.0, found.weight))
 
 
-def another_s(matches: Matches, frame: Frame, known: Shown, layers: I32, least: float) -> Bool:
+def of_another_layer(matches: Matches, frame: Frame, known: Shown, layers: I32, least: float) -> Bool:
     """Return which matches (M,) have, just inside the contour, colours that are surely another layer's."""
     wrong = np.zeros(len(matches.vertex), bool)
     for camera in np.unique(matches.camera):

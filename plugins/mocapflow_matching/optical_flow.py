@@ -15,11 +15,14 @@ from mocapflow.pooling import pool, weighted
 from mocapflow.records import F32, F64, Bool
 from mocapflow.scene import Scene
 from mocapflow_matching.carried import CLOTH_SHARE, carried_points, distances
-from mocapflow_matching.robust import robust_weights
+from mocapflow_matching.robust import robust_precision
 from mocapflow_matching.shape_flow import register
 from mocapflow_matching.uncertainty import contour_sigma
 
 WORKING_SIDE = 200  # px, at most, of the distance images: they are smooth
+SMOOTHNESS = 3.0  # weight of the flow's smoothness against the difference of the distance images
+BAND = 0.1  # half width of the band about the model's contour, share of the picture's longer side
+LEVELS = 3  # of the pyramid of distance images
 ON_CONTOUR = 1.0  # px from the image contour within which a target has to end
 LATER_SHARE = 0.25  # of points followed, after the turns in which shapes are registered: 0.2 to contour_icp's 0.8
 CONTOUR_SIGMA_PX = 1.0  # standard deviation of a pair of contour points on skin
@@ -41,9 +44,6 @@ class OpticalFlow(Matcher):
     first_turns: NonNegativeInt = 1  # turns at the beginning of a frame in which shapes are registered
     first_share: NonNegativeFloat = 2.3  # weight in these turns, where contour_icp's is 1
     spacing_px: PositiveFloat = 4.0  # between the points of the model's contour
-    smoothness: PositiveFloat = 3.0  # weight of the flow's smoothness against the difference of the distance images
-    band: PositiveFloat = 0.1  # half width of the band about the model's contour, share of the picture's longer side
-    levels: NonNegativeInt = 3  # levels of the pyramid
     cloth_sigma_px_per_m: PositiveFloat = 80.0  # as for contour_icp
     image_sigma_px: PositiveFloat = 1.5  # standard deviation of a tracked point
     scale: PositiveFloat = 2.0  # standard deviations beyond which a pair pulls no harder (Huber)
@@ -64,7 +64,7 @@ class OpticalFlow(Matcher):
         """Return the pairs by flow between frames."""
         matches = carried_points(frame, past, scene)
         away = distances(matches, surface, scene)
-        weight = self._robust(away, np.full(len(away), self.image_sigma_px))
+        weight = robust_precision(away, self.image_sigma_px, "huber", self.scale)
         return replace(matches, weight=weight * np.where(surface.cloth[matches.vertex], CLOTH_SHARE, 1.0))
 
     def registered(self, silhouette: Silhouette, surface: Surface, scene: Scene) -> Matches:
@@ -77,7 +77,7 @@ class OpticalFlow(Matcher):
         shrink = int(np.ceil(camera.size.max() / WORKING_SIDE))
         covered, shown = silhouettes.mask(boundary, camera), silhouette.distance > 0
         here, there = (silhouettes.mask_distance(_shrunk(mask, shrink)) for mask in (covered, shown))
-        flow = register(here, there, self.smoothness, self.levels, self.band * max(here.shape))
+        flow = register(here, there, SMOOTHNESS, LEVELS, BAND * max(here.shape))
         middle = (shrink - 1) / 2  # pixel centres are on integers in both sizes
         small = (model.pixel - middle) / shrink
         target = shrink * _snapped(small + _sampled(flow, small), there) + middle
@@ -90,12 +90,8 @@ class OpticalFlow(Matcher):
             pixel=(target - (model.pixel - model.anchor))[on],
             direction=np.zeros((int(on.sum()), 2)),
             vertex=model.vertex[on],
-            weight=self._robust(away, sigma)[on],
+            weight=robust_precision(away, sigma, "huber", self.scale)[on],
         )
-
-    def _robust(self, away: F64, sigma: F64) -> F64:
-        weight: F64 = robust_weights(away / sigma, "huber", self.scale) / sigma**2
-        return weight
 
 
 def _shrunk(mask: Bool, factor: int) -> Bool:

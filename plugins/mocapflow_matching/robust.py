@@ -29,6 +29,15 @@ def robust_weights(distance: F64, loss: Loss, scale: float) -> F64:
     return np.ones_like(distance)
 
 
+def robust_precision(distance: F64, sigma: F64 | float, loss: Loss, scale: float) -> F64:
+    """Return the weights (M,) px^-2 of pairs so many px apart, of standard deviation `sigma` px each or all.
+
+    One over the variance, times the robust factor; `scale` is in standard deviations, see `robust_weights`.
+    """
+    weight: F64 = robust_weights(distance / sigma, loss, scale) / sigma**2
+    return weight
+
+
 def zhang_keeps(distance: F64, good: float) -> Bool:
     """Return which pairs the statistics of their distances let pass.
 

@@ -10,7 +10,7 @@ import numpy as np
 from mocapflow.records import F32, F64, I32, Bool
 from mocapflow_physics.cloth import GRAVITY
 
-SPEED = 12.0  # m/s, far above a knee pulled up within `move_s` (2.7); between two looks for contacts less than REACH
+SPEED = 12.0  # m/s, far above a knee pulled up within 0.3 s (2.7); between two looks for contacts less than REACH
 REACH = 0.03  # m, nearer than this to the body a particle has a contact
 FRICTION = 0.2  # of cloth on skin
 SHARE = 0.2  # stiffness of a link in masses over squared steps: newton adds corrections up, more would overshoot

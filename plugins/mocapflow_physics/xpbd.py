@@ -8,12 +8,11 @@ from typing import Annotated, ClassVar
 from mocapflow_draping.forces import remaining_length, thickness
 from mocapflow_draping.kinematic import Fitting, Kinematic
 from mocapflow_draping.parts import posed_parts
-from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import Field, NonNegativeFloat, model_validator
 
 from mocapflow.assets import GarmentMesh
 from mocapflow.data import Past, Pose, PoseBatch
 from mocapflow.dressing.roles import Draper
-from mocapflow.errors import PluginError
 from mocapflow.geometry.kinematics import chain_batch
 from mocapflow.memo import memoised
 from mocapflow.records import F64, I32, Bool
@@ -22,7 +21,10 @@ from mocapflow_physics.cloth import drawn_in, links_of, pinned_of, pins_at, pull
 from mocapflow_physics.motion import beginning, between, centred
 from mocapflow_physics.simulation import Simulation
 
+MOVE = 0.3  # s in which the body comes from its last pose, or from rest
+REST = 0.3  # s in which the cloth then comes to rest
 EVERY = 2  # steps of the solver between two looks for contacts
+KINEMATIC = Kinematic(sweeps=4)  # whose strands, distance fields and velocities are used
 
 
 class Xpbd(Draper):
@@ -34,9 +36,6 @@ class Xpbd(Draper):
     name: ClassVar[str] = "xpbd"
     skin_m: NonNegativeFloat = 0.005  # room between skin and cloth of no thickness
     rate_hz: Annotated[float, Field(ge=60)] = 1920.0  # steps of the solver per second
-    move_s: PositiveFloat = 0.3  # time in which the body comes from its last pose, or from rest
-    rest_s: NonNegativeFloat = 0.3  # time in which the cloth then comes to rest
-    moves_like: Kinematic = Kinematic(sweeps=4)  # draper whose strands, distance fields and velocities are used
 
     @model_validator(mode="after")
     def _simulator_is_there(self) -> Xpbd:
@@ -47,16 +46,15 @@ class Xpbd(Draper):
     def drape(self, poses: PoseBatch, parameters: F64, past: Past, scene: Scene) -> F64:
         """Return cloth vertices (B, W, 3) m in the world for B poses and parameters (B, Q)."""
         garment = scene.garment
-        if garment is None:
-            raise PluginError("the draper has no garment to drape", hint="name a garment in the pipeline's scene")
-        fitting = self.moves_like.fitting(garment, scene.body)
+        assert garment is not None
+        fitting = KINEMATIC.fitting(garment, scene.body)
         strands = fitting.strands
         root, centre = centred(scene, poses.root)
         end = PoseBatch(root=root, angles=poses.angles)
         start, cloth = beginning(past, scene, end)
-        moving = max(round(self.move_s * self.rate_hz / EVERY), 1)
+        moving = max(round(MOVE * self.rate_hz / EVERY), 1)
         chains = [chain_batch(scene.body, moment) for moment in between(start, end, moving)]
-        resting = 1 + round(self.rest_s * self.rate_hz / EVERY)
+        resting = 1 + round(REST * self.rate_hz / EVERY)
         parts = [posed_parts(fitting.fields, chain) for chain in chains]
         settled = _simulation(fitting, garment, len(cloth), 1 / self.rate_hz).settle(
             cloth,
@@ -72,11 +70,11 @@ class Xpbd(Draper):
 
     def velocity(self, pose: Pose, parameters: F64, vertices: I32, past: Past, scene: Scene) -> F64:
         """Return the velocities (M, 3, 6 + D + Q) of cloth vertices (M,), taken from another draper."""
-        return self.moves_like.velocity(pose, parameters, vertices, past, scene)
+        return KINEMATIC.velocity(pose, parameters, vertices, past, scene)
 
     def touchable(self, scene: Scene) -> Bool:
         """Return which joints (J,) move what the garment hangs from or can touch."""
-        return self.moves_like.touchable(scene)
+        return KINEMATIC.touchable(scene)
 
 
 @memoised

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated
-from zipfile import BadZipFile
 
 import numpy as np
 from pydantic import AfterValidator
@@ -100,7 +99,7 @@ def read(path: Path) -> Density:
             density = Density(names=names, poses=poses, bandwidth=float(file["bandwidth"]))
     except FileNotFoundError:
         raise PipelineError("there is no such file of training poses", where=str(path), hint=hint) from None
-    except (OSError, ValueError, KeyError, AttributeError, EOFError, BadZipFile):  # what numpy says is about pickles
+    except Exception:  # of numpy, zipfile, zlib and tokenize, which say nothing that would help
         raise PipelineError("this is no file of training poses", where=str(path), hint=hint) from None
     usable = poses.ndim == 2 and poses.shape[1] == len(names) and poses.size and np.abs(poses).max() <= LARGEST
     if not (usable and 0 < density.bandwidth < np.inf):  # NaN is neither

@@ -10,10 +10,10 @@ from mocapflow_matching.robust import robust_weights
 from mocapflow_twist.twist_gauss_newton import TwistGaussNewton
 from pydantic import PositiveFloat
 
-from mocapflow.components import PoseSolver, Predictor, Prior
+from mocapflow.components import Predictor
 from mocapflow.data import NO_CLOTH, Frame, Matches, Past, Pose, Surface, Turn
 from mocapflow.geometry.cameras import project_each
-from mocapflow.guards.answers import estimate_of, pose_of
+from mocapflow.guards.answers import pose_of
 from mocapflow.model import ClothedModel
 from mocapflow.prediction import believed
 from mocapflow.scene import Scene
@@ -21,6 +21,8 @@ from mocapflow_priors.constant_velocity import ConstantVelocity
 from mocapflow_priors.joint_limits import JointLimits
 from mocapflow_priors.rest_pose import RestPose
 
+SOLVER = TwistGaussNewton(iterations=8, angle_sd_deg=20.0)  # of the pose that the points show
+PRIORS = (JointLimits(), RestPose())  # points on one side of a limb do not tell how it is turned
 LEAST_POINTS = 30  # that are followed; fewer are not believed
 LEAST_AGREEMENT = 0.5  # share of points that come to lie within `AGREEING_PX`
 AGREEING_PX = 4.0  # distance to where it was tracked
@@ -36,8 +38,6 @@ class ImageFlowPredictor(Predictor):
     name = "image_flow"
 
     otherwise: Predictor = ConstantVelocity()  # guesses what no point shows
-    pose_solver: PoseSolver = TwistGaussNewton(iterations=8, angle_sd_deg=20.0)  # of the pose that the points show
-    priors: tuple[Prior, ...] = (JointLimits(), RestPose())  # points on one side of a limb do not tell how it is turned
     sigma_px: PositiveFloat = 1.0  # standard deviation of a tracked point
     scale: PositiveFloat = 2.0  # standard deviations beyond which a point pulls no harder (Huber)
     touching_mm: PositiveFloat = 20.0  # from the skin within which cloth touches it; points on other cloth do not count
@@ -56,7 +56,7 @@ class ImageFlowPredictor(Predictor):
             return replace(followed, weight=followed.weight * robust / self.sigma_px**2)
 
         state = believed(guess, np.empty(0), NO_CLOTH)
-        pose = estimate_of(self.pose_solver, match, state, model, self.priors, past, Turn(index=0)).pose
+        pose = SOLVER.solve(match, state, model, PRIORS, past, Turn(index=0)).pose
         reached = distances(followed, model.surface(pose, NO_CLOTH), scene)
         return pose if np.mean(reached < AGREEING_PX) >= LEAST_AGREEMENT else guess
 

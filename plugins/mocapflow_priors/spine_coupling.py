@@ -14,22 +14,22 @@ from mocapflow.memo import memoised
 from mocapflow.scene import Scene
 from mocapflow_priors.rows import whitened
 
+LOWER, UPPER = "spine", "chest"  # the joints of the trunk
+
 
 class SpineCoupling(Prior):
-    """Holds the angles of two joints of the trunk together, each with its namesake.
+    """Holds the angles of the two joints of the trunk together, each with its namesake.
 
     The vertebrae share a bend; with clothes over the hips, the visible upper part of it says how the pelvis tilts.
     A body that lacks one of the joints has no such row.
     """
 
     name: ClassVar[str] = "spine_coupling"
-    lower: str = "spine"  # the lower joint
-    upper: str = "chest"  # the upper joint
     sd_deg: PositiveFloat = 3.0  # standard deviation between the two; 2.5 to 2.8 in walks, squats, kicks, jumps
 
     def residual(self, pose: Pose, past: Past, scene: Scene) -> Residual:
         """Return one row for each pair of angles of the same name."""
-        pairs = _namesakes(scene.body, self.lower, self.upper)
+        pairs = _namesakes(scene.body)
         jacobian = np.zeros((len(pairs), 6 + len(pose.angles)))
         sharpness = 1.0 / np.radians(self.sd_deg)
         for row, (below, above) in enumerate(pairs):
@@ -38,8 +38,8 @@ class SpineCoupling(Prior):
 
 
 @memoised
-def _namesakes(body: Body, lower: str, upper: str) -> list[tuple[int, int]]:
+def _namesakes(body: Body) -> list[tuple[int, int]]:
     """Return the screws of the lower and of the upper joint that have the same name, e.g. flexion."""
     number = {name: index for index, name in enumerate(body.screw_names)}
-    both = [(name, f"{upper}.{name.partition('.')[2]}") for name in body.screw_names]
-    return [(number[a], number[b]) for a, b in both if a.startswith(f"{lower}.") and b in number]
+    both = [(name, f"{UPPER}.{name.partition('.')[2]}") for name in body.screw_names]
+    return [(number[a], number[b]) for a, b in both if a.startswith(f"{LOWER}.") and b in number]

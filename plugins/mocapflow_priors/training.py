@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 
 from mocapflow.assets import Body
-from mocapflow.errors import PipelineError, RecordingError, alternatives
+from mocapflow.errors import MocapflowError, PipelineError, RecordingError, alternatives
 from mocapflow.geometry import angles
 from mocapflow.geometry.joints import angles_from_rotations
 from mocapflow.geometry.skeleton import unsided
@@ -97,7 +96,9 @@ def read_angles(path: Path, body: Body) -> Angles:
         raise RecordingError("there is no such file", where=str(path))
     try:
         return reader(path, body)
-    except (ValueError, KeyError, TypeError, IndexError, SyntaxError, BadZipFile) as error:  # as readers say so
+    except MocapflowError:
+        raise
+    except Exception as error:  # of bvhio, numpy, zipfile, zlib and tokenize
         raise RecordingError(f"cannot be read as {path.suffix}: {error}", where=str(path)) from error
 
 
@@ -161,7 +162,7 @@ def from_opensim(path: Path, body: Body) -> Angles:
     rest = opensim_at_rest(body)
     angles_only = {name: values for name, values in columns.items() if name[:-2] in COORDINATES and name in rest}
     degrees = bent_forwards(possible(angles_only, path), path)
-    return named({name: values - rest[name] for name, values in degrees.items()}, COORDINATES)
+    return {screw_of(name, COORDINATES): np.radians(values - rest[name]) for name, values in degrees.items()}
 
 
 def bent_forwards(degrees: Mapping[str, F64], path: Path) -> Mapping[str, F64]:
@@ -184,11 +185,6 @@ def opensim_at_rest(body: Body) -> Mapping[str, float]:
 
     found = coordinates(body, np.eye(4)[None], np.zeros((1, len(body.twists))))
     return {name: float(value[0]) for name, value in found.items()}
-
-
-def named(degrees: Mapping[str, F64], table: Mapping[str, str]) -> Angles:
-    """Return columns in degrees by the screws that a table of names without sides gives them."""
-    return {screw: np.radians(values) for name, values in degrees.items() if (screw := screw_of(name, table))}
 
 
 def screw_of(column: str, table: Mapping[str, str]) -> str:

@@ -81,15 +81,12 @@ def _check_whole(path: Path) -> None:
 def our_names(names: Sequence[str]) -> dict[str, int]:
     """Return which of the joints of a file are joints of ours."""
     plain = [name.rpartition(":")[2].lower().replace("_", "").replace(" ", "") for name in names]
+    right = {f"{ours[:-1]}r": tuple(map(mirrored, others)) for ours, others in ALIASES.items() if ours.endswith("_l")}
     found = {}
-    for ours, others in ALIASES.items():
-        sides = ("l", "r") if ours.endswith("_l") else ("",)
-        for side in sides:
-            own = ours[:-1] + side if side else ours
-            called = [own.replace("_", ""), *(mirrored(other) if side == "r" else other for other in others)]
-            index = next((plain.index(name) for name in called if name in plain), None)
-            if index is not None:
-                found[own] = index
+    for ours, others in {**ALIASES, **right}.items():
+        there = [name for name in (ours.replace("_", ""), *others) if name in plain]
+        if there:
+            found[ours] = plain.index(there[0])
     return found
 
 

@@ -20,7 +20,7 @@ from mocapflow.recordings.recording import Recording
 from mocapflow.records import U8
 from mocapflow.scene import Scene
 from mocapflow_sequence.commonest import commonest
-from mocapflow_sequence.first_frame import Learnt, empty_scene
+from mocapflow_sequence.first_frame import LEAST_SHARE, Learnt, empty_scene
 
 LOG = logging.getLogger("mocapflow")
 TURNED = (
@@ -46,7 +46,6 @@ class EmptyScene(Stage):
     extent: ClassVar[Literal["first"]] = "first"  # that of the `Start`; pictures come from all over the recording
     source: Literal["auto", "plates", "recording"] = "auto"  # auto: the plates where there are any
     samples: Annotated[int, Field(ge=3)] = 50  # pictures of each camera that are looked at
-    least_share: Annotated[float, Field(ge=0, le=1)] = 0.06  # share of them that has to show a colour
 
     def need(self, recording: Recording) -> None:
         """Raise if plates are wanted and missing, or if a camera lacks one though others have theirs."""
@@ -104,13 +103,13 @@ class EmptyScene(Stage):
         for c in views:
             pictures = self._pictures(recording, c)
             if first.usable[c]:
-                yield empty_scene(pictures, first.images[c], body, scene.cameras[c], self.least_share)
+                yield empty_scene(pictures, first.images[c], body, scene.cameras[c])
             else:
                 yield self._commonest(pictures)
 
     def _commonest(self, pictures: U8) -> Learnt:
         mean, spread, share = commonest(pictures, 1)[0]
-        return Learnt(mean, np.where(share[..., None] >= self.least_share, spread, np.float32(np.inf)))
+        return Learnt(mean, np.where(share[..., None] >= LEAST_SHARE, spread, np.float32(np.inf)))
 
     def _pictures(self, recording: Recording, camera: int) -> U8:
         """Return pictures (N, H, W, 3) of one camera, spread over the recording."""

@@ -16,6 +16,7 @@ from mocapflow.records import F32, F64, U8, Bool
 from mocapflow_sequence.colours import DEEP, Colours, alike, every, lab_bins, more_common, shaded
 from mocapflow_sequence.commonest import commonest
 
+LEAST_SHARE = 0.06  # of the pictures that has to show a colour
 COLOURS = 4  # of each pixel that are looked at: the room's, of who stands there, of shadows
 REACH_M = 0.15  # from the body at the start pose: limbs may be off by so much, and clothes stand off
 AROUND_M = 0.5  # up to where the room beside the person is looked at
@@ -49,7 +50,7 @@ class Evidence(NamedTuple):
         return np.where(self.far, alike(colour, self.first) | lit, self.rooms[bins])
 
 
-def empty_scene(pictures: U8, first: U8, body: Surface, camera: Camera, least_share: float) -> Learnt:
+def empty_scene(pictures: U8, first: U8, body: Surface, camera: Camera) -> Learnt:
     """Return one view of the empty scene: of the commonest colours of each pixel the first that is the room's.
 
     Away from the body as believed in the first frame, that frame shows the room. Near it a colour is the room's if it
@@ -60,7 +61,6 @@ def empty_scene(pictures: U8, first: U8, body: Surface, camera: Camera, least_sh
         first: (H, W, 3) the first frame.
         body: the person as believed in it.
         camera: the view.
-        least_share: of the pictures that have to show a colour.
     """
     colours, now = commonest(pictures, COLOURS), lab_bins(first)
     usual = np.median(colours[0].spread, axis=(0, 1))
@@ -71,16 +71,16 @@ def empty_scene(pictures: U8, first: U8, body: Surface, camera: Camera, least_sh
     for _ in range(ROUNDS):
         rooms, persons = more_common(now[beside], now[person]), more_common(now[person], now[beside])
         evidence = Evidence(shown.mean, far, rooms, persons)
-        learnt = chosen((*colours, shown), evidence, least_share)
+        learnt = chosen((*colours, shown), evidence)
         person = ~far & learnt.known & ~alike(shown, learnt.mean) & ~shaded(shown.mean, learnt.mean)
     return lit(learnt, pictures, evidence, usual, floor_around(body, camera) & learnt.known)
 
 
-def chosen(colours: Iterable[Colours], evidence: Evidence, least_share: float) -> Learnt:
+def chosen(colours: Iterable[Colours], evidence: Evidence) -> Learnt:
     """Return the first colour of each pixel that is the room's."""
     learnt = Learnt(evidence.first.copy(), np.full(evidence.first.shape, np.inf, np.float32))
     for colour in colours:
-        _take(learnt, colour, (colour.share >= least_share) & ~learnt.known & evidence.of_room(colour))
+        _take(learnt, colour, (colour.share >= LEAST_SHARE) & ~learnt.known & evidence.of_room(colour))
     return learnt
 
 

@@ -7,7 +7,6 @@ from functools import partial
 from typing import ClassVar
 
 import numpy as np
-from pydantic import PositiveFloat
 
 from mocapflow.components import Stage
 from mocapflow.geometry import twists
@@ -17,6 +16,9 @@ from mocapflow.scene import Scene
 from mocapflow.series import Numbers, changed
 from mocapflow_sequence.banded import difference_weights, minimise
 
+TURN_ACCELERATION = np.radians(2000.0)  # rad/s^2, standard deviation for the turning of the root
+ROOT_ACCELERATION = 15.0  # m/s^2, for the place of the root joint
+ANGLE_ACCELERATION = np.radians(4000.0)  # rad/s^2, for every joint angle
 LOST = 100.0  # rad^2 and m^2, the variance of a lost frame: its neighbours decide
 
 
@@ -24,15 +26,12 @@ class Smooth(Stage):
     """Balances each pose, weighted by its covariance, against accelerations that people do not make.
 
     The smallest sum of squares over the whole sequence of (correction / its standard deviation) and
-    (acceleration / the settings below): a Rauch-Tung-Striebel smoother, solved at once as a banded system. With
-    good images hardly anything changes; a frame that was lost is bridged by its neighbours. The settings are
-    standard deviations of what people do, not limits. The root turns about its joint, wherever rest has its origin.
+    (acceleration / the standard deviation of what people do): a Rauch-Tung-Striebel smoother, solved at once as a
+    banded system. With good images hardly anything changes; a frame that was lost is bridged by its neighbours. The
+    root turns about its joint, wherever rest has its origin.
     """
 
     name: ClassVar[str] = "smooth"
-    angle_acceleration_deg_s2: PositiveFloat = 4000.0  # standard deviation for every joint angle
-    root_acceleration_deg_s2: PositiveFloat = 2000.0  # standard deviation for the turning of the root
-    root_acceleration_m_s2: PositiveFloat = 15.0  # standard deviation for the place of the root joint
 
     def run(self, track: Track, scene: Scene) -> Track:
         """Return the smoothed track, which keeps the poses it was made from.
@@ -47,7 +46,9 @@ class Smooth(Stage):
         joint[:3, 3] = scene.body.positions[0]
         placed = track.root @ joint
         spread = changed(track.covariance, partial(_about_joint, placed, lost))
-        change, bridged = minimise(spread, _second_differences(placed, track), self._limits(track), track.time, lost)
+        change, bridged = minimise(
+            spread, _second_differences(placed, track), _limits(track.angles.shape[1]), track.time, lost
+        )
         turned = placed.copy()
         turned[:, :3, :3] = twists.exp(np.pad(change[:, :3], ((0, 0), (0, 3))))[:, :3, :3] @ placed[:, :3, :3]
         turned[:, :3, 3] += change[:, 3:6]
@@ -61,11 +62,10 @@ class Smooth(Stage):
             raw_root=track.root, raw_angles=track.angles,
         )  # fmt: skip
 
-    def _limits(self, track: Track) -> F64:
-        """Return the standard deviation of each acceleration (6 + D,) per s^2."""
-        turn, angle = np.radians(self.root_acceleration_deg_s2), np.radians(self.angle_acceleration_deg_s2)
-        parts = [np.full(3, turn), np.full(3, self.root_acceleration_m_s2), np.full(track.angles.shape[1], angle)]
-        return np.concatenate(parts)
+
+def _limits(angles: int) -> F64:
+    """Return the standard deviation of each acceleration (6 + D,) per s^2."""
+    return np.repeat([TURN_ACCELERATION, ROOT_ACCELERATION, ANGLE_ACCELERATION], [3, 3, angles])
 
 
 def _about(points: F64, size: int) -> F64:

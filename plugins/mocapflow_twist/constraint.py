@@ -14,8 +14,8 @@ import numpy as np
 
 from mocapflow.assets import Camera
 from mocapflow.data import Matches
-from mocapflow.geometry import cameras as pinhole
 from mocapflow.geometry import lines, twists
+from mocapflow.geometry.cameras import projections
 from mocapflow.records import F64, I32, Bool, array, record
 from mocapflow_twist import kernels
 
@@ -52,8 +52,8 @@ def image_rows(matches: Matches, cameras: Sequence[Camera]) -> Rows:
     Returns:
         One row per match with a direction, two for the others; errors in px.
     """
-    matrices = np.array([pinhole.projection(camera) for camera in cameras]).reshape(-1, 3, 4)
-    plane, divisor, match = kernels.image_planes(matches.camera, matches.pixel, matches.direction, matrices)
+    views = projections(cameras)
+    plane, divisor, match = kernels.image_planes(matches.camera, matches.pixel, matches.direction, views)
     return Rows(
         plane=plane,
         divisor=divisor,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from pydantic import PositiveFloat, PositiveInt
+from pydantic import PositiveFloat
 
 from mocapflow.assets import GarmentMesh
 from mocapflow.components import ClothFitter
@@ -27,11 +27,13 @@ from mocapflow.geometry.misfit import bilinear, dressed, misfit, outlines
 from mocapflow.geometry.sewing import TAKE_UP, THICKNESS
 from mocapflow.model import ClothedModel
 from mocapflow.pooling import pool
-from mocapflow.records import F64, Bool
+from mocapflow.records import F64
 from mocapflow_twist import steps
 from mocapflow_twist.constraint import image_rows
 from mocapflow_twist.normal_equations import Equations, dense_equations
 
+STEPS = 3  # at most
+FIRST_DAMPING = 1e-3  # share of the mean diagonal
 TRIALS = 4  # times that the damping is raised before a step is given up
 
 
@@ -44,11 +46,9 @@ class GaussNewton(ClothFitter):
     """
 
     name: ClassVar[str] = "gauss_newton"
-    iterations: PositiveInt = 3  # steps, at most
     sigma_px: PositiveFloat = 3.0  # standard deviation of the outline of cloth
     correlation_px: PositiveFloat = 15.0  # length over which the outline's errors agree
     cloth_sd: PositiveFloat = 0.15  # standard deviation of each parameter about a calm garment, share of its range
-    damping: PositiveFloat = 1e-3  # first damping, share of the mean diagonal
     spacing_px: PositiveFloat = 4.0  # between the points of the outline
 
     def fit(
@@ -59,8 +59,8 @@ class GaussNewton(ClothFitter):
         if garment is None or not segmentation.silhouettes:
             return cloth
         task = Task(self, segmentation, estimate, model, garment, past, model.surface(estimate.pose, cloth))
-        energy, damping = task.energy(cloth), self.damping
-        for _ in range(self.iterations):
+        energy, damping = task.energy(cloth), FIRST_DAMPING
+        for _ in range(STEPS):
             equations, before = task.equations(cloth), cloth
             for _ in range(TRIALS):
                 trial = task.moved(before, equations, damping)
@@ -118,17 +118,14 @@ class Task(NamedTuple):
         """Return the cloth after one damped step, its parameters within their bounds."""
         low, high = self.garment.parameter_bounds.T
         parameters, downhill = cloth.parameters, -equations.gradient
-        free = ~steps.at_bound(parameters, downhill, low, high) & self._fitted
+        forces = np.array([name not in (THICKNESS, TAKE_UP) for name in self.garment.parameter_names])
+        free = forces & ~steps.at_bound(parameters, downhill, low, high)
         if not free.any():  # the garment knows no forces, or each stands at a bound
             return cloth
         part = Equations(equations.hessian[np.ix_(free, free)], equations.gradient[free], equations.energy)
         increment = np.zeros(len(parameters))
         increment[free] = steps.step(part, steps.CLOTH_LEVER / (high - low)[free], damping)
         return self.model.drape(self.estimate.pose, np.clip(parameters + increment, low, high), self.past)
-
-    @property
-    def _fitted(self) -> Bool:
-        return np.array([name not in (THICKNESS, TAKE_UP) for name in self.garment.parameter_names])
 
     def _from_calm(self, cloth: Cloth) -> F64:
         return cloth.parameters - self.model.scene.calm

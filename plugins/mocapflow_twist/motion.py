@@ -44,15 +44,15 @@ class ClothMotion:
             return Guess(pose, guess.cloth)
         parameters = guess.cloth.parameters
         if self.unknowns:
-            low, high = self._bounds.T
+            low, high = self.bounds.T
             parameters = np.clip(parameters + increment[6 + len(pose.angles) :], low, high)
         return Guess(pose, self.model.drape(pose, parameters, self.past))
 
     def within_bounds(self, equations: Equations, guess: Guess) -> Equations:
         """Return the equations with cloth parameters held that stand at a bound and would leave it, and the take-up."""
-        if not (self.unknowns and self.model.clothed):
+        if not len(self.bounds):
             return equations
-        low, high = self._bounds.T
+        low, high = self.bounds.T
         first = 6 + len(guess.pose.angles)
         downhill, parameters = -equations.gradient[first:], guess.cloth.parameters
         held = first + np.flatnonzero(at_bound(parameters, downhill, low, high) | self._slow)
@@ -70,6 +70,14 @@ class ClothMotion:
         return np.array([name == TAKE_UP for name in self.model.scene.garment.parameter_names])
 
     @property
-    def _bounds(self) -> F64:
-        assert self.model.scene.garment is not None
-        return self.model.scene.garment.parameter_bounds
+    def bounds(self) -> F64:
+        """The bounds (Q, 2) of the cloth parameters that are solved for."""
+        return solved_bounds(self.model, self.unknowns)
+
+
+def solved_bounds(model: ClothedModel, unknowns: bool) -> F64:
+    """Return the bounds (Q, 2) of the cloth parameters that are solved for: of all or of none."""
+    garment = model.scene.garment
+    if not unknowns or model.draper is None or garment is None:
+        return np.empty((0, 2))
+    return garment.parameter_bounds

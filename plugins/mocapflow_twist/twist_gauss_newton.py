@@ -16,10 +16,11 @@ from mocapflow.records import F64
 from mocapflow_twist import steps
 from mocapflow_twist.constraint import image_rows, line_rows
 from mocapflow_twist.covariance import covariance, effective_share, observed, view_balance
-from mocapflow_twist.motion import ClothMotion
+from mocapflow_twist.motion import ClothMotion, solved_bounds
 from mocapflow_twist.normal_equations import Equations
 from mocapflow_twist.problem import Anchor, Data, Guess, Problem, Quadratic
 
+LINE_SIGMA = 0.003  # m, standard deviation of the distance to a projection ray, of a match known to one pixel
 TRIALS = 8  # times that the damping is raised before a step is given up
 LEAST_GAIN = 1e-14  # share of the energy below which a step is only rounding
 FIRST_DAMPING_PER_TURN = 0.3  # factor of the first damping at each further turn: gentle, then exact
@@ -38,7 +39,6 @@ class TwistGaussNewton(PoseSolver):
     far_iterations: NonNegativeInt = 0  # stands for iterations, if more, in a frame that begins far off
     steps_per_match: PositiveInt = 1  # steps with the same matches
     residual: Literal["image", "line"] = "image"  # distances in pixels, or to projection rays in space
-    line_sigma_mm: PositiveFloat = 3.0  # line: standard deviation of the distance to a ray, of a match known to 1 px
     damping: NonNegativeFloat = 1e-4  # least damping, share of the mean diagonal; ten times more after a worse step
     damping_per_turn: PositiveFloat = 1.0  # factor on it at each turn of the loop: above 1, first exact, then gentle
     first_damping: NonNegativeFloat = 0.0  # least damping in the first turn of a first frame, whose start is far off
@@ -88,7 +88,7 @@ class TwistGaussNewton(PoseSolver):
         """Return the matches as rows, weighted by how many independent measurements they hold."""
         cameras = model.scene.cameras
         line = self.residual == "line"
-        rows = line_rows(matches, cameras, self.line_sigma_mm / 1000) if line else image_rows(matches, cameras)
+        rows = line_rows(matches, cameras, LINE_SIGMA) if line else image_rows(matches, cameras)
         share = effective_share(matches, self.correlation_px)
         balance = view_balance(matches, share) if self.balance_views else np.ones(len(share))
         weight = rows.weight * (share * balance).take(rows.match)
@@ -110,10 +110,9 @@ class TwistGaussNewton(PoseSolver):
     def _precision(self, model: ClothedModel, guess: Guess) -> F64:
         """Return one over the variance of the damping of every unknown."""
         turn, bend = np.radians(self.root_sd_deg), np.radians(self.angle_sd_deg)
-        spread = [np.full(3, turn), np.full(3, self.root_sd_m), np.full(len(guess.pose.angles), bend)]
-        if self.cloth_unknowns and model.clothed:
-            spread.append(np.maximum(self.cloth_sd * parameter_ranges(model), 1e-12))
-        precision: F64 = np.concatenate(spread) ** -2.0
+        pose = np.repeat([turn, self.root_sd_m, bend], [3, 3, len(guess.pose.angles)])
+        cloth = self.cloth_sd * np.ptp(solved_bounds(model, self.cloth_unknowns), axis=1)
+        precision: F64 = np.concatenate([pose, np.maximum(cloth, 1e-12)]) ** -2.0
         return precision
 
     def _descend(
@@ -122,8 +121,7 @@ class TwistGaussNewton(PoseSolver):
         """Return a guess of lower energy for the same matches, or the same guess where there is none worth a step."""
         equations = motion.within_bounds(equations, guess)
         angles = len(guess.pose.angles)
-        ranges = parameter_ranges(problem.model) if problem.unknowns > 6 + angles else np.empty(0)
-        lever = steps.levers(angles, ranges)
+        lever = steps.levers(angles, np.ptp(motion.bounds, axis=1))
         least = max(LEAST_GAIN * equations.energy, 0.5 * problem.unknowns * self.stop_sigmas**2)
         for _ in range(TRIALS):
             increment = steps.step(equations, lever, damping)
@@ -156,13 +154,4 @@ def quadratic(problem: Problem, guess: Guess, motion: ClothMotion) -> Quadratic:
 
 def calmed(guess: Guess, model: ClothedModel) -> Guess:
     """Return a guess whose garment hangs without forces: where its parameters are held, however they came about."""
-    if model.scene.garment is None:
-        return guess
     return Guess(guess.pose, replace(guess.cloth, parameters=model.scene.calm))
-
-
-def parameter_ranges(model: ClothedModel) -> F64:
-    """Return the width of the bounds of each cloth parameter: (Q,)."""
-    assert model.scene.garment is not None
-    ranges: F64 = np.ptp(model.scene.garment.parameter_bounds, axis=1)
-    return ranges

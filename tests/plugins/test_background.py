@@ -187,7 +187,7 @@ def learnt(places, shade=1.0, move=None):
     shown, empty, mask, body, camera = taken(places, shade)
     if move is not None:
         body = replace(body, vertices=body.vertices + move)
-    scene = empty_scene(shown, shown[0], body, camera, 0.06)
+    scene = empty_scene(shown, shown[0], body, camera)
     return scene.known, np.abs(scene.mean - empty).max(axis=2), mask
 
 

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mocapflow_bodies.joints import TABLE, screws, table_row
+from mocapflow_bodies.joints import TABLE, screws
 from mocapflow_bodies.scanned import Morph, Scanned
 
 from mocapflow.data import Pose
 from mocapflow.errors import PipelineError, RecordingError
 from mocapflow.geometry import kinematics, twists
 from mocapflow.geometry.joints import angles_from_rotations
-from mocapflow.geometry.skeleton import Skeleton
+from mocapflow.geometry.skeleton import Skeleton, unsided
 from mocapflow.io.scans import read_skeleton
 
 RECORDINGS = Path(__file__).parents[2] / "examples" / "data"
@@ -117,7 +117,7 @@ def test_axes_turn_with_the_body(body):
 def test_limits_of_knee_and_elbow_count_from_the_straight_limb(body):
     for name, at_rest in (("knee_l", 9.5), ("elbow_l", 37.8)):
         screw = body.screw_names.index(f"{name}.flexion")
-        low = table_row(name)[0].low_deg
+        low = TABLE[unsided(name)][0].low_deg
         assert np.degrees(body.limits[screw, 0]) == pytest.approx(low - at_rest, abs=0.2)
 
 

@@ -272,12 +272,6 @@ def test_a_draper_that_has_draped_can_be_sent_to_another_process():
     assert np.array_equal(sent.drape(poses, parameters, Past(), scene), draped)
 
 
-def test_a_draper_without_a_garment_says_so():
-    scene, poses = skirted(), leg_poses()
-    with pytest.raises(PluginError, match="no garment to drape"):
-        draper().drape(poses, calm(scene, 4), Past(), Scene(cameras=(), body=scene.body))
-
-
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [

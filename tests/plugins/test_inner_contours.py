@@ -14,7 +14,7 @@ from mocapflow_levelset.inner import Search, inner_contours, told_apart
 from mocapflow_levelset.inner_edges import inner_edges
 from mocapflow_levelset.layers import COLOURS, layer_of, shown
 from mocapflow_matching.inner_contours import InnerContours, slipped
-from mocapflow_matching.layered_icp import LayeredIcp, another_s
+from mocapflow_matching.layered_icp import LayeredIcp, of_another_layer
 from test_layers import CLOTHS, SCENE, SKIN, dressed, learned, painted
 
 from mocapflow.data import CLOTH, Change, Matches, Past, Pose, Turn, empty_matches
@@ -237,7 +237,7 @@ def test_contours_of_another_part_s_colours_make_no_pair():
     )
     assert (right.weight > 0).mean() > 0.95
     assert (wrong.weight > 0).mean() < 0.2
-    assert another_s(right, swapped, shown(past), layer_of(SCENE), 2.0).mean() > 0.8
+    assert of_another_layer(right, swapped, shown(past), layer_of(SCENE), 2.0).mean() > 0.8
 
 
 def test_whose_colours_they_are_needs_the_direction_of_a_contour():

@@ -214,7 +214,10 @@ def test_files_of_another_kind(body: Body, tmp_path: Path) -> None:
     (tmp_path / "take.bvh").write_text("ROOT hips\n{\n}\nMOTION\nFrames: 0\nFrame Time: 0.1\n")
     with (tmp_path / "take.npz").open("wb") as file:
         np.save(file, np.ones(3))
-    for name in ("take.bvh", "take.npz"):
+    np.savez(tmp_path / "headless.npz", joint_names=np.array(["knee_l"]))
+    broken = (tmp_path / "headless.npz").read_bytes().replace(b"}", b" ")
+    (tmp_path / "headless.npz").write_bytes(broken)
+    for name in ("take.bvh", "take.npz", "headless.npz"):
         with pytest.raises(RecordingError, match=rf"{name}  cannot be read as \.(bvh|npz): "):
             training.read_angles(tmp_path / name, body)
 
