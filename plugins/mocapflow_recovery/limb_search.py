@@ -38,7 +38,6 @@ CURED = 2.0  # times as far apart may be what is doubted no more: a leg lay wher
 CLEARED = 1.1  # the same, what leaves no hint: of a foot that was lost all other limbs and the cloth tell nothing
 NEAR_M = 0.35  # changes farther than this from the model are somebody else
 START = np.radians(6.0)  # how far off, in each angle, a given first pose may be
-OVERBENT = np.radians(5.0)  # a joint so far beyond its soft limits is looked for: lost limbs go there
 TOLERANCE = 0.03  # share by which the error may grow for parts to stay as they were fitted
 FIRST_LOOKS = 2  # times that each search is repeated in a first frame whose fit is doubted
 UNKNOWN = "too little is known of the room behind the person: limbs that are lost are not looked for"
@@ -234,7 +233,7 @@ class LimbSearch(Recovery):
     def signs(self) -> Signs:
         """What calls for a search."""
         leap = np.radians(self.leap_deg)
-        return Signs(self.uncovered_cm2, self.floating_cm2, self.hint_cm2, self.beginnings, OVERBENT, leap)
+        return Signs(self.uncovered_cm2, self.floating_cm2, self.hint_cm2, self.beginnings, leap)
 
 
 def noted(result: FrameResult, note: str, doubted: bool) -> FrameResult:
