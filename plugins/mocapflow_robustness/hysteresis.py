@@ -42,10 +42,10 @@ class Cleared:
 
     scenes: Mapping[str, tuple[F32, F32]]
 
-    def frames(self, source: Recording, indices: range) -> Iterator[Frame]:
+    def frames(self, source: Recording) -> Iterator[Frame]:
         """Yield the cleared frames."""
         scenes = [self.scenes[view.lens.name] for view in source.views]
-        for frame in replace(source, indices=indices).frames():
+        for frame in source.frames():
             pairs = zip(frame.images, scenes, strict=True)
             yield replace(frame, images=tuple(cleared(image, *scene) for image, scene in pairs))
 
