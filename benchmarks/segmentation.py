@@ -16,17 +16,16 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 from mocapflow_levelset.grabcut import GrabCut
-from mocapflow_levelset.levelset import LevelSet
+from mocapflow_levelset.levelset import BORDER_PX, LevelSet
 from mocapflow_levelset.masks import counted
 from mocapflow_levelset.plates import Plate, Shadow, plate_of
 from mocapflow_levelset.redistance import redistance
-from mocapflow_levelset.view import Empty, View, find
+from mocapflow_levelset.view import BAND_PX, Empty, View, find
 from skimage.segmentation import chan_vese, morphological_chan_vese
 
 from mocapflow.records import F32, U8, Bool
 
 WIDTH, HEIGHT, ROUNDS = 640, 800, 5
-BAND_PX = 12.0
 TEXTURE = 18.0  # grey levels, standard deviation of each of two patterns
 
 
@@ -91,8 +90,8 @@ def levelset(task: Task, start: F32, known: bool = False) -> Bool:
     segmenter = LevelSet(shape_weight=0.0)
     levels = segmenter._levels(warm=False)
     empty = Empty(task.plates, np.zeros((HEIGHT, WIDTH), bool)) if known else None
-    view = View(task.image, start, start, counted(start.shape, segmenter.border_px), empty)
-    return find(view, levels, segmenter._method(Shadow()), BAND_PX).level > 0
+    view = View(task.image, start, start, counted(start.shape, BORDER_PX), empty)
+    return find(view, levels, segmenter._method(Shadow())).level > 0
 
 
 def grabcut(task: Task, start: F32, iterations: int) -> Bool:

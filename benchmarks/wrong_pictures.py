@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from mocapflow_robustness import doubts
-from mocapflow_robustness.check_views import CheckViews, rooms
+from mocapflow_robustness.check_views import JUMP, doubted, longest, rooms
 from mocapflow_robustness.thumbnails import Thumbnails, thumbnails
 
 from mocapflow.recordings.recording import open_recording
@@ -43,8 +43,7 @@ def spoil(seen: Thumbnails, kind: str, rng: np.random.Generator) -> tuple[F32, F
 
 def main(folders: list[Path]) -> None:
     """Print a line for each recording."""
-    stage = CheckViews()
-    print(f"{'':20} flagged  strongest (of {stage.jump:g})  " + "  ".join(KINDS))
+    print(f"{'':20} flagged  strongest (of {JUMP:g})  " + "  ".join(KINDS))
     for folder in folders:
         recording = open_recording(folder)
         seen, names = thumbnails(recording), [camera.name for camera in recording.cameras]
@@ -52,11 +51,11 @@ def main(folders: list[Path]) -> None:
 
         def flagged(grey: F32, news: F64, seen: Thumbnails = seen, room: F32 = room) -> np.ndarray:
             given = Thumbnails(grey=grey, news=news, there=seen.there)
-            return stage.doubt(given, room, recording.frame_rate, names) != ""  # noqa: B023  used in this round only
+            return doubted(given, room, recording.frame_rate, names) != ""  # noqa: B023  used in this round only
 
         steps = doubts.distance(np.diff(seen.grey, axis=0))
-        longest = stage.longest(recording.frame_rate)
-        strongest = max((found[0] for found in doubts.candidates(seen.grey, steps, longest, 0.1)), default=0.0)
+        bursts = doubts.candidates(seen.grey, steps, longest(recording.frame_rate), 0.1)
+        strongest = max((found[0] for found in bursts), default=0.0)
         line = f"{folder.name:20} {flagged(seen.grey, seen.news).sum():7} {strongest:10.2f}          "
         rng = np.random.default_rng(2)
         for kind in KINDS:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from functools import cached_property, partial
 from itertools import pairwise
@@ -46,11 +46,6 @@ class ViewChecks:
         for camera, reason in zip(self.camera[first:last], self.reasons[first:last], strict=True):
             usable[camera], reasons[camera] = False, reason
         return replace(frame, usable=usable, reasons=tuple(reasons))
-
-
-def steadied(frames: Iterable[Frame], checks: ViewChecks | None) -> Iterable[Frame]:
-    """Return frames as the track is drawn on them: see `ViewChecks.steadied`."""
-    return frames if checks is None else map(checks.steadied, frames)
 
 
 @record
@@ -126,6 +121,14 @@ class Track:
 def _unknown(lost: Bool, covariance: F64, rows: Numbers) -> F64:
     """Return the covariances of rows (K,), of lost frames those of a pose that nobody has seen."""
     return np.where(lost[rows, None, None], UNKNOWN * np.eye(covariance.shape[1]), covariance)
+
+
+def rows_with_frames(track: Track, frames: Iterable[Frame], checks: ViewChecks | None) -> Iterator[tuple[int, Frame]]:
+    """Yield rows of a track, each with the frame that it is of, to be drawn on: see `ViewChecks.steadied`."""
+    rows = {int(index): row for row, index in enumerate(track.frame)}
+    for frame in frames:
+        if frame.index in rows:
+            yield rows[frame.index], frame if checks is None else checks.steadied(frame)
 
 
 def values_of(frame: Frame, result: FrameResult, steps: Sequence[str]) -> dict[str, Any]:

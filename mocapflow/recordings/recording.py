@@ -31,8 +31,8 @@ class FrameChange(Protocol):
     Which frames are asked for, and in what order, must not matter for what any of them becomes.
     """
 
-    def frames(self, source: Recording, indices: range) -> Iterator[Frame]:
-        """Yield the changed frames; `source` gives them as they were, and any other."""
+    def frames(self, source: Recording) -> Iterator[Frame]:
+        """Yield the frames of `source`, which gives them as they were, changed."""
 
 
 @record
@@ -129,8 +129,8 @@ class Recording:
         }
 
     def _read(self, indices: range) -> Iterator[Frame]:
-        source = replace(self, changes=self.changes[:-1], watch=silent)
-        frames = self.changes[-1].frames(source, indices) if self.changes else self._decode(indices)
+        source = replace(self, changes=self.changes[:-1], indices=indices, watch=silent)
+        frames = self.changes[-1].frames(source) if self.changes else self._decode(indices)
         for done, frame in enumerate(frames, 1):
             yield frame
             self.watch(done, len(indices))

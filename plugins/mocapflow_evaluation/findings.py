@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from mocapflow.records import F64
 from mocapflow_evaluation.alignment import HALF, Alignment
 from mocapflow_evaluation.cycles import Cycle
 from mocapflow_evaluation.ours import Ours
@@ -27,20 +28,15 @@ def said(
         notes.append(f"not compared, for the track has no such angles: {', '.join(unknown[:MOST])}{more}")
     if not reference.by_frame and len(reference.at) > 1:
         notes.append(f"reference at {1 / reference.step:.4g} per second, interpolated at our {own.frame_rate:.4g}")
-    theirs, most = (
-        max((float(np.nanmax(np.abs(curve), initial=0.0)) for curve in curves), default=0.0)
-        for curves in ([known[name] for name in found.signs] for known in (reference.curves, own.columns))
-    )
-    if theirs <= np.pi and most > min(BENT, LARGER * theirs):
-        notes.append(f"no angle of the reference is above {theirs:.1f}, ours reach {most:.0f}: is it in radians?")
+    ours, theirs = (_largest([known[name] for name in found.signs]) for known in (own.columns, reference.curves))
+    if theirs <= np.pi and ours > min(BENT, LARGER * theirs):
+        notes.append(f"no angle of the reference is above {theirs:.1f}, ours reach {ours:.0f}: is it in radians?")
     if np.isnan(found.lag):
         notes.append(f"no lag within {longest_lag_s:g} s fits best; see longest_lag_s of stage evaluate")
     elif found.worth:
         when = "later" if found.lag > 0 else "earlier"
-        shift, late = abs(found.lag), 1000 * abs(found.lag) / own.frame_rate
-        notes.append(
-            f"we come {shift:.1f} frames ({late:.0f} ms) {when} than the reference; only 'aligned' takes it out"
-        )
+        late = f"{abs(found.lag):.1f} frames ({1000 * abs(found.lag) / own.frame_rate:.0f} ms) {when}"
+        notes.append(f"we come {late} than the reference; only 'aligned' takes it out")
     turned = [name for name, sign in found.signs.items() if sign < 0]
     if turned:
         notes.append(f"the reference counts the other way: {', '.join(turned)}; only 'aligned' turns it round")
@@ -48,6 +44,10 @@ def said(
         count = {side: sum(c.side == side for c in strides) for side in ("l", "r")}
         notes.append(f"strides, by heel strikes in our own joint centres: {count['l']} left, {count['r']} right")
     return notes
+
+
+def _largest(curves: Sequence[F64]) -> float:
+    return max((float(np.nanmax(np.abs(curve), initial=0.0)) for curve in curves), default=0.0)
 
 
 def apart_in_time(own: Ours, reference: Reference) -> list[str]:

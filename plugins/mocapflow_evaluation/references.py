@@ -69,12 +69,15 @@ def read_reference(path: Path) -> Reference:
     if not path.is_file():
         raise RecordingError("no such reference", where=str(path))
     if path.suffix.lower() not in readers:
-        raise RecordingError(
-            f"can't compare with a {path.suffix or 'file without ending'}",
-            where=str(path),
-            hint=f"known: {', '.join(SUFFIXES)}, and folders like keypoints/",
-        )
+        hint = f"known: {', '.join(SUFFIXES)}, and folders like keypoints/"
+        raise RecordingError(f"can't compare with a {path.suffix or 'file without ending'}", where=str(path), hint=hint)
     reference = readers[path.suffix.lower()](path)
+    _check(reference, path)
+    return reference
+
+
+def _check(reference: Reference, path: Path) -> None:
+    """Raise where the samples of a reference are not one curve in time, or its angles are none."""
     grows = np.diff(reference.at) > 0  # what is interpolated has to; nan does not
     if not grows.all():
         row, clock = int(np.argmin(grows)) + 1, "frame" if reference.by_frame else "time"
@@ -87,7 +90,6 @@ def read_reference(path: Path) -> Reference:
         if (size := float(np.nanmax(np.abs(curve), initial=0.0))) > AROUND:
             hint = "angles are in degrees; mend or leave out this column"
             raise RecordingError(f"{name} reaches {size:.0f}°, more than once around", where=str(path), hint=hint)
-    return reference
 
 
 def _table(path: Path) -> Reference:
@@ -136,12 +138,9 @@ def _positions(path: Path, labels: tuple[str, ...], positions: F64, time: F64) -
         centres = marker_joints.joint_centres(marks)
         names = tuple(centres)
         if not names:
-            hint = (
-                f'name the landmarks in {path.parent / FILE}: knee_lateral_l = "…"; the markers are {", ".join(labels)}'
-            )
-            raise RecordingError(
-                "these are neither joint centres nor markers that are known", where=str(path), hint=hint
-            )
+            said, known_by = "these are neither joint centres nor markers that are known", path.parent / FILE
+            hint = f'name the landmarks in {known_by}: knee_lateral_l = "…"; the markers are {", ".join(labels)}'
+            raise RecordingError(said, where=str(path), hint=hint)
         positions = np.stack(list(centres.values()), axis=1)
         curves = angles.between_centres(centres) | _about_axes(marks, centres)
         notes = (f"joint centres and knee axes from {len(marks)} markers on bony landmarks",)

@@ -81,7 +81,7 @@ def compare_rigs(own: Ours, reference: Reference, lag: float, common_points: Pat
     )
 
 
-def _sampled(reference: Reference, ours: F64, lag: float = 0.0) -> Stick:
+def _sampled(reference: Reference, ours: F64, lag: float) -> Stick:
     """Return the joint centres of a reference at our times (T,) s, or a lag (s) before."""
     assert reference.joints is not None
     columns = reference.joints.reshape(len(reference.at), -1).T
@@ -103,12 +103,8 @@ def _figures(found: Registration, by: str) -> dict[str, Any]:
 
 def _notes(found: Registration, by: str, measured: bool) -> tuple[str, ...]:
     residual, left_out = 1000 * compare.rms(found.residual), 1000 * compare.rms(found.left_out)
-    said = (
-        f"rigs registered by {by}: residual {residual:.1f} mm, leave-one-out {left_out:.1f} mm, scale {found.scale:.4f}"
-    )
-    odd = (
-        "the scale is not applied: check units and calibrations of both"
-        if measured and abs(found.scale - 1) > ODD
-        else ""
-    )
-    return (said, odd) if odd else (said,)
+    sizes = f"residual {residual:.1f} mm, leave-one-out {left_out:.1f} mm, scale {found.scale:.4f}"
+    said = f"rigs registered by {by}: {sizes}"
+    if measured and abs(found.scale - 1) > ODD:
+        return said, "the scale is not applied: check units and calibrations of both"
+    return (said,)

@@ -21,17 +21,8 @@ STICK_PLOT = RESULTS / "stick_model.png"
 AGREEMENT_PLOT = RESULTS / "agreement.png"
 CYCLES_PLOT = RESULTS / "cycles.png"
 COMPARISON = (
-    EVALUATION,
-    ERRORS,
-    CYCLES,
-    FINDINGS,
-    KEYPOINTS,
-    DISTANCES,
-    STICK,
-    STICK_PLOT,
-    AGREEMENT_PLOT,
-    CYCLES_PLOT,
-)
+    EVALUATION, ERRORS, CYCLES, FINDINGS, KEYPOINTS, DISTANCES, STICK, STICK_PLOT, AGREEMENT_PLOT, CYCLES_PLOT,
+)  # fmt: skip
 PLOT = RESULTS / "angles.png"
 OVERLAP = RESULTS / "overlap.png"
 RUN = Path("run.json")

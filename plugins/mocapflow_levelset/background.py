@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from pydantic import Field, NonNegativeFloat
+from pydantic import NonNegativeFloat
 
 from mocapflow.assets import Background
 from mocapflow.data import Frame, FrameState, Past, Segmentation, Silhouette, Turn
@@ -21,14 +21,22 @@ from mocapflow_levelset.masks import counted
 from mocapflow_levelset.plates import Plate, Shadow, density_image, plate_in
 from mocapflow_levelset.shadows import ShadowAware, shadowed
 from mocapflow_levelset.statistics import Window
-from mocapflow_levelset.view import Empty, Level, Method, View, find
+from mocapflow_levelset.view import BAND_PX, Empty, Level, Method, View, find
 
 CHANNELS: tuple[ChannelName, ...] = ("lab",)
-STRIDE = 2  # of the pixels that the statistics are taken from
 SMOOTH_PX = 1.0  # of the evidence before it is cut
 REFINE_STEPS = 4  # against the plate, then as many with local statistics on both sides
 HOLE_PX2 = 120  # area up to which holes are filled
 SMALLEST_PART = 0.01  # of the largest part's area; smaller parts are noise
+METHOD = Method(  # of the refinement; the shadow is that of the image
+    channels=CHANNELS,
+    weights=Weights(sigma_px=1.5, length=0.5, shape=0.0, clip=RATIO_CLIP, step=1.0, band_px=INNER_BAND_PX),
+    shadow=Shadow(),
+    calm_px=SMOOTH_PX,
+    decorrelate=False,
+    stride=2,
+    margin_px=40,
+)
 
 
 class BackgroundDifference(ShadowAware):
@@ -41,8 +49,6 @@ class BackgroundDifference(ShadowAware):
     needs_background: ClassVar[bool] = True
 
     reach_px: NonNegativeFloat = 60.0  # parts further from the projected model than this are someone else; 0: keep all
-    length_weight: NonNegativeFloat = 0.5  # weight of the boundary's length in the refinement
-    band_px: Annotated[float, Field(ge=8)] = 12.0  # half width of the band in which the distance is computed
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
         """Return the person's silhouette in each usable view.
@@ -60,8 +66,8 @@ class BackgroundDifference(ShadowAware):
         for c, camera in enumerate(scene.cameras):
             if not frame.usable[c]:
                 continue
-            model = model_distance(surface, camera, self.band_px)
-            floor = shadowed(frame, surface, scene, c, self.shadow_reach_m)
+            model = model_distance(surface, camera, BAND_PX)
+            floor = shadowed(frame, surface, scene, c)
             distance = self.find(frame.images[c], model, floor, scene.background, c, frame.hidden_in(c))
             silhouettes.append(Silhouette(camera=c, layer=PERSON, distance=distance))
         return Segmentation(silhouettes=tuple(silhouettes))
@@ -84,7 +90,7 @@ class BackgroundDifference(ShadowAware):
         view = View(image, start, start, counted(start.shape, 0, hidden), Empty({1: plate}, floor))
         against_plate = Level(1, Rhythm(REFINE_STEPS, 3, 3), Window(12.0, 8, 0.02))
         levels = [against_plate, against_plate._replace(use_plate=False)]
-        return find(view, levels, self._method(shadow), self.band_px).level
+        return find(view, levels, METHOD._replace(shadow=shadow)).level
 
     def _start(self, image: U8, model: F32, plate: Plate, floor: Bool, shadow: Shadow, hidden: Bool | None) -> F32:
         """Return a level set (H, W), not a distance: positive where the image is unlike the plate."""
@@ -119,16 +125,3 @@ class BackgroundDifference(ShadowAware):
         small[0] = False
         kept: Bool = person | small[label]
         return kept
-
-    def _method(self, shadow: Shadow) -> Method:
-        return Method(
-            channels=CHANNELS,
-            weights=Weights(
-                sigma_px=1.5, length=self.length_weight, shape=0.0, clip=RATIO_CLIP, step=1.0, band_px=INNER_BAND_PX
-            ),
-            shadow=shadow,
-            calm_px=SMOOTH_PX,
-            decorrelate=False,
-            stride=STRIDE,
-            margin_px=40,
-        )

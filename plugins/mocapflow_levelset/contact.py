@@ -12,10 +12,11 @@ from mocapflow.records import Bool
 NEAR_M = 0.04  # above the lowest point of the body: what shades the floor right beside itself
 DOWNWARD = 0.3  # least part of an outward normal that points down the image
 SPACING_PX = 4.0
+REACH_PX = 6  # to either side of the outline
 
 
-def contact_zone(surface: Surface, camera: Camera, reach_px: float) -> Bool:
-    """Return the pixels (H, W) within reach of where the surface's outline faces down, near its lowest point."""
+def contact_zone(surface: Surface, camera: Camera) -> Bool:
+    """Return the pixels (H, W) near where the surface's outline faces down, near its lowest point."""
     import cv2
 
     outline = occluding_contour(surface, camera, SPACING_PX)
@@ -23,5 +24,5 @@ def contact_zone(surface: Surface, camera: Camera, reach_px: float) -> Bool:
     meets = (height[outline.vertex] < height.min() + NEAR_M) & (outline.normal[:, 1] > DOWNWARD)
     zone = np.zeros((camera.size[1], camera.size[0]), np.uint8)
     for x, y in np.rint(outline.pixel[meets]).astype(int):
-        cv2.circle(zone, (int(x), int(y)), round(reach_px), 1, cv2.FILLED)
+        cv2.circle(zone, (int(x), int(y)), REACH_PX, 1, cv2.FILLED)
     return zone.view(bool)

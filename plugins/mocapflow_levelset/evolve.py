@@ -13,9 +13,7 @@ from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.statistics import Window, local_gaussians, step_table, totals
 
 FRONT = 3.5  # sigmas: beyond, the slope of the smooth step is below 0.3 % of its peak
-
 REST = 4  # pixels that the contour sweeps between two estimates of the statistics, at most, when it rests
-BLOCK = 8  # pixels in a vector; runs are made of whole blocks
 
 
 class Weights(NamedTuple):
@@ -111,7 +109,7 @@ def costs(settled: Settled, prior: F32, weights: Weights) -> Costs:
 def near(level: F32, weights: Weights, first: int = 0) -> I32:
     """Return the runs (N, 3) of pixels near enough to the contour to move it, rows of (y, first x, last x + 1)."""
     reach = min(FRONT * weights.sigma_px, weights.band_px - 1e-3)
-    runs: I32 = kernels.find_runs(level, np.float32(reach), BLOCK, first)
+    runs: I32 = kernels.find_runs(level, np.float32(reach), first)
     return runs
 
 
@@ -127,7 +125,7 @@ def log_ratio(
         return
     values = evidence.along(runs)
     known = evidence.outside is not None
-    outside = evidence.outside(runs, values) if evidence.outside is not None else np.empty(0, np.float32)
+    outside = evidence.outside(runs, values) if evidence.outside else np.empty(0, np.float32)
     first = np.float32((cell_px // stride - 1) * stride / 2)  # centre of the first cell's pixels
     bounds = np.float32(weights.clip), np.float32(weights.any_colour)
     kernels.log_ratio(runs, values, evidence.weight, outside, known, gaussians, cell_px, first, *bounds, out)
@@ -135,15 +133,5 @@ def log_ratio(
 
 def advance(level: F32, ratio: F32, prior: F32, runs: I32, change: F32, weights: Weights) -> None:
     """Take one step in place: data and length explicitly, the shape prior implicitly (stable for any weight)."""
-    kernels.advance(
-        level,
-        ratio,
-        prior,
-        runs,
-        change,
-        np.float32(weights.sigma_px),
-        np.float32(weights.length),
-        np.float32(weights.shape),
-        np.float32(weights.step),
-        np.float32(weights.band_px),
-    )
+    constants = weights.sigma_px, weights.length, weights.shape, weights.step, weights.band_px
+    kernels.advance(level, ratio, prior, runs, change, *map(np.float32, constants))

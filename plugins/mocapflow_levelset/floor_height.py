@@ -9,7 +9,8 @@ import numpy as np
 from mocapflow.assets import Background, Camera
 from mocapflow.data import Frame, Surface
 from mocapflow.records import F64
-from mocapflow_levelset.one_floor import agreement, small_views
+from mocapflow_levelset.floor_light import small_views
+from mocapflow_levelset.one_floor import agreement
 from mocapflow_levelset.plates import BLACK, plate_in
 from mocapflow_levelset.shadows import floor_around
 

@@ -7,19 +7,21 @@ import numpy as np
 
 from mocapflow_levelset.statistics_kernels import STEP_BINS, STEP_RANGE
 
+BLOCK = 8  # pixels in a vector
+
 
 @numba.njit(cache=True, error_model="numpy")
-def find_runs(level, reach, block, first):  # type: ignore[no-untyped-def]
+def find_runs(level, reach, first):  # type: ignore[no-untyped-def]
     """Return runs made of whole blocks of pixels, the blocks of a row starting at `first`, modulo a block."""
     height, width = level.shape
-    runs = np.empty((height * (width // (2 * block) + 2), 3), np.int32)
+    runs = np.empty((height * (width // (2 * BLOCK) + 2), 3), np.int32)
     count = 0
     for y in range(height):
         here = level[y]
         start = -1
-        left = min(first - block, 0)
+        left = min(first - BLOCK, 0)
         while left < width:
-            a, b = max(left, 0), min(left + block, width)
+            a, b = max(left, 0), min(left + BLOCK, width)
             moves = False
             for x in range(a, b):
                 moves |= abs(here[x]) < reach
@@ -29,7 +31,7 @@ def find_runs(level, reach, block, first):  # type: ignore[no-untyped-def]
                 runs[count, 0], runs[count, 1], runs[count, 2] = y, start, a
                 count += 1
                 start = -1
-            left += block
+            left += BLOCK
         if start >= 0:
             runs[count, 0], runs[count, 1], runs[count, 2] = y, start, width
             count += 1

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from pydantic import Field, PositiveInt
+from pydantic import PositiveInt
 
 from mocapflow.components import Segmenter
 from mocapflow.data import Frame, FrameState, Past, Segmentation, Silhouette, Turn
@@ -15,8 +15,10 @@ from mocapflow.scene import Scene
 from mocapflow_levelset import crops
 from mocapflow_levelset.levelset import PERSON
 from mocapflow_levelset.redistance import redistance
+from mocapflow_levelset.view import BAND_PX
 
 UNSURE_PX = 15.0  # half width of the band that is left to the cut
+MARGIN_PX = 60  # of the crop around the model
 
 
 class GrabCut(Segmenter):
@@ -28,18 +30,15 @@ class GrabCut(Segmenter):
     name: ClassVar[str] = "grabcut"
 
     iterations: PositiveInt = 2  # iterations of the graph cut
-    margin_px: PositiveInt = 60  # margin of the crop around the model
-    band_px: Annotated[float, Field(ge=8)] = 12.0  # half width of the band in which the distance is computed
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
         """Return the person's silhouette in each usable view."""
         surface = scene.surface(state.estimate.pose, state.cloth)
-        reach = max(self.band_px, UNSURE_PX + 1)
         silhouettes = []
         for c, camera in enumerate(scene.cameras):
             if not frame.usable[c]:
                 continue
-            distance = self.find(frame.images[c], model_distance(surface, camera, reach), frame.hidden_in(c))
+            distance = self.find(frame.images[c], model_distance(surface, camera, UNSURE_PX + 1), frame.hidden_in(c))
             silhouettes.append(Silhouette(camera=c, layer=PERSON, distance=distance))
         return Segmentation(silhouettes=tuple(silhouettes))
 
@@ -50,8 +49,8 @@ class GrabCut(Segmenter):
         """
         import cv2
 
-        distance = np.full(model.shape, -self.band_px, np.float32)
-        crop = crops.around(model, self.margin_px, 1)
+        distance = np.full(model.shape, -BAND_PX, np.float32)
+        crop = crops.around(model, MARGIN_PX, 1)
         if crop is None:
             return distance
         near = crop.of(model)
@@ -66,7 +65,7 @@ class GrabCut(Segmenter):
         person = (labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)
         if hidden is not None:
             person = np.where(crop.of(hidden), near > 0, person)
-        crop.of(distance)[:] = redistance(np.where(person, np.float32(1), np.float32(-1)), self.band_px)
+        crop.of(distance)[:] = redistance(np.where(person, np.float32(1), np.float32(-1)), BAND_PX)
         return distance
 
     def _decidable(self, labels: U8) -> bool:

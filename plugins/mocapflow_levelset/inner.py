@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from mocapflow.assets import Camera
@@ -16,14 +14,8 @@ from mocapflow_levelset.layers import CLIP, Shown
 
 SPACING_PX = 4.0  # between the points of an edge of the model
 HALF_PX = 3  # on either side that colours have to agree over
+LEAST = 1.0  # mean log ratio of colours from which on one side is told from the other
 SIGMA_PX = 1.0  # standard deviation of a point; that by the noise of the colours is added
-
-
-class Search(NamedTuple):
-    """How to look for the end of a part."""
-
-    reach_px: int  # along the normal
-    least: float  # mean log ratio from which on a side is told from the other
 
 
 def told_apart(scene: Scene, layers: I32, known: Shown) -> Bool:
@@ -37,13 +29,24 @@ def told_apart(scene: Scene, layers: I32, known: Shown) -> Bool:
 
 def inner_contours(
     image: U8, silhouette: Silhouette, surface: Surface, camera: Camera, layers: I32, told: Bool, known: Shown,
-    search: Search,
+    reach_px: int,
 ) -> Matches:  # fmt: skip
-    """Return points of inner contours, each with the vertex at whose edge the part ends there; see `told_apart`."""
+    """Return points of inner contours, each with the vertex at whose edge the part ends there.
+
+    Args:
+        image: (H, W, 3) BGR.
+        silhouette: of the person in it.
+        surface: as believed, N vertices.
+        camera: of the image.
+        layers: (N,) of the vertices.
+        told: (N,) see `told_apart`.
+        known: what colours say of layers.
+        reach_px: how far along the normal of an edge the end of a part is looked for.
+    """
     edges = inner_edges(surface, camera, SPACING_PX, told)
     rough = splits.split(
         image, silhouette.distance, known.ratio, layers[edges.vertex], edges.pixel, edges.normal, CLIP,
-        search.reach_px, HALF_PX, search.least,
+        reach_px, HALF_PX, LEAST,
     )  # fmt: skip
     ended = np.isfinite(rough)  # few, so that what is seen is looked up for few
     edges, rough = picked_rows(edges, ended), rough[ended]

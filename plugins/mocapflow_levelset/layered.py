@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
+from pydantic import NonNegativeFloat
 
 from mocapflow.data import Frame, FrameState, Matches, Past, Segmentation, Surface, Turn
 from mocapflow.pooling import pool
 from mocapflow.records import F32
 from mocapflow.scene import Scene
-from mocapflow_levelset.inner import Search, inner_contours, told_apart
+from mocapflow_levelset.inner import inner_contours, told_apart
 from mocapflow_levelset.layers import COLOURS, gathered, layer_of, shown
 from mocapflow_levelset.levelset import PERSON, LevelSet
 from mocapflow_levelset.surround import ROOM, beside, told
 
 GRID_PX = 4  # colours are taken every so many px, so far from borders
+KEPT = 0.9  # share of what is known of the colours that a frame keeps
 KEEP_MM = 5.0  # change of the body in a turn below which inner contours stay where outlines do
+CALM_MM = 15.0  # change of the body in a turn below which the ends of parts are looked for nearby
+FAR_PX, NEAR_PX = 24, 10  # how far along the normal the end of a part is looked for, and once the body is calm
 
 
 class Layered(LevelSet):
@@ -35,11 +38,6 @@ class Layered(LevelSet):
     """
 
     name: ClassVar[str] = "layered"
-    keep: Annotated[float, Field(ge=0, lt=1)] = 0.9  # share of what is known of the colours that a frame keeps
-    calm_mm: PositiveFloat = 15.0  # change of the body in a turn below which `later_reach_px` holds
-    first_reach_px: PositiveInt = 24  # how far along the normal the end of a part is looked for at first
-    later_reach_px: PositiveInt = 10  # how far it is looked for once the body is calm
-    least: PositiveFloat = 1.0  # mean log ratio of colours from which on one side is told from the other
     colour_weight: NonNegativeFloat = 0.0  # weight of what learned colours say, over that of the local statistics
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
@@ -53,9 +51,9 @@ class Layered(LevelSet):
         surface = scene.surface(state.estimate.pose, state.cloth)
         colours = dict(state.segmentation.appearance if turn.index > 1 else past.appearance)
         if turn.index == 1:
-            colours[COLOURS] = gathered(frame, found.of(PERSON), surface, scene, past, self.keep, GRID_PX)
+            colours[COLOURS] = gathered(frame, found.of(PERSON), surface, scene, past, KEPT, GRID_PX)
             if self.colour_weight:
-                colours[ROOM] = beside(frame, found.of(PERSON), past, self.keep, GRID_PX, self.margin_px)
+                colours[ROOM] = beside(frame, found.of(PERSON), past, KEPT, GRID_PX, self.margin_px)
         return replace(found, inner=self._inner(frame, found, surface, past, scene, turn), appearance=colours)
 
     def _inner(
@@ -63,10 +61,12 @@ class Layered(LevelSet):
     ) -> Matches | None:
         if COLOURS not in past.appearance:
             return None
-        layers, known, search = layer_of(scene), shown(past), self._search(turn)
+        layers, known, reach_px = layer_of(scene), shown(past), NEAR_PX if turn.calm(CALM_MM) else FAR_PX
         findable = told_apart(scene, layers, known)
         parts = [
-            inner_contours(frame.images[s.camera], s, surface, scene.cameras[s.camera], layers, findable, known, search)
+            inner_contours(
+                frame.images[s.camera], s, surface, scene.cameras[s.camera], layers, findable, known, reach_px
+            )
             for s in found.of(PERSON)
         ]
         return pool(parts) if parts else None
@@ -75,7 +75,3 @@ class Layered(LevelSet):
         if not self.colour_weight or ROOM not in past.appearance:
             return None
         return np.float32(self.colour_weight) * told(past, camera)
-
-    def _search(self, turn: Turn) -> Search:
-        reach = self.later_reach_px if turn.calm(self.calm_mm) else self.first_reach_px
-        return Search(reach, self.least)

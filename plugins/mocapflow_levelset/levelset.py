@@ -22,16 +22,16 @@ from mocapflow_levelset.moved import moved_outline
 from mocapflow_levelset.plates import Shadow, plate_in
 from mocapflow_levelset.shadows import ShadowAware, shadowed
 from mocapflow_levelset.statistics import Window
-from mocapflow_levelset.view import Contact, Empty, Level, Matte, Method, View, find
+from mocapflow_levelset.view import BAND_PX, Contact, Empty, Level, Matte, Method, View, find
 
 Share = Annotated[float, Field(ge=0, lt=1)]
 
 PERSON = "person"
-INNER_BAND_PX = 7.0  # while the contour moves
+INNER_BAND_PX = 7.0  # half width of the band while the contour moves: only what is within 3.5 sigma of it, 5.3 px, does
+BORDER_PX = 3  # of the image that is left out
 REDUCED_RHO_PX = 8.0  # Gaussian window of the local statistics at reduced sizes, in px of the shrunken image
 COARSE, HALF, FULL = 4, 2, 1  # what the image is shrunk by
 RATIO_CLIP = 6.0  # bound on log p1/p2
-CONTACT_PX = 6.0  # to either side of the outline where the body meets the floor
 
 
 class LevelSet(ShadowAware):
@@ -65,8 +65,6 @@ class LevelSet(ShadowAware):
     keep_px: NonNegativeFloat = 2.0  # move of the model's outline in a turn up to which the contour stays; 0: never
     statistics_every: PositiveInt = 4  # steps between estimates of the colours
     redistance_every: PositiveInt = 4  # steps between repairs of the distance function
-    band_px: Annotated[float, Field(ge=8)] = 12.0  # half width of the band in which the distance is computed
-    border_px: NonNegativeInt = 3  # border of the image that is left out
     margin_px: PositiveInt = 40  # margin of the crop around the start contour
     use_background: bool = True  # take the outside's density from the empty scene, where it is known
     shadow_share: Share = 0.5  # prior share of shadow on the background; 0: shadows count as changes
@@ -92,7 +90,7 @@ class LevelSet(ShadowAware):
             if c in last:
                 view = view._replace(start=last[c].distance, moved=parts[c])
             shadow = self.shadow(view.image, self._background(scene), c)
-            found = find(view, levels, self._method(shadow), self.band_px)
+            found = find(view, levels, self._method(shadow))
             silhouettes[c] = Silhouette(camera=c, layer=PERSON, distance=found.level)
             for term, cost in found.costs._asdict().items():
                 key = f"{scene.cameras[c].name}.{term}"
@@ -104,8 +102,8 @@ class LevelSet(ShadowAware):
     ) -> View:
         """Return what is given of one view, to start from the projected model."""
         lens = scene.cameras[camera]
-        model = model_distance(surface, lens, self.band_px)
-        counts = counted(model.shape, self.border_px, frame.hidden_in(camera))
+        model = model_distance(surface, lens, BAND_PX)
+        counts = counted(model.shape, BORDER_PX, frame.hidden_in(camera))
         return View(
             image=frame.images[camera],
             start=model,
@@ -131,7 +129,7 @@ class LevelSet(ShadowAware):
             return None
         factors = [level.factor for level in levels if level.use_plate]
         plates = {factor: plate_in(background, camera, self.channels, factor) for factor in factors}
-        return Empty(plates, shadowed(frame, surface, scene, camera, self.shadow_reach_m))
+        return Empty(plates, shadowed(frame, surface, scene, camera))
 
     def _colours(self, past: Past, camera: int) -> F32 | None:
         """Return what colours tell of person and room in a view (BINS,); None: nothing is learned."""
@@ -140,8 +138,7 @@ class LevelSet(ShadowAware):
     def _contact(self, surface: Surface, camera: Camera) -> Contact | None:
         if not self.contact_steps:
             return None
-        zone = contact_zone(surface, camera, CONTACT_PX)
-        return Contact(zone, self._rhythm(self.contact_steps), self._window(self.rho_px))
+        return Contact(contact_zone(surface, camera), self._rhythm(self.contact_steps), self._window(self.rho_px))
 
     def _matte(self, scene: Scene, camera: int) -> Matte | None:
         background = self._background(scene)

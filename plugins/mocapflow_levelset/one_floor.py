@@ -7,68 +7,23 @@ one view can't be told from a shadow, is told by another that sees the floor beh
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numba
 import numpy as np
 
 from mocapflow.assets import Background, Camera
 from mocapflow.data import Frame
-from mocapflow.geometry.cameras import shrunk
 from mocapflow.memo import memoised
-from mocapflow.records import F32, F64, I32, U8, Bool
-from mocapflow_levelset import crops
-from mocapflow_levelset.channels import ChannelName, features
-from mocapflow_levelset.evidence import calmed
-from mocapflow_levelset.plates import Plate, Shadow, on_ray, plate_in
+from mocapflow.records import F32, F64, I32, Bool
+from mocapflow_levelset.floor_light import SmallView, small_views
 
-CHANNELS: tuple[ChannelName, ...] = ("lab",)
-USUAL = Shadow()
-ROWS = 400  # about so many of a view are compared
-CALM_PX = 1.0
-OFF = 3.5  # standard deviations off the ray of its shadows up to which a pixel may be the floor's
-BRIGHTER = 1.06  # than the empty scene: more is no floor
 REACH = 2  # px to either side, within which views have to see the same
 LIT = 0.98  # of the light: more is no shadow, whatever it is
 TOLERANCE = 0.025  # of the light
 SOLID = np.ones((3, 3), np.uint8)  # thinner things are edges, whose pixels mix person and floor
 
 
-class Small(NamedTuple):
-    """A view, shrunk, and the share of its light that reaches the floor."""
-
-    camera: Camera
-    factor: int
-    light: F32  # (h, w) NaN where it does not look like the floor
-
-
-def small_views(frame: Frame, background: Background, cameras: Sequence[Camera], rows: int = ROWS) -> list[Small]:
-    """Return how much light reaches what each usable view of a frame shows, were it the floor; others show nothing."""
-    found = []
-    for number, camera in enumerate(cameras):
-        factor = max(round(camera.size[1] / rows), 1)
-        small = shrunk(camera, factor)
-        light = np.full(small.size[::-1], np.nan, np.float32)
-        if frame.usable[number]:
-            plate = plate_in(background, number, CHANNELS, factor)
-            light = light_on(crops.shrink(frame.images[number], factor), plate)
-            if (hidden := frame.hidden_in(number)) is not None:
-                light[crops.shrink_mask(hidden, factor)] = np.nan
-        found.append(Small(small, factor, light))
-    return found
-
-
-def light_on(image: U8, plate: Plate) -> F32:
-    """Return the factor (h, w) by which an image (h, w, 3) is darker than its plate, NaN where it is something else."""
-    values = features(calmed(image, CALM_PX), CHANNELS)
-    flat, expected = values.reshape(len(values), -1), plate.planes.reshape(len(values), -1)
-    out = np.empty(flat.shape[1], np.float32)
-    limits = tuple(np.float32(limit) for limit in (USUAL.darkest, BRIGHTER, USUAL.chroma, OFF))
-    _light(flat, expected, plate.spread.ravel(), limits, out)
-    return out.reshape(image.shape[:2])
-
-
-def contradicted(views: Sequence[Small], floor_m: float) -> list[Bool]:
+def contradicted(views: Sequence[SmallView], floor_m: float) -> list[Bool]:
     """Return for each view where (h, w) its pixels have another light than others see there.
 
     These are two views that agree, or one that sees the floor fully lit; and none sees the light that this one sees.
@@ -91,7 +46,7 @@ def contradicted(views: Sequence[Small], floor_m: float) -> list[Bool]:
     return found
 
 
-def agreement(views: Sequence[Small], floor_m: float, dark: float) -> int:
+def agreement(views: Sequence[SmallView], floor_m: float, dark: float) -> int:
     """Return how many pixels in a shadow agree with other views, counted once for each of these.
 
     Args:
@@ -119,7 +74,7 @@ def no_shadows(frame: Frame, background: Background, cameras: tuple[Camera, ...]
     return tuple(_enlarged(mask, view.factor, c) for mask, view, c in zip(told, views, cameras, strict=True))
 
 
-def _seen(view: Small, camera: Camera, places: I32, floor_m: float) -> F32:
+def _seen(view: SmallView, camera: Camera, places: I32, floor_m: float) -> F32:
     """Return the least and the greatest light (N, 2) that a view sees near places of the floor.
 
     Args:
@@ -158,15 +113,6 @@ def _enlarged(mask: Bool, factor: int, camera: Camera) -> Bool:
     large = cv2.resize(mask.view(np.uint8), (width, height), interpolation=cv2.INTER_NEAREST)
     whole[:height, :width] = large.view(bool)
     return whole
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _light(values, plate, spread, limits, out):  # type: ignore[no-untyped-def]
-    darkest, brightest, chroma, most = limits
-    for n in range(out.size):
-        light, _, residual, across = on_ray(values, plate, n, 0, chroma)
-        floor = residual < most * most * across and darkest < light < brightest
-        out[n] = light if floor and np.isfinite(spread[n]) else np.nan
 
 
 @numba.njit(cache=True, error_model="numpy")

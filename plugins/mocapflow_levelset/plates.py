@@ -34,6 +34,9 @@ class Shadow(NamedTuple):
     chroma: float = 0.005  # standard deviation of the distance to the ray, share of a channel's range
 
 
+USUAL = Shadow()
+
+
 class Plate(NamedTuple):
     """The empty scene in one view, as pixels are compared with it."""
 
@@ -132,16 +135,9 @@ def on_ray(values, plate, n, lab, chroma):  # type: ignore[no-untyped-def]
     These are the factor of the plate's light, the plate's square distance from black, the pixel's square distance from
     the ray, and the variance of a shadow's.
     """
-    l0, a0, b0 = (
-        plate[lab, n] - np.float32(BLACK[0]),
-        plate[lab + 1, n] - np.float32(BLACK[1]),
-        plate[lab + 2, n] - np.float32(BLACK[2]),
-    )
-    l1, a1, b1 = (
-        values[lab, n] - np.float32(BLACK[0]),
-        values[lab + 1, n] - np.float32(BLACK[1]),
-        values[lab + 2, n] - np.float32(BLACK[2]),
-    )
+    black_l, black_a, black_b = np.float32(BLACK[0]), np.float32(BLACK[1]), np.float32(BLACK[2])
+    l0, a0, b0 = plate[lab, n] - black_l, plate[lab + 1, n] - black_a, plate[lab + 2, n] - black_b
+    l1, a1, b1 = values[lab, n] - black_l, values[lab + 1, n] - black_a, values[lab + 2, n] - black_b
     square = l0 * l0 + a0 * a0 + b0 * b0
     k = (l1 * l0 + a1 * a0 + b1 * b0) / square
     r0, r1, r2 = l1 - k * l0, a1 - k * a0, b1 - k * b0

@@ -15,14 +15,13 @@ from mocapflow.memo import memoised
 from mocapflow.records import F64, U8, Bool
 from mocapflow.scene import Scene
 from mocapflow_levelset.one_floor import no_shadows
-from mocapflow_levelset.plates import Shadow
+from mocapflow_levelset.plates import USUAL, Shadow
 
 CORNERS = 72
 THIN = 4  # every so many-th pixel tells whether there are colours
 GREY = 32  # levels between the colours of a pixel that has hardly any; bare skin has 20 to 75
 FEW = 0.001  # share of the pixels that may have more: a stamp, a coloured lamp
 REACH_M = 2.0  # from the person, where their shadow may fall
-USUAL = Shadow()
 
 
 class ShadowAware(Segmenter):
@@ -30,16 +29,14 @@ class ShadowAware(Segmenter):
 
     spread_floor: PositiveFloat = USUAL.floor  # smallest standard deviation of the empty scene, share of the range
     shadow_share: Annotated[float, Field(ge=0, lt=1)] = USUAL.share  # prior share of shadows; 0: they count as changes
-    shadow_reach_m: PositiveFloat = REACH_M  # shadows fall on the floor within this distance of the person
     darkest_shadow: Annotated[float, Field(gt=0, lt=1)] = USUAL.darkest  # least factor of a shadow on L + 16, a, b
     darkest_grey_shadow: Annotated[float, Field(gt=0, lt=1)] = 0.8  # the same in pictures without colours to tell it by
-    shadow_chroma: PositiveFloat = USUAL.chroma  # deviation of a shadow's chromaticity off the plate's, of the range
 
     def shadow(self, image: U8, background: Background | None, camera: int) -> Shadow:
         """Return what counts as background in an image (H, W, 3) of a camera, as it is set."""
         grey = background is not None and _grey_room(background, camera) and colourless(image)
         darkest = max(self.darkest_shadow, self.darkest_grey_shadow) if grey else self.darkest_shadow
-        return Shadow(self.spread_floor, self.shadow_share, darkest, self.shadow_chroma)
+        return Shadow(self.spread_floor, self.shadow_share, darkest)
 
 
 def colourless(image: U8) -> bool:
@@ -65,9 +62,9 @@ def _circle(surface: Surface, radius_m: float) -> F64:
     return np.column_stack([circle, np.full(CORNERS, feet)])
 
 
-def shadowed(frame: Frame, surface: Surface, scene: Scene, camera: int, reach_m: float = REACH_M) -> Bool:
+def shadowed(frame: Frame, surface: Surface, scene: Scene, camera: int) -> Bool:
     """Return True for pixels (H, W) that may show the person's shadow, as far as the other views know."""
-    floor = floor_around(surface, scene.cameras[camera], reach_m)
+    floor = floor_around(surface, scene.cameras[camera])
     others = None if scene.background is None else no_shadows(frame, scene.background, scene.cameras)
     return floor if others is None else floor & ~others[camera]
 

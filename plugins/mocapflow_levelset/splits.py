@@ -78,45 +78,53 @@ def refine(image, pixel, normal, offset, half):  # type: ignore[no-untyped-def]
     Along the normal the colour goes from that of one side to that of the other; how much of the profile belongs to the
     first says where it ends, whatever blur is between.
     """
-    height, width = image.shape[:2]
     arm = half + MARGIN
-    count = 2 * arm + 1
     exact, variance = np.full(len(pixel), np.nan), np.full(len(pixel), np.inf)
-    profile = np.empty((count, 3))
+    profile = np.empty((2 * arm + 1, 3))
     for k in range(len(pixel)):
-        if math.isnan(offset[k]):
+        if math.isnan(offset[k]) or not _look_along(image, pixel[k], normal[k], offset[k], arm, profile):
             continue
-        inside = True
-        for s in range(count):
-            t = offset[k] + s - arm
-            x, y = pixel[k, 0] + t * normal[k, 0], pixel[k, 1] + t * normal[k, 1]
-            left, top = int(math.floor(x)), int(math.floor(y))
-            if not (0 <= left < width - 1 and 0 <= top < height - 1):
-                inside = False
-                break
-            fx, fy = x - left, y - top
-            for c in range(3):
-                profile[s, c] = (1 - fy) * ((1 - fx) * image[top, left, c] + fx * image[top, left + 1, c]) + fy * (
-                    (1 - fx) * image[top + 1, left, c] + fx * image[top + 1, left + 1, c]
-                )
-        if not inside:
-            continue
-        one, other = np.zeros(3), np.zeros(3)
-        for s in range(ENDS):
-            one += profile[s] / ENDS
-            other += profile[count - 1 - s] / ENDS
-        step = other - one
-        square = step @ step
-        if square < 1.0:
-            continue
-        mine, noise = 0.0, 0.0
-        for s in range(count):
-            share = (profile[s] - one) @ step / square
-            mine += 1.0 - share
-            if s < ENDS:
-                noise += share * share
-            elif s >= count - ENDS:
-                noise += (1.0 - share) * (1.0 - share)
+        mine, variance[k] = _first_share(profile)
         exact[k] = offset[k] + mine - arm - 0.5
-        variance[k] = count * noise / (2 * ENDS - 2)
     return exact, variance
+
+
+@numba.njit(cache=True)
+def _look_along(image, pixel, normal, offset, arm, profile):  # type: ignore[no-untyped-def]
+    """Write the colours (2 arm + 1, 3) around an offset along a normal; return whether all are in the image."""
+    height, width = image.shape[:2]
+    for s in range(len(profile)):
+        t = offset + s - arm
+        x, y = pixel[0] + t * normal[0], pixel[1] + t * normal[1]
+        left, top = int(math.floor(x)), int(math.floor(y))
+        if not (0 <= left < width - 1 and 0 <= top < height - 1):
+            return False
+        fx, fy = x - left, y - top
+        for c in range(3):
+            upper = (1 - fx) * image[top, left, c] + fx * image[top, left + 1, c]
+            lower = (1 - fx) * image[top + 1, left, c] + fx * image[top + 1, left + 1, c]
+            profile[s, c] = (1 - fy) * upper + fy * lower
+    return True
+
+
+@numba.njit(cache=True)
+def _first_share(profile):  # type: ignore[no-untyped-def]
+    """Return how much of a profile (S, 3) is of its first side, px, and the variance; NaN and inf: its sides match."""
+    count = len(profile)
+    one, other = np.zeros(3), np.zeros(3)
+    for s in range(ENDS):
+        one += profile[s] / ENDS
+        other += profile[count - 1 - s] / ENDS
+    step = other - one
+    square = step @ step
+    if square < 1.0:
+        return np.nan, np.inf
+    mine, noise = 0.0, 0.0
+    for s in range(count):
+        share = (profile[s] - one) @ step / square
+        mine += 1.0 - share
+        if s < ENDS:
+            noise += share * share
+        elif s >= count - ENDS:
+            noise += (1.0 - share) * (1.0 - share)
+    return mine, count * noise / (2 * ENDS - 2)

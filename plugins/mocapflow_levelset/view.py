@@ -20,6 +20,8 @@ from mocapflow_levelset.plates import Plate, Shadow
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.statistics import Window
 
+BAND_PX = 12.0  # half width of the band in which a silhouette's distances are computed
+
 
 class Empty(NamedTuple):
     """What is known of the empty scene in one view."""
@@ -86,36 +88,21 @@ class Found(NamedTuple):
     costs: Costs
 
 
-def find(view: View, levels: Sequence[Level], method: Method, band_px: float) -> Found:
+def find(view: View, levels: Sequence[Level], method: Method) -> Found:
     """Return the silhouette of one view (H, W) and its costs; everything outside without a start contour.
 
     Args:
         view: what is given of it.
         levels: coarse to fine; the last is of the image as it is.
         method: the constants.
-        band_px: where the silhouette's distances are clipped.
     """
     part, multiple = view.start if view.moved is None else view.moved, max(level.factor for level in levels)
     crop = crops.around(part, method.margin_px, multiple)
-    whole = np.full(view.start.shape, -band_px, np.float32) if view.moved is None else view.start.copy()
+    whole = np.full(view.start.shape, -BAND_PX, np.float32) if view.moved is None else view.start.copy()
     if crop is None:
         return Found(whole, Costs(0.0, 0.0, 0.0))
-    front, factor = crop.of(view.start), 1
-    image = crop.of(view.image)
-    images = crops.pyramid(image, [level.factor for level in levels])
-    for level in levels:
-        prior = crops.coarser(crop.of(view.prior), level.factor)
-        front = _brought(front, factor, level.factor, method.weights.band_px)
-        evidence = _evidence(images[level.factor], view, crop, level, method)
-        settled = settle(without_islands(front, evidence), prior, evidence, level.window, method.weights, level.rhythm)
-        front, factor = settled.level, level.factor
-    if view.contact is not None:
-        front = _by_chromaticity(front, view, view.contact, crop, method)
-    if view.matte is not None:
-        front = redistance(front, NEAR_PX)
-        movable = crop.of(view.matte.known) & _movable(view, crop)
-        front = sharpened(front, image, crop.of(view.matte.room), movable, view.matte.reach_px)
-    new = redistance(front, band_px)
+    settled, prior = _settled(view, crop, levels, method)
+    new = redistance(_refined(settled.level, view, crop, method), BAND_PX)
     # near the rim of a part its statistics lack a side
     kept = crop if view.moved is None else crops.around(view.moved, method.margin_px // 2, multiple)
     assert kept is not None
@@ -127,16 +114,38 @@ def find(view: View, levels: Sequence[Level], method: Method, band_px: float) ->
     return Found(whole, Costs(*(new - old for new, old in zip(now, before, strict=True))))
 
 
+def _settled(view: View, crop: Crop, levels: Sequence[Level], method: Method) -> tuple[Settled, F32]:
+    """Return where the descent within a crop ended, coarse to fine, and the prior that it kept near."""
+    images = crops.pyramid(crop.of(view.image), [level.factor for level in levels])
+    front, factor = crop.of(view.start), 1
+    for level in levels:
+        prior = crops.coarser(crop.of(view.prior), level.factor)
+        front = _brought(front, factor, level.factor, method.weights.band_px)
+        evidence = _evidence(images[level.factor], view, crop, level, method)
+        settled = settle(without_islands(front, evidence), prior, evidence, level.window, method.weights, level.rhythm)
+        front, factor = settled.level, level.factor
+    return settled, prior
+
+
+def _refined(front: F32, view: View, crop: Crop, method: Method) -> F32:
+    """Return a level set within a crop that has gone on where the body meets the floor, and within its pixels.
+
+    A matte does not move it where a shadow that the empty room lacks ends at the foot.
+    """
+    movable = crop.of(view.counted)
+    if view.contact is not None:
+        front = _by_chromaticity(front, view, view.contact, crop, method)
+        movable = movable & ~crop.of(view.contact.zone)
+    if view.matte is None:
+        return front
+    room, movable = crop.of(view.matte.room), crop.of(view.matte.known) & movable
+    return sharpened(redistance(front, NEAR_PX), crop.of(view.image), room, movable, view.matte.reach_px)
+
+
 def _costs(level: F32, settled: Settled, prior: F32, method: Method) -> Costs:
     """Return what a level set costs by the evidence at hand, where the contour has moved in it."""
     band = np.float32(method.weights.band_px)
     return costs(settled._replace(level=np.clip(level, -band, band)), prior, method.weights)
-
-
-def _movable(view: View, crop: Crop) -> Bool:
-    """Return where a matte may move the contour: not where a shadow that the empty room lacks ends at the foot."""
-    counts = crop.of(view.counted)
-    return counts if view.contact is None else counts & ~crop.of(view.contact.zone)
 
 
 def _by_chromaticity(front: F32, view: View, contact: Contact, crop: Crop, method: Method) -> F32:

@@ -9,7 +9,7 @@ import numpy as np
 from mocapflow_levelset import crops
 from mocapflow_levelset.channels import ChannelName, features
 from mocapflow_levelset.colours import bins_of
-from mocapflow_levelset.plates import Plate, Shadow, density_image, plate_in
+from mocapflow_levelset.plates import USUAL, Plate, density_image, plate_in
 from mocapflow_levelset.shadows import floor_around
 
 from mocapflow.assets import Background, Camera
@@ -20,7 +20,7 @@ from mocapflow.memo import memoised
 from mocapflow.records import F32, F64, U8, Bool
 
 CHANNELS: tuple[ChannelName, ...] = ("lab",)
-SHADOW = Shadow()
+ROWS = 160  # of a small view, about
 EMPTY = 3.0  # standard deviations within which a pixel is that of the empty room
 SPECK = 0.01  # of the largest part's area: smaller parts are noise
 MOST = 3.0  # of the model's area: more can't be the person
@@ -50,7 +50,7 @@ class View(NamedTuple):
 
 
 @memoised
-def small_room(background: Background, cameras: tuple[Camera, ...], rows: int) -> Room:
+def small_room(background: Background, cameras: tuple[Camera, ...], rows: int = ROWS) -> Room:
     """Return the empty room in images of about so many rows; made once, forgotten with the background."""
     factors = tuple(max(round(camera.size[1] / rows), 1) for camera in cameras)
     plates = (plate_in(background, number, CHANNELS, factor) for number, factor in enumerate(factors))
@@ -111,8 +111,8 @@ def _compared(image: U8, plate: Plate, floor: Bool) -> tuple[Bool, Bool]:
     Where nobody knows the room, it is neither.
     """
     values = features(image, CHANNELS)
-    off = np.sum((values - plate.planes) ** 2, axis=0) / np.maximum(plate.spread, SHADOW.floor) ** 2
-    changed = density_image(values, plate, floor, CHANNELS, SHADOW) < 0
+    off = np.sum((values - plate.planes) ** 2, axis=0) / np.maximum(plate.spread, USUAL.floor) ** 2
+    changed = density_image(values, plate, floor, CHANNELS, USUAL) < 0
     return changed, (off < EMPTY**2) & np.isfinite(plate.spread)
 
 

@@ -73,9 +73,8 @@ def floating_area(bare: Surface, views: Sequence[View], reach_m: float) -> float
     if not (empty >= 2).any():
         return 0.0
     corners = bare.vertices[bare.faces[(empty >= 2)[bare.faces].all(axis=1)]]
-    return float(
-        np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
-    )
+    one, other = (corners[:, k] - corners[:, 0] for k in (1, 2))
+    return float(np.linalg.norm(np.cross(one, other), axis=1).sum() / 2)
 
 
 def _from_cloth(surface: Surface, view: View) -> F32:

@@ -19,6 +19,7 @@ REACH_M = 0.06  # what lies nearer to the other does not stray
 HINT_M = 0.03  # the same, of what is but a hint
 CLOTH_M = 0.2  # what lies so near to the garment may be the garment, wherever it swings
 CAP_M = 0.2  # beyond, it does not matter how far
+FACES = 2600  # of a body that many poses are measured with, about
 
 
 class Stray(NamedTuple):

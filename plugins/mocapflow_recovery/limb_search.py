@@ -15,7 +15,7 @@ from mocapflow_levelset.one_floor import no_shadows
 from mocapflow_matching.camouflage import with_feet
 from mocapflow_priors.density import Density, Poses, read
 from mocapflow_priors.parzen import SHIPPED
-from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
+from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt
 
 from mocapflow.assets import Body
 from mocapflow.components import Recovery
@@ -26,9 +26,9 @@ from mocapflow.scene import Scene
 from mocapflow.settings import PositiveOrInf
 from mocapflow_recovery.certain import View, small_room, views
 from mocapflow_recovery.disagreement import FLIES, HANGS
-from mocapflow_recovery.judge import Fit, Given, Judge, stray_of, surface_of
+from mocapflow_recovery.judge import FACES, Fit, Given, Judge, Stray, stray_of, surface_of
 from mocapflow_recovery.looks import Looks
-from mocapflow_recovery.sampling import Plan, Spread
+from mocapflow_recovery.sampling import SHARES, Plan, Spread
 from mocapflow_recovery.suspicion import Signs, Suspicion, suspicion
 from mocapflow_recovery.told import like_the_floor, warn_of_furniture, warn_of_untold
 from mocapflow_recovery.vain import counted, forgotten, in_turn, vain_before
@@ -36,6 +36,10 @@ from mocapflow_recovery.vain import counted, forgotten, in_turn, vain_before
 LOG = logging.getLogger("mocapflow")
 CURED = 2.0  # times as far apart may be what is doubted no more: a leg lay where a skirt flew
 CLEARED = 1.1  # the same, what leaves no hint: of a foot that was lost all other limbs and the cloth tell nothing
+NEAR_M = 0.35  # changes farther than this from the model are somebody else
+START = np.radians(6.0)  # how far off, in each angle, a given first pose may be
+TOLERANCE = 0.03  # share by which the error may grow for parts to stay as they were fitted
+FIRST_LOOKS = 2  # times that each search is repeated in a first frame whose fit is doubted
 UNKNOWN = "too little is known of the room behind the person: limbs that are lost are not looked for"
 FEET_UNTOLD = "the feet look like the floor: outlines are not compared with them, and ankles are unsure"
 UNSEARCHED = "fit doubted as in frames before: not searched again yet"
@@ -61,7 +65,7 @@ class LimbSearch(Recovery):
     where a limb has leapt into a pose that nobody was seen in. There a part moves only if that brings person and model
     together. A joint bent too far, and a limb that leapt, are looked for alone: nothing is known against the others.
 
-    The first frame starts from a pose that was given and is about right (`start_deg`). So it is searched near that one
+    The first frame starts from a pose that was given and is about right. So it is searched near that one
     first, and of two poses that fit alike the nearer one is taken: crossed legs look the same when exchanged. If its
     fit is doubted, the pose is also tried turned round: a standing person looks much the same from behind.
 
@@ -85,20 +89,12 @@ class LimbSearch(Recovery):
     hint_cm2: PositiveOrInf = inf  # area of the person 3 cm off it above which limbs are looked for; noise has some
     beginnings: bool = True  # look for limbs in the first frame, and in the first one after a gap
     leap_deg: PositiveOrInf = 20.0  # a limb so far from what was believed and from all `poses` is looked for
-    overbent_deg: PositiveOrInf = 5.0  # a joint so far beyond its soft limits is looked for: lost limbs go there
     least_known: Annotated[float, Field(ge=0, le=1)] = 0.4  # of the room behind the model to be known, mean of views
     gain: Annotated[float, Field(ge=0, lt=1)] = 0.1  # share that each part mends, and a fit that cures no doubt
-    tolerance: NonNegativeFloat = 0.03  # share by which the error may grow for parts to stay as they were fitted
-    rows: Annotated[int, Field(ge=50)] = 160  # images are shrunk to about this height
-    faces: Annotated[int, Field(ge=200)] = 2600  # faces of the body that is searched with, about
-    near_m: PositiveFloat = 0.35  # changes further than this from the model are somebody else
     samples: PositiveInt = 40  # samples of each part in a round
     poses: Poses = SHIPPED  # poses that people were seen in, made by `mocapflow prior fit`: limbs are tried as there
     seen_samples: NonNegativeInt = 100  # samples of each limb from `poses`, in the first round
-    shares: Annotated[tuple[PositiveFloat, ...], Field(min_length=1)] = (1.0, 0.6, 0.4, 0.25, 0.12)  # of the spread
-    first_looks: PositiveInt = 2  # times that each search is repeated in a first frame whose fit is doubted
     vain_every: PositiveInt = 4  # after three searches in vain, or overbent frames, one of so many is searched at first
-    start_deg: PositiveFloat = 6.0  # how far off, in each angle, a given first pose may be
     spread_deg: PositiveFloat = 25.0  # standard deviation of the first samples; less where a joint hardly bends
     root_spread_deg: PositiveFloat = 8.0  # standard deviation of the first samples of the root's orientation
     root_spread_m: PositiveFloat = 0.06  # standard deviation of the first samples of the root's place
@@ -142,37 +138,40 @@ class LimbSearch(Recovery):
         model: ClothedModel,
         settle: Settle,
     ) -> FrameResult:
-        surface = surface_of(model, result)
-        seen = self.views(frame, surface, past, model.scene)
+        surface, scene = surface_of(model, result), model.scene
+        seen = self.views(frame, surface, past, scene)
         if not seen:
             return noted(result, UNSEEN, doubted=True)
         if np.mean([view.known for view in seen]) < self.least_known:
             return result if past.moments else noted(result, UNKNOWN, doubted=False)
         if not past.moments:
-            given = model.scene.surface(state.estimate.pose, state.cloth)
-            warn_of_untold(surface, seen, model.scene.body)
-            warn_of_furniture(given, self.views(frame, given, past, model.scene), model.scene.body)
-        stray = stray_of(surface, model.scene, seen)
-        fitted, believed, body = result.state.estimate.pose, state.estimate.pose, model.scene.body
+            given = scene.surface(state.estimate.pose, state.cloth)
+            warn_of_untold(surface, seen, scene.body)
+            warn_of_furniture(given, self.views(frame, given, past, scene), scene.body)
+        stray = stray_of(surface, scene, seen)
+        fitted, believed, body = result.state.estimate.pose, state.estimate.pose, scene.body
         suspected = suspicion(self.signs, stray, fitted, believed, past, body, self._density)
         if suspected is None:
             return forgotten(result, past)
-        if suspected.doubtful:
-            if not vain_before(past).due(stray.area, frame.time, past, self.vain_every):
-                return noted(result, UNSEARCHED, doubted=True)
-        elif self.signs.stay_bent(past, body) and not in_turn(self.vain_every, frame.time, past):
-            return forgotten(result, past)
+        if not self._due(suspected, stray, frame.time, past, body):
+            return noted(result, UNSEARCHED, doubted=True) if suspected.doubtful else forgotten(result, past)
         judge = self._judge(believed, result, seen, past, model)
-        looks = Looks(judge, self._plan(body), believed, fitted, self.gain, self.tolerance)
+        looks = Looks(judge, self._plan(body), believed, fitted, self.gain, TOLERANCE)
         found = self._searched(frame.index, judge.of(result), looks, suspected, settle)
         return counted(found, result, stray.area, past)
+
+    def _due(self, suspected: Suspicion, stray: Stray, time: float, past: Past, body: Body) -> bool:
+        """Return whether a suspected fit is searched in this frame: what lasts is searched only now and then."""
+        if suspected.doubtful:
+            return vain_before(past).due(stray.area, time, past, self.vain_every)
+        return not self.signs.stay_bent(past, body) or in_turn(self.vain_every, time, past)
 
     def views(self, frame: Frame, surface: Surface, past: Past, scene: Scene) -> list[View]:
         """Return what the views of a frame surely show around a surface, in a scene whose empty room is known."""
         assert scene.background is not None
-        room = small_room(scene.background, scene.cameras, self.rows)
+        room = small_room(scene.background, scene.cameras)
         no_shadow = no_shadows(frame, scene.background, scene.cameras)
-        return views(frame, surface, room, self.near_m, garment_told(past, scene), no_shadow)
+        return views(frame, surface, room, NEAR_M, garment_told(past, scene), no_shadow)
 
     def _searched(self, index: int, fit: Fit, looks: Looks, suspected: Suspicion, settle: Settle) -> FrameResult:
         """Return the result of the best pose that is found, or that of the fit where none is better."""
@@ -200,8 +199,8 @@ class LimbSearch(Recovery):
             return [partial(looks.alone, limbs=suspected.limbs)]
         far = partial(looks.far, astray=suspected.doubtful)
         if looks.judge.given:  # where all begins, chance shall not decide
-            near = partial(looks.near, spread=2 * np.radians(self.start_deg))
-            return [near, partial(far, cloth=HANGS)] * self.first_looks if suspected.doubtful else [near]
+            near = partial(looks.near, spread=2 * START)
+            return [near, partial(far, cloth=HANGS)] * FIRST_LOOKS if suspected.doubtful else [near]
         return [partial(far, cloth=belief) for belief in ((HANGS, FLIES) if looks.judge.model.clothed else (HANGS,))]
 
     def _better(self, other: Fit, fit: Fit) -> Fit:
@@ -217,14 +216,14 @@ class LimbSearch(Recovery):
     def _judge(
         self, believed: Pose, result: FrameResult, seen: Sequence[View], past: Past, model: ClothedModel
     ) -> Judge:
-        given = None if past.moments or past.after_gap else Given(believed, np.radians(self.start_deg))
-        coarse = model.scene.simplified(self.faces)
+        given = None if past.moments or past.after_gap else Given(believed, START)
+        coarse = model.scene.simplified(FACES)
         cloth = HANGS if given else FLIES  # where all begins, the garment's colours are not known
         return Judge(model, coarse, seen, result.state.cloth.parameters, past, given, cloth)
 
     def _plan(self, body: Body) -> Plan:
         spread = Spread(np.radians(self.spread_deg), np.radians(self.root_spread_deg), self.root_spread_m)
-        return Plan(spread, self.shares, self.samples, self._density.on(body.screw_names), self.seen_samples)
+        return Plan(spread, SHARES, self.samples, self._density.on(body.screw_names), self.seen_samples)
 
     @cached_property
     def _density(self) -> Density:
@@ -233,8 +232,8 @@ class LimbSearch(Recovery):
     @property
     def signs(self) -> Signs:
         """What calls for a search."""
-        overbent, leap = np.radians(self.overbent_deg), np.radians(self.leap_deg)
-        return Signs(self.uncovered_cm2, self.floating_cm2, self.hint_cm2, self.beginnings, overbent, leap)
+        leap = np.radians(self.leap_deg)
+        return Signs(self.uncovered_cm2, self.floating_cm2, self.hint_cm2, self.beginnings, leap)
 
 
 def noted(result: FrameResult, note: str, doubted: bool) -> FrameResult:

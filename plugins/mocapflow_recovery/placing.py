@@ -56,7 +56,7 @@ def largest_changes(frame: Frame, room: Room) -> tuple[list[Bool], list[Camera]]
     return masks, cameras
 
 
-def apart(one: Pose, other: Pose) -> float:
+def heading_between(one: Pose, other: Pose) -> float:
     """Return the angle (rad) between the directions in which two poses look."""
     forward = one.root[:2, 1], other.root[:2, 1]
     return float(np.arccos(np.clip(np.dot(*forward) / np.prod(np.linalg.norm(forward, axis=1)), -1, 1)))

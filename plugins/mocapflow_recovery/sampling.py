@@ -20,6 +20,8 @@ from mocapflow.records import F64, I32, Bool
 
 Cost = Callable[[Sequence[Pose]], F64]  # of poses (B,): (B,), the less the better
 
+SHARES = (1.0, 0.6, 0.4, 0.25, 0.12)  # of the spread of the first samples, round by round
+
 
 class Spread(NamedTuple):
     """Standard deviations of the first samples; those of later ones are a share of it."""
@@ -148,16 +150,12 @@ def samples(
 
     By turns the whole part is tried, and what lies from each further joint on: a leg may be right but for its foot.
     """
-    angles = len(pose.angles)
     if part is None:
         middle = root_position(body, pose.root)
-        turns, shifts = (
-            share * spread.turn * rng.normal(size=(count, 3)),
-            share * spread.shift * rng.normal(size=(count, 3)),
-        )
+        turns = share * spread.turn * rng.normal(size=(count, 3))
+        shifts = share * spread.shift * rng.normal(size=(count, 3))
         for turn, shift in zip(turns, shifts, strict=True):  # about the root joint
-            increment = np.concatenate([turn, shift - np.cross(turn, middle), np.zeros(angles)])
-            yield moved(pose, increment)
+            yield moved(pose, np.concatenate([turn, shift - np.cross(turn, middle), np.zeros(len(pose.angles))]))
         return
     deviation = share * np.minimum(body.rest_spread[part], spread.angle)
     joint = body.screw_joint[part]

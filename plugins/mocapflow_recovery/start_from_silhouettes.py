@@ -5,13 +5,12 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from functools import cached_property, partial
-from typing import Annotated, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from mocapflow_draping.kinematic import Kinematic
 from mocapflow_priors.density import Density, Poses, read
 from mocapflow_priors.parzen import SHIPPED
-from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt
 
 from mocapflow.components import Stage
 from mocapflow.data import NO_CLOTH, Past, Pose, Start
@@ -24,15 +23,19 @@ from mocapflow.records import F64
 from mocapflow.scene import Scene
 from mocapflow_recovery.certain import small_room, views
 from mocapflow_recovery.disagreement import HANGS
-from mocapflow_recovery.judge import Judge
-from mocapflow_recovery.placing import apart, centred, largest_changes, meeting, placed
-from mocapflow_recovery.sampling import Cost, Plan, Spread, search
+from mocapflow_recovery.judge import FACES, Judge
+from mocapflow_recovery.placing import centred, heading_between, largest_changes, meeting, placed
+from mocapflow_recovery.sampling import SHARES, Cost, Plan, Spread, search
 
 LOG = logging.getLogger("mocapflow")
 NEAR_M = 0.6  # what differs from the room farther from somebody who stands upright there is somebody else
 SPREAD = Spread(angle=np.radians(25.0), turn=np.radians(12.0), shift=0.06)  # of the first samples
-SHARES = (1.0, 0.6, 0.4, 0.25, 0.12)  # of it, round by round
 SAMPLES, SEEN_SAMPLES = 40, 60  # of each part in a round, and of each limb as it was seen
+TRIED = 24  # of the poses that people were seen in, as unlike each other as can be; standing upright is the first
+DIRECTIONS = 16  # in which each of them is turned
+SEARCHES = 4  # from the best pose of as many directions
+REPEATS = 4  # of the best one, as far as that helps
+NATURAL = np.radians(20.0)  # a pose so far in each angle from all that were seen counts as twice as far off
 OTHERWISE = np.radians(60.0)  # between two directions that a person looks in
 ENOUGH = 0.95  # times the cost before: a search that gains less is the last
 ALIKE = 1.5  # times the least cost: so little worse, and another direction may be the right one
@@ -57,15 +60,8 @@ class StartFromSilhouettes(Stage):
     """
 
     name: ClassVar[str] = "start_from_silhouettes"
-    rows: Annotated[int, Field(ge=50)] = 160  # images are shrunk to about this height
-    faces: Annotated[int, Field(ge=200)] = 2600  # of the body that is compared
     poses: Poses = SHIPPED  # that people were seen in, made by `mocapflow prior fit`
-    tried: PositiveInt = 24  # of these, as unlike each other as can be; standing upright is the first
-    directions: Annotated[int, Field(ge=4)] = 16  # in which each of them is turned
-    searches: PositiveInt = 4  # from the best pose of as many directions
-    repeats: NonNegativeInt = 4  # of the best one, as far as that helps
     draper: Draper | None = Kinematic(sweeps=4)  # of the garment; null: clothes are left out
-    natural_deg: PositiveFloat = 20.0  # a pose so far in each angle from all that were seen counts as twice as far off
 
     def need(self, recording: Recording) -> None:
         """Raise if there are no clean plates."""
@@ -84,7 +80,7 @@ class StartFromSilhouettes(Stage):
         """
         self.need(recording)
         seen, known = self._seen(recording, scene), self._density.on(scene.body.screw_names)
-        cost = partial(costs, seen=seen, known=known, natural=np.radians(self.natural_deg))
+        cost = partial(costs, seen=seen, known=known)
         plan = Plan(SPREAD, SHARES, SAMPLES, known, SEEN_SAMPLES)
         ends = [
             search(cost, begin, scene.body, plan, np.random.default_rng(number))
@@ -92,13 +88,13 @@ class StartFromSilhouettes(Stage):
         ]
         off = cost(ends)
         best, least = ends[int(off.argmin())], float(off.min())
-        for again in range(self.repeats):
+        for again in range(REPEATS):
             best = search(cost, best, scene.body, plan, np.random.default_rng(len(ends) + again))
             before, least = least, float(cost([best])[0])
             if least > ENOUGH * before:
                 break
         LOG.info("first pose: %.1f mm off the silhouettes in the mean", 1000 * least)
-        others = [value for value, end in zip(off, ends, strict=True) if apart(end, best) > OTHERWISE]
+        others = [value for value, end in zip(off, ends, strict=True) if heading_between(end, best) > OTHERWISE]
         if min(others, default=np.inf) < ALIKE * off.min():
             LOG.warning("silhouettes of the first frame hardly tell which way the person looks: see the overlay")
         return Start(pose=best, parameters=scene.calm)
@@ -106,8 +102,8 @@ class StartFromSilhouettes(Stage):
     def _seen(self, recording: Recording, scene: Scene) -> Seen:
         frame, background = recording.frame(recording.indices[0]), recording.background()
         assert background is not None
-        dressed, room = scene if self.draper else scene.undressed, small_room(background, scene.cameras, self.rows)
-        coarse = dressed.simplified(self.faces)
+        dressed, room = scene if self.draper else scene.undressed, small_room(background, scene.cameras)
+        coarse = dressed.simplified(FACES)
         bare = coarse.undressed
         upright = placed(bare, 0.0, np.zeros(len(bare.body.twists)), meeting(*largest_changes(frame, room)))
         found = [view for view in views(frame, bare.surface(upright, NO_CLOTH), room, NEAR_M) if view.shown]
@@ -123,8 +119,8 @@ class StartFromSilhouettes(Stage):
 
     def _begins(self, seen: Seen, known: F64, cost: Cost) -> list[Pose]:
         """Return the best poses of some directions, best first."""
-        turns = np.linspace(0, 2 * np.pi, self.directions, endpoint=False)
-        angles = unlike(np.nan_to_num(known), self.tried)
+        turns = np.linspace(0, 2 * np.pi, DIRECTIONS, endpoint=False)
+        angles = unlike(np.nan_to_num(known), TRIED)
         bare, cameras = seen.judge.coarse.undressed, [view.camera for view in seen.judge.seen]
 
         def there(turn: float, bent: F64) -> Pose:
@@ -132,26 +128,25 @@ class StartFromSilhouettes(Stage):
 
         poses = [[there(turn, bent) for bent in angles] for turn in turns]
         off = np.array([cost(those) for those in poses])
-        return [poses[turn][int(off[turn].argmin())] for turn in scattered(off.min(axis=1), self.searches)]
+        return [poses[turn][int(off[turn].argmin())] for turn in scattered(off.min(axis=1), SEARCHES)]
 
     @cached_property
     def _density(self) -> Density:
         return read(self.poses)
 
 
-def costs(poses: Sequence[Pose], seen: Seen, known: F64, natural: float) -> F64:
+def costs(poses: Sequence[Pose], seen: Seen, known: F64) -> F64:
     """Return how far poses (B,) are from the silhouettes, m per unit of the person's area, more if nobody was seen so.
 
     Args:
         poses: to compare.
         seen: what the views show.
         known: (N, D) rad, poses that people were seen in; NaN where an angle is not known.
-        natural: rad, so far from all of these in each angle a pose counts twice.
     """
     off = seen.judge.apart(poses)
     known = np.concatenate([np.zeros((1, known.shape[1])), np.nan_to_num(known)])
     strange = [np.sqrt(((known - pose.angles) ** 2).mean(axis=1).min()) for pose in poses]
-    return np.asarray(off * (1 + np.array(strange) / natural))
+    return np.asarray(off * (1 + np.array(strange) / NATURAL))
 
 
 def scattered(off: F64, count: int) -> list[int]:

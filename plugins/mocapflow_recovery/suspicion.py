@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
 from mocapflow_priors.density import Density
 
 from mocapflow.assets import Body
@@ -12,6 +13,8 @@ from mocapflow.data import REMEMBERED, Past, Pose
 from mocapflow.records import I32
 from mocapflow_recovery.judge import Stray
 from mocapflow_recovery.leaps import leaping, overbent
+
+OVERBENT = np.radians(5.0)  # a joint so far beyond its soft limits is looked for: lost limbs go there
 
 
 class Signs(NamedTuple):
@@ -21,7 +24,6 @@ class Signs(NamedTuple):
     floating: float  # cm² of skin in empty space
     hint: float  # cm² of the person a little off the model
     beginnings: bool  # a frame without one before it
-    overbent: float  # rad, beyond the limits of a joint
     leap: float  # rad, from what was believed and from all that was seen
 
     def doubtful(self, stray: Stray) -> bool:
@@ -30,7 +32,7 @@ class Signs(NamedTuple):
 
     def stay_bent(self, past: Past, body: Body) -> bool:
         """Return whether all frames that are remembered have a joint beyond its limits."""
-        bent = [bool(overbent(moment.pose, body, self.overbent)) for moment in past.moments]
+        bent = [bool(overbent(moment.pose, body, OVERBENT)) for moment in past.moments]
         return len(bent) == REMEMBERED and all(bent)
 
 
@@ -68,7 +70,7 @@ def suspicion(
         why = f"{stray.near:.0f} cm² of the person a little off the model"
     elif signs.beginnings and not past.moments:
         why = f"looked for the limbs {'after a gap' if past.after_gap else 'of a first frame'}"
-    elif limbs := overbent(fitted, body, signs.overbent):
+    elif limbs := overbent(fitted, body, OVERBENT):
         why = "a joint is bent beyond its limits"
     elif limbs := leaping(fitted, believed, body, density, signs.leap):
         why = "a limb leapt into a pose that nobody was seen in"

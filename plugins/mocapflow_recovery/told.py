@@ -95,7 +95,7 @@ def _seen_by(view: View, shown: Bool, surface: Surface, beyond: bool) -> Bool:
     """Return what a view shows (h, w) where vertices lie: (N,), or else what holds beyond its edges."""
     pixels, found = project(surface.vertices, view.camera), np.full(len(surface.vertices), beyond)
     size = np.array(shown.shape[::-1])
-    inside = np.isfinite(pixels).all(axis=1) & (pixels > -0.5).all(axis=1) & (pixels < size - 0.5).all(axis=1)
+    inside = ((pixels > -0.5) & (pixels < size - 0.5)).all(axis=1)  # NaN is not
     column, row = np.rint(pixels[inside]).astype(int).T
     found[inside] = shown[row, column]
     return found

@@ -13,7 +13,7 @@ from mocapflow.periodic import falls_due
 VAIN = "searches in vain"  # of Segmentation.appearance: (2,) a `Vain`
 SOON = 3  # such searches in a row, after which the next one waits
 LONGEST_S = 1.0  # that it waits, at most
-ALIKE = 1.5  # times as much, or as little, may stray of a doubt that is still the same
+CHANGED = 1.5  # times as much, or as little, may stray of a doubt that is still the same
 MORE = 300.0  # cm² that may stray more: a limb that is lost before a room that has changed has more
 
 
@@ -32,7 +32,7 @@ class Vain(NamedTuple):
         if self.searches < SOON or not past.moments:
             return True
         wait = every
-        if self.alike(strays) and every > 1:
+        if self.same(strays) and every > 1:
             longest = round(LONGEST_S / (time - past.moments[-1].time))
             wait = max(every, min(every << (self.searches - SOON), longest))
         return in_turn(wait, time, past)
@@ -40,11 +40,11 @@ class Vain(NamedTuple):
     def after(self, strays: float, helped: bool) -> Vain:
         """Return what is known after one more search, of a fit of which so much (cm²) strayed."""
         searches = self.searches + 1
-        return Vain(min(searches, SOON) if helped or not self.alike(strays) else searches, strays)
+        return Vain(min(searches, SOON) if helped or not self.same(strays) else searches, strays)
 
-    def alike(self, strays: float) -> bool:
-        """Return whether so much (cm²) is about what strayed before."""
-        return self.strayed / ALIKE < strays < min(ALIKE * self.strayed, self.strayed + MORE)
+    def same(self, strays: float) -> bool:
+        """Return whether a doubt stays the same: about as much (cm²) strays as before."""
+        return self.strayed / CHANGED < strays < min(CHANGED * self.strayed, self.strayed + MORE)
 
 
 def in_turn(every: int, time: float, past: Past) -> bool:

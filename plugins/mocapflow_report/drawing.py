@@ -21,13 +21,14 @@ CLOTH: Colour = (235, 90, 235)
 BONE: Colour = (60, 200, 255)
 JOINT: Colour = (255, 255, 255)
 SUBPIXEL = 4  # bits
+FARTHEST = 1e4  # px off the image that OpenCV can be asked to draw at; what is not known (NaN) is no nearer
 
 
 def segments(image: U8, ends: F64, colour: Colour, thickness: int = 1) -> None:
     """Draw line segments (B, 2, 2) px into an image; those that are not finite are left out."""
     import cv2
 
-    kept = ends[np.isfinite(ends).all((1, 2)) & (np.abs(ends) < 1e4).all((1, 2))]
+    kept = ends[(np.abs(ends) < FARTHEST).all((1, 2))]
     lines = np.round(kept * 2**SUBPIXEL).astype(np.int32)
     cv2.polylines(image, list(lines[:, :, None]), False, colour, thickness, cv2.LINE_AA, SUBPIXEL)
 
@@ -36,7 +37,7 @@ def dots(image: U8, places: F64, colour: Colour, radius: float) -> None:
     """Draw filled circles at pixels (K, 2); those that are not finite are left out."""
     import cv2
 
-    for x, y in places[np.isfinite(places).all(1) & (np.abs(places) < 1e4).all(1)]:
+    for x, y in places[(np.abs(places) < FARTHEST).all(1)]:
         at = (round(x * 2**SUBPIXEL), round(y * 2**SUBPIXEL))
         cv2.circle(image, at, round(radius * 2**SUBPIXEL), colour, -1, cv2.LINE_AA, SUBPIXEL)
 

@@ -13,7 +13,7 @@ from mocapflow.data import CLOTH, NO_CLOTH, Frame, Pose, Surface
 from mocapflow.geometry import cameras, kinematics, meshes, silhouettes
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64, I32, U8
-from mocapflow.results import Files, RunFolder, Track, ViewChecks, steadied
+from mocapflow.results import Files, RunFolder, Track, ViewChecks, rows_with_frames
 from mocapflow.scene import Scene
 from mocapflow_report import drawing
 
@@ -40,13 +40,11 @@ class Overlay(Stage):
     ) -> Files:
         """Write one video per view and return their paths."""
         paths = [layout.place(run_folder.path, layout.overlay(camera.name)) for camera in scene.cameras]
-        rows = {int(index): row for row, index in enumerate(track.frame)}
         painter = Painter(scene)
         with drawing.videos(paths, recording.run_rate, self.codec) as opened:
-            for frame in steadied(recording.frames(), checks):
-                if frame.index in rows:
-                    for video, image in zip(opened, painter.paint(frame, track, rows[frame.index]), strict=True):
-                        video.write(image)
+            for row, frame in rows_with_frames(track, recording.frames(), checks):
+                for video, image in zip(opened, painter.paint(frame, track, row), strict=True):
+                    video.write(image)
         return Files(paths=tuple(paths))
 
 

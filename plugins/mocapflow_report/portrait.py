@@ -13,7 +13,7 @@ from mocapflow.geometry.angles import anatomical_axes
 from mocapflow.records import F64, U8
 from mocapflow.scene import Scene
 from mocapflow_report import drawing, raster
-from mocapflow_report.room import GARMENT, SKIN, SMOOTH, WALL
+from mocapflow_report.room import SMOOTH, WALL, draw_person
 
 FIELD_OF_VIEW = 18.0  # deg
 HEAD_ROOM = 1.15  # height of the picture over the person's
@@ -48,10 +48,7 @@ def portrait(
     skin = kinematics.skin(scene.body, kinematics.chain(scene.body, pose)[0], pose.angles)
     camera = _before(scene, pose, np.radians(bearing_deg), above, (SMOOTH * size[0], SMOOTH * size[1]))
     canvas = raster.Canvas(np.full((SMOOTH * size[1], SMOOTH * size[0], 3), WALL, np.float32), camera)
-    canvas.draw(skin, scene.body.faces, raster.shade(skin, scene.body.faces, SKIN))
-    if scene.garment is not None and len(cloth):
-        faces = scene.garment.faces
-        canvas.veil(cloth, faces, raster.shade(cloth, faces, GARMENT, two_sided=True), opacity)
+    draw_person(canvas, scene, skin, cloth, opacity)
     fine = np.clip(255 * canvas.picture, 0, 255).astype(np.uint8)
     return np.asarray(cv2.resize(fine, size, interpolation=cv2.INTER_AREA), np.uint8)
 

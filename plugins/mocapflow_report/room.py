@@ -36,7 +36,6 @@ class Room:
 
     def __init__(self, scene: Scene, root: F64, size: tuple[int, int]) -> None:
         self._scene = scene
-        self._faces = None if scene.garment is None else scene.garment.faces
         roots = kinematics.root_position(scene.body, root)
         lowest = scene.body.vertices[:, 2].min() - scene.body.positions[0, 2]
         height = float(np.median(roots[:, 2]) + lowest)
@@ -50,9 +49,7 @@ class Room:
         import cv2
 
         canvas = raster.Canvas(self._shadowed(body), self._camera)
-        canvas.draw(body.vertices, body.faces, raster.shade(body.vertices, body.faces, SKIN))
-        if self._faces is not None and len(cloth):
-            canvas.veil(cloth, self._faces, raster.shade(cloth, self._faces, GARMENT, two_sided=True), 0.55)
+        draw_person(canvas, self._scene, body.vertices, cloth, opacity=0.55)
         image = np.clip(255 * canvas.picture, 0, 255).astype(np.uint8)
         self._stick(image, body)
         return np.asarray(cv2.resize(image, None, fx=1 / SMOOTH, fy=1 / SMOOTH, interpolation=cv2.INTER_AREA), np.uint8)
@@ -118,6 +115,14 @@ class Room:
         pixels = cameras.project(places, self._camera)
         drawing.segments(image, drawing.bones(self._scene.body.parents, pixels), STICK, 3 * SMOOTH)
         drawing.dots(image, pixels, (40, 40, 200), 3.5 * SMOOTH)
+
+
+def draw_person(canvas: raster.Canvas, scene: Scene, skin: F64, cloth: F64, opacity: float) -> None:
+    """Draw the body (V, 3) m of a scene and its garment (W, 3) m, which lets it shine through; empty: no garment."""
+    canvas.draw(skin, scene.body.faces, raster.shade(skin, scene.body.faces, SKIN))
+    if scene.garment is not None and len(cloth):
+        faces = scene.garment.faces
+        canvas.veil(cloth, faces, raster.shade(cloth, faces, GARMENT, two_sided=True), opacity)
 
 
 def _frustum(camera: Camera, floor: float) -> F64:

@@ -6,7 +6,7 @@ import numpy as np
 
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import U8
-from mocapflow.results import Track, ViewChecks, steadied
+from mocapflow.results import Track, ViewChecks, rows_with_frames
 from mocapflow.scene import Scene
 from mocapflow_report.overlay import Painter
 
@@ -22,9 +22,9 @@ def stills(
     chosen = chosen_rows(track)
     painter, found = Painter(scene), {}
     last = max(int(track.frame[row]) for row in chosen.values())
-    for frame in steadied(recording.until(last).frames(), checks):
-        for what, row in chosen.items():
-            if track.frame[row] == frame.index:
+    for row, frame in rows_with_frames(track, recording.until(last).frames(), checks):
+        for what, wanted in chosen.items():
+            if wanted == row:
                 wall = _side_by_side(painter.paint(frame, track, row))
                 caption = f"{what}: frame {frame.index}, {_overlaps(track, row)}"
                 found[what] = (caption, cv2.imencode(".jpg", wall)[1].tobytes())

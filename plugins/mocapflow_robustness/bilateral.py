@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from pydantic import PositiveFloat, PositiveInt
+from pydantic import PositiveFloat
 
 from mocapflow.records import F32, F64, U8, Bool
 from mocapflow_robustness.restoring import Restorer, mean_around
@@ -17,6 +17,8 @@ SIDE = 7  # px, of such a place
 ENOUGH = 0.9  # share of a blur's window that has to show the scene: beside what hides it, noise is left
 LEAST_NOISE = 8.0  # grey levels, standard deviation; cameras make less
 SPACE_PX = 4.0  # standard deviation of the filter in the picture
+COLOUR = 40.0  # standard deviation of the filter in colours, grey levels
+PASSES = 3  # of the filter, one after the other
 
 
 class Bilateral(Restorer):
@@ -30,9 +32,7 @@ class Bilateral(Restorer):
     """
 
     name: ClassVar[str] = "bilateral"
-    left: PositiveFloat = 16.0  # grey levels of noise that the blur may leave
-    alike: PositiveFloat = 40.0  # standard deviation of the filter in colours, grey levels
-    passes: PositiveInt = 3  # passes of the filter, one after the other
+    noise_left: PositiveFloat = 16.0  # grey levels of noise that the blur may leave
 
     def restore(self, image: U8) -> tuple[U8, Bool]:
         """Return an image (H, W, 3) without its noise, and where (H, W) it does not show the scene."""
@@ -44,10 +44,10 @@ class Bilateral(Restorer):
             return image, np.zeros(rough.shape, bool)
         calm = (rough < FREE * noise).astype(np.uint8)
         hidden = np.asarray(cv2.dilate(calm, np.ones((SIDE, SIDE), np.uint8)), bool)
-        smooth, share = mean_around(image, ~hidden, noise / (2 * np.sqrt(np.pi) * self.left))
+        smooth, share = mean_around(image, ~hidden, noise / (2 * np.sqrt(np.pi) * self.noise_left))
         hidden |= share < ENOUGH
-        for _ in range(self.passes):
-            smooth = np.asarray(cv2.bilateralFilter(smooth, -1, self.alike, SPACE_PX), np.float32)
+        for _ in range(PASSES):
+            smooth = np.asarray(cv2.bilateralFilter(smooth, -1, COLOUR, SPACE_PX), np.float32)
         return unclipped(smooth, noise), hidden
 
 

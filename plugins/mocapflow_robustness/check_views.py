@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import Field, PositiveFloat
 
 from mocapflow.assets import Background
 from mocapflow.components import Stage
@@ -19,8 +18,8 @@ from mocapflow_robustness import doubts
 from mocapflow_robustness.knocked import Probes
 from mocapflow_robustness.thumbnails import Thumbnails, thumbnail, thumbnails
 
-Factor = Annotated[float, Field(gt=1)]
-
+LONGEST_S = 0.17  # of a burst of wrong pictures
+JUMP = 2.0  # how much larger than the motion around it a jump is, in the view that shows it best
 JOINT_JUMP = 1.3  # how much larger than the motion around it a jump is in a view that jumps with another one
 
 
@@ -38,8 +37,6 @@ class CheckViews(Stage):
 
     name: ClassVar[str] = "check_views"
     extent: ClassVar[Literal["all"]] = "all"  # so that a longer run finds the same
-    longest_s: PositiveFloat = 0.17  # longest burst of wrong pictures
-    jump: Factor = 2.0  # how much larger than the motion around it a jump is, in the view that shows it best
 
     def run(self, recording: Recording, background: Background | None = None) -> ViewChecks:
         """Return the pictures to do without, each with a reason, and when cameras were knocked."""
@@ -47,7 +44,7 @@ class CheckViews(Stage):
         probes = Probes(recording, room=dict(enumerate(known)))
         seen = thumbnails(recording, probes.look)
         names = [camera.name for camera in recording.cameras]
-        said = self.doubt(seen, rooms(seen, background), recording.frame_rate, names)
+        said = doubted(seen, rooms(seen, background), recording.frame_rate, names)
         rows, cameras = np.nonzero(said != "")
         return ViewChecks(
             frame=rows.astype(np.int32),
@@ -56,33 +53,35 @@ class CheckViews(Stage):
             knocks=probes.knocks(),
         )
 
-    def longest(self, frame_rate: float) -> int:
-        """Return of how many frames a burst may be."""
-        return max(round(self.longest_s * frame_rate), 1)
 
-    def doubt(self, seen: Thumbnails, room: F32, frame_rate: float, names: Sequence[str]) -> npt.NDArray[np.object_]:
-        """Return (T, C) why a picture is not to be trusted, "" where it is.
+def longest(frame_rate: float) -> int:
+    """Return of how many frames a burst may be."""
+    return max(round(LONGEST_S * frame_rate), 1)
 
-        Args:
-            seen: all pictures.
-            room: (C, S, S) thumbnails of the empty scene.
-            frame_rate: per second.
-            names: of the cameras.
-        """
-        empty = doubts.blank(seen.grey, room)
-        foreign, like = doubts.lookalike(seen.grey, room)
-        good = seen.there & ~(empty | foreign)
-        old = repeated(np.where(empty | foreign, np.nan, seen.news)) | frozen(seen)
-        old &= doubts.peopled(seen.grey, room, good) | (frozen_from(seen.news) == 0)  # then it is its own empty room
-        settled = doubts.bridged(seen.grey, good & ~old)
-        torn = doubts.bursts(settled, self.longest(frame_rate), self.jump, JOINT_JUMP)
-        said = np.full(empty.shape, "", object)
-        said[torn] = "the picture does not fit the ones before and after"
-        said[old] = "the picture repeats the one before"
-        said[foreign] = [f"the picture looks like one of {names[camera]}" for camera in like[foreign]]
-        said[empty] = "the picture shows nothing"
-        said[~seen.there] = ""  # already known to be missing
-        return said
+
+def doubted(seen: Thumbnails, room: F32, frame_rate: float, names: Sequence[str]) -> npt.NDArray[np.object_]:
+    """Return (T, C) why a picture is not to be trusted, "" where it is.
+
+    Args:
+        seen: all pictures.
+        room: (C, S, S) thumbnails of the empty scene.
+        frame_rate: per second.
+        names: of the cameras.
+    """
+    empty = doubts.blank(seen.grey, room)
+    foreign, like = doubts.lookalike(seen.grey, room)
+    good = seen.there & ~(empty | foreign)
+    old = repeated(np.where(empty | foreign, np.nan, seen.news)) | frozen(seen)
+    old &= doubts.peopled(seen.grey, room, good) | (frozen_from(seen.news) == 0)  # then it is its own empty room
+    settled = doubts.bridged(seen.grey, good & ~old)
+    torn = doubts.bursts(settled, longest(frame_rate), JUMP, JOINT_JUMP)
+    said = np.full(empty.shape, "", object)
+    said[torn] = "the picture does not fit the ones before and after"
+    said[old] = "the picture repeats the one before"
+    said[foreign] = [f"the picture looks like one of {names[camera]}" for camera in like[foreign]]
+    said[empty] = "the picture shows nothing"
+    said[~seen.there] = ""  # already known to be missing
+    return said
 
 
 def rooms(seen: Thumbnails, background: Background | None) -> F32:

@@ -74,11 +74,11 @@ class Corruption:
     settings: Corrupt
     whole: Recording
 
-    def frames(self, source: Recording, indices: range) -> Iterator[Frame]:
+    def frames(self, source: Recording) -> Iterator[Frame]:
         """Yield the disturbed frames."""
         names = [view.lens.name for view in source.views]
         tapes: Tapes = {}
-        for frame in replace(source, indices=indices).frames():
+        for frame in source.frames():
             yield self._disturbed(frame, names, tapes)
 
     def _disturbed(self, frame: Frame, names: list[str], tapes: Tapes) -> Frame:

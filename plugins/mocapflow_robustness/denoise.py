@@ -7,7 +7,6 @@ from typing import ClassVar
 
 import numba
 import numpy as np
-from pydantic import PositiveInt
 
 from mocapflow.records import U8, Bool
 from mocapflow_robustness.restoring import Restorer, mean_around
@@ -18,6 +17,7 @@ STRIP_PX = 3  # width of the strips that are left between things before the scen
 CHANCE = 1e-9  # that noise spares a whole neighbourhood
 RADIUS_PX = 2  # of the square of neighbours that are asked of a pixel
 COMPANY = 2  # neighbours that have to agree with a pixel
+TOLERANCE = 16  # grey levels by which the colours of neighbours that agree differ at most
 FLAT_PX = 13  # side of a square of one colour that is not the scene's; compression makes small ones
 FILL_PX = 1.0  # standard deviation of the window a lonely pixel is filled from
 
@@ -34,11 +34,10 @@ class Denoise(Restorer):
     """
 
     name: ClassVar[str] = "denoise"
-    alike: PositiveInt = 16  # neighbours agree that differ by no more in any colour, grey levels
 
     def restore(self, image: U8) -> tuple[U8, Bool]:
         """Return an image (H, W, 3) without its noise, and where (H, W) it does not show the scene."""
-        kept = in_company(image, RADIUS_PX, self.alike, COMPANY)
+        kept = in_company(image, RADIUS_PX, TOLERANCE, COMPANY)
         share = noise_share(kept)
         if share < LEAST_NOISE:
             return image, np.zeros(kept.shape, bool)
@@ -112,7 +111,7 @@ def filled(image: U8, known: Bool, wanted: Bool, sigma_px: float) -> U8:
 
 
 @numba.njit(cache=True)
-def in_company(image, radius, alike, company):  # type: ignore[no-untyped-def]
+def in_company(image, radius, tolerance, company):  # type: ignore[no-untyped-def]
     """Return which pixels (H, W) have at least so many neighbours of their colour in an image (H, W, 3)."""
     height, width, _ = image.shape
     kept = np.zeros((height, width), np.bool_)
@@ -123,9 +122,9 @@ def in_company(image, radius, alike, company):  # type: ignore[no-untyped-def]
             for v in range(max(y - radius, 0), min(y + radius + 1, height)):
                 for u in range(max(x - radius, 0), min(x + radius + 1, width)):
                     agree += (
-                        abs(np.int32(image[v, u, 0]) - blue) <= alike
-                        and abs(np.int32(image[v, u, 1]) - green) <= alike
-                        and abs(np.int32(image[v, u, 2]) - red) <= alike
+                        abs(np.int32(image[v, u, 0]) - blue) <= tolerance
+                        and abs(np.int32(image[v, u, 1]) - green) <= tolerance
+                        and abs(np.int32(image[v, u, 2]) - red) <= tolerance
                     )
                 if agree >= company:
                     kept[y, x] = True

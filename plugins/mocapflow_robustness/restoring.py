@@ -33,9 +33,9 @@ class Restored:
 
     restorer: Restorer
 
-    def frames(self, source: Recording, indices: range) -> Iterator[Frame]:
+    def frames(self, source: Recording) -> Iterator[Frame]:
         """Yield the restored frames."""
-        for frame in replace(source, indices=indices).frames():
+        for frame in source.frames():
             images, hidden = zip(*(self.restorer.restore(image) for image in frame.images), strict=True)
             yield replace(frame, images=images, hidden=together(frame.hidden, hidden))
 

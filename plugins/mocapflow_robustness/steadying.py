@@ -28,10 +28,10 @@ class Steadied:
     tolerance: float  # share by which they may differ
     typical: Mapping[str, U8]  # blocks (h, w, 3) of that picture, by camera
 
-    def frames(self, source: Recording, indices: range) -> Iterator[Frame]:
+    def frames(self, source: Recording) -> Iterator[Frame]:
         """Yield the steadied frames."""
         typical = [self.typical.get(view.lens.name) for view in source.views]
-        for frame in replace(source, indices=indices).frames():
+        for frame in source.frames():
             images = (self.image(image, usual) for image, usual in zip(frame.images, typical, strict=True))
             yield replace(frame, images=tuple(images))
 

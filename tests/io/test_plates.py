@@ -119,8 +119,8 @@ class Noisier:
 
     rows: int = 30
 
-    def frames(self, source, indices):
-        for frame in replace(source, indices=indices).frames():
+    def frames(self, source):
+        for frame in source.frames():
             noise = np.random.default_rng(0).normal(0, 10, frame.images[0].shape)
             hidden = np.zeros(frame.images[0].shape[:2], bool)
             hidden[: self.rows] = True
@@ -146,8 +146,8 @@ class BlankAtFirst:
 
     level: int = 0
 
-    def frames(self, source, indices):
-        for frame in replace(source, indices=indices).frames():
+    def frames(self, source):
+        for frame in source.frames():
             yield replace(frame, images=tuple(np.full_like(image, self.level) for image in frame.images))
 
 

@@ -90,7 +90,7 @@ def test_several_things_at_once(clip):
 def test_a_reason_ends_where_the_name_of_its_camera_does(clip):
     recording = Corrupt(events=(Event(what="other_camera", first=40, views=("cam03",)),)).run(open_recording(clip))
     names = ["the camera behind the door on the left side", "b", "c"]
-    said = CheckViews().doubt(thumbnails(recording), check_views.rooms(thumbnails(recording), None), 30.0, names)
+    said = check_views.doubted(thumbnails(recording), check_views.rooms(thumbnails(recording), None), 30.0, names)
     assert said[45, 2] == f"the picture looks like one of {names[0]}"
 
 
@@ -120,7 +120,7 @@ def test_what_a_codec_draws_anew_is_no_news_of_a_view_that_hangs(clip):
     news = seen.news.copy()
     news[40, 1] = news[40, 0]
     seen = replace(seen, news=news)
-    said = CheckViews().doubt(seen, check_views.rooms(seen, None), 30.0, ["cam01", "cam02", "cam03"])
+    said = check_views.doubted(seen, check_views.rooms(seen, None), 30.0, ["cam01", "cam02", "cam03"])
     assert np.argwhere(said != "").tolist() == [[row, 1] for row in range(25, FRAMES)]
 
 
@@ -137,9 +137,9 @@ def test_a_view_that_the_person_leaves_does_not_repeat_itself(clip, tmp_path):
 @pytest.mark.parametrize("rate", [7.5, 10.0, 30.0, 120.0])
 def test_how_long_a_burst_may_be_does_not_depend_on_the_frame_rate(rate):
     """At 10 frames a second half a second of a kick is five frames."""
-    assert CheckViews().longest(rate) == pytest.approx(0.17 * rate, abs=0.5)
+    assert check_views.longest(rate) == pytest.approx(0.17 * rate, abs=0.5)
     gesture = np.concatenate([drifting(20, 0, 0), 8 + drifting(0, 0, round(0.5 * rate)), drifting(20, 0, 0)])
-    wrong = bursts(gesture, longest=CheckViews().longest(rate), strong=2, weak=1.3)
+    wrong = bursts(gesture, longest=check_views.longest(rate), strong=2, weak=1.3)
     assert not wrong.any()
 
 

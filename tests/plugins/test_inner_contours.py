@@ -10,7 +10,7 @@ import pytest
 from matching_scenes import FIRST
 from mocapflow_levelset import splits
 from mocapflow_levelset.colours import BINS, bins_of
-from mocapflow_levelset.inner import Search, inner_contours, told_apart
+from mocapflow_levelset.inner import inner_contours, told_apart
 from mocapflow_levelset.inner_edges import inner_edges
 from mocapflow_levelset.layers import COLOURS, layer_of, shown
 from mocapflow_matching.inner_contours import InnerContours, slipped
@@ -99,11 +99,11 @@ def match(colour_of, believed, true=None, slipped_m=0.0):
     pose = kicked(60.0) if true is None else true
     frame, surface = painted(colour_of, pose, lower_m=slipped_m), surface_at(believed)
     past = Past(appearance={COLOURS: learned(frame, pose=pose)})
-    segmentation, search = tiny_segmentation(SCENE, pose), Search(24, 1.0)
+    segmentation = tiny_segmentation(SCENE, pose)
     layers, known = layer_of(SCENE), shown(past)
     told = told_apart(SCENE, layers, known)
     parts = [
-        inner_contours(image, silhouette, surface, camera, layers, told, known, search)
+        inner_contours(image, silhouette, surface, camera, layers, told, known, 24)
         for image, silhouette, camera in zip(frame.images, segmentation.silhouettes, SCENE.cameras, strict=True)
     ]
     return InnerContours().match(frame, replace(segmentation, inner=pool(parts)), surface, past, SCENE, FIRST)

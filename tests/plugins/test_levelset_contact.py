@@ -41,7 +41,7 @@ def sole(steps):
     contact = Contact(zone, Rhythm(steps, 4, 4), Window(12.0, 8, 0.03)) if steps else None
     segmenter = LevelSet(use_background=False, shape_weight=0.01)
     view = View(image=image, start=model, prior=model, counted=np.ones(model.shape, bool), contact=contact)
-    level = find(view, segmenter._levels(warm=False), segmenter._method(Shadow()), 12.0).level
+    level = find(view, segmenter._levels(warm=False), segmenter._method(Shadow())).level
     return np.mean([EDGE - 20 + np.flatnonzero(level[EDGE - 20 :, x] < 0)[0] for x in range(65, 96)]) - 0.5
 
 
@@ -66,11 +66,11 @@ def test_the_zone_lies_below_what_is_lowest():
     pose = scenes.tiny_pose(scene, 3, 0.1)
     surface = scene.surface(pose, scenes.tiny_cloth(scene, pose))
     camera = scene.cameras[0]
-    zone = contact_zone(surface, camera, 6.0)
+    zone = contact_zone(surface, camera)
     height = surface.vertices[:, 2]
     low = project(surface.vertices[height < height.min() + NEAR_M], camera)
     row, column = np.nonzero(zone)
     assert len(row)
     distance = np.linalg.norm(np.stack([column, row], axis=1)[:, None] - low[None], axis=2).min(axis=1)
     assert distance.max() < 6 + 4  # the outline may lie between vertices
-    assert not contact_zone(surface, camera, 6.0)[: int(project(surface.vertices, camera)[:, 1].min())].any()
+    assert not contact_zone(surface, camera)[: int(project(surface.vertices, camera)[:, 1].min())].any()

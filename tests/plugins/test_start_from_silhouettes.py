@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mocapflow_bodies.template import Template
 from mocapflow_fitting.start_from_file import read_pose
-from mocapflow_recovery.placing import apart, centred, meeting, placed
+from mocapflow_recovery.placing import centred, heading_between, meeting, placed
 from mocapflow_recovery.start_from_silhouettes import StartFromSilhouettes, scattered, unlike
 
 from mocapflow.config.pipeline import load_pipeline
@@ -34,7 +34,7 @@ def test_a_body_is_put_where_it_is_wanted_and_turned(bare):
         pose = placed(bare, turn, angles, middle)
         vertices = bare.surface(pose, NO_CLOTH).vertices
         np.testing.assert_allclose((vertices.max(axis=0) + vertices.min(axis=0)) / 2, middle, atol=1e-9)
-        assert apart(placed(bare, 0.0, angles, middle), pose) == pytest.approx(turn)
+        assert heading_between(placed(bare, 0.0, angles, middle), pose) == pytest.approx(turn)
 
 
 def test_rays_through_the_middles_of_silhouettes_meet_in_the_middle_of_a_person(bare):
@@ -102,7 +102,7 @@ def test_a_person_is_found_without_any_hint(clip, frame):
     scene = Scene(cameras=recording.cameras, body=body, garment=pipeline.garment.sew(body))
     start = StartFromSilhouettes().run(recording, scene)
     given = read_pose(DATA / clip / "init.json", body)
-    assert np.degrees(apart(start.pose, given)) < 30  # they hardly turn
+    assert np.degrees(heading_between(start.pose, given)) < 30  # they hardly turn
     found = measure(body, start.pose.root[None], start.pose.angles[None])
     lines = (DATA / clip / "truth" / "angles.csv").read_text().splitlines()
     truth = dict(zip(lines[0].split(","), map(float, lines[1 + frame].split(",")), strict=True))

@@ -75,9 +75,8 @@ class Author:
         columns = np.swapaxes(inverse, 1, 2).reshape(-1, 16).astype(np.float32)
         joints = list(range(1, len(body.parents) + 1))
         self._gltf.skins = [lib.Skin(joints=joints, inverseBindMatrices=self._add(columns))]
-        weight = body.skin_weight[:, :4] / body.skin_weight[:, :4].sum(
-            axis=1, keepdims=True
-        )  # sorted, viewers read four
+        weight = body.skin_weight[:, :4]  # sorted, viewers read four
+        weight = weight / weight.sum(axis=1, keepdims=True)
         attributes = lib.Attributes(
             POSITION=self._add(body.vertices.astype(np.float32), vertices=True),
             NORMAL=self._add(meshes.vertex_normals(body.vertices, body.faces).astype(np.float32)),

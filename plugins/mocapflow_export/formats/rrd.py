@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mocapflow.geometry import angles, silhouettes
-from mocapflow.results import steadied
+from mocapflow.results import rows_with_frames
 from mocapflow_export.formats.result import Result, library
 
 BODY, GARMENT, OUTLINE = (200, 160, 135), (60, 120, 130), (255, 200, 0)
@@ -24,13 +24,11 @@ def write(result: Result, path: Path) -> None:
     stream.save(str(path))
     stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     log_cameras(rr, stream, result)
-    rows = {int(index): row for row, index in enumerate(result.track.frame)}
-    for frame in steadied(result.recording.frames(), result.checks):
-        if frame.index in rows:
-            stream.set_time("time", duration=frame.time)
-            stream.set_time("frame", sequence=frame.index)
-            log_model(rr, stream, result, rows[frame.index])
-            log_images(rr, stream, result, rows[frame.index], frame.images)
+    for row, frame in rows_with_frames(result.track, result.recording.frames(), result.checks):
+        stream.set_time("time", duration=frame.time)
+        stream.set_time("frame", sequence=frame.index)
+        log_model(rr, stream, result, row)
+        log_images(rr, stream, result, row, frame.images)
     stream.disconnect()
 
 
