@@ -1,0 +1,76 @@
+"""What a keypoint tool measures on a recording whose motion is known, beside our run of it.
+
+python benchmarks/keypoint_tool.py RECORDING KEYPOINTS [RUN]: KEYPOINTS is a folder like keypoints/ of a recording, as
+examples/mediapipe_keypoints.py writes it. Its points are triangulated robustly with all cameras. Angles between them
+are the first column; those of the scanned body fitted to them frame by frame (inverse kinematics) the second. Both are
+low-passed at 6 Hz, as Pose2Sim does it.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from mocapflow_bodies.scanned import Scanned
+from mocapflow_evaluation.keypoint_reference import low_pass, with_keypoints, write_triangulated
+from mocapflow_evaluation.references import read_reference
+from mocapflow_export import layout
+from mocapflow_fitting.detections import layout as names_of
+from mocapflow_fitting.detections import persons, seen
+from mocapflow_fitting.keypoint_fit import fit
+from mocapflow_fitting.landmarks import landmarks
+
+from mocapflow.geometry.angles import measure
+from mocapflow.io.columns import read_columns
+from mocapflow.recordings.recording import Recording, open_recording
+from mocapflow.records import F64
+
+Curves = Mapping[str, F64]  # (T,) deg, a row for each frame of the recording
+
+
+def main() -> None:
+    folder, keypoints = Path(sys.argv[1]), Path(sys.argv[2])
+    recording = open_recording(folder)
+    systems = {"triangulated": triangulated(recording, keypoints), "fitted body": fitted_body(recording, keypoints)}
+    if len(sys.argv) > 3:
+        systems["mocapflow"] = read_columns(Path(sys.argv[3]) / layout.ANGLES)
+    truth = read_columns(folder / "truth/angles.csv")
+    print(f"{'RMS °, without the mean difference':36}" + "".join(f"{name:>20}" for name in systems))
+    for name in (name for name in truth if name != "frame"):
+        print(f"{name:36}" + "".join(f"{errors(truth, curves, name):>20}" for curves in systems.values()))
+
+
+def triangulated(recording: Recording, keypoints: Path) -> Curves:
+    """Return the angles between triangulated keypoints."""
+    with tempfile.TemporaryDirectory() as place:
+        return read_reference(write_triangulated(recording, keypoints, recording.cameras, Path(place), None)).curves
+
+
+def fitted_body(recording: Recording, keypoints: Path) -> Curves:
+    """Return the angles of the recording's scan, fitted to the keypoints of each frame."""
+    recording, body = with_keypoints(recording, keypoints), Scanned().load(recording.folder)
+    people = persons(recording, recording.indices, recording.cameras)
+    names, wanted = names_of(recording, list(people), None), landmarks(body).names
+    poses = [fit(body, [seen(person, names, wanted)], recording.cameras)[1][0] for person in people.values()]
+    series = measure(body, np.stack([pose.root for pose in poses]), np.stack([pose.angles for pose in poses]))
+    values = np.full((recording.length, len(series.names)), np.nan)
+    values[list(people)] = series.value
+    return dict(zip(series.names, low_pass(values, recording.frame_rate).T, strict=True))
+
+
+def errors(truth: Curves, curves: Curves, name: str) -> str:
+    """Return the RMS error of an angle, the same without its mean, and how many frames have no value."""
+    if name not in curves:
+        return "-"
+    frames = truth["frame"].astype(int)
+    off = curves[name][frames] - truth[name]
+    known = off[np.isfinite(off)]
+    missing = f" ({len(off) - len(known)} missing)" if len(known) < len(off) else ""
+    return f"{np.sqrt(np.mean(known**2)):.1f}, {np.std(known):.1f}{missing}"
+
+
+if __name__ == "__main__":
+    main()
