@@ -18,8 +18,7 @@ from mocapflow_bodies.scanned import Scanned
 from mocapflow_evaluation.keypoint_reference import low_pass, with_keypoints, write_triangulated
 from mocapflow_evaluation.references import read_reference
 from mocapflow_export import layout
-from mocapflow_fitting.detections import layout as names_of
-from mocapflow_fitting.detections import persons, seen
+from mocapflow_fitting.detections import names_of, persons, seen
 from mocapflow_fitting.keypoint_fit import fit
 from mocapflow_fitting.landmarks import landmarks
 
