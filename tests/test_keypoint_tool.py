@@ -1,0 +1,52 @@
+"""The benchmark beside a keypoint tool is fair: keypoints that are exact measure the motion exactly."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mocapflow_fitting.keypoint_layouts import LAYOUTS
+
+from mocapflow.geometry.cameras import project
+from mocapflow.help.shipped import shipped
+from mocapflow.io.cameras import read_cameras
+
+SCRIPT = Path(__file__).parents[1] / "benchmarks" / "keypoint_tool.py"
+CLIP = shipped("examples", "data", "shorts_steps")
+CALLED = {"big_toe_l": "toe_l", "big_toe_r": "toe_r", "hip_mid": "pelvis"}  # joints of the truth that have other names
+
+
+def write_true_keypoints(folder: Path) -> None:
+    """Write the true joints of the clip as a detector would that makes no mistakes."""
+    with np.load(CLIP / "truth" / "joints.npz") as truth:
+        places = dict(zip(truth["names"].tolist(), np.moveaxis(truth["positions"].astype(float), 1, 0), strict=True))
+    names = LAYOUTS["halpe_26"]
+    for camera in read_cameras(CLIP):
+        (folder / f"{camera.name}_json").mkdir(parents=True)
+        pixels = {
+            name: project(where, camera) for name in names if (where := places.get(CALLED.get(name, name))) is not None
+        }
+        for frame in range(len(places["hip_l"])):
+            points = [(*pixels[name][frame], 1.0) if name in pixels else (0.0, 0.0, 0.0) for name in names]
+            person = {"pose_keypoints_2d": np.ravel(points).tolist()}
+            (folder / f"{camera.name}_json" / f"{frame:06d}.json").write_text(json.dumps({"people": [person]}))
+
+
+@pytest.mark.long
+def test_true_keypoints_give_the_true_angles(tmp_path: Path) -> None:
+    """The filter takes tenths of a degree; a body whose landmarks are not its joints keeps a constant difference."""
+    write_true_keypoints(tmp_path)
+    done = subprocess.run([sys.executable, SCRIPT, CLIP, tmp_path], check=False, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    rows = {
+        line.split()[0]: line.split()[1:] for line in done.stdout.splitlines() if line.startswith(("knee", "elbow"))
+    }
+    assert len(rows) == 4
+    print(done.stdout)
+    triangulated, fitted_without_mean = (np.array([float(row[k].rstrip(",")) for row in rows.values()]) for k in (0, 3))
+    assert triangulated.max() < 0.5
+    assert fitted_without_mean[:2].max() < 1.0, "knees"
