@@ -11,7 +11,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.errors import PydanticUserError
 
 from mocapflow.config.documents import Document, KeyPath, dotted
-from mocapflow.errors import MocapflowError, PipelineError, guess
+from mocapflow.errors import MocapflowError, PipelineError, PluginError, guess, raised
 from mocapflow.registry import Registry
 from mocapflow.settings import Component, plain_parts
 
@@ -48,7 +48,7 @@ class Resolver:
         return self.build(cls, {**(defaults or {}), **settings}, steps)
 
     def build(self, cls: type[BaseModel], settings: Mapping[str, Any], steps: KeyPath) -> BaseModel:
-        """Return an instance of a pydantic model, its validation error told by line."""
+        """Return an instance of a pydantic model; what its validation raises is told by line."""
         try:
             return cls(**settings)
         except ValidationError as error:
@@ -57,6 +57,10 @@ class Resolver:
             message = f"{_title(cls)} is not complete: {error.message.splitlines()[0]}"
             hint = "import the types of its settings when the module is imported, not under TYPE_CHECKING"
             raise self.located(PipelineError(message, hint=hint), steps) from None
+        except MocapflowError as error:
+            raise self.located(error, steps) from None
+        except (Exception, SystemExit) as error:  # of a plugin's own validator
+            raise self.located(PluginError(f"{_title(cls)} can't be made: {raised(error)}"), steps) from error
 
     def place(self, steps: KeyPath) -> str:
         """Return where a value is written, as file:line:column."""

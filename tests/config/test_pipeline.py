@@ -219,6 +219,30 @@ def test_what_is_wrong_is_told_with_its_line(folder, written, instead, message):
     assert caught.value.exit_status == 2
 
 
+@pytest.mark.parametrize(
+    "error, said",
+    [
+        (RuntimeError("no GPU here"), "can't be made: RuntimeError: no GPU here"),
+        (SystemExit(0), "can't be made: it left with status 0"),
+        (PluginError("no GPU here", hint="rent one"), "no GPU here\n       rent one"),
+    ],
+)
+def test_whatever_the_validator_of_a_plugin_raises_is_told_with_its_line(folder, error, said):
+    class Picky(small_plugins.Kinematic):
+        name = "picky"
+
+        def model_post_init(self, context):
+            raise error
+
+    registry = small_plugins.registry()
+    registry.add(Origin("p", "p", "1"), lambda: SimpleNamespace(mocapflow_drapers=hookimpl(lambda: [Picky])))
+    Path("skirt.yaml").write_text(TEXT.replace("draper: kinematic", "draper: picky"))
+    with pytest.raises(MocapflowError) as caught:
+        load_pipeline(Path("skirt.yaml"), registry)
+    picky = "" if isinstance(error, MocapflowError) else "picky "
+    assert str(caught.value) == f"skirt.yaml:7:5  stages.track.draper: {picky}{said}"
+
+
 def test_a_change_of_what_is_not_there_is_told_as_such(folder):
     with pytest.raises(
         MocapflowError, match=r"^--set stages.track.nope.x=3  stages.track.nope: unknown setting of cou"
