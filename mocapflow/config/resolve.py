@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import NoneType
 from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
@@ -87,7 +88,7 @@ class Resolver:
     def _setting(self, annotation: Any, value: Any, steps: KeyPath) -> Any:
         """Return a value of the file as the model takes it: nested components built, paths made absolute."""
         base = _component_base(annotation)
-        if value is None:
+        if value is None and (base is None or NoneType in plain_parts(annotation)):
             return None
         if base is None:
             return (

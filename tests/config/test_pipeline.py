@@ -203,6 +203,9 @@ def test_a_plugin_file_named_by_the_pipeline(folder):
          "       its name is that of files: letters, digits, _ and -"),
         ("recording: clip", "recording: clip\nframes: {start: 9, stop: 2}",
          "skirt.yaml:2:1  frames: 9:2 holds no frame"),
+        ("matchers: [contour_icp, {use: contour_icp, share: 0.5}]", "matchers: null",
+         "skirt.yaml:8:5  stages.track.matchers: name a matcher, as `name` or as {use: name, setting: value}\n"
+         "       available: contour_icp"),
         ("recording: clip", "recording: clip\nparts: 3",
          "skirt.yaml:2:1  parts: input should be `name: value` lines, not 3"),
         ("recording: clip", "recording: clip\nplugins: mine.py",
