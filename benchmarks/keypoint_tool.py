@@ -1,9 +1,9 @@
 """What a keypoint tool measures on a recording whose motion is known, beside our run of it.
 
-python benchmarks/keypoint_tool.py RECORDING KEYPOINTS [RUN]: KEYPOINTS is a folder like keypoints/ of a recording, as
-examples/mediapipe_keypoints.py writes it. Its points are triangulated robustly with all cameras. Angles between them
-are the first column; those of the scanned body fitted to them frame by frame (inverse kinematics) the second. Both are
-low-passed at 6 Hz, as Pose2Sim does it.
+python benchmarks/keypoint_tool.py RECORDING KEYPOINTS [RUN [PNG]]: KEYPOINTS is a folder like keypoints/ of a
+recording, as examples/mediapipe_keypoints.py writes it. Its points are triangulated robustly with all cameras. Angles
+between them are the first column; those of the scanned body fitted to them frame by frame (inverse kinematics) the
+second. Both are low-passed at 6 Hz, as Pose2Sim does it. PNG gets the curves of the knees.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 from mocapflow_bodies.scanned import Scanned
 from mocapflow_evaluation.keypoint_reference import low_pass, with_keypoints, write_triangulated
+from mocapflow_evaluation.panels import OURS, TRUTH, legend, panels, save, title
 from mocapflow_evaluation.references import read_reference
 from mocapflow_export import layout
 from mocapflow_fitting.detections import names_of, persons, seen
@@ -27,6 +28,11 @@ from mocapflow.io.columns import read_columns
 from mocapflow.recordings.recording import Recording, open_recording
 from mocapflow.records import F64
 
+DRAWN = {
+    "triangulated": ("tab:orange", "keypoints, triangulated"),
+    "fitted body": ("tab:brown", "the scan fitted to the keypoints"),
+    "mocapflow": (OURS, "mocapflow"),
+}
 Curves = Mapping[str, F64]  # (T,) deg, a row for each frame of the recording
 
 
@@ -40,6 +46,8 @@ def main() -> None:
     print(f"{'RMS °, without the mean difference':36}" + "".join(f"{name:>20}" for name in systems))
     for name in (name for name in truth if name != "frame"):
         print(f"{name:36}" + "".join(f"{errors(truth, curves, name):>20}" for curves in systems.values()))
+    if len(sys.argv) > 4:
+        plot_knees(Path(sys.argv[4]), truth, systems)
 
 
 def triangulated(recording: Recording, keypoints: Path) -> Curves:
@@ -69,6 +77,23 @@ def errors(truth: Curves, curves: Curves, name: str) -> str:
     known = off[np.isfinite(off)]
     missing = f" ({len(off) - len(known)} missing)" if len(known) < len(off) else ""
     return f"{np.sqrt(np.mean(known**2)):.1f}, {np.std(known):.1f}{missing}"
+
+
+def plot_knees(path: Path, truth: Curves, systems: Mapping[str, Curves]) -> None:
+    """Write the curves of both knees by all systems, the truth in black."""
+    names = ("knee_flexion_l", "knee_flexion_r")
+    figure, both = panels(len(names), 2, 3.2)
+    for panel, name in zip(both, names, strict=True):
+        panel.plot(truth["frame"], truth[name], color=TRUTH, linewidth=1.8, label="truth")
+        for system, (colour, label) in DRAWN.items():
+            if system in systems:
+                curve = systems[system][name]
+                panel.plot(np.arange(len(curve)), curve, color=colour, linewidth=1.3, label=label)
+        panel.set_title(title(name), fontsize=10, loc="left")
+        panel.set_xlabel("frame")
+        panel.set_ylabel("deg")
+    legend(figure, both)
+    save(figure, path)
 
 
 if __name__ == "__main__":

@@ -29,6 +29,8 @@ class Commands(typer.core.TyperGroup):
         """Run the command and turn errors into exit status 1 or 2, an interrupt or SIGTERM into 130."""
         try:
             return super().invoke(ctx)
+        except SystemExit as error:  # of a plugin or a library: no command of ours ends so, and 0 would say it is done
+            raise RuntimeError("a plugin or a library left the program") from error
         except (Exception, KeyboardInterrupt) as error:
             if interrupted(error):
                 typer.echo(f"\ninterrupted{_to_go_on(ctx.invoked_subcommand)}", err=True)

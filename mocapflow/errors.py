@@ -90,6 +90,16 @@ def uncompilable(error: BaseException) -> MocapflowError | None:
     return MocapflowError("compiled code can be kept neither beside its source nor in a home folder", hint=hint)
 
 
+def raised(error: BaseException) -> str:
+    """Return in one line what foreign code has raised."""
+    if isinstance(error, MocapflowError):
+        return error.message
+    if isinstance(error, SystemExit):
+        return f"it left with status {error.code}"
+    first = " ".join(str(error).partition("\n\n")[0].splitlines())  # pydantic adds an address behind it
+    return f"{type(error).__name__}: {first}"
+
+
 class ComponentFailed(MocapflowError):
     """A component raised while a run was going on."""
 

@@ -38,7 +38,7 @@ class Observers:
                 continue
             try:
                 observer.function(*(news[name] for name in observer.argnames))
-            except Exception as error:  # an onlooker must never stop a run
+            except (Exception, SystemExit) as error:  # an onlooker must never stop a run
                 if interrupted(error):
                     raise KeyboardInterrupt from None
                 self._off.add(observer.function)

@@ -17,7 +17,7 @@ import pluggy
 
 from mocapflow import components, hookspecs
 from mocapflow.dressing import roles
-from mocapflow.errors import MocapflowError, PluginError, UnknownComponent, alternatives
+from mocapflow.errors import PluginError, UnknownComponent, alternatives, raised
 from mocapflow.guards.vetting import check_hooks, import_file, vetted
 from mocapflow.observers import Observers
 from mocapflow.settings import Component
@@ -55,14 +55,12 @@ class Failure:
     """A plugin, or one of its roles, that did not load."""
 
     origin: Origin
-    error: Exception
+    error: Exception | SystemExit
     role: str = ""  # empty: the whole plugin
 
     def __str__(self) -> str:
         part = f" its {self.role} components" if self.role else ""
-        first = " ".join(str(self.error).partition("\n\n")[0].splitlines())  # pydantic adds an address behind it
-        text = self.error.message if isinstance(self.error, MocapflowError) else ""
-        return f"{self.origin} did not load{part}: {text or f'{type(self.error).__name__}: {first}'}"
+        return f"{self.origin} did not load{part}: {raised(self.error)}"
 
 
 class Registry:
@@ -128,8 +126,7 @@ class Registry:
             self._manager.register(plugin, name=f"{origin.distribution}:{origin.plugin}")
             self._plugins[origin] = plugin
         except (Exception, SystemExit) as error:  # a foreign module may raise anything; it must not stop the others
-            cause = error if isinstance(error, Exception) else PluginError(f"it left with status {error.code}")
-            self._failures.append(Failure(origin, cause))
+            self._failures.append(Failure(origin, error))
 
     def provided(self, role: str) -> Mapping[str, Sequence[type[Component]]]:
         """Return the components of a role by name; a name with two of them is an error for who asks for it."""
@@ -147,7 +144,7 @@ class Registry:
         providers = [each.function for each in implementations if each.plugin is plugin]
         try:
             classes = [cls for provide in providers for cls in vetted(provide(), base, hook)]
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             self._failures.append(Failure(origin, error, role))
             return
         for cls in classes:

@@ -282,6 +282,18 @@ def test_a_run_that_fails_is_not_said_to_be_finished(call, monkeypatch):
     assert "finished" not in call("status", "runs/start").stdout
 
 
+def test_a_plugin_that_leaves_the_program_is_no_success(call, monkeypatch):
+    def leaves(*_):
+        raise SystemExit(0)
+
+    monkeypatch.setattr(Skirt, "sew", leaves)
+    shown = call("show", "garment", "skirt", "--recording", str(CLIP), "--out", "skirt.png")
+    assert shown.exit_code == 1
+    assert str(shown.exception) == "a plugin or a library left the program"
+    found = call("doctor", str(CLIP))
+    assert found.exit_code == 2 and "skirt can't be sewn: it left with status 0" in found.stdout
+
+
 def test_a_viewer_that_can_not_open_is_told(call, monkeypatch):
     monkeypatch.setattr(results, "export", lambda run, formats: None)
     monkeypatch.setattr(sys, "executable", "false")

@@ -76,6 +76,7 @@ def test_a_plugin_that_does_not_load_is_told_when_something_is_missing(plugin, r
         ("unlisted", "garment", "mocapflow_garments returned Cape, not a list of classes"),
         ("silent", "garment", "mocapflow_garments returned None, not a list of classes"),
         ("failing_provider", "draper", "ModuleNotFoundError: No module named 'triangle'"),
+        ("leaving_provider", "garment", "it left with status 0"),
     ],
 )
 def test_a_provider_that_returns_something_wrong(plugin, role, said):
@@ -232,6 +233,16 @@ def test_observers_are_told_and_a_raising_one_is_switched_off(caplog):
         "observer mocapflow_frame_done of plugin 'mocapflow-wardrobe:wardrobe' raised ValueError: no window; "
         "it is switched off for the rest of this run"
     ]
+
+
+def test_an_observer_that_leaves_does_not_end_the_run(caplog):
+    @hookimpl
+    def mocapflow_frame_done(frame):
+        raise SystemExit(0)
+
+    registry = registry_of((OURS, lambda: SimpleNamespace(mocapflow_frame_done=mocapflow_frame_done)))
+    registry.observers.frame_done(3, "result")
+    assert "mocapflow_frame_done of plugin 'mocapflow-cape:cape' raised SystemExit: 0" in caplog.text
 
 
 def test_an_observer_that_is_interrupted_does_not_keep_it_to_itself():

@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import NoneType
 from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic.errors import PydanticUserError
 
 from mocapflow.config.documents import Document, KeyPath, dotted
-from mocapflow.errors import MocapflowError, PipelineError, guess
+from mocapflow.errors import MocapflowError, PipelineError, PluginError, guess, raised
 from mocapflow.registry import Registry
 from mocapflow.settings import Component, plain_parts
 
@@ -48,7 +49,7 @@ class Resolver:
         return self.build(cls, {**(defaults or {}), **settings}, steps)
 
     def build(self, cls: type[BaseModel], settings: Mapping[str, Any], steps: KeyPath) -> BaseModel:
-        """Return an instance of a pydantic model, its validation error told by line."""
+        """Return an instance of a pydantic model; what its validation raises is told by line."""
         try:
             return cls(**settings)
         except ValidationError as error:
@@ -57,6 +58,10 @@ class Resolver:
             message = f"{_title(cls)} is not complete: {error.message.splitlines()[0]}"
             hint = "import the types of its settings when the module is imported, not under TYPE_CHECKING"
             raise self.located(PipelineError(message, hint=hint), steps) from None
+        except MocapflowError as error:
+            raise self.located(error, steps) from None
+        except (Exception, SystemExit) as error:  # of a plugin's own validator
+            raise self.located(PluginError(f"{_title(cls)} can't be made: {raised(error)}"), steps) from error
 
     def place(self, steps: KeyPath) -> str:
         """Return where a value is written, as file:line:column."""
@@ -82,9 +87,9 @@ class Resolver:
 
     def _setting(self, annotation: Any, value: Any, steps: KeyPath) -> Any:
         """Return a value of the file as the model takes it: nested components built, paths made absolute."""
-        if value is None:
-            return None
         base = _component_base(annotation)
+        if value is None and (base is None or NoneType in plain_parts(annotation)):
+            return None
         if base is None:
             is_path = isinstance(value, str) and Path in plain_parts(annotation)
             return self.file(value, steps).absolute() if is_path else value

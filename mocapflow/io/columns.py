@@ -11,6 +11,7 @@ import numpy as np
 from mocapflow.errors import RecordingError
 from mocapflow.records import F64
 
+DIVIDERS = {";": "semicolons", "\t": "tabs"}  # that spreadsheets write in place of commas
 FORM = "expected UTF-8 text, commas between the columns, a point in a number"
 
 
@@ -34,8 +35,8 @@ def read_columns(path: Path) -> dict[str, F64]:
     if len(lines) < 2:
         raise RecordingError("the table has no rows", where=str(path))
     header = [name.strip() for name in lines[0][1]]
-    if len(header) == 1 and ";" in header[0]:
-        raise RecordingError("the columns are divided by semicolons", where=f"{path}:1", hint=FORM)
+    if len(header) == 1 and (divided := next((name for sign, name in DIVIDERS.items() if sign in header[0]), "")):
+        raise RecordingError(f"the columns are divided by {divided}", where=f"{path}:1", hint=FORM)
     if twice := next((name for name in header if header.count(name) > 1), None):
         raise RecordingError(f"two columns are called '{twice}'", where=f"{path}:1", hint="which one is meant?")
     values = np.array([row_of_numbers(row, len(header), f"{path}:{number}") for number, row in lines[1:]])

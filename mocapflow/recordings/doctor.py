@@ -10,7 +10,7 @@ from typing import Any
 from mocapflow.config import measures
 from mocapflow.dressing.guards import mesh_of
 from mocapflow.dressing.roles import Garment
-from mocapflow.errors import MocapflowError, RecordingError, UnknownComponent
+from mocapflow.errors import MocapflowError, RecordingError, UnknownComponent, raised
 from mocapflow.io import first_pose
 from mocapflow.io.cameras import find_calibration, read_cameras
 from mocapflow.io.findings import Finding, attempt, error, has_errors, note, warning
@@ -133,9 +133,8 @@ def _sewn(garment: Garment, folder: Path, registry: Registry) -> list[Finding]:
         if scanned:
             raise
         return [warning(f"on the template: {problem.message}", problem.hint, folder / measures.FILE)]
-    except Exception as problem:  # a garment of somebody else's may raise anything
-        said = f"{garment.name} can't be sewn: {type(problem).__name__}: {problem}"
-        return [error(said, where=folder / measures.FILE)]
+    except (Exception, SystemExit) as problem:  # a garment of somebody else's may raise anything
+        return [error(f"{garment.name} can't be sewn: {raised(problem)}", where=folder / measures.FILE)]
     mended = mesh.repairs if scanned else ()  # a template is not as wide as the person
     return [warning(f"{mesh.name}: {said}", where=folder / measures.FILE) for said in mended]
 

@@ -115,8 +115,7 @@ def evaluate(own: Ours, path: Path, folder: Path, longest_lag_s: float = LONGEST
     rigs = compare_rigs(own, reference, alignment.worth, path.parent / COMMON_POINTS)
     notes = [*reference.notes, *rigs.notes]
     if not rows:  # a comparison that a command wrote before stays
-        had = ", ".join(tables.angle_names(own.columns))
-        notes.append(f"the reference shares no angle and frame with the track, which has {had}")
+        notes.append(findings.nothing_shared(own, reference))
         return Evaluation(reference=str(path), rows=(), notes=tuple(notes))
     layout.forget_comparison(folder, but=layout.KEYPOINTS)  # it may be what is compared with, and can be again
     notes += findings.said(own, reference, alignment, strides, longest_lag_s)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from mocapflow_export.tables import angle_names
 
 from mocapflow.records import F64
 from mocapflow_evaluation.alignment import HALF, Alignment
@@ -16,6 +17,18 @@ MOST = 10  # names in a note
 BENT = 20.0  # deg that some angle of a person who moves exceeds
 LARGER = 20.0  # times, that our angles are larger than a reference in radians at least: 57 where both agree
 ALIKE = 0.01  # by which two frame rates may differ that are the same
+
+
+def nothing_shared(own: Ours, reference: Reference) -> str:
+    """Return what to say of a reference without our angles, or without values of them in our frames."""
+    if len(reference.at) and not own.columns.keys().isdisjoint(reference.curves):
+        kind, unit = ("frame", "") if reference.by_frame else ("time", " s")
+        clock = own.columns[kind]
+        at = reference.moments(clock)
+        theirs, ours = (f"{kind} {each[0]:g} to {each[-1]:g}{unit}" for each in (at, clock))
+        return f"the reference has no angle where the track has one: it has {theirs}, the track {ours}"
+    had = ", ".join(angle_names(own.columns))
+    return f"the reference shares no angle with the track, which has {had}"
 
 
 def said(

@@ -203,6 +203,9 @@ def test_a_plugin_file_named_by_the_pipeline(folder):
          "       its name is that of files: letters, digits, _ and -"),
         ("recording: clip", "recording: clip\nframes: {start: 9, stop: 2}",
          "skirt.yaml:2:1  frames: 9:2 holds no frame"),
+        ("matchers: [contour_icp, {use: contour_icp, share: 0.5}]", "matchers: null",
+         "skirt.yaml:8:5  stages.track.matchers: name a matcher, as `name` or as {use: name, setting: value}\n"
+         "       available: contour_icp"),
         ("recording: clip", "recording: clip\nparts: 3",
          "skirt.yaml:2:1  parts: input should be `name: value` lines, not 3"),
         ("recording: clip", "recording: clip\nplugins: mine.py",
@@ -217,6 +220,30 @@ def test_what_is_wrong_is_told_with_its_line(folder, written, instead, message):
         load()
     assert str(caught.value) == message
     assert caught.value.exit_status == 2
+
+
+@pytest.mark.parametrize(
+    "error, said",
+    [
+        (RuntimeError("no GPU here"), "can't be made: RuntimeError: no GPU here"),
+        (SystemExit(0), "can't be made: it left with status 0"),
+        (PluginError("no GPU here", hint="rent one"), "no GPU here\n       rent one"),
+    ],
+)
+def test_whatever_the_validator_of_a_plugin_raises_is_told_with_its_line(folder, error, said):
+    class Picky(small_plugins.Kinematic):
+        name = "picky"
+
+        def model_post_init(self, context):
+            raise error
+
+    registry = small_plugins.registry()
+    registry.add(Origin("p", "p", "1"), lambda: SimpleNamespace(mocapflow_drapers=hookimpl(lambda: [Picky])))
+    Path("skirt.yaml").write_text(TEXT.replace("draper: kinematic", "draper: picky"))
+    with pytest.raises(MocapflowError) as caught:
+        load_pipeline(Path("skirt.yaml"), registry)
+    picky = "" if isinstance(error, MocapflowError) else "picky "
+    assert str(caught.value) == f"skirt.yaml:7:5  stages.track.draper: {picky}{said}"
 
 
 def test_a_change_of_what_is_not_there_is_told_as_such(folder):

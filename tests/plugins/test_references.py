@@ -262,7 +262,16 @@ def test_times_that_begin_at_one_sample_are_told(tmp_path: Path, decimals: int) 
 
 def test_a_reference_without_rows_shares_nothing(own: Ours, tmp_path: Path) -> None:
     markers.write_mot(tmp_path / "m.mot", {"knee_angle_r": np.empty(0)}, np.empty(0))
-    assert "shares no angle and frame" in evaluate(own, tmp_path / "m.mot", tmp_path).notes[-1]
+    assert "shares no angle with the track" in evaluate(own, tmp_path / "m.mot", tmp_path).notes[-1]
+
+
+@pytest.mark.usefixtures("unrendered")
+def test_a_reference_of_other_frames_says_which(own: Ours, tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text("frame,knee_flexion_l\n1000,9\n1001,10\n")
+    last = len(own.columns["frame"]) - 1
+    assert evaluate(own, tmp_path / "t.csv", tmp_path).notes[-1] == (
+        f"the reference has no angle where the track has one: it has frame 1000 to 1001, the track frame 0 to {last}"
+    )
 
 
 @pytest.mark.usefixtures("unrendered")

@@ -188,6 +188,7 @@ def test_legs_alone_export(recording: Recording, tmp_path: Path) -> None:
     [
         (b"frame,knee_flexion_l,knee_flexion_l\n0,1,2\n", r"t\.csv:1  two columns are called 'knee_flexion_l'"),
         (b"frame;knee_flexion_l\n0;1,5\n", r"t\.csv:1  the columns are divided by semicolons\n.*commas between"),
+        (b"frame\tknee_flexion_l\n0\t1.5\n", r"t\.csv:1  the columns are divided by tabs\n.*commas between"),
         (b"frame,knee (\xb0)\n0,1\n", r"t\.csv  is not UTF-8 text\n"),
     ],
 )
