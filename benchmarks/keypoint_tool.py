@@ -1,16 +1,17 @@
 """What a keypoint tool measures on a recording whose motion is known, beside our run of it.
 
 python benchmarks/keypoint_tool.py RECORDING KEYPOINTS [RUN [PNG]]: KEYPOINTS is a folder like keypoints/ of a
-recording, as examples/mediapipe_keypoints.py writes it. Its points are triangulated robustly with all cameras. Angles
-between them are the first column; those of the scanned body fitted to them frame by frame (inverse kinematics) the
-second. Both are low-passed at 6 Hz, as Pose2Sim does it. PNG gets the curves of the knees.
+recording, as examples/mediapipe_keypoints.py writes it. Its points are triangulated robustly with all cameras and
+low-passed at 6 Hz by the filter of Pose2Sim; angles between them are the first column. Those of the scanned body,
+fitted to the keypoints frame by frame (inverse kinematics) and low-passed alike, are the second. PNG gets
+the curves of the knees.
 """
 
 from __future__ import annotations
 
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -37,15 +38,16 @@ Curves = Mapping[str, F64]  # (T,) deg, a row for each frame of the recording
 
 
 def main() -> None:
+    """Print a row for each angle, and draw those of the knees if asked."""
     folder, keypoints = Path(sys.argv[1]), Path(sys.argv[2])
     recording = open_recording(folder)
     systems = {"triangulated": triangulated(recording, keypoints), "fitted body": fitted_body(recording, keypoints)}
     if len(sys.argv) > 3:
-        systems["mocapflow"] = read_columns(Path(sys.argv[3]) / layout.ANGLES)
+        systems["mocapflow"] = tracked(recording, Path(sys.argv[3]))
     truth = read_columns(folder / "truth/angles.csv")
-    print(f"{'RMS °, without the mean difference':36}" + "".join(f"{name:>20}" for name in systems))
+    print(f"{'RMS °, without the mean difference':36}" + "".join(f"{name:>26}" for name in systems))
     for name in (name for name in truth if name != "frame"):
-        print(f"{name:36}" + "".join(f"{errors(truth, curves, name):>20}" for curves in systems.values()))
+        print(f"{name:36}" + "".join(f"{errors(truth, curves, name):>26}" for curves in systems.values()))
     if len(sys.argv) > 4:
         plot_knees(Path(sys.argv[4]), truth, systems)
 
@@ -63,9 +65,22 @@ def fitted_body(recording: Recording, keypoints: Path) -> Curves:
     names, wanted = names_of(recording, list(people), None), landmarks(body).names
     poses = [fit(body, [seen(person, names, wanted)], recording.cameras)[1][0] for person in people.values()]
     series = measure(body, np.stack([pose.root for pose in poses]), np.stack([pose.angles for pose in poses]))
-    values = np.full((recording.length, len(series.names)), np.nan)
-    values[list(people)] = series.value
-    return dict(zip(series.names, low_pass(values, recording.frame_rate).T, strict=True))
+    values = low_pass(in_all_frames(series.value, list(people), recording), recording.frame_rate)
+    return dict(zip(series.names, values.T, strict=True))
+
+
+def tracked(recording: Recording, run: Path) -> Curves:
+    """Return the angles of a run of the recording, or of a part of it."""
+    columns = read_columns(run / layout.ANGLES)
+    frames = columns["frame"].astype(int).tolist()
+    return {name: in_all_frames(values, frames, recording) for name, values in columns.items()}
+
+
+def in_all_frames(values: F64, frames: Sequence[int], recording: Recording) -> F64:
+    """Return values (F, ...) of some frames as those of all (T, ...): NaN in the others."""
+    found = np.full((recording.length, *values.shape[1:]), np.nan)
+    found[frames] = values
+    return found
 
 
 def errors(truth: Curves, curves: Curves, name: str) -> str:

@@ -29,12 +29,12 @@ class Commands(typer.core.TyperGroup):
         """Run the command and turn errors into exit status 1 or 2, an interrupt or SIGTERM into 130."""
         try:
             return super().invoke(ctx)
-        except SystemExit as error:  # of a plugin or a library: no command of ours ends so, and 0 would say it is done
-            raise RuntimeError("a plugin or a library left the program") from error
-        except (Exception, KeyboardInterrupt) as error:
+        except (Exception, KeyboardInterrupt, SystemExit) as error:
             if interrupted(error):
                 typer.echo(f"\ninterrupted{_to_go_on(ctx.invoked_subcommand)}", err=True)
                 raise typer.Exit(INTERRUPTED) from None
+            if isinstance(error, SystemExit):  # no command of ours ends so, and 0 would say that it is done
+                raise RuntimeError("a plugin or a library left the program") from error
             said = unwritable(error) if isinstance(error, OSError) else uncompilable(error) or error
             if not isinstance(said, MocapflowError):
                 raise

@@ -381,6 +381,17 @@ def test_an_interrupted_command_that_saves_no_frames_does_not_say_so(call, monke
     assert (result.exit_code, result.stderr) == (130, "\ninterrupted\n")
 
 
+def test_a_library_that_leaves_when_it_is_interrupted_was_interrupted(call, monkeypatch):
+    def leaves(*_, **__):
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt:
+            sys.exit(1)
+
+    monkeypatch.setattr(doctor, "examine", leaves)
+    assert call("doctor", ".").exit_code == 130
+
+
 def test_no_place_for_compiled_code_is_told(call, monkeypatch):
     def broken(*_, **__):
         raise RuntimeError("cannot cache function '_chain': no locator available for file '/usr/kinematics.py'")

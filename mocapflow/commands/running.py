@@ -37,7 +37,7 @@ Store = Annotated[
     typer.Option(
         metavar="PATH|URL",
         help="Cached results, or a URL (s3://…) to share them.",
-        show_default="store.zarr beside the run folder",
+        show_default="store.zarr beside --out",
     ),
 ]
 Set = Annotated[list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Change a value; repeatable.")]

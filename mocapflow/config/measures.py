@@ -111,7 +111,7 @@ def _no_garment(file: Path) -> RecordingError:
 
 
 def _wrong_measure(error: MocapflowError, recorded: RecordedGarment, by_file_alone: bool) -> MocapflowError:
-    """Return an error of settings that the file does not give, told of the tape measures where they come from."""
+    """Return an error of the garment as a whole, with where its tape measures come from, and which of them is wrong."""
     source = f"describes a {recorded.kind}" if recorded.kind else "does not exist"
     note = f"measures, in metres, come from {recorded.file}, which {source}; a value in the pipeline overrides them"
     setting = next((name for name in recorded.written if error.message.startswith(f"garment.{name}: ")), "")

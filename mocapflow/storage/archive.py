@@ -68,7 +68,8 @@ def load_record(group: zarr.Group, rows: int | None = None) -> Any:
 
 def _field_values(group: zarr.Group, cls: type, rows: int | None) -> Iterator[tuple[str, Any]]:
     """Yield name and value of the fields that a group has: of others the default holds, or they are missed."""
-    plain: Any = group.attrs[PLAIN]
+    attributes: Any = group.attrs.asdict()
+    plain = dict(attributes[PLAIN])
     for field in fields(cls):
         if field.name in plain:
             yield field.name, _untyped(plain[field.name], str(field.type))

@@ -75,6 +75,13 @@ def test_a_known_wind_is_recovered_within_one_sampling_step(fitter, model, azimu
     assert abs(np.hypot(cos, sin) - 0.3) < STEP
 
 
+def test_a_garment_without_parameters_stays_as_it_is_draped(fitter, model):
+    plain = replace(model.scene.garment, parameter_names=(), parameter_bounds=np.empty((0, 2)))
+    model = ClothedModel(scene=replace(model.scene, garment=plain), draper=model.draper)
+    draped = model.drape(STANDING, np.empty(0), Past()).vertices
+    assert np.array_equal(fitted(fitter, model, np.empty(0), np.empty(0)).vertices, draped)
+
+
 def test_forces_are_held_about_none_as_firmly_as_asked(model):
     """A wind of 17 degrees: held to 6 degrees it is found to two thirds, to 2 to less than half, to 0.3 not at all."""
     truth, forces = parameters(model, wind_cos_rad=0.3), sum(samples.forces(model.scene.garment), [])

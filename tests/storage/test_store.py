@@ -144,6 +144,15 @@ def test_a_bare_array_that_is_missing_is_damage(store):
         store.load(made)
 
 
+def test_plain_values_that_are_no_mapping_are_damage(store):
+    made = put(store, VALUES["background"])
+    meta = json.loads((made.path / "zarr.json").read_text())
+    meta["attributes"]["plain"] = "floor"
+    (made.path / "zarr.json").write_text(json.dumps(meta))
+    with pytest.raises(Corrupted):
+        store.load(made)
+
+
 def test_a_record_says_how_its_types_are_to_be_written():
     with pytest.raises(ShapeError, match="knee: begin the module of a record with `from __future__"):
 
