@@ -34,6 +34,7 @@ def need_keypoints(recording: Recording) -> None:
     there = ", ".join(sorted(path.name for path in recording.folder.iterdir()))
     hint = (
         f"expected keypoints/cam01_json/*.json as OpenPose writes them; the recording has: {there}\n"
+        "docs/tutorial.md finds some with mediapipe; "
         "with a pose of the first frame in init.json, use the stage start_from_file"
     )
     raise keypoint_error(recording, "there are no 2D keypoints of two cameras or more", hint)
