@@ -21,7 +21,7 @@ import numpy.typing as npt
 Point = tuple[float, float, float]  # px, px, confidence
 UNSEEN: Point = (0.0, 0.0, 0.0)
 # Of mediapipe's 33 landmarks those that HALPE_26 has, in its order: nose, eyes, ears, shoulders, elbows, wrists, hips,
-# knees, ankles, left before right. The last point of its foot lies between the toes and stands for the big one.
+# knees, ankles, left before right. Its "foot index" stands for the big toe.
 FACE_AND_LIMBS = (0, 2, 5, 7, 8, 11, 12, 13, 14, 15, 16, 23, 24, 25, 26, 27, 28)
 SHOULDERS, HIPS, BIG_TOES, HEELS = (11, 12), (23, 24), (31, 32), (29, 30)
 OF_A_VIDEO = {"smooth_landmarks": False, "model_complexity": 1}  # smoothed landmarks lag; mediapipe ships this model
@@ -83,12 +83,16 @@ def write_view(source: Path, out: Path) -> int:
 
 def main() -> None:
     """Write the keypoints of all cameras, and tell what they cost."""
+    if len(sys.argv) < 2:
+        raise SystemExit(__doc__)
     recording = Path(sys.argv[1])
     out = Path(sys.argv[2]) if len(sys.argv) > 2 else recording / "keypoints"
     for source in sorted((recording / "videos").iterdir()):
         begin = time.process_time()
         frames = write_view(source, out / f"{source.stem}_json")
-        spent = 1000 * (time.process_time() - begin) / max(frames, 1)
+        if not frames:
+            raise SystemExit(f"{source}: no picture in it can be read")
+        spent = 1000 * (time.process_time() - begin) / frames
         print(f"{source.stem}: {frames} frames, {spent:.0f} ms of CPU each")
 
 

@@ -96,8 +96,8 @@ def raised(error: BaseException) -> str:
         return error.message
     if isinstance(error, SystemExit):
         return f"it left with status {error.code}"
-    first = " ".join(str(error).partition("\n\n")[0].splitlines())  # pydantic adds an address behind it
-    return f"{type(error).__name__}: {first}"
+    first = " ".join(str(error).strip().partition("\n\n")[0].splitlines())  # pydantic adds an address behind it
+    return f"{type(error).__name__}: {first}" if first else type(error).__name__
 
 
 class ComponentFailed(MocapflowError):

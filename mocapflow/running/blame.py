@@ -19,6 +19,7 @@ from mocapflow.errors import (
     ShapeError,
     StoreError,
     moment_of,
+    raised,
     unwritable,
 )
 from mocapflow.interrupts import interrupted
@@ -102,8 +103,7 @@ def _reason(error: BaseException) -> str:
         return f"it sets '{first['loc'][0]}', but a component is frozen and keeps nothing between calls"
     if isinstance(error, WrongAnswer):
         return f"it returned {error.what}"
-    text = str(error).strip().splitlines()
-    return f"{type(error).__name__}: {text[0]}" if text else type(error).__name__
+    return raised(error)
 
 
 def _write_traceback(error: BaseException, log: Path) -> str:

@@ -227,6 +227,7 @@ def test_what_is_wrong_is_told_with_its_line(folder, written, instead, message):
     [
         (RuntimeError("no GPU here"), "can't be made: RuntimeError: no GPU here"),
         (SystemExit(0), "can't be made: it left with status 0"),
+        (RuntimeError(), "can't be made: RuntimeError"),
         (PluginError("no GPU here", hint="rent one"), "no GPU here\n       rent one"),
     ],
 )
