@@ -52,6 +52,8 @@ class Body:
     morph_offset: F64 | None = array("V", 3, unit="m, added at rest in full where the morph is complete", default=None)
     morph_screw: int = -1  # the angle that drives the morph
     morph_range: tuple[float, float] = (0.0, 1.0)  # rad, where the morph begins and where it is complete
+    shape_modes: F64 | None = array("M", "V", 3, unit="m a standard deviation: how people differ at rest", default=None)
+    joint_modes: F64 | None = array("M", "J", 3, unit="m a standard deviation, of the joints with them", default=None)
 
     def __post_init__(self) -> None:
         """Refuse what points beyond the body: kernels look up unchecked.

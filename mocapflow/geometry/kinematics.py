@@ -143,11 +143,12 @@ def root_position(body: Body, root: F64) -> F64:
 
 def part_of(body: Body, vertices: npt.NDArray[np.integer[Any]]) -> Body:
     """Return a body of the same joints with the given vertices alone, without faces."""
-    offset = body.morph_offset
+    offset, modes = body.morph_offset, body.shape_modes
     return replace(
         body, vertices=body.vertices[vertices], faces=np.empty((0, 3), np.int32),
         skin_joint=body.skin_joint[vertices], skin_weight=body.skin_weight[vertices], cut=body.cut[vertices],
         morph_offset=None if offset is None else offset[vertices],
+        shape_modes=None if modes is None else modes[:, vertices],
     )  # fmt: skip
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, ClassVar
 
@@ -15,16 +16,16 @@ from mocapflow.geometry.skeleton import Skeleton
 from mocapflow.records import I32
 from mocapflow_bodies.assemble import Part, assemble
 
-FILE = Path(__file__).parent / "data" / "template.npz"  # made by benchmarks/make_template.py from CC0 bodies
+FILE = Path(__file__).parent / "data" / "template.npz"  # made by benchmarks/make_template.py from MakeHuman's CC0 bodies
 UNIT = 1e-4  # m, of the lengths in the file
 
 
 class Template(BodyModel):
-    """A blend of two adults, a woman of 1.68 m and a man of 1.76 m, standing with the arms 45 degrees out."""
+    """The mean of adults, standing with the arms 45 degrees out; whole, it knows how they differ from each other."""
 
     name: ClassVar[str] = "template"
-    shape: Annotated[float, Field(ge=0, le=1)] = 0.5  # 0 the woman, 1 the man
-    height_m: Annotated[float, Field(gt=0.5, lt=2.6)] | None = None  # null: as blended
+    shape: Annotated[float, Field(ge=0, le=1)] = 0.5  # 0 the mean woman, 1 the mean man
+    height_m: Annotated[float, Field(gt=0.5, lt=2.6)] | None = None  # null: that of the mean
     part: Part = "full"  # what is used of it; the rest is cut off
 
     def inputs(self, folder: Path) -> Sequence[Path]:
@@ -42,5 +43,7 @@ class Template(BodyModel):
             weights = np.zeros((len(vertices), len(names)))
             rows = np.arange(len(vertices))[:, None]
             np.add.at(weights, (rows, content["skin_joint"].astype(np.intp)), content["skin_weight"] / 65535)
+            modes = {name: UNIT * content[name].astype(np.float64) for name in ("shape_modes", "joint_modes")}
         scale = 1.0 if self.height_m is None else self.height_m / float(np.ptp(vertices[:, 2]))
-        return assemble(scale * vertices, faces, Skeleton(names, parents, scale * positions), weights, self.part)
+        body = assemble(scale * vertices, faces, Skeleton(names, parents, scale * positions), weights, self.part)
+        return replace(body, **modes) if self.part == "full" else body

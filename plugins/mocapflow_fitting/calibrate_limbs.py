@@ -28,7 +28,7 @@ from mocapflow_fitting.detections import frames_seen, spaced_evenly
 from mocapflow_fitting.keypoint_fit import fit
 from mocapflow_fitting.landmarks import landmarks
 from mocapflow_fitting.pose_fit import Solution, Spreads
-from mocapflow_fitting.proportions import Proportion, fitted, scaled
+from mocapflow_fitting.proportions import Proportion, fitted, modes_of, scaled
 from mocapflow_fitting.silhouette_fit import refine
 
 # near the solution matchers reach less far and give up what is off
@@ -50,6 +50,7 @@ class CalibrateLimbs(Stage):
     proportions: tuple[Proportion, ...] = (  # those that are fitted
         "girth", "trunk", "shoulder_width", "thigh", "shank", "foot", "upper_arm", "forearm",
     )  # fmt: skip
+    shape: bool = False  # also in what ways people differ most, where the body knows them: the template does
     spread: PositiveFloat = 0.02  # standard deviation of a log proportion from a scan; from a template 0.05
     frames: PositiveInt = 10  # spread over the recording
     passes: PositiveInt = 3  # times that the images are segmented; after the first, matching is calm
@@ -75,8 +76,9 @@ class CalibrateLimbs(Stage):
         """
         scene = (scene if self.draper else scene.undressed).with_background(background)
         indices, poses, clothes = self._from_track(track) if track else self._from_keypoints(recording, scene)
-        spreads: Spreads = {name: self.spread for name in self.proportions}
         body = scene.body
+        modes = modes_of(body) if self.shape else ()
+        spreads: Spreads = dict.fromkeys(self.proportions, self.spread) | dict.fromkeys(modes, 1.0)
         share = self.independent / len(indices)  # contours err alike in all frames: more of them tell no more
         solution = Solution(np.zeros(len(spreads)), tuple(poses))
         for done in range(self.passes):

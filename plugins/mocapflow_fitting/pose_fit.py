@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
@@ -12,7 +13,7 @@ from mocapflow.data import Pose
 from mocapflow.geometry import kinematics
 from mocapflow.model import moved
 from mocapflow.records import F64, I32
-from mocapflow_fitting.proportions import scaled
+from mocapflow_fitting.proportions import SHAPE, scaled
 
 FREE_SPREAD = np.radians(60.0)  # rad, of angles the body leaves free: unseen joints stay near rest
 LIMIT_SPREAD = np.radians(2.0)  # rad, by how much an angle may pass a limit
@@ -47,8 +48,9 @@ class Solution(NamedTuple):
     poses: tuple[Pose, ...]
 
     def factors(self, spreads: Spreads) -> Mapping[str, float]:
-        """Return the proportions by name."""
-        return dict(zip(spreads, np.exp(self.logs).tolist(), strict=True))
+        """Return the proportions, and the deviations of the shape, by name."""
+        values = zip(spreads, self.logs.tolist(), strict=True)
+        return {name: value if name.startswith(SHAPE) else math.exp(value) for name, value in values}
 
 
 def projected(points: F64, matrices: F64) -> tuple[F64, F64, F64]:
@@ -142,7 +144,7 @@ def velocities(body: Body, pose: Pose, logs: F64, spreads: Spreads) -> tuple[F64
     """Return the vertices (V, 3) m of the scaled body and their velocities (V, 3, P + 6 + D)."""
 
     def at(shift: F64) -> tuple[Body, F64, F64, F64]:
-        other = scaled(body, dict(zip(spreads, np.exp(logs + shift), strict=True)))
+        other = scaled(body, Solution(logs + shift, ()).factors(spreads))
         joints, screws = kinematics.chain(other, pose)
         return other, kinematics.skin(other, joints, pose.angles), joints, screws
 

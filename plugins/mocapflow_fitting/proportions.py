@@ -1,4 +1,4 @@
-"""Bodies of other proportions: segments stretched along and across, the mesh with them."""
+"""Bodies of other shapes and proportions: as people differ, and segments stretched, the mesh with them."""
 
 from __future__ import annotations
 
@@ -22,19 +22,24 @@ Proportion = Literal[
 ]  # fmt: skip
 PROPORTIONS: tuple[str, ...] = get_args(Proportion)
 LIMBS = {start: segment for segment, (start, _) in SEGMENTS.items()}
+SHAPE = "shape_"  # begins the name of what a body is changed by along one of its modes
 WHOLE = {"neck": "head", "head": "head", "ankle": "foot", "toe": "foot", "wrist": "forearm"}
 
 
 def scaled(body: Body, factors: Mapping[str, float]) -> Body:
-    """Return a body of other proportions.
+    """Return a body of another shape and other proportions.
 
     Args:
         body: at rest.
-        factors: by the names in PROPORTIONS, 1 where left out; left and right alike.
+        factors: by the names in PROPORTIONS, 1 where left out, left and right alike; and shape_0 and so on, how many
+            standard deviations to go along each of the body's modes.
 
-    Joint j stretches what it carries by A_j about itself, so child joints move by A_parent, and a vertex moves to
-    sum_j w_j (p'_j + A_j (v - p_j)): smooth where the weights are. Axes keep their directions.
+    The shape changes first. Then joint j stretches what it carries by A_j about itself, so child joints move by
+    A_parent, and a vertex moves to sum_j w_j (p'_j + A_j (v - p_j)): smooth where the weights are. Axes keep their
+    directions.
     """
+    body = _shaped(body, {name: value for name, value in factors.items() if name.startswith(SHAPE)})
+    factors = {name: value for name, value in factors.items() if not name.startswith(SHAPE)}
     stretch = _stretches(body, factors)
     positions = body.positions.copy()
     for joint in range(len(positions)):
@@ -61,6 +66,21 @@ def fitted(body: Body, factors: Mapping[str, float]) -> Body:
     other = scaled(body, factors)
     up = np.array([0.0, 0.0, body.vertices[:, 2].min() - other.vertices[:, 2].min()])
     return _moved(other, other.vertices + up, other.positions + up)
+
+
+def modes_of(body: Body) -> tuple[str, ...]:
+    """Return the names of the modes in which a body can change its shape."""
+    return () if body.shape_modes is None else tuple(f"{SHAPE}{m}" for m in range(len(body.shape_modes)))
+
+
+def _shaped(body: Body, deviations: Mapping[str, float]) -> Body:
+    """Return a body moved along its modes by standard deviations; it has none any more."""
+    plain = replace(body, shape_modes=None, joint_modes=None)
+    if not deviations or body.shape_modes is None or body.joint_modes is None:
+        return plain
+    by = np.array([deviations.get(name, 0.0) for name in modes_of(body)])
+    vertices, positions = (np.tensordot(by, modes, 1) for modes in (body.shape_modes, body.joint_modes))
+    return _moved(plain, body.vertices + vertices, body.positions + positions)
 
 
 def _moved(body: Body, vertices: F64, positions: F64) -> Body:

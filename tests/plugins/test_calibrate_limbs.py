@@ -78,6 +78,28 @@ def test_exact_silhouettes_give_the_lengths_back(body, poses, tmp_path):
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("shape", [True, False])
+def test_exact_silhouettes_give_the_shape_back(body, poses, tmp_path, shape):
+    """Of a template that is another person; without its modes limbs and girth can't make that person of it."""
+    folder = copy_demo(tmp_path / "recording")
+    person, cameras = scaled(body, {"shape_1": 1.5, "shape_2": -1.0}), open_recording(folder).cameras
+    write(folder, person, poses, cameras, noise_px=0.5)
+    stage = CalibrateLimbs(
+        segmenter=masks_of(person, poses), matchers=(ContourIcp(spacing_px=2.0),), shape=shape,
+        spread=0.05, frames=2, passes=1, rounds=5,
+    )  # fmt: skip
+    fitted = stage.run(open_recording(folder, stop=2), Scene(cameras=cameras, body=body))
+    before, after = (off(b.vertices - person.vertices) for b in (body, fitted))
+    assert before > 0.015  # m
+    assert (after < 0.3 * before) is shape
+
+
+def off(difference):
+    """Return how far (m, RMS) a mesh is off another, wherever that stands."""
+    return np.sqrt(np.mean(np.sum((difference - difference.mean(axis=0)) ** 2, axis=1)))
+
+
+@pytest.mark.long
 def test_clothes_are_laid_on_every_pose_that_is_tried(body, poses, tmp_path):
     folder = copy_demo(tmp_path / "recording")
     cameras, rng = open_recording(folder).cameras, np.random.default_rng(3)

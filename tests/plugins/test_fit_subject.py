@@ -8,12 +8,12 @@ from keypoint_recording import DEMO, copy_demo, length, write
 from mocapflow_bodies.template import Template
 from mocapflow_fitting import fit_subject
 from mocapflow_fitting.fit_subject import FitSubject
-from mocapflow_fitting.proportions import PROPORTIONS, fitted, scaled
+from mocapflow_fitting.proportions import PROPORTIONS, fitted, modes_of, scaled
 from mocapflow_fitting.start_from_file import read_pose
 
 from mocapflow.data import Pose
 from mocapflow.geometry import angles
-from mocapflow.geometry.kinematics import chain, skin
+from mocapflow.geometry.kinematics import chain, part_of, skin
 from mocapflow.recordings.recording import open_recording
 from mocapflow.scene import Scene
 
@@ -29,7 +29,7 @@ def poses(body, count):
 
 def test_template_is_a_person():
     woman, man = Template(shape=0.0).load(DEMO), Template(shape=1.0).load(DEMO)
-    assert [round(float(np.ptp(b.vertices[:, 2])), 2) for b in (woman, man)] == [1.68, 1.76]
+    assert [round(float(np.ptp(b.vertices[:, 2])), 2) for b in (woman, man)] == [1.61, 1.74]
     np.testing.assert_allclose(np.ptp(Template(height_m=1.9).load(DEMO).vertices[:, 2]), 1.9, atol=1e-9)
     assert Template(part="legs").load(DEMO).cut.any()
     assert all(path.is_file() and path.stat().st_size < 1.5e6 for path in Template().inputs(DEMO))
@@ -42,6 +42,33 @@ def test_joint_centres_of_the_template_are_those_of_people(shape):
     assert length(body, "hip_l", "hip_r") == pytest.approx(0.17, abs=0.02)
     assert length(body, "hip_l", "knee_l") == pytest.approx(length(body, "knee_l", "ankle_l"), rel=0.05)
     assert angles.three_point(np.stack([hip, knee, ankle])) < 6  # degrees: it stands with straight legs
+
+
+def test_a_template_knows_how_people_differ():
+    body = Template().load(DEMO)
+    smaller, taller = (scaled(body, {"shape_0": sign}) for sign in (-1.0, 1.0))
+    assert abs(np.ptp(taller.vertices[:, 2]) - np.ptp(smaller.vertices[:, 2])) == pytest.approx(0.2, abs=0.05)
+    others = [scaled(body, {name: 1.0}) for name in modes_of(body)[1:]]
+    assert all(np.ptp(b.vertices[:, 2]) == pytest.approx(np.ptp(body.vertices[:, 2]), abs=0.04) for b in others)
+    for other in (taller, *others):  # joints stay where the mesh has them: midway between what lies around them
+        knee = np.abs(other.vertices - other.positions[other.joint("knee_l")]).max(axis=1) < 0.1
+        assert 0 < other.positions[other.joint("knee_l")][0] - other.vertices[knee, 0].min() < 0.1
+    assert not modes_of(taller) and not modes_of(Template(part="legs").load(DEMO))
+    assert np.ptp(scaled(Template(height_m=0.835).load(DEMO), {"shape_0": 1.0}).vertices[:, 2]) == pytest.approx(
+        0.5 * np.ptp(taller.vertices[:, 2]), rel=0.01
+    )
+
+
+def test_a_shape_changes_before_proportions_and_alike_in_parts_of_the_body():
+    body, factors = Template().load(DEMO), {"shape_1": 1.5, "shape_3": -2.0, "thigh": 1.1}
+    some = np.arange(0, len(body.vertices), 7)
+    whole, part = scaled(body, factors), scaled(part_of(body, some), factors)
+    np.testing.assert_allclose(part.vertices, whole.vertices[some], atol=1e-12)
+    np.testing.assert_allclose(part.twists, whole.twists, atol=1e-12)
+    shaped = scaled(body, {"shape_1": 1.5, "shape_3": -2.0})
+    expected = body.vertices + 1.5 * body.shape_modes[1] - 2.0 * body.shape_modes[3]
+    np.testing.assert_allclose(shaped.vertices, expected, atol=1e-12)
+    assert length(whole, "hip_l", "knee_l") == pytest.approx(1.1 * length(shaped, "hip_l", "knee_l"), rel=1e-9)
 
 
 def test_no_change_without_factors(body):
