@@ -16,6 +16,7 @@ import mocapflow_draping
 import numpy as np
 import pytest
 from mocapflow_bodies.scanned import Scanned
+from mocapflow_draping.kinematic import Kinematic
 from mocapflow_export import layout, tables
 from mocapflow_export.export import WriteFormats
 from mocapflow_garments.skirt import Skirt
@@ -288,10 +289,11 @@ def test_a_plugin_that_leaves_the_program_is_no_success(call, monkeypatch):
 
     monkeypatch.setattr(Skirt, "sew", leaves)
     shown = call("show", "garment", "skirt", "--recording", str(CLIP), "--out", "skirt.png")
-    assert shown.exit_code == 1
-    assert str(shown.exception) == "a plugin or a library left the program"
+    assert shown.exit_code == 1 and "failed: it left with status 0\n" in shown.stderr
     found = call("doctor", str(CLIP))
     assert found.exit_code == 2 and "skirt can't be sewn: it left with status 0" in found.stdout
+    monkeypatch.setattr(doctor, "examine", leaves)
+    assert str(call("doctor", str(CLIP)).exception) == "a plugin or a library left the program"
 
 
 def test_a_viewer_that_can_not_open_is_told(call, monkeypatch):
@@ -653,12 +655,29 @@ def test_a_garment_or_a_body_that_a_run_would_refuse_is_not_drawn(call, monkeypa
     with monkeypatch.context() as patch:
         patch.setattr(Skirt, "sew", lambda self, body: replace(m := sew(self, body), vertices=m.vertices + 5))
         refused = call("show", "garment", "skirt", "--out", "garment.png")
-        assert refused.exit_code == 2 and "garment 'skirt' returned a pin 8" in refused.stderr
+        assert refused.exit_code == 1 and "error: garment 'skirt' (" in refused.stderr
+        assert "failed: it returned a pin 8" in refused.stderr
     monkeypatch.setattr(
         Scanned, "load", lambda self, folder: replace(b := load_body(self, folder), vertices=b.vertices * np.nan)
     )
     refused = call("show", "garment", "skirt", "--out", "garment.png")
-    assert refused.exit_code == 2 and "body 'scanned' returned vertices that are not finite" in refused.stderr
+    assert refused.exit_code == 1 and "error: body 'scanned' (" in refused.stderr
+    assert "failed: it returned vertices that are not finite" in refused.stderr
+
+
+@pytest.mark.parametrize(("cls", "verb"), [(Skirt, "sew"), (Kinematic, "drape")])
+def test_a_garment_or_a_draper_that_raises_is_told(call, monkeypatch, cls, verb):
+    def torn(self, *_):
+        raise ValueError("torn")
+
+    monkeypatch.setattr(cls, verb, torn)
+    shown = call("show", "garment", "skirt", "--out", "new/garment.png")
+    assert shown.exit_code == 1
+    assert shown.stderr.startswith(f"error: {cls.role} '{cls.name}' (plugin '")
+    assert shown.stderr.endswith("failed: ValueError: torn\n       traceback: new/garment.log\n")
+    assert "in torn" in Path("new/garment.log").read_text()
+    quiet = call("show", "garment", "skirt")
+    assert quiet.exit_code == 0 and f"no picture: {cls.role} '{cls.name}'" in quiet.stdout
 
 
 @pytest.mark.parametrize("out", ["start.yaml/skirt.png", "skirt.doc"])
