@@ -12,6 +12,7 @@ from mocapflow_export import layout
 from typer.testing import CliRunner
 
 from mocapflow import cli
+from mocapflow.commands import invocation
 from mocapflow.commands.former import FORMER, differing, set_aside
 from mocapflow.commands.invocation import FILE, alone
 from mocapflow.errors import StoreError
@@ -201,6 +202,17 @@ def test_a_run_folder_that_can_not_be_locked_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr(fcntl, "flock", unknown)
     with pytest.raises(StoreError, match="can't write the run folder: No locks available"), alone(tmp_path):
         pass
+
+
+def test_a_run_folder_on_a_full_drive_is_told(call, monkeypatch):
+    def full(*_, **__):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(invocation, "atomic_write", full)
+    told = call("run", "tiny.yaml", "--out", "out")
+    assert told.exit_code == 1
+    what = "can't write the run folder: No space left on device\n       name another folder, or free some space"
+    assert told.stderr == f"error: out  {what}\n"
 
 
 def test_a_run_leaves_no_traceback_of_one_that_failed_before(call, monkeypatch):
