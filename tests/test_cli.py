@@ -220,7 +220,7 @@ def test_what_a_run_is_writing_is_not_pruned(call, monkeypatch):
         (("plan", "start.yaml", "--frames", "3"),
          "error: --frames 3  frames are written A:B or A:B:STEP; either end may be left out\n"),
         (("plan", "start.yaml", "--recording", "nowhere"),
-         "error: nowhere  there is no such folder\n       --recording DIR of run, plan and compare names another\n"),
+         "error: nowhere  there is no such folder\n       --recording DIR names another\n"),
         (("status", "nowhere"), "error: nowhere  this is no run folder\n"
          "       a run folder is what `mocapflow run` writes; it holds command.json\n"),
         (("evaluate", "nowhere"), "error: nowhere  this is no run folder\n"
@@ -297,7 +297,7 @@ def test_a_plugin_that_leaves_the_program_is_no_success(call, monkeypatch):
 
 
 def test_a_viewer_that_can_not_open_is_told(call, monkeypatch):
-    monkeypatch.setattr(results, "export", lambda run, formats: None)
+    monkeypatch.setattr(results, "export", lambda *_: None)
     monkeypatch.setattr(sys, "executable", "false")
     shown = call("view", "out")
     assert shown.exit_code == 2

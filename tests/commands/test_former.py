@@ -2,6 +2,7 @@
 
 import errno
 import fcntl
+import re
 import shutil
 import threading
 from pathlib import Path
@@ -109,6 +110,18 @@ def test_what_differs_is_named():
     assert differing({"track": "a", "smooth": "b"}, {"track": "a", "smooth": "b"}) == []
     assert differing({"track": "a", "smooth": "b"}, {"track": "c", "smooth": "b"}) == ["track"]
     assert differing({"track": "a", "smooth": "b"}, {"track": "a", "export": "d"}) == ["smooth", "export"]
+
+
+def test_a_recording_that_was_moved_is_named(call):
+    run(call)
+    Path("clip").rename("moved")
+    lost = call("status", "out")
+    assert lost.exit_code == 2 and lost.stderr.endswith("--recording DIR names another\n")
+    assert re.search(r"^track +hit ", call("status", "out", "--recording", "moved").stdout, re.MULTILINE)
+    exported = call("export", "out", "--format", "trc", "--recording", "moved")
+    assert exported.exit_code == 0 and (OUT / layout.JOINTS).exists(), exported.output
+    evaluated = call("evaluate", "out", "--recording", "moved")
+    assert "there is nothing to compare with\n       the recording has no truth" in evaluated.stderr
 
 
 @pytest.mark.long
