@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+from contextlib import contextmanager
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
@@ -17,6 +18,7 @@ import numpy as np
 import pytest
 from mocapflow_bodies.scanned import Scanned
 from mocapflow_draping.kinematic import Kinematic
+from mocapflow_evaluation import evaluate
 from mocapflow_export import layout, tables
 from mocapflow_export.export import WriteFormats
 from mocapflow_garments.skirt import Skirt
@@ -30,6 +32,7 @@ from mocapflow.help.shipped import shipped
 from mocapflow.io import markers
 from mocapflow.io.columns import read_columns
 from mocapflow.recordings import doctor
+from mocapflow.results import Evaluation
 from mocapflow.running import runner
 from mocapflow.storage.locks import myself
 from tests.fixtures.stores import STAGES, write_pipeline, write_recording
@@ -467,6 +470,27 @@ def test_what_the_pipeline_compares_with_is_compared_with_again(call, tmp_path):
     markers.write_trc(tmp_path / layout.KEYPOINTS, ["hip_l", "knee_l", "ankle_l"], joints, 30.0)
     again = call("evaluate", str(tmp_path))
     assert again.stdout.startswith(f"compared with {tmp_path / layout.KEYPOINTS}\n"), again.output
+
+
+def test_a_comparison_waits_for_a_run_that_writes_into_the_folder(call, tmp_path, monkeypatch):
+    held = []
+
+    @contextmanager
+    def holding(out):
+        held.append(out)
+        yield
+        held.clear()
+
+    def compared(run, *_):
+        assert held == [run]
+        return Evaluation(reference="", rows=(), notes=("looked at",))
+
+    monkeypatch.setattr(results, "alone", holding)
+    monkeypatch.setattr(evaluate, "evaluate_run", compared)
+    assert "looked at" in call("evaluate", str(tmp_path), "--truth", "known.csv").stderr
+    lost = call("evaluate", "nowhere", "--truth", "known.csv")
+    assert lost.exit_code == 2 and "nowhere  this is no run folder" in lost.stderr
+    assert not Path("nowhere").exists()
 
 
 def test_an_export_leaves_what_the_run_folder_remembers(call, tmp_path):

@@ -44,7 +44,8 @@ def evaluate(run: Run, truth: Truth = None, recording: Moved = None) -> None:
         named = f"{missing}\nname a file of known angles with --truth"
         hint = named if reference is None else f"keypoints are compared in a run: {again}"
         raise RecordingError("there is nothing to compare with", where=str(reference or run), hint=hint)
-    evaluation = evaluate_run(run, reference, longest_lag_s)
+    with alone(run):
+        evaluation = evaluate_run(run, reference, longest_lag_s)
     if not evaluation.rows:
         raise RecordingError("; ".join(evaluation.notes), where=str(reference))
     typer.echo(f"compared with {evaluation.reference}")
@@ -62,7 +63,7 @@ def _comparison(run: Path, truth: Path | None, recording: Path | None) -> tuple[
     try:
         pipeline = recall(run, recording).load()
     except MocapflowError as error:
-        if truth is None:
+        if truth is None or not run.is_dir():
             raise
         typer.echo(f"warning: compared by the default settings, as those of the run can't be read: {error}", err=True)
         return truth, "", LONGEST_LAG_S
