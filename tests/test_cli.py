@@ -372,12 +372,12 @@ def test_an_interrupt_ends_with_130_and_says_how_to_go_on(call, monkeypatch):
     result = call("run", "start.yaml", "--set", "frames={start: 1}")
     assert result.exit_code == 130
     assert result.stderr == (
-        "\ninterrupted; finished frames are saved. To go on: mocapflow run start.yaml --set 'frames={start: 1}'\n"
+        "\ninterrupted; what is finished is saved. To go on: mocapflow run start.yaml --set 'frames={start: 1}'\n"
     )
     assert call("run", "start.yaml", "--fresh").stderr.endswith("To go on: mocapflow run start.yaml\n")
 
 
-def test_an_interrupted_command_that_saves_no_frames_does_not_say_so(call, monkeypatch):
+def test_an_interrupted_command_that_saves_nothing_does_not_say_so(call, monkeypatch):
     def stopped(*_, **__):
         raise KeyboardInterrupt
 

@@ -222,7 +222,7 @@ def test_nobody_is_blamed_for_an_interrupt(tmp_path):
     path = with_prior(tmp_path, "interrupted")
     done = CliRunner().invoke(app, ["run", str(path), "--out", str(tmp_path / "out"), "--frames", "0:2"])
     assert done.exit_code == 130
-    assert "interrupted; finished frames are saved" in done.output
+    assert "interrupted; what is finished is saved" in done.output
     assert "failed" not in done.output
     assert not (tmp_path / "out" / "failed.log").exists()
 
