@@ -132,4 +132,4 @@ def _tell_on_stderr() -> None:
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    typer.echo(f"warning: {message}", err=True)
+    logging.getLogger("py.warnings").warning("%s", message)  # where progress makes way for it

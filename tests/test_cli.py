@@ -642,6 +642,30 @@ def test_a_bar_fits_the_terminal_and_what_comes_after_it_begins_a_line(monkeypat
     assert len(line) < 60 and line.startswith("track: █") and rest == ""
 
 
+def test_what_is_logged_while_a_bar_is_open_begins_a_line(monkeypatch):
+    class Terminal(io.StringIO):
+        def isatty(self):
+            return True
+
+    terminal = Terminal()
+    ours, root = logging.getLogger("mocapflow"), logging.getLogger()
+    for logger in (ours, root):
+        monkeypatch.setattr(logger, "handlers", [])
+    monkeypatch.setattr(sys, "stderr", terminal)
+    level = ours.level
+    try:
+        cli._tell_on_stderr()
+        with reporter() as show:
+            for log in (ours.info, logging.getLogger("of_a_library").warning, cli._show_warning, ours.debug):
+                show("track: 3 of 6 frames, at rest after 2 turns")
+                log("dark")
+    finally:
+        ours.setLevel(level)
+    lines = terminal.getvalue().split("\n")
+    assert [line for line in lines if "dark" in line] == ["dark", "warning: dark", "warning: dark"]
+    assert len(lines) == 8 and not any(handler.filters for handler in root.handlers)
+
+
 @pytest.mark.parametrize("garment", ["skirt", "shorts", "cylinder"])
 @pytest.mark.long
 def test_a_garment_is_drawn(call, garment):
