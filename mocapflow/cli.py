@@ -43,11 +43,11 @@ class Commands(typer.core.TyperGroup):
 
 
 def _to_go_on(command: str | None) -> str:
-    """Return how to resume a command that was interrupted; "" where it saves no frames."""
+    """Return how to resume a command that was interrupted; "" where it saves nothing."""
     if command not in ("run", "demo", "compare"):
         return ""
     words = [word for word in sys.argv[1:] if word != "--fresh"]  # it would remove what is saved
-    return f"; finished frames are saved. To go on: {shlex.join(['mocapflow', *words])}"
+    return f"; what is finished is saved. To go on: {shlex.join(['mocapflow', *words])}"
 
 
 app = typer.Typer(
@@ -132,4 +132,4 @@ def _tell_on_stderr() -> None:
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    typer.echo(f"warning: {message}", err=True)
+    logging.getLogger("py.warnings").warning("%s", message)  # where progress makes way for it

@@ -69,7 +69,7 @@ def folder_error(error: OSError) -> type[MocapflowError]:
 
 def no_run_folder(out: Path, error: OSError) -> MocapflowError:
     """Return the error for a run folder that can't be made or written."""
-    hint = "name another folder, or make it writable"
+    hint = f"name another folder, or {'free some space' if error.errno in FULL else 'make it writable'}"
     return folder_error(error)(f"can't write the run folder: {error.strerror}", where=str(out), hint=hint)
 
 

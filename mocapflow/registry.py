@@ -81,6 +81,12 @@ class Registry:
         return tuple(self._plugins)
 
     @property
+    def packages(self) -> frozenset[str]:
+        """The top names of the packages, or the modules, that the plugins are."""
+        modules = (getattr(plugin, "__name__", type(plugin).__module__) for plugin in self._plugins.values())
+        return frozenset(module.partition(".")[0] for module in modules)
+
+    @property
     def failures(self) -> tuple[Failure, ...]:
         """What did not load so far; asking for the names of every role makes it complete."""
         return tuple(self._failures)

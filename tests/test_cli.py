@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+from contextlib import contextmanager
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
@@ -16,6 +17,8 @@ import mocapflow_draping
 import numpy as np
 import pytest
 from mocapflow_bodies.scanned import Scanned
+from mocapflow_draping.kinematic import Kinematic
+from mocapflow_evaluation import evaluate
 from mocapflow_export import layout, tables
 from mocapflow_export.export import WriteFormats
 from mocapflow_garments.skirt import Skirt
@@ -29,6 +32,7 @@ from mocapflow.help.shipped import shipped
 from mocapflow.io import markers
 from mocapflow.io.columns import read_columns
 from mocapflow.recordings import doctor
+from mocapflow.results import Evaluation
 from mocapflow.running import runner
 from mocapflow.storage.locks import myself
 from tests.fixtures.stores import STAGES, write_pipeline, write_recording
@@ -219,7 +223,7 @@ def test_what_a_run_is_writing_is_not_pruned(call, monkeypatch):
         (("plan", "start.yaml", "--frames", "3"),
          "error: --frames 3  frames are written A:B or A:B:STEP; either end may be left out\n"),
         (("plan", "start.yaml", "--recording", "nowhere"),
-         "error: nowhere  there is no such folder\n       --recording DIR of run, plan and compare names another\n"),
+         "error: nowhere  there is no such folder\n       --recording DIR names another\n"),
         (("status", "nowhere"), "error: nowhere  this is no run folder\n"
          "       a run folder is what `mocapflow run` writes; it holds command.json\n"),
         (("evaluate", "nowhere"), "error: nowhere  this is no run folder\n"
@@ -288,14 +292,15 @@ def test_a_plugin_that_leaves_the_program_is_no_success(call, monkeypatch):
 
     monkeypatch.setattr(Skirt, "sew", leaves)
     shown = call("show", "garment", "skirt", "--recording", str(CLIP), "--out", "skirt.png")
-    assert shown.exit_code == 1
-    assert str(shown.exception) == "a plugin or a library left the program"
+    assert shown.exit_code == 1 and "failed: it left with status 0\n" in shown.stderr
     found = call("doctor", str(CLIP))
     assert found.exit_code == 2 and "skirt can't be sewn: it left with status 0" in found.stdout
+    monkeypatch.setattr(doctor, "examine", leaves)
+    assert str(call("doctor", str(CLIP)).exception) == "a plugin or a library left the program"
 
 
 def test_a_viewer_that_can_not_open_is_told(call, monkeypatch):
-    monkeypatch.setattr(results, "export", lambda run, formats: None)
+    monkeypatch.setattr(results, "export", lambda *_: None)
     monkeypatch.setattr(sys, "executable", "false")
     shown = call("view", "out")
     assert shown.exit_code == 2
@@ -367,12 +372,12 @@ def test_an_interrupt_ends_with_130_and_says_how_to_go_on(call, monkeypatch):
     result = call("run", "start.yaml", "--set", "frames={start: 1}")
     assert result.exit_code == 130
     assert result.stderr == (
-        "\ninterrupted; finished frames are saved. To go on: mocapflow run start.yaml --set 'frames={start: 1}'\n"
+        "\ninterrupted; what is finished is saved. To go on: mocapflow run start.yaml --set 'frames={start: 1}'\n"
     )
     assert call("run", "start.yaml", "--fresh").stderr.endswith("To go on: mocapflow run start.yaml\n")
 
 
-def test_an_interrupted_command_that_saves_no_frames_does_not_say_so(call, monkeypatch):
+def test_an_interrupted_command_that_saves_nothing_does_not_say_so(call, monkeypatch):
     def stopped(*_, **__):
         raise KeyboardInterrupt
 
@@ -465,6 +470,27 @@ def test_what_the_pipeline_compares_with_is_compared_with_again(call, tmp_path):
     markers.write_trc(tmp_path / layout.KEYPOINTS, ["hip_l", "knee_l", "ankle_l"], joints, 30.0)
     again = call("evaluate", str(tmp_path))
     assert again.stdout.startswith(f"compared with {tmp_path / layout.KEYPOINTS}\n"), again.output
+
+
+def test_a_comparison_waits_for_a_run_that_writes_into_the_folder(call, tmp_path, monkeypatch):
+    held = []
+
+    @contextmanager
+    def holding(out):
+        held.append(out)
+        yield
+        held.clear()
+
+    def compared(run, *_):
+        assert held == [run]
+        return Evaluation(reference="", rows=(), notes=("looked at",))
+
+    monkeypatch.setattr(results, "alone", holding)
+    monkeypatch.setattr(evaluate, "evaluate_run", compared)
+    assert "looked at" in call("evaluate", str(tmp_path), "--truth", "known.csv").stderr
+    lost = call("evaluate", "nowhere", "--truth", "known.csv")
+    assert lost.exit_code == 2 and "nowhere  this is no run folder" in lost.stderr
+    assert not Path("nowhere").exists()
 
 
 def test_an_export_leaves_what_the_run_folder_remembers(call, tmp_path):
@@ -616,6 +642,30 @@ def test_a_bar_fits_the_terminal_and_what_comes_after_it_begins_a_line(monkeypat
     assert len(line) < 60 and line.startswith("track: █") and rest == ""
 
 
+def test_what_is_logged_while_a_bar_is_open_begins_a_line(monkeypatch):
+    class Terminal(io.StringIO):
+        def isatty(self):
+            return True
+
+    terminal = Terminal()
+    ours, root = logging.getLogger("mocapflow"), logging.getLogger()
+    for logger in (ours, root):
+        monkeypatch.setattr(logger, "handlers", [])
+    monkeypatch.setattr(sys, "stderr", terminal)
+    level = ours.level
+    try:
+        cli._tell_on_stderr()
+        with reporter() as show:
+            for log in (ours.info, logging.getLogger("of_a_library").warning, cli._show_warning, ours.debug):
+                show("track: 3 of 6 frames, at rest after 2 turns")
+                log("dark")
+    finally:
+        ours.setLevel(level)
+    lines = terminal.getvalue().split("\n")
+    assert [line for line in lines if "dark" in line] == ["dark", "warning: dark", "warning: dark"]
+    assert len(lines) == 8 and not any(handler.filters for handler in root.handlers)
+
+
 @pytest.mark.parametrize("garment", ["skirt", "shorts", "cylinder"])
 @pytest.mark.long
 def test_a_garment_is_drawn(call, garment):
@@ -653,12 +703,29 @@ def test_a_garment_or_a_body_that_a_run_would_refuse_is_not_drawn(call, monkeypa
     with monkeypatch.context() as patch:
         patch.setattr(Skirt, "sew", lambda self, body: replace(m := sew(self, body), vertices=m.vertices + 5))
         refused = call("show", "garment", "skirt", "--out", "garment.png")
-        assert refused.exit_code == 2 and "garment 'skirt' returned a pin 8" in refused.stderr
+        assert refused.exit_code == 1 and "error: garment 'skirt' (" in refused.stderr
+        assert "failed: it returned a pin 8" in refused.stderr
     monkeypatch.setattr(
         Scanned, "load", lambda self, folder: replace(b := load_body(self, folder), vertices=b.vertices * np.nan)
     )
     refused = call("show", "garment", "skirt", "--out", "garment.png")
-    assert refused.exit_code == 2 and "body 'scanned' returned vertices that are not finite" in refused.stderr
+    assert refused.exit_code == 1 and "error: body 'scanned' (" in refused.stderr
+    assert "failed: it returned vertices that are not finite" in refused.stderr
+
+
+@pytest.mark.parametrize(("cls", "verb"), [(Skirt, "sew"), (Kinematic, "drape")])
+def test_a_garment_or_a_draper_that_raises_is_told(call, monkeypatch, cls, verb):
+    def torn(self, *_):
+        raise ValueError("torn")
+
+    monkeypatch.setattr(cls, verb, torn)
+    shown = call("show", "garment", "skirt", "--out", "new/garment.png")
+    assert shown.exit_code == 1
+    assert shown.stderr.startswith(f"error: {cls.role} '{cls.name}' (plugin '")
+    assert shown.stderr.endswith("failed: ValueError: torn\n       traceback: new/garment.log\n")
+    assert "in torn" in Path("new/garment.log").read_text()
+    quiet = call("show", "garment", "skirt")
+    assert quiet.exit_code == 0 and f"no picture: {cls.role} '{cls.name}'" in quiet.stdout
 
 
 @pytest.mark.parametrize("out", ["start.yaml/skirt.png", "skirt.doc"])

@@ -57,7 +57,7 @@ def test_a_run_is_asked_after_interrupted_and_gone_on_with(tmp_path, path, stop)
     assert re.search(r"^track +resume .* \d+ of 30 frames done", said, re.MULTILINE)
     assert re.search(rf"^process {run.pid} on \S+, 0:\d\d ago: track: ", said, re.MULTILINE)
     assert run.returncode == 130
-    assert rest.endswith(f"interrupted; finished frames are saved. To go on: mocapflow {' '.join(words)}\n")
+    assert rest.endswith(f"interrupted; what is finished is saved. To go on: mocapflow {' '.join(words)}\n")
     assert "Traceback" not in rest
     assert not (tmp_path / "out" / FILE).exists()
     assert not list((tmp_path / "store.zarr" / ".state").glob("*.lock"))

@@ -119,10 +119,10 @@ def _write(out: Path, said: Mapping[str, object]) -> None:
         raise no_run_folder(out, error) from None
 
 
-def recall(out: Path) -> Invocation:
-    """Return the invocation a run folder was made by."""
+def recall(out: Path, recording: Path | None = None) -> Invocation:
+    """Return the invocation a run folder was made by, with another recording folder where one is given."""
     try:
-        said = _read(out)
+        said = _read(out) | ({"recording": str(recording)} if recording else {})
         known = {name: value for name, value in said.items() if name not in NO_ARGUMENTS}
         return Invocation(**{**known, "changes": tuple(said["changes"])})
     except (FileNotFoundError, NotADirectoryError):

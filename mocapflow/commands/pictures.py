@@ -21,6 +21,7 @@ from mocapflow.io.paths import for_opencv
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64, U8
 from mocapflow.registry import Registry
+from mocapflow.running.blame import blaming
 from mocapflow.scene import Scene
 
 CLIPS = ("skirt_steps", "shorts_steps")
@@ -33,6 +34,7 @@ def draw_garment(registry: Registry, name: str, recording: Path | None, draper: 
     Raises:
         MocapflowError: the recording is not there, the garment needs measures that it does not have, or can't be sewn
             from them; or the draper can't be made.
+        ComponentFailed: the garment or the draper raised, or answered what is none; the traceback lies beside `out`.
         StoreError: the picture can't be written.
     """
     import cv2
@@ -42,9 +44,11 @@ def draw_garment(registry: Registry, name: str, recording: Path | None, draper: 
         raise RecordingError("no such recording folder", where=str(recording))
     resolver = Resolver(Document({}, {(): Place(f"show garment {name}", Path())}), registry)
     garment: Any = garment_of(name, recording, resolver)
-    body, scanned = wearer(recording, registry)
-    scene = Scene(cameras=(), body=body, garment=mesh_of(garment, body))
-    image = poster(scene, garment, resolver.component("draper", draper, ()))
+    lays = resolver.component("draper", draper, ())
+    with blaming(garment, registry, lambda: "", out.with_suffix(".log")):
+        body, scanned = wearer(recording, registry)
+        scene = Scene(cameras=(), body=body, garment=mesh_of(garment, body))
+        image = poster(scene, garment, lays)
     file = for_opencv(out)
     with suppress(OSError):
         out.parent.mkdir(parents=True, exist_ok=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import re
 import shutil
 import sys
@@ -27,9 +28,14 @@ def reporter(stream: TextIO | None = None) -> Iterator[Callable[[str], None]]:
         yield lambda line: print(line, file=out, flush=True)
         return
     bar = _Bar(out)
+    handlers = [*logging.getLogger().handlers, *logging.getLogger("mocapflow").handlers]
+    for handler in handlers:
+        handler.addFilter(bar.make_way)
     try:
         yield bar.show
     finally:
+        for handler in handlers:
+            handler.removeFilter(bar.make_way)
         bar.close()
 
 
@@ -87,6 +93,11 @@ class _Bar:
             self._open = done < total
             self._out.write("" if self._open else "\n")
         self._out.flush()
+
+    def make_way(self, _: logging.LogRecord) -> bool:
+        """End the line before something is logged; as a filter of handlers it lets all of that pass."""
+        self.close()
+        return True
 
     def close(self) -> None:
         """End the line of a count that has not come to its end."""

@@ -14,6 +14,7 @@ import typer
 from mocapflow.commands.former import differing
 from mocapflow.commands.invocation import alone, recall, recalled_keys
 from mocapflow.commands.progress import reporter
+from mocapflow.commands.running import Moved, carry_out, prepare
 from mocapflow.errors import MocapflowError, PipelineError, RecordingError, alternatives
 
 if TYPE_CHECKING:
@@ -30,20 +31,21 @@ Format = Annotated[
 COLUMNS = ("angle", "frames", "rms_deg", "mae_deg", "offset_deg", "max_deg", "worst_frame")
 
 
-def evaluate(run: Run, truth: Truth = None) -> None:
+def evaluate(run: Run, truth: Truth = None, recording: Moved = None) -> None:
     """Compare the joint angles of a run with known ones: those its own pipeline names, unless others are given.
 
     Settings are those of the run. A folder whose pipeline is not here is compared with what is given by the defaults.
     """
     from mocapflow_evaluation.evaluate import evaluate_run
 
-    reference, missing, longest_lag_s = _comparison(run, truth)
+    reference, missing, longest_lag_s = _comparison(run, truth, recording)
     if reference is None or reference.is_dir():
         again = "run its pipeline again" if truth is None else "--set stages.evaluate.reference=keypoints"
         named = f"{missing}\nname a file of known angles with --truth"
         hint = named if reference is None else f"keypoints are compared in a run: {again}"
         raise RecordingError("there is nothing to compare with", where=str(reference or run), hint=hint)
-    evaluation = evaluate_run(run, reference, longest_lag_s)
+    with alone(run):
+        evaluation = evaluate_run(run, reference, longest_lag_s)
     if not evaluation.rows:
         raise RecordingError("; ".join(evaluation.notes), where=str(reference))
     typer.echo(f"compared with {evaluation.reference}")
@@ -53,15 +55,15 @@ def evaluate(run: Run, truth: Truth = None) -> None:
     typer.echo("all figures: results/evaluation.csv in the run folder")
 
 
-def _comparison(run: Path, truth: Path | None) -> tuple[Path | None, str, float]:
+def _comparison(run: Path, truth: Path | None, recording: Path | None) -> tuple[Path | None, str, float]:
     """Return what a run is compared with, or why there is nothing, and the longest lag to look for (s)."""
     from mocapflow_evaluation.evaluate import LONGEST_LAG_S, Evaluate, chosen
     from mocapflow_export import layout
 
     try:
-        pipeline = recall(run).load()
+        pipeline = recall(run, recording).load()
     except MocapflowError as error:
-        if truth is None:
+        if truth is None or not run.is_dir():
             raise
         typer.echo(f"warning: compared by the default settings, as those of the run can't be read: {error}", err=True)
         return truth, "", LONGEST_LAG_S
@@ -72,16 +74,15 @@ def _comparison(run: Path, truth: Path | None) -> tuple[Path | None, str, float]
     return reference, missing, stage.longest_lag_s
 
 
-def export(run: Run, format_: Format) -> None:
+def export(run: Run, format_: Format, recording: Moved = None) -> None:
     """Write the track of a run in other formats, into the run folder.
 
     Code may have changed since; pipeline and recording may not.
     """
-    from mocapflow.commands.running import carry_out, prepare
     from mocapflow.running.former_code import as_made
 
     _check_formats(format_)
-    invocation = recall(run)
+    invocation = recall(run, recording)
     pipeline = invocation.load()
     with alone(run):
         steps = prepare(pipeline, invocation).steps
@@ -132,9 +133,10 @@ def view(
     show: Annotated[
         bool, typer.Option("--show/--no-show", help="Open the viewer, or only write results/scene.rrd.")
     ] = True,
+    recording: Moved = None,
 ) -> None:
     """Look at a run in Rerun: cameras, images, outlines, body, garment and angles on one timeline."""
-    export(run, ["rrd"])
+    export(run, ["rrd"], recording)
     scene = run / "results" / "scene.rrd"
     if show and (status := subprocess.run([sys.executable, "-m", "rerun", str(scene)], check=False).returncode):
         hint = "it needs a display; --no-show only writes this file, which `rerun` opens anywhere"

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 File = Annotated[Path, typer.Argument(metavar="PIPELINE", help="A pipeline file (.yaml).")]
 Recording = Annotated[Path | None, typer.Option(help="Use this recording folder instead of the file's.")]
+Moved = Annotated[Path | None, typer.Option("--recording", metavar="DIR", help="Where the recording is now.")]
 Out = Annotated[Path | None, typer.Option(help="The run folder.", show_default="runs/NAME_OF_PIPELINE")]
 Store = Annotated[
     str | None,
@@ -82,9 +83,11 @@ def plan(
     _print_plan(_invocation(pipeline, recording, _out(pipeline, out), store, changes, frames))
 
 
-def status(run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")]) -> None:
+def status(
+    run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.")], recording: Moved = None
+) -> None:
     """Say how far a run is."""
-    _print_plan(recall(run_folder))
+    _print_plan(recall(run_folder, recording))
     when = finished_at(run_folder)
     if said := last_word(run_folder) or (when and f"finished at {when}"):
         typer.echo(said)

@@ -164,7 +164,7 @@ def _recording(said: PipelineFile, given: Path | str | None, name: str, resolver
     if folder.is_dir():
         return folder
     what, where = ("", str(folder)) if given else (f": {folder}", resolver.place(("recording",)))
-    option = "--recording DIR of run, plan and compare names another"
+    option = "--recording DIR names another"
     hint = "\n".join(filter(None, [led_nowhere(folder), option]))
     raise RecordingError(f"there is no such folder{what}", where=where, hint=hint)
 

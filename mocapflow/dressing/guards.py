@@ -11,9 +11,11 @@ from mocapflow.data import Past, Pose, PoseBatch
 from mocapflow.dressing.roles import BodyModel, Draper, Garment
 from mocapflow.records import F64, I32, stray
 from mocapflow.scene import Scene
+from mocapflow.settings import Component
 from mocapflow.wrong_answer import UNIT, WrongAnswer, array_of, of_kind
 
 REACH = 1.0  # m from the skin that holds it: a pin farther off is surely wrong
+FARTHEST = 10.0  # m from the body's first joint: cloth farther off is no longer worn
 
 
 def body_of(model: BodyModel, recording: Path) -> Body:
@@ -64,11 +66,25 @@ def drape_of(draper: Draper, poses: PoseBatch, parameters: F64, past: Past, scen
     """Return cloth vertices (B, W, 3) as a draper lays them.
 
     Raises:
-        WrongAnswer: they are of another shape, or not finite.
+        WrongAnswer: they are of another shape, not finite, or far away from the body.
     """
     assert scene.garment is not None
     laid = of_kind(draper, draper.drape(poses, parameters, past, scene), np.ndarray)
-    return array_of(draper, laid, (len(parameters), *scene.garment.vertices.shape), "cloth")
+    array_of(draper, laid, (len(parameters), *scene.garment.vertices.shape), "cloth")
+    return worn(draper, laid, poses.root, scene.body)
+
+
+def worn(component: Component, laid: F64, root: F64, body: Body) -> F64:
+    """Return cloth (..., W, 3) m that a component answered for poses with roots (..., 4, 4).
+
+    Raises:
+        WrongAnswer: it lies far away from the body.
+    """
+    middle = root[..., :3, :3] @ body.positions[0] + root[..., :3, 3]
+    away = float(np.abs(laid - middle[..., None, :]).max(initial=0.0))  # along an axis: enough to tell, and quick
+    if away > FARTHEST:
+        raise WrongAnswer(component, f"cloth {away:.3g} m from the body; is it in metres, and posed as the body is?")
+    return laid
 
 
 def velocity_of(draper: Draper, pose: Pose, parameters: F64, vertices: I32, past: Past, scene: Scene) -> F64:

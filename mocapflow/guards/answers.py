@@ -23,6 +23,7 @@ from mocapflow.data import (
     Surface,
     Turn,
 )
+from mocapflow.dressing.guards import worn
 from mocapflow.records import F64, stray
 from mocapflow.scene import Scene
 from mocapflow.settings import Component
@@ -182,12 +183,12 @@ def cloth_of(
     """Return the cloth that a fitter chooses.
 
     Raises:
-        WrongAnswer: it is not that of the garment, not finite, or a parameter is out of its bounds.
+        WrongAnswer: it is not that of the garment, not finite, far away, or a parameter is out of its bounds.
     """
     cloth = of_kind(fitter, fitter.fit(frame, segmentation, estimate, model, past, turn), Cloth)
     garment = model.scene.garment
     vertices, parameters = (0, 0) if garment is None else (len(garment.vertices), len(garment.parameter_names))
-    array_of(fitter, cloth.vertices, (vertices, 3), "cloth")
+    worn(fitter, array_of(fitter, cloth.vertices, (vertices, 3), "cloth"), estimate.pose.root, model.scene.body)
     array_of(fitter, cloth.parameters, (parameters,), "cloth parameters")
     if garment is not None:
         ranges = zip(garment.parameter_names, cloth.parameters, garment.parameter_bounds, strict=True)
@@ -209,6 +210,7 @@ def result_of(recovery: Recovery, found: Any, looped: FrameResult, scene: Scene)
     _checked_estimate(recovery, result.state.estimate, looped.state.estimate, scene)
     cloth, before = result.state.cloth, looped.state.cloth
     array_of(recovery, cloth.vertices, before.vertices.shape, "cloth")
+    worn(recovery, cloth.vertices, result.state.estimate.pose.root, scene.body)
     array_of(recovery, cloth.parameters, before.parameters.shape, "cloth parameters")
     for name in ("overlap", "energy"):
         shape, meant = getattr(result, name).shape, getattr(looped, name).shape

@@ -22,8 +22,8 @@ def atomic_write(path: Path) -> Iterator[Path]:
         yield part
         part.replace(path)
     except OSError as error:
-        if error.filename == str(part):  # people know the file by its own name
-            error.filename = str(path)
+        if error.filename == str(part) or (error.errno and error.filename is None):  # a full drive tells no name
+            error.filename = str(path)  # by which people know the file
         raise
     finally:
         part.unlink(missing_ok=True)

@@ -97,7 +97,10 @@ class Recording:
         return background(self.folder, self.views, lambda: self.frame(0))
 
     def static(self) -> Recording | None:
-        """Return the standing trial, seen by the same cameras, or None where there is none."""
+        """Return the standing trial, seen by the same cameras, or None where there is none.
+
+        It is no part of `content`: a stage that looks at it names its folder among its `inputs`.
+        """
         if not (self.folder / "static" / "videos").is_dir():
             return None
         return open_recording(self.folder / "static", scale=self.views[0].scale, calibration=self.calibration)

@@ -169,7 +169,7 @@ class Execution:
         self._report(f"{step.label}: running {step.named.stage.name}")
         check()
         cpu, wall, stage = time.process_time(), time.perf_counter(), step.named.stage
-        with warnings_logged() as said, self._blaming(stage, checkpoint):
+        with warnings_logged(self._pipeline.registry.packages) as said, self._blaming(stage, checkpoint):
             if checkpoint is not None:
                 checkpoint.keep_warnings(said)
             value = of_kind(stage, stage.run(**inputs), made_by(step.named))

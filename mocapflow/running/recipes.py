@@ -136,11 +136,8 @@ def _frames(part: Recording, pipeline: Pipeline, chain: bool) -> dict[str, Any]:
 
 
 def _content(part: Recording, digests: Digests) -> dict[str, Any]:
-    paths = dict(part.content)
-    if (part.folder / "static").is_dir():
-        paths["static"] = part.folder / "static"
     return {
-        "content": {name: digests.file(path, name) for name, path in sorted(paths.items())},
+        "content": {name: digests.file(path, name) for name, path in sorted(part.content.items())},
         "reader": digests.package("mocapflow.recordings.recording"),
     }
 

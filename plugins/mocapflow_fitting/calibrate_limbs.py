@@ -83,7 +83,9 @@ class CalibrateLimbs(Stage):
         solution = Solution(np.zeros(len(spreads)), tuple(poses))
         for done in range(self.passes):
             model = self._model(scene, scaled(body, solution.factors(spreads)))
-            views = self._segmented(recording, checks, model, indices, solution.poses, clothes)
+            views = self._segmented(
+                _in_pass(done, self.passes, recording), checks, model, indices, solution.poses, clothes
+            )
             turn = Turn(index=done, change=AT_REST if done else None)
             matchers = [partial(self._match, scene, *view, turn) for view in views]
             solution = refine(body, matchers, solution, scene.cameras, spreads, share, self.rounds)
@@ -131,3 +133,8 @@ class CalibrateLimbs(Stage):
         model, past = self._model(scene, body), Past()
         surface = model.surface(pose, model.drape(pose, cloth, past))
         return pool_matches(self.matchers, frame, segmentation, past, model.scene, turn, surface)
+
+
+def _in_pass(done: int, passes: int, recording: Recording) -> Recording:
+    """Return a recording that is read in each pass, told of as frames of all of them: one count that goes on."""
+    return replace(recording, watch=lambda frame, of: recording.watch(done * of + frame, passes * of))

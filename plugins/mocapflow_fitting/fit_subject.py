@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -43,6 +44,10 @@ class FitSubject(Stage):
     frames: PositiveInt = 16  # spread over the recording
     trial: Literal["auto", "static", "recording"] = "auto"  # auto: both, if the standing trial shows the same person
     layout: Layout | None = None  # order of the keypoints; null: told by their number
+
+    def inputs(self, folder: Path) -> Sequence[Path]:
+        """Return the folder of the standing trial, where it counts."""
+        return () if self.trial == "recording" else (folder / "static",)
 
     def need(self, recording: Recording) -> None:
         """Raise if there are no keypoints, or no standing trial where that is wanted."""

@@ -136,7 +136,7 @@ def test_cameras_made_by_a_stage_change_what_comes_after_it(tmp_path, clip):
         ("README.md", set()),
         ("videos/cam01/.DS_Store", set()),
         ("videos/.hidden/cam01.mp4", set()),
-        ("static/videos/cam01.mp4", {"background", "start", "track"}),
+        ("static/videos/cam01.mp4", set()),
     ],
 )
 def test_content_of_files(tmp_path, clip, name, expected):
@@ -152,6 +152,17 @@ def test_content_of_files(tmp_path, clip, name, expected):
     after = changed(before, keys(tmp_path, clip))
     assert after >= expected
     assert bool(after) == bool(expected)
+
+
+@pytest.mark.parametrize("trial", ["auto", "static", "recording"])
+def test_the_standing_trial_counts_for_who_looks_at_it(tmp_path, clip, trial):
+    stages = STAGES | {"late": {"use": "fit_subject", "trial": trial}}
+    film = clip / "static" / "videos" / "cam01.mp4"
+    film.parent.mkdir(parents=True)
+    film.write_text("one")
+    before = keys(tmp_path, clip, stages=stages)
+    film.write_text("two")
+    assert changed(before, keys(tmp_path, clip, stages=stages)) == (set() if trial == "recording" else {"late"})
 
 
 def test_the_name_of_a_file_counts_that_a_stage_may_read_by_its_name(tmp_path, clip):

@@ -2,6 +2,7 @@
 
 import errno
 import fcntl
+import re
 import shutil
 import threading
 from pathlib import Path
@@ -12,6 +13,7 @@ from mocapflow_export import layout
 from typer.testing import CliRunner
 
 from mocapflow import cli
+from mocapflow.commands import invocation
 from mocapflow.commands.former import FORMER, differing, set_aside
 from mocapflow.commands.invocation import FILE, alone
 from mocapflow.errors import StoreError
@@ -110,6 +112,18 @@ def test_what_differs_is_named():
     assert differing({"track": "a", "smooth": "b"}, {"track": "a", "export": "d"}) == ["smooth", "export"]
 
 
+def test_a_recording_that_was_moved_is_named(call):
+    run(call)
+    Path("clip").rename("moved")
+    lost = call("status", "out")
+    assert lost.exit_code == 2 and lost.stderr.endswith("--recording DIR names another\n")
+    assert re.search(r"^track +hit ", call("status", "out", "--recording", "moved").stdout, re.MULTILINE)
+    exported = call("export", "out", "--format", "trc", "--recording", "moved")
+    assert exported.exit_code == 0 and (OUT / layout.JOINTS).exists(), exported.output
+    evaluated = call("evaluate", "out", "--recording", "moved")
+    assert "there is nothing to compare with\n       the recording has no truth" in evaluated.stderr
+
+
 @pytest.mark.long
 def test_an_export_is_of_the_track_that_was_exported(call):
     run(call, "--set", "stages.export={use: export, from: {track: track}, formats: [csv]}")
@@ -201,6 +215,17 @@ def test_a_run_folder_that_can_not_be_locked_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr(fcntl, "flock", unknown)
     with pytest.raises(StoreError, match="can't write the run folder: No locks available"), alone(tmp_path):
         pass
+
+
+def test_a_run_folder_on_a_full_drive_is_told(call, monkeypatch):
+    def full(*_, **__):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(invocation, "atomic_write", full)
+    told = call("run", "tiny.yaml", "--out", "out")
+    assert told.exit_code == 1
+    what = "can't write the run folder: No space left on device\n       name another folder, or free some space"
+    assert told.stderr == f"error: out  {what}\n"
 
 
 def test_a_run_leaves_no_traceback_of_one_that_failed_before(call, monkeypatch):

@@ -183,10 +183,10 @@ def test_a_plugin_file_named_by_the_pipeline(folder):
          "skirt.yaml:10:12  stages.smooth.from: write {parameter: label of an earlier stage}"),
         ("recording: clip", "recording: clap",
          "skirt.yaml:1:1  there is no such folder: clap\n"
-         "       --recording DIR of run, plan and compare names another"),
+         "       --recording DIR names another"),
         ("recording: clip", "recording: ~nobody-here/clip",
          "skirt.yaml:1:1  there is no such folder: ~nobody-here/clip\n"
-         "       --recording DIR of run, plan and compare names another"),
+         "       --recording DIR names another"),
         ("matchers: [contour_icp, {use: contour_icp, share: 0.5}]", "matchers: []",
          "skirt.yaml:8:5  stages.track.matchers: needs at least 1 entry"),
         ("recording: clip\n", "",

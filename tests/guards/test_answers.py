@@ -222,7 +222,7 @@ def test_nobody_is_blamed_for_an_interrupt(tmp_path):
     path = with_prior(tmp_path, "interrupted")
     done = CliRunner().invoke(app, ["run", str(path), "--out", str(tmp_path / "out"), "--frames", "0:2"])
     assert done.exit_code == 130
-    assert "interrupted; finished frames are saved" in done.output
+    assert "interrupted; what is finished is saved" in done.output
     assert "failed" not in done.output
     assert not (tmp_path / "out" / "failed.log").exists()
 
@@ -302,6 +302,8 @@ class Dressing(Draper, ClothFitter, Garment, Segmenter, BodyModel):
         (lambda v: v[:, 1:], "cloth of shape .*, not"),
         (lambda v: v * np.nan, "cloth that is not finite"),
         (lambda v: v.astype(np.float32), "cloth of float32, not float64"),
+        (lambda v: v + [0, 100, 0], "cloth 1.* m from the body; is it in metres"),
+        (lambda v: 1000 * v, "cloth .* m from the body; is it in metres"),
     ],
 )
 def test_drapes_that_are_none(change, said):
@@ -325,6 +327,7 @@ def test_velocities_that_are_none():
         (CLOTH.vertices, "ndarray, not Cloth"),
         (NO_CLOTH, r"cloth of shape \(0, 3\), not"),
         (replace(CLOTH, vertices=CLOTH.vertices * np.nan), "cloth that is not finite"),
+        (replace(CLOTH, vertices=CLOTH.vertices - 100), "cloth 1.* m from the body"),
         (replace(CLOTH, parameters=np.zeros(9)), r"cloth parameters of shape \(9,\)"),
         (replace(CLOTH, parameters=CLOTH.parameters + 1), "1 for parameter 'thickness_m', which goes from 0 to 0.01"),
     ],
@@ -426,3 +429,11 @@ def test_a_recovery_that_answers_with_no_result(answer, said):
     assert result_of(Lost(), replace(LOOPED, notes=("found",)), LOOPED, SCENE).notes == ("found",)
     with pytest.raises(WrongAnswer, match=f"recovery 'lost' returned {said}"):
         result_of(Lost(), answer, LOOPED, SCENE)
+
+
+def test_a_recovery_that_leaves_the_cloth_behind():
+    worn = replace(LOOPED, state=replace(STATE, cloth=CLOTH))
+    left = replace(worn, state=replace(STATE, cloth=replace(CLOTH, vertices=CLOTH.vertices + 100)))
+    assert result_of(Lost(), left, left, SCENE) is left  # what the loop found was looked at there
+    with pytest.raises(WrongAnswer, match=r"recovery 'lost' returned cloth 1.* m from the body"):
+        result_of(Lost(), left, worn, SCENE)

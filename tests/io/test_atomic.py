@@ -1,3 +1,6 @@
+import errno
+import os
+
 import pytest
 
 from mocapflow.io.atomic import PART, atomic_write, forget_parts
@@ -35,4 +38,11 @@ def test_an_error_names_the_file_itself(tmp_path):
     path = tmp_path / "nowhere" / "angles.csv"
     with pytest.raises(FileNotFoundError) as caught, atomic_write(path) as part:
         part.write_text("new")
+    assert caught.value.filename == str(path)
+
+
+def test_an_error_of_a_full_drive_names_the_file(tmp_path):
+    path = tmp_path / "angles.csv"
+    with pytest.raises(OSError, match="No space left") as caught, atomic_write(path):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))  # as `write` does
     assert caught.value.filename == str(path)

@@ -149,6 +149,16 @@ def test_the_fitted_body_stands_on_the_floor(body, poses, monkeypatch):
     assert fitted.vertices[:, 2].min() == pytest.approx(body.vertices[:, 2].min(), abs=1e-12)
 
 
+def test_frames_are_counted_through_all_passes(body, poses, monkeypatch):
+    monkeypatch.setattr("mocapflow_fitting.calibrate_limbs.refine", lambda body, matchers, solution, *_: solution)
+    told = []
+    recording = replace(open_recording(DEMO, stop=2), watch=lambda *count: told.append(count))
+    track = make_track(np.stack([p.root for p in poses[:2]]), np.stack([p.angles for p in poses[:2]]))
+    stage = CalibrateLimbs(segmenter=masks_of(body, poses), matchers=(ContourIcp(),), passes=3)
+    stage.run(recording, Scene(cameras=recording.cameras, body=body), None, track)
+    assert told == [(k, 6) for k in range(1, 7)]
+
+
 @pytest.mark.parametrize(("good", "looked"), [([1, 4], [1, 4]), ([], [0, 2, 5])])
 def test_few_good_frames_are_better_than_bad_ones(body, poses, good, looked):
     track = make_track(np.tile(poses[0].root, (6, 1, 1)), np.tile(poses[0].angles, (6, 1)))
