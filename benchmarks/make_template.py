@@ -144,10 +144,11 @@ def areas(points: F64, faces: I32) -> F64:
 
 
 def principal(points: F64, weight: F64) -> F64:
-    """Return the first principal directions (MODES, N, 3) of points (P, N, 3), m a standard deviation."""
+    """Return the first principal directions (MODES, N, 3) of points (P, N, 3), m a standard deviation, tall ahead."""
     off = points - points.mean(axis=0)
     who = np.linalg.svd((np.sqrt(weight)[:, None] * off).reshape(len(off), -1), full_matrices=False)[0][:, :MODES]
-    return np.tensordot(who.T, off, 1) / np.sqrt(len(off))
+    modes = np.tensordot(who.T, off, 1) / np.sqrt(len(off))
+    return np.asarray(modes * np.sign(modes[..., 2].mean(axis=1))[:, None, None])
 
 
 def packed(lengths: F64) -> np.ndarray:

@@ -43,7 +43,7 @@ class Template(BodyModel):
             weights = np.zeros((len(vertices), len(names)))
             rows = np.arange(len(vertices))[:, None]
             np.add.at(weights, (rows, content["skin_joint"].astype(np.intp)), content["skin_weight"] / 65535)
-            modes = {name: UNIT * content[name].astype(np.float64) for name in ("shape_modes", "joint_modes")}
-        scale = 1.0 if self.height_m is None else self.height_m / float(np.ptp(vertices[:, 2]))
+            scale = 1.0 if self.height_m is None else self.height_m / float(np.ptp(vertices[:, 2]))
+            modes = {name: scale * UNIT * content[name].astype(np.float64) for name in ("shape_modes", "joint_modes")}
         body = assemble(scale * vertices, faces, Skeleton(names, parents, scale * positions), weights, self.part)
         return replace(body, **modes) if self.part == "full" else body
