@@ -23,5 +23,5 @@ def simplified(body: Body, faces: int) -> Body:
     points, triangles = o3d.utility.Vector3dVector(body.vertices.copy()), o3d.utility.Vector3iVector(body.faces.copy())
     mesh = o3d.geometry.TriangleMesh(points, triangles).simplify_quadric_decimation(faces)
     vertices = np.array(mesh.vertices, np.float64)
-    simpler = part_of(body, nearest_skin(body, vertices))  # its modes go with those vertices
+    simpler = part_of(body, nearest_skin(body, vertices))
     return replace(simpler, vertices=vertices, faces=np.array(mesh.triangles, np.int32))

@@ -16,7 +16,7 @@ from mocapflow.geometry.skeleton import Skeleton
 from mocapflow.records import I32
 from mocapflow_bodies.assemble import Part, assemble
 
-FILE = Path(__file__).parent / "data" / "template.npz"  # made by benchmarks/make_template.py from MakeHuman's CC0 bodies
+FILE = Path(__file__).parent / "data" / "template.npz"  # made by benchmarks/make_template.py, of MakeHuman (CC0)
 UNIT = 1e-4  # m, of the lengths in the file
 
 

@@ -38,9 +38,8 @@ def scaled(body: Body, factors: Mapping[str, float]) -> Body:
     A_parent, and a vertex moves to sum_j w_j (p'_j + A_j (v - p_j)): smooth where the weights are. Axes keep their
     directions.
     """
-    body = _shaped(body, {name: value for name, value in factors.items() if name.startswith(SHAPE)})
-    factors = {name: value for name, value in factors.items() if not name.startswith(SHAPE)}
-    stretch = _stretches(body, factors)
+    body = _shaped(body, factors)
+    stretch = _stretches(body, {name: factor for name, factor in factors.items() if not name.startswith(SHAPE)})
     positions = body.positions.copy()
     for joint in range(len(positions)):
         parent = int(body.parents[joint])
@@ -73,12 +72,12 @@ def modes_of(body: Body) -> tuple[str, ...]:
     return () if body.shape_modes is None else tuple(f"{SHAPE}{m}" for m in range(len(body.shape_modes)))
 
 
-def _shaped(body: Body, deviations: Mapping[str, float]) -> Body:
-    """Return a body moved along its modes by standard deviations; it has none any more."""
+def _shaped(body: Body, factors: Mapping[str, float]) -> Body:
+    """Return a body moved along its modes; it has none any more."""
     plain = replace(body, shape_modes=None, joint_modes=None)
-    if not deviations or body.shape_modes is None or body.joint_modes is None:
+    if body.shape_modes is None or body.joint_modes is None:
         return plain
-    by = np.array([deviations.get(name, 0.0) for name in modes_of(body)])
+    by = np.array([factors.get(name, 0.0) for name in modes_of(body)])
     vertices, positions = (np.tensordot(by, modes, 1) for modes in (body.shape_modes, body.joint_modes))
     return _moved(plain, body.vertices + vertices, body.positions + positions)
 
