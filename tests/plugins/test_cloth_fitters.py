@@ -119,9 +119,27 @@ def test_a_force_that_its_bounds_fix_stays_and_the_others_are_found(model):
     assert 0.05 < found[column] < 0.12
 
 
-def test_the_take_up_is_found_in_a_few_steps_where_the_hem_stands_out(model):
-    column, past = model.scene.garment.parameter_names.index("take_up"), Past()
-    truth, found = parameters(model, take_up=0.06, flare_rad=0.3), parameters(model, flare_rad=0.3)
+def lived(model, cloth, *times):
+    """Return a past of moments in which the cloth hung as it does."""
+    past = Past()
+    for time in times:
+        past = past.after(Moment(time=time, pose=STANDING, cloth=cloth), {})
+    return past
+
+
+@pytest.mark.parametrize("amount", [0.0, 0.06, 0.12])
+def test_the_take_up_is_found_at_once_in_the_second_frame(model, amount):
+    column, start = model.scene.garment.parameter_names.index("take_up"), parameters(model, flare_rad=0.3)
+    truth = parameters(model, take_up=amount, flare_rad=0.3)
+    found = fitted(TakeUp(), model, truth, start, lived(model, model.drape(STANDING, start, Past()), 0.0), 1 / 30)
+    assert abs(found.parameters[column] - amount) < 0.01
+    np.testing.assert_array_equal(np.delete(found.parameters, column), np.delete(truth, column))
+
+
+def test_the_take_up_is_followed_in_a_few_steps_where_the_hem_stands_out(model):
+    column, found = model.scene.garment.parameter_names.index("take_up"), parameters(model, flare_rad=0.3)
+    truth = parameters(model, take_up=0.06, flare_rad=0.3)
+    past = lived(model, model.drape(STANDING, found, Past()), -0.2, -0.1)
     for index in range(10):
         cloth = fitted(TakeUp(), model, truth, found, past, index / 10)
         past, found = past.after(Moment(time=index / 10, pose=STANDING, cloth=cloth), {}), cloth.parameters
@@ -130,15 +148,16 @@ def test_the_take_up_is_found_in_a_few_steps_where_the_hem_stands_out(model):
 
 
 def test_a_hem_that_hardly_shows_moves_little_in_one_step(model):
-    column = model.scene.garment.parameter_names.index("take_up")
-    found = fitted(TakeUp(), model, parameters(model, take_up=0.06), parameters(model), later(model), 0.1)
+    column, start = model.scene.garment.parameter_names.index("take_up"), parameters(model)
+    past = lived(model, model.drape(STANDING, start, Past()), -0.1, 0.0)
+    found = fitted(TakeUp(), model, parameters(model, take_up=0.06), start, past, 0.1)
     assert 0 < found.parameters[column] < 0.01
 
 
 def test_a_step_is_as_long_whenever_the_frame_before_it_was(model):
     truth, start = parameters(model, take_up=0.06, flare_rad=0.3), parameters(model, flare_rad=0.3)
     cloth = model.drape(STANDING, start, Past())
-    pasts = [Past().after(Moment(time=time, pose=STANDING, cloth=cloth), {}) for time in (0.0, 0.1 - 1 / 30)]
+    pasts = [lived(model, cloth, time - 1 / 30, time) for time in (0.0, 0.1 - 1 / 30)]
     far, near = (fitted(TakeUp(), model, truth, start, past, 0.1).parameters for past in pasts)
     assert np.any(far != start)
     np.testing.assert_array_equal(far, near)
@@ -148,7 +167,7 @@ def test_the_take_up_steps_every_tenth_of_a_second(model):
     truth, start = parameters(model, take_up=0.06, flare_rad=0.3), parameters(model, flare_rad=0.3)
     cloth, stepped = model.drape(STANDING, start, Past()), []
     for frame in range(1, 31):
-        past = Past().after(Moment(time=(frame - 1) / 30, pose=STANDING, cloth=cloth), {})
+        past = lived(model, cloth, (frame - 2) / 30, (frame - 1) / 30)
         found = fitted(TakeUp(), model, truth, start, past, frame / 30)
         stepped.extend([frame] if np.any(found.parameters != start) else [])
     assert stepped == list(range(3, 31, 3))
@@ -163,8 +182,10 @@ def test_nothing_is_taken_up_while_the_person_is_being_found_or_is_not_seen(mode
     np.testing.assert_array_equal(kept.parameters, start)
 
 
-def test_three_values_of_a_parabola_tell_where_it_is_lowest():
-    places = np.array([0.01, 0.02, 0.03])
+def test_values_of_a_parabola_tell_where_it_is_lowest():
+    places, more = np.array([0.01, 0.02, 0.03]), 0.01 * np.arange(16)
+    for where in (0.025, 0.104, 0.15):
+        assert lowest(more, (more - where) ** 2) == pytest.approx(where)
     assert lowest(places, (places - 0.025) ** 2) == pytest.approx(0.025)
     assert lowest(places, (places - 0.9) ** 2) == pytest.approx(0.04)  # no farther than two steps
     assert lowest(places, -((places - 0.018) ** 2)) == 0.03
