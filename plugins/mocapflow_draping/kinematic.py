@@ -40,13 +40,13 @@ class Kinematic(Draper):
     """Lays a garment by geometry alone: no mass, no time, no history.
 
     What touches the skin slides along it while rings close; by the literal rule it and what is taut above stay.
-    Particles lie in the middle of the cloth; that it is seen half its thickness farther out is not drawn.
+    Particles lie on the outer side of the cloth, where it is seen: its whole thickness off the skin.
 
     Source: Rosenhahn 2008, section 12.3
     """
 
     name: ClassVar[str] = "kinematic"
-    skin_m: NonNegativeFloat = 0.005  # room between skin and cloth of no thickness
+    skin_m: NonNegativeFloat = 0.005  # room between skin and cloth
     voxel_m: PositiveFloat = 0.010  # edge of a voxel of the body's distance fields
     rule: Literal["contact", "literal"] = "contact"  # from contact to contact; or in steps, as printed, a wind alone
     step_deg: PositiveFloat = 2.0  # literal: how far a particle turns in an iteration
@@ -66,7 +66,7 @@ class Kinematic(Draper):
         assert garment is not None
         fitting = self.fitting(garment, scene.body)
         strands = fitting.strands
-        skin = self.skin_m + thickness(garment, parameters) / 2
+        skin = self.skin_m + thickness(garment, parameters)
         length = remaining_length(garment, parameters)
         kept, source = distinct(poses, skin, length)
         chain, skin = chain_batch(scene.body, PoseBatch(root=poses.root[kept], angles=poses.angles[kept])), skin[kept]
@@ -99,7 +99,7 @@ class Kinematic(Draper):
         strands = fitting.strands
         chain = chain_batch(scene.body, poses)
         parts = posed_parts(fitting.fields, chain[-1:])
-        skin = self.skin_m + thickness(garment, values) / 2
+        skin = self.skin_m + thickness(garment, values)
         length = remaining_length(garment, values)
         links = length[:, None, None] * strands.links
         moved = moving(fitting.fields, chain, skin, length, steps)

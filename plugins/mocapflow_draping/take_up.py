@@ -1,15 +1,16 @@
-"""The cloth fitter of how high the hem hangs: what folds and gathers take up of the strands."""
+"""The cloth fitter of what a garment keeps from frame to frame: how far it stands off, and how high its hem hangs."""
 
 from __future__ import annotations
 
 import math
-from typing import ClassVar
+from collections.abc import Callable
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from mocapflow.components import ClothFitter
-from mocapflow.data import Cloth, Estimate, Frame, Past, Segmentation, Turn
-from mocapflow.geometry.sewing import TAKE_UP
+from mocapflow.data import REMEMBERED, Cloth, Estimate, Frame, Past, Pose, Segmentation, Turn
+from mocapflow.geometry.sewing import TAKE_UP, THICKNESS
 from mocapflow.model import ClothedModel
 from mocapflow.periodic import falls_due
 from mocapflow.records import F64
@@ -23,11 +24,12 @@ FARTHEST = 2.0  # steps from the middle of three values that their parabola is t
 
 
 class TakeUp(ClothFitter):
-    """Moves the take-up of a hanging garment to where the outline fits the images; all else is as estimated.
+    """Moves take-up and thickness of a garment to where the outline fits the images; all else is as estimated.
 
-    In the first frame, in which the person is only being found, there is none; in the second it is looked for anywhere.
-    Folds and gathers come and go more slowly than a leg moves, so from there it is a random walk, with a step every
-    tenth of a second, in the first turn of a frame. A garment without this parameter is draped as it is.
+    In the first frame, in which the person is only being found, there is none of either. In the second the take-up is
+    looked for anywhere. Folds and gathers come and go more slowly than a leg moves, so from there it is a random walk,
+    with a step every tenth of a second, in the first turn of a frame. The thickness is the mean of those that fit the
+    second and the third frame, and stays. A garment without one of these parameters is draped as it is.
     """
 
     name: ClassVar[str] = "take_up"
@@ -35,29 +37,69 @@ class TakeUp(ClothFitter):
     def fit(
         self, frame: Frame, segmentation: Segmentation, estimate: Estimate, model: ClothedModel, past: Past, turn: Turn
     ) -> Cloth:
-        """Return the garment draped at the estimated pose with the take-up that fits."""
+        """Return the garment draped at the estimated pose with the take-up and the thickness that fit."""
         cloth, garment = model.drape(estimate.pose, estimate.parameters, past), model.scene.garment
-        if garment is None or not segmentation.silhouettes or TAKE_UP not in garment.parameter_names:
+        if garment is None or not segmentation.silhouettes or turn.index > 0 or not past.moments:
             return cloth
-        if turn.index > 0 or not past.moments:
+        names, lived = garment.parameter_names, len(past.moments)
+        due = TAKE_UP in names and (lived == 1 or falls_due(past.moments[-1].time, frame.time, EVERY))
+        early = THICKNESS in names and lived < REMEMBERED
+        if not (due or early):
             return cloth
-        last, second = past.moments[-1], len(past.moments) == 1
-        if not (second or falls_due(last.time, frame.time, EVERY)):
-            return cloth
-        column = garment.parameter_names.index(TAKE_UP)
-        low, high = garment.parameter_bounds[column]
-        before = last.cloth.parameters[column]
-        if second:
-            spread, tried = SPREAD, np.arange(low, high + STEP / 2, STEP)
-        else:
-            spread = SPREAD * math.sqrt(max(frame.time - last.time, EVERY))
-            tried = np.clip(estimate.parameters[column], low + STEP, high - STEP) + STEP * np.array([-1.0, 0.0, 1.0])
-        trials = samples.replaced(garment, estimate.parameters, [column], tried[:, None])
-        error = outline_error(estimate.pose, cloth, segmentation, model)
-        off = np.array([error(vertices) for vertices in model.drapes(estimate.pose, trials, past)])
-        best = lowest(tried, off + ((tried - before) / spread) ** 2)
-        parameters = samples.replaced(garment, estimate.parameters, [column], np.array([[best]]))[0]
-        return model.drape(estimate.pose, parameters, past)
+        trials = Trials(estimate.pose, model, past, outline_error(estimate.pose, cloth, segmentation, model))
+        if due:
+            cloth = taken_up(cloth, trials, frame.time)
+        return thickened(cloth, trials) if early else cloth
+
+
+class Trials(NamedTuple):
+    """Drapes at one pose that differ in one parameter."""
+
+    pose: Pose
+    model: ClothedModel
+    past: Past
+    error: Callable[[F64], float]  # of the outline of cloth (W, 3) m
+
+    def parameter(self, name: str) -> tuple[int, F64]:
+        """Return the column of a parameter, and its bounds (2,)."""
+        assert self.model.scene.garment is not None
+        column = self.model.scene.garment.parameter_names.index(name)
+        return column, self.model.scene.garment.parameter_bounds[column]
+
+    def errors(self, cloth: Cloth, column: int, values: F64) -> F64:
+        """Return the error of the outline (B,) for each value of a parameter."""
+        changed = self._changed(cloth, column, values)
+        return np.array([self.error(vertices) for vertices in self.model.drapes(self.pose, changed, self.past)])
+
+    def draped(self, cloth: Cloth, column: int, value: float) -> Cloth:
+        """Return the garment with another value of a parameter."""
+        return self.model.drape(self.pose, self._changed(cloth, column, np.array([value]))[0], self.past)
+
+    def _changed(self, cloth: Cloth, column: int, values: F64) -> F64:
+        assert self.model.scene.garment is not None
+        return samples.replaced(self.model.scene.garment, cloth.parameters, [column], values[:, None])
+
+
+def taken_up(cloth: Cloth, trials: Trials, time: float) -> Cloth:
+    """Return the garment taken up as the outline says, not far from what it was the frame before."""
+    column, (low, high) = trials.parameter(TAKE_UP)
+    last = trials.past.moments[-1]
+    if len(trials.past.moments) == 1:
+        spread, tried = SPREAD, np.arange(low, high + STEP / 2, STEP)
+    else:
+        spread = SPREAD * math.sqrt(max(time - last.time, EVERY))
+        tried = np.clip(cloth.parameters[column], low + STEP, high - STEP) + STEP * np.array([-1.0, 0.0, 1.0])
+    moved = (tried - last.cloth.parameters[column]) / spread
+    return trials.draped(cloth, column, lowest(tried, trials.errors(cloth, column, tried) + moved**2))
+
+
+def thickened(cloth: Cloth, trials: Trials) -> Cloth:
+    """Return the garment as thick as the outlines of the frames from the second to this one say in the mean."""
+    column, (low, high) = trials.parameter(THICKNESS)
+    tried, frames = np.linspace(low, high, samples.THICKNESSES), len(trials.past.moments)
+    found = float(np.clip(lowest(tried, trials.errors(cloth, column, tried)), low, high))
+    before = trials.past.moments[-1].cloth.parameters[column] if frames > 1 else found
+    return trials.draped(cloth, column, before + (found - before) / frames)
 
 
 def lowest(places: F64, values: F64) -> float:

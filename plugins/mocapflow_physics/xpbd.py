@@ -34,7 +34,7 @@ class Xpbd(Draper):
     """
 
     name: ClassVar[str] = "xpbd"
-    skin_m: NonNegativeFloat = 0.005  # room between skin and cloth of no thickness
+    skin_m: NonNegativeFloat = 0.005  # room between skin and cloth
     rate_hz: Annotated[float, Field(ge=60)] = 1920.0  # steps of the solver per second
 
     @model_validator(mode="after")
@@ -61,7 +61,7 @@ class Xpbd(Draper):
             [pins_at(strands, chain) for chain in chains] + [pins_at(strands, chains[-1])] * resting,
             parts + [parts[-1]] * resting,
             fitting.fields.values,
-            self.skin_m + thickness(garment, parameters) / 2,
+            self.skin_m + thickness(garment, parameters),
             pull_of(strands, garment, parameters, chains[-1]),
             drawn_in(garment, remaining_length(garment, parameters)),
             EVERY,

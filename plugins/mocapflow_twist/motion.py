@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mocapflow.data import Past
-from mocapflow.geometry.sewing import TAKE_UP
+from mocapflow.geometry.sewing import TAKE_UP, THICKNESS
 from mocapflow.model import ClothedModel, moved
 from mocapflow.records import F64, Bool
 from mocapflow_twist.normal_equations import Equations
@@ -49,7 +49,7 @@ class ClothMotion:
         return Guess(pose, self.model.drape(pose, parameters, self.past))
 
     def within_bounds(self, equations: Equations, guess: Guess) -> Equations:
-        """Return the equations with cloth parameters held that stand at a bound and would leave it, and the take-up."""
+        """Return the equations with the slow cloth parameters held, and those at a bound that would leave it."""
         if not len(self.bounds):
             return equations
         low, high = self.bounds.T
@@ -67,7 +67,7 @@ class ClothMotion:
     def _slow(self) -> Bool:
         """Which cloth parameters (Q,) follow the recording, not the frame: a cloth fitter moves them."""
         assert self.model.scene.garment is not None
-        return np.array([name == TAKE_UP for name in self.model.scene.garment.parameter_names])
+        return np.array([name in (TAKE_UP, THICKNESS) for name in self.model.scene.garment.parameter_names])
 
     @property
     def bounds(self) -> F64:

@@ -11,7 +11,7 @@ from mocapflow_draping.sampled_forces import SampledForces
 from mocapflow_draping.take_up import TakeUp, lowest
 from mocapflow_twist.gauss_newton import GaussNewton, Task
 
-from mocapflow.data import Estimate, Frame, Moment, Past, Pose, Segmentation, Silhouette, Turn
+from mocapflow.data import REMEMBERED, Estimate, Frame, Moment, Past, Pose, Segmentation, Silhouette, Turn
 from mocapflow.geometry.misfit import misfit, unclipped
 from mocapflow.geometry.sewing import THICKNESS
 from mocapflow.geometry.silhouettes import model_distance
@@ -54,7 +54,7 @@ def fitted(fitter, model, truth, start, past=None, time=0.0):
 def later(model):
     """Return what a frame after the first ones knows."""
     calm = model.drape(STANDING, parameters(model), Past())
-    return Past(moments=tuple(Moment(time=index / 30, pose=STANDING, cloth=calm) for index in range(2)))
+    return Past(moments=tuple(Moment(time=index / 30, pose=STANDING, cloth=calm) for index in range(REMEMBERED)))
 
 
 @pytest.fixture(params=[SampledForces(), GaussNewton()], ids=lambda fitter: fitter.name)
@@ -98,6 +98,19 @@ def test_thickness_is_measured_in_the_first_frame_and_kept(model):
     thickness = model.scene.garment.parameter_names.index("thickness_m")
     assert abs(fitted(SampledForces(), model, truth, nothing).parameters[thickness] - 0.006) <= 0.002
     assert fitted(SampledForces(), model, truth, nothing, later(model)).parameters[thickness] == 0
+
+
+def test_the_take_up_fitter_measures_the_thickness_in_the_first_frames_but_the_very_first(model):
+    """T-CL7: the mean of both, and kept from then on."""
+    column, past = model.scene.garment.parameter_names.index("thickness_m"), Past()
+    found, thick = parameters(model), []
+    for index, truth in enumerate([0.006, 0.008, 0.004, 0.0]):
+        cloth = fitted(TakeUp(), model, parameters(model, thickness_m=truth), found, past, index / 30)
+        past, found = past.after(Moment(time=index / 30, pose=STANDING, cloth=cloth), {}), cloth.parameters
+        thick.append(found[column])
+    assert thick[0] == 0
+    assert abs(thick[1] - 0.008) < 0.001 and abs(thick[2] - 0.006) < 0.001
+    assert thick[3] == thick[2]
 
 
 def test_later_frames_follow_a_force_step_by_step(fitter, model):

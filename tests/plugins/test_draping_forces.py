@@ -174,15 +174,15 @@ def test_winds_of_one_drape_are_its_winds_one_by_one(draper):
     assert np.linalg.norm(together - alone, axis=-1).max() < 1e-3
 
 
-def test_the_silhouette_grows_with_the_thickness(draper):
-    """T-CL7: by half of it on either side, for the middle of the cloth is drawn. The true thickness alone fits."""
+def test_the_silhouette_grows_by_the_thickness_on_either_side(draper):
+    """T-CL7: so of silhouettes of thin and thick cloth the true thickness alone fits, and others fit the less."""
     scene, amounts = skirted(), np.linspace(0, 0.010, 6)
     thick = np.concatenate([parameters(scene.garment, thickness_m=h) for h in (*amounts, 0.006)])
     poses = PoseBatch(root=np.tile(np.eye(4), (len(thick), 1, 1)), angles=np.zeros((len(thick), 4)))
     drapes = draper.drape(poses, thick, Past(), scene)
     *tried, seen = [from_the_front(scene, Cloth(vertices=v, parameters=p)) for v, p in zip(drapes, thick, strict=True)]
     hem = [np.flatnonzero(mask[650]) for mask in tried]
-    assert np.ptp(hem[-1]) - np.ptp(hem[0]) == pytest.approx(10, abs=2)
+    assert np.ptp(hem[-1]) - np.ptp(hem[0]) == pytest.approx(20, abs=2)
     off = np.array([np.count_nonzero(mask != seen) for mask in tried])
     assert off.argmin() == 3 and off[3] == 0
     assert (np.diff(off[:4]) < 0).all() and (np.diff(off[3:]) > 0).all()
@@ -193,7 +193,7 @@ def test_thick_cloth_keeps_farther_from_the_skin(draper):
     thick = draper.drape(standing(), parameters(scene.garment, thickness_m=0.010), Past(), scene)
     free = np.setdiff1d(np.arange(thick.shape[1]), scene.garment.pinned)
     nearest = distances(scene.body, thick[:, free], standing()).min()
-    assert nearest == pytest.approx(draper.skin_m + 0.010 / 2, abs=4e-4)  # half of it lies on either side
+    assert nearest == pytest.approx(draper.skin_m + 0.010, abs=4e-4)
     two = np.repeat(parameters(scene.garment, thickness_m=0.003), 2, axis=0)
     np.testing.assert_array_equal(thickness(scene.garment, two), [0.003, 0.003])
 

@@ -141,11 +141,10 @@ def test_forces_that_nothing_shows_go_to_calm_and_are_as_unsure_as_stated() -> N
     assert np.sqrt(np.diag(estimate.covariance))[18:] == pytest.approx(0.06 * np.array([2.0, 0.5]))  # of the ranges
 
 
-def test_the_take_up_is_left_to_the_cloth_fitter() -> None:
+@pytest.mark.parametrize("slow", ["take_up", "thickness_m"])
+def test_what_follows_the_recording_is_left_to_the_cloth_fitter(slow: str) -> None:
     truth, given = make_pose(0), np.array([0.2, 0.3])
-    folding = replace(
-        MODEL, scene=replace(MODEL.scene, garment=replace(garment(), parameter_names=("lean", "take_up")))
-    )
+    folding = replace(MODEL, scene=replace(MODEL.scene, garment=replace(garment(), parameter_names=("lean", slow))))
     matches, state = make_matches(truth, given, np.arange(COUNT)), clothed_state(truth, np.array([0.1, 0.1]))
     solver = TwistGaussNewton(**{**EXACT, "cloth_sd": 1e6, "cloth_unknowns": True})
     estimate = solver.solve(lambda _: matches, state, folding, [], Past(), TURN)
