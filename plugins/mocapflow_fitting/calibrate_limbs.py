@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -31,6 +32,7 @@ from mocapflow_fitting.pose_fit import Solution, Spreads
 from mocapflow_fitting.proportions import Proportion, fitted, modes_of, scaled
 from mocapflow_fitting.silhouette_fit import refine
 
+LOG = logging.getLogger("mocapflow")
 # near the solution matchers reach less far and give up what is off
 AT_REST = Change(body=0.0, cloth=0.0, angles=0.0, sigmas=0.0)
 
@@ -78,14 +80,15 @@ class CalibrateLimbs(Stage):
         indices, poses, clothes = self._from_track(track) if track else self._from_keypoints(recording, scene)
         body = scene.body
         modes = modes_of(body) if self.shape else ()
+        if self.shape and not modes:
+            LOG.warning("shape: this body does not know how people differ, so only its proportions are fitted")
         spreads: Spreads = dict.fromkeys(self.proportions, self.spread) | dict.fromkeys(modes, 1.0)
         share = self.independent / len(indices)  # contours err alike in all frames: more of them tell no more
         solution = Solution(np.zeros(len(spreads)), tuple(poses))
         for done in range(self.passes):
             model = self._model(scene, scaled(body, solution.factors(spreads)))
-            views = self._segmented(
-                _in_pass(done, self.passes, recording), checks, model, indices, solution.poses, clothes
-            )
+            part = _in_pass(done, self.passes, recording)
+            views = self._segmented(part, checks, model, indices, solution.poses, clothes)
             turn = Turn(index=done, change=AT_REST if done else None)
             matchers = [partial(self._match, scene, *view, turn) for view in views]
             solution = refine(body, matchers, solution, scene.cameras, spreads, share, self.rounds)

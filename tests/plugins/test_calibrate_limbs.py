@@ -118,6 +118,17 @@ def test_clothes_are_laid_on_every_pose_that_is_tried(body, poses, tmp_path):
         assert abs(length(fitted, *ends) - length(body, *ends)) < 0.006  # m: half a pixel, half of what was wrong
 
 
+def test_a_body_without_modes_is_told_of(body, poses, monkeypatch, caplog):
+    monkeypatch.setattr("mocapflow_fitting.calibrate_limbs.refine", lambda body, matchers, solution, *_: solution)
+    recording, scan = open_recording(DEMO, stop=1), replace(body, shape_modes=None, joint_modes=None)
+    track = make_track(np.stack([p.root for p in poses[:1]]), np.stack([p.angles for p in poses[:1]]))
+    for shape in (False, True):
+        assert "does not know how people differ" not in caplog.text
+        stage = CalibrateLimbs(segmenter=masks_of(body, poses), matchers=(ContourIcp(),), shape=shape, passes=1)
+        stage.run(recording, Scene(cameras=recording.cameras, body=scan), None, track)
+    assert "does not know how people differ" in caplog.text
+
+
 def test_views_that_were_found_wrong_do_not_count(body, poses):
     seen = []
 
