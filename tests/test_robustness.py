@@ -79,9 +79,13 @@ def test_legs_that_nobody_sees_do_not_jump_and_are_found_where_they_are(tmp_path
 
 @pytest.mark.long
 def test_a_forearm_behind_a_stripe_is_not_drawn_to_the_arm_before_it(tmp_path):
-    """T-EXP5."""
-    errors, _, _ = tracked(tmp_path / "run", "disturbed.yaml", "--frames", "0:12", names=ELBOWS)
-    assert errors.max() < 15  # it left by 100
+    """T-EXP5. How far an elbow is off in the worst of twelve frames is chance: 3 to 15 degrees over five seeds."""
+    worst = []
+    for seed in range(3):
+        changed = ("--frames", "0:12", "--set", f"stages.corrupt.seed={seed}")
+        errors, _, _ = tracked(tmp_path / str(seed), "disturbed.yaml", *changed, names=ELBOWS)
+        worst.append(errors.max())
+    assert np.median(worst) < 8  # it left by 100
 
 
 @pytest.mark.long

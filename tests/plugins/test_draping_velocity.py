@@ -30,8 +30,10 @@ def test_velocities_are_the_slopes_of_the_drape(clothed, sweeps, monkeypatch):
     monkeypatch.setattr(differences, "ANGLE_STEP", 1e-5)
     monkeypatch.setattr(differences, "PARAMETER_STEP", 1e-5)
     draper, poses, garment = Kinematic(skin_m=SKIN, sweeps=sweeps), leg_poses(), clothed.garment
+    parameters = 0.1 * garment.parameter_bounds[:, 1]
+    parameters[garment.parameter_names.index("thickness_m")] /= 2  # at 1 mm one drape jumps within the difference
     for root, angles in zip(poses.root, poses.angles, strict=True):
-        pose, parameters = Pose(root=root, angles=angles + 0.01), 0.1 * garment.parameter_bounds[:, 1]
+        pose = Pose(root=root, angles=angles + 0.01)
         asked = pose, parameters, np.arange(len(garment.vertices)), Past(), clothed
         rates, measured = draper.velocity(*asked), Draper.velocity(draper, *asked)
         off = np.linalg.norm(rates - measured, axis=1)
