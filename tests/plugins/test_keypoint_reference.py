@@ -33,7 +33,7 @@ def track() -> Track:
 
 @pytest.fixture(scope="module")
 def recording(track: Track, tmp_path_factory: pytest.TempPathFactory) -> Recording:
-    """Return a recording whose second camera has turned by a third of a degree since it was calibrated, beside a bystander."""
+    """Return a recording whose second camera has turned by a third of a degree since, beside a bystander."""
     folder = copy_demo(tmp_path_factory.mktemp("turned") / "recording")
     cameras = seen_by(open_recording(folder))
     write(folder, BODY, [track.pose(t) for t in range(FRAMES)], cameras, noise_px=0.0)
