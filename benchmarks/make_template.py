@@ -21,7 +21,6 @@ from mocapflow.records import F64, I32
 
 PEOPLE, MODES = 1000, 8
 SKIN = np.delete(np.arange(13_380), np.r_[1778:1794, 8450:8466])  # vertices of MakeHuman's mesh that the template has
-AGES = ("young", "old")
 # MakeHuman's scales: how each is spread among the people, and the words of its targets from 0 to 1; None: no target.
 SCALES = {
     "muscle": ((0.5, 0.15), ("minmuscle", "averagemuscle", "maxmuscle")),
@@ -65,9 +64,9 @@ def main(folder: Path) -> None:
 
 def people(folder: Path, chance: Generator) -> Iterator[F64]:
     """Yield the meshes (V, 3) m of made-up adults, a woman and a man in turn: z up, facing -y, as MakeHuman stands."""
-    files = [p for p in (folder / "targets" / "macrodetails").rglob("*.target.gz")]
+    files = sorted((folder / "targets" / "macrodetails").rglob("*.target.gz"))
     words = {file: set(file.name.removesuffix(".target.gz").split("-")) - {"universal"} for file in files}
-    adult = sorted(file for file in files if not words[file] & {"baby", "child"})
+    adult = [file for file in files if not words[file] & {"baby", "child"}]
     base, targets = turned(base_mesh(folder)[0]), np.stack([turned(target(file)) for file in adult])
     for number in range(PEOPLE):
         share = person("male" if number % 2 else "female", chance)
