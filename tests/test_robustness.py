@@ -85,7 +85,7 @@ def test_a_forearm_behind_a_stripe_is_not_drawn_to_the_arm_before_it(tmp_path):
         changed = ("--frames", "0:12", "--set", f"stages.corrupt.seed={seed}")
         errors, _, _ = tracked(tmp_path / str(seed), "disturbed.yaml", *changed, names=ELBOWS)
         worst.append(errors.max())
-    assert np.median(worst) < 8  # it left by 100
+    assert np.median(worst) < 8 and max(worst) < 20  # it left by 100
 
 
 @pytest.mark.long
