@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import gzip
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -45,8 +45,9 @@ def main(folder: Path) -> None:
     with np.load(FILE) as content:
         kept = {name: content[name] for name in ("faces", "names", "parents", "skin_joint", "skin_weight")}
     names = tuple(str(name) for name in kept["names"])
-    meshes = np.stack(list(people(folder, default_rng(0))))
-    centres = joint_centres(meshes, folder, names)
+    base, groups = base_mesh(folder)
+    meshes = base + np.stack(list(people(folder, default_rng(0))))
+    centres = joint_centres(meshes, groups, names)
     meshes = meshes[:, SKIN]
     ground = np.stack([np.zeros(len(meshes)), centres[:, 0, 1], meshes[..., 2].min(axis=1)], axis=1)[:, None]
     both = np.concatenate([meshes - ground, centres - ground], axis=1)
@@ -63,14 +64,14 @@ def main(folder: Path) -> None:
 
 
 def people(folder: Path, chance: Generator) -> Iterator[F64]:
-    """Yield the meshes (V, 3) m of made-up adults, a woman and a man in turn: z up, facing -y, as MakeHuman stands."""
+    """Yield how far (V, 3) m the meshes of made-up adults are off MakeHuman's, a woman and a man in turn."""
     files = sorted((folder / "targets" / "macrodetails").rglob("*.target.gz"))
     words = {file: set(file.name.removesuffix(".target.gz").split("-")) - {"universal"} for file in files}
     adult = [file for file in files if not words[file] & {"baby", "child"}]
-    base, targets = turned(base_mesh(folder)[0]), np.stack([turned(target(file)) for file in adult])
+    targets = np.stack([turned(target(file)) for file in adult])
     for number in range(PEOPLE):
         share = person("male" if number % 2 else "female", chance)
-        yield base + np.tensordot([np.prod([share.get(word, 0.0) for word in words[f]]) for f in adult], targets, 1)
+        yield np.tensordot([np.prod([share.get(word, 0.0) for word in words[f]]) for f in adult], targets, 1)
 
 
 def person(sex: str, chance: Generator) -> dict[str, float]:
@@ -86,7 +87,7 @@ def person(sex: str, chance: Generator) -> dict[str, float]:
 
 
 def base_mesh(folder: Path) -> tuple[F64, dict[str, set[int]]]:
-    """Return the vertices (V, 3) of MakeHuman's mesh and those of each of its groups."""
+    """Return the vertices (V, 3) m of MakeHuman's mesh, z up and facing -y, and those of each of its groups."""
     vertices: list[list[float]] = []
     groups: dict[str, set[int]] = {}
     for line in (folder / "3dobjs" / "base.obj").read_text().splitlines():
@@ -97,7 +98,7 @@ def base_mesh(folder: Path) -> tuple[F64, dict[str, set[int]]]:
             group = groups.setdefault(rest[0], set())
         elif kind == "f":
             group.update(int(corner.split("/")[0]) - 1 for corner in rest)
-    return np.array(vertices), groups
+    return turned(np.array(vertices)), groups
 
 
 def target(file: Path) -> F64:
@@ -116,9 +117,8 @@ def turned(vertices: F64) -> F64:
     return 0.1 * np.stack([vertices[:, 0], -vertices[:, 2], vertices[:, 1]], axis=1)
 
 
-def joint_centres(meshes: F64, folder: Path, names: Sequence[str]) -> F64:
+def joint_centres(meshes: F64, groups: Mapping[str, set[int]], names: Sequence[str]) -> F64:
     """Return the joints (N, J, 3) m, hips and knees where people have their centres of rotation."""
-    groups = base_mesh(folder)[1]
 
     def centre(name: str) -> F64:
         side = name[-1] if name.endswith(("_l", "_r")) else ""

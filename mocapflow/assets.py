@@ -59,7 +59,8 @@ class Body:
         """Refuse what points beyond the body: kernels look up unchecked.
 
         Raises:
-            ShapeError: an index is not that of a vertex, joint or screw, or joints or screws are out of order.
+            ShapeError: an index is not that of a vertex, joint or screw, joints or screws are out of order, or modes
+                lack those of the joints.
         """
         if (odd := stray(self.faces, len(self.vertices))) is not None:
             raise ShapeError(f"Body: a face names vertex {odd} of {len(self.vertices)}")
@@ -73,6 +74,8 @@ class Body:
         start, stop = self.morph_range
         if self.morph_offset is not None and (start == stop or not 0 <= self.morph_screw < len(self.twists)):
             raise ShapeError("Body: its morph is driven by no angle, or over no range")
+        if (self.shape_modes is None) != (self.joint_modes is None):
+            raise ShapeError("Body: modes of its shape move the joints, too: give both or none")
 
     @cached_property
     def main_joint(self) -> I32:

@@ -75,6 +75,8 @@ def test_impure_steps_are_found():
         (lambda body: {"screw_joint": body.screw_joint[::-1].copy()}, "parents have to stand before"),
         (lambda body: {"morph_offset": body.vertices, "morph_screw": -1, "morph_range": (0.0, 1.0)}, "its morph"),
         (lambda body: {"morph_offset": body.vertices, "morph_screw": 0, "morph_range": (1.0, 1.0)}, "its morph"),
+        (lambda body: {"shape_modes": body.vertices[None]}, "modes of its shape move the joints"),
+        (lambda body: {"joint_modes": body.positions[None]}, "modes of its shape move the joints"),
     ],
 )
 def test_a_body_that_contradicts_itself_is_refused_when_it_is_made(change, said):

@@ -55,7 +55,8 @@ def _carrying(body: Body, vertices: F64, carriers: I32) -> Body:
     weight = np.zeros((len(vertices), body.skin_weight.shape[1]))
     weight[:, 0] = 1.0
     return replace(
-        body, vertices=vertices, faces=np.empty((0, 3), np.int32), morph_offset=None, shape_modes=None,
+        body, vertices=vertices, faces=np.empty((0, 3), np.int32),
+        morph_offset=None, shape_modes=None, joint_modes=None,
         skin_joint=np.repeat(carriers[:, None], weight.shape[1], axis=1), skin_weight=weight,
         cut=np.zeros(len(vertices), bool),
     )  # fmt: skip

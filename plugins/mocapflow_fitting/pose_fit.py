@@ -22,7 +22,8 @@ ENOUGH = 1e-6  # share of the cost below which a gain is none
 NEAREST = 0.1  # m, depth below which a projection is not believed
 STEP = 1e-4  # of a log proportion, for differences
 
-Spreads = Mapping[str, float]  # proportions to fit, with the standard deviation of their logarithm about zero
+# What is fitted, with its standard deviation about zero: logarithms of proportions, deviations along modes of a shape.
+Spreads = Mapping[str, float]
 
 
 class Observed(NamedTuple):
@@ -42,7 +43,7 @@ class View(NamedTuple):
 
 
 class Solution(NamedTuple):
-    """Shared log proportions (P,) and the pose of each moment."""
+    """Shared log proportions and deviations of the shape (P,), and the pose of each moment."""
 
     logs: F64
     poses: tuple[Pose, ...]

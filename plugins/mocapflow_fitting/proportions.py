@@ -74,10 +74,9 @@ def modes_of(body: Body) -> tuple[str, ...]:
 
 def _shaped(body: Body, factors: Mapping[str, float]) -> Body:
     """Return a body moved along its modes; it has none any more."""
-    plain = replace(body, shape_modes=None, joint_modes=None)
-    if body.shape_modes is None or body.joint_modes is None:
+    plain, by = replace(body, shape_modes=None, joint_modes=None), [factors.get(name, 0.0) for name in modes_of(body)]
+    if body.shape_modes is None or body.joint_modes is None or not any(by):
         return plain
-    by = np.array([factors.get(name, 0.0) for name in modes_of(body)])
     vertices, positions = (np.tensordot(by, modes, 1) for modes in (body.shape_modes, body.joint_modes))
     return _moved(plain, body.vertices + vertices, body.positions + positions)
 

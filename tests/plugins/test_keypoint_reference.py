@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from keypoint_recording import copy_demo, template, write
+from keypoint_recording import DEMO, copy_demo, write
+from mocapflow_bodies.template import Template
 from mocapflow_evaluation.evaluate import Evaluate
 from mocapflow_evaluation.keypoint_reference import low_pass
 from mocapflow_fitting.align_cameras import turn
@@ -22,7 +23,7 @@ from mocapflow.results import Evaluation, RunFolder, Track, ViewChecks
 from mocapflow.scene import Scene
 
 FRAMES = 16  # a little more than the filter needs
-BODY = template()
+BODY = Template(height_m=1.72).load(DEMO)
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +34,7 @@ def track() -> Track:
 
 @pytest.fixture(scope="module")
 def recording(track: Track, tmp_path_factory: pytest.TempPathFactory) -> Recording:
-    """Return a recording whose second camera has turned by a third of a degree since, beside a bystander."""
+    """Return a recording whose second camera has turned by a degree since it was calibrated, beside a bystander."""
     folder = copy_demo(tmp_path_factory.mktemp("turned") / "recording")
     cameras = seen_by(open_recording(folder))
     write(folder, BODY, [track.pose(t) for t in range(FRAMES)], cameras, noise_px=0.0)
@@ -42,7 +43,7 @@ def recording(track: Track, tmp_path_factory: pytest.TempPathFactory) -> Recordi
 
 def seen_by(recording: Recording):
     turns = np.zeros((4, 3))
-    turns[1] = np.radians([0.1, 0.3, 0.07])
+    turns[1] = np.radians([0.3, 0.9, 0.2])
     return turn(recording.cameras, turns)
 
 
