@@ -17,6 +17,8 @@ from mocapflow.results import Track, values_of
 from mocapflow.series import overwritten
 
 AGAIN = "fitted again from between its neighbours"
+AGAIN_AT_END = "fitted again from where its neighbours lead"
+LEAST_FRAMES = 3  # of a track, for one to lie between two others
 KEPT = ("frame", "time", "usable", "doubted", "seconds", "raw_root", "raw_angles")  # of the first fit
 
 
@@ -52,16 +54,26 @@ class Fits:
     def leaps(self) -> F64:
         """Return how far (T,) m a joint of each frame is from between where it is before and after, at most.
 
-        0 where the frame or one of its neighbours is lost, and at the ends.
+        0 where the frame or one of its neighbours is lost. The first and the last frame leap as the one beside them
+        does: either of the two may be wrong.
         """
-        far, known = np.zeros(len(self._centres)), ~self.before.lost
+        known, centres = ~self.before.lost, self._centres
+        if len(centres) < LEAST_FRAMES:
+            return np.zeros(len(centres))
         sure = known[:-2] & known[1:-1] & known[2:]
-        far[1:-1] = sure * np.linalg.norm(self._centres[1:-1] - self._between(), axis=2).max(axis=1, initial=0)
-        return far
+        off = _off(centres[:-2], centres[1:-1], centres[2:], self._later()[:, None, None])
+        return np.pad(sure * np.linalg.norm(off, axis=2).max(axis=1, initial=0), 1, mode="edge")
 
     def leap(self, row: int, pose: Pose) -> float:
-        """Return how far (m) the joints of an inner row would be from between those before and after, RMS."""
-        off = self._joints(pose) - self._between()[row - 1]
+        """Return how far (m) joints would be from between those before and after, RMS, if a row had a pose.
+
+        The joints are those of the row, or of the frame beside it if it is the first or the last.
+        """
+        inner = min(max(row, 1), len(self._centres) - 2)
+        three = self._centres[inner - 1 : inner + 2].copy()
+        three[row - inner + 1] = self._joints(pose)
+        before, here, after = three
+        off = _off(before, here, after, self._later()[inner - 1])
         return float(np.sqrt(np.mean(np.sum(off**2, axis=1))))
 
     def apart(self, row: int, pose: Pose) -> float:
@@ -69,9 +81,15 @@ class Fits:
         return float(np.linalg.norm(self._joints(pose) - self._centres[row], axis=1).max())
 
     def between(self, row: int) -> Pose:
-        """Return the pose between the frames before and after a row."""
-        before, after = self.pose(row - 1), self.pose(row + 1)
-        return moved(before, self._later()[row - 1] * increment_between(before, after))
+        """Return the pose between the frames before and after a row; at an end, where the next two lead."""
+        end, time = {0: (1, 2), len(self._centres) - 1: (row - 1, row - 2)}, self.before.time
+        one, other = end.get(row, (row - 1, row + 1))
+        share = (time[row] - time[one]) / (time[other] - time[one])
+        return moved(self.pose(one), share * increment_between(self.pose(one), self.pose(other)))
+
+    def beside(self, row: int) -> list[int]:
+        """Return the rows before and after a row, of those that the track has."""
+        return [other for other in (row - 1, row + 1) if 0 <= other < len(self._centres)]
 
     def past(self, row: int, appearance: Mapping[str, F64]) -> Past:
         """Return what a frame may know of those before it."""
@@ -94,18 +112,14 @@ class Fits:
             for name in array_fields(Track)
             if name not in KEPT
         }
-        notes = sorted([*track.notes, *(f"frame {track.frame[row]}: {AGAIN}" for row in found)], key=_frame_of)
+        again = {row: AGAIN if len(self.beside(row)) == 2 else AGAIN_AT_END for row in found}
+        notes = sorted([*track.notes, *(f"frame {track.frame[row]}: {again[row]}" for row in found)], key=_frame_of)
         return replace(track, notes=tuple(notes), **changes)
 
     def _later(self) -> F64:
         """Return how far (T - 2,) on the way from the frame before to the one after each inner frame lies, 0 to 1."""
         time = self.before.time
         return np.asarray((time[1:-1] - time[:-2]) / (time[2:] - time[:-2]))
-
-    def _between(self) -> F64:
-        """Return where the joints of the inner frames (T - 2, J, 3) m are between those before and after."""
-        later = self._later()[:, None, None]
-        return np.asarray((1 - later) * self._centres[:-2] + later * self._centres[2:])
 
     def _joints(self, pose: Pose) -> F64:
         centres: F64 = kinematics.joint_centres(self._body, pose.root[None], pose.angles[None])[0]
@@ -115,6 +129,11 @@ class Fits:
         track, other = self.before, self._found.get(row)
         observed = other["observed"] if other else track.observed[row].copy()
         return Moment(time=float(track.time[row]), pose=self.pose(row), cloth=self.cloth(row), observed=observed)
+
+
+def _off(before: F64, here: F64, after: F64, later: F64) -> F64:
+    """Return how far (…, J, 3) m joints are from between two frames, `later` (0 to 1) on the way to the second."""
+    return np.asarray(here - ((1 - later) * before + later * after))
 
 
 def _frame_of(note: str) -> int:

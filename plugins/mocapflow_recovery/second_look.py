@@ -37,7 +37,8 @@ class SecondLook(Stage):
     A track knows only what came before. Where a limb has moved too far from one frame to the next, the fit may end
     beside it, and a frame later, begun elsewhere, lie on it again. Both neighbours together say better where the limb
     was: the frame begins between them and is settled like any other. Of the two fits that one is kept which the
-    pictures like better and which leaps less; where the person has leapt, both are the same.
+    pictures like better and which leaps less; where the person has leapt, both are the same. The first and the last
+    frame are looked at if the one beside them leaps; they begin where the next two lead.
 
     It goes from later frames to earlier ones: a limb that was lost for some frames is found in one leap, and from there
     each frame leads to the one before. What the pictures surely show is measured as in `limb_search`, by its settings
@@ -69,19 +70,33 @@ class SecondLook(Stage):
         return sight.fits.track()
 
     def _look(self, rows: I32, frames: Sequence[Frame], looked: Bool, sight: Hindsight) -> None:
-        """Fit again the rows of a window that leap, but the last; neighbours of one that changes are due again."""
-        fits, colours = sight.fits, None
-        for row, frame, after in reversed(list(zip(rows.tolist(), frames, frames[1:], strict=False))):
-            if looked[row] or not self._leaping(fits)[row]:
-                continue
-            colours = sight.colours(after, row + 1) if colours is None else colours
-            past = fits.past(row, colours)
-            result = sight.settled(frame, row, past, fits.between(row))
-            looked[row] = True
-            same = fits.apart(row, result.state.estimate.pose) < OTHER_MM / 1000
-            if not same and self._preferred(result, row, fits, sight.strays(frame, row, past, result)):
-                fits.take(row, frame, result)
-                looked[[row - 1, row + 1]] = fits.other(row - 1), fits.other(row + 1)
+        """Fit again the rows of a window that leap; neighbours of one that changes are due again.
+
+        The last row shows the colours for those before it. Only the end of the track is fitted again itself, at last.
+        """
+        shown, colours = dict(zip(rows.tolist(), frames, strict=True)), None
+        *inner, last = shown
+        for row in reversed(inner):
+            if self._due(row, looked, sight):
+                colours = sight.colours(shown[row + 1], row + 1) if colours is None else colours
+                self._fit_again(row, shown[row], colours, looked, sight)
+        if last + 1 == len(looked) and self._due(last, looked, sight):
+            colours = sight.colours(shown[last - 1], last - 1)
+            self._fit_again(last, shown[last], colours, looked, sight)
+
+    def _due(self, row: int, looked: Bool, sight: Hindsight) -> bool:
+        return not looked[row] and bool(self._leaping(sight.fits)[row])
+
+    def _fit_again(self, row: int, frame: Frame, colours: Mapping[str, F64], looked: Bool, sight: Hindsight) -> None:
+        """Let the better of two fits of a row stand."""
+        fits, past = sight.fits, sight.fits.past(row, colours)
+        result = sight.settled(frame, row, past, fits.between(row))
+        looked[row] = True
+        same = fits.apart(row, result.state.estimate.pose) < OTHER_MM / 1000
+        if not same and self._preferred(result, row, fits, sight.strays(frame, row, past, result)):
+            fits.take(row, frame, result)
+            beside = fits.beside(row)
+            looked[beside] = [fits.other(other) for other in beside]
 
     def _leaping(self, fits: Fits) -> Bool:
         return np.asarray(fits.leaps() > self.leap_mm / 1000)

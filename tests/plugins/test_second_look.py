@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -113,6 +114,24 @@ def test_a_limb_that_was_lost_for_some_frames_is_followed_back(looked):
     np.testing.assert_array_equal(again.angles, TRUE.angles)
     indices = [index for index, *_ in looked]
     assert set(rows) <= set(indices) and len(indices) < 2 * len(rows)
+
+
+@pytest.mark.parametrize(
+    ("end", "lead"), [(0, (1, 2)), (len(TRUE.frame) - 1, (len(TRUE.frame) - 2, len(TRUE.frame) - 3))]
+)
+def test_an_end_begins_where_the_next_two_frames_lead(looked, end, lead):
+    again = second_look(astray(end))
+    np.testing.assert_array_equal(again.angles, TRUE.angles)
+    *_, start = (pose for index, _, pose in looked if index == end)  # it may have shown colours before
+    near, far = TRUE.angles[list(lead), KNEE]
+    assert abs(start.angles[KNEE] - (2 * near - far)) < 1e-12
+    assert f"frame {end}: fitted again from where its neighbours lead" in again.notes
+
+
+def test_of_two_frames_none_leaps():
+    track = astray(0)
+    two = SimpleNamespace(root=track.root[:2], angles=track.angles[:2], lost=np.zeros(2, bool))
+    assert Fits(two, SCENE.body).leaps().tolist() == [0.0, 0.0]
 
 
 def test_a_smooth_track_stays_as_it_is_and_no_picture_is_read(looked, monkeypatch):
