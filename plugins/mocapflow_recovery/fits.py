@@ -17,7 +17,7 @@ from mocapflow.results import Track, values_of
 from mocapflow.series import overwritten
 
 AGAIN = "fitted again from between its neighbours"
-AGAIN_AT_END = "fitted again from where its neighbours lead"
+AGAIN_AT_END = "fitted again, for the frame beside it leaps"
 LEAST_FRAMES = 3  # of a track, for one to lie between two others
 KEPT = ("frame", "time", "usable", "doubted", "seconds", "raw_root", "raw_angles")  # of the first fit
 
@@ -81,9 +81,8 @@ class Fits:
         return float(np.linalg.norm(self._joints(pose) - self._centres[row], axis=1).max())
 
     def between(self, row: int) -> Pose:
-        """Return the pose between the frames before and after a row; at an end, where the next two lead."""
-        end, time = {0: (1, 2), len(self._centres) - 1: (row - 1, row - 2)}, self.before.time
-        one, other = end.get(row, (row - 1, row + 1))
+        """Return the pose between the frames before and after a row; of the first, where the next two lead back."""
+        (one, other), time = (row - 1, row + 1) if row else (1, 2), self.before.time
         share = (time[row] - time[one]) / (time[other] - time[one])
         return moved(self.pose(one), share * increment_between(self.pose(one), self.pose(other)))
 

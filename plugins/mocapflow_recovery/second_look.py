@@ -13,6 +13,7 @@ from mocapflow.assets import Background
 from mocapflow.components import Stage
 from mocapflow.data import Frame, FrameResult, Past, Pose
 from mocapflow.functional import image_cost
+from mocapflow.guards.answers import pose_of
 from mocapflow.model import ClothedModel
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64, I32, Bool
@@ -38,7 +39,8 @@ class SecondLook(Stage):
     beside it, and a frame later, begun elsewhere, lie on it again. Both neighbours together say better where the limb
     was: the frame begins between them and is settled like any other. Of the two fits that one is kept which the
     pictures like better and which leaps less; where the person has leapt, both are the same. The first and the last
-    frame are looked at if the one beside them leaps; they begin where the next two lead.
+    frame are looked at if the one beside them leaps: the first begins where the next two lead back, the last where it
+    is predicted from those before it.
 
     It goes from later frames to earlier ones: a limb that was lost for some frames is found in one leap, and from there
     each frame leads to the one before. What the pictures surely show is measured as in `limb_search`, by its settings
@@ -90,7 +92,8 @@ class SecondLook(Stage):
     def _fit_again(self, row: int, frame: Frame, colours: Mapping[str, F64], looked: Bool, sight: Hindsight) -> None:
         """Let the better of two fits of a row stand."""
         fits, past = sight.fits, sight.fits.past(row, colours)
-        result = sight.settled(frame, row, past, fits.between(row))
+        begin = fits.between(row) if row + 1 < len(looked) else sight.predicted(frame, past)
+        result = sight.settled(frame, row, past, begin)
         looked[row] = True
         same = fits.apart(row, result.state.estimate.pose) < OTHER_MM / 1000
         if not same and self._preferred(result, row, fits, sight.strays(frame, row, past, result)):
@@ -120,6 +123,10 @@ class Hindsight(NamedTuple):
     def settled(self, frame: Frame, row: int, past: Past, begin: Pose) -> FrameResult:
         """Return what the loop makes of a frame from a pose."""
         return self.loop.settled(frame, past, self.model, begin, self.fits.cloth(row).parameters)
+
+    def predicted(self, frame: Frame, past: Past) -> Pose:
+        """Return where the loop would begin a frame."""
+        return pose_of(self.loop.predictor, frame, past, self.model.scene)
 
     def colours(self, frame: Frame, row: int) -> Mapping[str, F64]:
         """Return what a frame shows of the person's colours and of feet like the floor; a track does not keep it."""
