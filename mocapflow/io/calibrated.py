@@ -10,6 +10,7 @@ import numpy as np
 from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import twists
+from mocapflow.io.paths import composed
 from mocapflow.io.typed import place
 from mocapflow.records import F64
 
@@ -42,7 +43,7 @@ def make_camera(
         motion[:3, :3] = twists.exp(np.concatenate([vector, np.zeros(3)]))[:3, :3]
     coefficients = _coefficients(distortion, fisheye, name, where)
     return Camera(
-        name=name,
+        name=composed(name),
         size=_numbers(size, (2,), "size", name, where).astype(np.int32),
         intrinsics=_numbers(intrinsics, (3, 3), "matrix", name, where),
         distortion=np.pad(coefficients, (0, 5 - len(coefficients))),

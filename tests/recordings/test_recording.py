@@ -149,6 +149,22 @@ def test_two_videos_of_one_camera(tmp_path):
     assert "two videos of cam02: cam02, cam02.mp4" in refused(tmp_path)
 
 
+def test_names_of_files_with_the_dots_of_an_umlaut_apart(tmp_path):
+    """As macOS writes them."""
+    write_recording(tmp_path, frames=2)
+    (tmp_path / "cameras.toml").write_text((tmp_path / "cameras.toml").read_text().replace("cam02", "T\u00fcr"))
+    apart = "Tu\u0308r"
+    (tmp_path / "videos" / "cam02.mp4").rename(tmp_path / "videos" / f"{apart}.mp4")
+    for folder in (tmp_path / "background" / apart, tmp_path / "keypoints" / f"{apart}_json"):
+        folder.mkdir(parents=True)
+    (tmp_path / "recording.json").write_text(json.dumps({"late_frames": {apart: 1}}))
+    cv2.imwrite(str(tmp_path / "background" / apart / "0.png"), picture(0))
+    recording = open_recording(tmp_path)
+    assert [recording.lenses[1].name, recording.videos[1].late] == ["T\u00fcr", 1]
+    assert recording.keypoint_folders == (None, tmp_path / "keypoints" / f"{apart}_json", None)
+    assert f"background/{apart}/0.png" in recording.content
+
+
 def test_unequal_lengths(tmp_path):
     write_recording(tmp_path, frames=10, lengths={"cam03": 8})
     assert refused(tmp_path) == (
