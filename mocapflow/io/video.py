@@ -45,6 +45,7 @@ class Video:
     declared: int  # frames, as the file says; more than `frames` where it breaks off
     numbers: I32 = array("N", unit="frame number of each packet, in the order of the file; HIDDEN where none is shown")
     starts: I32 = array("N", unit="packet of the key frame from which each is decoded")
+    uneven: float = 0.0  # frames by which a picture's time is off an even rhythm of the numbers, at most
     first: int = 0  # number in the name of frame 0's image
     late: int = 0  # frames by which its pictures come after those of the other cameras
 

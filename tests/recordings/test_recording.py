@@ -4,13 +4,16 @@ import json
 import shutil
 import tracemalloc
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 
+import av
 import cv2
 import numpy as np
 import pytest
 
 from mocapflow.errors import RecordingError
+from mocapflow.io import rates
 from mocapflow.io.cameras import write_cameras
 from mocapflow.recordings.doctor import examine
 from mocapflow.recordings.recording import open_recording
@@ -341,6 +344,46 @@ def test_different_frame_rates(tmp_path):
     shutil.move(tmp_path / "videos", tmp_path / "static" / "videos")
     calibration = tmp_path / "cameras.toml"
     assert f"{tmp_path}/static/videos  {said}" in refused(tmp_path / "static", calibration=calibration)
+
+
+def test_a_stated_frame_rate_does_not_hide_that_the_videos_differ(tmp_path):
+    write_recording(tmp_path, frames=4)
+    write_video(tmp_path / "videos" / "cam02.mp4", 4, rate=50.0)
+    with (tmp_path / "cameras.toml").open("a") as file:
+        file.write("[metadata]\nframe_rate = 25\n")
+    (said,) = open_recording(tmp_path).warnings
+    assert said.startswith("the videos differ in frame rate (cam01: 25 per second, cam02: 50 per second, cam03: 25")
+
+
+@pytest.mark.parametrize(("rate", "apart"), [(25.1, ()), (25.2, ("0.3",))])
+def test_rates_that_are_nearly_one(tmp_path, monkeypatch, rate, apart):
+    monkeypatch.setattr(rates, "OFF", 0.3)
+    write_recording(tmp_path, frames=40)
+    write_video(tmp_path / "videos" / "cam02.mp4", 40, rate=rate)
+    found = open_recording(tmp_path)
+    assert found.frame_rate == 25
+    assert [said[:47] for said in found.warnings] == [f"at their end the videos are {n} frames apart (c" for n in apart]
+    assert len(examine(tmp_path)) >= len(apart)
+
+
+def test_a_frame_rate_that_varies(tmp_path):
+    write_recording(tmp_path, frames=60)
+    path = tmp_path / "videos" / "cam02.mp4"
+    times = [*range(0, 3000, 100), *range(3000, 3000 + 30 * 130, 130)]
+    with av.open(str(path), "w") as file:
+        stream = file.add_stream("mpeg4", rate=25, options={"bf": "0"})
+        stream.width, stream.height, stream.pix_fmt, stream.time_base = 64, 48, "yuv420p", Fraction(1, 2500)
+        stream.codec_context.time_base = stream.time_base
+        for number, time in enumerate(times):
+            frame = av.VideoFrame.from_ndarray(picture(number), "bgr24")
+            frame.pts = time
+            file.mux(stream.encode(frame))
+        file.mux(stream.encode(None))
+    with (tmp_path / "cameras.toml").open("a") as file:
+        file.write("[metadata]\nframe_rate = 25\n")
+    said = open_recording(tmp_path).warnings
+    assert said[0].startswith("cam02: its frame rate varies, which puts frames up to ")
+    assert said[0] in [finding.message for finding in examine(tmp_path)]
 
 
 def test_a_calibration_that_has_no_place_for_a_frame_rate(tmp_path):
