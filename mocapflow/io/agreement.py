@@ -12,13 +12,14 @@ from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.io.images import name_frames
 from mocapflow.io.lateness import TIMING
+from mocapflow.io.optics import check_focal_length, odd_lens
 from mocapflow.io.typed import place
 from mocapflow.io.video import Video
 
 CUT = 0.02  # share of the width or height that a video may lack against its calibration
 TURNED = (
     "the video is turned by a quarter, perhaps by a mark in the file that players heed and other\n"
-    "programs do not: calibrate with pictures that are turned the same way"
+    "programs do not: calibrate with pictures that are turned the same way; or size is not [width, height]"
 )
 RESIZED = "calibrate at the size of the video, or scale size and matrix of the calibration to it"
 
@@ -26,7 +27,13 @@ RESIZED = "calibrate at the size of the video, or scale size and matrix of the c
 def fit_sizes(
     cameras: Sequence[Camera], videos: Sequence[Video], calibration: Path
 ) -> tuple[tuple[Camera, ...], list[str]]:
-    """Return the cameras with the size of their videos; a slightly smaller video was cut at the right and bottom."""
+    """Return the cameras with the size of their videos, and what is odd about them.
+
+    A slightly smaller video was cut at the right and bottom.
+
+    Raises:
+        RecordingError: a video has another size than its calibration, or a focal length is not in pixels.
+    """
     lenses, warnings = [], []
     for camera, video in zip(cameras, videos, strict=True):
         size = np.array([video.width, video.height], np.int32)
@@ -37,7 +44,10 @@ def fit_sizes(
                 where = place(calibration, camera.name)
                 raise RecordingError(f"camera '{camera.name}': {sizes}", where=where, hint=hint)
             warnings.append(f"{camera.name}: {sizes}: taken as cut at the right and bottom")
-        lenses.append(replace(camera, size=size))
+        lens = replace(camera, size=size)
+        check_focal_length(lens, calibration)
+        warnings += odd_lens(lens)
+        lenses.append(lens)
     return tuple(lenses), warnings
 
 

@@ -14,6 +14,11 @@ from mocapflow.io.paths import composed
 from mocapflow.io.typed import place
 from mocapflow.records import F64
 
+FEWER = (
+    "write 2, 4 or 5 of them, in this order: k1 k2 p1 p2 k3; with more, calibrate again without OpenCV's\n"
+    "CALIB_RATIONAL_MODEL, CALIB_THIN_PRISM_MODEL and CALIB_TILTED_MODEL: the first 5 alone are no model"
+)
+
 
 def make_camera(
     name: str,
@@ -58,7 +63,7 @@ def _coefficients(distortion: Any, fisheye: bool, name: str, where: Path) -> F64
     known = 4 if fisheye else 5
     # three may be k1 k2 k3 or k1 k2 p1: OpenCV has no such list
     if found[known:].any() or (len(found) == 3 and found[2]):
-        hint = "a fisheye has 4: k1 k2 k3 k4" if fisheye else "write 2, 4 or 5 of them, in this order: k1 k2 p1 p2 k3"
+        hint = "a fisheye has 4: k1 k2 k3 k4" if fisheye else FEWER
         raise bad(name, where, f"has {len(found)} distortion coefficients", hint)
     return found[:known]
 

@@ -20,6 +20,7 @@ from mocapflow.io.lenses import View
 from mocapflow.io.occluders import occluder
 from mocapflow.io.plates import background
 from mocapflow.io.rates import common_rate
+from mocapflow.io.rigs import examine_rig
 from mocapflow.io.video import Video, count_from_first, open_video
 from mocapflow.records import F64, Watch, record, silent
 
@@ -178,6 +179,7 @@ def open_recording(
     agreement.check_lateness(cameras, videos, length, folder)
     rate, assumed = common_rate(cameras, videos, calibration)
     gaps = [*agreement.first_warnings(videos), *agreement.gap_warnings(cameras, videos)]
+    rig = [f"{found.message}: {found.hint}" for found in examine_rig(lenses) if found.severity != "note"]
     odd = folders.keypoint_warnings(folder, cameras, length, videos[0].first)
     _check_scale(scale, lenses)
     return Recording(
@@ -189,7 +191,7 @@ def open_recording(
         frame_rate=rate,
         indices=_indices(start, stop, step, length, folder),
         length=length,
-        warnings=(*cut, *broken, *gaps, *assumed, *odd, *folders.unused_pictures(folder, cameras)),
+        warnings=(*cut, *rig, *broken, *gaps, *assumed, *odd, *folders.unused_pictures(folder, cameras)),
     )
 
 

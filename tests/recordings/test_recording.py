@@ -232,6 +232,44 @@ def test_a_video_turned_by_a_quarter(tmp_path):
     assert "the video is turned by a quarter, perhaps by a mark in the file" in refused(tmp_path)
 
 
+def changed(tmp_path, matrix=None, distortion=None):
+    """Return a recording whose second camera has another matrix or distortion."""
+    cameras = list(ring())
+    given = {"intrinsics": matrix, "distortion": distortion}
+    new = {key: np.array(value, float) for key, value in given.items() if value is not None}
+    cameras[1] = replace(cameras[1], **new)
+    return write_recording(tmp_path, frames=2, cameras=cameras)
+
+
+def test_a_focal_length_in_millimetres(tmp_path):
+    folder = changed(tmp_path, [[4.2, 0, 31.5], [0, 4.2, 23.5], [0, 0, 1]])
+    assert refused(folder).startswith(
+        f"{tmp_path / 'cameras.toml'}:10:3  camera 'cam02' has a focal length of 4.2 px in pictures of 64\n"
+        "       matrix is in pixels: "
+    )
+
+
+@pytest.mark.parametrize(
+    ("matrix", "distortion", "said"),
+    [
+        ([[60, 0, 0], [0, 60, 0], [0, 0, 1]], None, "principal point (0, 0) is not in its pictures of 64 x 48 px"),
+        (None, [-0.1, 0.1, 0.05, 0.001, 0], "tangential distortion moves pixels by "),
+        (None, [-3, 0, 0, 0, 0], "distortion shows nothing in 86% of the picture, as that of no lens"),
+        (None, [-0.3, 0.1, 0.002, 0.001, 0], ""),
+    ],
+)
+def test_numbers_that_no_lens_has(tmp_path, matrix, distortion, said):
+    warnings = open_recording(changed(tmp_path, matrix, distortion)).warnings
+    assert [text[: len(said) + 11] for text in warnings[:1]] == ([f"cam02: its {said}"] if said else [])
+
+
+def test_a_run_is_told_of_a_world_that_is_not_z_up(tmp_path):
+    turned = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+    cameras = [replace(c, camera_from_world=c.camera_from_world @ turned.T) for c in ring()]
+    said = open_recording(write_recording(tmp_path, cameras=cameras)).warnings
+    assert said[0] == "the images' up is the y axis of the world: the world has to be z up: turn the calibration"
+
+
 def test_a_camera_later_than_the_recording_is_long(tmp_path):
     write_recording(tmp_path, frames=2)
     (tmp_path / "recording.json").write_text('{"late_frames": {"cam02": -40}}')
