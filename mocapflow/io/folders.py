@@ -93,7 +93,8 @@ def match_videos(folder: Path, names: Sequence[str], calibration: Path) -> tuple
             f"missing camera: {what}",
             where=str(folder),
             hint=f"{calibration.name} has: {', '.join(names)}\nvideos/ has: {', '.join(paths) or 'nothing'}\n"
-            "name each video after its camera, or remove the camera or the video that is too many",
+            "name each video after its camera, or remove the camera or the video that is too many;\n"
+            f"a video is a folder of images, or ends in {', '.join(VIDEOS)}",
         )
     return tuple(paths[name] for name in names)
 

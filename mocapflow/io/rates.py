@@ -59,8 +59,13 @@ def _stated(calibration: Path) -> float | None:
 
 
 def _uneven(cameras: Sequence[Camera], videos: Sequence[Video], rate: float) -> list[str]:
-    """Say whose frames come at other times than their numbers say, as those of a phone that slows down in the dark."""
-    return [
+    """Say whose frames are of other moments than their numbers say, as those of a phone that slows down in the dark."""
+    mixed = [
+        f"{camera.name}: its video is interlaced, each picture shows two moments; ffmpeg -i IN -vf bwdif=0 -crf 12 OUT"
+        for camera, video in zip(cameras, videos, strict=True)
+        if video.interlaced
+    ]
+    return mixed + [
         f"{camera.name}: its frame rate varies, which puts frames up to {video.uneven:.1f} from their place; "
         f"convert it to an even rate: {_command(rate)}"
         for camera, video in zip(cameras, videos, strict=True)

@@ -33,6 +33,7 @@ class Stamps(NamedTuple):
     numbers: I32
     starts: I32
     uneven: float
+    interlaced: bool
 
 
 @contextmanager
@@ -117,7 +118,7 @@ def read_stamps(path: Path) -> Stamps:
             rate = (frames - 1) / float(np.ptp(times[shown]) * (stream.time_base or 0))
         height, width, _ = picture(first).shape
         uneven = unevenness(times[shown], numbers[shown])
-    return Stamps(width, height, rate, max(declared, frames), numbers, starts, uneven)
+    return Stamps(width, height, rate, max(declared, frames), numbers, starts, uneven, bool(first.interlaced_frame))
 
 
 class Packets(NamedTuple):

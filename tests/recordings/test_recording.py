@@ -15,6 +15,7 @@ import pytest
 from mocapflow.errors import RecordingError
 from mocapflow.io import rates
 from mocapflow.io.cameras import write_cameras
+from mocapflow.io.video import VIDEOS
 from mocapflow.recordings.doctor import examine
 from mocapflow.recordings.recording import open_recording
 from tests.fixtures.recordings import NAMES, avi_frames, number_of, picture, ring, write_recording, write_video
@@ -134,7 +135,8 @@ def test_missing_camera(tmp_path):
         f"{tmp_path}  missing camera: no video of cam02\n"
         "       cameras.toml has: cam01, cam02, cam03\n"
         "       videos/ has: cam01, cam03, side\n"
-        "       name each video after its camera, or remove the camera or the video that is too many"
+        "       name each video after its camera, or remove the camera or the video that is too many;\n"
+        f"       a video is a folder of images, or ends in {', '.join(VIDEOS)}"
     )
     write_cameras(tmp_path / "cameras.toml", [camera for camera in ring() if camera.name != "cam02"])
     assert "missing camera: no calibration of side\n" in refused(tmp_path)
@@ -422,6 +424,20 @@ def test_a_frame_rate_that_varies(tmp_path):
     said = open_recording(tmp_path).warnings
     assert said[0].startswith("cam02: its frame rate varies, which puts frames up to ")
     assert said[0] in [finding.message for finding in examine(tmp_path)]
+
+
+def test_a_camcorder_s_interlaced_video(tmp_path):
+    write_recording(tmp_path, frames=6)
+    (tmp_path / "videos" / "cam02.mp4").unlink()
+    with av.open(str(tmp_path / "videos" / "cam02.MTS"), "w", format="mpegts") as file:
+        stream = file.add_stream("libx264", rate=25, options={"x264-params": "tff=1"})
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        for number in range(6):
+            frame = av.VideoFrame.from_ndarray(picture(number), "bgr24")
+            file.mux(stream.encode(frame))
+        file.mux(stream.encode(None))
+    (said,) = open_recording(tmp_path).warnings
+    assert said.startswith("cam02: its video is interlaced, each picture shows two moments; ffmpeg ")
 
 
 def test_a_calibration_that_has_no_place_for_a_frame_rate(tmp_path):
