@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from av import Packet, VideoFrame, VideoStream
 
 HIDDEN = np.iinfo(np.int32).min  # the number of a packet that players do not show
+TRACK_END = re.compile(r"(\d+):(\d+):(\d+\.\d+)")
 FASTEST = 1e5  # frames a second; what a file says beyond is nonsense
 FEW = 1 / 16  # of an AVI's packets: if fewer are shown before the one before them, their times are guessed wrong
 AHEAD = 8  # pictures, among which those that follow a late one at once catch up
@@ -113,12 +115,26 @@ def read_stamps(path: Path) -> Stamps:
         frames = int(numbers.max()) + 1
         rate = float(stream.average_rate or 0)
         rate = rate if rate < FASTEST else 0.0
-        declared = (stream.frames or round((container.duration or 0) * rate / 1e6)) - int(found.hidden.sum())
+        declared = (stream.frames or round(_seconds(stream) * rate)) - int(found.hidden.sum())
         if frames > shown.sum():  # with gaps that rate is the average
             rate = (frames - 1) / float(np.ptp(times[shown]) * (stream.time_base or 0))
         height, width, _ = picture(first).shape
         uneven = unevenness(times[shown], numbers[shown])
     return Stamps(width, height, rate, max(declared, frames), numbers, starts, uneven, bool(first.interlaced_frame))
+
+
+def _seconds(stream: VideoStream) -> float:
+    """Return how long a video is said to be; Matroska tells in a tag when each track ends.
+
+    The length of the file, where no other is known, is that of its sound, too.
+    """
+    container: Any = stream.container
+    if stream.duration:
+        return float(stream.duration * (stream.time_base or 0))
+    if not (told := TRACK_END.fullmatch(stream.metadata.get("DURATION", ""))):
+        return (container.duration or 0) / 1e6
+    hours, minutes, seconds = map(float, told.groups())
+    return 3600 * hours + 60 * minutes + seconds - float((stream.start_time or 0) * (stream.time_base or 0))
 
 
 class Packets(NamedTuple):
