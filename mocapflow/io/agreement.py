@@ -60,7 +60,10 @@ def agree_on_length(cameras: Sequence[Camera], videos: Sequence[Video], folder: 
     lengths = {v.declared if b else v.frames for v, b in zip(videos, broken, strict=True)}
     if len(lengths) > 1:
         counts = ", ".join(f"{c.name}: {v.frames} frames" for c, v in zip(cameras, videos, strict=True))
-        hint = f"{counts}\ncut them to the same moments: frame i must be the same instant in every video"
+        hint = (
+            f"{counts}\ncut them to the same moments: frame i must be the same instant in every video:\n"
+            f"ffmpeg -i IN -ss SECONDS -frames:v {min(lengths)} -crf 12 OUT; then `mocapflow doctor DIR --sync`"
+        )
         raise RecordingError("the videos differ in length", where=str(folder / "videos"), hint=hint)
     length = lengths.pop()
     return length, [

@@ -175,7 +175,8 @@ def test_unequal_lengths(tmp_path):
     assert refused(tmp_path) == (
         f"{tmp_path / 'videos'}  the videos differ in length\n"
         "       cam01: 10 frames, cam02: 10 frames, cam03: 8 frames\n"
-        "       cut them to the same moments: frame i must be the same instant in every video"
+        "       cut them to the same moments: frame i must be the same instant in every video:\n"
+        "       ffmpeg -i IN -ss SECONDS -frames:v 8 -crf 12 OUT; then `mocapflow doctor DIR --sync`"
     )
 
 
