@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mocapflow.errors import RecordingError
+from mocapflow.io.numbering import number_frames, unevenness
 from mocapflow.io.paths import for_opencv
 from mocapflow.records import F64, I32, U8, Bool
 
@@ -21,7 +22,6 @@ HIDDEN = np.iinfo(np.int32).min  # the number of a packet that players do not sh
 TRACK_END = re.compile(r"(\d+):(\d+):(\d+\.\d+)")
 FASTEST = 1e5  # frames a second; what a file says beyond is nonsense
 FEW = 1 / 16  # of an AVI's packets: if fewer are shown before the one before them, their times are guessed wrong
-AHEAD = 8  # pictures, among which those that follow a late one at once catch up
 PATIENCE = 10_000  # failed attempts to read on; then the file is over
 
 
@@ -158,36 +158,6 @@ def _read_packets(stream: VideoStream) -> tuple[VideoFrame | None, Packets]:
             rows.append((packet.pts, packet.dts, packet.is_keyframe, packet.is_discard))
     shown_at, decoded_at, key, hidden = np.array(rows, np.float64).reshape(-1, 4).T
     return (first[0] if first else None), Packets(shown_at, decoded_at, key > 0, hidden > 0)
-
-
-def number_frames(times: F64) -> I32:
-    """Return the frame number (N,) at each time (N,), in any unit and order: a gap of k periods is k - 1 lost frames.
-
-    What has one time, such as what VP8 never shows, has one number. A picture that is late, as those after it that
-    come at once tell, is no gap.
-    """
-    moments, place = np.unique(times, return_inverse=True)
-    if len(moments) < 2:
-        return np.arange(len(times), dtype=np.int32)
-    period = float(np.median(np.diff(moments)))
-    steps = np.maximum(1, np.round(np.diff(_undelayed(moments, period)) / period))
-    return np.append(0, np.cumsum(steps)).astype(np.int32)[place]
-
-
-def _undelayed(times: F64, period: float) -> F64:
-    """Return the latest time (N,) for each, in order, that leaves a period before each of the next."""
-    ahead = np.append(times, np.full(AHEAD, np.inf))
-    windows = np.lib.stride_tricks.sliding_window_view(ahead, AHEAD + 1)
-    latest: F64 = (windows - period * np.arange(AHEAD + 1)).min(axis=1)
-    return latest
-
-
-def unevenness(times: F64, numbers: I32) -> float:
-    """Return by how many frames a picture at its time (N,) is off an even rhythm of the numbers (N,), at most."""
-    if len(times) < 3 or np.ptp(numbers) == 0 or np.ptp(times) == 0:
-        return 0.0
-    period, start = np.polyfit(numbers, times, 1)
-    return float(np.abs((times - start) / period - numbers).max())
 
 
 def find_starts(times: F64, keys: Bool) -> I32:

@@ -12,7 +12,8 @@ import pytest
 
 from mocapflow.errors import RecordingError
 from mocapflow.io.images import name_frames, numbered
-from mocapflow.io.stamps import decode, number_frames, packets, unevenness
+from mocapflow.io.numbering import number_frames, unevenness
+from mocapflow.io.stamps import decode, packets
 from mocapflow.io.video import DAMAGED, TORN, open_video, read_frames
 from tests.fixtures.recordings import avi_frames, mp4_frames, number_of, picture, write_reordered, write_video
 
