@@ -1,8 +1,7 @@
-"""What videos and calibration have to agree on: sizes, lengths, frame rate."""
+"""What videos and calibration have to agree on: sizes and lengths."""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,26 +10,30 @@ import numpy as np
 
 from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
-from mocapflow.io.cameras import metadata
 from mocapflow.io.images import name_frames
 from mocapflow.io.lateness import TIMING
+from mocapflow.io.optics import check_focal_length, odd_lens
 from mocapflow.io.typed import place
 from mocapflow.io.video import Video
 
 CUT = 0.02  # share of the width or height that a video may lack against its calibration
-USUAL_RATE = 30.0  # frames per second, where nothing says it
 TURNED = (
     "the video is turned by a quarter, perhaps by a mark in the file that players heed and other\n"
-    "programs do not: calibrate with pictures that are turned the same way"
+    "programs do not: calibrate with pictures that are turned the same way; or size is not [width, height]"
 )
 RESIZED = "calibrate at the size of the video, or scale size and matrix of the calibration to it"
-SLOWEST, FASTEST = 1.0, 10_000.0  # frames per second; between, somebody who moves can be filmed
 
 
 def fit_sizes(
     cameras: Sequence[Camera], videos: Sequence[Video], calibration: Path
 ) -> tuple[tuple[Camera, ...], list[str]]:
-    """Return the cameras with the size of their videos; a slightly smaller video was cut at the right and bottom."""
+    """Return the cameras with the size of their videos, and what is odd about them.
+
+    A slightly smaller video was cut at the right and bottom.
+
+    Raises:
+        RecordingError: a video has another size than its calibration, or a focal length is not in pixels.
+    """
     lenses, warnings = [], []
     for camera, video in zip(cameras, videos, strict=True):
         size = np.array([video.width, video.height], np.int32)
@@ -41,7 +44,10 @@ def fit_sizes(
                 where = place(calibration, camera.name)
                 raise RecordingError(f"camera '{camera.name}': {sizes}", where=where, hint=hint)
             warnings.append(f"{camera.name}: {sizes}: taken as cut at the right and bottom")
-        lenses.append(replace(camera, size=size))
+        lens = replace(camera, size=size)
+        check_focal_length(lens, calibration)
+        warnings += odd_lens(lens)
+        lenses.append(lens)
     return tuple(lenses), warnings
 
 
@@ -54,7 +60,10 @@ def agree_on_length(cameras: Sequence[Camera], videos: Sequence[Video], folder: 
     lengths = {v.declared if b else v.frames for v, b in zip(videos, broken, strict=True)}
     if len(lengths) > 1:
         counts = ", ".join(f"{c.name}: {v.frames} frames" for c, v in zip(cameras, videos, strict=True))
-        hint = f"{counts}\ncut them to the same moments: frame i must be the same instant in every video"
+        hint = (
+            f"{counts}\ncut them to the same moments: frame i must be the same instant in every video:\n"
+            f"ffmpeg -i IN -ss SECONDS -frames:v {min(lengths)} -crf 12 OUT; then `mocapflow doctor DIR --sync`"
+        )
         raise RecordingError("the videos differ in length", where=str(folder / "videos"), hint=hint)
     length = lengths.pop()
     return length, [
@@ -90,27 +99,3 @@ def first_warnings(videos: Sequence[Video]) -> list[str]:
     """Say which image is frame 0 where that is not the one with number 0."""
     first = videos[0].first
     return [f"the images are numbered from {first} on: number {first} is frame 0"] if first else []
-
-
-def common_rate(cameras: Sequence[Camera], videos: Sequence[Video], calibration: Path) -> tuple[float, list[str]]:
-    """Return the frames per second: as [metadata] says, or as the videos do.
-
-    Raises:
-        RecordingError: it is stated as something else than a rate, or the videos differ by more than 1 %.
-    """
-    rates = {c.name: v.frame_rate for c, v in zip(cameras, videos, strict=True) if v.frame_rate}
-    stated = metadata(calibration).get("frame_rate")
-    if isinstance(stated, int | float) and not isinstance(stated, bool) and SLOWEST <= stated <= FASTEST:
-        return float(stated), []
-    if stated is not None:
-        hint = f"write frames per second, {SLOWEST:g} to {FASTEST:g}, or leave it out: then the videos say it"
-        raise RecordingError(f"frame_rate is {stated!r}", where=place(calibration, "frame_rate"), hint=hint)
-    toml = calibration.name if calibration.suffix == ".toml" else "a cameras.toml, which this calibration has to become"
-    told = f"frame_rate under [metadata] in {toml}"
-    if not rates:
-        return USUAL_RATE, [f"nothing says the frame rate: {USUAL_RATE:g} frames per second assumed; write {told}"]
-    if max(rates.values()) > 1.01 * min(rates.values()):
-        each = ", ".join(f"{name}: {rate:g} per second" for name, rate in rates.items())
-        hint = f"{each}\nrecord all cameras at one rate, or write the true {told}"
-        raise RecordingError("the videos differ in frame rate", where=str(videos[0].path.parent), hint=hint)
-    return Counter(rates.values()).most_common(1)[0][0], []

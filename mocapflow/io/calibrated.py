@@ -10,8 +10,14 @@ import numpy as np
 from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import twists
+from mocapflow.io.paths import composed
 from mocapflow.io.typed import place
 from mocapflow.records import F64
+
+FEWER = (
+    "write 2, 4 or 5 of them, in this order: k1 k2 p1 p2 k3; with more, calibrate again without OpenCV's\n"
+    "CALIB_RATIONAL_MODEL, CALIB_THIN_PRISM_MODEL and CALIB_TILTED_MODEL: the first 5 alone are no model"
+)
 
 
 def make_camera(
@@ -42,7 +48,7 @@ def make_camera(
         motion[:3, :3] = twists.exp(np.concatenate([vector, np.zeros(3)]))[:3, :3]
     coefficients = _coefficients(distortion, fisheye, name, where)
     return Camera(
-        name=name,
+        name=composed(name),
         size=_numbers(size, (2,), "size", name, where).astype(np.int32),
         intrinsics=_numbers(intrinsics, (3, 3), "matrix", name, where),
         distortion=np.pad(coefficients, (0, 5 - len(coefficients))),
@@ -57,7 +63,7 @@ def _coefficients(distortion: Any, fisheye: bool, name: str, where: Path) -> F64
     known = 4 if fisheye else 5
     # three may be k1 k2 k3 or k1 k2 p1: OpenCV has no such list
     if found[known:].any() or (len(found) == 3 and found[2]):
-        hint = "a fisheye has 4: k1 k2 k3 k4" if fisheye else "write 2, 4 or 5 of them, in this order: k1 k2 p1 p2 k3"
+        hint = "a fisheye has 4: k1 k2 k3 k4" if fisheye else FEWER
         raise bad(name, where, f"has {len(found)} distortion coefficients", hint)
     return found[:known]
 

@@ -103,14 +103,15 @@ def _from_toml(path: Path) -> tuple[Camera, ...]:
     if any("frame_rate" in table for table in (content, *tables.values())):
         hint = "in TOML what follows a [table] belongs to it: write it right below a line [metadata]"
         raise RecordingError("frame_rate is not under [metadata]", where=place(path, "frame_rate"), hint=hint)
-    return tuple(_from_table(key, table, path) for key, table in tables.items())
+    cameras = {key: table for key, table in tables.items() if set(table) & set(FIELDS)}  # others are of other programs
+    return tuple(_from_table(key, table, path) for key, table in cameras.items())
 
 
 def _from_table(key: str, table: Mapping[str, Any], path: Path) -> Camera:
     name = str(table.get("name", key))
     missing = [field for field in FIELDS if field not in table]
     if missing:
-        hint = f"each camera needs {', '.join(FIELDS)}; tables other than [metadata] are cameras"
+        hint = f"each camera needs {', '.join(FIELDS)}"
         raise bad(name, path, f"lacks {', '.join(missing)}", hint)
     size, matrix, distortion, rotation, translation = (table[field] for field in FIELDS)
     for field in set(table) - {*FIELDS, *OPTIONAL}:  # other programs add fields of their own

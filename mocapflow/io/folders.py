@@ -9,6 +9,7 @@ from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.io.images import IMAGES
 from mocapflow.io.keypoints import first_numbers, odd_keypoints
+from mocapflow.io.paths import composed
 from mocapflow.io.video import VIDEOS
 
 KEYPOINTS, OCCLUDERS = "keypoints", "occluders"
@@ -25,7 +26,7 @@ def video_paths(folder: Path) -> dict[str, Path]:
     for path in _entries(folder / "videos"):
         if not path.is_dir() and path.suffix.lower() not in VIDEOS:
             continue
-        name = path.name if path.is_dir() else path.stem
+        name = composed(path.name if path.is_dir() else path.stem)
         if (other := paths.setdefault(name, path)) != path:
             hint = "which one is meant? move the other one out of videos/"
             what = f"two videos of {name}: {other.name}, {path.name}"
@@ -41,7 +42,8 @@ def plates(folder: Path, camera: str) -> tuple[Path, ...]:
     """
     place = folder / "background"
     single = picture_of(place, camera, "clean plates", f", or put all plates of this camera into background/{camera}/")
-    return (single,) if single else tuple(_images(place / camera))
+    own = _folder(place, camera)
+    return (single,) if single else tuple(_images(own)) if own else ()
 
 
 def picture_of(place: Path, camera: str, what: str, or_else: str = "") -> Path | None:
@@ -50,7 +52,7 @@ def picture_of(place: Path, camera: str, what: str, or_else: str = "") -> Path |
     Raises:
         RecordingError: two images have the name of the camera.
     """
-    found = [path for path in _images(place) if path.stem == camera]
+    found = [path for path in _images(place) if composed(path.stem) == camera]
     if len(found) > 1:
         names = ", ".join(path.name for path in found)
         hint = f"keep one of them{or_else}"
@@ -91,15 +93,16 @@ def match_videos(folder: Path, names: Sequence[str], calibration: Path) -> tuple
             f"missing camera: {what}",
             where=str(folder),
             hint=f"{calibration.name} has: {', '.join(names)}\nvideos/ has: {', '.join(paths) or 'nothing'}\n"
-            "name each video after its camera, or remove the camera or the video that is too many",
+            "name each video after its camera, or remove the camera or the video that is too many;\n"
+            f"a video is a folder of images, or ends in {', '.join(VIDEOS)}",
         )
     return tuple(paths[name] for name in names)
 
 
 def keypoint_folders(place: Path, cameras: Sequence[Camera]) -> tuple[Path | None, ...]:
     """Return <camera>_json (or <camera>) of each camera in a folder of keypoints, None where it is missing."""
-    named = ([place / f"{camera.name}{ending}" for ending in KEYPOINT_ENDINGS] for camera in cameras)
-    return tuple(next(filter(Path.is_dir, paths), None) for paths in named)
+    named = ([_folder(place, f"{camera.name}{ending}") for ending in KEYPOINT_ENDINGS] for camera in cameras)
+    return tuple(next(filter(None, paths), None) for paths in named)
 
 
 def keypoint_numbers(folder: Path, cameras: Sequence[Camera], length: int, image: int) -> list[str]:
@@ -126,6 +129,11 @@ def keypoint_warnings(folder: Path, cameras: Sequence[Camera], length: int, imag
 def _entries(place: Path) -> list[Path]:
     """Return what a folder holds but hidden files, in order; nothing where there is no such folder."""
     return sorted(path for path in place.iterdir() if not path.name.startswith(".")) if place.is_dir() else []
+
+
+def _folder(place: Path, name: str) -> Path | None:
+    """Return the folder of this name in a folder."""
+    return next((path for path in _entries(place) if path.is_dir() and composed(path.name) == name), None)
 
 
 def _images(place: Path) -> list[Path]:

@@ -9,6 +9,7 @@ from typing import Any
 
 from mocapflow.errors import RecordingError, alternatives
 from mocapflow.io.atomic import atomic_write
+from mocapflow.io.paths import composed
 from mocapflow.io.typed import place, read_json
 
 TIMING = "recording.json"
@@ -28,7 +29,7 @@ def late_frames(folder: Path, names: Sequence[str]) -> tuple[int, ...]:
     if isinstance(content, dict) and (strange := sorted(content.keys() - {"late_frames"})):
         raise RecordingError(f"unknown setting '{strange[0]}'", where=place(path, strange[0]), hint=FORM)
     try:
-        late = {name: _rounded(frames) for name, frames in content["late_frames"].items()}
+        late = {composed(name): _rounded(frames) for name, frames in content["late_frames"].items()}
     except (ValueError, TypeError, KeyError, AttributeError, OverflowError) as error:
         raise RecordingError(f"does not say how late the cameras are: {error!r}", where=str(path), hint=FORM) from error
     if unknown := sorted(set(late) - set(names)):

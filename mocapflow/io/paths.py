@@ -1,8 +1,9 @@
-"""Paths as OpenCV takes them, and links that lead nowhere."""
+"""Paths as OpenCV takes them, names that look alike, and links that lead nowhere."""
 
 from __future__ import annotations
 
 import os
+import unicodedata
 from pathlib import Path
 
 from mocapflow.errors import MocapflowError
@@ -22,6 +23,11 @@ def for_opencv(path: Path) -> str:
         hint = "rename the file or folder, or set a UTF-8 locale (LC_ALL=C.UTF-8)"
         raise MocapflowError("this path holds bytes that are no UTF-8", where=where, hint=hint) from None
     return text
+
+
+def composed(name: str) -> str:
+    """Return a name with each letter as one character: macOS writes `ü` in file names as `u` and two dots."""
+    return unicodedata.normalize("NFC", name)
 
 
 def led_nowhere(path: Path) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mocapflow.errors import RecordingError
+from mocapflow.io.numbering import number_frames, unevenness
 from mocapflow.io.paths import for_opencv
 from mocapflow.records import F64, I32, U8, Bool
 
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
     from av import Packet, VideoFrame, VideoStream
 
 HIDDEN = np.iinfo(np.int32).min  # the number of a packet that players do not show
+TRACK_END = re.compile(r"(\d+):(\d+):(\d+\.\d+)")
 FASTEST = 1e5  # frames a second; what a file says beyond is nonsense
 FEW = 1 / 16  # of an AVI's packets: if fewer are shown before the one before them, their times are guessed wrong
 PATIENCE = 10_000  # failed attempts to read on; then the file is over
@@ -31,6 +34,8 @@ class Stamps(NamedTuple):
     declared: int
     numbers: I32
     starts: I32
+    uneven: float
+    interlaced: bool
 
 
 @contextmanager
@@ -110,11 +115,26 @@ def read_stamps(path: Path) -> Stamps:
         frames = int(numbers.max()) + 1
         rate = float(stream.average_rate or 0)
         rate = rate if rate < FASTEST else 0.0
-        declared = (stream.frames or round((container.duration or 0) * rate / 1e6)) - int(found.hidden.sum())
+        declared = (stream.frames or round(_seconds(stream) * rate)) - int(found.hidden.sum())
         if frames > shown.sum():  # with gaps that rate is the average
             rate = (frames - 1) / float(np.ptp(times[shown]) * (stream.time_base or 0))
         height, width, _ = picture(first).shape
-    return Stamps(width, height, rate, max(declared, frames), numbers, starts)
+        uneven = unevenness(times[shown], numbers[shown])
+    return Stamps(width, height, rate, max(declared, frames), numbers, starts, uneven, bool(first.interlaced_frame))
+
+
+def _seconds(stream: VideoStream) -> float:
+    """Return how long a video is said to be; Matroska tells in a tag when each track ends.
+
+    The length of the file, where no other is known, is that of its sound, too.
+    """
+    container: Any = stream.container
+    if stream.duration:
+        return float(stream.duration * (stream.time_base or 0))
+    if not (told := TRACK_END.fullmatch(stream.metadata.get("DURATION", ""))):
+        return (container.duration or 0) / 1e6
+    hours, minutes, seconds = map(float, told.groups())
+    return 3600 * hours + 60 * minutes + seconds - float((stream.start_time or 0) * (stream.time_base or 0))
 
 
 class Packets(NamedTuple):
@@ -138,20 +158,6 @@ def _read_packets(stream: VideoStream) -> tuple[VideoFrame | None, Packets]:
             rows.append((packet.pts, packet.dts, packet.is_keyframe, packet.is_discard))
     shown_at, decoded_at, key, hidden = np.array(rows, np.float64).reshape(-1, 4).T
     return (first[0] if first else None), Packets(shown_at, decoded_at, key > 0, hidden > 0)
-
-
-def number_frames(times: F64) -> I32:
-    """Return the frame number (N,) at each time (N,), in any unit and order: a gap of k periods is k - 1 lost frames.
-
-    What has one time, such as what VP8 never shows, has one number.
-    """
-    order = np.argsort(times, kind="stable")
-    gaps = np.diff(times[order])
-    period = np.median(gaps) if len(gaps) else 0.0
-    steps = np.maximum(gaps > 0, np.round(gaps / period)) if period > 0 else np.ones(len(gaps))
-    numbers = np.empty(len(times), np.int32)
-    numbers[order] = np.concatenate([[0], np.cumsum(steps)])
-    return numbers
 
 
 def find_starts(times: F64, keys: Bool) -> I32:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 NO_MORE = (sys.maxsize, None, "")  # what comes after all frames
 DAMAGED, TORN = "the frame is damaged", "the frame is decoded from damaged ones"
-VIDEOS = (".mp4", ".avi", ".mov", ".mkv", ".m4v", ".webm", ".mpg")
+VIDEOS = (".mp4", ".avi", ".mov", ".mkv", ".m4v", ".webm", ".mpg", ".mpeg", ".mts", ".m2ts", ".ts", ".wmv", ".3gp")
 
 
 @record
@@ -45,6 +45,8 @@ class Video:
     declared: int  # frames, as the file says; more than `frames` where it breaks off
     numbers: I32 = array("N", unit="frame number of each packet, in the order of the file; HIDDEN where none is shown")
     starts: I32 = array("N", unit="packet of the key frame from which each is decoded")
+    uneven: float = 0.0  # frames by which a picture's time is off an even rhythm of the numbers, at most
+    interlaced: bool = False  # every picture mixes two moments
     first: int = 0  # number in the name of frame 0's image
     late: int = 0  # frames by which its pictures come after those of the other cameras
 
@@ -176,7 +178,7 @@ def _open_folder(path: Path) -> Video:
     found = ((f, i) for f in files.values() if (i := read_image(f)) is not None)
     first, image = next(found, (path, None))
     if image is None:
-        hint = "images are named by frame: 000000.png, 000001.png"
+        hint = f"images are named by frame: 000000.png, 000001.png; they end in {', '.join(IMAGES)}"
         raise RecordingError("no image in this folder can be read", where=str(path), hint=hint)
     check_depth(first)
     check_numbers(files, path)

@@ -19,6 +19,8 @@ from mocapflow.io.lateness import TIMING, late_frames
 from mocapflow.io.lenses import View
 from mocapflow.io.occluders import occluder
 from mocapflow.io.plates import background
+from mocapflow.io.rates import common_rate
+from mocapflow.io.rigs import examine_rig
 from mocapflow.io.video import Video, count_from_first, open_video
 from mocapflow.records import F64, Watch, record, silent
 
@@ -175,8 +177,9 @@ def open_recording(
     lenses, cut = agreement.fit_sizes(cameras, videos, calibration)
     length, broken = agreement.agree_on_length(cameras, videos, folder)
     agreement.check_lateness(cameras, videos, length, folder)
-    rate, assumed = agreement.common_rate(cameras, videos, calibration)
+    rate, assumed = common_rate(cameras, videos, calibration)
     gaps = [*agreement.first_warnings(videos), *agreement.gap_warnings(cameras, videos)]
+    rig = [f"{found.message}: {found.hint}" for found in examine_rig(lenses) if found.severity != "note"]
     odd = folders.keypoint_warnings(folder, cameras, length, videos[0].first)
     _check_scale(scale, lenses)
     return Recording(
@@ -188,7 +191,7 @@ def open_recording(
         frame_rate=rate,
         indices=_indices(start, stop, step, length, folder),
         length=length,
-        warnings=(*cut, *broken, *gaps, *assumed, *odd, *folders.unused_pictures(folder, cameras)),
+        warnings=(*cut, *rig, *broken, *gaps, *assumed, *odd, *folders.unused_pictures(folder, cameras)),
     )
 
 

@@ -21,6 +21,7 @@ from mocapflow.io.lateness import late_frames
 from mocapflow.io.lenses import View
 from mocapflow.io.occluders import occluder
 from mocapflow.io.plates import background
+from mocapflow.io.rates import common_rate
 from mocapflow.io.rigs import examine_rig
 from mocapflow.io.video import Video, count_from_first, open_video, read_frames
 from mocapflow.recordings.freezing import difference, frozen_from
@@ -74,7 +75,7 @@ def _agreed(
     """Return the cameras with the size of their videos, None where that is another, and how many frames all have."""
     fitted = attempt(lambda: agreement.fit_sizes(cameras, videos, calibration), findings)
     agreed = attempt(lambda: agreement.agree_on_length(cameras, videos, folder), findings)
-    rate = attempt(lambda: agreement.common_rate(cameras, videos, calibration), findings)
+    rate = attempt(lambda: common_rate(cameras, videos, calibration), findings)
     findings += [warning(text, where=folder) for part in (fitted, agreed, rate) if part is not None for text in part[1]]
     findings += [note(text, where=folder) for text in agreement.first_warnings(videos)]
     length = min(video.frames for video in videos) if agreed is None else agreed[0]

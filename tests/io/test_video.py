@@ -12,7 +12,8 @@ import pytest
 
 from mocapflow.errors import RecordingError
 from mocapflow.io.images import name_frames, numbered
-from mocapflow.io.stamps import decode, number_frames, packets
+from mocapflow.io.numbering import number_frames, unevenness
+from mocapflow.io.stamps import decode, packets
 from mocapflow.io.video import DAMAGED, TORN, open_video, read_frames
 from tests.fixtures.recordings import avi_frames, mp4_frames, number_of, picture, write_reordered, write_video
 
@@ -216,6 +217,23 @@ def test_a_late_video_ends_earlier_and_is_not_broken(tmp_path):
     assert [reason for image, reason in rows if image is None] == ["the video ends earlier"] * 3
 
 
+def test_sound_that_is_longer_than_the_pictures_is_no_video_that_breaks_off(tmp_path):
+    with av.open(str(tmp_path / "a.mkv"), "w") as file:
+        stream = file.add_stream("mpeg4", rate=25)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        sound = file.add_stream("pcm_s16le", rate=8000, layout="mono")
+        silence = av.AudioFrame.from_ndarray(np.zeros((1, 24000), np.int16), "s16", "mono")
+        silence.sample_rate = 8000
+        file.mux(sound.encode(silence))
+        for number in range(10):
+            frame = av.VideoFrame.from_ndarray(picture(number), "bgr24")
+            frame.pts = number + 2
+            file.mux(stream.encode(frame))
+        file.mux(stream.encode(None))
+    video = open_video(tmp_path / "a.mkv")
+    assert (video.frames, video.declared) == (10, 10)
+
+
 def test_a_truncated_mp4_can_not_be_decoded(tmp_path):
     path = write_video(tmp_path / "a.mp4", FRAMES)
     path.write_bytes(path.read_bytes()[:2000])
@@ -246,9 +264,19 @@ def test_gaps_in_the_time_stamps_are_lost_frames():
     jitter = np.random.default_rng(0).uniform(-0.2, 0.2, 30) * period
     assert number_frames(np.arange(30) * period + jitter).tolist() == list(range(30))
     assert number_frames(np.round(np.arange(3000) * period)).tolist() == list(range(3000))  # times in whole ms
+    late = np.array([0, 1, 2.6, 3, 4.7, 5, 6, 9, 10, 12.6, 13, 14])  # 7, 8 and 11 are lost
+    assert number_frames(late).tolist() == [0, 1, 2, 3, 4, 5, 6, 9, 10, 12, 13, 14]
     assert number_frames(np.zeros(4)).tolist() == [0, 1, 2, 3]
     assert number_frames(np.zeros(1)).tolist() == [0]
     assert number_frames(np.array([0.0, 3, 1, 1, 2])).tolist() == [0, 3, 1, 1, 2]
+
+
+def test_how_uneven_frames_come():
+    times = np.delete(np.arange(60) * 3003, [20, 21])
+    assert unevenness(times, number_frames(times)) < 1e-6
+    slower = np.append(np.arange(40), 40 + 1.25 * np.arange(20))  # as of a phone in the dark
+    assert unevenness(slower, number_frames(slower)) == pytest.approx(2, abs=0.5)
+    assert unevenness(np.zeros(1), np.zeros(1, np.int32)) == unevenness(np.zeros(5), np.zeros(5, np.int32)) == 0
 
 
 def test_frames_of_another_size_are_lost(tmp_path):

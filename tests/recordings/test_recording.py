@@ -4,14 +4,18 @@ import json
 import shutil
 import tracemalloc
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 
+import av
 import cv2
 import numpy as np
 import pytest
 
 from mocapflow.errors import RecordingError
+from mocapflow.io import rates
 from mocapflow.io.cameras import write_cameras
+from mocapflow.io.video import VIDEOS
 from mocapflow.recordings.doctor import examine
 from mocapflow.recordings.recording import open_recording
 from tests.fixtures.recordings import NAMES, avi_frames, number_of, picture, ring, write_recording, write_video
@@ -131,7 +135,8 @@ def test_missing_camera(tmp_path):
         f"{tmp_path}  missing camera: no video of cam02\n"
         "       cameras.toml has: cam01, cam02, cam03\n"
         "       videos/ has: cam01, cam03, side\n"
-        "       name each video after its camera, or remove the camera or the video that is too many"
+        "       name each video after its camera, or remove the camera or the video that is too many;\n"
+        f"       a video is a folder of images, or ends in {', '.join(VIDEOS)}"
     )
     write_cameras(tmp_path / "cameras.toml", [camera for camera in ring() if camera.name != "cam02"])
     assert "missing camera: no calibration of side\n" in refused(tmp_path)
@@ -149,12 +154,29 @@ def test_two_videos_of_one_camera(tmp_path):
     assert "two videos of cam02: cam02, cam02.mp4" in refused(tmp_path)
 
 
+def test_names_of_files_with_the_dots_of_an_umlaut_apart(tmp_path):
+    """As macOS writes them."""
+    write_recording(tmp_path, frames=2)
+    (tmp_path / "cameras.toml").write_text((tmp_path / "cameras.toml").read_text().replace("cam02", "T\u00fcr"))
+    apart = "Tu\u0308r"
+    (tmp_path / "videos" / "cam02.mp4").rename(tmp_path / "videos" / f"{apart}.mp4")
+    for folder in (tmp_path / "background" / apart, tmp_path / "keypoints" / f"{apart}_json"):
+        folder.mkdir(parents=True)
+    (tmp_path / "recording.json").write_text(json.dumps({"late_frames": {apart: 1}}))
+    cv2.imwrite(str(tmp_path / "background" / apart / "0.png"), picture(0))
+    recording = open_recording(tmp_path)
+    assert [recording.lenses[1].name, recording.videos[1].late] == ["T\u00fcr", 1]
+    assert recording.keypoint_folders == (None, tmp_path / "keypoints" / f"{apart}_json", None)
+    assert f"background/{apart}/0.png" in recording.content
+
+
 def test_unequal_lengths(tmp_path):
     write_recording(tmp_path, frames=10, lengths={"cam03": 8})
     assert refused(tmp_path) == (
         f"{tmp_path / 'videos'}  the videos differ in length\n"
         "       cam01: 10 frames, cam02: 10 frames, cam03: 8 frames\n"
-        "       cut them to the same moments: frame i must be the same instant in every video"
+        "       cut them to the same moments: frame i must be the same instant in every video:\n"
+        "       ffmpeg -i IN -ss SECONDS -frames:v 8 -crf 12 OUT; then `mocapflow doctor DIR --sync`"
     )
 
 
@@ -211,6 +233,44 @@ def test_a_video_turned_by_a_quarter(tmp_path):
     write_recording(tmp_path)
     write_video(tmp_path / "videos" / "cam02.mp4", 10, (48, 64))
     assert "the video is turned by a quarter, perhaps by a mark in the file" in refused(tmp_path)
+
+
+def changed(tmp_path, matrix=None, distortion=None):
+    """Return a recording whose second camera has another matrix or distortion."""
+    cameras = list(ring())
+    given = {"intrinsics": matrix, "distortion": distortion}
+    new = {key: np.array(value, float) for key, value in given.items() if value is not None}
+    cameras[1] = replace(cameras[1], **new)
+    return write_recording(tmp_path, frames=2, cameras=cameras)
+
+
+def test_a_focal_length_in_millimetres(tmp_path):
+    folder = changed(tmp_path, [[4.2, 0, 31.5], [0, 4.2, 23.5], [0, 0, 1]])
+    assert refused(folder).startswith(
+        f"{tmp_path / 'cameras.toml'}:10:3  camera 'cam02' has a focal length of 4.2 px in pictures of 64\n"
+        "       matrix is in pixels: "
+    )
+
+
+@pytest.mark.parametrize(
+    ("matrix", "distortion", "said"),
+    [
+        ([[60, 0, 0], [0, 60, 0], [0, 0, 1]], None, "principal point (0, 0) is not in its pictures of 64 x 48 px"),
+        (None, [-0.1, 0.1, 0.05, 0.001, 0], "tangential distortion moves pixels by "),
+        (None, [-3, 0, 0, 0, 0], "distortion shows nothing in 86% of the picture, as that of no lens"),
+        (None, [-0.3, 0.1, 0.002, 0.001, 0], ""),
+    ],
+)
+def test_numbers_that_no_lens_has(tmp_path, matrix, distortion, said):
+    warnings = open_recording(changed(tmp_path, matrix, distortion)).warnings
+    assert [text[: len(said) + 11] for text in warnings[:1]] == ([f"cam02: its {said}"] if said else [])
+
+
+def test_a_run_is_told_of_a_world_that_is_not_z_up(tmp_path):
+    turned = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+    cameras = [replace(c, camera_from_world=c.camera_from_world @ turned.T) for c in ring()]
+    said = open_recording(write_recording(tmp_path, cameras=cameras)).warnings
+    assert said[0] == "the images' up is the y axis of the world: the world has to be z up: turn the calibration"
 
 
 def test_a_camera_later_than_the_recording_is_long(tmp_path):
@@ -325,6 +385,60 @@ def test_different_frame_rates(tmp_path):
     shutil.move(tmp_path / "videos", tmp_path / "static" / "videos")
     calibration = tmp_path / "cameras.toml"
     assert f"{tmp_path}/static/videos  {said}" in refused(tmp_path / "static", calibration=calibration)
+
+
+def test_a_stated_frame_rate_does_not_hide_that_the_videos_differ(tmp_path):
+    write_recording(tmp_path, frames=4)
+    write_video(tmp_path / "videos" / "cam02.mp4", 4, rate=50.0)
+    with (tmp_path / "cameras.toml").open("a") as file:
+        file.write("[metadata]\nframe_rate = 25\n")
+    (said,) = open_recording(tmp_path).warnings
+    assert said.startswith("the videos differ in frame rate (cam01: 25 per second, cam02: 50 per second, cam03: 25")
+
+
+@pytest.mark.parametrize(("rate", "apart"), [(25.1, ()), (25.2, ("0.3",))])
+def test_rates_that_are_nearly_one(tmp_path, monkeypatch, rate, apart):
+    monkeypatch.setattr(rates, "OFF", 0.3)
+    write_recording(tmp_path, frames=40)
+    write_video(tmp_path / "videos" / "cam02.mp4", 40, rate=rate)
+    found = open_recording(tmp_path)
+    assert found.frame_rate == 25
+    assert [said[:47] for said in found.warnings] == [f"at their end the videos are {n} frames apart (c" for n in apart]
+    assert len(examine(tmp_path)) >= len(apart)
+
+
+def test_a_frame_rate_that_varies(tmp_path):
+    write_recording(tmp_path, frames=60)
+    path = tmp_path / "videos" / "cam02.mp4"
+    times = [*range(0, 3000, 100), *range(3000, 3000 + 30 * 130, 130)]
+    with av.open(str(path), "w") as file:
+        stream = file.add_stream("mpeg4", rate=25, options={"bf": "0"})
+        stream.width, stream.height, stream.pix_fmt, stream.time_base = 64, 48, "yuv420p", Fraction(1, 2500)
+        stream.codec_context.time_base = stream.time_base
+        for number, time in enumerate(times):
+            frame = av.VideoFrame.from_ndarray(picture(number), "bgr24")
+            frame.pts = time
+            file.mux(stream.encode(frame))
+        file.mux(stream.encode(None))
+    with (tmp_path / "cameras.toml").open("a") as file:
+        file.write("[metadata]\nframe_rate = 25\n")
+    said = open_recording(tmp_path).warnings
+    assert said[0].startswith("cam02: its frame rate varies, which puts frames up to ")
+    assert said[0] in [finding.message for finding in examine(tmp_path)]
+
+
+def test_a_camcorder_s_interlaced_video(tmp_path):
+    write_recording(tmp_path, frames=6)
+    (tmp_path / "videos" / "cam02.mp4").unlink()
+    with av.open(str(tmp_path / "videos" / "cam02.MTS"), "w", format="mpegts") as file:
+        stream = file.add_stream("libx264", rate=25, options={"x264-params": "tff=1"})
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        for number in range(6):
+            frame = av.VideoFrame.from_ndarray(picture(number), "bgr24")
+            file.mux(stream.encode(frame))
+        file.mux(stream.encode(None))
+    (said,) = open_recording(tmp_path).warnings
+    assert said.startswith("cam02: its video is interlaced, each picture shows two moments; ffmpeg ")
 
 
 def test_a_calibration_that_has_no_place_for_a_frame_rate(tmp_path):

@@ -150,8 +150,9 @@ def test_what_a_track_warned_of_is_kept_with_its_frames(tmp_path, path, monkeypa
 
 def test_what_is_odd_about_a_recording_is_told_when_it_is_run(tmp_path, path):
     _, lines = run_tiny(path, tmp_path, frames=2)
-    (said,) = [line for line in lines if line.startswith("warning: ")]
-    assert said.startswith("warning: nothing says the frame rate: 30 frames per second assumed")
+    said = "\n".join(lines)
+    assert "warning: nothing says the frame rate: 30 frames per second assumed" in said
+    assert "warning: the images' up is the y axis of the world" in said
 
 
 def test_a_body_made_by_a_stage_replaces_the_body_of_later_ones(tmp_path):
