@@ -26,6 +26,7 @@ import numpy as np
 import open3d as o3d
 from known_garments import measures_for, sew
 from known_poses import RATE, Body, Motion, angles, chain, ground, read_body, skin
+from known_rigs import RIGS
 from known_scripts import SCRIPTS
 from known_takes import TAKES, Take
 from scipy.spatial import cKDTree
@@ -111,7 +112,10 @@ def prepare(take: Take, data: Path, out: Path) -> None:
         (out / folder).mkdir(parents=True, exist_ok=True)
     for file in ("cameras.toml", "subject/body.obj", "subject/skeleton.json", "subject/weights.npz"):
         shutil.copyfile(own / file, out / file)
-    cameras, body = tomllib.loads((own / "cameras.toml").read_text()), read_body(own / "subject")
+    centre = np.load(own / "truth/joints.npz")["positions"][:, 0, :2].mean(0)
+    if take.rig:
+        (out / "cameras.toml").write_text(RIGS[take.rig](centre))
+    cameras, body = tomllib.loads((out / "cameras.toml").read_text()), read_body(own / "subject")
     del cameras["metadata"]
     for camera in cameras.values():
         camera["turn"] = Rotation.from_rotvec(camera["rotation"]).as_matrix().tolist()  # from world to camera
@@ -120,7 +124,6 @@ def prepare(take: Take, data: Path, out: Path) -> None:
         measures = measures_for(body, measures, read_body(owners / "subject"))
     measures |= take.cut
     (out / "subject/garment.json").write_text(json.dumps(measures, indent=1))
-    centre = np.load(own / "truth/joints.npz")["positions"][:, 0, :2].mean(0)
     whole, first = build_motion(take, body, data, centre, cameras)
     motion = Motion(whole.translation[first:], whole.rotations[first:])
     (out / "init.json").write_text(json.dumps(disturbed(body, motion, take.seed), indent=1))

@@ -57,6 +57,7 @@ class Take:
     flight: tuple[int, int] | None = None  # frames of take-off and landing
     cut: dict[str, float] = field(default_factory=dict)  # m, measures in which the garment differs from its owner's
     room: str = ""  # one of `ROOMS`; if empty, the one that is named like the subject
+    rig: str = ""  # one of `known_rigs.RIGS`; if empty, the cameras of the subject's recording
 
     @property
     def place(self) -> Room:
@@ -66,12 +67,13 @@ class Take:
     @property
     def plates(self) -> str:
         """The folder of the empty room, as the subject's cameras see it."""
-        return f"room_{self.subject}_{self.room}" if self.room else f"room_{self.subject}"
+        return "_".join(filter(None, ("room", self.subject, self.room, self.rig)))
 
 
 TAKES = {
     "legcross_A_skirt": Take("A", "skirt", "legcross_A", 1, PURPLE, start=150),
     "squat_A_skirt": Take("A", "skirt", "kneebend_A", 2, GREEN, start=190),
+    "squat_A_ring": Take("A", "skirt", "kneebend_A", 2, GREEN, start=190, rig="ring"),  # eight cameras
     "walk_B_skirt": Take("B", "skirt", "walk_B", 3, GREEN, start=100),
     "dance_A_shorts": Take("A", "shorts", "dance", 4, GREY),
     "kick_B_shorts": Take("B", "shorts", "kick_B", 5, GREY, frames=40),
