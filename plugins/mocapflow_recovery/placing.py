@@ -12,7 +12,7 @@ from mocapflow.data import NO_CLOTH, Frame, Pose
 from mocapflow.geometry.silhouettes import covered
 from mocapflow.records import F64, Bool
 from mocapflow.scene import Scene
-from mocapflow_recovery.certain import Room, changes
+from mocapflow_recovery.trimaps import Room, changes
 
 
 def placed(bare: Scene, turn: float, angles: F64, middle: F64) -> Pose:

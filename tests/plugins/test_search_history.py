@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mocapflow_recovery.vain import VAIN, counted, forgotten, vain_before
+from mocapflow_recovery.search_history import HISTORY, history_of, with_search, without_history
 
 from mocapflow.data import FrameResult, Past
 from mocapflow.testing import pictures, scenes
@@ -27,9 +27,9 @@ def searched(strays, found: FrameResult = FITTED, every: int = 4) -> list[int]:
     appearance, frames = {}, []
     for frame, strayed in enumerate(strays):
         past = before(frame, appearance)
-        if vain_before(past).due(strayed, frame / 30, past, every):
+        if history_of(past).due(strayed, frame / 30, past, every):
             frames.append(frame)
-            result = counted(replace(found, doubted=True), FITTED, strayed, past)
+            result = with_search(replace(found, doubted=True), FITTED, strayed, past)
             appearance = result.state.segmentation.appearance
     return frames
 
@@ -53,11 +53,11 @@ def test_searches_that_help_stay_as_frequent_though_the_fit_is_still_doubted():
 
 
 def test_the_first_frame_after_a_gap_is_searched():
-    assert vain_before(Past(appearance={VAIN: np.array([9.0, 400.0])})).due(400.0, 1 / 30, Past(), every=4)
+    assert history_of(Past(appearance={HISTORY: np.array([9.0, 400.0])})).due(400.0, 1 / 30, Past(), every=4)
 
 
 def test_a_fit_that_is_not_doubted_ends_it_and_all_else_that_is_known_stays():
-    past = before(5, {VAIN: np.array([9.0, 400.0]), **COLOURS})
-    known = forgotten(FITTED, past).state.segmentation.appearance
-    assert vain_before(before(6, known)).searches == 0 and (known["colours"] == 1).all()
-    assert forgotten(FITTED, before(5, COLOURS)) is FITTED
+    past = before(5, {HISTORY: np.array([9.0, 400.0]), **COLOURS})
+    known = without_history(FITTED, past).state.segmentation.appearance
+    assert history_of(before(6, known)).searches == 0 and (known["colours"] == 1).all()
+    assert without_history(FITTED, before(5, COLOURS)) is FITTED

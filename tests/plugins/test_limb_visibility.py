@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from mocapflow_matching.camouflage import FEET
 from mocapflow_recovery import limb_search
-from mocapflow_recovery.certain import small_room, views
 from mocapflow_recovery.limb_search import LimbSearch
-from mocapflow_recovery.told import hidden_legs, like_the_floor, untold
+from mocapflow_recovery.limb_visibility import camouflaged_feet, camouflaged_limbs, occluded_legs
+from mocapflow_recovery.trimaps import small_room, trimaps
 
 from mocapflow.data import NO_CLOTH
 from mocapflow.geometry.cameras import project
@@ -32,15 +32,15 @@ def without_feet():
 
 
 def seen(frame):
-    return views(frame, SURFACE, small_room(SCENE.background, SCENE.cameras, 120), 0.35)
+    return trimaps(frame, SURFACE, small_room(SCENE.background, SCENE.cameras, 120), 0.35)
 
 
 def test_limbs_that_differ_from_the_room_are_not_told():
-    assert untold(SURFACE, seen(FRAME), SCENE.body) == {}
+    assert camouflaged_limbs(SURFACE, seen(FRAME), SCENE.body) == {}
 
 
 def test_limbs_that_look_like_the_room_are():
-    told = untold(SURFACE, seen(without_feet()), SCENE.body)
+    told = camouflaged_limbs(SURFACE, seen(without_feet()), SCENE.body)
     assert set(told) == {name for name in SCENE.body.joint_names if name.startswith("knee")}
     assert max(told.values()) < 0.1
 
@@ -62,10 +62,10 @@ def test_feet_that_look_like_the_room_are_told_from_others(share, moves):
     carriers, weights = body.skin_joint.copy(), body.skin_weight.copy()
     carriers[shank], weights[shank] = [knee, ankle, 0, 0, 0], [1 - share, share, 0, 0, 0]
     body = replace(body, skin_joint=carriers, skin_weight=weights)
-    told = like_the_floor(SURFACE, seen(without_feet()), body)
+    told = camouflaged_feet(SURFACE, seen(without_feet()), body)
     assert told[feet].all()
     assert told[shank] == moves
-    assert not like_the_floor(SURFACE, seen(FRAME), body).any()
+    assert not camouflaged_feet(SURFACE, seen(FRAME), body).any()
 
 
 @pytest.mark.parametrize(
@@ -99,12 +99,12 @@ def test_legs_are_told_that_some_views_show_nothing_of_though_others_do(views, t
     for view in views:
         images[view] = behind_furniture[view]
     legs = ["knee_l", "knee_r"]
-    found = hidden_legs(SURFACE, seen(replace(FRAME, images=tuple(images))), SCENE.body)
+    found = occluded_legs(SURFACE, seen(replace(FRAME, images=tuple(images))), SCENE.body)
     assert found == {camera: legs for camera in told}
 
 
 def test_where_no_view_shows_anything_surely_no_leg_is_told():
-    assert hidden_legs(SURFACE, [], SCENE.body) == {}
+    assert occluded_legs(SURFACE, [], SCENE.body) == {}
 
 
 def test_the_search_warns_of_furniture_before_legs_in_the_first_frame(caplog):

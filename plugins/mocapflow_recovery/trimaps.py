@@ -1,4 +1,4 @@
-"""What an image surely shows: here the person, there the empty room, and elsewhere either, for all one can tell."""
+"""Trimaps: where an image surely shows the person, where surely the empty room, and where it may be either."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ class Room(NamedTuple):
     plates: tuple[Plate, ...]
 
 
-class View(NamedTuple):
-    """One small view. The person casts shadows and may wear the colours of the room: such pixels are neither."""
+class Trimap(NamedTuple):
+    """The trimap of one small view. Shadows of the person, and clothes of the colours of the room, are neither."""
 
     camera: Camera
     person: Bool  # (h, w) surely no empty room, lit or in a shadow
     cloth: Bool  # (h, w) pixels of the person that show the garment, by its colours; none are known in a first frame
-    shown: bool  # whether the person is more than a scrap; else the view tells nothing of a pose
-    away: F32  # (h, w) px to the nearest pixel that may be the person; 0 on it
+    informative: bool  # whether the person is more than a scrap; else it tells nothing of a pose
+    distance: F32  # (h, w) px to the nearest pixel that may be the person; 0 on it
     pixel_m: float  # how large a pixel is where the person stands
     known: float  # share of the model's area before a room that somebody knows
 
@@ -57,21 +57,21 @@ def small_room(background: Background, cameras: tuple[Camera, ...], rows: int = 
     return Room(tuple(map(shrunk, cameras, factors)), factors, tuple(plates))
 
 
-def views(
+def trimaps(
     frame: Frame,
     surface: Surface,
     room: Room,
     near_m: float,
     garment: F64 | None = None,
     no_shadow: Sequence[Bool] | None = None,
-) -> list[View]:
-    """Return what the usable views of a frame surely show, each at the size of its camera.
+) -> list[Trimap]:
+    """Return the trimaps of the usable views of a frame, each at the size of its camera.
 
     A view that is unlike the empty room nearly everywhere shows nothing surely and is left out.
 
     Args:
         frame: the images, in full size.
-        surface: the person as believed: parts further away than `near_m` in the image are somebody else.
+        surface: the person as predicted or fitted: parts further away than `near_m` in the image are somebody else.
         room: the empty room, small.
         near_m: see `surface`.
         garment: (BINS,) log density of colours on the garment over that on parts outside of it; None: it is not known.
@@ -87,15 +87,14 @@ def views(
         if no_shadow is not None:
             floor = floor & ~crops.shrink_mask(no_shadow[int(number)], factor)
         changed, same = _compared(small, plate, floor)
-        told = True if hidden is None else crops.shrink(hidden.astype(np.float32), factor) == 0
-        person = _near(changed & told, model, near_m / size)
+        visible = True if hidden is None else crops.shrink(hidden.astype(np.float32), factor) == 0
+        person = _near(changed & visible, model, near_m / size)
         seen, expected = np.count_nonzero(person), np.count_nonzero(model)
         if seen < MOST * expected:
             cloth = np.zeros(person.shape, bool) if garment is None else person & (garment[bins_of(small)] > SURELY)
             known = float(np.isfinite(plate.spread)[model].mean())
-            found.append(
-                View(camera, person, cloth, bool(seen > LEAST * expected), _away(same & told, person), size, known)
-            )
+            informative, distance = bool(seen > LEAST * expected), _distance(same & visible, person)
+            found.append(Trimap(camera, person, cloth, informative, distance, size, known))
     return found
 
 
@@ -116,7 +115,7 @@ def _compared(image: U8, plate: Plate, floor: Bool) -> tuple[Bool, Bool]:
     return changed, (off < EMPTY**2) & np.isfinite(plate.spread)
 
 
-def _away(empty: Bool, person: Bool) -> F32:
+def _distance(empty: Bool, person: Bool) -> F32:
     """Return the distance (h, w) px of every pixel from what may be the person: that is not empty, or in a gap."""
     import cv2
 

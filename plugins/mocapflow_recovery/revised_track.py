@@ -1,4 +1,4 @@
-"""A track while some of its frames are replaced by other fits."""
+"""A track in which some frames are replaced by other fits."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from mocapflow.records import F64, array_fields
 from mocapflow.results import Track, values_of
 from mocapflow.series import overwritten
 
-AGAIN = "fitted again from between its neighbours"
+REFITTED = "fitted again from between its neighbours"
 KEPT = ("frame", "time", "usable", "doubted", "seconds", "raw_root", "raw_angles")  # of the first fit
 
 
-class Fits:
+class RevisedTrack:
     """The poses of a track, and how far each leaps.
 
     Args:
@@ -45,7 +45,7 @@ class Fits:
             return Cloth(vertices=other["cloth"], parameters=other["cloth_parameters"])
         return Cloth(vertices=np.array(track.cloth[row]), parameters=track.cloth_parameters[row].copy())
 
-    def other(self, row: int) -> bool:
+    def replaced(self, row: int) -> bool:
         """Return whether a row has another fit than the track had."""
         return row in self._found
 
@@ -59,12 +59,12 @@ class Fits:
         far[1:-1] = sure * np.linalg.norm(self._centres[1:-1] - self._between(), axis=2).max(axis=1, initial=0)
         return far
 
-    def leap(self, row: int, pose: Pose) -> float:
+    def leap_of(self, row: int, pose: Pose) -> float:
         """Return how far (m) the joints of an inner row would be from between those before and after, RMS."""
         off = self._joints(pose) - self._between()[row - 1]
         return float(np.sqrt(np.mean(np.sum(off**2, axis=1))))
 
-    def apart(self, row: int, pose: Pose) -> float:
+    def largest_move(self, row: int, pose: Pose) -> float:
         """Return how far (m) a pose moves the joint of a row that it moves most."""
         return float(np.linalg.norm(self._joints(pose) - self._centres[row], axis=1).max())
 
@@ -78,7 +78,7 @@ class Fits:
         moments = tuple(self._moment(earlier) for earlier in range(max(0, row - REMEMBERED), row))
         return Past(moments=moments, appearance=appearance).believable()
 
-    def take(self, row: int, frame: Frame, result: FrameResult) -> None:
+    def replace_fit(self, row: int, frame: Frame, result: FrameResult) -> None:
         """Let a row stand with another fit."""
         self._centres[row] = self._joints(result.state.estimate.pose)
         cloth = {"cloth": result.state.cloth.vertices}
@@ -94,7 +94,7 @@ class Fits:
             for name in array_fields(Track)
             if name not in KEPT
         }
-        notes = sorted([*track.notes, *(f"frame {track.frame[row]}: {AGAIN}" for row in found)], key=_frame_of)
+        notes = sorted([*track.notes, *(f"frame {track.frame[row]}: {REFITTED}" for row in found)], key=_frame_of)
         return replace(track, notes=tuple(notes), **changes)
 
     def _later(self) -> F64:

@@ -1,4 +1,4 @@
-"""How well poses agree with what the images surely show, by two measures."""
+"""How well poses agree with trimaps of the images, by two measures: a distance, and areas of mismatch."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from mocapflow.dressing.guards import drape_of
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow.scene import Scene
-from mocapflow_recovery.certain import View
-from mocapflow_recovery.disagreement import distance, floating_area, uncovered_areas
+from mocapflow_recovery.disagreement import chamfer_distance, floating_area, uncovered_areas
+from mocapflow_recovery.trimaps import Trimap
 
-REACH_M = 0.06  # what lies nearer to the other does not stray
+REACH_M = 0.06  # what of person or model lies nearer to the other is no mismatch
 HINT_M = 0.03  # the same, of what is but a hint
 CLOTH_M = 0.2  # what lies so near to the garment may be the garment, wherever it swings
 CAP_M = 0.2  # beyond, it does not matter how far
 FACES = 2600  # of a body that many poses are measured with, about
 
 
-class Stray(NamedTuple):
+class Mismatch(NamedTuple):
     """How much of person and model lie apart, cm²."""
 
     uncovered: float
     floating: float
     cloth: float  # uncovered as well; a limb may hold it there, or it flies
-    near: float  # of the person, without cloth, off the model by `HINT_M` or more
+    hint: float  # of the person, without cloth, off the model by `HINT_M` or more
 
     @property
     def area(self) -> float:
@@ -41,61 +41,61 @@ class Stray(NamedTuple):
         return f"{area:.0f} cm² of the person uncovered{worn}, {self.floating:.0f} cm² of skin in empty space"
 
 
-def stray_of(surface: Surface, scene: Scene, seen: Sequence[View]) -> Stray:
+def mismatch_of(surface: Surface, scene: Scene, trimaps: Sequence[Trimap]) -> Mismatch:
     """Return how much of the person lies off a surface of the scene, and of its skin off the person."""
-    (skin, cloth), (near, _) = 1e4 * uncovered_areas(surface, seen, (REACH_M, HINT_M), CLOTH_M)
-    floating = 1e4 * floating_area(scene.bare(surface), seen, REACH_M)
-    return Stray(uncovered=skin, floating=floating, cloth=cloth, near=near)
+    (skin, cloth), (hint, _) = 1e4 * uncovered_areas(surface, trimaps, (REACH_M, HINT_M), CLOTH_M)
+    floating = 1e4 * floating_area(scene.bare(surface), trimaps, REACH_M)
+    return Mismatch(uncovered=skin, floating=floating, cloth=cloth, hint=hint)
 
 
 class Fit(NamedTuple):
     """A result, and how well it agrees with what the images surely show."""
 
     result: FrameResult
-    stray: Stray
-    apart: float  # see `Judge.apart`
+    mismatch: Mismatch
+    distance: float  # see `Scorer.distances`
 
 
-class Given(NamedTuple):
-    """A pose that was given beforehand, about right: of two that fit alike the one nearer to it is taken."""
+class StartPose(NamedTuple):
+    """A pose that was given as a start, about right: of two that fit alike the one nearer to it is taken."""
 
     pose: Pose
     sd: float  # rad, of its angles
 
-    def strain(self, pose: Pose) -> float:
-        """Return the factor by which a pose counts as farther from the person for being far from the given one."""
+    def penalty(self, pose: Pose) -> float:
+        """Return the factor by which a pose counts as farther from the person for being far from the start."""
         return 1.0 + float(np.sqrt(np.mean(((pose.angles - self.pose.angles) / self.sd) ** 2)))
 
 
-class Judge(NamedTuple):
-    """Measures poses of a coarse body in the garment as it is believed."""
+class Scorer(NamedTuple):
+    """Scores poses of a coarse body, in the garment with some parameters."""
 
     model: ClothedModel  # drapes the garment
     coarse: Scene  # its body has few faces
-    seen: Sequence[View]
+    trimaps: Sequence[Trimap]
     parameters: F64  # of the cloth
     past: Past
-    given: Given | None  # None: nothing was
-    cloth: float  # what a pixel of cloth counts, on either side
+    start: StartPose | None  # None: none was given
+    cloth_weight: float  # of a pixel of cloth, of person and model
 
-    def of(self, result: FrameResult) -> Fit:
-        """Return a result judged by its full surface."""
+    def score(self, result: FrameResult) -> Fit:
+        """Return a result scored by its full surface."""
         pose, surface = result.state.estimate.pose, surface_of(self.model, result)
-        stray = stray_of(surface, self.model.scene, self.seen)
-        return Fit(result, stray, self._apart(pose, surface, self.model.scene))
+        mismatch = mismatch_of(surface, self.model.scene, self.trimaps)
+        return Fit(result, mismatch, self._distance(pose, surface, self.model.scene))
 
-    def apart(self, poses: Sequence[Pose]) -> F64:
-        """Return for each pose (B,) how far surface and person are apart, m per unit of its area, times the strain."""
+    def distances(self, poses: Sequence[Pose]) -> F64:
+        """Return for each pose (B,) the distance of surface and person, m per unit of its area, times the penalty."""
         pairs = zip(poses, self._surfaces(poses), strict=True)
-        return np.array([self._apart(pose, surface, self.coarse) for pose, surface in pairs])
+        return np.array([self._distance(pose, surface, self.coarse) for pose, surface in pairs])
 
-    def stray(self, poses: Sequence[Pose]) -> F64:
-        """Return for each pose (B,) how much of surface and person strays, without cloth, cm²."""
-        return np.array([stray_of(surface, self.coarse, self.seen).area for surface in self._surfaces(poses)])
+    def mismatches(self, poses: Sequence[Pose]) -> F64:
+        """Return for each pose (B,) the mismatch of surface and person, without cloth, cm²."""
+        return np.array([mismatch_of(surface, self.coarse, self.trimaps).area for surface in self._surfaces(poses)])
 
-    def _apart(self, pose: Pose, surface: Surface, scene: Scene) -> float:
-        strain = self.given.strain(pose) if self.given else 1.0
-        return strain * distance(surface, scene.bare(surface), self.seen, CAP_M, self.cloth)
+    def _distance(self, pose: Pose, surface: Surface, scene: Scene) -> float:
+        penalty = self.start.penalty(pose) if self.start else 1.0
+        return penalty * chamfer_distance(surface, scene.bare(surface), self.trimaps, CAP_M, self.cloth_weight)
 
     def _surfaces(self, poses: Sequence[Pose]) -> list[Surface]:
         clothes = drapes(self.model, poses, self.parameters, self.past)
@@ -103,7 +103,7 @@ class Judge(NamedTuple):
 
 
 def surface_of(model: ClothedModel, result: FrameResult) -> Surface:
-    """Return the surface that a result believes in."""
+    """Return the surface of a result."""
     return model.surface(result.state.estimate.pose, result.state.cloth)
 
 
@@ -113,8 +113,8 @@ def drapes(model: ClothedModel, poses: Sequence[Pose], parameters: F64, past: Pa
         return [NO_CLOTH] * len(poses)
     lays = model.draper.touchable(model.scene)[model.scene.body.screw_joint]
     root, angles = np.stack([pose.root for pose in poses]), np.stack([pose.angles for pose in poses])
-    told_apart = np.concatenate([root.reshape(len(poses), -1), angles[:, lays]], axis=1)
-    _, first, same = np.unique(told_apart, axis=0, return_index=True, return_inverse=True)
+    differing = np.concatenate([root.reshape(len(poses), -1), angles[:, lays]], axis=1)
+    _, first, same = np.unique(differing, axis=0, return_index=True, return_inverse=True)
     batch = PoseBatch(root=root[first], angles=angles[first])
     vertices = drape_of(model.draper, batch, np.repeat(parameters[None], len(first), axis=0), past, model.scene)
     return [Cloth(vertices=vertices[row], parameters=parameters) for row in same.ravel()]
