@@ -40,7 +40,7 @@ class Strands:
     skin_weight: F64 = array("N", "L", 5, unit="1")
     beside: I32 = array("N", "L", unit="strand linked on its left-hand side in this row, or -1")
     ring_length: F64 = array("N", "L", unit="m, of that link")
-    rides: bool  # most strands lie on the limb that carries them, as trouser legs do; else they hang free, as skirts do
+    skinned: bool  # most strands move with the skin under them, as trouser legs do; else they hang free, as skirts do
 
     @cached_property
     def own(self) -> Bool:
@@ -86,8 +86,8 @@ def strands_of(garment: GarmentMesh, body: Body) -> Strands:
     beside, ring_length = _beside(garment, vertex, own)
     carrier = garment.carried_by[vertex[:, -1]]
     under = np.asarray(cKDTree(body.vertices).query(rows)[1], np.int32)
-    rides = bool(np.mean(_limbs(body.parents)[carrier, body.main_joint[under[:, -1]]]) > 0.5)
-    facing = _from_middle(rows, beside) if rides else _along(garment.name, rows)
+    skinned = bool(np.mean(_limbs(body.parents)[carrier, body.main_joint[under[:, -1]]]) > 0.5)
+    facing = _from_middle(rows, beside) if skinned else _along(garment.name, rows)
     return Strands(
         vertex=vertex,
         first=first,
@@ -100,7 +100,7 @@ def strands_of(garment: GarmentMesh, body: Body) -> Strands:
         azimuth=np.arctan2(facing[:, 1], facing[:, 0]),
         carrier=carrier,
         limb=body.main_joint[under[:, vertex.shape[1] // 3]],
-        rides=rides,
+        skinned=skinned,
         tail=garment.carried_by[vertex] == carrier[:, None],
         skin_joint=body.skin_joint[under],
         skin_weight=body.skin_weight[under],

@@ -1,4 +1,4 @@
-"""Cloth that hangs from a limb sinks there while its rings close, so that the limb stays inside them (numba).
+"""Cloth that hangs from a limb relaxes while its rings close, so that the limb stays inside them (numba).
 
 Fallen by itself, a strand beside a raised thigh hangs straight down, and its ring would be drawn together next to the
 leg, or across it. So bars begin near the direction in which the limb carries them and turn down from sweep to sweep.
@@ -11,7 +11,7 @@ import math
 
 import numba
 
-from mocapflow_draping.pushes import place
+from mocapflow_draping.collisions import place
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -42,7 +42,7 @@ def hold(grid, limb, links, first, last, row, most, target, left):  # type: igno
 
 
 @numba.njit(cache=True, error_model="numpy")
-def sink(grid, links, row, target, left, turns):  # type: ignore[no-untyped-def]
+def relax(grid, links, row, target, left, turns):  # type: ignore[no-untyped-def]
     """Turn the bars of a row that were held towards their `target` (N, 3), by one of so many turns."""
     for n in range(len(grid)):
         if left[n] > 0.0:

@@ -1,4 +1,4 @@
-"""The directions in which strands stand before they fall and to which winds turn them, and strands that ride."""
+"""The directions in which strands stand before they fall and to which winds turn them, and skinned strands."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def along_limbs(strands: Strands, chain: F64) -> F64:
     return along
 
 
-def blown(facing: F64, out: F64, aside: F64) -> tuple[F64, F64, F64]:
+def wind_turns(facing: F64, out: F64, aside: F64) -> tuple[F64, F64, F64]:
     """Return how hanging tails are turned: the plane of each turn, two unit directions (B, N, 3), and its angle.
 
     Args:
@@ -62,7 +62,7 @@ def tilted(down: F64, facing: F64, out: F64, aside: F64) -> F64:
     return turned
 
 
-def riding(strands: Strands, chain: F64, links: F64, out: F64, aside: F64) -> F64:
+def skinned_strands(strands: Strands, chain: F64, links: F64, out: F64, aside: F64) -> F64:
     """Return strands (B, N, L, 3) m carried along by the skin under them, their tails tilted, lengths kept.
 
     Args:
@@ -83,9 +83,9 @@ def riding(strands: Strands, chain: F64, links: F64, out: F64, aside: F64) -> F6
 
 def standing(strands: Strands, chain: F64, links: F64) -> F64:
     """Return strands (B, N, L, 3) m before they fall: level, or where a limb has carried them."""
-    if strands.rides:
+    if strands.skinned:
         still = np.zeros((len(chain), len(strands.facing)))
-        return riding(strands, chain, links, still, still)
+        return skinned_strands(strands, chain, links, still, still)
     reach = np.concatenate([np.zeros((*links.shape[:2], 1)), np.cumsum(links, axis=2)], axis=2)
     grid: F64 = roots(strands, chain)[:, :, None] + reach[..., None] * standing_out(strands, chain)[:, :, None]
     return grid

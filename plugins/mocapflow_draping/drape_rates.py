@@ -1,4 +1,4 @@
-"""How a drape moves: the rates of its particles through each step of draping, contacts held as they are (numba).
+"""Rates of a drape: how its particles move through each step of draping, contacts held as they are (numba).
 
 Rates are per column of unknowns, (..., 3, S), columns side by side for the processor's wide registers. A particle that
 touches a part of the body goes along its normal as that part does, and is free to slide.
@@ -30,7 +30,7 @@ class Motion(NamedTuple):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def follow_swing(  # type: ignore[no-untyped-def]
+def swing_rates(  # type: ignore[no-untyped-def]
     grid, held, facing, down, roots, facing_rate, down_rate, links, first, last, parts, values, part_rate, skin_rate,
     stretch_rate, rate,
 ):  # fmt: skip
@@ -90,7 +90,7 @@ def follow_swing(  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, error_model="numpy", forceinline=True)
-def follow_move(rate, n, row, amount, towards):  # type: ignore[no-untyped-def]
+def add_rates(rate, n, row, amount, towards):  # type: ignore[no-untyped-def]
     """Add amounts (S,) along a direction to the rates of a particle."""
     for a in range(3):
         for s in range(len(amount)):
@@ -111,7 +111,7 @@ def contact_lag(normal, p, rate, part_rate, skin_rate):  # type: ignore[no-untyp
 
 
 @numba.njit(cache=True, error_model="numpy", forceinline=True)
-def follow_length(rate, n, row, bar, link, stretch_rate):  # type: ignore[no-untyped-def]
+def length_rates(rate, n, row, bar, link, stretch_rate):  # type: ignore[no-untyped-def]
     """Change the rates of a bar's lower end, in `row`, as the bar from the row above is brought to its length."""
     dx, dy, dz = bar
     r = max(math.sqrt(dx * dx + dy * dy + dz * dz), 1e-9)
@@ -126,7 +126,7 @@ def follow_length(rate, n, row, bar, link, stretch_rate):  # type: ignore[no-unt
 
 
 @numba.njit(cache=True, error_model="numpy", forceinline=True)
-def follow_draw(rate, n, m, row, way, share, most, here, there):  # type: ignore[no-untyped-def]
+def pull_rates(rate, n, m, row, way, share, most, here, there):  # type: ignore[no-untyped-def]
     """Change the rates of two particles that are drawn together by a share of the way between them.
 
     Args:

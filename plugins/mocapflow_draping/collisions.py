@@ -1,7 +1,7 @@
-"""Out of the body: particles at the ends of their bars, and links whose middle a limb has come through (numba).
+"""Collisions resolved: particles inside the body, and links whose middle a limb has come through, move out (numba).
 
-`seen` (N, 3) m is where each strand was measured last and `room` (N,) m how far from contact it was there, below
-zero where it was inside: within that room nothing is measured anew. What is called for every particle is inlined:
+`probe` (N, 3) m is where each strand was measured last and `gap` (N,) m how far from contact it was there, below
+zero where it was inside: nearer to it nothing is measured anew. What is called for every particle is inlined:
 handing an array on counts its owners, atomically, which costs as much as a voxel read.
 """
 
@@ -13,7 +13,7 @@ import numba
 import numpy as np
 
 from mocapflow_draping.distance import body_distance, outwards
-from mocapflow_draping.following import contact_lag, follow_length, follow_move
+from mocapflow_draping.drape_rates import add_rates, contact_lag, length_rates
 
 CLEAR = 2e-4  # m beyond contact to which a particle is pushed, so that it need not be pushed again at once
 LIES = 0.003  # m, so near to contact a particle lies on the body
@@ -51,7 +51,7 @@ def free_roots(grid, first, last, parts, values, motion):  # type: ignore[no-unt
                 for row in range(first[n], last[n] + 1):
                     move(grid[b], n, row, CLEAR - d, out)
                     if motion is not None:
-                        follow_move(motion.rate, n, row, amount, out)
+                        add_rates(motion.rate, n, row, amount, out)
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -69,35 +69,35 @@ def free_strands(grid, links, first, last, skin, parts, values):  # type: ignore
     """
     bodies, strands = grid.shape[:2]
     for b in range(bodies):
-        seen, room, near = grid[b, :, 0].copy(), np.full(strands, -1.0), np.zeros(strands, np.int64)
+        probe, gap, near = grid[b, :, 0].copy(), np.full(strands, -1.0), np.zeros(strands, np.int64)
         for n in range(strands):
             before = grid[b, n].copy()
             for row in range(first[n] + 1, last[n] + 1):
                 grid[b, n, row] = grid[b, n, row - 1] + before[row] - before[row - 1]
-                push_out(grid[b], n, row, links[b, n, row - 1], skin[b], seen, room, near, parts[b], values, None)
+                push_out(grid[b], n, row, links[b, n, row - 1], skin[b], probe, gap, near, parts[b], values, None)
 
 
 @numba.njit(cache=True, error_model="numpy", forceinline=True)
-def push_out(grid, n, row, link, skin, seen, room, near, parts, values, motion):  # type: ignore[no-untyped-def]
+def push_out(grid, n, row, link, skin, probe, gap, near, parts, values, motion):  # type: ignore[no-untyped-def]
     """Move a particle that may be inside the body out of it, at the length of its bar."""
     for _ in range(PUSHES):
-        if within(place(grid, n, row), n, seen, room):
+        if within(place(grid, n, row), n, probe, gap):
             return
-        _measure(grid, n, row, skin, seen, room, near, parts, values)
-        if room[n] >= 0.0:
+        _measure(grid, n, row, skin, probe, gap, near, parts, values)
+        if gap[n] >= 0.0:
             return
         p = place(grid, n, row)
         out = outwards(p[0], p[1], p[2], near[n], parts, values)
         if motion is not None:
             amount = contact_lag(out, p, motion.rate[n, row], motion.part_rate[near[n]], motion.skin_rate)
-            follow_move(motion.rate, n, row, amount, out)
-        move(grid, n, row, CLEAR - room[n], out)
+            add_rates(motion.rate, n, row, amount, out)
+        move(grid, n, row, CLEAR - gap[n], out)
         to_length(grid, n, row, link, motion)
-    _stand_off(grid, n, row, link, skin, seen, room, near, parts, values, motion)
+    _stand_off(grid, n, row, link, skin, probe, gap, near, parts, values, motion)
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _stand_off(grid, n, row, link, skin, seen, room, near, parts, values, motion):  # type: ignore[no-untyped-def]
+def _stand_off(grid, n, row, link, skin, probe, gap, near, parts, values, motion):  # type: ignore[no-untyped-def]
     """Turn a bar that pushing did not free towards straight out of the body above, until it is free."""
     x, y, z = place(grid, n, row - 1)
     part = body_distance(x, y, z, near[n], parts, values)[1]
@@ -110,16 +110,16 @@ def _stand_off(grid, n, row, link, skin, seen, room, near, parts, values, motion
         grid[n, row, 1] = y + link * ((1.0 - w) * uy + w * gy)
         grid[n, row, 2] = z + link * ((1.0 - w) * uz + w * gz)
         to_length(grid, n, row, link, motion)  # its own turn is not followed: it ends where the skin lets it
-        _measure(grid, n, row, skin, seen, room, near, parts, values)
-        if room[n] >= 0.0:
+        _measure(grid, n, row, skin, probe, gap, near, parts, values)
+        if gap[n] >= 0.0:
             return
 
 
 @numba.njit(cache=True, error_model="numpy")
-def lift(grid, first, last, beside, row, seen, room, near, between, clear, parts, values, motion):  # type: ignore[no-untyped-def]
+def lift(grid, first, last, beside, row, probe, gap, near, mid_probe, mid_gap, parts, values, motion):  # type: ignore[no-untyped-def]
     """Move both ends of a link out of the body where its middle is inside: no limb shall come between them.
 
-    `between` (N, 3) m is where each middle was measured last, `clear` (N,) m how far from the body it was there.
+    `mid_probe` (N, 3) m is where each middle was measured last, `mid_gap` (N,) m how far from the body it was there.
     """
     for n in range(grid.shape[0]):
         m = beside[n, row]
@@ -128,19 +128,19 @@ def lift(grid, first, last, beside, row, seen, room, near, between, clear, parts
         px, py, pz = place(grid, n, row)
         qx, qy, qz = place(grid, m, row)
         middle = 0.5 * (px + qx), 0.5 * (py + qy), 0.5 * (pz + qz)
-        if within(middle, n, between, clear) or within(middle, n, seen, room) or within(middle, m, seen, room):
+        if within(middle, n, mid_probe, mid_gap) or within(middle, n, probe, gap) or within(middle, m, probe, gap):
             continue
         d, part = body_distance(middle[0], middle[1], middle[2], near[n], parts, values)
-        clear[n], between[n, 0], between[n, 1], between[n, 2] = d, middle[0], middle[1], middle[2]
+        mid_gap[n], mid_probe[n, 0], mid_probe[n, 1], mid_probe[n, 2] = d, middle[0], middle[1], middle[2]
         if d < 0.0:
             out = outwards(middle[0], middle[1], middle[2], part, parts, values)
             if motion is not None:
                 between_them = 0.5 * (motion.rate[n, row] + motion.rate[m, row])
                 amount = contact_lag(out, middle, between_them, motion.part_rate[part], 0.0 * motion.skin_rate)
                 if row > first[n]:
-                    follow_move(motion.rate, n, row, amount, out)
+                    add_rates(motion.rate, n, row, amount, out)
                 if row > first[m]:
-                    follow_move(motion.rate, m, row, amount, out)
+                    add_rates(motion.rate, m, row, amount, out)
             if row > first[n]:
                 move(grid, n, row, CLEAR - d, out)
             if row > first[m]:
@@ -148,9 +148,9 @@ def lift(grid, first, last, beside, row, seen, room, near, between, clear, parts
 
 
 @numba.njit(cache=True, error_model="numpy", forceinline=True)
-def supported(grid, n, row, room, near, parts, values):  # type: ignore[no-untyped-def]
+def supported(grid, n, row, gap, near, parts, values):  # type: ignore[no-untyped-def]
     """Return how well (0 to 1) the body under a particle keeps it from falling."""
-    if room[n] >= LIES:
+    if gap[n] >= LIES:
         return 0.0
     p = place(grid, n, row)
     return min(max(outwards(p[0], p[1], p[2], near[n], parts, values)[2] / LEVEL, 0.0), 1.0)
@@ -162,7 +162,7 @@ def to_length(grid, n, row, link, motion):  # type: ignore[no-untyped-def]
     x, y, z = place(grid, n, row - 1)
     dx, dy, dz = grid[n, row, 0] - x, grid[n, row, 1] - y, grid[n, row, 2] - z
     if motion is not None:
-        follow_length(motion.rate, n, row, (dx, dy, dz), link, motion.stretch_rate)
+        length_rates(motion.rate, n, row, (dx, dy, dz), link, motion.stretch_rate)
     scale = link / max(math.sqrt(dx * dx + dy * dy + dz * dz), 1e-9)
     grid[n, row, 0], grid[n, row, 1], grid[n, row, 2] = x + scale * dx, y + scale * dy, z + scale * dz
 
@@ -182,20 +182,20 @@ def move(grid, n, row, amount, towards):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, error_model="numpy", forceinline=True)
-def square(p, n, seen):  # type: ignore[no-untyped-def]
+def square(p, n, probe):  # type: ignore[no-untyped-def]
     """Return the squared distance of a point from where strand n was measured."""
-    dx, dy, dz = p[0] - seen[n, 0], p[1] - seen[n, 1], p[2] - seen[n, 2]
+    dx, dy, dz = p[0] - probe[n, 0], p[1] - probe[n, 1], p[2] - probe[n, 2]
     return dx * dx + dy * dy + dz * dz
 
 
 @numba.njit(cache=True, error_model="numpy", forceinline=True)
-def within(p, n, seen, room):  # type: ignore[no-untyped-def]
-    """Return whether a point is surely clear: no farther from where strand n was measured than it had room there."""
-    return room[n] >= 0.0 and room[n] * room[n] >= square(p, n, seen)
+def within(p, n, probe, gap):  # type: ignore[no-untyped-def]
+    """Return whether a point is surely clear: no farther from where strand n was measured than its gap there."""
+    return gap[n] >= 0.0 and gap[n] * gap[n] >= square(p, n, probe)
 
 
 @numba.njit(cache=True, error_model="numpy", forceinline=True)
-def _measure(grid, n, row, skin, seen, room, near, parts, values):  # type: ignore[no-untyped-def]
+def _measure(grid, n, row, skin, probe, gap, near, parts, values):  # type: ignore[no-untyped-def]
     x, y, z = place(grid, n, row)
     d, near[n] = body_distance(x, y, z, near[n], parts, values)
-    room[n], seen[n, 0], seen[n, 1], seen[n, 2] = d - skin, x, y, z
+    gap[n], probe[n, 0], probe[n, 1], probe[n, 2] = d - skin, x, y, z

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from drape_bodies import SKIN, SKIRT, draper, leg_poses, legs, lying_cylinder, prepared, skirted
-from mocapflow_draping.frames import along_limbs, standing_out
-from mocapflow_draping.pushes import LEVEL, supported
-from mocapflow_draping.sinking import hold, sink
+from mocapflow_draping.collisions import LEVEL, supported
+from mocapflow_draping.directions import along_limbs, standing_out
+from mocapflow_draping.relaxation import hold, relax
 from mocapflow_garments.skirt import Skirt
 from scipy.spatial.transform import Rotation
 
@@ -35,7 +35,7 @@ def test_a_bar_stands_near_its_limb_and_sinks_to_where_it_hung(near):
     np.testing.assert_allclose([bar @ FORWARD, bar @ DOWN], [np.cos(np.radians(near)), np.sin(np.radians(near))])
     np.testing.assert_allclose(left, np.radians(90 - near))
     for turn in range(TURNS):
-        sink(grid, links, 1, target, left, TURNS)
+        relax(grid, links, 1, target, left, TURNS)
         angle = np.arctan2(*((grid[0, 1] - grid[0, 0]) @ np.stack([FORWARD, DOWN], axis=1)))
         np.testing.assert_allclose(angle, left[0] * (1 - (turn + 1) / TURNS), atol=1e-7)
     np.testing.assert_allclose(grid, hung, atol=1e-8)
@@ -45,7 +45,7 @@ def test_a_bar_that_hangs_near_its_limb_stays():
     grid, links, first, last = one_bar()
     hung, left = grid.copy(), np.ones(1)
     assert not hold(grid, DOWN[None], links, first, last, 1, np.radians(45), np.zeros((1, 3)), left)
-    sink(grid, links, 1, np.zeros((1, 3)), left, TURNS)
+    relax(grid, links, 1, np.zeros((1, 3)), left, TURNS)
     np.testing.assert_array_equal(grid, hung)
     np.testing.assert_array_equal(left, 0)
 

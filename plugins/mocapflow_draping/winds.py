@@ -17,7 +17,7 @@ SAME = 1.0 - 1e-12  # cosine between directions that are the same
 
 
 @numba.njit(cache=True, error_model="numpy")
-def blow_batch(  # type: ignore[no-untyped-def]
+def wind_batch(  # type: ignore[no-untyped-def]
     source, back, towards, amount, skin, links, pivot, last, parts, values, fallen, lying, grid, held
 ):
     """Turn the hanging tails of D fallen drapes by B winds until they reach a direction or lie.
@@ -44,7 +44,7 @@ def blow_batch(  # type: ignore[no-untyped-def]
     Source: Rosenhahn 2008, section 12.3
     """
     many, rows = len(source), links.shape[2] + 1  # the last row of what is known of tails: as they hang
-    room, near = np.empty((many + 1, rows)), np.zeros((many + 1, rows), np.int64)
+    gap, near = np.empty((many + 1, rows)), np.zeros((many + 1, rows), np.int64)
     # as in `fall_batch`: `swing` is compiled for each kind of integer
     fresh, ended = np.ones((many + 1, rows), np.bool_), np.empty(many + 1, np.int32)
     for n in range(len(last)):
@@ -55,7 +55,7 @@ def blow_batch(  # type: ignore[no-untyped-def]
                 grid[b, n], held[b, n] = fallen[d, n], lying[d, n]
                 continue
             if measured != d:
-                _measure(pivot[d, n], last[n], fallen[d, n], skin[d], parts[d], values, room[many], near[many])
+                _measure(pivot[d, n], last[n], fallen[d, n], skin[d], parts[d], values, gap[many], near[many])
                 measured, ended[many] = d, pivot[d, n]
             a = _weaker(b, n, source, towards, amount)
             if a == many:
@@ -63,10 +63,10 @@ def blow_batch(  # type: ignore[no-untyped-def]
             else:
                 grid[b, n], held[b, n] = grid[a, n], held[a, n]
                 angle -= amount[a, n]
-            room[b], near[b], fresh[b] = room[a], near[a], fresh[a]
+            gap[b], near[b], fresh[b] = gap[a], near[a], fresh[a]
             ended[b] = swing(
                 ended[a], back[b, n], towards[b, n], angle, skin[d], links[d, n], last[n], parts[d], values,
-                grid[b, n], held[b, n], room[b], near[b], fresh[b],
+                grid[b, n], held[b, n], gap[b], near[b], fresh[b],
             )  # fmt: skip
 
 
@@ -83,10 +83,10 @@ def _weaker(b, n, source, towards, amount):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _measure(pivot, last, strand, skin, parts, values, room, near):  # type: ignore[no-untyped-def]
+def _measure(pivot, last, strand, skin, parts, values, gap, near):  # type: ignore[no-untyped-def]
     """Write how far each particle of a tail is from contact, and the part that it is nearest to."""
     part = 0
     for k in range(pivot + 1, last + 1):
         p = strand[k]
         distance, part = body_distance(p[0], p[1], p[2], part, parts, values)
-        room[k], near[k] = distance - skin, part
+        gap[k], near[k] = distance - skin, part

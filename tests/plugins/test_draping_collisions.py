@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from drape_bodies import EYE, SKIN, lying_cylinder, prepared
-from mocapflow_draping.following import Motion
-from mocapflow_draping.pushes import CLEAR, free_roots, free_strands
+from mocapflow_draping.collisions import CLEAR, free_roots, free_strands
+from mocapflow_draping.drape_rates import Motion
 
 RADIUS = 0.05
 FIRST, LAST = np.array([0, 1], np.int32), np.array([3, 3], np.int32)
