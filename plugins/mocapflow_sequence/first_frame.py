@@ -14,7 +14,7 @@ from mocapflow.geometry.cameras import magnification
 from mocapflow.geometry.silhouettes import covered, distance_to
 from mocapflow.records import F32, F64, U8, Bool
 from mocapflow_sequence.colours import DEEP, Colours, alike, every, lab_bins, more_common, shaded
-from mocapflow_sequence.commonest import commonest
+from mocapflow_sequence.dominant_colours import dominant_colours
 
 LEAST_SHARE = 0.06  # of the pictures that has to show a colour
 COLOURS = 4  # of each pixel that are looked at: the room's, of who stands there, of shadows
@@ -51,7 +51,7 @@ class Evidence(NamedTuple):
 
 
 def empty_scene(pictures: U8, first: U8, body: Surface, camera: Camera) -> Learnt:
-    """Return one view of the empty scene: of the commonest colours of each pixel the first that is the room's.
+    """Return one view of the empty scene: of the dominant colours of each pixel the first that is the room's.
 
     Away from the body as believed in the first frame, that frame shows the room. Near it a colour is the room's if it
     is more common beside the body than on it.
@@ -62,7 +62,7 @@ def empty_scene(pictures: U8, first: U8, body: Surface, camera: Camera) -> Learn
         body: the person as believed in it.
         camera: the view.
     """
-    colours, now = commonest(pictures, COLOURS), lab_bins(first)
+    colours, now = dominant_colours(pictures, COLOURS), lab_bins(first)
     usual = np.median(colours[0].spread, axis=(0, 1))
     shown = _shown(first, usual)
     person, away_m = _about(body, camera)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mocapflow_robustness import knocked
+from mocapflow_robustness import knock_detection
 from mocapflow_robustness.check_views import CheckViews
 from mocapflow_robustness.corrupt import Corrupt
 from mocapflow_robustness.events import Event
@@ -64,7 +64,7 @@ def test_the_frame_and_the_turn_are_found(demo, caplog, first, degrees):
 
 @pytest.mark.long
 def test_a_camera_that_swings_and_is_put_back(demo, monkeypatch):
-    monkeypatch.setattr(knocked, "EVERY_S", 0.5)
+    monkeypatch.setattr(knock_detection, "EVERY_S", 0.5)
     told = found(demo, (20, 1.2), (22, 0.6), (23, -0.3), (40, 0.0))
     assert [(frame, camera) for frame, camera, _ in told] == [(20, 1), (22, 1), (23, 1), (40, 1)]
     assert max(off for *_, off in told) < 0.3

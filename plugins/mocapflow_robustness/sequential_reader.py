@@ -9,7 +9,7 @@ from mocapflow.data import Frame
 from mocapflow.recordings.recording import Recording
 
 
-class Tape:
+class SequentialReader:
     """The pictures of one camera, wound forward as they are asked for: one at a time is held."""
 
     def __init__(self, recording: Recording) -> None:

@@ -10,7 +10,7 @@ from mocapflow.records import U8, Bool
 from mocapflow_robustness.events import Event
 
 
-def masks(events: Sequence[Event | None], images: Sequence[U8]) -> tuple[Bool, ...]:
+def occlusion_masks(events: Sequence[Event | None], images: Sequence[U8]) -> tuple[Bool, ...]:
     """Return where pictures (H, W, 3) are covered, (H, W) each; nothing where none is."""
     if not any(event is not None and event.what == "covered" for event in events):
         return ()
@@ -21,7 +21,7 @@ def masks(events: Sequence[Event | None], images: Sequence[U8]) -> tuple[Bool, .
     return tuple(hidden)
 
 
-def together(before: Sequence[Bool], now: Sequence[Bool]) -> tuple[Bool, ...]:
+def union(before: Sequence[Bool], now: Sequence[Bool]) -> tuple[Bool, ...]:
     """Return where the scene is hidden in each view (H, W): where it was before, or is now; () for nowhere."""
     if not before or not now:
         return tuple(before or now)

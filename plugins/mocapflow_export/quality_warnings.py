@@ -1,4 +1,4 @@
-"""What of a whole track should make its user look twice."""
+"""Warnings about a whole track: what should make its user look twice."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ POOR = 0.7  # median overlap of all views below which the model is not where the
 WORST, USUAL = 0.8, 0.86
 
 
-def misgivings(track: Track, cameras: Sequence[str]) -> list[str]:
+def quality_warnings(track: Track, cameras: Sequence[str]) -> list[str]:
     """Return in words what to look at: frames that are guesses, views that show something else than the model."""
     count, lost = len(track.frame), int(track.lost.sum())
     said = [f"{lost} of {count} frames are lost: their pose is a guess"] if lost else []

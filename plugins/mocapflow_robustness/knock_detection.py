@@ -21,7 +21,7 @@ Moved = tuple[int, F64]  # frame from which on, and how pixels (3, 3) of the fir
 
 
 @dataclass
-class Probes:
+class KnockDetector:
     """What some frames tell about how the cameras stand, while all frames of a recording are read."""
 
     recording: Recording

@@ -1,4 +1,4 @@
-"""Our side of a comparison: angles and joint centres of a track, or of the files of a run folder."""
+"""The tracked side of a comparison: angles and joint centres of a track, or of the files of a run folder."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SIGNED = ("knee_angle_l", "knee_angle_r")  # of angles.mot: about the axis of th
 
 
 @record
-class Ours:
+class TrackedMotion:
     """What is compared with a reference."""
 
     columns: Mapping[str, F64]  # of angles.csv, and the signed angles of the knees
@@ -37,16 +37,16 @@ class Ours:
         return frame_rate_of(self.columns["time"])
 
 
-def of_track(track: Track, scene: Scene) -> Ours:
+def of_track(track: Track, scene: Scene) -> TrackedMotion:
     """Return what a track has."""
     places = kinematics.joint_centres(scene.body, track.root, track.angles)
     columns, raw = (_columns(each, scene) for each in (track, track.before_smoothing))
     flagged = track.lost | track.doubted | ~track.steady
     stick = Stick(names=scene.body.joint_names, places=places)
-    return Ours(columns=columns, raw=raw, stick=stick, flagged_share=float(np.mean(flagged)))
+    return TrackedMotion(columns=columns, raw=raw, stick=stick, flagged_share=float(np.mean(flagged)))
 
 
-def of_folder(folder: Path) -> Ours:
+def of_folder(folder: Path) -> TrackedMotion:
     """Return what the files of a run folder have.
 
     Raises:
@@ -59,7 +59,7 @@ def of_folder(folder: Path) -> Ours:
     columns = read_columns(path)
     raw = folder / layout.RAW_ANGLES
     motion = markers.read_mot(folder / layout.MOTION)[0] if (folder / layout.MOTION).is_file() else {}
-    return Ours(
+    return TrackedMotion(
         columns=columns | {name: motion[name] for name in SIGNED if name in motion},
         raw=read_columns(raw) if raw.is_file() else columns,
         stick=_stick(folder / layout.JOINTS, len(columns["frame"])),

@@ -1,4 +1,4 @@
-"""The commonest colours of every pixel over pictures of a camera that stands still."""
+"""The dominant colours of every pixel over pictures of a camera that stands still."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ SAME = 4.0  # standard deviations of the noise within which a pixel has the same
 LEAST_SAME = 6.0  # grey levels: compressed pictures differ by so much where nothing moves
 
 
-def commonest(pictures: U8, count: int) -> list[Colours]:
-    """Return the commonest colours of each pixel, the commonest first.
+def dominant_colours(pictures: U8, count: int) -> list[Colours]:
+    """Return the dominant colours of each pixel, the most common first.
 
     Args:
         pictures: (N, H, W, 3), of one camera; what moves covers each pixel in some of them only.
@@ -24,7 +24,7 @@ def commonest(pictures: U8, count: int) -> list[Colours]:
     shape = (count, *pictures.shape[1:])
     mean, spread = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
     share = np.zeros(shape[:3], np.float32)
-    _commonest(pictures, within, mean, spread, share)
+    _dominant_colours(pictures, within, mean, spread, share)
     spread = np.maximum(spread, np.maximum(np.median(spread[0], axis=(0, 1)), LEAST_SPREAD), dtype=np.float32)
     return [Colours(*view) for view in zip(mean, spread, share, strict=True)]
 
@@ -36,7 +36,7 @@ def noise(pictures: U8) -> F32:
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _commonest(pictures, within, mean, spread, share):  # type: ignore[no-untyped-def]
+def _dominant_colours(pictures, within, mean, spread, share):  # type: ignore[no-untyped-def]
     number, height, width, _ = pictures.shape
     row, left = np.empty((width, number, 3), np.int32), np.empty(number, np.bool_)
     for y in range(height):

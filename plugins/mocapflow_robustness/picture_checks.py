@@ -35,7 +35,7 @@ def lookalike(grey: F32, room: F32) -> tuple[Bool, npt.NDArray[np.intp]]:
     return others.min(axis=-1) < NEARER * own, others.argmin(axis=-1)
 
 
-def peopled(grey: F32, room: F32, good: Bool) -> Bool:
+def shows_person(grey: F32, room: F32, good: Bool) -> Bool:
     """Return (T, C) which thumbnails differ from the empty room (C, S, S): an empty one has no news either.
 
     Args:
@@ -91,7 +91,7 @@ def distance(difference: F32) -> F64:
     return root
 
 
-def bridged(grey: F32, good: Bool) -> F32:
+def interpolated(grey: F32, good: Bool) -> F32:
     """Return thumbnails (T, C, S, S) whose bad ones are interpolated in time, so that they make no steps."""
     filled, rows = grey.copy(), np.arange(len(grey))
     for camera in range(grey.shape[1]):
