@@ -1,4 +1,4 @@
-"""What is said of a frame without a look at it: the state that is believed, and why nobody could look."""
+"""What is known of a frame without a look at it: its predicted state, and why nobody could look."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def enough(frame: Frame) -> int:
     return min(VIEWS, len(frame.usable))
 
 
-def believed(pose: Pose, parameters: F64, cloth: Cloth) -> FrameState:
+def initial_state(pose: Pose, parameters: F64, cloth: Cloth) -> FrameState:
     """Return the state of a frame nobody has looked at."""
     covariance = UNKNOWN * np.eye(6 + len(pose.angles) + len(parameters))
     return FrameState(

@@ -43,9 +43,9 @@ def wind_turns(facing: F64, out: F64, aside: F64) -> tuple[F64, F64, F64]:
     """
     left = np.stack([-facing[..., 1], facing[..., 0], np.zeros_like(out)], axis=-1)
     amount = np.hypot(out, aside)
-    calm = amount == 0.0
-    whole = np.where(calm, 1.0, amount)
-    level = (np.where(calm, 1.0, out) / whole)[..., None] * facing + (aside / whole)[..., None] * left
+    still = amount == 0.0
+    whole = np.where(still, 1.0, amount)
+    level = (np.where(still, 1.0, out) / whole)[..., None] * facing + (aside / whole)[..., None] * left
     sine, cosine = np.sin(amount)[..., None], np.cos(amount)[..., None]
     return sine * DOWN - cosine * level, cosine * DOWN + sine * level, amount
 

@@ -10,8 +10,8 @@ from math import inf
 from typing import Annotated, ClassVar
 
 import numpy as np
-from mocapflow_levelset.layers import garment_told
-from mocapflow_levelset.one_floor import no_shadows
+from mocapflow_levelset.layers import garment_log_ratio
+from mocapflow_levelset.shadow_consistency import no_shadows
 from mocapflow_matching.camouflage import with_feet
 from mocapflow_priors.density import Density, Poses, read
 from mocapflow_priors.parzen import SHIPPED
@@ -171,7 +171,7 @@ class LimbSearch(Recovery):
         assert scene.background is not None
         room = small_room(scene.background, scene.cameras)
         no_shadow = no_shadows(frame, scene.background, scene.cameras)
-        return trimaps(frame, surface, room, NEAR_M, garment_told(past, scene), no_shadow)
+        return trimaps(frame, surface, room, NEAR_M, garment_log_ratio(past, scene), no_shadow)
 
     def _searched(self, index: int, fit: Fit, searches: Searches, trigger: Trigger, settle: Settle) -> FrameResult:
         """Return the result of the best pose that is found, or that of the fit where none is better."""

@@ -97,7 +97,7 @@ class StartFromSilhouettes(Stage):
         others = [value for value, end in zip(off, ends, strict=True) if heading_between(end, best) > OTHERWISE]
         if min(others, default=np.inf) < ALIKE * off.min():
             LOG.warning("silhouettes of the first frame hardly tell which way the person looks: see the overlay")
-        return Start(pose=best, parameters=scene.calm)
+        return Start(pose=best, parameters=scene.neutral_parameters)
 
     def _target(self, recording: Recording, scene: Scene) -> Target:
         frame, background = recording.frame(recording.indices[0]), recording.background()
@@ -115,7 +115,7 @@ class StartFromSilhouettes(Stage):
                 hint="begin where two cameras see all of the person; do plates and videos show the same room?",
             )
         model = ClothedModel(scene=dressed, draper=self.draper)
-        scorer = Scorer(model, coarse, found, scene.calm, Past(), start=None, cloth_weight=HANGING)
+        scorer = Scorer(model, coarse, found, scene.neutral_parameters, Past(), start=None, cloth_weight=HANGING)
         return Target(scorer, meeting([trimap.person for trimap in found], [trimap.camera for trimap in found]))
 
     def _begins(self, target: Target, known: F64, cost: Cost) -> list[Pose]:

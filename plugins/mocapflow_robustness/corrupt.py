@@ -13,7 +13,7 @@ from pydantic import Field, NonNegativeInt, model_validator
 from mocapflow.components import Stage
 from mocapflow.data import Frame
 from mocapflow.errors import RecordingError, alternatives
-from mocapflow.geometry.turned import as_seen
+from mocapflow.geometry.camera_rotation import warped
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import U8
 from mocapflow_robustness import disturbances
@@ -139,7 +139,7 @@ class Corruption:
             return disturbances.covered(image, event.first_covered(len(image)), len(image))
         names = [v.lens.name for v in self.whole.views]
         if event.what == "knocked":
-            return as_seen(image, event.homography(self.whole.cameras[names.index(view)]))[0]
+            return warped(image, event.homography(self.whole.cameras[names.index(view)]))[0]
         camera = (names.index(view) + (event.what == "other_camera")) % len(names)
         reader = readers.setdefault((event, view), SequentialReader(self.whole.seen_by(camera)))
         return fitted(reader.at(event.source(frame.index, self.whole.length)).images[0], image)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from mocapflow.data import Frame
-from mocapflow.geometry.turned import LEAST_PX, shift_px, turn_between
+from mocapflow.geometry.camera_rotation import LEAST_PX, shift_px, turn_between
 from mocapflow.knocks import Knocks
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64, U8, Bool

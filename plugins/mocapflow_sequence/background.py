@@ -39,7 +39,7 @@ class EmptyScene(Stage):
     `samples` pictures of one camera.
 
     Of a floor without colours it learns the height, too, if the person's shadow tells it: then views can tell grey
-    clothes from shadows together (`mocapflow_levelset.one_floor`).
+    clothes from shadows together (`mocapflow_levelset.shadow_consistency`).
     """
 
     name: ClassVar[str] = "background"

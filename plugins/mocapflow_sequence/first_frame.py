@@ -20,7 +20,7 @@ LEAST_SHARE = 0.06  # of the pictures that has to show a colour
 COLOURS = 4  # of each pixel that are looked at: the room's, of who stands there, of shadows
 REACH_M = 0.15  # from the body at the start pose: limbs may be off by so much, and clothes stand off
 AROUND_M = 0.5  # up to where the room beside the person is looked at
-ROUNDS = 2  # first the body as believed is the person, then what differs there from the room that was found
+ROUNDS = 2  # first the body in its start pose is the person, then what differs there from the room that was found
 
 
 class Learnt(NamedTuple):
@@ -53,13 +53,13 @@ class Evidence(NamedTuple):
 def empty_scene(pictures: U8, first: U8, body: Surface, camera: Camera) -> Learnt:
     """Return one view of the empty scene: of the dominant colours of each pixel the first that is the room's.
 
-    Away from the body as believed in the first frame, that frame shows the room. Near it a colour is the room's if it
-    is more common beside the body than on it.
+    Away from the body in its start pose, the first frame shows the room. Near it a colour is the room's if it is more
+    common beside the body than on it.
 
     Args:
         pictures: (N, H, W, 3) BGR, from all over the recording.
         first: (H, W, 3) the first frame.
-        body: the person as believed in it.
+        body: the person in it, in the start pose.
         camera: the view.
     """
     colours, now = dominant_colours(pictures, COLOURS), lab_bins(first)

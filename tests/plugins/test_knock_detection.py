@@ -9,7 +9,7 @@ from mocapflow_robustness.check_views import CheckViews
 from mocapflow_robustness.corrupt import Corrupt
 from mocapflow_robustness.events import Event
 
-from mocapflow.geometry.turned import shift_px
+from mocapflow.geometry.camera_rotation import shift_px
 from mocapflow.recordings.recording import open_recording
 
 DEMO = Path(__file__).parents[2] / "examples" / "data" / "skirt_steps"

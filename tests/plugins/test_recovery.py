@@ -491,7 +491,7 @@ def test_a_leap_ends_far_from_what_was_believed_and_from_what_was_seen(believed,
 @pytest.mark.parametrize("found", [True, False])
 def test_cloth_that_strays_calls_for_a_search_and_is_not_doubted(monkeypatch, found) -> None:
     """A raised knee holds a skirt before itself; or the skirt flies, and there is nothing to find."""
-    monkeypatch.setattr("mocapflow_recovery.limb_search.garment_told", lambda *_: np.full(BINS, 4.0))
+    monkeypatch.setattr("mocapflow_recovery.limb_search.garment_log_ratio", lambda *_: np.full(BINS, 4.0))
     lost, past = pictures.tiny_state(SCENE, astray(0.9), POSE), scenes.tiny_past(SCENE, POSE)
     end, search = POSE if found else astray(0.9), LimbSearch(floating_cm2=1e6)
     model = scenes.tiny_model(SCENE)

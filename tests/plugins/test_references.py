@@ -302,7 +302,6 @@ def tables_of_words(path: Path) -> list[dict[str, str]]:
 
 def test_our_side_from_files_is_that_from_the_track(own: TrackedMotion, tmp_path: Path) -> None:
     angles_only = {n: v for n, v in own.columns.items() if n not in tracked_motion.SIGNED}
-    signed = {n: own.columns[n] for n in tracked_motion.SIGNED}
     tables.write_columns(layout.place(tmp_path, layout.ANGLES), angles_only)
     markers.write_trc(
         layout.place(tmp_path, layout.JOINTS), own.stick.names, markers.opensim_from_world(own.stick.places), RATE

@@ -15,7 +15,7 @@ from results_scene import DEMO, demo_scene, stepping
 from mocapflow.config.pipeline import load_pipeline
 from mocapflow.data import NO_CLOTH, Change, FrameResult, Past, Pose
 from mocapflow.help.shipped import shipped
-from mocapflow.prediction import believed
+from mocapflow.prediction import initial_state
 from mocapflow.recordings.recording import open_recording
 from mocapflow.results import Track
 from mocapflow.series import Series
@@ -40,7 +40,7 @@ def astray(*rows: int, by: float = 0.8) -> Track:
 def fitted(pose: Pose, cost: float = 0.5) -> FrameResult:
     """A result of the loop that costs so much by the pictures; those of the track cost 0.5."""
     return FrameResult(
-        state=believed(pose, np.zeros(0), NO_CLOTH), iterations=1, steady=True, oscillating=False,
+        state=initial_state(pose, np.zeros(0), NO_CLOTH), iterations=1, steady=True, oscillating=False,
         change=Change(body=0.0, cloth=0.0, angles=0.0, sigmas=0.0), overlap=np.full(4, 0.8),
         energy=np.array([[cost, 0.0], [np.nan, np.nan], [np.nan, np.nan]]),
         energy_terms=("cam01.data", "rest_pose"),

@@ -16,7 +16,9 @@ from mocapflow_levelset.layers import CLIP, COLOURS, LEAST, SURELY, UNSEEN, dens
 ROOM = "room"  # of Segmentation.appearance: (C, BINS) pixels beside the person in each view by colour, older ones less
 
 
-def beside(frame: Frame, silhouettes: Sequence[Silhouette], past: Past, keep: float, grid: int, reach_px: int) -> F64:
+def room_histograms(
+    frame: Frame, silhouettes: Sequence[Silhouette], past: Past, keep: float, grid: int, reach_px: int
+) -> F64:
     """Return the colours (C, BINS) of the room near the silhouettes: `keep` of what is known, and those of this frame.
 
     What colours surely say is the person does not count: a limb that was lost must not pass for the room.
@@ -33,13 +35,13 @@ def beside(frame: Frame, silhouettes: Sequence[Silhouette], past: Past, keep: fl
             outside &= ~hidden[crop.top : crop.bottom : grid, crop.left : crop.right : grid]
         colour = bins_of(crop.of(frame.images[number])[::grid, ::grid][outside])
         if known is not None:
-            colour = colour[told(past, number)[colour] < -SURELY]
+            colour = colour[person_log_ratio(past, number)[colour] < -SURELY]
         counts[number] += np.bincount(colour, minlength=BINS)
     return counts
 
 
 @memoised
-def told(past: Past, camera: int) -> F32:
+def person_log_ratio(past: Past, camera: int) -> F32:
     """Return the log density (BINS,) of colours on the person over that in a view of the room, bounded; 0: unknown."""
     counts = np.stack([past.appearance[COLOURS].sum(axis=0), past.appearance[ROOM][camera]])
     if (counts.sum(axis=1) < LEAST).any():

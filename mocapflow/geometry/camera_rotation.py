@@ -7,7 +7,7 @@ from typing import TypeVar
 import numpy as np
 
 from mocapflow.assets import Camera
-from mocapflow.geometry.following import LucasKanade, followed
+from mocapflow.geometry.point_tracking import LucasKanade, track_points
 from mocapflow.records import F32, F64, U8, Bool
 
 Picture = TypeVar("Picture", U8, F32)
@@ -43,7 +43,7 @@ def turn_between(before: U8, after: U8, shown: Bool, camera: Camera) -> F64 | No
         return None
     here, there = here[inner], there[inner]
     turn = _fitted(here, there, camera)
-    explained = points_seen(here, turn)
+    explained = warped_points(here, turn)
     clear_px = max(LEAST_PX, CLEAR * _rms(there - explained))
     return turn if _rms(explained - here) >= clear_px else np.eye(3)
 
@@ -61,10 +61,10 @@ def shift_px(turn: F64, camera: Camera) -> float:
     """Return how far the middle of a side of the picture moves at most, if pixels move by a homography (3, 3)."""
     width, height = camera.size
     middles = np.array([[0, height / 2], [width, height / 2], [width / 2, 0], [width / 2, height]])
-    return float(np.linalg.norm(points_seen(middles, turn) - middles, axis=1).max())
+    return float(np.linalg.norm(warped_points(middles, turn) - middles, axis=1).max())
 
 
-def as_seen(picture: Picture, turn: F64) -> tuple[Picture, Bool]:
+def warped(picture: Picture, turn: F64) -> tuple[Picture, Bool]:
     """Return what a camera that has turned sees of a picture (H, W or H, W, 3), and where (H, W) that is known."""
     import cv2
 
@@ -75,7 +75,7 @@ def as_seen(picture: Picture, turn: F64) -> tuple[Picture, Bool]:
     return np.clip(moved, 0, 255).astype(picture.dtype), np.asarray(known)
 
 
-def points_seen(points: F64, turn: F64) -> F64:
+def warped_points(points: F64, turn: F64) -> F64:
     """Return points (..., 2 or more: px, px and what stays) of a picture where a camera that has turned sees them."""
     seen, pixels = points.copy(), np.concatenate([points[..., :2], np.ones_like(points[..., :1])], axis=-1) @ turn.T
     seen[..., :2] = pixels[..., :2] / pixels[..., 2:]
@@ -91,7 +91,7 @@ def _fitted(here: F64, there: F64, camera: Camera) -> F64:
         return homography(Rotation.from_rotvec(parameters[:3]).as_matrix(), camera, parameters[3])
 
     def off(parameters: F64) -> F64:
-        return np.ravel(points_seen(here, motion(parameters)) - there)
+        return np.ravel(warped_points(here, motion(parameters)) - there)
 
     return motion(least_squares(off, np.array([0.0, 0.0, 0.0, 1.0]), method="lm").x)
 
@@ -114,5 +114,5 @@ def _followed_corners(before: U8, after: U8, shown: Bool) -> tuple[F32, F32]:
     if corners is None:
         return np.zeros((0, 2), np.float32), np.zeros((0, 2), np.float32)
     start = np.asarray(corners[:, 0], np.float32)
-    there, kept = followed(before, after, start, STEPS)
+    there, kept = track_points(before, after, start, STEPS)
     return start[kept], there[kept]

@@ -8,7 +8,7 @@ from types import ModuleType
 import pytest
 
 from mocapflow.observers import LOG
-from mocapflow.running.warned import warnings_logged
+from mocapflow.running.warning_log import warnings_logged
 from tests.fixtures.stores import PLUGIN, run_tiny, write_pipeline, write_recording
 
 

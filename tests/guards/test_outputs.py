@@ -1,4 +1,4 @@
-"""What components answer is looked at: a wrong answer names who gave it, and nothing wrong goes on."""
+"""What components return is checked: what is wrong names who returned it, and nothing wrong goes on."""
 
 import pickle
 from dataclasses import replace
@@ -14,10 +14,10 @@ from mocapflow.data import NO_CLOTH, Matches, Past, Pose, Residual, Turn
 from mocapflow.dressing.guards import body_of, mesh_of
 from mocapflow.dressing.roles import BodyModel, Draper, Garment
 from mocapflow.errors import MocapflowError
-from mocapflow.guards.answers import cloth_of, estimate_of, matches_of, pose_of, residual_of, result_of, segmentation_of
+from mocapflow.guards.outputs import cloth_of, estimate_of, matches_of, pose_of, residual_of, result_of, segmentation_of
+from mocapflow.output_checks import InvalidOutput, of_kind
 from mocapflow.testing import pictures, scenes
 from mocapflow.testing.recovery import settled
-from mocapflow.wrong_answer import WrongAnswer, of_kind
 from tests.fixtures.stores import STAGES, load, run_tiny, write_pipeline, write_recording
 
 SCENE = scenes.tiny_scene()
@@ -34,33 +34,33 @@ class Saying(Matcher, PoseSolver, Predictor, Prior):
     """Says what it is told to."""
 
     name = "saying"
-    answer: object
+    output: object
 
     def match(self, frame, segmentation, surface, past, scene, turn):
-        return self.answer
+        return self.output
 
     def predict(self, frame, past, scene):
-        return self.answer
+        return self.output
 
     def residual(self, pose, past, scene):
-        return self.answer
+        return self.output
 
     def solve(self, match, state, model, priors, past, turn):
-        return self.answer
+        return self.output
 
 
-def test_a_wrong_answer_reaches_another_process() -> None:
-    there = pickle.loads(pickle.dumps(WrongAnswer(Saying(answer=1), "nonsense")))
+def test_a_wrong_output_reaches_another_process() -> None:
+    there = pickle.loads(pickle.dumps(InvalidOutput(Saying(output=1), "nonsense")))
     assert str(there) == "matcher 'saying' returned nonsense" and there.what == "nonsense"
 
 
-def matches(answer):
-    return matches_of(Saying(answer=answer), FRAME, SEEN, SURFACE, Past(), SCENE, Turn(index=0))
+def matches(output):
+    return matches_of(Saying(output=output), FRAME, SEEN, SURFACE, Past(), SCENE, Turn(index=0))
 
 
 def residual(error=0.0, jacobian=0.0, energy=0.0, width=WIDTH):
-    answer = Residual(error=np.full(2, error), jacobian=np.full((2, width), jacobian), energy=energy)
-    return residual_of(Saying(answer=answer), POSE, Past(), SCENE)
+    output = Residual(error=np.full(2, error), jacobian=np.full((2, width), jacobian), energy=energy)
+    return residual_of(Saying(output=output), POSE, Past(), SCENE)
 
 
 def other(name, value):
@@ -70,7 +70,7 @@ def other(name, value):
 
 
 @pytest.mark.parametrize(
-    ("answer", "said"),
+    ("output", "said"),
     [
         (None, "NoneType, not Matches"),
         (other("vertex", -1), "a pair of vertex -1; there are 0 to"),
@@ -83,9 +83,9 @@ def other(name, value):
         (other("direction", 17.0), "a direction that is neither a unit vector nor zero"),
     ],
 )
-def test_pairs_that_are_none(answer, said):
-    with pytest.raises(WrongAnswer, match=f"'saying' returned {said}"):
-        matches(answer)
+def test_pairs_that_are_none(output, said):
+    with pytest.raises(InvalidOutput, match=f"'saying' returned {said}"):
+        matches(output)
 
 
 def test_pairs_that_are_some():
@@ -95,7 +95,7 @@ def test_pairs_that_are_some():
 
 
 @pytest.mark.parametrize(
-    ("answer", "said"),
+    ("output", "said"),
     [
         (dict(error=np.nan), "an error or a jacobian that is not finite"),
         (dict(jacobian=-np.inf), "an error or a jacobian that is not finite"),
@@ -105,9 +105,9 @@ def test_pairs_that_are_some():
         (dict(width=WIDTH - 6), rf"a jacobian of {WIDTH - 6} columns; \(omega, v, angles\) are {WIDTH}"),
     ],
 )
-def test_residuals_that_are_none(answer, said):
-    with pytest.raises(WrongAnswer, match=f"'saying' returned {said}"):
-        residual(**answer)
+def test_residuals_that_are_none(output, said):
+    with pytest.raises(InvalidOutput, match=f"'saying' returned {said}"):
+        residual(**output)
 
 
 def test_an_infinite_energy_rules_a_pose_out():
@@ -116,7 +116,7 @@ def test_an_infinite_energy_rules_a_pose_out():
 
 
 @pytest.mark.parametrize(
-    ("answer", "said"),
+    ("output", "said"),
     [
         (POSE.root, "ndarray, not Pose"),
         (Pose(root=POSE.root, angles=POSE.angles[:-1]), "joint angles; the body has"),
@@ -125,9 +125,9 @@ def test_an_infinite_energy_rules_a_pose_out():
         (Pose(root=np.diag([2.0, 2, 2, 1]), angles=POSE.angles), "a root that is no rigid motion"),
     ],
 )
-def test_poses_that_are_none(answer, said):
-    with pytest.raises(WrongAnswer, match=f"'saying' returned .*{said}"):
-        pose_of(Saying(answer=answer), FRAME, Past(), SCENE)
+def test_poses_that_are_none(output, said):
+    with pytest.raises(InvalidOutput, match=f"'saying' returned .*{said}"):
+        pose_of(Saying(output=output), FRAME, Past(), SCENE)
 
 
 PLUGIN = """
@@ -211,7 +211,7 @@ def mocapflow_priors():
         ("asks", r"^prior 'asks'  the body has no joint 'left_hip'\n +available: root, top"),
     ],
 )
-def test_a_run_names_who_answers_wrongly(tmp_path, prior, said):
+def test_a_run_names_who_outputs_wrongly(tmp_path, prior, said):
     path = with_prior(tmp_path, prior)
     assert load(path)
     with pytest.raises(MocapflowError, match=said):
@@ -254,14 +254,14 @@ def test_an_estimate_that_is_none_names_the_solver(change, said) -> None:
     state = pictures.tiny_state(SCENE, POSE, POSE)
     good = state.estimate
     asked = (None, state, scenes.tiny_model(SCENE), (), Past(), Turn(index=0))
-    assert estimate_of(Saying(answer=good), *asked) is good
-    with pytest.raises(WrongAnswer, match=f"'saying' returned .*{said}"):
-        estimate_of(Saying(answer=replace(good, **change)), *asked)
+    assert estimate_of(Saying(output=good), *asked) is good
+    with pytest.raises(InvalidOutput, match=f"'saying' returned .*{said}"):
+        estimate_of(Saying(output=replace(good, **change)), *asked)
 
 
 def test_what_is_of_another_kind_names_who_made_it() -> None:
-    with pytest.raises(WrongAnswer, match="'saying' returned NoneType, not Matches"):
-        of_kind(Saying(answer=None), None, Matches)
+    with pytest.raises(InvalidOutput, match="'saying' returned NoneType, not Matches"):
+        of_kind(Saying(output=None), None, Matches)
 
 
 CLOTHED = scenes.tiny_scene(clothed=True)
@@ -274,25 +274,25 @@ class Dressing(Draper, ClothFitter, Garment, Segmenter, BodyModel):
     """Says what it is told to."""
 
     name = "dressing"
-    answer: object
+    output: object
 
     def drape(self, poses, parameters, past, scene):
-        return self.answer
+        return self.output
 
     def velocity(self, pose, parameters, vertices, past, scene):
-        return self.answer
+        return self.output
 
     def fit(self, frame, segmentation, estimate, model, past, turn):
-        return self.answer
+        return self.output
 
     def sew(self, body):
-        return self.answer
+        return self.output
 
     def load(self, folder):
-        return self.answer
+        return self.output
 
     def segment(self, frame, state, past, scene, turn):
-        return self.answer
+        return self.output
 
 
 @pytest.mark.parametrize(
@@ -307,22 +307,22 @@ class Dressing(Draper, ClothFitter, Garment, Segmenter, BodyModel):
     ],
 )
 def test_drapes_that_are_none(change, said):
-    model = replace(MODEL, draper=Dressing(answer=change(CLOTH.vertices[None])))
-    with pytest.raises(WrongAnswer, match=f"draper 'dressing' returned {said}"):
+    model = replace(MODEL, draper=Dressing(output=change(CLOTH.vertices[None])))
+    with pytest.raises(InvalidOutput, match=f"draper 'dressing' returned {said}"):
         model.drapes(POSE, CLOTH.parameters[None], Past())
-    model = replace(MODEL, draper=Dressing(answer=CLOTH.vertices[None]))
+    model = replace(MODEL, draper=Dressing(output=CLOTH.vertices[None]))
     assert np.array_equal(model.drapes(POSE, CLOTH.parameters[None], Past())[0], CLOTH.vertices)
 
 
 def test_velocities_that_are_none():
     vertices, width = np.arange(2, dtype=np.int32), WIDTH + len(CLOTH.parameters)
-    for answer, said in ((np.zeros((2, 3, WIDTH - 1)), "shape"), (np.full((2, 3, width), np.inf), "are not finite")):
-        with pytest.raises(WrongAnswer, match=f"returned velocities .*{said}"):
-            replace(MODEL, draper=Dressing(answer=answer)).velocity(POSE, CLOTH, vertices, Past())
+    for output, said in ((np.zeros((2, 3, WIDTH - 1)), "shape"), (np.full((2, 3, width), np.inf), "are not finite")):
+        with pytest.raises(InvalidOutput, match=f"returned velocities .*{said}"):
+            replace(MODEL, draper=Dressing(output=output)).velocity(POSE, CLOTH, vertices, Past())
 
 
 @pytest.mark.parametrize(
-    ("answer", "said"),
+    ("output", "said"),
     [
         (CLOTH.vertices, "ndarray, not Cloth"),
         (NO_CLOTH, r"cloth of shape \(0, 3\), not"),
@@ -332,11 +332,11 @@ def test_velocities_that_are_none():
         (replace(CLOTH, parameters=CLOTH.parameters + 1), "1 for parameter 'thickness_m', which goes from 0 to 0.01"),
     ],
 )
-def test_fitted_cloth_that_is_none(answer, said):
+def test_fitted_cloth_that_is_none(output, said):
     asked = (FRAME, SEEN, STATE.estimate, MODEL, Past(), Turn(index=0))
-    assert cloth_of(Dressing(answer=CLOTH), *asked) is CLOTH
-    with pytest.raises(WrongAnswer, match=f"'dressing' returned {said}"):
-        cloth_of(Dressing(answer=answer), *asked)
+    assert cloth_of(Dressing(output=CLOTH), *asked) is CLOTH
+    with pytest.raises(InvalidOutput, match=f"'dressing' returned {said}"):
+        cloth_of(Dressing(output=output), *asked)
 
 
 BODY = CLOTHED.body
@@ -351,9 +351,9 @@ BODY = CLOTHED.body
     ],
 )
 def test_bodies_that_are_none(change, said):
-    assert body_of(Dressing(answer=BODY), Path()) is BODY
-    with pytest.raises(WrongAnswer, match=f"'dressing' returned {said}"):
-        body_of(Dressing(answer=replace(BODY, **change)), Path())
+    assert body_of(Dressing(output=BODY), Path()) is BODY
+    with pytest.raises(InvalidOutput, match=f"'dressing' returned {said}"):
+        body_of(Dressing(output=replace(BODY, **change)), Path())
 
 
 MESH = CLOTHED.garment
@@ -373,9 +373,9 @@ MESH = CLOTHED.garment
     ],
 )
 def test_garments_that_are_none(change, said):
-    assert mesh_of(Dressing(answer=MESH), CLOTHED.body) is MESH
-    with pytest.raises(WrongAnswer, match=f"'dressing' returned {said}"):
-        mesh_of(Dressing(answer=replace(MESH, **change)), CLOTHED.body)
+    assert mesh_of(Dressing(output=MESH), CLOTHED.body) is MESH
+    with pytest.raises(InvalidOutput, match=f"'dressing' returned {said}"):
+        mesh_of(Dressing(output=replace(MESH, **change)), CLOTHED.body)
 
 
 @pytest.mark.parametrize(
@@ -391,13 +391,13 @@ def test_garments_that_are_none(change, said):
 )
 def test_silhouettes_that_are_none(change, said):
     asked = (FRAME, STATE, Past(), SCENE, Turn(index=0))
-    assert segmentation_of(Dressing(answer=SEEN), *asked) is SEEN
+    assert segmentation_of(Dressing(output=SEEN), *asked) is SEEN
     one, two, *rest = SEEN.silhouettes
     wrong = replace(SEEN, silhouettes=(one, replace(two, **change), *rest))
-    with pytest.raises(WrongAnswer, match=f"'dressing' returned {said}"):
-        segmentation_of(Dressing(answer=wrong), *asked)
-    with pytest.raises(WrongAnswer, match="'dressing' returned silhouettes as a Silhouette, not a tuple of them"):
-        segmentation_of(Dressing(answer=replace(SEEN, silhouettes=one)), *asked)
+    with pytest.raises(InvalidOutput, match=f"'dressing' returned {said}"):
+        segmentation_of(Dressing(output=wrong), *asked)
+    with pytest.raises(InvalidOutput, match="'dressing' returned silhouettes as a Silhouette, not a tuple of them"):
+        segmentation_of(Dressing(output=replace(SEEN, silhouettes=one)), *asked)
 
 
 class Lost(Recovery):
@@ -414,7 +414,7 @@ ESTIMATE = STATE.estimate
 
 
 @pytest.mark.parametrize(
-    ("answer", "said"),
+    ("output", "said"),
     [
         (None, "NoneType, not FrameResult"),
         (replace(LOOPED, overlap=np.ones(1)), r"the overlap of shape \(1,\), not \(4,\)"),
@@ -425,15 +425,15 @@ ESTIMATE = STATE.estimate
          "a covariance that is not finite"),
     ],
 )  # fmt: skip
-def test_a_recovery_that_answers_with_no_result(answer, said):
+def test_a_recovery_that_outputs_with_no_result(output, said):
     assert result_of(Lost(), replace(LOOPED, notes=("found",)), LOOPED, SCENE).notes == ("found",)
-    with pytest.raises(WrongAnswer, match=f"recovery 'lost' returned {said}"):
-        result_of(Lost(), answer, LOOPED, SCENE)
+    with pytest.raises(InvalidOutput, match=f"recovery 'lost' returned {said}"):
+        result_of(Lost(), output, LOOPED, SCENE)
 
 
 def test_a_recovery_that_leaves_the_cloth_behind():
     worn = replace(LOOPED, state=replace(STATE, cloth=CLOTH))
     left = replace(worn, state=replace(STATE, cloth=replace(CLOTH, vertices=CLOTH.vertices + 100)))
     assert result_of(Lost(), left, left, SCENE) is left  # what the loop found was looked at there
-    with pytest.raises(WrongAnswer, match=r"recovery 'lost' returned cloth 1.* m from the body"):
+    with pytest.raises(InvalidOutput, match=r"recovery 'lost' returned cloth 1.* m from the body"):
         result_of(Lost(), left, worn, SCENE)

@@ -1,4 +1,4 @@
-"""What is wrong with an answer, whoever gave it: its kind, its shape, its numbers."""
+"""Checks of what any component returns: its kind, its shape, its numbers."""
 
 from __future__ import annotations
 
@@ -10,45 +10,45 @@ from mocapflow.errors import PluginError
 from mocapflow.records import F32, F64
 from mocapflow.settings import Component
 
-Answer = TypeVar("Answer")
+Output = TypeVar("Output")
 UNIT = 1e-3  # by how much the length of a unit vector, or its square, may fail to be one
 
 
-class WrongAnswer(PluginError):
+class InvalidOutput(PluginError):
     """A component returned what its role can't."""
 
     def __init__(self, component: Component, message: str) -> None:
         self.component, self.what = component, message
         super().__init__(f"{component.role} '{component.name}' returned {message}")
 
-    def __reduce__(self) -> tuple[type[WrongAnswer], tuple[Component, str]]:
+    def __reduce__(self) -> tuple[type[InvalidOutput], tuple[Component, str]]:
         """Pickle by the arguments: those of exceptions are their text."""
         return type(self), (self.component, self.what)
 
 
-def of_kind(component: Component, value: Any, kind: type[Answer]) -> Answer:
-    """Return what a component answered.
+def of_kind(component: Component, value: Any, kind: type[Output]) -> Output:
+    """Return what a component has returned.
 
     Raises:
-        WrongAnswer: it is something else than its role returns.
+        InvalidOutput: it is something else than its role returns.
     """
     if not isinstance(value, kind):
-        raise WrongAnswer(component, f"{type(value).__name__}, not {getattr(kind, '__name__', kind)}")
+        raise InvalidOutput(component, f"{type(value).__name__}, not {getattr(kind, '__name__', kind)}")
     return value
 
 
 def array_of(component: Component, values: F64, shape: tuple[int, ...], what: str) -> F64:
-    """Return an array that a component answered.
+    """Return an array that a component has returned.
 
     Raises:
-        WrongAnswer: it has another shape or type, or is not finite.
+        InvalidOutput: it has another shape or type, or is not finite.
     """
     if values.dtype != np.float64:
-        raise WrongAnswer(component, f"{what} of {values.dtype}, not float64")
+        raise InvalidOutput(component, f"{what} of {values.dtype}, not float64")
     if values.shape != shape:
-        raise WrongAnswer(component, f"{what} of shape {values.shape}, not {shape}")
+        raise InvalidOutput(component, f"{what} of shape {values.shape}, not {shape}")
     if not finite(values):
-        raise WrongAnswer(component, f"{what} that {'are' if what.endswith('s') else 'is'} not finite")
+        raise InvalidOutput(component, f"{what} that {'are' if what.endswith('s') else 'is'} not finite")
     return values
 
 

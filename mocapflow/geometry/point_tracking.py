@@ -1,4 +1,4 @@
-"""Points followed from one grey picture into another by pyramids of Lucas-Kanade steps, there and back."""
+"""Points tracked from one grey picture into another by pyramids of Lucas-Kanade steps, there and back."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from mocapflow.records import F32, U8, Bool
 
 
 class LucasKanade(NamedTuple):
-    """How points are followed."""
+    """How points are tracked."""
 
     window_px: int  # edge of the square that is compared
     levels: int  # of the pyramid: each doubles the motion that can be followed
@@ -19,7 +19,7 @@ class LucasKanade(NamedTuple):
     round_trip_px: float  # how near a point has to come to where it was
 
 
-def followed(old: U8, new: U8, points: F32, steps: LucasKanade) -> tuple[F32, Bool]:
+def track_points(old: U8, new: U8, points: F32, steps: LucasKanade) -> tuple[F32, Bool]:
     """Return where points (N, 2) px of a grey picture (H, W) are in another, and which come back from there."""
     there, found = _step(old, new, points, steps)
     back, refound = _step(new, old, there, steps)

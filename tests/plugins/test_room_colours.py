@@ -7,7 +7,7 @@ import pytest
 from mocapflow_levelset.colours import BINS, bins_of
 from mocapflow_levelset.layered import Layered
 from mocapflow_levelset.layers import CLIP, COLOURS, layer_of
-from mocapflow_levelset.surround import ROOM, beside, told
+from mocapflow_levelset.room_colours import ROOM, person_log_ratio, room_histograms
 
 from mocapflow.data import Frame, Past, Pose, Turn
 from mocapflow.geometry.silhouettes import intersection_over_union, mask, outline
@@ -35,7 +35,7 @@ def pictures(pose):
 
 
 def learned(frame, past=None):
-    return beside(frame, tiny_segmentation(SCENE, POSE).silhouettes, past or Past(), 0.9, GRID, REACH)
+    return room_histograms(frame, tiny_segmentation(SCENE, POSE).silhouettes, past or Past(), 0.9, GRID, REACH)
 
 
 def past_of(frame):
@@ -69,7 +69,7 @@ def test_a_limb_beside_the_model_does_not_pass_for_the_room():
 
 
 def test_colours_tell_person_from_room_and_nothing_of_what_was_never_seen():
-    ratio = told(past_of(pictures(POSE)), 0)
+    ratio = person_log_ratio(past_of(pictures(POSE)), 0)
     skin, wall, never = (ratio[bins_of(np.array(colour, np.uint8))] for colour in (SKIN, WALL, (250, 250, 5)))
     assert skin > 2 and wall < -2
     assert never == pytest.approx(0, abs=0.01)
@@ -79,9 +79,9 @@ def test_colours_tell_person_from_room_and_nothing_of_what_was_never_seen():
 def test_a_view_that_has_shown_no_room_tells_nothing():
     frame = pictures(POSE)
     usable = [s for s in tiny_segmentation(SCENE, POSE).silhouettes if s.camera != 2]
-    appearance = past_of(frame).appearance | {ROOM: beside(frame, usable, Past(), 0.9, GRID, REACH)}
-    assert not told(Past(appearance=appearance), 2).any()
-    assert told(Past(appearance=appearance), 1).any()
+    appearance = past_of(frame).appearance | {ROOM: room_histograms(frame, usable, Past(), 0.9, GRID, REACH)}
+    assert not person_log_ratio(Past(appearance=appearance), 2).any()
+    assert person_log_ratio(Past(appearance=appearance), 1).any()
 
 
 def test_a_limb_that_came_back_elsewhere_is_found_by_its_colours():

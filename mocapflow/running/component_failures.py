@@ -23,15 +23,15 @@ from mocapflow.errors import (
     unwritable,
 )
 from mocapflow.interrupts import interrupted
+from mocapflow.output_checks import InvalidOutput
 from mocapflow.registry import Registry
 from mocapflow.settings import Component
-from mocapflow.wrong_answer import WrongAnswer
 
 LOG = "failed.log"  # in the run folder, the traceback of the last failure
 
 
 @contextmanager
-def blaming(component: Component, registry: Registry, kept: Callable[[], str], log: Path) -> Iterator[None]:
+def naming_failures(component: Component, registry: Registry, kept: Callable[[], str], log: Path) -> Iterator[None]:
     """If a component raises, say who it was, what is saved and how to go on.
 
     Args:
@@ -64,7 +64,7 @@ def _nobodys(error: OSError, out: Path) -> bool:
 
 def _failure(error: BaseException, stage: Component, registry: Registry, saved: str, log: Path) -> ComponentFailed:
     """Return the error for people: the innermost frame of the traceback in a plugin names the culprit."""
-    component = error.component if isinstance(error, WrongAnswer) else _culprit(error, registry) or stage
+    component = error.component if isinstance(error, InvalidOutput) else _culprit(error, registry) or stage
     moment = f" at {when}" if (when := moment_of(error)) else ""
     message = f"{_named(component)} ({registry.origin(type(component))}) failed{moment}: {_reason(error)}"
     hints = [saved, _write_traceback(error, log)]
@@ -101,7 +101,7 @@ def _is_known(call: FrameType, registry: Registry) -> bool:
 def _reason(error: BaseException) -> str:
     if isinstance(error, ValidationError) and (first := error.errors()[0])["type"] == "frozen_instance":
         return f"it sets '{first['loc'][0]}', but a component is frozen and keeps nothing between calls"
-    if isinstance(error, WrongAnswer):
+    if isinstance(error, InvalidOutput):
         return f"it returned {error.what}"
     return raised(error)
 

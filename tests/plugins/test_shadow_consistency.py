@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mocapflow_levelset.floor_height import floor_height, grey_floor
 from mocapflow_levelset.floor_light import small_views
-from mocapflow_levelset.one_floor import contradicted, no_shadows
+from mocapflow_levelset.shadow_consistency import contradicted, no_shadows
 from mocapflow_levelset.shadows import floor_around, shadowed
 from mocapflow_sequence.background import EmptyScene
 

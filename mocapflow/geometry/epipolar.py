@@ -1,4 +1,4 @@
-"""The planes through the centres of two cameras: what both see lies in the same one, in either view.
+"""Epipolar planes, through the centres of two cameras: what both see lies in the same one, in either view.
 
 The angle of its plane is thus a number that two views agree on at every moment, for a point (a keypoint) as for the
 outermost planes that touch a silhouette (its epipolar tangents; Sinha and Pollefeys, "Synchronization and calibration

@@ -1,4 +1,4 @@
-"""What components answer the loop with, looked at where it comes in: who answers wrongly is named, not who uses it."""
+"""What components return to the loop, checked where it comes in: who returns it wrong is named, not who uses it."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from mocapflow.data import (
     Turn,
 )
 from mocapflow.dressing.guards import worn
+from mocapflow.output_checks import UNIT, InvalidOutput, array_of, finite, of_kind
 from mocapflow.records import F64, stray
 from mocapflow.scene import Scene
 from mocapflow.settings import Component
-from mocapflow.wrong_answer import UNIT, WrongAnswer, array_of, finite, of_kind
 
 if TYPE_CHECKING:
     from mocapflow.model import ClothedModel
@@ -41,7 +41,7 @@ def pose_of(predictor: Predictor, frame: Frame, past: Past, scene: Scene) -> Pos
     """Return the pose that a predictor begins a frame with.
 
     Raises:
-        WrongAnswer: it is no pose of the body.
+        InvalidOutput: it is no pose of the body.
     """
     return _checked_pose(predictor, of_kind(predictor, predictor.predict(frame, past, scene), Pose), scene)
 
@@ -58,7 +58,7 @@ def estimate_of(
     """Return the estimate of a pose solver.
 
     Raises:
-        WrongAnswer: its pose is none of the body, or what it says besides has another shape or is not finite.
+        InvalidOutput: its pose is none of the body, or what it says besides has another shape or is not finite.
     """
     found = of_kind(solver, solver.solve(match, state, model, priors, past, turn), Estimate)
     return _checked_estimate(solver, found, state.estimate, model.scene)
@@ -71,22 +71,22 @@ def _checked_estimate(component: Component, found: Estimate, before: Estimate, s
     size = max(len(found.covariance), 6 + len(found.pose.angles))  # unknowns of the cloth may follow
     array_of(component, found.covariance, (size, size), "a covariance")
     if np.diag(found.covariance).min() <= 0:
-        raise WrongAnswer(component, "a variance that is not above zero")
+        raise InvalidOutput(component, "a variance that is not above zero")
     try:
         np.linalg.cholesky(found.covariance)  # which units its rows have is no matter to it
     except np.linalg.LinAlgError:
-        raise WrongAnswer(component, "a covariance that is not positive definite") from None
+        raise InvalidOutput(component, "a covariance that is not positive definite") from None
     return found
 
 
 def _checked_pose(component: Component, pose: Pose, scene: Scene) -> Pose:
     if len(pose.angles) != len(scene.body.twists):
-        raise WrongAnswer(component, f"{len(pose.angles)} joint angles; the body has {len(scene.body.twists)}")
+        raise InvalidOutput(component, f"{len(pose.angles)} joint angles; the body has {len(scene.body.twists)}")
     if not (finite(pose.root) and finite(pose.angles)):
-        raise WrongAnswer(component, "a pose that is not finite")
+        raise InvalidOutput(component, "a pose that is not finite")
     turn = pose.root[:3, :3]
     if np.abs(turn @ turn.T - np.eye(3)).max() > SQUARE or np.linalg.det(turn) < 0:
-        raise WrongAnswer(component, "a root that is no rigid motion")
+        raise InvalidOutput(component, "a root that is no rigid motion")
     return pose
 
 
@@ -102,7 +102,7 @@ def matches_of(
     """Return the pairs of a matcher.
 
     Raises:
-        WrongAnswer: a pair is of a camera or a vertex that is not there, or not finite.
+        InvalidOutput: a pair is of a camera or a vertex that is not there, or not finite.
     """
     found = of_kind(matcher, matcher.match(frame, segmentation, surface, past, scene, turn), Matches)
     if not len(found.camera):
@@ -112,15 +112,15 @@ def matches_of(
         ("vertex", found.vertex, len(surface.vertices)),
     ):
         if (odd := stray(index, count)) is not None:
-            raise WrongAnswer(matcher, f"a pair of {name} {odd}; there are 0 to {count - 1}")
+            raise InvalidOutput(matcher, f"a pair of {name} {odd}; there are 0 to {count - 1}")
     for name in ("pixel", "direction", "weight"):
         if not finite(getattr(found, name)):
-            raise WrongAnswer(matcher, f"a {name} that is not finite")
+            raise InvalidOutput(matcher, f"a {name} that is not finite")
     if found.weight.min() < 0:
-        raise WrongAnswer(matcher, "a weight below zero")
+        raise InvalidOutput(matcher, "a weight below zero")
     squared = (found.direction * found.direction).sum(axis=1)
     if ((np.abs(squared - 1) > UNIT) & (squared > 0)).any():
-        raise WrongAnswer(matcher, "a direction that is neither a unit vector nor zero")
+        raise InvalidOutput(matcher, "a direction that is neither a unit vector nor zero")
     return found
 
 
@@ -128,16 +128,16 @@ def residual_of(prior: Prior, pose: Pose, past: Past, scene: Scene) -> Residual:
     """Return what a prior adds to the pose equations; an infinite energy rules a pose out.
 
     Raises:
-        WrongAnswer: its rows are not finite, or do not have the columns (omega, v, angles).
+        InvalidOutput: its rows are not finite, or do not have the columns (omega, v, angles).
     """
     said, least = of_kind(prior, prior.residual(pose, past, scene), Residual), 6 + len(pose.angles)
     if said.jacobian.shape[1] < least:
         message = f"a jacobian of {said.jacobian.shape[1]} columns; (omega, v, angles) are {least}"
-        raise WrongAnswer(prior, message)
+        raise InvalidOutput(prior, message)
     if not (_squares(said.error) and _squares(said.jacobian)):
-        raise WrongAnswer(prior, f"an error or a jacobian that is not finite, or above {LARGEST:g}")
+        raise InvalidOutput(prior, f"an error or a jacobian that is not finite, or above {LARGEST:g}")
     if not isinstance(said.energy, float | int | np.floating) or np.isnan(said.energy):
-        raise WrongAnswer(prior, f"the energy {said.energy!r}")
+        raise InvalidOutput(prior, f"the energy {said.energy!r}")
     return said
 
 
@@ -147,27 +147,27 @@ def segmentation_of(
     """Return the silhouettes of a segmenter.
 
     Raises:
-        WrongAnswer: one is of a camera or layer that is not there, or comes twice; is of another size than its
+        InvalidOutput: one is of a camera or layer that is not there, or comes twice; is of another size than its
             picture, or not finite.
     """
     found = of_kind(segmenter, segmenter.segment(frame, state, past, scene, turn), Segmentation)
     if not isinstance(found.silhouettes, tuple):
-        raise WrongAnswer(segmenter, f"silhouettes as a {type(found.silhouettes).__name__}, not a tuple of them")
+        raise InvalidOutput(segmenter, f"silhouettes as a {type(found.silhouettes).__name__}, not a tuple of them")
     for number, silhouette in enumerate(found.silhouettes):
         kind = silhouette.camera, silhouette.layer
         if silhouette.camera not in range(len(scene.cameras)):
             message = f"a silhouette of camera {silhouette.camera}; there are 0 to {len(scene.cameras) - 1}"
-            raise WrongAnswer(segmenter, message)
+            raise InvalidOutput(segmenter, message)
         if silhouette.layer not in LAYERS:
-            raise WrongAnswer(segmenter, f"a silhouette of layer '{silhouette.layer}'; there are {', '.join(LAYERS)}")
+            raise InvalidOutput(segmenter, f"a silhouette of layer '{silhouette.layer}'; there are {', '.join(LAYERS)}")
         if kind in [(other.camera, other.layer) for other in found.silhouettes[:number]]:
-            raise WrongAnswer(segmenter, f"two silhouettes of camera {silhouette.camera}, layer '{silhouette.layer}'")
+            raise InvalidOutput(segmenter, f"two silhouettes of camera {silhouette.camera}, layer '{silhouette.layer}'")
         width, height = scene.cameras[silhouette.camera].size
         if silhouette.distance.shape != (height, width):
             rows, columns = silhouette.distance.shape
-            raise WrongAnswer(segmenter, f"a silhouette of {columns} x {rows} px; the picture is {width} x {height}")
+            raise InvalidOutput(segmenter, f"a silhouette of {columns} x {rows} px; the picture is {width} x {height}")
         if not np.isfinite(silhouette.distance.sum()):  # a sum costs a fifth of a look at every pixel
-            raise WrongAnswer(segmenter, "a silhouette that is not finite")
+            raise InvalidOutput(segmenter, "a silhouette that is not finite")
     return found
 
 
@@ -183,7 +183,7 @@ def cloth_of(
     """Return the cloth that a fitter chooses.
 
     Raises:
-        WrongAnswer: it is not that of the garment, not finite, far away, or a parameter is out of its bounds.
+        InvalidOutput: it is not that of the garment, not finite, far away, or a parameter is out of its bounds.
     """
     cloth = of_kind(fitter, fitter.fit(frame, segmentation, estimate, model, past, turn), Cloth)
     garment = model.scene.garment
@@ -194,15 +194,15 @@ def cloth_of(
         ranges = zip(garment.parameter_names, cloth.parameters, garment.parameter_bounds, strict=True)
         for name, value, (low, high) in ranges:
             if not low - SLACK <= value <= high + SLACK:
-                raise WrongAnswer(fitter, f"{value:g} for parameter '{name}', which goes from {low:g} to {high:g}")
+                raise InvalidOutput(fitter, f"{value:g} for parameter '{name}', which goes from {low:g} to {high:g}")
     return cloth
 
 
 def result_of(recovery: Recovery, found: Any, looped: FrameResult, scene: Scene) -> FrameResult:
-    """Return what a recovery answered to what the loop had found.
+    """Return what a recovery returned for what the loop had found.
 
     Raises:
-        WrongAnswer: it is no result, its estimate is none, or something in it has another shape than the loop's.
+        InvalidOutput: it is no result, its estimate is none, or something in it has another shape than the loop's.
     """
     result = of_kind(recovery, found, FrameResult)
     if result is looped:
@@ -215,9 +215,9 @@ def result_of(recovery: Recovery, found: Any, looped: FrameResult, scene: Scene)
     for name in ("overlap", "energy"):
         shape, meant = getattr(result, name).shape, getattr(looped, name).shape
         if shape != meant:
-            raise WrongAnswer(recovery, f"the {name} of shape {shape}, not {meant}")
+            raise InvalidOutput(recovery, f"the {name} of shape {shape}, not {meant}")
     if not isinstance(result.notes, tuple):
-        raise WrongAnswer(recovery, f"notes as a {type(result.notes).__name__}, not a tuple of them")
+        raise InvalidOutput(recovery, f"notes as a {type(result.notes).__name__}, not a tuple of them")
     return result
 
 

@@ -70,8 +70,8 @@ def no_shadows(frame: Frame, background: Background, cameras: tuple[Camera, ...]
     if background.floor_m is None or np.count_nonzero(frame.usable) < 3:
         return None
     views = small_views(frame, background, cameras)
-    told = contradicted(views, background.floor_m)
-    return tuple(_enlarged(mask, view.factor, c) for mask, view, c in zip(told, views, cameras, strict=True))
+    masks = contradicted(views, background.floor_m)
+    return tuple(_enlarged(mask, view.factor, c) for mask, view, c in zip(masks, views, cameras, strict=True))
 
 
 def _seen(view: SmallView, camera: Camera, places: I32, floor_m: float) -> F32:

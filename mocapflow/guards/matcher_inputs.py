@@ -1,4 +1,4 @@
-"""What the components of a loop would do without in a recording: an error where nothing is left, else a warning."""
+"""Whether a recording has what matchers need: an error where none of them has, else warnings."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from mocapflow.recordings.recording import Recording
 
 
-def idle_matchers(matchers: Sequence[Matcher], recording: Recording) -> list[str]:
+def check_matcher_inputs(matchers: Sequence[Matcher], recording: Recording) -> list[str]:
     """Return what to say of matchers that will never find a pair.
 
     Raises:

@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mocapflow.assets import Camera
-from mocapflow.geometry.turned import as_seen, shift_px, turn_between
+from mocapflow.geometry.camera_rotation import shift_px, turn_between, warped
 
 CAMERA = Camera(
     name="cam01",
@@ -36,7 +36,7 @@ def homography(degrees, camera=CAMERA):
 
 
 def seen(turn, noise=1.0):
-    return levels(as_seen(room(0.0), turn)[0] + np.random.default_rng(1).normal(0, noise, (400, 320, 3)))
+    return levels(warped(room(0.0), turn)[0] + np.random.default_rng(1).normal(0, noise, (400, 320, 3)))
 
 
 def corners_off(found, true):
@@ -96,8 +96,8 @@ def test_where_too_little_tells_there_is_no_answer(picture):
 
 def test_a_plate_is_not_known_beyond_its_border():
     turn = homography((0, 1.0, 0))  # by 430 tan 1° = 7.5 px
-    moved, known = as_seen(room(0.0), turn)
+    moved, known = warped(room(0.0), turn)
     assert shift_px(turn, CAMERA) == pytest.approx(430 * np.tan(np.radians(1)), rel=0.2)
     assert known.mean() == pytest.approx(1 - 7.5 / 320, abs=0.01)
-    back, _ = as_seen(moved, np.linalg.inv(turn))
+    back, _ = warped(moved, np.linalg.inv(turn))
     np.testing.assert_allclose(back[20:-20, 20:-20].astype(float), room(0.0)[20:-20, 20:-20], atol=2.0)
