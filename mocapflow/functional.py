@@ -10,17 +10,7 @@ import numpy as np
 
 from mocapflow.assets import Camera
 from mocapflow.components import Prior
-from mocapflow.data import (
-    Cloth,
-    Estimate,
-    FrameState,
-    Matches,
-    Past,
-    Pose,
-    Segmentation,
-    Silhouette,
-    Surface,
-)
+from mocapflow.data import Cloth, Estimate, FrameState, Matches, Past, Pose, Segmentation, Silhouette, Surface
 from mocapflow.geometry import silhouettes
 from mocapflow.geometry.cameras import project_each
 from mocapflow.guards.outputs import residual_of

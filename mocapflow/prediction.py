@@ -66,7 +66,7 @@ def lost(frame: Frame, begun: FrameState, steps: Steps, model: ClothedModel) -> 
 
 
 def notes_on(frame: Frame, scene: Scene, known: Past, result: FrameResult) -> Sequence[str]:
-    """Return what went wrong with the views of a frame and with those before it; see `Past.believable`."""
+    """Return what went wrong with the views of a frame and with those before it; see `Past.trusted`."""
     reasons = frame.reasons or ("",) * len(frame.usable)
     views = zip(scene.cameras, frame.usable, reasons, strict=True)
     notes = [f"{camera.name} not usable: {reason or 'no image'}" for camera, usable, reason in views if not usable]

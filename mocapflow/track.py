@@ -145,7 +145,7 @@ class CoupledLoop(Stage):
         self, frame: Frame, past: Past, start: Start, model: ClothedModel, observe: Observe, watch: Stopwatch
     ) -> FrameResult:
         """Return the result of one frame: predicted, settled by the loop, and recovered if the loop was lost."""
-        known, begun = past.believable(), self.begin(frame, past, start, model, watch)
+        known, begun = past.trusted(), self.begin(frame, past, start, model, watch)
         if seen(frame):
             near = begun if len(known.moments) >= MOVING else self.approach(frame, begun, known, model)
             watch.lap("predict")

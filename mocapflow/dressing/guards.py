@@ -10,7 +10,7 @@ from mocapflow.assets import Body, GarmentMesh
 from mocapflow.data import Past, Pose, PoseBatch
 from mocapflow.dressing.roles import BodyModel, Draper, Garment
 from mocapflow.output_checks import UNIT, InvalidOutput, array_of, of_kind
-from mocapflow.records import F64, I32, stray
+from mocapflow.records import F64, I32, out_of_range
 from mocapflow.scene import Scene
 from mocapflow.settings import Component
 
@@ -46,7 +46,7 @@ def mesh_of(garment: Garment, body: Body) -> GarmentMesh:
         ("pinned to vertex", mesh.pinned_to, len(body.vertices)),
         ("carried by joint", mesh.carried_by, len(body.parents)),
     ):
-        if (odd := stray(index, count)) is not None:
+        if (odd := out_of_range(index, count)) is not None:
             raise InvalidOutput(garment, f"cloth {what} {odd}; the body has 0 to {count - 1}")
     if not len(mesh.pinned):
         raise InvalidOutput(garment, "cloth that is pinned nowhere")

@@ -25,7 +25,7 @@ from mocapflow.data import (
 )
 from mocapflow.dressing.guards import worn
 from mocapflow.output_checks import UNIT, InvalidOutput, array_of, finite, of_kind
-from mocapflow.records import F64, stray
+from mocapflow.records import F64, out_of_range
 from mocapflow.scene import Scene
 from mocapflow.settings import Component
 
@@ -111,7 +111,7 @@ def matches_of(
         ("camera", found.camera, len(scene.cameras)),
         ("vertex", found.vertex, len(surface.vertices)),
     ):
-        if (odd := stray(index, count)) is not None:
+        if (odd := out_of_range(index, count)) is not None:
             raise InvalidOutput(matcher, f"a pair of {name} {odd}; there are 0 to {count - 1}")
     for name in ("pixel", "direction", "weight"):
         if not finite(getattr(found, name)):

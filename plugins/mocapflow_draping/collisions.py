@@ -116,13 +116,13 @@ def _stand_off(grid, n, row, link, skin, probe, gap, near, parts, values, motion
 
 
 @numba.njit(cache=True, error_model="numpy")
-def lift(grid, first, last, beside, row, probe, gap, near, mid_probe, mid_gap, parts, values, motion):  # type: ignore[no-untyped-def]
+def lift(grid, first, last, left, row, probe, gap, near, mid_probe, mid_gap, parts, values, motion):  # type: ignore[no-untyped-def]
     """Move both ends of a link out of the body where its middle is inside: no limb shall come between them.
 
     `mid_probe` (N, 3) m is where each middle was measured last, `mid_gap` (N,) m how far from the body it was there.
     """
     for n in range(grid.shape[0]):
-        m = beside[n, row]
+        m = left[n, row]
         if m < 0 or row > last[n] or (row <= first[n] and row <= first[m]):
             continue
         px, py, pz = place(grid, n, row)

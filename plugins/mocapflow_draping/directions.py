@@ -25,7 +25,7 @@ def standing_out(strands: Strands, chain: F64) -> F64:
 def along_limbs(strands: Strands, chain: F64) -> F64:
     """Return the unit directions (B, N, 3) of strands that move with the limb under them, at joints (B, J, 4, 4)."""
     # in the order that one alone has: kernels are compiled anew for every layout
-    along: F64 = np.einsum("bnij,nj->bni", chain[:, strands.limb, :3, :3], strands.way, order="C")
+    along: F64 = np.einsum("bnij,nj->bni", chain[:, strands.limb, :3, :3], strands.direction, order="C")
     return along
 
 

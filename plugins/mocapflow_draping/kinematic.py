@@ -85,7 +85,7 @@ class Kinematic(Draper):
             grid = drape_strands(strands, fitting.fields, starts, winds, source, skin, parts).grid
         if self.sweeps:
             self._close(fitting, grid, first, links[source], chain[source], skin[source], parts[source])
-        vertices: F64 = grid.reshape(len(grid), -1, 3)[:, strands.place]
+        vertices: F64 = grid.reshape(len(grid), -1, 3)[:, strands.particle]
         return vertices
 
     def velocity(self, pose: Pose, parameters: F64, vertices: I32, past: Past, scene: Scene) -> F64:
@@ -116,7 +116,7 @@ class Kinematic(Draper):
             free_roots(grid, strands.first, strands.last, parts, fitting.fields.values, motion)
         if self.sweeps:
             self._close(fitting, grid, strands.first[None], links[-1:], chain[-1:], skin[-1:], parts, motion)
-        row, unknowns = strands.place[vertices], 6 + len(pose.angles) + len(parameters)
+        row, unknowns = strands.particle[vertices], 6 + len(pose.angles) + len(parameters)
         return all_columns(grid.reshape(-1, 3)[row], rate.reshape(-1, 3, len(steps))[row], tried, pose, unknowns)
 
     def touchable(self, scene: Scene) -> Bool:

@@ -54,7 +54,7 @@ def pull_of(strands: Strands, garment: GarmentMesh, parameters: F64, chain: F64)
     """Return the acceleration (B, W, 3) m/s^2 that tilts gravity as the parameters say."""
     _, down, _ = wind_turns(standing_out(strands, chain), *tilts(garment, parameters, strands.azimuth))
     pull = np.zeros((len(chain), len(garment.vertices), 3))
-    strand, row = np.nonzero(strands.own)
+    strand, row = np.nonzero(strands.valid)
     pull[:, strands.vertex[strand, row]] = GRAVITY * (down + [0.0, 0.0, 1.0])[:, strand]
     return pull
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from mocapflow_matching.carried import CLOTH_SHARE, carried_points, distances
+from mocapflow_matching.flow_points import CLOTH_SHARE, distances, flow_points
 from mocapflow_matching.robust import robust_weights
 from mocapflow_twist.twist_gauss_newton import TwistGaussNewton
 from pydantic import PositiveFloat
@@ -45,7 +45,7 @@ class ImageFlowPredictor(Predictor):
     def predict(self, frame: Frame, past: Past, scene: Scene) -> Pose:
         """Return the pose the flow leads to, or what `otherwise` predicts."""
         guess = pose_of(self.otherwise, frame, past, scene)
-        followed = self.on_skin(carried_points(frame, past, scene), past, scene)
+        followed = self.on_skin(flow_points(frame, past, scene), past, scene)
         if len(followed.vertex) < LEAST_POINTS:
             return guess
         model = ClothedModel(scene=scene.undressed)

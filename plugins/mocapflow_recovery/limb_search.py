@@ -100,13 +100,7 @@ class LimbSearch(Recovery):
     root_spread_m: PositiveFloat = 0.06  # standard deviation of the first samples of the root's place
 
     def recover(
-        self,
-        frame: Frame,
-        state: FrameState,
-        result: FrameResult,
-        past: Past,
-        model: ClothedModel,
-        settle: Settle,
+        self, frame: Frame, state: FrameState, result: FrameResult, past: Past, model: ClothedModel, settle: Settle
     ) -> FrameResult:
         """Return the result, or a better one; see the class."""
         found = self._recovered(frame, state, result, past, model, settle)
@@ -130,13 +124,7 @@ class LimbSearch(Recovery):
         return replace(result, state=replace(result.state, segmentation=known))
 
     def _recovered(
-        self,
-        frame: Frame,
-        state: FrameState,
-        result: FrameResult,
-        past: Past,
-        model: ClothedModel,
-        settle: Settle,
+        self, frame: Frame, state: FrameState, result: FrameResult, past: Past, model: ClothedModel, settle: Settle
     ) -> FrameResult:
         surface, scene = surface_of(model, result), model.scene
         trimaps = self.trimaps(frame, surface, past, scene)

@@ -76,7 +76,7 @@ class RevisedTrack:
     def past(self, row: int, appearance: Mapping[str, F64]) -> Past:
         """Return what a frame may know of those before it."""
         moments = tuple(self._moment(earlier) for earlier in range(max(0, row - REMEMBERED), row))
-        return Past(moments=moments, appearance=appearance).believable()
+        return Past(moments=moments, appearance=appearance).trusted()
 
     def replace_fit(self, row: int, frame: Frame, result: FrameResult) -> None:
         """Let a row stand with another fit."""

@@ -22,7 +22,7 @@ from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow.scene import Scene
 from mocapflow_recovery.disagreement import HANGING
-from mocapflow_recovery.placing import centred, heading_between, largest_changes, meeting, placed
+from mocapflow_recovery.placing import centred, heading_between, largest_changes, mask_centre, placed
 from mocapflow_recovery.sampling import SHARES, Cost, Plan, Spread, search
 from mocapflow_recovery.scoring import FACES, Scorer
 from mocapflow_recovery.trimaps import small_room, trimaps
@@ -105,7 +105,7 @@ class StartFromSilhouettes(Stage):
         dressed, room = scene if self.draper else scene.undressed, small_room(background, scene.cameras)
         coarse = dressed.simplified(FACES)
         bare = coarse.undressed
-        upright = placed(bare, 0.0, np.zeros(len(bare.body.twists)), meeting(*largest_changes(frame, room)))
+        upright = placed(bare, 0.0, np.zeros(len(bare.body.twists)), mask_centre(*largest_changes(frame, room)))
         every = trimaps(frame, bare.surface(upright, NO_CLOTH), room, NEAR_M)
         found = [trimap for trimap in every if trimap.informative]
         if len(found) < 2:
@@ -116,7 +116,7 @@ class StartFromSilhouettes(Stage):
             )
         model = ClothedModel(scene=dressed, draper=self.draper)
         scorer = Scorer(model, coarse, found, scene.neutral_parameters, Past(), start=None, cloth_weight=HANGING)
-        return Target(scorer, meeting([trimap.person for trimap in found], [trimap.camera for trimap in found]))
+        return Target(scorer, mask_centre([trimap.person for trimap in found], [trimap.camera for trimap in found]))
 
     def _begins(self, target: Target, known: F64, cost: Cost) -> list[Pose]:
         """Return the best poses of some directions, best first."""

@@ -14,7 +14,7 @@ from mocapflow.scene import Scene
 CLOTH_SHARE = 0.2  # weight of a point on cloth, over that of one on skin: cloth slides
 
 
-def carried_points(frame: Frame, past: Past, scene: Scene) -> Matches:
+def flow_points(frame: Frame, past: Past, scene: Scene) -> Matches:
     """Return the tracked points that lie on the surface of the frame before, each with unit weight.
 
     A point lies between vertices; the nearest vertex of what is seen there stands for it and is shifted as it is.
