@@ -211,7 +211,7 @@ def mocapflow_priors():
         ("asks", r"^prior 'asks'  the body has no joint 'left_hip'\n +available: root, top"),
     ],
 )
-def test_a_run_names_who_outputs_wrongly(tmp_path, prior, said):
+def test_a_run_names_who_returns_what_is_wrong(tmp_path, prior, said):
     path = with_prior(tmp_path, prior)
     assert load(path)
     with pytest.raises(MocapflowError, match=said):
@@ -425,7 +425,7 @@ ESTIMATE = STATE.estimate
          "a covariance that is not finite"),
     ],
 )  # fmt: skip
-def test_a_recovery_that_outputs_with_no_result(output, said):
+def test_a_recovery_that_returns_no_result(output, said):
     assert result_of(Lost(), replace(LOOPED, notes=("found",)), LOOPED, SCENE).notes == ("found",)
     with pytest.raises(InvalidOutput, match=f"recovery 'lost' returned {said}"):
         result_of(Lost(), output, LOOPED, SCENE)
