@@ -34,7 +34,7 @@ from mocapflow.io.cameras import read_cameras
 from mocapflow.io.first_pose import read_pose
 from mocapflow.loop import Steps, settle
 from mocapflow.model import ClothedModel
-from mocapflow.prediction import believed
+from mocapflow.prediction import initial_state
 from mocapflow.records import F64
 from mocapflow.scene import Scene
 from mocapflow.steady import Steady
@@ -111,12 +111,13 @@ def error(scene: Scene, truth: Pose, start: Pose, matchers: Sequence[Matcher], r
     )  # fmt: skip
 
     def settle_from(pose: Pose, parameters: F64) -> FrameResult:
-        begun = replace(believed(pose, parameters, NO_CLOTH), segmentation=seen)
+        begun = replace(initial_state(pose, parameters, NO_CLOTH), segmentation=seen)
         return settle(frame, begun, Past(), steps, model, lambda *_: None)
 
     result = settle_from(start, np.empty(0))
     if recovery is not None:
-        result = recovery.recover(frame, believed(start, np.empty(0), NO_CLOTH), result, Past(), model, settle_from)
+        begun = initial_state(start, np.empty(0), NO_CLOTH)
+        result = recovery.recover(frame, begun, result, Past(), model, settle_from)
     found = result.state.estimate.pose
     one, other = (scene.surface(pose, NO_CLOTH).vertices for pose in (truth, found))
     return float(np.linalg.norm(one - other, axis=1).mean())

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 from mocapflow_evaluation.compare import NINETY, rms
-from mocapflow_evaluation.ours import of_folder
+from mocapflow_evaluation.tracked_motion import of_folder
 from mocapflow_export import layout, tables
 from mocapflow_export.uncertainty import OUTLINE_MM, excess, px_per_mm
 

@@ -57,7 +57,7 @@ def main() -> None:
 def track_of(scene: Scene, rows: Sequence[int], truth: Sequence[Pose]) -> Track:
     """Return a track whose poses are off by `OFF`."""
     count, size = len(rows), len(scene.body.twists)
-    parameters = scene.calm
+    parameters = scene.neutral_parameters
     return Track(
         frame=np.array(rows, np.int32), time=np.array(rows) / 30.0, root=np.stack([pose.root for pose in truth]),
         angles=np.stack([p.angles for p in truth]) + OFF * np.random.default_rng(0).normal(size=(count, size)),

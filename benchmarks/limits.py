@@ -41,7 +41,7 @@ from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.io.first_pose import read_pose
 from mocapflow.loop import settle
 from mocapflow.model import ClothedModel, moved
-from mocapflow.prediction import believed
+from mocapflow.prediction import initial_state
 from mocapflow.recordings.recording import open_recording
 from mocapflow.records import F64, Bool
 from mocapflow.scene import Scene
@@ -98,13 +98,13 @@ def track(
     truth: Sequence[Pose],
 ) -> list[Pose]:  # fmt: skip
     """Return the pose of each frame, tracked from the true pose of the first."""
-    past, poses, pose, parameters = Past(), list[Pose](), truth[0], model.scene.calm
+    past, poses, pose, parameters = Past(), list[Pose](), truth[0], model.scene.neutral_parameters
     for row, frame in enumerate(frames):
         if past.moments:
             pose = loop.predictor.predict(frame, past, model.scene)
         here = [replace_row(prior, row) for prior in priors]
         steps = replace(loop.steps, segmenter=segmenter, priors=(*loop.priors, *here))
-        state = believed(pose, parameters, model.drape(pose, parameters, past))
+        state = initial_state(pose, parameters, model.drape(pose, parameters, past))
         new = settle(frame, state, past, steps, model, lambda *_: None).state
         parameters = new.cloth.parameters
         found = new.estimate

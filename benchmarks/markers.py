@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 from mocapflow_evaluation.evaluate import evaluate, evaluate_run
-from mocapflow_evaluation.ours import Ours
 from mocapflow_evaluation.rigs import COMMON_POINTS
 from mocapflow_evaluation.stick import Stick
+from mocapflow_evaluation.tracked_motion import TrackedMotion
 from mocapflow_export import layout
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, filtfilt
@@ -51,7 +51,7 @@ def main() -> None:
     known = {**truth, "time": time}
     nothing = Stick(names=(), places=np.empty((len(time), 0, 3)))
     columns = {
-        "markers, truth": evaluate(Ours(columns=known, raw=known, stick=nothing), path, folder / "truth").rows,
+        "markers, truth": evaluate(TrackedMotion(columns=known, raw=known, stick=nothing), path, folder / "truth").rows,
         "ours, markers": evaluate_run(run, path).rows,
         "ours, truth": evaluate_run(run, recording / "truth/angles.csv").rows,
     }

@@ -11,8 +11,8 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from mocapflow_robustness import doubts
-from mocapflow_robustness.check_views import JUMP, doubted, longest, rooms
+from mocapflow_robustness import picture_checks
+from mocapflow_robustness.check_views import JUMP, faults, longest, rooms
 from mocapflow_robustness.thumbnails import Thumbnails, thumbnails
 
 from mocapflow.recordings.recording import open_recording
@@ -23,22 +23,22 @@ KINDS = ("other time, one view", "other time, all", "other camera, one view", "o
 
 
 def spoil(seen: Thumbnails, kind: str, rng: np.random.Generator) -> tuple[F32, F64, np.ndarray]:
-    """Thumbnails and news of a recording with wrong pictures, and which these are (T, C)."""
-    frames, cameras = seen.there.shape
+    """Thumbnails and change of a recording with wrong pictures, and which these are (T, C)."""
+    frames, cameras = seen.usable.shape
     count = int(rng.integers(2, 5))
     first = int(rng.integers(3, frames - count - 3))
-    rows, wrong = slice(first, first + count), np.zeros(seen.there.shape, bool)
+    rows, wrong = slice(first, first + count), np.zeros(seen.usable.shape, bool)
     views = slice(None) if kind.endswith("all") else [int(rng.integers(cameras))]
-    grey, news = seen.grey.copy(), seen.news.copy()
+    grey, change = seen.grey.copy(), seen.change.copy()
     if kind.startswith("other time"):
         instead = seen.grey[(np.arange(first, first + count) + rng.integers(8, frames - 8)) % frames]
     elif kind.startswith("other camera"):
         instead = np.roll(seen.grey[rows], -1, axis=1)
     else:
         instead = np.repeat(seen.grey[first - 1 : first], count, axis=0)
-        news[rows, views] = 0
+        change[rows, views] = 0
     grey[rows, views], wrong[rows, views] = instead[:, views], True
-    return grey, news, wrong
+    return grey, change, wrong
 
 
 def main(folders: list[Path]) -> None:
@@ -49,18 +49,19 @@ def main(folders: list[Path]) -> None:
         seen, names = thumbnails(recording), [camera.name for camera in recording.cameras]
         room = rooms(seen, recording.background())
 
-        def flagged(grey: F32, news: F64, seen: Thumbnails = seen, room: F32 = room) -> np.ndarray:
-            given = Thumbnails(grey=grey, news=news, there=seen.there)
-            return doubted(given, room, recording.frame_rate, names) != ""  # noqa: B023  used in this round only
+        def flagged(grey: F32, change: F64, seen: Thumbnails = seen, room: F32 = room) -> np.ndarray:
+            given = Thumbnails(grey=grey, change=change, usable=seen.usable)
+            return faults(given, room, recording.frame_rate, names) != ""  # noqa: B023  used in this round only
 
-        steps = doubts.distance(np.diff(seen.grey, axis=0))
-        bursts = doubts.candidates(seen.grey, steps, longest(recording.frame_rate), 0.1)
+        steps = picture_checks.distance(np.diff(seen.grey, axis=0))
+        bursts = picture_checks.candidates(seen.grey, steps, longest(recording.frame_rate), 0.1)
         strongest = max((found[0] for found in bursts), default=0.0)
-        line = f"{folder.name:20} {flagged(seen.grey, seen.news).sum():7} {strongest:10.2f}          "
+        line = f"{folder.name:20} {flagged(seen.grey, seen.change).sum():7} {strongest:10.2f}          "
         rng = np.random.default_rng(2)
         for kind in KINDS:
             trials = [
-                (flagged(grey, news), wrong) for grey, news, wrong in (spoil(seen, kind, rng) for _ in range(TRIALS))
+                (flagged(grey, change), wrong)
+                for grey, change, wrong in (spoil(seen, kind, rng) for _ in range(TRIALS))
             ]
             found, too_many = (np.sum([(told & part).sum() for told, part in rows]) for rows in pairs(trials))
             total = np.sum([wrong.sum() for _, wrong in trials])

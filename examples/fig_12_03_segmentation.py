@@ -12,7 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 from mocapflow_levelset.evidence import from_image
-from mocapflow_levelset.evolve import Rhythm, Weights, settle
+from mocapflow_levelset.evolve import Schedule, Weights, settle
 from mocapflow_levelset.masks import counted
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.statistics import Window
@@ -39,7 +39,7 @@ def segment(image: U8, start: F32, steps: int) -> F32:
     evidence = from_image(image, counted(start.shape, 3).astype(np.float32), ("lab",), 1)
     # a poor start: a wide window for the statistics and a soft step, as in coarse-to-fine
     weights = Weights(sigma_px=3.0, length=0.9, shape=0.0, clip=6.0, step=2.0, band_px=14.0)
-    return settle(start, start, evidence, Window(24.0, 4, 0.02), weights, Rhythm(steps, 1, 2)).level
+    return settle(start, start, evidence, Window(24.0, 4, 0.02), weights, Schedule(steps, 1, 2)).level
 
 
 def drawn(image: U8, level: F32, title: str) -> U8:

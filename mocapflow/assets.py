@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from mocapflow.errors import GarmentError, MocapflowError, ShapeError, alternatives
-from mocapflow.records import F32, F64, I32, U8, Bool, array, arrays, record, stray
+from mocapflow.records import F32, F64, I32, U8, Bool, array, arrays, out_of_range, record
 
 
 @record
@@ -62,12 +62,12 @@ class Body:
             ShapeError: an index is not that of a vertex, joint or screw, joints or screws are out of order, or modes
                 lack those of the joints.
         """
-        if (odd := stray(self.faces, len(self.vertices))) is not None:
+        if (odd := out_of_range(self.faces, len(self.vertices))) is not None:
             raise ShapeError(f"Body: a face names vertex {odd} of {len(self.vertices)}")
         count = len(self.parents)
         skin, screws, parents = (self.skin_joint, 0), (self.screw_joint, 0), (self.parents, -1)
         for what, (index, least) in {"the skin": skin, "a screw": screws, "a parent": parents}.items():
-            if (odd := stray(index, count, least)) is not None:
+            if (odd := out_of_range(index, count, least)) is not None:
                 raise ShapeError(f"Body: {what} names joint {odd} of {count}")
         if (self.parents >= np.arange(count)).any() or (np.diff(self.screw_joint) < 0).any():
             raise ShapeError("Body: parents have to stand before their children, and screws in the order of the joints")
@@ -120,7 +120,7 @@ class GarmentMesh:
         count = len(self.vertices)
         face, strand, ring, pin = (self.faces, 0), (self.strands, -1), (self.rings, 0), (self.pinned, 0)
         for what, (index, least) in {"face": face, "strand": strand, "ring": ring, "pin": pin}.items():
-            if (odd := stray(index, count, least)) is not None:
+            if (odd := out_of_range(index, count, least)) is not None:
                 raise GarmentError(f"{self.name}: a {what} names vertex {odd} of {count}")
         if not np.isfinite(self.vertices).all():
             first = int(np.argwhere(~np.isfinite(self.vertices))[0, 0])

@@ -139,7 +139,7 @@ class Recovery(Component):
     ) -> FrameResult:
         """Return the result of the loop, or a better one that `settle` has reached from elsewhere.
 
-        `settle` takes a pose and cloth parameters; `state` is what was believed before looking. What was found
+        `settle` takes a pose and cloth parameters; `state` is what was predicted before looking. What was found
         wrong, and what became of it, goes into `notes`.
         """
 

@@ -273,7 +273,7 @@ class Past:
         """Return the past one frame later."""
         return Past(moments=(*self.moments, moment)[-REMEMBERED:], appearance=appearance)
 
-    def believable(self) -> Past:
+    def trusted(self) -> Past:
         """Return the past, without moments where the last two do not show the person: the next begins like a first."""
         blind = bool(self.moments) and all(moment.blind for moment in self.moments[-2:])
         return Past(appearance=self.appearance, after_gap=True) if blind else self

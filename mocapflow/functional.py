@@ -10,20 +10,10 @@ import numpy as np
 
 from mocapflow.assets import Camera
 from mocapflow.components import Prior
-from mocapflow.data import (
-    Cloth,
-    Estimate,
-    FrameState,
-    Matches,
-    Past,
-    Pose,
-    Segmentation,
-    Silhouette,
-    Surface,
-)
+from mocapflow.data import Cloth, Estimate, FrameState, Matches, Past, Pose, Segmentation, Silhouette, Surface
 from mocapflow.geometry import silhouettes
 from mocapflow.geometry.cameras import project_each
-from mocapflow.guards.answers import residual_of
+from mocapflow.guards.outputs import residual_of
 from mocapflow.model import ClothedModel, increment_between, moved
 from mocapflow.records import F32, F64
 
@@ -46,7 +36,7 @@ class Functional:
     def terms(self) -> tuple[str, ...]:
         """The names (E,) of the terms: view and term, then the priors."""
         views = [f"{camera.name}.{term}" for camera in self.model.scene.cameras for term in IN_VIEW]
-        return (*views, *told_apart([prior.name for prior in self.priors]))
+        return (*views, *unique_names([prior.name for prior in self.priors]))
 
     def values(self, state: FrameState, surface: Surface) -> F64:
         """Return the terms (E,) of a state with its surface; NaN where a view is not seen or has no such energy.
@@ -67,7 +57,7 @@ class Functional:
         counted = [not name.endswith(".contour") for name in self.terms]
         return float(np.nansum(values[counted]))
 
-    def pull(self, segmentation: Segmentation, pose: Pose, cloth: Cloth) -> float:
+    def pose_cost(self, segmentation: Segmentation, pose: Pose, cloth: Cloth) -> float:
         """Return the terms that pose and cloth can change, summed: area and priors."""
         surface, cameras = self.model.surface(pose, cloth), self.model.scene.cameras
         areas = [area(surface, silhouette, cameras[silhouette.camera]) for silhouette in segmentation.of("person")]
@@ -79,9 +69,9 @@ class Functional:
         """Return the new estimate and cloth; while they cost more than the state's, the step to them is halved."""
         if not halvings:
             return estimate, cloth
-        most = (1 + SLACK) * self.pull(segmentation, state.estimate.pose, state.cloth)
+        most = (1 + SLACK) * self.pose_cost(segmentation, state.estimate.pose, state.cloth)
         for _ in range(halvings):
-            if self.pull(segmentation, estimate.pose, cloth) <= most:
+            if self.pose_cost(segmentation, estimate.pose, cloth) <= most:
                 break
             pose = halfway(state.estimate.pose, estimate.pose)
             cloth = self.model.drape(pose, (state.cloth.parameters + cloth.parameters) / 2, self.past)
@@ -142,7 +132,7 @@ def halfway(one: Pose, other: Pose) -> Pose:
     return moved(one, 0.5 * increment_between(one, other))
 
 
-def told_apart(names: Sequence[str]) -> tuple[str, ...]:
+def unique_names(names: Sequence[str]) -> tuple[str, ...]:
     """Return the names, each that was there before with its number: parzen, parzen_2."""
     counts = [names[: at + 1].count(name) for at, name in enumerate(names)]
     return tuple(name if count == 1 else f"{name}_{count}" for name, count in zip(names, counts, strict=True))

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from mocapflow.data import Frame
-from mocapflow.geometry.turned import as_seen, points_seen
+from mocapflow.geometry.camera_rotation import warped, warped_points
 from mocapflow.records import F64, I16, I32, U8, Bool, array, record
 
 
@@ -40,7 +40,7 @@ class Knocks:
     def people(self, index: int, people: Sequence[F64]) -> tuple[F64, ...]:
         """Return the keypoints of a frame, per camera (N, K, 3) px, px, confidence, as such cameras would see them."""
         ways = self._back(index)
-        return tuple(points_seen(p, ways[camera]) if camera in ways else p for camera, p in enumerate(people))
+        return tuple(warped_points(p, ways[camera]) if camera in ways else p for camera, p in enumerate(people))
 
     def _back(self, index: int) -> dict[int, F64]:
         """Return the homographies (3, 3) that move pictures of a frame back, by camera."""
@@ -51,6 +51,6 @@ class Knocks:
 
 def _moved(image: U8, hidden: Bool, turn: F64) -> tuple[U8, Bool]:
     """Return an image (H, W, 3) and where (H, W) it shows nothing, as a camera that has turned sees it."""
-    seen, known = as_seen(image, turn)
-    covered, _ = as_seen(hidden.astype(np.uint8) * 255, turn)
+    seen, known = warped(image, turn)
+    covered, _ = warped(hidden.astype(np.uint8) * 255, turn)
     return seen, ~known | (covered > 0)

@@ -12,11 +12,11 @@ from mocapflow.components import ClothFitter, Matcher, Observe, PoseSolver, Prio
 from mocapflow.data import NO_CLOTH, Frame, FrameResult, FrameState, Past, Turn
 from mocapflow.errors import noting
 from mocapflow.functional import Functional, overlaps
-from mocapflow.guards.answers import cloth_of, estimate_of, segmentation_of
+from mocapflow.guards.outputs import cloth_of, estimate_of, segmentation_of
 from mocapflow.model import ClothedModel
 from mocapflow.pooling import pool_matches
 from mocapflow.records import record
-from mocapflow.steady import Shown, Steady, measure_change
+from mocapflow.steady import PosedSurface, Steady, measure_change
 from mocapflow.timing import Stopwatch
 
 LAPS = ("segment", "solve", "cloth", "energy")  # of a turn, timed
@@ -44,32 +44,32 @@ def settle(
     functional, watch = Functional(model, steps.priors, past), Stopwatch(LAPS)
     far = not past.moments
     steady = steps.steady.beginning if far else steps.steady
-    calm, change = 0, None
-    shown = deque([Shown(state.estimate.pose, model.surface(state.estimate.pose, state.cloth))], maxlen=3)
+    at_rest, change = 0, None
+    recent = deque([PosedSurface(state.estimate.pose, model.surface(state.estimate.pose, state.cloth))], maxlen=3)
     energy, cost = np.full((steady.cap, len(functional.terms)), np.nan), np.nan
     for index in range(steady.cap):
         turn = Turn(index=index, change=change, far=far)
         with noting(f"frame {frame.index}, iteration {index + 1}"):
             state = take_turn(frame, state, past, steps, functional, turn, watch)
-            now = Shown(state.estimate.pose, model.surface(state.estimate.pose, state.cloth))
+            now = PosedSurface(state.estimate.pose, model.surface(state.estimate.pose, state.cloth))
             energy[index] = functional.values(state, now.surface)
         last_cost, cost = cost, functional.total(energy[index])
-        change = measure_change(shown[-1], now, state.estimate.covariance)
-        shown.append(now)
+        change = measure_change(recent[-1], now, state.estimate.covariance)
+        recent.append(now)
         if index == 0 and steady.far(change):
             far, steady = True, steady.beginning
         watch.lap("energy")
         observe(frame.index, turn, state)
-        calm = calm + 1 if steady.holds(change, index + 1) and steady.even(last_cost, cost) else 0
-        if calm >= steady.turns or index + 1 >= steady.max_turns:
+        at_rest = at_rest + 1 if steady.holds(change, index + 1) and steady.even(last_cost, cost) else 0
+        if at_rest >= steady.turns or index + 1 >= steady.max_turns:
             break
     assert change is not None
-    swing = measure_change(shown[0], now, state.estimate.covariance)  # over the last two turns
+    swing = measure_change(recent[0], now, state.estimate.covariance)  # over the last two turns
     return FrameResult(
         state=state,
         iterations=index + 1,
-        steady=calm >= steady.turns,
-        oscillating=calm == 0 and index > 1 and steady.holds(swing, index + 1),
+        steady=at_rest >= steady.turns,
+        oscillating=at_rest == 0 and index > 1 and steady.holds(swing, index + 1),
         change=change,
         overlap=overlaps(now.surface, state.segmentation, model.scene.cameras),
         energy=energy,

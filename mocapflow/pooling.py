@@ -12,7 +12,7 @@ from mocapflow.components import Matcher
 from mocapflow.data import Frame, Matches, Past, Segmentation, Surface, Turn, empty_matches
 from mocapflow.geometry.cameras import project
 from mocapflow.geometry.contours import at_nearest
-from mocapflow.guards.answers import matches_of
+from mocapflow.guards.outputs import matches_of
 from mocapflow.records import joined_rows, picked_rows
 from mocapflow.scene import Scene
 

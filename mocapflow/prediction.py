@@ -1,4 +1,4 @@
-"""What is said of a frame without a look at it: the state that is believed, and why nobody could look."""
+"""What is known of a frame without a look at it: its predicted state, and why nobody could look."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def enough(frame: Frame) -> int:
     return min(VIEWS, len(frame.usable))
 
 
-def believed(pose: Pose, parameters: F64, cloth: Cloth) -> FrameState:
+def initial_state(pose: Pose, parameters: F64, cloth: Cloth) -> FrameState:
     """Return the state of a frame nobody has looked at."""
     covariance = UNKNOWN * np.eye(6 + len(pose.angles) + len(parameters))
     return FrameState(
@@ -66,7 +66,7 @@ def lost(frame: Frame, begun: FrameState, steps: Steps, model: ClothedModel) -> 
 
 
 def notes_on(frame: Frame, scene: Scene, known: Past, result: FrameResult) -> Sequence[str]:
-    """Return what went wrong with the views of a frame and with those before it; see `Past.believable`."""
+    """Return what went wrong with the views of a frame and with those before it; see `Past.trusted`."""
     reasons = frame.reasons or ("",) * len(frame.usable)
     views = zip(scene.cameras, frame.usable, reasons, strict=True)
     notes = [f"{camera.name} not usable: {reason or 'no image'}" for camera, usable, reason in views if not usable]

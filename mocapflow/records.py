@@ -132,7 +132,7 @@ def joined_rows(parts: Sequence[Record]) -> Record:
     return _each(parts[0], lambda name: np.concatenate([getattr(part, name) for part in parts]))
 
 
-def stray(index: npt.NDArray[np.signedinteger[Any]], count: int, least: int = 0) -> int | None:
+def out_of_range(index: npt.NDArray[np.signedinteger[Any]], count: int, least: int = 0) -> int | None:
     """Return an index that is not in least ... count - 1, None where all are."""
     low, high = int(index.min(initial=least)), int(index.max(initial=-1))
     return low if low < least else high if high >= count else None

@@ -26,19 +26,19 @@ class ViewChecks:
     reasons: tuple[str, ...]  # P, for people
     knocks: Knocks | None = None  # None: all cameras stood still
 
-    def steadied(self, frame: Frame) -> Frame:
+    def stabilised(self, frame: Frame) -> Frame:
         """Return a frame as knocked cameras would have seen it, had they stood still."""
         return frame if self.knocks is None else self.knocks.undone(frame)
 
     def people(self, index: int, people: Sequence[F64]) -> tuple[F64, ...]:
-        """Return the keypoints of a frame, per camera (N, K, 3), steadied; none of wrong views."""
+        """Return the keypoints of a frame, per camera (N, K, 3), stabilised; none of wrong views."""
         steady = people if self.knocks is None else self.knocks.people(index, people)
         wrong = self.camera[self.frame == index]
         return tuple(points[:0] if camera in wrong else points for camera, points in enumerate(steady))
 
     def passed(self, frame: Frame) -> Frame:
-        """Return a frame, steadied, whose wrong views are not usable."""
-        frame = self.steadied(frame)
+        """Return a frame, stabilised, whose wrong views are not usable."""
+        frame = self.stabilised(frame)
         first, last = np.searchsorted(self.frame, [frame.index, frame.index + 1])
         if first == last:
             return frame
@@ -124,11 +124,11 @@ def _unknown(lost: Bool, covariance: F64, rows: Numbers) -> F64:
 
 
 def rows_with_frames(track: Track, frames: Iterable[Frame], checks: ViewChecks | None) -> Iterator[tuple[int, Frame]]:
-    """Yield rows of a track, each with the frame that it is of, to be drawn on: see `ViewChecks.steadied`."""
+    """Yield rows of a track, each with the frame that it is of, to be drawn on: see `ViewChecks.stabilised`."""
     rows = {int(index): row for row, index in enumerate(track.frame)}
     for frame in frames:
         if frame.index in rows:
-            yield rows[frame.index], frame if checks is None else checks.steadied(frame)
+            yield rows[frame.index], frame if checks is None else checks.stabilised(frame)
 
 
 def values_of(frame: Frame, result: FrameResult, steps: Sequence[str]) -> dict[str, Any]:

@@ -82,7 +82,7 @@ class Scene:
         return meshes.lengths_along(self.garment.vertices, self.garment.strands)
 
     @property
-    def calm(self) -> F64:
+    def neutral_parameters(self) -> F64:
         """Parameters (Q,) of the garment without forces: zero, or the nearest to it within bounds."""
         return np.empty(0) if self.garment is None else np.clip(0.0, *self.garment.parameter_bounds.T)
 

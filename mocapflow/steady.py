@@ -55,14 +55,14 @@ class Steady(Settings):
         return self.energy_share == float("inf") or abs(now - before) <= self.energy_share * abs(before)
 
 
-class Shown(NamedTuple):
+class PosedSurface(NamedTuple):
     """A pose with the surface it has."""
 
     pose: Pose
     surface: Surface
 
 
-def measure_change(old: Shown, new: Shown, covariance: F64) -> Change:
+def measure_change(old: PosedSurface, new: PosedSurface, covariance: F64) -> Change:
     """Return how far body, cloth and joint angles moved between two poses.
 
     The covariance (S, S) weighs the move in `sigmas`: along a direction that no image shows even a long way counts

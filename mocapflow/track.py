@@ -18,11 +18,11 @@ from mocapflow.data import Frame, FrameResult, FrameState, Past, Pose, Start
 from mocapflow.dressing.roles import Draper
 from mocapflow.errors import ComponentFailed, PipelineError, noting
 from mocapflow.functional import image_cost
-from mocapflow.guards.answers import pose_of, result_of
-from mocapflow.guards.idle import idle_matchers
+from mocapflow.guards.matcher_inputs import check_matcher_inputs
+from mocapflow.guards.outputs import pose_of, result_of
 from mocapflow.loop import LAPS, Steps, settle
 from mocapflow.model import ClothedModel
-from mocapflow.prediction import believed, lost, notes_on, seen
+from mocapflow.prediction import initial_state, lost, notes_on, seen
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64, silent
 from mocapflow.results import ImageFlow, Track, ViewChecks
@@ -66,7 +66,7 @@ class CoupledLoop(Stage):
 
     def need(self, recording: Recording) -> None:
         """Raise if no matcher would find a pair in the recording."""
-        idle_matchers(self.matchers, recording)
+        check_matcher_inputs(self.matchers, recording)
 
     def run(
         self,
@@ -86,7 +86,7 @@ class CoupledLoop(Stage):
         if scene.garment is not None and self.draper is None:
             hint = "name a draper and a cloth_fitter, or track the bare body: garment: null"
             raise PipelineError(f"the person wears a {scene.garment.name}, which the track does not drape", hint=hint)
-        for said in idle_matchers(self.matchers, recording):
+        for said in check_matcher_inputs(self.matchers, recording):
             LOG.warning(said)
         able, model = self if background else self.without_scene(), self.model_of(scene, background)
         if self.keep == "trace":
@@ -145,7 +145,7 @@ class CoupledLoop(Stage):
         self, frame: Frame, past: Past, start: Start, model: ClothedModel, observe: Observe, watch: Stopwatch
     ) -> FrameResult:
         """Return the result of one frame: predicted, settled by the loop, and recovered if the loop was lost."""
-        known, begun = past.believable(), self.begin(frame, past, start, model, watch)
+        known, begun = past.trusted(), self.begin(frame, past, start, model, watch)
         if seen(frame):
             near = begun if len(known.moments) >= MOVING else self.approach(frame, begun, known, model)
             watch.lap("predict")
@@ -159,7 +159,7 @@ class CoupledLoop(Stage):
         return replace(result, notes=notes, seconds=watch.seconds)
 
     def begin(self, frame: Frame, past: Past, start: Start, model: ClothedModel, watch: Stopwatch) -> FrameState:
-        """Return what is believed of a frame before looking: the predicted pose, clothed."""
+        """Return the predicted state of a frame: the pose before looking, clothed."""
         pose, parameters = start.pose, start.parameters
         if past.moments:
             pose = pose_of(self.predictor, frame, past, model.scene)
@@ -167,7 +167,7 @@ class CoupledLoop(Stage):
         watch.lap("predict")
         cloth = model.drape(pose, parameters, past)
         watch.lap("drape")
-        return believed(pose, parameters, cloth)
+        return initial_state(pose, parameters, cloth)
 
     def approach(self, frame: Frame, state: FrameState, past: Past, model: ClothedModel) -> FrameState:
         """Return a first or second frame's state moved near the person by the first segmenter, if there is one.
@@ -180,7 +180,7 @@ class CoupledLoop(Stage):
             return state
         steps = replace(self.steps, segmenter=self.first_segmenter)
         near = settle(frame, state, past, steps, model, silent).state
-        begins = (state, believed(near.estimate.pose, near.cloth.parameters, near.cloth))
+        begins = (state, initial_state(near.estimate.pose, near.cloth.parameters, near.cloth))
         once = replace(self.steps, steady=Steady(max_turns=1))
 
         def costs(begin: FrameState) -> float:
@@ -202,7 +202,7 @@ class CoupledLoop(Stage):
     def settled(self, frame: Frame, past: Past, model: ClothedModel, pose: Pose, parameters: F64) -> FrameResult:
         """Return the result of the loop from a pose and cloth parameters; nobody looks on."""
         with noting(f"frame {frame.index}"):
-            begun = believed(pose, parameters, model.drape(pose, parameters, past))
+            begun = initial_state(pose, parameters, model.drape(pose, parameters, past))
             return settle(frame, begun, past, self.steps, model, silent)
 
     def complain(self, frame: Frame, result: FrameResult) -> None:

@@ -30,7 +30,7 @@ LAYERS = (  # a module imports only from its own layer or an earlier one
     "results",
     "scene",
     "io",
-    "wrong_answer",
+    "output_checks",
     "dressing",
     "model",
     "components",

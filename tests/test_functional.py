@@ -7,7 +7,7 @@ import pytest
 from mocapflow_priors.rest_pose import RestPose
 
 from mocapflow.data import FrameState, Matches, Past, Pose
-from mocapflow.functional import SHAPE_WEIGHT, Functional, area, contours, halfway, image_cost, told_apart
+from mocapflow.functional import SHAPE_WEIGHT, Functional, area, contours, halfway, image_cost, unique_names
 from mocapflow.geometry.cameras import project
 from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.model import increment_between, moved
@@ -87,7 +87,7 @@ def test_a_step_that_raises_the_functional_is_halved(shift, halvings, share):
 def test_a_step_may_raise_the_functional_by_one_percent(monkeypatch, risen, halved):
     """What a step lowers is the error of contours, not this; half of the step is let pass here."""
     costs = iter([100.0, 100.0 * risen, 100.0])
-    monkeypatch.setattr(Functional, "pull", lambda *given: next(costs))
+    monkeypatch.setattr(Functional, "pose_cost", lambda *given: next(costs))
     state, target = pictures.tiny_state(SCENE, POSE), off(POSE, 0.02)
     estimate = replace(state.estimate, pose=target, parameters=CLOTH.parameters)
     step = Functional(MODEL, (), Past()).step
@@ -110,7 +110,7 @@ def test_halfway_lies_in_the_middle():
 
 
 def test_two_priors_of_one_name_are_told_apart():
-    assert told_apart(["parzen", "limits", "parzen", "parzen"]) == ("parzen", "limits", "parzen_2", "parzen_3")
+    assert unique_names(["parzen", "limits", "parzen", "parzen"]) == ("parzen", "limits", "parzen_2", "parzen_3")
 
 
 def test_images_cost_what_the_last_turn_left_of_data_and_length():

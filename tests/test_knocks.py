@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mocapflow.data import Frame
-from mocapflow.geometry.turned import as_seen
+from mocapflow.geometry.camera_rotation import warped
 from mocapflow.knocks import Knocks
 from mocapflow.results import ViewChecks
 
@@ -22,7 +22,7 @@ def room():
 
 
 def seen(index, degrees, **more):
-    images = (room(), as_seen(room(), turn(degrees))[0])
+    images = (room(), warped(room(), turn(degrees))[0])
     return Frame(index=index, time=0.0, images=images, usable=np.ones(2, bool), **more)
 
 

@@ -12,7 +12,7 @@ from mocapflow.functional import Functional
 from mocapflow.geometry.kinematics import chain, skin
 from mocapflow.loop import Steps, settle
 from mocapflow.model import ClothedModel
-from mocapflow.prediction import believed
+from mocapflow.prediction import initial_state
 from mocapflow.scene import Scene
 from mocapflow.steady import Steady
 from tests.fixtures.tiny_plugin import TinyMatcher, TinySegmenter, tiny_body
@@ -49,7 +49,7 @@ def go(frame, share, observe=lambda *_: None, max_turns=8, sigmas=(), past=None,
         steady=Steady(sigmas=sigmas, max_turns=max_turns, far_turns=far_turns, **(steady or {})),
     )  # fmt: skip
     pose = Pose(root=np.eye(4), angles=np.array([0.3, -0.4]))
-    start = believed(pose, np.empty(0), model.drape(pose, np.empty(0), Past()))
+    start = initial_state(pose, np.empty(0), model.drape(pose, np.empty(0), Past()))
     return settle(frame, start, past or Past(), steps, model, observe)
 
 

@@ -6,7 +6,7 @@ import pytest
 from mocapflow.data import UNKNOWN, Cloth, Frame, Past
 from mocapflow.loop import Steps
 from mocapflow.model import ClothedModel
-from mocapflow.prediction import believed, lost, notes_on, seen
+from mocapflow.prediction import initial_state, lost, notes_on, seen
 from mocapflow.steady import Steady
 from mocapflow.testing import tiny_pose, tiny_scene
 
@@ -33,7 +33,7 @@ def test_two_views_fix_a_pose_or_the_only_one_there_is(usable, enough):
 
 def test_a_lost_frame_keeps_what_was_believed_and_says_which_views_were_missing():
     scene = tiny_scene(cameras=2)
-    begun = believed(tiny_pose(scene), np.zeros(1), Cloth(vertices=np.zeros((3, 3)), parameters=np.zeros(1)))
+    begun = initial_state(tiny_pose(scene), np.zeros(1), Cloth(vertices=np.zeros((3, 3)), parameters=np.zeros(1)))
     np.testing.assert_array_equal(begun.estimate.covariance, UNKNOWN * np.eye(7 + len(begun.estimate.pose.angles)))
     assert not begun.estimate.observed.any() and not begun.segmentation.silhouettes and not len(begun.matches.weight)
     steady = Steady(max_turns=3)

@@ -7,7 +7,7 @@ import pytest
 
 from mocapflow.data import Change
 from mocapflow.model import moved
-from mocapflow.steady import Shown, Steady, measure_change
+from mocapflow.steady import PosedSurface, Steady, measure_change
 from mocapflow.testing import tiny_cloth, tiny_pose, tiny_scene
 
 SCENE = tiny_scene(clothed=True)
@@ -19,7 +19,7 @@ def shown(increment=None, cloth=None):
     """A pose after an increment; the cloth stays where it was but for its own shift (W, 3) m."""
     pose = POSE if increment is None else moved(POSE, increment)
     hanging = tiny_cloth(SCENE, POSE)
-    return Shown(
+    return PosedSurface(
         pose, SCENE.surface(pose, hanging if cloth is None else replace(hanging, vertices=hanging.vertices + cloth))
     )
 

@@ -31,10 +31,11 @@ CORE = (
     "dressing.roles",
     "functional",
     "geometry",
-    "guards.answers",
+    "guards.outputs",
     "knocks",
     "loop",
     "model",
+    "output_checks",
     "periodic",
     "pooling",
     "prediction",
@@ -44,7 +45,6 @@ CORE = (
     "series",
     "steady",
     "track",
-    "wrong_answer",
 )
 LOADED: dict[str, tuple[ModuleSpec, str]] = {}  # loaded modules, each with its code when this process first looked
 PYTHON = f" {sys.version_info.major}.{sys.version_info.minor}"  # syntax trees differ between minor versions

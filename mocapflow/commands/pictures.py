@@ -21,7 +21,7 @@ from mocapflow.io.paths import for_opencv
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64, U8
 from mocapflow.registry import Registry
-from mocapflow.running.blame import blaming
+from mocapflow.running.component_failures import naming_failures
 from mocapflow.scene import Scene
 
 CLIPS = ("skirt_steps", "shorts_steps")
@@ -34,7 +34,7 @@ def draw_garment(registry: Registry, name: str, recording: Path | None, draper: 
     Raises:
         MocapflowError: the recording is not there, the garment needs measures that it does not have, or can't be sewn
             from them; or the draper can't be made.
-        ComponentFailed: the garment or the draper raised, or answered what is none; the traceback lies beside `out`.
+        ComponentFailed: the garment or the draper raised, or returned what is none; the traceback lies beside `out`.
         StoreError: the picture can't be written.
     """
     import cv2
@@ -45,7 +45,7 @@ def draw_garment(registry: Registry, name: str, recording: Path | None, draper: 
     resolver = Resolver(Document({}, {(): Place(f"show garment {name}", Path())}), registry)
     garment: Any = garment_of(name, recording, resolver)
     lays = resolver.component("draper", draper, ())
-    with blaming(garment, registry, lambda: "", out.with_suffix(".log")):
+    with naming_failures(garment, registry, lambda: "", out.with_suffix(".log")):
         body, scanned = wearer(recording, registry)
         scene = Scene(cameras=(), body=body, garment=mesh_of(garment, body))
         image = poster(scene, garment, lays)
@@ -84,7 +84,7 @@ def poster(scene: Scene, garment: Garment, draper: Draper) -> U8:
 
 
 def _draped(draper: Draper, scene: Scene, pose: Pose) -> F64:
-    return ClothedModel(scene=scene, draper=draper).drape(pose, scene.calm, Past()).vertices
+    return ClothedModel(scene=scene, draper=draper).drape(pose, scene.neutral_parameters, Past()).vertices
 
 
 def _pose(scene: Scene, degrees: dict[str, float]) -> Pose:

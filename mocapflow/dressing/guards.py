@@ -1,4 +1,4 @@
-"""What bodies, garments and drapers answer, looked at where it comes in: who answers wrongly is named."""
+"""What bodies, garments and drapers return, checked where it comes in: who returns it wrong is named."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 from mocapflow.assets import Body, GarmentMesh
 from mocapflow.data import Past, Pose, PoseBatch
 from mocapflow.dressing.roles import BodyModel, Draper, Garment
-from mocapflow.records import F64, I32, stray
+from mocapflow.output_checks import UNIT, InvalidOutput, array_of, of_kind
+from mocapflow.records import F64, I32, out_of_range
 from mocapflow.scene import Scene
 from mocapflow.settings import Component
-from mocapflow.wrong_answer import UNIT, WrongAnswer, array_of, of_kind
 
 REACH = 1.0  # m from the skin that holds it: a pin farther off is surely wrong
 FARTHEST = 10.0  # m from the body's first joint: cloth farther off is no longer worn
@@ -22,7 +22,7 @@ def body_of(model: BodyModel, recording: Path) -> Body:
     """Return the body that is loaded for a recording.
 
     Raises:
-        WrongAnswer: it is not finite, or its skin or joints would not move as a body does.
+        InvalidOutput: it is not finite, or its skin or joints would not move as a body does.
     """
     body = of_kind(model, model.load(recording), Body)
     array_of(model, body.vertices, body.vertices.shape, "vertices")
@@ -31,7 +31,7 @@ def body_of(model: BodyModel, recording: Path) -> Body:
         ("a twist about an axis that is no unit vector", np.linalg.norm(body.twists[:, :3], axis=1)),
     ):
         if not np.allclose(values, 1, rtol=0, atol=UNIT):
-            raise WrongAnswer(model, what)
+            raise InvalidOutput(model, what)
     return body
 
 
@@ -39,26 +39,26 @@ def mesh_of(garment: Garment, body: Body) -> GarmentMesh:
     """Return what a garment sews on a body.
 
     Raises:
-        WrongAnswer: it hangs from what the body lacks or from nothing near, or its parameters have no bounds.
+        InvalidOutput: it hangs from what the body lacks or from nothing near, or its parameters have no bounds.
     """
     mesh = of_kind(garment, garment.sew(body), GarmentMesh)
     for what, index, count in (
         ("pinned to vertex", mesh.pinned_to, len(body.vertices)),
         ("carried by joint", mesh.carried_by, len(body.parents)),
     ):
-        if (odd := stray(index, count)) is not None:
-            raise WrongAnswer(garment, f"cloth {what} {odd}; the body has 0 to {count - 1}")
+        if (odd := out_of_range(index, count)) is not None:
+            raise InvalidOutput(garment, f"cloth {what} {odd}; the body has 0 to {count - 1}")
     if not len(mesh.pinned):
-        raise WrongAnswer(garment, "cloth that is pinned nowhere")
+        raise InvalidOutput(garment, "cloth that is pinned nowhere")
     away = np.linalg.norm(mesh.vertices[mesh.pinned] - body.vertices[mesh.pinned_to], axis=1).max()
     if away > REACH:
-        raise WrongAnswer(garment, f"a pin {away:.3g} m from the skin that holds it; are its measures in metres?")
+        raise InvalidOutput(garment, f"a pin {away:.3g} m from the skin that holds it; are its measures in metres?")
     names, bounds = mesh.parameter_names, mesh.parameter_bounds
     if not len(set(names)) == len(names) == len(bounds):
-        raise WrongAnswer(garment, f"{len(bounds)} bounds of parameters for the names {', '.join(names) or 'none'}")
+        raise InvalidOutput(garment, f"{len(bounds)} bounds of parameters for the names {', '.join(names) or 'none'}")
     for name, (low, high) in zip(names, bounds, strict=True):
         if not (np.isfinite([low, high]).all() and low <= high):
-            raise WrongAnswer(garment, f"the bounds {low:g} to {high:g} of parameter '{name}'")
+            raise InvalidOutput(garment, f"the bounds {low:g} to {high:g} of parameter '{name}'")
     return mesh
 
 
@@ -66,7 +66,7 @@ def drape_of(draper: Draper, poses: PoseBatch, parameters: F64, past: Past, scen
     """Return cloth vertices (B, W, 3) as a draper lays them.
 
     Raises:
-        WrongAnswer: they are of another shape, not finite, or far away from the body.
+        InvalidOutput: they are of another shape, not finite, or far away from the body.
     """
     assert scene.garment is not None
     laid = of_kind(draper, draper.drape(poses, parameters, past, scene), np.ndarray)
@@ -75,15 +75,15 @@ def drape_of(draper: Draper, poses: PoseBatch, parameters: F64, past: Past, scen
 
 
 def worn(component: Component, laid: F64, root: F64, body: Body) -> F64:
-    """Return cloth (..., W, 3) m that a component answered for poses with roots (..., 4, 4).
+    """Return cloth (..., W, 3) m that a component returned for poses with roots (..., 4, 4).
 
     Raises:
-        WrongAnswer: it lies far away from the body.
+        InvalidOutput: it lies far away from the body.
     """
     middle = root[..., :3, :3] @ body.positions[0] + root[..., :3, 3]
     away = float(np.abs(laid - middle[..., None, :]).max(initial=0.0))  # along an axis: enough to tell, and quick
     if away > FARTHEST:
-        raise WrongAnswer(component, f"cloth {away:.3g} m from the body; is it in metres, and posed as the body is?")
+        raise InvalidOutput(component, f"cloth {away:.3g} m from the body; is it in metres, and posed as the body is?")
     return laid
 
 
@@ -91,7 +91,7 @@ def velocity_of(draper: Draper, pose: Pose, parameters: F64, vertices: I32, past
     """Return the velocities (M, 3, 6 + D + Q) of cloth vertices (M,) as a draper tells them.
 
     Raises:
-        WrongAnswer: they are of another shape, or not finite.
+        InvalidOutput: they are of another shape, or not finite.
     """
     told = of_kind(draper, draper.velocity(pose, parameters, vertices, past, scene), np.ndarray)
     return array_of(draper, told, (len(vertices), 3, 6 + len(pose.angles) + len(parameters)), "velocities")

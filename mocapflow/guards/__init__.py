@@ -1,1 +1,1 @@
-"""What plugins provide and components answer, looked at where it comes in."""
+"""What plugins provide and components return, checked where it comes in."""

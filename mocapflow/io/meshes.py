@@ -13,7 +13,7 @@ import numpy as np
 
 from mocapflow.errors import RecordingError
 from mocapflow.geometry.libraries import load_open3d
-from mocapflow.records import F64, I32, stray
+from mocapflow.records import F64, I32, out_of_range
 
 OPPOSED = 0.01  # of the edges of a mesh, that two triangles go along the same way; a scan has a few
 OPEN3D_FORMATS = (".ply", ".stl", ".off", ".gltf", ".glb")
@@ -81,7 +81,7 @@ def _checked(vertices: F64, triangles: Sequence[tuple[int, int, int]] | I32, pat
         raise RecordingError(f"{len(vertices)} vertices and {len(faces)} faces: no mesh", where=str(path))
     if not np.isfinite(vertices).all():
         raise RecordingError("a vertex is not a number", where=str(path))
-    if stray(faces, len(vertices)) is not None:
+    if out_of_range(faces, len(vertices)) is not None:
         raise RecordingError(f"a face names a vertex that is not there; the file has {len(vertices)}", where=str(path))
     return vertices, faces.astype(np.int32)
 

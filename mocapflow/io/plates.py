@@ -10,7 +10,7 @@ import numpy as np
 from mocapflow.assets import Background, Camera
 from mocapflow.data import Frame
 from mocapflow.errors import RecordingError
-from mocapflow.geometry.turned import Picture, as_seen, shift_px, turn_between
+from mocapflow.geometry.camera_rotation import Picture, shift_px, turn_between, warped
 from mocapflow.io.folders import plates
 from mocapflow.io.images import check_depth, read_sized
 from mocapflow.io.lenses import View
@@ -91,7 +91,7 @@ def _laid_over(plates: F32, frame: F32, shown: Bool, camera: Camera) -> tuple[F3
         turn = turn_between(_levels(toned(mean, frame, shown)), _levels(frame), shown, camera)
     if turn is None or np.array_equal(turn, np.eye(3)):
         return plates, np.ones(shown.shape, bool), 0.0
-    moved = [as_seen(plate, turn) for plate in plates]
+    moved = [warped(plate, turn) for plate in plates]
     return np.stack([plate for plate, _ in moved]), moved[0][1], shift_px(turn, camera)
 
 

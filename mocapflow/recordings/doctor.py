@@ -121,7 +121,7 @@ def _sewn(garment: Garment, folder: Path, registry: Registry) -> list[Finding]:
 
     Raises:
         GarmentError: it can't be sewn to the scanned person.
-        WrongAnswer: what is sewn is no garment of this body.
+        InvalidOutput: what is sewn is no garment of this body.
     """
     try:
         body, scanned = measures.wearer(folder, registry)

@@ -9,7 +9,7 @@ import numpy as np
 
 from mocapflow.assets import Camera
 from mocapflow.data import BORDER, Frame
-from mocapflow.geometry.pencils import pencil_axes, plane_angles
+from mocapflow.geometry.epipolar import pencil_axes, plane_angles
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F32, F64, U8, Bool
 

@@ -17,13 +17,14 @@ from mocapflow.dressing.guards import body_of, mesh_of
 from mocapflow.dressing.roles import Garment
 from mocapflow.errors import GarmentError
 from mocapflow.interrupts import check
+from mocapflow.output_checks import of_kind
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import silent
 from mocapflow.results import RunFolder
-from mocapflow.running.blame import LOG, blaming
+from mocapflow.running.component_failures import LOG, naming_failures
 from mocapflow.running.progress import Progress
 from mocapflow.running.recipes import Step
-from mocapflow.running.warned import warnings_logged
+from mocapflow.running.warning_log import warnings_logged
 from mocapflow.running.wiring import Itself, Source, made_by
 from mocapflow.scene import Scene
 from mocapflow.settings import Component
@@ -32,7 +33,6 @@ from mocapflow.storage.checkpoint import Checkpoint
 from mocapflow.storage.locks import Lock
 from mocapflow.storage.rows import Corrupted
 from mocapflow.storage.store import Report, Store
-from mocapflow.wrong_answer import of_kind
 
 
 def is_hit(step: Step, artifact: Artifact) -> bool:
@@ -134,7 +134,7 @@ class Execution:
     def _whole(self, step: Step) -> Made:
         made = self._run(step)
         begun = self._store.begin(step.label, step.key, step.recipe)
-        with self._blaming(step.named.stage):
+        with self._naming(step.named.stage):
             self._store.save(begun, made.value, warnings=made.warnings)
         return made
 
@@ -169,7 +169,7 @@ class Execution:
         self._report(f"{step.label}: running {step.named.stage.name}")
         check()
         cpu, wall, stage = time.process_time(), time.perf_counter(), step.named.stage
-        with warnings_logged(self._pipeline.registry.packages) as said, self._blaming(stage, checkpoint):
+        with warnings_logged(self._pipeline.registry.packages) as said, self._naming(stage, checkpoint):
             if checkpoint is not None:
                 checkpoint.keep_warnings(said)
             value = of_kind(stage, stage.run(**inputs), made_by(step.named))
@@ -211,21 +211,21 @@ class Execution:
 
     def _body(self) -> Body:
         model = self._pipeline.body
-        with self._blaming(model):
+        with self._naming(model):
             return body_of(model, self._pipeline.recording)
 
     def _sewn(self, garment: Garment, body: Body) -> GarmentMesh:
         try:
-            with self._blaming(garment):
+            with self._naming(garment):
                 return mesh_of(garment, body)
         except GarmentError as error:
             raise GarmentError(error.message, where=self._pipeline.garment_where, hint=error.hint) from None
 
-    def _blaming(self, component: Component, checkpoint: Checkpoint | None = None) -> AbstractContextManager[None]:
+    def _naming(self, component: Component, checkpoint: Checkpoint | None = None) -> AbstractContextManager[None]:
         def kept() -> str:
             return checkpoint.kept if checkpoint else ""
 
-        return blaming(component, self._pipeline.registry, kept, self._out / LOG)
+        return naming_failures(component, self._pipeline.registry, kept, self._out / LOG)
 
     def _enter_found(self, step: Step, found: Artifact) -> None:
         if step.label in self.entries:

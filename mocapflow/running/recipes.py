@@ -15,11 +15,11 @@ from mocapflow.config.pipeline import NamedStage, Pipeline
 from mocapflow.data import Start
 from mocapflow.dressing.roles import BodyModel
 from mocapflow.errors import PluginError, alternatives
+from mocapflow.output_checks import InvalidOutput
 from mocapflow.recordings.recording import Recording, open_recording
 from mocapflow.results import Evaluation, Files
 from mocapflow.running.parts import in_parts
 from mocapflow.running.wiring import Source, latest, makes, wire
-from mocapflow.wrong_answer import WrongAnswer
 
 BEGINNING = 10  # frames of the extent "beginning"
 SEEN = {Start: "first", Background: "all", Rig: "all", Body: "all", Recording: "all"}  # where a stage names no extent
@@ -162,7 +162,7 @@ def _files(component: BodyModel | Stage, recording: Path, digests: Digests) -> d
     """Return the digests of the files that a component reads besides the frames, by their names: these may matter."""
     paths = component.inputs(recording)
     if not isinstance(paths, list | tuple) or not all(isinstance(path, Path) for path in paths):
-        raise WrongAnswer(component, f"the inputs {paths!r}, which are no list of Path")
+        raise InvalidOutput(component, f"the inputs {paths!r}, which are no list of Path")
     found: dict[str, list[str]] = {}
     for path in filter(Path.exists, paths):
         name = path.relative_to(recording).as_posix() if path.is_relative_to(recording) else path.name

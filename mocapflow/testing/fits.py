@@ -7,7 +7,7 @@ import pytest
 
 from mocapflow.components import ClothFitter, PoseSolver, Prior
 from mocapflow.data import NO_CLOTH, Matches, Past, Pose, Turn
-from mocapflow.guards.answers import cloth_of, estimate_of, residual_of
+from mocapflow.guards.outputs import cloth_of, estimate_of, residual_of
 from mocapflow.model import ClothedModel, moved
 from mocapflow.records import F64
 from mocapflow.scene import Scene

@@ -7,7 +7,7 @@ import pytest
 
 from mocapflow.components import Matcher, Predictor, Segmenter
 from mocapflow.data import Matches
-from mocapflow.guards.answers import matches_of, pose_of, segmentation_of
+from mocapflow.guards.outputs import matches_of, pose_of, segmentation_of
 from mocapflow.model import moved
 from mocapflow.testing import pictures, scenes
 from mocapflow.testing.component import TURN, Conformance

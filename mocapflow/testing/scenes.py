@@ -61,7 +61,7 @@ def tiny_model(scene: Scene) -> ClothedModel:
 
 def tiny_cloth(scene: Scene, pose: Pose) -> Cloth:
     """Return the cloth of the tiny scene at a pose, at rest."""
-    return tiny_model(scene).drape(pose, scene.calm, Past())
+    return tiny_model(scene).drape(pose, scene.neutral_parameters, Past())
 
 
 def tiny_past(scene: Scene, *poses: Pose) -> Past:

@@ -16,13 +16,13 @@ from mocapflow.geometry.kinematics import chain_batch
 from mocapflow.memo import memoised
 from mocapflow.records import F64, I32, Bool, record
 from mocapflow.scene import Scene
+from mocapflow_draping.collisions import free_roots, free_strands
+from mocapflow_draping.directions import along_limbs, skinned_strands, standing
+from mocapflow_draping.drape_rates import Motion
+from mocapflow_draping.drape_steps import body_rates, distinct, drape_strands, drape_with_rates, strand_starts
 from mocapflow_draping.fields import BodyFields, build_fields, touchable_joints
-from mocapflow_draping.following import Motion
 from mocapflow_draping.forces import remaining_length, thickness, tilts, wind
-from mocapflow_draping.frames import along_limbs, riding, standing
-from mocapflow_draping.laying import distinct, lay, lay_moving, moving, placed
 from mocapflow_draping.parts import posed_parts, rates
-from mocapflow_draping.pushes import free_roots, free_strands
 from mocapflow_draping.strands import Strands, strands_of
 
 TINY = 1e-6  # rad, and share of a parameter's range: what the drape starts from is differentiated by steps
@@ -77,14 +77,15 @@ class Kinematic(Draper):
         if self.rule == "literal":
             force = wind(garment, parameters, chain[source, strands.carrier[0], :3, :3])
             grid, first = self._literal(fitting, chain, links, skin, parts, source, force)
-        elif strands.rides:
-            grid = riding(strands, chain[source], links[source], *winds)
+        elif strands.skinned:
+            grid = skinned_strands(strands, chain[source], links[source], *winds)
             free_roots(grid, strands.first, strands.last, parts[source], fitting.fields.values, None)
         else:
-            grid = lay(strands, fitting.fields, placed(strands, chain, links), winds, source, skin, parts).grid
+            starts = strand_starts(strands, chain, links)
+            grid = drape_strands(strands, fitting.fields, starts, winds, source, skin, parts).grid
         if self.sweeps:
             self._close(fitting, grid, first, links[source], chain[source], skin[source], parts[source])
-        vertices: F64 = grid.reshape(len(grid), -1, 3)[:, strands.place]
+        vertices: F64 = grid.reshape(len(grid), -1, 3)[:, strands.particle]
         return vertices
 
     def velocity(self, pose: Pose, parameters: F64, vertices: I32, past: Past, scene: Scene) -> F64:
@@ -102,21 +103,20 @@ class Kinematic(Draper):
         skin = self.skin_m + thickness(garment, values)
         length = remaining_length(garment, values)
         links = length[:, None, None] * strands.links
-        moved = moving(fitting.fields, chain, skin, length, steps)
+        moved = body_rates(fitting.fields, chain, skin, length, steps)
         winds = tilts(garment, values, strands.azimuth)
-        if strands.rides:
-            ridden = riding(strands, chain, links, *winds)
-            grid, rate = ridden[-1:], rates(ridden, steps)
+        if strands.skinned:
+            moved_strands = skinned_strands(strands, chain, links, *winds)
+            grid, rate = moved_strands[-1:], rates(moved_strands, steps)
         else:
-            grid, rate = lay_moving(
-                strands, fitting.fields, placed(strands, chain, links), winds, skin[-1:], parts, moved
-            )
+            starts = strand_starts(strands, chain, links)
+            grid, rate = drape_with_rates(strands, fitting.fields, starts, winds, skin[-1:], parts, moved)
         motion = Motion(rate, np.zeros_like(rate), moved.part_rate, moved.skin_rate, moved.stretch_rate)
-        if strands.rides:
+        if strands.skinned:
             free_roots(grid, strands.first, strands.last, parts, fitting.fields.values, motion)
         if self.sweeps:
             self._close(fitting, grid, strands.first[None], links[-1:], chain[-1:], skin[-1:], parts, motion)
-        row, unknowns = strands.place[vertices], 6 + len(pose.angles) + len(parameters)
+        row, unknowns = strands.particle[vertices], 6 + len(pose.angles) + len(parameters)
         return all_columns(grid.reshape(-1, 3)[row], rate.reshape(-1, 3, len(steps))[row], tried, pose, unknowns)
 
     def touchable(self, scene: Scene) -> Bool:
@@ -127,7 +127,7 @@ class Kinematic(Draper):
         touched = np.zeros(len(scene.body.parents), bool)
         touched[fitting.fields.joints] = True
         touched[strands.root_joint[strands.root_weight > 0]] = True
-        touched[strands.skin_joint[strands.skin_weight > 0] if strands.rides else strands.carrier] = True
+        touched[strands.skin_joint[strands.skin_weight > 0] if strands.skinned else strands.carrier] = True
         return touched
 
     def fitting(self, garment: GarmentMesh, body: Body) -> Fitting:
@@ -143,7 +143,7 @@ class Kinematic(Draper):
         strands, values = fitting.strands, fitting.fields.values
         rows = strands.first, strands.last
         grid = standing(strands, chain, links)
-        if strands.rides:
+        if strands.skinned:
             free_roots(grid, *rows, parts, values, None)
             free_strands(grid, links, *rows, skin, parts, values)
         fixed = np.zeros(grid.shape[:3], bool)
@@ -163,9 +163,9 @@ class Kinematic(Draper):
         strands = fitting.strands
         across, length = strands.spans
         bend, hold, slips = np.zeros_like(strands.links), math.pi, 1.0
-        if self.bending_m > 0 and not strands.rides:
+        if self.bending_m > 0 and not strands.skinned:
             bend = np.exp(-strands.links / self.bending_m)
-        if self.rule == "contact" and not strands.rides:
+        if self.rule == "contact" and not strands.skinned:
             hold, slips = math.radians(self.hold_deg), self.slips
         close_batch(  # rows that may be written, always: each kind is compiled by itself
             grid, links, np.array(first, order="C"), strands.last, across, length, skin, self.longest, self.stiff,

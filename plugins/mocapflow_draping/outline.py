@@ -25,7 +25,7 @@ def outline_error(pose: Pose, cloth: Cloth, segmentation: Segmentation, model: C
 
     Args:
         pose: of the body.
-        cloth: on it, as it is believed to hang: says how large a millimetre is in each view.
+        cloth: on it, as estimated: says how large a millimetre is in each view.
         segmentation: the silhouettes.
         model: the scene.
     """

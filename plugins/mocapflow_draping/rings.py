@@ -16,14 +16,14 @@ import math
 import numba
 import numpy as np
 
-from mocapflow_draping.following import follow_draw
-from mocapflow_draping.pushes import lift, move, place, push_out, square, supported, to_length
-from mocapflow_draping.sinking import hold, sink
+from mocapflow_draping.collisions import lift, move, place, push_out, square, supported, to_length
+from mocapflow_draping.drape_rates import pull_rates
+from mocapflow_draping.relaxation import hold, relax
 
 ENOUGH = 0.03  # of its length: a ring none of whose links is longer by more than that is let be
 LEAST = 3  # sweeps, before that
-SINKING = 15  # sweeps in which cloth sinks away from the limb that carries it
-STRIDE = 0.02  # m beyond its room that a particle may go in one sweep, so that it can't end up across a limb
+RELAXING = 15  # sweeps in which cloth sinks away from the limb that carries it
+STRIDE = 0.02  # m beyond its gap to the body that a particle may go in one sweep, so that it can't end up across a limb
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -45,7 +45,7 @@ def close_batch(  # type: ignore[no-untyped-def]
         stiff: 0 to 1, the share of a shortened link's lack that one sweep makes good.
         bend: (N, L - 1) 0 to 1, how much each bar keeps the direction of the one above it.
         limb: (B, N, 3) unit direction of each strand if it moved with the limb under it.
-        hold_rad: how far from there bars stand at most before they sink; pi: they hang as they fell.
+        hold_rad: how far from there bars stand at most before they relax; pi: they hang as they fell.
         slips: 0 to 1, how much what lies on top of the body gives way beside what hangs.
         sweeps: passes over each row, at most.
         parts: (B, P, COLUMNS), the bodies, see `parts`.
@@ -65,11 +65,11 @@ def _close(  # type: ignore[no-untyped-def]
     motion,
 ):  # fmt: skip
     strands, rows = grid.shape[0], grid.shape[1]
-    bars, seen = np.empty((strands, rows, 3)), grid[:, 0].copy()
-    room, near = np.full(strands, -1.0), np.zeros(strands, np.int64)
-    between, clear = seen.copy(), np.full(strands, -1.0)
+    bars, probe = np.empty((strands, rows, 3)), grid[:, 0].copy()
+    gap, near = np.full(strands, -1.0), np.zeros(strands, np.int64)
+    mid_probe, mid_gap = probe.copy(), np.full(strands, -1.0)
     gives, target, left = np.ones(strands), np.zeros((strands, 3)), np.zeros(strands)
-    turns = min(SINKING, sweeps - LEAST)  # fewer sweeps have no time for it
+    turns = min(RELAXING, sweeps - LEAST)  # fewer sweeps have no time for it
     may_hold = turns > 0 and hold_rad < math.pi
     _bars(grid, links, first, last, bars)
     if motion is not None:
@@ -77,21 +77,21 @@ def _close(  # type: ignore[no-untyped-def]
     for row in range(1, rows):
         _place(grid, bars, links, first, last, row, bend, motion)
         held = may_hold and hold(grid, limb, links, first, last, row, hold_rad, target, left)
-        sinking = turns if held else 0
+        relaxing = turns if held else 0
         gives[:] = 1.0
         for sweep in range(sweeps):
-            if 0 < sweep <= sinking:
-                sink(grid, links, row, target, left, turns)
+            if 0 < sweep <= relaxing:
+                relax(grid, links, row, target, left, turns)
             if sweep > 0 and slips < 1.0:
-                _weigh(grid, row, slips, gives, room, near, parts, values)
+                _weigh(grid, row, slips, gives, gap, near, parts, values)
             back = sweep % 2 == 1
             for k in range(len(across) - 1, 0, -1):
                 _pull(grid, first, last, across[k], length[k], row, longest, 0.0, gives, back, motion)
             excess = _pull(grid, first, last, across[0], length[0], row, longest, stiff, gives, back, motion)
             if sweep > 0:
-                lift(grid, first, last, across[0], row, seen, room, near, between, clear, parts, values, motion)
-            _clear(grid, links, first, last, row, sweep > 0, skin, seen, room, near, parts, values, motion)
-            if sweep + 1 >= LEAST + sinking and excess < ENOUGH:
+                lift(grid, first, last, across[0], row, probe, gap, near, mid_probe, mid_gap, parts, values, motion)
+            _clear(grid, links, first, last, row, sweep > 0, skin, probe, gap, near, parts, values, motion)
+            if sweep + 1 >= LEAST + relaxing and excess < ENOUGH:
                 break
 
 
@@ -124,10 +124,10 @@ def _place(grid, bars, links, first, last, row, bend, motion):  # type: ignore[n
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _weigh(grid, row, slips, gives, room, near, parts, values):  # type: ignore[no-untyped-def]
+def _weigh(grid, row, slips, gives, gap, near, parts, values):  # type: ignore[no-untyped-def]
     """Write how much each particle of a row gives way: as it hangs, or as it lies on the body."""
     for n in range(len(gives)):
-        gives[n] = 1.0 - (1.0 - slips) * supported(grid, n, row, room, near, parts, values)
+        gives[n] = 1.0 - (1.0 - slips) * supported(grid, n, row, gap, near, parts, values)
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -158,22 +158,22 @@ def _pull(grid, first, last, across, length, row, longest, stiff, gives, backwar
         else:
             continue
         if motion is not None:
-            follow_draw(motion.rate, n, m, row, (dx, dy, dz), share, limit, here, there)
+            pull_rates(motion.rate, n, m, row, (dx, dy, dz), share, limit, here, there)
         move(grid, n, row, here * share, (dx, dy, dz))
         move(grid, m, row, -there * share, (dx, dy, dz))
     return worst
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _clear(grid, links, first, last, row, limited, skin, seen, room, near, parts, values, motion):  # type: ignore[no-untyped-def]
+def _clear(grid, links, first, last, row, limited, skin, probe, gap, near, parts, values, motion):  # type: ignore[no-untyped-def]
     """Give every bar of a row its length, outside the body."""
     for n in range(grid.shape[0]):
         if first[n] < row <= last[n]:
-            most = max(room[n], 0.0) + STRIDE
-            far = square(place(grid, n, row), n, seen)
+            most = max(gap[n], 0.0) + STRIDE
+            far = square(place(grid, n, row), n, probe)
             if limited and far > most * most:
                 share = most / math.sqrt(far)
                 for a in range(3):
-                    grid[n, row, a] = seen[n, a] + share * (grid[n, row, a] - seen[n, a])
+                    grid[n, row, a] = probe[n, a] + share * (grid[n, row, a] - probe[n, a])
             to_length(grid, n, row, links[n, row - 1], motion)
-            push_out(grid, n, row, links[n, row - 1], skin, seen, room, near, parts, values, motion)
+            push_out(grid, n, row, links[n, row - 1], skin, probe, gap, near, parts, values, motion)

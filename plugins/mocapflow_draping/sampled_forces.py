@@ -78,7 +78,7 @@ class SampledForces(ClothFitter):
             yield partial(samples.replaced, garment, columns=every, values=np.zeros((1, len(every))))
         for k in range(self.rounds):
             for columns in forces:
-                yield partial(samples.beside, garment, columns=columns, step=STEP / 2**k)
+                yield partial(samples.neighbours, garment, columns=columns, step=STEP / 2**k)
             if first and THICKNESS in garment.parameter_names:
                 column = garment.parameter_names.index(THICKNESS)
-                yield partial(samples.beside, garment, columns=[column], step=THICKNESS_STEP / 2**k)
+                yield partial(samples.neighbours, garment, columns=[column], step=THICKNESS_STEP / 2**k)

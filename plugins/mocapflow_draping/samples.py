@@ -50,7 +50,7 @@ def replaced(garment: GarmentMesh, parameters: F64, columns: list[int], values: 
     return within(garment, rows)
 
 
-def beside(garment: GarmentMesh, parameters: F64, columns: list[int], step: float) -> F64:
+def neighbours(garment: GarmentMesh, parameters: F64, columns: list[int], step: float) -> F64:
     """Return parameters (B, Q) one step up and down in each of some columns."""
     moves = step * np.eye(len(parameters))[columns]
     return within(garment, parameters + np.concatenate([moves, -moves]))

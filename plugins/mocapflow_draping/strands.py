@@ -38,32 +38,32 @@ class Strands:
     tail: Bool = array("N", "L", unit="True for particles that move with `carrier`")
     skin_joint: I32 = array("N", "L", 5, unit="joint index, of the skin nearest at rest")
     skin_weight: F64 = array("N", "L", 5, unit="1")
-    beside: I32 = array("N", "L", unit="strand linked on its left-hand side in this row, or -1")
+    left: I32 = array("N", "L", unit="strand linked on its left-hand side in this row, or -1")
     ring_length: F64 = array("N", "L", unit="m, of that link")
-    rides: bool  # most strands lie on the limb that carries them, as trouser legs do; else they hang free, as skirts do
+    skinned: bool  # most strands move with the skin under them, as trouser legs do; else they hang free, as skirts do
 
     @cached_property
-    def own(self) -> Bool:
+    def valid(self) -> Bool:
         """(N, L), True where a strand has a particle of its own."""
-        return _own(self.first, self.last, self.vertex.shape[1])
+        return _valid(self.first, self.last, self.vertex.shape[1])
 
     @cached_property
-    def way(self) -> F64:
+    def direction(self) -> F64:
         """(N, 3), the unit direction from each strand's root to its end, at rest."""
         return unit(self.rest[:, -1] - self.rest[:, 0])
 
     @cached_property
-    def place(self) -> I32:
+    def particle(self) -> I32:
         """(W,), where each cloth vertex stands among the N x L particles."""
-        place = np.zeros(self.vertex.max() + 1, np.int32)
-        place[self.vertex[self.own]] = np.flatnonzero(self.own)
-        return place
+        particle = np.zeros(self.vertex.max() + 1, np.int32)
+        particle[self.vertex[self.valid]] = np.flatnonzero(self.valid)
+        return particle
 
     @cached_property
     def spans(self) -> tuple[I32, F64]:
         """Strands (K, N, L) that lie 1, 2, 4, ... links to the left within a row, or -1, and the cloth between in m."""
-        across, length = [self.beside], [self.ring_length]
-        row = np.arange(self.beside.shape[1])
+        across, length = [self.left], [self.ring_length]
+        row = np.arange(self.left.shape[1])
         for _ in range(DOUBLINGS):
             next_one = np.maximum(across[-1], 0)
             across.append(np.where(across[-1] >= 0, across[-1][next_one, row], np.int32(-1)))
@@ -81,13 +81,13 @@ def strands_of(garment: GarmentMesh, body: Body) -> Strands:
     vertex, first, last = _rows(garment)
     rows = garment.vertices[vertex]
     links = np.linalg.norm(np.diff(rows, axis=1), axis=2)
-    own = _own(first, last, vertex.shape[1])
+    valid = _valid(first, last, vertex.shape[1])
     skin = _pinned_skin(garment, vertex[:, 0])
-    beside, ring_length = _beside(garment, vertex, own)
+    left, ring_length = _left(garment, vertex, valid)
     carrier = garment.carried_by[vertex[:, -1]]
     under = np.asarray(cKDTree(body.vertices).query(rows)[1], np.int32)
-    rides = bool(np.mean(_limbs(body.parents)[carrier, body.main_joint[under[:, -1]]]) > 0.5)
-    facing = _from_middle(rows, beside) if rides else _along(garment.name, rows)
+    skinned = bool(np.mean(_limbs(body.parents)[carrier, body.main_joint[under[:, -1]]]) > 0.5)
+    facing = _from_middle(rows, left) if skinned else _along(garment.name, rows)
     return Strands(
         vertex=vertex,
         first=first,
@@ -100,11 +100,11 @@ def strands_of(garment: GarmentMesh, body: Body) -> Strands:
         azimuth=np.arctan2(facing[:, 1], facing[:, 0]),
         carrier=carrier,
         limb=body.main_joint[under[:, vertex.shape[1] // 3]],
-        rides=rides,
+        skinned=skinned,
         tail=garment.carried_by[vertex] == carrier[:, None],
         skin_joint=body.skin_joint[under],
         skin_weight=body.skin_weight[under],
-        beside=beside,
+        left=left,
         ring_length=ring_length,
     )
 
@@ -153,10 +153,10 @@ def _levels(a: I32, b: I32, step: I32, count: int) -> I32:
     return level
 
 
-def _own(first: I32, last: I32, rows: int) -> Bool:
+def _valid(first: I32, last: I32, rows: int) -> Bool:
     row = np.arange(rows)
-    own: Bool = (row >= first[:, None]) & (row <= last[:, None])
-    return own
+    valid: Bool = (row >= first[:, None]) & (row <= last[:, None])
+    return valid
 
 
 def _pinned_skin(garment: GarmentMesh, roots: I32) -> I32:
@@ -214,22 +214,22 @@ def _along(garment: str, rows: F64) -> F64:
     return along
 
 
-def _from_middle(rows: F64, beside: I32) -> F64:
+def _from_middle(rows: F64, left: I32) -> F64:
     """Return the horizontal directions (N, 3) from the middle of each strand's last ring."""
     count = len(rows)
-    linked = beside[:, -1] >= 0
-    graph = coo_matrix((np.ones(linked.sum()), (np.flatnonzero(linked), beside[linked, -1])), shape=(count, count))
+    linked = left[:, -1] >= 0
+    graph = coo_matrix((np.ones(linked.sum()), (np.flatnonzero(linked), left[linked, -1])), shape=(count, count))
     _, ring = connected_components(graph, directed=False)
     middle = np.stack([np.bincount(ring, rows[:, -1, a]) / np.bincount(ring) for a in range(3)], axis=1)
     return unit((rows[:, -1] - middle[ring]) * [1.0, 1.0, 0.0])
 
 
-def _beside(garment: GarmentMesh, vertex: I32, own: Bool) -> tuple[I32, F64]:
+def _left(garment: GarmentMesh, vertex: I32, valid: Bool) -> tuple[I32, F64]:
     """Return for each particle the strand it is linked to within its row, and the length of that link."""
     strand, row = np.full((2, len(garment.vertices)), -1)
-    strand[vertex[own]], row[vertex[own]] = np.nonzero(own)
+    strand[vertex[valid]], row[vertex[valid]] = np.nonzero(valid)
     a, b = garment.rings.T
-    beside, length = np.full(vertex.shape, -1, np.int32), np.zeros(vertex.shape)
-    beside[strand[a], row[a]] = strand[b]
+    left, length = np.full(vertex.shape, -1, np.int32), np.zeros(vertex.shape)
+    left[strand[a], row[a]] = strand[b]
     length[strand[a], row[a]] = garment.ring_length
-    return beside, length
+    return left, length

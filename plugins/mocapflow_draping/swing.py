@@ -39,23 +39,23 @@ def fall_batch(roots, facing, start, skin, links, first, last, parts, values, gr
         held: (B, N, L), written: the part that each particle touches, plus one; 0 where it touches none.
     """
     rows, down = links.shape[2] + 1, np.array([0.0, 0.0, -1.0])
-    room, near, fresh = np.empty(rows), np.zeros(rows, np.int64), np.empty(rows, np.bool_)
+    gap, near, fresh = np.empty(rows), np.zeros(rows, np.int64), np.empty(rows, np.bool_)
     for b in range(len(roots)):
         near[:] = 0  # as if it were the only one: the part that is tried first decides in the last digits
         for n in range(roots.shape[1]):
             held[b, n], grid[b, n, first[n]] = 0, roots[b, n]
-            room[:], fresh[:] = 0.0, False
+            gap[:], fresh[:] = 0.0, False
             swing(
                 first[n], facing[b, n], down, start, skin[b], links[b, n], last[n], parts[b], values,
-                grid[b, n], held[b, n], room, near, fresh,
+                grid[b, n], held[b, n], gap, near, fresh,
             )  # fmt: skip
 
 
 @numba.njit(cache=True, error_model="numpy")
-def swing(pivot, facing, down, angle, skin, links, last, parts, values, out, held, room, near, fresh):  # type: ignore[no-untyped-def]
+def swing(pivot, facing, down, angle, skin, links, last, parts, values, out, held, gap, near, fresh):  # type: ignore[no-untyped-def]
     """Turn the tail below `pivot` from `angle` to `down`; return the row of the last supported particle.
 
-    `room` is how far each particle may yet move untouched, `fresh` where it was measured right here.
+    `gap` is how far each particle may yet move untouched, `fresh` where it was measured right here.
     """
     turn, backs = 0.0, 0
     guard = GUARD * parts[0, PITCH]
@@ -65,29 +65,29 @@ def swing(pivot, facing, down, angle, skin, links, last, parts, values, out, hel
         while touched < 0:
             bx, by, bz = _bar(facing, down, angle)
             turn, arm = angle, 0.0
-            for k in range(pivot + 1, last + 1):  # measure only where the room left could end the turn
+            for k in range(pivot + 1, last + 1):  # measure only where the gap could end the turn
                 arm += links[k - 1]
-                if room[k] - guard < arm * turn:
+                if gap[k] - guard < arm * turn:
                     if not fresh[k]:
                         distance, near[k] = body_distance(
                             x[0] + arm * bx, x[1] + arm * by, x[2] + arm * bz, near[k], parts, values
                         )
-                        room[k], fresh[k] = distance - skin, True
-                    if room[k] < -DEEP and backs < BACKS and angle < math.pi:  # read too far at a sharp edge
-                        turn = 2.0 * room[k] / arm
+                        gap[k], fresh[k] = distance - skin, True
+                    if gap[k] < -DEEP and backs < BACKS and angle < math.pi:  # read too far at a sharp edge
+                        turn = 2.0 * gap[k] / arm
                         backs += 1
                         break
-                    if room[k] < TOUCH:
+                    if gap[k] < TOUCH:
                         touched = k
                         break
-                    turn = min(turn, room[k] / arm)
+                    turn = min(turn, gap[k] / arm)
             if touched >= 0 or turn == 0.0:
                 break
             angle -= turn
             arm = 0.0
             for k in range(pivot + 1, last + 1):
                 arm += links[k - 1]
-                room[k] -= arm * abs(turn)
+                gap[k] -= arm * abs(turn)
                 fresh[k] = False
         bx, by, bz = _bar(facing, down, angle)
         arm = 0.0

@@ -15,14 +15,14 @@ from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow.results import Evaluation, RunFolder, Track, ViewChecks
 from mocapflow.scene import Scene
-from mocapflow_evaluation import compare, comparison_plots, cycles, findings, ours
+from mocapflow_evaluation import compare, comparison_plots, cycles, findings, tracked_motion
 from mocapflow_evaluation.alignment import align, at_our_frames
 from mocapflow_evaluation.cycles import Cycle
 from mocapflow_evaluation.keypoint_reference import low_pass, with_keypoints, write_triangulated
-from mocapflow_evaluation.ours import Ours
 from mocapflow_evaluation.references import SUFFIXES, read_reference
 from mocapflow_evaluation.rigs import COMMON_POINTS, compare_rigs
 from mocapflow_evaluation.stick import between_points
+from mocapflow_evaluation.tracked_motion import TrackedMotion
 
 LONGEST_LAG_S = 0.5  # s
 Row = Mapping[str, float | str]
@@ -74,7 +74,7 @@ class Evaluate(Stage):
             return Evaluation(reference="", rows=(), notes=(note,))
         if path.is_dir():
             path = write_triangulated(recording, path, scene.cameras, run_folder.path, checks)
-        return evaluate(ours.of_track(track, scene), path, run_folder.path, self.longest_lag_s)
+        return evaluate(tracked_motion.of_track(track, scene), path, run_folder.path, self.longest_lag_s)
 
 
 def chosen(recording: Path, wanted: str) -> tuple[Path | None, str]:
@@ -98,10 +98,10 @@ def evaluate_run(run_folder: Path, truth: Path, longest_lag_s: float = LONGEST_L
     Raises:
         RecordingError: the run folder has no angles, or the reference can't be read.
     """
-    return evaluate(ours.of_folder(run_folder), truth, run_folder, longest_lag_s)
+    return evaluate(tracked_motion.of_folder(run_folder), truth, run_folder, longest_lag_s)
 
 
-def evaluate(own: Ours, path: Path, folder: Path, longest_lag_s: float = LONGEST_LAG_S) -> Evaluation:
+def evaluate(own: TrackedMotion, path: Path, folder: Path, longest_lag_s: float = LONGEST_LAG_S) -> Evaluation:
     """Compare with a reference file; writes tables, what was found of both systems, and pictures into a run folder."""
     reference = read_reference(path)
     known = cycles.shared(own.columns, at_our_frames(reference, own.columns))
@@ -139,7 +139,7 @@ def _write_tables(
         tables.write_rows(layout.place(folder, layout.CYCLES), walked)
 
 
-def _row(own: Ours, name: str, known: F64, aligned: F64, strides: Sequence[Cycle]) -> dict[str, float | str]:
+def _row(own: TrackedMotion, name: str, known: F64, aligned: F64, strides: Sequence[Cycle]) -> dict[str, float | str]:
     """Return the figures of one angle against its reference as it is, and as aligned with us."""
     curve, frame = own.columns[name], own.columns["frame"]
     unknown = np.full(len(curve), np.nan)

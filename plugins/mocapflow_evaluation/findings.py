@@ -10,8 +10,8 @@ from mocapflow_export.tables import angle_names
 from mocapflow.records import F64
 from mocapflow_evaluation.alignment import HALF, Alignment
 from mocapflow_evaluation.cycles import Cycle
-from mocapflow_evaluation.ours import Ours
 from mocapflow_evaluation.references import Reference
+from mocapflow_evaluation.tracked_motion import TrackedMotion
 
 MOST = 10  # names in a note
 BENT = 20.0  # deg that some angle of a person who moves exceeds
@@ -19,7 +19,7 @@ LARGER = 20.0  # times, that our angles are larger than a reference in radians a
 ALIKE = 0.01  # by which two frame rates may differ that are the same
 
 
-def nothing_shared(own: Ours, reference: Reference) -> str:
+def nothing_shared(own: TrackedMotion, reference: Reference) -> str:
     """Return what to say of a reference without our angles, or without values of them in our frames."""
     if len(reference.at) and not own.columns.keys().isdisjoint(reference.curves):
         kind, unit = ("frame", "") if reference.by_frame else ("time", " s")
@@ -32,7 +32,7 @@ def nothing_shared(own: Ours, reference: Reference) -> str:
 
 
 def said(
-    own: Ours, reference: Reference, found: Alignment, strides: Sequence[Cycle], longest_lag_s: float
+    own: TrackedMotion, reference: Reference, found: Alignment, strides: Sequence[Cycle], longest_lag_s: float
 ) -> list[str]:
     """Return how the reference came to our frames, its lag, the curves it counts the other way, and the strides."""
     notes = apart_in_time(own, reference)
@@ -63,7 +63,7 @@ def _largest(curves: Sequence[F64]) -> float:
     return max((float(np.nanmax(np.abs(curve), initial=0.0)) for curve in curves), default=0.0)
 
 
-def apart_in_time(own: Ours, reference: Reference) -> list[str]:
+def apart_in_time(own: TrackedMotion, reference: Reference) -> list[str]:
     """Return what to doubt where a reference has other times at our frames than we do."""
     frame, time = own.columns["frame"], own.columns["time"]
     _, ours, theirs = np.intersect1d(frame, reference.at, return_indices=True)

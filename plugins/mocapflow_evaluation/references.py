@@ -16,7 +16,7 @@ from mocapflow.io.columns import read_columns
 from mocapflow.records import F64, array, record
 from mocapflow_evaluation import marker_joints
 from mocapflow_evaluation.marker_names import FILE, landmarks
-from mocapflow_evaluation.ours import SIGNED
+from mocapflow_evaluation.tracked_motion import SIGNED
 
 MOTION = {"knee_angle": "knee_flexion", "hip_flexion": "hip_flexion", "ankle_angle": "ankle", "elbow_flex": "elbow"}
 POSE2SIM = {

@@ -14,9 +14,9 @@ from mocapflow.io import markers
 from mocapflow.records import F64, array, record
 from mocapflow_evaluation import compare, comparison_plots, stick
 from mocapflow_evaluation.alignment import resampled
-from mocapflow_evaluation.ours import Ours
 from mocapflow_evaluation.references import Reference
 from mocapflow_evaluation.stick import Stick
+from mocapflow_evaluation.tracked_motion import TrackedMotion
 
 COMMON_POINTS = "registration.csv"  # beside the reference: points that both rigs have measured
 ODD = 0.002  # of scale: calibrations are better than that
@@ -51,7 +51,7 @@ class Rigs:
         return [comparison_plots.draw_sticks(layout.place(folder, layout.STICK_PLOT), self.ours, laid, self.frame)]
 
 
-def compare_rigs(own: Ours, reference: Reference, lag: float, common_points: Path) -> Rigs:
+def compare_rigs(own: TrackedMotion, reference: Reference, lag: float, common_points: Path) -> Rigs:
     """Return the registration of both rigs and the reference's joint centres in our world, at our frames.
 
     It comes from a table of common points where there is one, else from the joint centres themselves, as they are

@@ -13,7 +13,7 @@ from mocapflow.results import Files, RunFolder, Track, ViewChecks
 from mocapflow.scene import Scene
 from mocapflow_export import layout, runjson, tables
 from mocapflow_export.formats import Result, need_packages, write
-from mocapflow_export.misgivings import misgivings
+from mocapflow_export.quality_warnings import quality_warnings
 from mocapflow_export.uncertainty import measured
 
 LOG = logging.getLogger("mocapflow")
@@ -63,10 +63,10 @@ class Export(WriteFormats):
     def write(self, result: Result, run_folder: RunFolder) -> list[Path]:
         """Write the files of a track and return their paths."""
         paths, track, scene = super().write(result, run_folder), result.track, result.scene
-        doubts = misgivings(track, [camera.name for camera in scene.cameras])
-        for doubt in doubts:
-            LOG.warning(doubt)
-        warnings = (*result.recording.warnings, *scene.warnings, *doubts)
+        quality = quality_warnings(track, [camera.name for camera in scene.cameras])
+        for warning in quality:
+            LOG.warning(warning)
+        warnings = (*result.recording.warnings, *scene.warnings, *quality)
         content = runjson.summary(track, scene.body, measured(track, scene), run_folder, warnings)
         return [*paths, runjson.write(layout.place(run_folder.path, layout.RUN), content)]
 

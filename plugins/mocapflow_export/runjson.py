@@ -17,7 +17,7 @@ from mocapflow.geometry.angles import AngleSeries
 from mocapflow.geometry.skeleton import segment_lengths
 from mocapflow.io.atomic import atomic_write
 from mocapflow.results import RunFolder, Track
-from mocapflow_export.misgivings import overlap_medians
+from mocapflow_export.quality_warnings import overlap_medians
 
 FRAME = re.compile(r"^frame (\d+): ?(.*)$")
 

@@ -13,8 +13,8 @@ from pydantic import PositiveFloat, PositiveInt
 from mocapflow.assets import Camera, Rig
 from mocapflow.components import Stage
 from mocapflow.geometry import twists
+from mocapflow.geometry.camera_rotation import homography, shift_px
 from mocapflow.geometry.cameras import project
-from mocapflow.geometry.turned import homography, shift_px
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow_fitting.detections import need_keypoints, persons, spaced_evenly

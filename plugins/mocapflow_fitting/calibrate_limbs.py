@@ -15,11 +15,11 @@ from mocapflow.assets import Background, Body
 from mocapflow.components import Matcher, Segmenter, Stage
 from mocapflow.data import Change, Frame, Matches, Past, Pose, Segmentation, Turn
 from mocapflow.dressing.roles import Draper
-from mocapflow.guards.answers import segmentation_of
-from mocapflow.guards.idle import idle_matchers
+from mocapflow.guards.matcher_inputs import check_matcher_inputs
+from mocapflow.guards.outputs import segmentation_of
 from mocapflow.model import ClothedModel
 from mocapflow.pooling import pool_matches
-from mocapflow.prediction import believed
+from mocapflow.prediction import initial_state
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow.results import Track, ViewChecks
@@ -61,7 +61,7 @@ class CalibrateLimbs(Stage):
 
     def need(self, recording: Recording) -> None:
         """Raise if no matcher would find a pair in the recording."""
-        idle_matchers(self.matchers, recording)
+        check_matcher_inputs(self.matchers, recording)
 
     def run(
         self,
@@ -109,7 +109,7 @@ class CalibrateLimbs(Stage):
         indices, names = spaced_evenly(recording.indices, self.frames), landmarks(scene.body).names
         found = frames_seen(recording, indices, scene.cameras, names)
         _, poses = fit(scene.body, list(found.values()), scene.cameras)
-        return list(found), list(poses), [scene.calm] * len(found)
+        return list(found), list(poses), [scene.neutral_parameters] * len(found)
 
     def _model(self, scene: Scene, body: Body) -> ClothedModel:
         return ClothedModel(scene=replace(scene, body=body), draper=self.draper)
@@ -124,7 +124,7 @@ class CalibrateLimbs(Stage):
         for frame in recording.until(max(indices)).frames(since=min(indices)):
             if frame.index in wanted:
                 pose, cloth = wanted[frame.index]
-                state = believed(pose, cloth, model.drape(pose, cloth, past))
+                state = initial_state(pose, cloth, model.drape(pose, cloth, past))
                 passed = prepared(frame, checks, flow=None)
                 found = segmentation_of(self.segmenter, passed, state, past, model.scene, Turn(index=0))
                 views.append((replace(passed, images=()), found, cloth))

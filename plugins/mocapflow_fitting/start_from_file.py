@@ -57,7 +57,7 @@ class StartFromFile(Stage):
             LOG.warning("%s bends joints as nobody can: %s; are its turns in radians, of the right sign?", path, odd)
         if not in_view(pose, scene):
             raise RecordingError("no camera sees the person at the first pose", where=str(path), hint=PLACE)
-        return Start(pose=pose, parameters=scene.calm)
+        return Start(pose=pose, parameters=scene.neutral_parameters)
 
     def _found(self, recording: Recording) -> Path:
         """Return the file with the pose of the first frame."""

@@ -50,7 +50,7 @@ class StartFromKeypoints(Stage):
                 if index > first:
                     LOG.warning("keypoints of frame %d tell no pose: that of frame %d is taken for it", first, index)
                 _, (pose,) = fit(scene.body, [points], scene.cameras)
-                return Start(pose=pose, parameters=scene.calm)
+                return Start(pose=pose, parameters=scene.neutral_parameters)
         later = range(last + recording.indices.step, recording.length, recording.indices.step)
         usable = next((index for index in later if person_at(recording, index, scene.cameras)), None)
         begin = "" if usable is None else f"they do in frame {usable}: begin there, with --frames {usable}:\nor "

@@ -14,8 +14,8 @@ from mocapflow.geometry.silhouettes import distance_to, model_distance
 from mocapflow.records import F32, U8, Bool
 from mocapflow.scene import Scene
 from mocapflow_levelset.channels import ChannelName, features
-from mocapflow_levelset.evidence import calmed
-from mocapflow_levelset.evolve import Rhythm, Weights
+from mocapflow_levelset.evidence import smoothed
+from mocapflow_levelset.evolve import Schedule, Weights
 from mocapflow_levelset.levelset import INNER_BAND_PX, PERSON, RATIO_CLIP
 from mocapflow_levelset.masks import counted
 from mocapflow_levelset.plates import Plate, Shadow, density_image, plate_in
@@ -32,7 +32,7 @@ METHOD = Method(  # of the refinement; the shadow is that of the image
     channels=CHANNELS,
     weights=Weights(sigma_px=1.5, length=0.5, shape=0.0, clip=RATIO_CLIP, step=1.0, band_px=INNER_BAND_PX),
     shadow=Shadow(),
-    calm_px=SMOOTH_PX,
+    smooth_px=SMOOTH_PX,
     decorrelate=False,
     stride=2,
     margin_px=40,
@@ -88,7 +88,7 @@ class BackgroundDifference(ShadowAware):
         plate, shadow = plate_in(background, camera, CHANNELS), self.shadow(image, background, camera)
         start = self._start(image, model, plate, floor, shadow, hidden)
         view = View(image, start, start, counted(start.shape, 0, hidden), Empty({1: plate}, floor))
-        against_plate = Level(1, Rhythm(REFINE_STEPS, 3, 3), Window(12.0, 8, 0.02))
+        against_plate = Level(1, Schedule(REFINE_STEPS, 3, 3), Window(12.0, 8, 0.02))
         levels = [against_plate, against_plate._replace(use_plate=False)]
         return find(view, levels, METHOD._replace(shadow=shadow)).level
 
@@ -96,8 +96,8 @@ class BackgroundDifference(ShadowAware):
         """Return a level set (H, W), not a distance: positive where the image is unlike the plate."""
         import cv2
 
-        calm = features(calmed(image, SMOOTH_PX), CHANNELS)
-        density = density_image(calm, plate, floor, CHANNELS, shadow)
+        values = features(smoothed(image, SMOOTH_PX), CHANNELS)
+        density = density_image(values, plate, floor, CHANNELS, shadow)
         unknown, bounded = np.isnan(density), np.nan_to_num(np.clip(-density, -RATIO_CLIP, RATIO_CLIP))
         change = cv2.GaussianBlur(bounded, (0, 0), SMOOTH_PX)
         untold = unknown if hidden is None else unknown | hidden

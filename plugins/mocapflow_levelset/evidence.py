@@ -23,7 +23,7 @@ class Evidence(NamedTuple):
     stride: int
     along: Callable[[I32], F32]  # features (C, N) of the N pixels of some runs
     outside: Callable[[I32, F32], F32] | None = None  # log density (N,) in the empty scene of runs and features, or NaN
-    told: F32 | None = None  # (H, W) log ratio of inside and outside that is known besides
+    prior_ratio: F32 | None = None  # (H, W) log ratio of inside and outside that is known besides
 
 
 class Room(NamedTuple):
@@ -32,7 +32,7 @@ class Room(NamedTuple):
     plate: Plate
     floor: Bool  # (H, W) True where a shadow may fall
     shadow: Shadow
-    calm_px: float = 0.0  # smoothing of the image before
+    smooth_px: float = 0.0  # smoothing of the image before
 
 
 def from_image(
@@ -64,11 +64,11 @@ def from_image(
 
 def in_room(evidence: Evidence, image: U8, channels: Sequence[ChannelName], room: Room) -> Evidence:
     """Return the evidence of an image whose outside is the empty room; its channels have to be as they are."""
-    calm = calmed(image, room.calm_px)
+    smooth = smoothed(image, room.smooth_px)
 
     def outside(runs: I32, values: F32) -> F32:
-        if calm is not image:
-            values = features(gather(calm, runs)[None], channels)[:, 0]
+        if smooth is not image:
+            values = features(gather(smooth, runs)[None], channels)[:, 0]
         expected, spread = gather_planes(room.plate.planes, runs), gather_planes(room.plate.spread[None], runs)[0]
         shaded = gather_planes(room.floor[None], runs)[0] > 0
         return density_of(values, expected, spread, shaded, channels, room.shadow)
@@ -76,7 +76,7 @@ def in_room(evidence: Evidence, image: U8, channels: Sequence[ChannelName], room
     return evidence._replace(outside=outside)
 
 
-def calmed(image: U8, smooth_px: float) -> U8:
+def smoothed(image: U8, smooth_px: float) -> U8:
     """Return an image (H, W, 3) less its noise, so that the colour of a shadow can be told from that of the plate."""
     import cv2
 

@@ -28,7 +28,7 @@ class Weights(NamedTuple):
     any_colour: float = -6.0  # least log density inside, where the outside's is that of the empty scene
 
 
-class Rhythm(NamedTuple):
+class Schedule(NamedTuple):
     """How many steps, and how often statistics and distances are renewed."""
 
     steps: int
@@ -53,7 +53,7 @@ class Costs(NamedTuple):
     shape: float
 
 
-def settle(level: F32, prior: F32, evidence: Evidence, window: Window, weights: Weights, rhythm: Rhythm) -> Settled:
+def settle(level: F32, prior: F32, evidence: Evidence, window: Window, weights: Weights, schedule: Schedule) -> Settled:
     """Descend from `level` for some steps, renewing statistics and distances in between.
 
     Args:
@@ -62,7 +62,7 @@ def settle(level: F32, prior: F32, evidence: Evidence, window: Window, weights: 
         evidence: features, mask and plate on the same grid.
         window: how local the statistics are.
         weights: the constants of energy and descent.
-        rhythm: how many steps, and how often the rest is renewed.
+        schedule: how many steps, and how often the rest is renewed.
 
     Source: Rosenhahn 2008, Eq. (12.10)
     """
@@ -74,11 +74,11 @@ def settle(level: F32, prior: F32, evidence: Evidence, window: Window, weights: 
     sums = totals(evidence.sparse, weight, grid.cell_px)
     level = np.clip(level, -np.float32(weights.band_px), np.float32(weights.band_px))
     ratio, change = np.zeros_like(level), np.empty_like(level)
-    runs, before = near(level, weights, first), level > 0 if rhythm.to_rest else None
-    for step in range(rhythm.steps):
-        if step and step % rhythm.redistance_every == 0:
+    runs, before = near(level, weights, first), level > 0 if schedule.to_rest else None
+    for step in range(schedule.steps):
+        if step and step % schedule.redistance_every == 0:
             level = redistance(level, weights.band_px)
-        if step % rhythm.statistics_every == 0:
+        if step % schedule.statistics_every == 0:
             if step and before is not None:
                 now = level > 0
                 if np.count_nonzero(now != before) <= REST:
@@ -88,8 +88,8 @@ def settle(level: F32, prior: F32, evidence: Evidence, window: Window, weights: 
             gaussians = local_gaussians(evidence.sparse, weight, sparse, sums, grid, weights.sigma_px / stride, reach)
             runs = near(level, weights, first) if step else runs
             log_ratio(runs, evidence, gaussians, grid.cell_px * stride, stride, weights, ratio)
-            if evidence.told is not None:
-                ratio = np.clip(ratio + evidence.told, -weights.clip, weights.clip)
+            if evidence.prior_ratio is not None:
+                ratio = np.clip(ratio + evidence.prior_ratio, -weights.clip, weights.clip)
         advance(level, ratio, prior, runs, change, weights)
     return Settled(level, ratio, runs)
 

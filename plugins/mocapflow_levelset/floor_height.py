@@ -10,8 +10,8 @@ from mocapflow.assets import Background, Camera
 from mocapflow.data import Frame, Surface
 from mocapflow.records import F64
 from mocapflow_levelset.floor_light import small_views
-from mocapflow_levelset.one_floor import agreement
 from mocapflow_levelset.plates import BLACK, plate_in
+from mocapflow_levelset.shadow_consistency import agreement
 from mocapflow_levelset.shadows import floor_around
 
 BELOW_M, ABOVE_M = 0.6, 0.15  # the lowest point of a body, which may be in a jump or stand on thick soles

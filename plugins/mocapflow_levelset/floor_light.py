@@ -14,12 +14,12 @@ from mocapflow.geometry.cameras import shrunk
 from mocapflow.records import F32, U8
 from mocapflow_levelset import crops
 from mocapflow_levelset.channels import ChannelName, features
-from mocapflow_levelset.evidence import calmed
+from mocapflow_levelset.evidence import smoothed
 from mocapflow_levelset.plates import USUAL, Plate, on_ray, plate_in
 
 CHANNELS: tuple[ChannelName, ...] = ("lab",)
 ROWS = 400  # about so many of a view are compared
-CALM_PX = 1.0
+SMOOTH_PX = 1.0
 OFF = 3.5  # standard deviations off the ray of its shadows up to which a pixel may be the floor's
 BRIGHTER = 1.06  # than the empty scene: more is no floor
 
@@ -50,7 +50,7 @@ def small_views(frame: Frame, background: Background, cameras: Sequence[Camera],
 
 def light_on(image: U8, plate: Plate) -> F32:
     """Return the factor (h, w) by which an image (h, w, 3) is darker than its plate, NaN where it is something else."""
-    values = features(calmed(image, CALM_PX), CHANNELS)
+    values = features(smoothed(image, SMOOTH_PX), CHANNELS)
     flat, expected = values.reshape(len(values), -1), plate.planes.reshape(len(values), -1)
     out = np.empty(flat.shape[1], np.float32)
     limits = tuple(np.float32(limit) for limit in (USUAL.darkest, BRIGHTER, USUAL.chroma, OFF))

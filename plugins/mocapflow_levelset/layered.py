@@ -12,10 +12,10 @@ from mocapflow.data import Frame, FrameState, Matches, Past, Segmentation, Surfa
 from mocapflow.pooling import pool
 from mocapflow.records import F32
 from mocapflow.scene import Scene
-from mocapflow_levelset.inner import inner_contours, told_apart
-from mocapflow_levelset.layers import COLOURS, gathered, layer_of, shown
+from mocapflow_levelset.inner import findable_edges, inner_contours
+from mocapflow_levelset.layers import COLOURS, colour_model, layer_histograms, layer_of
 from mocapflow_levelset.levelset import PERSON, LevelSet
-from mocapflow_levelset.surround import ROOM, beside, told
+from mocapflow_levelset.room_colours import ROOM, person_log_ratio, room_histograms
 
 GRID_PX = 4  # colours are taken every so many px, so far from borders
 KEPT = 0.9  # share of what is known of the colours that a frame keeps
@@ -33,7 +33,7 @@ class Layered(LevelSet):
     frame nothing is known yet.
 
     With a `colour_weight` the colours of the room beside the person are learned too, and both join the local statistics
-    of the level set. Those are taken where the person is believed to be; what earlier frames have shown finds a limb
+    of the level set. Those are taken where the person is estimated to be; what earlier frames have shown finds a limb
     that was hidden and comes back elsewhere.
     """
 
@@ -51,9 +51,9 @@ class Layered(LevelSet):
         surface = scene.surface(state.estimate.pose, state.cloth)
         colours = dict(state.segmentation.appearance if turn.index > 1 else past.appearance)
         if turn.index == 1:
-            colours[COLOURS] = gathered(frame, found.of(PERSON), surface, scene, past, KEPT, GRID_PX)
+            colours[COLOURS] = layer_histograms(frame, found.of(PERSON), surface, scene, past, KEPT, GRID_PX)
             if self.colour_weight:
-                colours[ROOM] = beside(frame, found.of(PERSON), past, KEPT, GRID_PX, self.margin_px)
+                colours[ROOM] = room_histograms(frame, found.of(PERSON), past, KEPT, GRID_PX, self.margin_px)
         return replace(found, inner=self._inner(frame, found, surface, past, scene, turn), appearance=colours)
 
     def _inner(
@@ -61,8 +61,8 @@ class Layered(LevelSet):
     ) -> Matches | None:
         if COLOURS not in past.appearance:
             return None
-        layers, known, reach_px = layer_of(scene), shown(past), NEAR_PX if turn.calm(CALM_MM) else FAR_PX
-        findable = told_apart(scene, layers, known)
+        layers, known, reach_px = layer_of(scene), colour_model(past), NEAR_PX if turn.calm(CALM_MM) else FAR_PX
+        findable = findable_edges(scene, layers, known)
         parts = [
             inner_contours(
                 frame.images[s.camera], s, surface, scene.cameras[s.camera], layers, findable, known, reach_px
@@ -74,4 +74,4 @@ class Layered(LevelSet):
     def _colours(self, past: Past, camera: int) -> F32 | None:
         if not self.colour_weight or ROOM not in past.appearance:
             return None
-        return np.float32(self.colour_weight) * told(past, camera)
+        return np.float32(self.colour_weight) * person_log_ratio(past, camera)

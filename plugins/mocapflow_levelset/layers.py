@@ -29,12 +29,12 @@ CLIP = 4.0  # bound on the log ratio of a pixel
 SURELY = -2.0  # log ratio below which a pixel is another layer's, whatever the surface says
 
 
-class Shown(NamedTuple):
-    """What a pixel's colour says of layers, from earlier frames."""
+class ColourModel(NamedTuple):
+    """What a pixel's colour says of layers, learned from earlier frames."""
 
     ratio: F32  # (L, BINS) log density in a layer over the greatest in any layer unlike it; 0: nothing is known
-    apart: Bool  # (L, L) True where two layers are told apart by colour
-    likely: F64  # (L, BINS) log density in a layer, part of which may have any colour
+    distinct: Bool  # (L, L) True where two layers are told apart by colour
+    log_density: F64  # (L, BINS) log density in a layer, part of which may have any colour
 
 
 @memoised
@@ -48,7 +48,7 @@ def layer_of(scene: Scene) -> I32:
     return np.asarray(layers, np.int32)
 
 
-def gathered(
+def layer_histograms(
     frame: Frame, silhouettes: Sequence[Silhouette], surface: Surface, scene: Scene, past: Past, keep: float, grid: int
 ) -> F64:
     """Return the colours (L, BINS) that layers have shown: `keep` of what is known, and those of this frame.
@@ -66,7 +66,7 @@ def gathered(
         pixel, layer = _drawn(surface, camera, layers, inside, grid)
         colour = bins_of(frame.images[silhouette.camera][pixel[:, 1], pixel[:, 0]])
         if known is not None:
-            mine = shown(past).ratio[layer, colour] > SURELY
+            mine = colour_model(past).ratio[layer, colour] > SURELY
             layer, colour = layer[mine], colour[mine]
         counts += np.bincount(layer * BINS + colour, minlength=counts.size).reshape(counts.shape)
     return counts if known is None else keep * known + counts
@@ -87,21 +87,21 @@ def _drawn(surface: Surface, camera: Camera, layers: I32, inside: Bool, grid: in
 
 
 @memoised
-def shown(past: Past) -> Shown:
+def colour_model(past: Past) -> ColourModel:
     """Return what colours say of the layers, by what earlier frames have shown."""
     counts = past.appearance[COLOURS]
     known = counts.sum(axis=1) >= LEAST
     density = densities(counts)
     root = np.sqrt(density)
-    apart = (root @ root.T < OVERLAP) & known[:, None] & known[None]
-    likely = np.log((1 - UNSEEN) * density + UNSEEN / BINS)
+    distinct = (root @ root.T < OVERLAP) & known[:, None] & known[None]
+    log_density = np.log((1 - UNSEEN) * density + UNSEEN / BINS)
     ratio = np.zeros(counts.shape, np.float32)
-    for layer in np.flatnonzero(apart.any(axis=1)):
-        ratio[layer] = np.clip(likely[layer] - likely[apart[layer]].max(axis=0), -CLIP, CLIP)
-    return Shown(ratio, apart, likely)
+    for layer in np.flatnonzero(distinct.any(axis=1)):
+        ratio[layer] = np.clip(log_density[layer] - log_density[distinct[layer]].max(axis=0), -CLIP, CLIP)
+    return ColourModel(ratio, distinct, log_density)
 
 
-def garment_told(past: Past, scene: Scene) -> F64 | None:
+def garment_log_ratio(past: Past, scene: Scene) -> F64 | None:
     """Return the log density (BINS,) of colours on the garment over that on any part that is mostly outside of it.
 
     Parts under the garment have shown its colours themselves, where it hung otherwise than it was drawn. None without a
@@ -109,10 +109,10 @@ def garment_told(past: Past, scene: Scene) -> F64 | None:
     """
     if scene.garment is None or COLOURS not in past.appearance:
         return None
-    layers, likely = layer_of(scene), shown(past).likely
+    layers, density = layer_of(scene), colour_model(past).log_density
     skin = layers[: len(scene.body.vertices)]
-    outside = np.bincount(skin, scene.near_garment, len(likely)) < 0.5 * np.bincount(skin, minlength=len(likely))
-    return likely[layers[-1]] - likely[outside].max(axis=0) if outside.any() else None
+    outside = np.bincount(skin, scene.near_garment, len(density)) < 0.5 * np.bincount(skin, minlength=len(density))
+    return density[layers[-1]] - density[outside].max(axis=0) if outside.any() else None
 
 
 def densities(counts: F64) -> F64:

@@ -16,7 +16,7 @@ from mocapflow.scene import Scene
 from mocapflow.settings import PositiveOrInf
 from mocapflow_levelset.channels import ChannelName
 from mocapflow_levelset.contact import contact_zone
-from mocapflow_levelset.evolve import Rhythm, Weights
+from mocapflow_levelset.evolve import Schedule, Weights
 from mocapflow_levelset.masks import counted, without_cut
 from mocapflow_levelset.moved import moved_outline
 from mocapflow_levelset.plates import Shadow, plate_in
@@ -138,7 +138,7 @@ class LevelSet(ShadowAware):
     def _contact(self, surface: Surface, camera: Camera) -> Contact | None:
         if not self.contact_steps:
             return None
-        return Contact(contact_zone(surface, camera), self._rhythm(self.contact_steps), self._window(self.rho_px))
+        return Contact(contact_zone(surface, camera), self._schedule(self.contact_steps), self._window(self.rho_px))
 
     def _matte(self, scene: Scene, camera: int) -> Matte | None:
         background = self._background(scene)
@@ -152,17 +152,17 @@ class LevelSet(ShadowAware):
     def _levels(self, warm: bool) -> list[Level]:
         reduced, full = self._window(REDUCED_RHO_PX), self._window(self.rho_px)
         levels = [
-            Level(COARSE, self._rhythm(0 if warm else self.coarse_steps, to_rest=True), reduced),
-            Level(HALF, self._rhythm(self.half_steps), reduced),
-            Level(FULL, self._rhythm(self.later_steps if warm else self.steps), full, use_plate=False),
+            Level(COARSE, self._schedule(0 if warm else self.coarse_steps, to_rest=True), reduced),
+            Level(HALF, self._schedule(self.half_steps), reduced),
+            Level(FULL, self._schedule(self.later_steps if warm else self.steps), full, use_plate=False),
         ]
-        return [level for level in levels if level.rhythm.steps]
+        return [level for level in levels if level.schedule.steps]
 
     def _window(self, rho_px: float) -> Window:
         return Window(rho_px, self.cell_px, self.variance_floor)
 
-    def _rhythm(self, steps: int, to_rest: bool = False) -> Rhythm:
-        return Rhythm(steps, self.statistics_every, self.redistance_every, to_rest)
+    def _schedule(self, steps: int, to_rest: bool = False) -> Schedule:
+        return Schedule(steps, self.statistics_every, self.redistance_every, to_rest)
 
     def _method(self, shadow: Shadow) -> Method:
         return Method(
@@ -177,7 +177,7 @@ class LevelSet(ShadowAware):
                 band_px=INNER_BAND_PX,
             ),
             shadow=shadow,
-            calm_px=0.0,  # the empty scene is compared with small images alone, which are calm
+            smooth_px=0.0,  # the empty scene is compared with small images alone, which are smooth
             decorrelate=self.decorrelate,
             stride=self.stride_px,
             margin_px=self.margin_px,

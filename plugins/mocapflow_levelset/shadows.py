@@ -14,8 +14,8 @@ from mocapflow.geometry.cameras import project
 from mocapflow.memo import memoised
 from mocapflow.records import F64, U8, Bool
 from mocapflow.scene import Scene
-from mocapflow_levelset.one_floor import no_shadows
 from mocapflow_levelset.plates import USUAL, Shadow
+from mocapflow_levelset.shadow_consistency import no_shadows
 
 CORNERS = 72
 THIN = 4  # every so many-th pixel tells whether there are colours

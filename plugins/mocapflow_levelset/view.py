@@ -13,7 +13,7 @@ from mocapflow_levelset.channels import ChannelName
 from mocapflow_levelset.colours import bins_of
 from mocapflow_levelset.crops import Crop
 from mocapflow_levelset.evidence import Evidence, Room, from_image, in_room
-from mocapflow_levelset.evolve import Costs, Rhythm, Settled, Weights, costs, settle
+from mocapflow_levelset.evolve import Costs, Schedule, Settled, Weights, costs, settle
 from mocapflow_levelset.islands import without_islands
 from mocapflow_levelset.matting import NEAR_PX, sharpened
 from mocapflow_levelset.plates import Plate, Shadow
@@ -34,7 +34,7 @@ class Contact(NamedTuple):
     """How to go on where the body meets the floor, in full size."""
 
     zone: Bool  # (H, W)
-    rhythm: Rhythm
+    schedule: Schedule
     window: Window
 
 
@@ -64,7 +64,7 @@ class Level(NamedTuple):
     """One resolution: the image shrunk by a factor, and how long to stay there."""
 
     factor: int
-    rhythm: Rhythm
+    schedule: Schedule
     window: Window  # in px of the shrunken image
     use_plate: bool = True  # False: local statistics on both sides even where the empty scene is known
 
@@ -76,7 +76,7 @@ class Method(NamedTuple):
     weights: Weights
     shadow: Shadow
     decorrelate: bool
-    calm_px: float  # smoothing of the full image before it is compared with the empty scene
+    smooth_px: float  # smoothing of the full image before it is compared with the empty scene
     stride: int  # of the pixels of the full image that the statistics are taken from
     margin_px: int
 
@@ -122,7 +122,8 @@ def _settled(view: View, crop: Crop, levels: Sequence[Level], method: Method) ->
         prior = crops.coarser(crop.of(view.prior), level.factor)
         front = _brought(front, factor, level.factor, method.weights.band_px)
         evidence = _evidence(images[level.factor], view, crop, level, method)
-        settled = settle(without_islands(front, evidence), prior, evidence, level.window, method.weights, level.rhythm)
+        begin = without_islands(front, evidence)
+        settled = settle(begin, prior, evidence, level.window, method.weights, level.schedule)
         front, factor = settled.level, level.factor
     return settled, prior
 
@@ -162,7 +163,7 @@ def _by_chromaticity(front: F32, view: View, contact: Contact, crop: Crop, metho
     evidence = from_image(image, weight, ("chromaticity",), method.stride, method.decorrelate)
     start = redistance(np.ascontiguousarray(near.of(front)), method.weights.band_px)
     prior = np.ascontiguousarray(near.of(crop.of(view.prior)))
-    found = settle(start, prior, evidence, contact.window, method.weights, contact.rhythm).level
+    found = settle(start, prior, evidence, contact.window, method.weights, contact.schedule).level
     whole = front.copy()
     near.of(whole)[near.of(zone)] = found[near.of(zone)]
     return whole
@@ -187,5 +188,7 @@ def _evidence(small: U8, view: View, crop: Crop, level: Level, method: Method) -
     evidence = from_image(small, weight, method.channels, max(method.stride // factor, 1), turned)
     if empty is not None:
         plate, floor = empty.plates[factor].of(crop.at(factor)), crops.shrink_mask(crop.of(empty.floor), factor)
-        evidence = in_room(evidence, small, method.channels, Room(plate, floor, method.shadow, method.calm_px))
-    return evidence if view.colours is None else evidence._replace(told=evidence.weight * view.colours[bins_of(small)])
+        evidence = in_room(evidence, small, method.channels, Room(plate, floor, method.shadow, method.smooth_px))
+    if view.colours is None:
+        return evidence
+    return evidence._replace(prior_ratio=evidence.weight * view.colours[bins_of(small)])

@@ -45,32 +45,32 @@ class Containment(Matcher):
         """Return the pairs of one view."""
         model = occluding_contour(surface, camera, self.spacing_px, skin=True)
         inside = at_nearest(silhouette.distance, model.pixel)  # px, a smooth field
-        stray, target, direction, distance = strays(
+        outside, target, direction, distance = outside_points(
             inside, model.pixel, model.normal, model.anchor, *silhouette.zero_level, self.margin_px, self.reach_px
         )
         return Matches(
-            camera=np.full(len(stray), silhouette.camera, np.int16),
+            camera=np.full(len(outside), silhouette.camera, np.int16),
             pixel=target,
             direction=direction,
-            vertex=model.vertex.take(stray),
+            vertex=model.vertex.take(outside),
             weight=robust_precision(distance, self.sigma_px, "huber", self.scale),
         )
 
 
 @numba.njit(cache=True)
-def strays(inside, place, facing, anchor, pixel, normal, margin, reach):  # type: ignore[no-untyped-def]
+def outside_points(inside, place, facing, anchor, pixel, normal, margin, reach):  # type: ignore[no-untyped-def]
     """Return the points of a contour (K,) that are less than `margin` inside, as pairs (M,) with the image contour.
 
     Returns:
         which points, where their anchors should be (M, 2), across the image contour (M, 2), and how far off (M,).
     """
-    stray = np.flatnonzero(inside < margin)
-    found = nearest_compatible(place[stray], facing[stray], pixel, normal, reach, ANY_DIRECTION)
-    stray, found = stray[found >= 0], found[found >= 0]
-    target, direction, distance = np.empty((len(stray), 2)), normal[found], np.empty(len(stray))
-    for m in range(len(stray)):
-        k, n, (dx, dy) = stray[m], found[m], direction[m]
+    outside = np.flatnonzero(inside < margin)
+    found = nearest_compatible(place[outside], facing[outside], pixel, normal, reach, ANY_DIRECTION)
+    outside, found = outside[found >= 0], found[found >= 0]
+    target, direction, distance = np.empty((len(outside), 2)), normal[found], np.empty(len(outside))
+    for m in range(len(outside)):
+        k, n, (dx, dy) = outside[m], found[m], direction[m]
         x, y = place[k, 0] - (pixel[n, 0] - margin * dx), place[k, 1] - (pixel[n, 1] - margin * dy)
         target[m, 0], target[m, 1] = anchor[k, 0] - x, anchor[k, 1] - y
         distance[m] = abs(x * dx + y * dy)
-    return stray, target, direction, distance
+    return outside, target, direction, distance

@@ -87,24 +87,24 @@ class ContourIcp(Matcher):
         image, (model, curvature) = self.contours(silhouette, surface, scene, turn)
         reach = self.later_reach_px if self._calm(turn) else self.first_reach_px
         cosine = float(np.cos(np.radians(self.normal_angle_deg)))
-        one = self.described(*image)
-        other = self.described(model.pixel, model.normal, curvature)
+        one = self.descriptors(*image)
+        other = self.descriptors(model.pixel, model.normal, curvature)
         forward, backward = self.direction != "backward", self.direction != "forward"  # image to model; model to image
-        seen, shown = pairs(one, image.normal, other, model.normal, reach, cosine, forward, backward)
+        image_row, model_row = pairs(one, image.normal, other, model.normal, reach, cosine, forward, backward)
         if reach > self.cloth_reach_px:
-            kept = self.reached(image.pixel.take(seen, axis=0), model, shown, surface)
-            seen, shown = seen[kept], shown[kept]
+            kept = self.within_reach(image.pixel.take(image_row, axis=0), model, model_row, surface)
+            image_row, model_row = image_row[kept], model_row[kept]
         if scene.body.cut.any():  # there the person goes on although the model ends
-            goes_on = np.isin(model.vertex, np.flatnonzero(scene.body.cut)).take(shown)
-            seen, shown = seen[~goes_on], shown[~goes_on]
+            goes_on = np.isin(model.vertex, np.flatnonzero(scene.body.cut)).take(model_row)
+            image_row, model_row = image_row[~goes_on], model_row[~goes_on]
         guard = self.hem_guard_px
         sigma = contour_sigma(model, surface, scene, self.sigma_px, self.cloth_sigma_px_per_m, guard)
-        return self.weigh(silhouette.camera, image, model, seen, shown, sigma, turn)
+        return self.weigh(silhouette.camera, image, model, image_row, model_row, sigma, turn)
 
-    def reached(self, pixel: F64, model: Contour, shown: I32, surface: Surface) -> Bool:
+    def within_reach(self, pixel: F64, model: Contour, model_row: I32, surface: Surface) -> Bool:
         """Return which pairs (M,) of image points (M, 2) px and model points are on skin, or near enough for cloth."""
-        away = np.linalg.norm(pixel - model.pixel.take(shown, axis=0), axis=1)
-        return np.asarray((away <= self.cloth_reach_px) | ~surface.cloth.take(model.vertex.take(shown)))
+        away = np.linalg.norm(pixel - model.pixel.take(model_row, axis=0), axis=1)
+        return np.asarray((away <= self.cloth_reach_px) | ~surface.cloth.take(model.vertex.take(model_row)))
 
     def _calm(self, turn: Turn) -> bool:
         return turn.calm(min(self.calm_mm, FAR_CALM_MM) if turn.far else self.calm_mm)
@@ -116,21 +116,21 @@ class ContourIcp(Matcher):
         model = occluding_contour(surface, scene.cameras[silhouette.camera], self.spacing_px)
         return image_contour(silhouette, self.stride), ModelContour(model, np.zeros(len(model.pixel)))
 
-    def described(self, pixel: F64, normal: F64, curvature: F64) -> F64:
+    def descriptors(self, pixel: F64, normal: F64, curvature: F64) -> F64:
         """Return what points (K,) are compared by, in px: their place first, then features."""
         return np.column_stack([pixel, self.normal_px * normal]) if self.normal_px else pixel
 
     def weigh(
-        self, index: int, image: ImageContour, model: Contour, seen: I32, shown: I32, sigma: F64, turn: Turn
+        self, index: int, image: ImageContour, model: Contour, image_row: I32, model_row: I32, sigma: F64, turn: Turn
     ) -> Matches:
-        """Return pairs of image points `seen` (M,) and model points `shown` (M,); those (K,) have errors `sigma` px."""
+        """Return pairs (M,) of rows of image and model contour; points of the model's (K,) have errors `sigma` px."""
         slides = self.residual == "normal"
         pixel, direction, vertex, spread, distance = paired_points(
-            seen, shown, image.pixel, image.normal, model.pixel, model.anchor, model.vertex, sigma, slides
+            image_row, model_row, image.pixel, image.normal, model.pixel, model.anchor, model.vertex, sigma, slides
         )
         loss = self.later_loss if self._calm(turn) else self.first_loss
         return Matches(
-            camera=np.full(len(seen), index, np.int16),
+            camera=np.full(len(image_row), index, np.int16),
             pixel=pixel,
             direction=direction,
             vertex=vertex,
@@ -146,16 +146,16 @@ def image_contour(silhouette: Silhouette, stride: int) -> ImageContour:
 
 
 @numba.njit(cache=True)
-def paired_points(seen, shown, pixel, normal, drawn, anchor, vertex, sigma, slides):  # type: ignore[no-untyped-def]
+def paired_points(image_row, model_row, pixel, normal, drawn, anchor, vertex, sigma, slides):  # type: ignore[no-untyped-def]
     """Return target, direction, vertex, standard deviation and distance of pairs (M,); see `ContourIcp.weigh`.
 
     A model point lies between vertices: moving the target by as much makes the vertex stand for it.
     """
-    count = len(seen)
+    count = len(image_row)
     target, direction, end = np.empty((count, 2)), np.zeros((count, 2)), np.empty(count, np.int32)
     spread, distance = np.empty(count), np.empty(count)
     for m in range(count):
-        s, k = seen[m], shown[m]
+        s, k = image_row[m], model_row[m]
         dx, dy = drawn[k, 0] - pixel[s, 0], drawn[k, 1] - pixel[s, 1]
         target[m, 0], target[m, 1] = anchor[k, 0] - dx, anchor[k, 1] - dy
         end[m], spread[m] = vertex[k], sigma[k]

@@ -55,9 +55,9 @@ class FourierIcp(ContourIcp):
         image = ImageContour(seen.pixel[order], seen.normal[order], seen.curvature[order])
         return image, _low_passed(model, own)
 
-    def described(self, pixel: F64, normal: F64, curvature: F64) -> F64:
+    def descriptors(self, pixel: F64, normal: F64, curvature: F64) -> F64:
         """Return what points are compared by, with curvature."""
-        columns = super().described(pixel, normal, curvature)
+        columns = super().descriptors(pixel, normal, curvature)
         return np.column_stack([columns, self.curvature_px2 * curvature]) if self.curvature_px2 else columns
 
     def _comparable(self, shown: Bool, covered: Bool, harmonics: int) -> tuple[Curve, Curve] | None:

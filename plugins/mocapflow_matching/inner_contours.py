@@ -63,7 +63,7 @@ def slipped(away: F64, worn: Bool, inner: Matches, surface: Surface, scene: Scen
         away: (M,) px of each pair, along its direction.
         worn: (M,) which pairs are of the garment.
         inner: the pairs.
-        surface: where they are believed to be.
+        surface: where they are estimated to be.
         scene: the cameras.
     """
     if not worn.any():

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 from mocapflow_levelset import splits
-from mocapflow_levelset.layers import COLOURS, Shown, layer_of, shown
+from mocapflow_levelset.layers import COLOURS, ColourModel, colour_model, layer_of
 
 from mocapflow.data import Frame, Matches, Past, Segmentation, Surface, Turn
 from mocapflow.records import I32, Bool
@@ -34,15 +34,15 @@ class LayeredIcp(ContourIcp):
         found = super().match(frame, segmentation, surface, past, scene, turn)
         if COLOURS not in past.appearance:
             return found
-        wrong = of_another_layer(found, frame, shown(past), layer_of(scene), SURE)
+        wrong = of_another_layer(found, frame, colour_model(past), layer_of(scene), SURE)
         return replace(found, weight=np.where(wrong, 0.0, found.weight))
 
 
-def of_another_layer(matches: Matches, frame: Frame, known: Shown, layers: I32, least: float) -> Bool:
+def of_another_layer(matches: Matches, frame: Frame, colours: ColourModel, layers: I32, least: float) -> Bool:
     """Return which matches (M,) have, just inside the contour, colours that are surely another layer's."""
     wrong = np.zeros(len(matches.vertex), bool)
     for camera in np.unique(matches.camera):
         rows, image = np.flatnonzero(matches.camera == camera), frame.images[camera]
         own, pixel, direction = layers[matches.vertex[rows]], matches.pixel[rows], matches.direction[rows]
-        wrong[rows] = splits.greatest(image, known.ratio, own, pixel, direction, *INSIDE) < -least
+        wrong[rows] = splits.greatest(image, colours.ratio, own, pixel, direction, *INSIDE) < -least
     return wrong

@@ -14,7 +14,7 @@ from mocapflow.geometry import silhouettes
 from mocapflow.pooling import pool, weighted
 from mocapflow.records import F32, F64, Bool
 from mocapflow.scene import Scene
-from mocapflow_matching.carried import CLOTH_SHARE, carried_points, distances
+from mocapflow_matching.flow_points import CLOTH_SHARE, distances, flow_points
 from mocapflow_matching.robust import robust_precision
 from mocapflow_matching.shape_flow import register
 from mocapflow_matching.uncertainty import contour_sigma
@@ -62,7 +62,7 @@ class OpticalFlow(Matcher):
 
     def carried(self, frame: Frame, surface: Surface, past: Past, scene: Scene) -> Matches:
         """Return the pairs by flow between frames."""
-        matches = carried_points(frame, past, scene)
+        matches = flow_points(frame, past, scene)
         away = distances(matches, surface, scene)
         weight = robust_precision(away, self.image_sigma_px, "huber", self.scale)
         return replace(matches, weight=weight * np.where(surface.cloth[matches.vertex], CLOTH_SHARE, 1.0))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from mocapflow_draping.directions import standing_out, wind_turns
 from mocapflow_draping.forces import tilts
-from mocapflow_draping.frames import blown, standing_out
 from mocapflow_draping.strands import Strands, roots
 
 from mocapflow.assets import GarmentMesh
@@ -52,9 +52,9 @@ def _without(edges: I32, known: I32) -> I32:
 
 def pull_of(strands: Strands, garment: GarmentMesh, parameters: F64, chain: F64) -> F64:
     """Return the acceleration (B, W, 3) m/s^2 that tilts gravity as the parameters say."""
-    _, down, _ = blown(standing_out(strands, chain), *tilts(garment, parameters, strands.azimuth))
+    _, down, _ = wind_turns(standing_out(strands, chain), *tilts(garment, parameters, strands.azimuth))
     pull = np.zeros((len(chain), len(garment.vertices), 3))
-    strand, row = np.nonzero(strands.own)
+    strand, row = np.nonzero(strands.valid)
     pull[:, strands.vertex[strand, row]] = GRAVITY * (down + [0.0, 0.0, 1.0])[:, strand]
     return pull
 

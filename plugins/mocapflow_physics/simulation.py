@@ -16,7 +16,7 @@ FRICTION = 0.2  # of cloth on skin
 SHARE = 0.2  # stiffness of a link in masses over squared steps: newton adds corrections up, more would overshoot
 ITERATIONS = 1  # of the solver, a step: for the same time more steps come nearer to equilibrium than more iterations
 PASSES = 20  # at the end, each laying what links pull into the body out of the part it is in
-CALM = 0.1  # s in which speed falls to 1/e: near the critical damping of a hem that swings
+DAMPING_S = 0.1  # s in which speed falls to 1/e: near the critical damping of a hem that swings
 
 Links = tuple[I32, F64, F64]  # as `cloth.links_of` gives them
 
@@ -48,7 +48,7 @@ class Simulation:
         self._model.shape_material_mu.fill_(FRICTION)
         self._model.particle_max_velocity = SPEED
         self._solver: Any = newton.solvers.SolverXPBD(self._model, iterations=ITERATIONS)
-        self._moved, self._step, self._damping = ~pinned, step, np.exp(-step / CALM)
+        self._moved, self._step, self._damping = ~pinned, step, np.exp(-step / DAMPING_S)
 
     def settle(
         self,

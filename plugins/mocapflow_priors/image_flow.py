@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from mocapflow_matching.carried import CLOTH_SHARE, carried_points, distances
+from mocapflow_matching.flow_points import CLOTH_SHARE, distances, flow_points
 from mocapflow_matching.robust import robust_weights
 from mocapflow_twist.twist_gauss_newton import TwistGaussNewton
 from pydantic import PositiveFloat
@@ -13,9 +13,9 @@ from pydantic import PositiveFloat
 from mocapflow.components import Predictor
 from mocapflow.data import NO_CLOTH, Frame, Matches, Past, Pose, Surface, Turn
 from mocapflow.geometry.cameras import project_each
-from mocapflow.guards.answers import pose_of
+from mocapflow.guards.outputs import pose_of
 from mocapflow.model import ClothedModel
-from mocapflow.prediction import believed
+from mocapflow.prediction import initial_state
 from mocapflow.scene import Scene
 from mocapflow_priors.constant_velocity import ConstantVelocity
 from mocapflow_priors.joint_limits import JointLimits
@@ -23,7 +23,7 @@ from mocapflow_priors.rest_pose import RestPose
 
 SOLVER = TwistGaussNewton(iterations=8, angle_sd_deg=20.0)  # of the pose that the points show
 PRIORS = (JointLimits(), RestPose())  # points on one side of a limb do not tell how it is turned
-LEAST_POINTS = 30  # that are followed; fewer are not believed
+LEAST_POINTS = 30  # that are followed; fewer are not trusted
 LEAST_AGREEMENT = 0.5  # share of points that come to lie within `AGREEING_PX`
 AGREEING_PX = 4.0  # distance to where it was tracked
 
@@ -45,7 +45,7 @@ class ImageFlowPredictor(Predictor):
     def predict(self, frame: Frame, past: Past, scene: Scene) -> Pose:
         """Return the pose the flow leads to, or what `otherwise` predicts."""
         guess = pose_of(self.otherwise, frame, past, scene)
-        followed = self.on_skin(carried_points(frame, past, scene), past, scene)
+        followed = self.on_skin(flow_points(frame, past, scene), past, scene)
         if len(followed.vertex) < LEAST_POINTS:
             return guess
         model = ClothedModel(scene=scene.undressed)
@@ -55,7 +55,7 @@ class ImageFlowPredictor(Predictor):
             robust = robust_weights(away / self.sigma_px, "huber", self.scale)
             return replace(followed, weight=followed.weight * robust / self.sigma_px**2)
 
-        state = believed(guess, np.empty(0), NO_CLOTH)
+        state = initial_state(guess, np.empty(0), NO_CLOTH)
         pose = SOLVER.solve(match, state, model, PRIORS, past, Turn(index=0)).pose
         reached = distances(followed, model.surface(pose, NO_CLOTH), scene)
         return pose if np.mean(reached < AGREEING_PX) >= LEAST_AGREEMENT else guess

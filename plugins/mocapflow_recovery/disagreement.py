@@ -1,4 +1,4 @@
-"""How far a surface and what the images surely show are apart."""
+"""How far a surface and the trimaps of a frame are apart."""
 
 from __future__ import annotations
 
@@ -13,63 +13,67 @@ from mocapflow.geometry.cameras import projection
 from mocapflow.geometry.silhouette_kernels import project
 from mocapflow.geometry.silhouettes import covered, distance_to, mask, outline
 from mocapflow.records import F32, F64, I32
-from mocapflow_recovery.certain import View
+from mocapflow_recovery.trimaps import Trimap
 
 BEYOND = 1.1  # times the cap, from the person: no nearer by the distance transform, which is a twentieth short
-HANGS, FLIES = 1.0, 0.3  # what a pixel of cloth counts: the body holds it where it is, or nothing does
+HANGING, FLYING = 1.0, 0.3  # weight of a pixel of cloth: the body holds it where it is, or nothing does
 
 
-def distance(surface: Surface, bare: Surface, views: Sequence[View], cap_m: float, cloth: float = HANGS) -> float:
-    """Return the mean over the views of what stands apart, in m per unit of the person's area.
+def chamfer_distance(
+    surface: Surface, bare: Surface, trimaps: Sequence[Trimap], cap_m: float, cloth_weight: float = HANGING
+) -> float:
+    """Return the mean over the views of a truncated chamfer distance, in m per unit of the person's area.
 
     Both ways: the person's pixels by their distance from the model, the model's by theirs from where the person may
     be, each at most `cap_m`. Unlike the area in which they differ it tells a limb that is near from one that is far.
 
     Args:
-        surface: the person as believed.
+        surface: the person, posed and clothed.
         bare: its body alone.
-        views: what the images surely show; without those that hardly show the person.
+        trimaps: of the views; those that hardly show the person do not count.
         cap_m: beyond, it does not matter how far.
-        cloth: what a pixel of cloth counts, of the person's off the model and of the model's where nobody is.
+        cloth_weight: of a pixel of cloth: the person's off the model, and the model's where nobody is.
     """
-    total, shown = 0.0, [view for view in views if view.shown]
-    for view in shown:
-        cap = cap_m / view.pixel_m
-        model = covered(surface, view.camera)
-        skin = model if cloth == HANGS else covered(bare, view.camera)
-        near = around(view.person, round(BEYOND * cap) + 2, 1)
+    total, counted = 0.0, [trimap for trimap in trimaps if trimap.informative]
+    for trimap in counted:
+        cap = cap_m / trimap.pixel_m
+        model = covered(surface, trimap.camera)
+        skin = model if cloth_weight == HANGING else covered(bare, trimap.camera)
+        near = around(trimap.person, round(BEYOND * cap) + 2, 1)
         assert near is not None
         off = distance_to(near.of(model))
-        apart = _apart(model, skin, off, near.top, near.left, view.person, view.cloth, view.away, cap, cloth)
-        total += apart * view.pixel_m / np.count_nonzero(view.person)
-    return total / max(len(shown), 1)
+        summed = _distance_sum(
+            model, skin, off, near.top, near.left, trimap.person, trimap.cloth, trimap.distance, cap, cloth_weight
+        )
+        total += summed * trimap.pixel_m / np.count_nonzero(trimap.person)
+    return total / max(len(counted), 1)
 
 
-def uncovered_areas(surface: Surface, views: Sequence[View], reaches_m: Sequence[float], cloth_m: float) -> F64:
+def uncovered_areas(surface: Surface, trimaps: Sequence[Trimap], reaches_m: Sequence[float], cloth_m: float) -> F64:
     """Return the areas (R, 2) m², all views together, of the person farther than each reach off the model: skin, cloth.
 
     What is within `cloth_m` of the garment counts as neither: cloth swings. Cloth is what shows the garment's colours.
     """
     areas = np.zeros((len(reaches_m), 2))
-    for view in views:
-        off = distance_to(mask(outline(surface, view.camera), view.camera))
-        loose = view.person & (_from_cloth(surface, view) > cloth_m / view.pixel_m)
+    for trimap in trimaps:
+        off = distance_to(mask(outline(surface, trimap.camera), trimap.camera))
+        loose = trimap.person & (_from_cloth(surface, trimap) > cloth_m / trimap.pixel_m)
         for row, reach_m in enumerate(reaches_m):
-            stray = loose & (off > reach_m / view.pixel_m)
-            worn = np.count_nonzero(stray & view.cloth)
-            areas[row] += np.array([np.count_nonzero(stray) - worn, worn]) * view.pixel_m**2
+            uncovered = loose & (off > reach_m / trimap.pixel_m)
+            worn = np.count_nonzero(uncovered & trimap.cloth)
+            areas[row] += np.array([np.count_nonzero(uncovered) - worn, worn]) * trimap.pixel_m**2
     return areas
 
 
-def floating_area(bare: Surface, views: Sequence[View], reach_m: float) -> float:
+def floating_area(bare: Surface, trimaps: Sequence[Trimap], reach_m: float) -> float:
     """Return the area (m²) of skin that at least two views show to be in empty space, `reach_m` from the person.
 
     One view alone may be deceived: by clothes of the colour of the wall behind.
     """
     empty = np.zeros(len(bare.vertices), int)
-    for view in views:
-        rows, column, row = _pixels(bare.vertices, view)
-        empty[rows] += view.away[row, column] > reach_m / view.pixel_m
+    for trimap in trimaps:
+        rows, column, row = _pixels(bare.vertices, trimap)
+        empty[rows] += trimap.distance[row, column] > reach_m / trimap.pixel_m
     if not (empty >= 2).any():
         return 0.0
     corners = bare.vertices[bare.faces[(empty >= 2)[bare.faces].all(axis=1)]]
@@ -77,21 +81,21 @@ def floating_area(bare: Surface, views: Sequence[View], reach_m: float) -> float
     return float(np.linalg.norm(np.cross(one, other), axis=1).sum() / 2)
 
 
-def _from_cloth(surface: Surface, view: View) -> F32:
+def _from_cloth(surface: Surface, trimap: Trimap) -> F32:
     """Return the distance (h, w) px of every pixel from the garment's vertices; far where there is no garment."""
-    cloth = np.zeros(view.person.shape, bool)
-    _, column, row = _pixels(surface.vertices[surface.cloth], view)
+    cloth = np.zeros(trimap.person.shape, bool)
+    _, column, row = _pixels(surface.vertices[surface.cloth], trimap)
     if not len(row):
         return np.full(cloth.shape, np.inf, np.float32)
     cloth[row, column] = True
     return distance_to(cloth)
 
 
-def _pixels(points: F64, view: View) -> tuple[I32, I32, I32]:
+def _pixels(points: F64, trimap: Trimap) -> tuple[I32, I32, I32]:
     """Return which of the points (K, 3) lie in the image, and the column and row of the pixels nearest to them."""
     pixels, depth = np.empty((len(points), 2)), np.empty(len(points))
-    project(points, projection(view.camera), pixels, depth)
-    rows, column, row = _within(pixels, *view.person.shape)
+    project(points, projection(trimap.camera), pixels, depth)
+    rows, column, row = _within(pixels, *trimap.person.shape)
     return rows, column, row
 
 
@@ -109,8 +113,8 @@ def _within(pixels, height, width):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def _apart(model, skin, off, top, left, person, worn, away, cap, cloth):  # type: ignore[no-untyped-def]
-    """Return what stands apart in a view, px summed over its pixels: see `distance`.
+def _distance_sum(model, skin, off, top, left, person, worn, distance, cap, cloth_weight):  # type: ignore[no-untyped-def]
+    """Return the truncated distances of a view, px summed over its pixels: see `chamfer_distance`.
 
     `off` begins at the row `top` and the column `left`, and holds all of the person.
     """
@@ -118,7 +122,7 @@ def _apart(model, skin, off, top, left, person, worn, away, cap, cloth):  # type
     for y in range(model.shape[0]):
         for x in range(model.shape[1]):
             if person[y, x]:
-                total += min(off[y - top, x - left], cap) * (cloth if worn[y, x] else 1.0)
+                total += min(off[y - top, x - left], cap) * (cloth_weight if worn[y, x] else 1.0)
             if model[y, x]:
-                total += min(away[y, x], cap) * (1.0 if skin[y, x] else cloth)
+                total += min(distance[y, x], cap) * (1.0 if skin[y, x] else cloth_weight)
     return total

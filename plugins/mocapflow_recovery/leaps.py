@@ -11,19 +11,19 @@ from mocapflow.records import F64, I32, Bool
 from mocapflow_recovery.sampling import parts
 
 
-def leaping(fitted: Pose, believed: Pose, body: Body, density: Density, least: float) -> list[I32]:
-    """Return the parts of a body that are far from where they were believed and as far from all that was seen of them.
+def leaping(fitted: Pose, predicted: Pose, body: Body, density: Density, least: float) -> list[I32]:
+    """Return the parts of a body that are far from where they were predicted and as far from all that was seen of them.
 
-    Either alone is nothing to wonder at: fast legs leave what was believed, and nobody has seen everything.
+    Either alone is nothing to wonder at: fast legs leave what was predicted, and nobody has seen everything.
 
     Args:
         fitted: the pose that is asked about.
-        believed: what was believed before looking.
+        predicted: before the images were looked at.
         body: whose parts are tried.
         density: its training poses are what people were seen in; the angles it does not know count as seen.
         least: rad, what counts as far: for the angle that changed most, and for all angles of a part together.
     """
-    moved = parts_with(np.abs(fitted.angles - believed.angles) > least, body)
+    moved = parts_with(np.abs(fitted.angles - predicted.angles) > least, body)
     if not moved:  # nearly always
         return []
     seen = density.on(body.screw_names)
@@ -42,7 +42,7 @@ def parts_with(screws: Bool, body: Body) -> list[I32]:
     return [part for part in parts(body) if part is not None and screws[part].any()]
 
 
-def eased(pose: Pose, other: Pose, body: Body) -> Pose:
+def without_overbent(pose: Pose, other: Pose, body: Body) -> Pose:
     """Return a pose whose joints that are bent beyond their limits have the angles of another pose."""
     return Pose(root=pose.root, angles=np.where(_beyond(pose, body, 0.0), other.angles, pose.angles))
 

@@ -10,8 +10,8 @@ from math import inf
 from typing import Annotated, ClassVar
 
 import numpy as np
-from mocapflow_levelset.layers import garment_told
-from mocapflow_levelset.one_floor import no_shadows
+from mocapflow_levelset.layers import garment_log_ratio
+from mocapflow_levelset.shadow_consistency import no_shadows
 from mocapflow_matching.camouflage import with_feet
 from mocapflow_priors.density import Density, Poses, read
 from mocapflow_priors.parzen import SHIPPED
@@ -24,28 +24,28 @@ from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow.scene import Scene
 from mocapflow.settings import PositiveOrInf
-from mocapflow_recovery.certain import View, small_room, views
-from mocapflow_recovery.disagreement import FLIES, HANGS
-from mocapflow_recovery.judge import FACES, Fit, Given, Judge, Stray, stray_of, surface_of
-from mocapflow_recovery.looks import Looks
+from mocapflow_recovery.disagreement import FLYING, HANGING
+from mocapflow_recovery.limb_visibility import camouflaged_feet, warn_of_camouflage, warn_of_occluders
 from mocapflow_recovery.sampling import SHARES, Plan, Spread
-from mocapflow_recovery.suspicion import Signs, Suspicion, suspicion
-from mocapflow_recovery.told import like_the_floor, warn_of_furniture, warn_of_untold
-from mocapflow_recovery.vain import counted, forgotten, in_turn, vain_before
+from mocapflow_recovery.scoring import FACES, Fit, Mismatch, Scorer, StartPose, mismatch_of, surface_of
+from mocapflow_recovery.search_history import history_of, one_frame_of, with_search, without_history
+from mocapflow_recovery.search_triggers import Thresholds, Trigger, search_trigger
+from mocapflow_recovery.searches import Searches
+from mocapflow_recovery.trimaps import Trimap, small_room, trimaps
 
 LOG = logging.getLogger("mocapflow")
-CURED = 2.0  # times as far apart may be what is doubted no more: a leg lay where a skirt flew
-CLEARED = 1.1  # the same, what leaves no hint: of a foot that was lost all other limbs and the cloth tell nothing
+UNDOUBTED = 2.0  # times as distant may be a fit that is doubted no more: a leg lay where a skirt flew
+WITHOUT_HINT = 1.1  # the same, without a hint: of a lost foot all other limbs and the cloth tell nothing
 NEAR_M = 0.35  # changes farther than this from the model are somebody else
 START = np.radians(6.0)  # how far off, in each angle, a given first pose may be
 TOLERANCE = 0.03  # share by which the error may grow for parts to stay as they were fitted
-FIRST_LOOKS = 2  # times that each search is repeated in a first frame whose fit is doubted
+FIRST_REPEATS = 2  # times that each search is repeated in a first frame whose fit is doubted
 UNKNOWN = "too little is known of the room behind the person: limbs that are lost are not looked for"
-FEET_UNTOLD = "the feet look like the floor: outlines are not compared with them, and ankles are unsure"
+FEET_CAMOUFLAGED = "the feet look like the floor: outlines are not compared with them, and ankles are unsure"
 UNSEARCHED = "fit doubted as in frames before: not searched again yet"
 UNSEEN = "fit doubted: no picture tells person from room where it lies"
 Settle = Callable[[Pose, F64], FrameResult]  # from a pose, with cloth parameters
-Look = Callable[[np.random.Generator], Pose]  # finds a pose by samples
+Search = Callable[[np.random.Generator], Pose]  # finds a pose by samples
 
 
 class LimbSearch(Recovery):
@@ -54,9 +54,9 @@ class LimbSearch(Recovery):
     A level set that starts from the model can't find a limb the model has lost, so the two agree in their error.
 
     Where large parts of person and model lie far apart, the search begins at the best of the fitted pose, the one that
-    was believed before, that of the frame before, and poses that people were seen in. Around it poses are sampled part
+    was predicted, that of the frame before, and poses that people were seen in. Around it poses are sampled part
     by part, limbs also as people were seen to hold them. A second search begins at the pose of the frame before, in
-    which trunk and legs have not yet gone astray together. A part moves only if that brings what strays together: a leg
+    which trunk and legs have not yet gone astray together. A part moves only if that lessens the mismatch: a leg
     must not take a new place under the skirt because an arm was lost. The loop settles again from what is found.
 
     It also looks where images need not contradict a limb that is elsewhere: in the first frame and after frames that
@@ -69,7 +69,7 @@ class LimbSearch(Recovery):
     first, and of two poses that fit alike the nearer one is taken: crossed legs look the same when exchanged. If its
     fit is doubted, the pose is also tried turned round: a standing person looks much the same from behind.
 
-    Cloth that strays, as its colours tell, calls for a search, but moves no part and raises no doubt: it may fly. So
+    Cloth off the model, as its colours tell, calls for a search, but moves no part and raises no doubt: it may fly. So
     the search is made twice: as if cloth lay where the body holds it, which tells of legs that nobody sees, and as if
     it flew, which leads no leg astray. The fit that agrees better is taken, by skin above all.
 
@@ -88,7 +88,7 @@ class LimbSearch(Recovery):
     floating_cm2: PositiveFloat = 30.0  # area of skin in empty space above which the fit is doubted
     hint_cm2: PositiveOrInf = inf  # area of the person 3 cm off it above which limbs are looked for; noise has some
     beginnings: bool = True  # look for limbs in the first frame, and in the first one after a gap
-    leap_deg: PositiveOrInf = 20.0  # a limb so far from what was believed and from all `poses` is looked for
+    leap_deg: PositiveOrInf = 20.0  # a limb so far from what was predicted and from all `poses` is looked for
     least_known: Annotated[float, Field(ge=0, le=1)] = 0.4  # of the room behind the model to be known, mean of views
     gain: Annotated[float, Field(ge=0, lt=1)] = 0.1  # share that each part mends, and a fit that cures no doubt
     samples: PositiveInt = 40  # samples of each part in a round
@@ -100,126 +100,116 @@ class LimbSearch(Recovery):
     root_spread_m: PositiveFloat = 0.06  # standard deviation of the first samples of the root's place
 
     def recover(
-        self,
-        frame: Frame,
-        state: FrameState,
-        result: FrameResult,
-        past: Past,
-        model: ClothedModel,
-        settle: Settle,
+        self, frame: Frame, state: FrameState, result: FrameResult, past: Past, model: ClothedModel, settle: Settle
     ) -> FrameResult:
         """Return the result, or a better one; see the class."""
         found = self._recovered(frame, state, result, past, model, settle)
         if past.moments or past.after_gap:
             return found
-        told = self.feet_told(frame, found, past, model)
-        if told is not found:
-            LOG.warning(FEET_UNTOLD)
-        return told
+        noted_feet = self.with_camouflaged_feet(frame, found, past, model)
+        if noted_feet is not found:
+            LOG.warning(FEET_CAMOUFLAGED)
+        return noted_feet
 
-    def feet_told(self, frame: Frame, result: FrameResult, past: Past, model: ClothedModel) -> FrameResult:
+    def with_camouflaged_feet(self, frame: Frame, result: FrameResult, past: Past, model: ClothedModel) -> FrameResult:
         """Return the result of a frame; if feet look like a floor without colours in it, it says so to later ones."""
         background, surface = model.scene.background, surface_of(model, result)
         if background is None or background.floor_m is None:
             return result
-        seen = self.views(frame, surface, past, model.scene)
-        if not seen or not (feet := like_the_floor(surface, seen, model.scene.body)).any():
+        trimaps = self.trimaps(frame, surface, past, model.scene)
+        if not trimaps or not (feet := camouflaged_feet(surface, trimaps, model.scene.body)).any():
             return result
         segmentation = result.state.segmentation
         known = replace(segmentation, appearance=with_feet(segmentation.appearance, feet))
         return replace(result, state=replace(result.state, segmentation=known))
 
     def _recovered(
-        self,
-        frame: Frame,
-        state: FrameState,
-        result: FrameResult,
-        past: Past,
-        model: ClothedModel,
-        settle: Settle,
+        self, frame: Frame, state: FrameState, result: FrameResult, past: Past, model: ClothedModel, settle: Settle
     ) -> FrameResult:
         surface, scene = surface_of(model, result), model.scene
-        seen = self.views(frame, surface, past, scene)
-        if not seen:
+        trimaps = self.trimaps(frame, surface, past, scene)
+        if not trimaps:
             return noted(result, UNSEEN, doubted=True)
-        if np.mean([view.known for view in seen]) < self.least_known:
+        if np.mean([trimap.known for trimap in trimaps]) < self.least_known:
             return result if past.moments else noted(result, UNKNOWN, doubted=False)
         if not past.moments:
             given = scene.surface(state.estimate.pose, state.cloth)
-            warn_of_untold(surface, seen, scene.body)
-            warn_of_furniture(given, self.views(frame, given, past, scene), scene.body)
-        stray = stray_of(surface, scene, seen)
-        fitted, believed, body = result.state.estimate.pose, state.estimate.pose, scene.body
-        suspected = suspicion(self.signs, stray, fitted, believed, past, body, self._density)
-        if suspected is None:
-            return forgotten(result, past)
-        if not self._due(suspected, stray, frame.time, past, body):
-            return noted(result, UNSEARCHED, doubted=True) if suspected.doubtful else forgotten(result, past)
-        judge = self._judge(believed, result, seen, past, model)
-        looks = Looks(judge, self._plan(body), believed, fitted, self.gain, TOLERANCE)
-        found = self._searched(frame.index, judge.of(result), looks, suspected, settle)
-        return counted(found, result, stray.area, past)
+            warn_of_camouflage(surface, trimaps, scene.body)
+            warn_of_occluders(given, self.trimaps(frame, given, past, scene), scene.body)
+        mismatch = mismatch_of(surface, scene, trimaps)
+        fitted, predicted, body = result.state.estimate.pose, state.estimate.pose, scene.body
+        trigger = search_trigger(self.thresholds, mismatch, fitted, predicted, past, body, self._density)
+        if trigger is None:
+            return without_history(result, past)
+        if not self._due(trigger, mismatch, frame.time, past, body):
+            return noted(result, UNSEARCHED, doubted=True) if trigger.doubtful else without_history(result, past)
+        scorer = self._scorer(predicted, result, trimaps, past, model)
+        searches = Searches(scorer, self._plan(body), predicted, fitted, self.gain, TOLERANCE)
+        found = self._searched(frame.index, scorer.score(result), searches, trigger, settle)
+        return with_search(found, result, mismatch.area, past)
 
-    def _due(self, suspected: Suspicion, stray: Stray, time: float, past: Past, body: Body) -> bool:
-        """Return whether a suspected fit is searched in this frame: what lasts is searched only now and then."""
-        if suspected.doubtful:
-            return vain_before(past).due(stray.area, time, past, self.vain_every)
-        return not self.signs.stay_bent(past, body) or in_turn(self.vain_every, time, past)
+    def _due(self, trigger: Trigger, mismatch: Mismatch, time: float, past: Past, body: Body) -> bool:
+        """Return whether a fit is searched in this frame: what lasts is searched only now and then."""
+        if trigger.doubtful:
+            return history_of(past).due(mismatch.area, time, past, self.vain_every)
+        return not self.thresholds.stay_overbent(past, body) or one_frame_of(self.vain_every, time, past)
 
-    def views(self, frame: Frame, surface: Surface, past: Past, scene: Scene) -> list[View]:
-        """Return what the views of a frame surely show around a surface, in a scene whose empty room is known."""
+    def trimaps(self, frame: Frame, surface: Surface, past: Past, scene: Scene) -> list[Trimap]:
+        """Return the trimaps of a frame around a surface, in a scene whose empty room is known."""
         assert scene.background is not None
         room = small_room(scene.background, scene.cameras)
         no_shadow = no_shadows(frame, scene.background, scene.cameras)
-        return views(frame, surface, room, NEAR_M, garment_told(past, scene), no_shadow)
+        return trimaps(frame, surface, room, NEAR_M, garment_log_ratio(past, scene), no_shadow)
 
-    def _searched(self, index: int, fit: Fit, looks: Looks, suspected: Suspicion, settle: Settle) -> FrameResult:
+    def _searched(self, index: int, fit: Fit, searches: Searches, trigger: Trigger, settle: Settle) -> FrameResult:
         """Return the result of the best pose that is found, or that of the fit where none is better."""
-        odd, judge, ways = self.signs.doubtful, looks.judge, self._ways(looks, suspected)
+        doubtful, scorer, strategies = self.thresholds.doubtful, searches.scorer, self._strategies(searches, trigger)
 
-        def settled(number: int, look: Look) -> Fit:
-            return judge.of(settle(look(np.random.default_rng([index, number])), judge.parameters))
+        def settled(number: int, search: Search) -> Fit:
+            return scorer.score(settle(search(np.random.default_rng([index, number])), scorer.parameters))
 
-        fits = [settled(number, look) for number, look in enumerate(ways)]
-        best = self._better(min(fits, key=lambda other: (odd(other.stray), other.apart)), fit)
-        if judge.given and suspected.doubtful:
-            turned = self._better(settled(len(ways), looks.turned), best)
+        fits = [settled(number, search) for number, search in enumerate(strategies)]
+        best = self._better(min(fits, key=lambda other: (doubtful(other.mismatch), other.distance)), fit)
+        if scorer.start and trigger.doubtful:
+            turned = self._better(settled(len(strategies), searches.turned_round), best)
             if turned is not best:
                 LOG.warning("the first pose looks the other way: the person was found turned round by half a turn")
             best = turned
         if best is not fit:
-            return noted(best.result, f"{suspected.why}: found again by search; then {best.stray}", odd(best.stray))
-        if suspected.doubtful:
-            return noted(fit.result, f"{suspected.why}: search found nothing better", doubted=True)
+            note = f"{trigger.reason}: found again by search; then {best.mismatch}"
+            return noted(best.result, note, doubtful(best.mismatch))
+        if trigger.doubtful:
+            return noted(fit.result, f"{trigger.reason}: search found nothing better", doubted=True)
         return fit.result
 
-    def _ways(self, looks: Looks, suspected: Suspicion) -> list[Look]:
-        """Return the ways to look for the pose, each from its own samples."""
-        if suspected.limbs:
-            return [partial(looks.alone, limbs=suspected.limbs)]
-        far = partial(looks.far, astray=suspected.doubtful)
-        if looks.judge.given:  # where all begins, chance shall not decide
-            near = partial(looks.near, spread=2 * START)
-            return [near, partial(far, cloth=HANGS)] * FIRST_LOOKS if suspected.doubtful else [near]
-        return [partial(far, cloth=belief) for belief in ((HANGS, FLIES) if looks.judge.model.clothed else (HANGS,))]
+    def _strategies(self, searches: Searches, trigger: Trigger) -> list[Search]:
+        """Return the ways to search for the pose, each from its own samples."""
+        if trigger.limbs:
+            return [partial(searches.limbs_alone, limbs=trigger.limbs)]
+        wide = partial(searches.wide, by_area=trigger.doubtful)
+        if searches.scorer.start:  # where all begins, chance shall not decide
+            local = partial(searches.local, spread=2 * START)
+            return [local, partial(wide, cloth_weight=HANGING)] * FIRST_REPEATS if trigger.doubtful else [local]
+        weights = (HANGING, FLYING) if searches.scorer.model.clothed else (HANGING,)
+        return [partial(wide, cloth_weight=weight) for weight in weights]
 
     def _better(self, other: Fit, fit: Fit) -> Fit:
         """Return another fit if it is clearly nearer to the person, or free of a doubt or hint and not much farther."""
         most = 1 - self.gain
-        if not self.signs.doubtful(other.stray):
-            if self.signs.doubtful(fit.stray):
-                most = CURED
-            elif fit.stray.near > self.hint_cm2 >= other.stray.near:
-                most = CLEARED
-        return other if other.apart < most * fit.apart else fit
+        if not self.thresholds.doubtful(other.mismatch):
+            if self.thresholds.doubtful(fit.mismatch):
+                most = UNDOUBTED
+            elif fit.mismatch.hint > self.hint_cm2 >= other.mismatch.hint:
+                most = WITHOUT_HINT
+        return other if other.distance < most * fit.distance else fit
 
-    def _judge(
-        self, believed: Pose, result: FrameResult, seen: Sequence[View], past: Past, model: ClothedModel
-    ) -> Judge:
-        given = None if past.moments or past.after_gap else Given(believed, START)
+    def _scorer(
+        self, predicted: Pose, result: FrameResult, trimaps: Sequence[Trimap], past: Past, model: ClothedModel
+    ) -> Scorer:
+        start = None if past.moments or past.after_gap else StartPose(predicted, START)
         coarse = model.scene.simplified(FACES)
-        cloth = HANGS if given else FLIES  # where all begins, the garment's colours are not known
-        return Judge(model, coarse, seen, result.state.cloth.parameters, past, given, cloth)
+        cloth_weight = HANGING if start else FLYING  # where all begins, the garment's colours are not known
+        return Scorer(model, coarse, trimaps, result.state.cloth.parameters, past, start, cloth_weight)
 
     def _plan(self, body: Body) -> Plan:
         spread = Spread(np.radians(self.spread_deg), np.radians(self.root_spread_deg), self.root_spread_m)
@@ -230,10 +220,10 @@ class LimbSearch(Recovery):
         return read(self.poses)
 
     @property
-    def signs(self) -> Signs:
+    def thresholds(self) -> Thresholds:
         """What calls for a search."""
         leap = np.radians(self.leap_deg)
-        return Signs(self.uncovered_cm2, self.floating_cm2, self.hint_cm2, self.beginnings, leap)
+        return Thresholds(self.uncovered_cm2, self.floating_cm2, self.hint_cm2, self.beginnings, leap)
 
 
 def noted(result: FrameResult, note: str, doubted: bool) -> FrameResult:

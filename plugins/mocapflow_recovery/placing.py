@@ -12,7 +12,7 @@ from mocapflow.data import NO_CLOTH, Frame, Pose
 from mocapflow.geometry.silhouettes import covered
 from mocapflow.records import F64, Bool
 from mocapflow.scene import Scene
-from mocapflow_recovery.certain import Room, changes
+from mocapflow_recovery.trimaps import Room, changes
 
 
 def placed(bare: Scene, turn: float, angles: F64, middle: F64) -> Pose:
@@ -30,11 +30,11 @@ def centred(pose: Pose, bare: Scene, middle: F64, cameras: Sequence[Camera]) -> 
     One that fewer than two cameras see stays.
     """
     surface, root = bare.surface(pose, NO_CLOTH), pose.root.copy()
-    root[:3, 3] += np.nan_to_num(middle - meeting([covered(surface, camera) for camera in cameras], cameras))
+    root[:3, 3] += np.nan_to_num(middle - mask_centre([covered(surface, camera) for camera in cameras], cameras))
     return Pose(root=root, angles=pose.angles)
 
 
-def meeting(masks: Sequence[Bool], cameras: Sequence[Camera]) -> F64:
+def mask_centre(masks: Sequence[Bool], cameras: Sequence[Camera]) -> F64:
     """Return where (3) m the rays through the middles of masks (h, w) meet best; NaN where fewer than two show any."""
     middles = [np.argwhere(mask).mean(axis=0)[::-1] if mask.any() else np.full(2, np.nan) for mask in masks]
     position: F64 = triangulate(np.array(middles)[:, None], np.ones((len(masks), 1)), cameras).position[0]

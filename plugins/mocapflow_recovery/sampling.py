@@ -72,22 +72,22 @@ def search(cost: Cost, pose: Pose, body: Body, plan: Plan, rng: np.random.Genera
     return best
 
 
-def without_idle_parts(stray: Cost, found: Pose, fitted: Pose, body: Body, share: float) -> Pose:
-    """Return a found pose in which the parts that mend next to nothing of what strays are as they were fitted.
+def without_idle_parts(cost: Cost, found: Pose, fitted: Pose, body: Body, share: float) -> Pose:
+    """Return a found pose in which the parts that mend next to nothing of a mismatch are as they were fitted.
 
     A search fits every part, also to what no pose explains, such as cloth that flies.
 
     Args:
-        stray: how far person and model are apart, by a measure that the search brought down.
+        cost: of the mismatch of person and model, which the search brought down.
         found: the pose that a search ended in.
         fitted: the pose in doubt.
         body: whose parts are tried.
-        share: of what the search brought together: a part that brings less stays as it was fitted.
+        share: of what the search mended: a part that mends less stays as it was fitted.
     """
-    before, after = stray([fitted, found])
+    before, after = cost([fitted, found])
     for part in parts(body):
         back = with_part(found, part, fitted)
-        if float(stray([back])[0]) - after <= share * (before - after):
+        if float(cost([back])[0]) - after <= share * (before - after):
             found = back
     return found
 

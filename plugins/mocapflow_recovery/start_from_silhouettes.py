@@ -21,17 +21,17 @@ from mocapflow.model import ClothedModel
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow.scene import Scene
-from mocapflow_recovery.certain import small_room, views
-from mocapflow_recovery.disagreement import HANGS
-from mocapflow_recovery.judge import FACES, Judge
-from mocapflow_recovery.placing import centred, heading_between, largest_changes, meeting, placed
+from mocapflow_recovery.disagreement import HANGING
+from mocapflow_recovery.placing import centred, heading_between, largest_changes, mask_centre, placed
 from mocapflow_recovery.sampling import SHARES, Cost, Plan, Spread, search
+from mocapflow_recovery.scoring import FACES, Scorer
+from mocapflow_recovery.trimaps import small_room, trimaps
 
 LOG = logging.getLogger("mocapflow")
 NEAR_M = 0.6  # what differs from the room farther from somebody who stands upright there is somebody else
 SPREAD = Spread(angle=np.radians(25.0), turn=np.radians(12.0), shift=0.06)  # of the first samples
 SAMPLES, SEEN_SAMPLES = 40, 60  # of each part in a round, and of each limb as it was seen
-TRIED = 24  # of the poses that people were seen in, as unlike each other as can be; standing upright is the first
+CANDIDATES = 24  # of the poses that people were seen in, as unlike each other as can be; standing upright is the first
 DIRECTIONS = 16  # in which each of them is turned
 SEARCHES = 4  # from the best pose of as many directions
 REPEATS = 4  # of the best one, as far as that helps
@@ -41,10 +41,10 @@ ENOUGH = 0.95  # times the cost before: a search that gains less is the last
 ALIKE = 1.5  # times the least cost: so little worse, and another direction may be the right one
 
 
-class Seen(NamedTuple):
+class Target(NamedTuple):
     """What poses are compared with."""
 
-    judge: Judge  # of the clothed person, by the views
+    scorer: Scorer  # of the clothed person, by the views
     middle: F64  # (3,) m, where the rays through the middles of the silhouettes meet
 
 
@@ -79,12 +79,12 @@ class StartFromSilhouettes(Stage):
             RecordingError: there are no clean plates, or fewer than two cameras see a person in the first frame.
         """
         self.need(recording)
-        seen, known = self._seen(recording, scene), self._density.on(scene.body.screw_names)
-        cost = partial(costs, seen=seen, known=known)
+        target, known = self._target(recording, scene), self._density.on(scene.body.screw_names)
+        cost = partial(costs, target=target, known=known)
         plan = Plan(SPREAD, SHARES, SAMPLES, known, SEEN_SAMPLES)
         ends = [
             search(cost, begin, scene.body, plan, np.random.default_rng(number))
-            for number, begin in enumerate(self._begins(seen, known, cost))
+            for number, begin in enumerate(self._begins(target, known, cost))
         ]
         off = cost(ends)
         best, least = ends[int(off.argmin())], float(off.min())
@@ -97,16 +97,17 @@ class StartFromSilhouettes(Stage):
         others = [value for value, end in zip(off, ends, strict=True) if heading_between(end, best) > OTHERWISE]
         if min(others, default=np.inf) < ALIKE * off.min():
             LOG.warning("silhouettes of the first frame hardly tell which way the person looks: see the overlay")
-        return Start(pose=best, parameters=scene.calm)
+        return Start(pose=best, parameters=scene.neutral_parameters)
 
-    def _seen(self, recording: Recording, scene: Scene) -> Seen:
+    def _target(self, recording: Recording, scene: Scene) -> Target:
         frame, background = recording.frame(recording.indices[0]), recording.background()
         assert background is not None
         dressed, room = scene if self.draper else scene.undressed, small_room(background, scene.cameras)
         coarse = dressed.simplified(FACES)
         bare = coarse.undressed
-        upright = placed(bare, 0.0, np.zeros(len(bare.body.twists)), meeting(*largest_changes(frame, room)))
-        found = [view for view in views(frame, bare.surface(upright, NO_CLOTH), room, NEAR_M) if view.shown]
+        upright = placed(bare, 0.0, np.zeros(len(bare.body.twists)), mask_centre(*largest_changes(frame, room)))
+        every = trimaps(frame, bare.surface(upright, NO_CLOTH), room, NEAR_M)
+        found = [trimap for trimap in every if trimap.informative]
         if len(found) < 2:
             raise RecordingError(
                 f"frame {frame.index}: {len(found)} cameras show a person who is not in their clean plates",
@@ -114,42 +115,42 @@ class StartFromSilhouettes(Stage):
                 hint="begin where two cameras see all of the person; do plates and videos show the same room?",
             )
         model = ClothedModel(scene=dressed, draper=self.draper)
-        judge = Judge(model, coarse, found, scene.calm, Past(), given=None, cloth=HANGS)
-        return Seen(judge, meeting([view.person for view in found], [view.camera for view in found]))
+        scorer = Scorer(model, coarse, found, scene.neutral_parameters, Past(), start=None, cloth_weight=HANGING)
+        return Target(scorer, mask_centre([trimap.person for trimap in found], [trimap.camera for trimap in found]))
 
-    def _begins(self, seen: Seen, known: F64, cost: Cost) -> list[Pose]:
+    def _begins(self, target: Target, known: F64, cost: Cost) -> list[Pose]:
         """Return the best poses of some directions, best first."""
         turns = np.linspace(0, 2 * np.pi, DIRECTIONS, endpoint=False)
-        angles = unlike(np.nan_to_num(known), TRIED)
-        bare, cameras = seen.judge.coarse.undressed, [view.camera for view in seen.judge.seen]
+        angles = farthest_points(np.nan_to_num(known), CANDIDATES)
+        bare, cameras = target.scorer.coarse.undressed, [trimap.camera for trimap in target.scorer.trimaps]
 
         def there(turn: float, bent: F64) -> Pose:
-            return centred(placed(bare, turn, bent, seen.middle), bare, seen.middle, cameras)
+            return centred(placed(bare, turn, bent, target.middle), bare, target.middle, cameras)
 
         poses = [[there(turn, bent) for bent in angles] for turn in turns]
         off = np.array([cost(those) for those in poses])
-        return [poses[turn][int(off[turn].argmin())] for turn in scattered(off.min(axis=1), SEARCHES)]
+        return [poses[turn][int(off[turn].argmin())] for turn in separate_minima(off.min(axis=1), SEARCHES)]
 
     @cached_property
     def _density(self) -> Density:
         return read(self.poses)
 
 
-def costs(poses: Sequence[Pose], seen: Seen, known: F64) -> F64:
+def costs(poses: Sequence[Pose], target: Target, known: F64) -> F64:
     """Return how far poses (B,) are from the silhouettes, m per unit of the person's area, more if nobody was seen so.
 
     Args:
         poses: to compare.
-        seen: what the views show.
+        target: what they are compared with.
         known: (N, D) rad, poses that people were seen in; NaN where an angle is not known.
     """
-    off = seen.judge.apart(poses)
+    off = target.scorer.distances(poses)
     known = np.concatenate([np.zeros((1, known.shape[1])), np.nan_to_num(known)])
-    strange = [np.sqrt(((known - pose.angles) ** 2).mean(axis=1).min()) for pose in poses]
-    return np.asarray(off * (1 + np.array(strange) / NATURAL))
+    unusual = [np.sqrt(((known - pose.angles) ** 2).mean(axis=1).min()) for pose in poses]
+    return np.asarray(off * (1 + np.array(unusual) / NATURAL))
 
 
-def scattered(off: F64, count: int) -> list[int]:
+def separate_minima(off: F64, count: int) -> list[int]:
     """Return the directions, of N around a circle (N,), of least cost, best first; none beside a better one."""
     chosen: list[int] = []
     for turn in np.argsort(off):
@@ -158,7 +159,7 @@ def scattered(off: F64, count: int) -> list[int]:
     return chosen[:count]
 
 
-def unlike(poses: F64, count: int) -> list[F64]:
+def farthest_points(poses: F64, count: int) -> list[F64]:
     """Return the rest pose and those of N poses (N, D) that are farthest from it and each other."""
     chosen, away = [np.zeros(poses.shape[1])], np.full(len(poses), np.inf)
     while len(chosen) < min(count, len(poses) + 1):

@@ -17,11 +17,7 @@ from mocapflow.results import Evaluation, Track
 
 
 def plot_angles(
-    path: Path,
-    ours: Mapping[str, F64],
-    raw: Mapping[str, F64],
-    evaluation: Evaluation | None,
-    lost: Bool,
+    path: Path, ours: Mapping[str, F64], raw: Mapping[str, F64], evaluation: Evaluation | None, lost: Bool
 ) -> Path:
     """Write one panel per angle: ours with its 90 % band, unsmoothed thin, the reference black, the RMS in the title.
 

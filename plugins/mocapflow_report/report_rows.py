@@ -10,7 +10,7 @@ import numpy as np
 from mocapflow_evaluation.compare import NINETY
 from mocapflow_evaluation.panels import title
 from mocapflow_export import runjson, tables
-from mocapflow_export.misgivings import misgivings
+from mocapflow_export.quality_warnings import quality_warnings
 
 from mocapflow.data import unseen
 from mocapflow.records import F64, Bool
@@ -27,7 +27,7 @@ DEVIATIONS = {  # column of evaluation.csv: its heading
 
 def glance(track: Track, cameras: Sequence[str], evaluation: Evaluation | None) -> list[str]:
     """Return what matters most."""
-    doubts, overlap = misgivings(track, cameras), track.overlap[np.isfinite(track.overlap)]
+    warnings, overlap = quality_warnings(track, cameras), track.overlap[np.isfinite(track.overlap)]
     rows = {str(row["angle"]): row for row in (evaluation.rows if evaluation else ())}
     knees = [
         f"{title(name)} {rows[name]['rms_deg']:.1f}° ({rows[name]['rms_aligned_deg']:.1f}° without lag and offset)"
@@ -37,7 +37,7 @@ def glance(track: Track, cameras: Sequence[str], evaluation: Evaluation | None) 
     said = [f"RMS deviation from the reference: {'; '.join(knees)}"] if knees else []
     if len(overlap):
         said.append(f"overlap of model and image: {np.median(overlap):.3f} in the median of all frames and views")
-    said.extend(doubts or ["no frame lost"])
+    said.extend(warnings or ["no frame lost"])
     return [*said, f"{np.median(track.seconds.sum(axis=1)):.2f} s of CPU a frame"]
 
 

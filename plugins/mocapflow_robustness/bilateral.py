@@ -42,8 +42,8 @@ class Bilateral(Restorer):
         noise = noise_of(rough)
         if noise < LEAST_NOISE:
             return image, np.zeros(rough.shape, bool)
-        calm = (rough < FREE * noise).astype(np.uint8)
-        hidden = np.asarray(cv2.dilate(calm, np.ones((SIDE, SIDE), np.uint8)), bool)
+        flat = (rough < FREE * noise).astype(np.uint8)
+        hidden = np.asarray(cv2.dilate(flat, np.ones((SIDE, SIDE), np.uint8)), bool)
         smooth, share = mean_around(image, ~hidden, noise / (2 * np.sqrt(np.pi) * self.noise_left))
         hidden |= share < ENOUGH
         for _ in range(PASSES):

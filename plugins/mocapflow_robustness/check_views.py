@@ -14,8 +14,8 @@ from mocapflow.recordings.freezing import frozen_from, repeated
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F32, Bool
 from mocapflow.results import ViewChecks
-from mocapflow_robustness import doubts
-from mocapflow_robustness.knocked import Probes
+from mocapflow_robustness.knock_detection import KnockDetector
+from mocapflow_robustness.picture_checks import blank, bursts, interpolated, lookalike, shows_person
 from mocapflow_robustness.thumbnails import Thumbnails, thumbnail, thumbnails
 
 LONGEST_S = 0.17  # of a burst of wrong pictures
@@ -41,16 +41,16 @@ class CheckViews(Stage):
     def run(self, recording: Recording, background: Background | None = None) -> ViewChecks:
         """Return the pictures to do without, each with a reason, and when cameras were knocked."""
         known = () if background is None else zip(background.pictures, background.known, strict=True)
-        probes = Probes(recording, room=dict(enumerate(known)))
-        seen = thumbnails(recording, probes.look)
+        detector = KnockDetector(recording, room=dict(enumerate(known)))
+        seen = thumbnails(recording, detector.look)
         names = [camera.name for camera in recording.cameras]
-        said = doubted(seen, rooms(seen, background), recording.frame_rate, names)
+        said = faults(seen, rooms(seen, background), recording.frame_rate, names)
         rows, cameras = np.nonzero(said != "")
         return ViewChecks(
             frame=rows.astype(np.int32),
             camera=cameras.astype(np.int16),
             reasons=tuple(said[rows, cameras].tolist()),
-            knocks=probes.knocks(),
+            knocks=detector.knocks(),
         )
 
 
@@ -59,7 +59,7 @@ def longest(frame_rate: float) -> int:
     return max(round(LONGEST_S * frame_rate), 1)
 
 
-def doubted(seen: Thumbnails, room: F32, frame_rate: float, names: Sequence[str]) -> npt.NDArray[np.object_]:
+def faults(seen: Thumbnails, room: F32, frame_rate: float, names: Sequence[str]) -> npt.NDArray[np.object_]:
     """Return (T, C) why a picture is not to be trusted, "" where it is.
 
     Args:
@@ -68,34 +68,34 @@ def doubted(seen: Thumbnails, room: F32, frame_rate: float, names: Sequence[str]
         frame_rate: per second.
         names: of the cameras.
     """
-    empty = doubts.blank(seen.grey, room)
-    foreign, like = doubts.lookalike(seen.grey, room)
-    good = seen.there & ~(empty | foreign)
-    old = repeated(np.where(empty | foreign, np.nan, seen.news)) | frozen(seen)
-    old &= doubts.peopled(seen.grey, room, good) | (frozen_from(seen.news) == 0)  # then it is its own empty room
-    settled = doubts.bridged(seen.grey, good & ~old)
-    torn = doubts.bursts(settled, longest(frame_rate), JUMP, JOINT_JUMP)
+    empty = blank(seen.grey, room)
+    foreign, like = lookalike(seen.grey, room)
+    good = seen.usable & ~(empty | foreign)
+    old = repeated(np.where(empty | foreign, np.nan, seen.change)) | frozen(seen)
+    old &= shows_person(seen.grey, room, good) | (frozen_from(seen.change) == 0)  # then it is its own empty room
+    settled = interpolated(seen.grey, good & ~old)
+    torn = bursts(settled, longest(frame_rate), JUMP, JOINT_JUMP)
     said = np.full(empty.shape, "", object)
     said[torn] = "the picture does not fit the ones before and after"
     said[old] = "the picture repeats the one before"
     said[foreign] = [f"the picture looks like one of {names[camera]}" for camera in like[foreign]]
     said[empty] = "the picture shows nothing"
-    said[~seen.there] = ""  # already known to be missing
+    said[~seen.usable] = ""  # already known to be missing
     return said
 
 
 def rooms(seen: Thumbnails, background: Background | None) -> F32:
     """Return (C, S, S) thumbnails of the empty scene; without one known, the median over the recording."""
     if background is None:
-        shown = seen.there & ~frozen(seen)
+        shown = seen.usable & ~frozen(seen)
         return np.stack([median(seen.grey[shown[:, c], c]) for c in range(seen.grey.shape[1])])
     return np.stack([thumbnail(room) for room in background.pictures])
 
 
 def frozen(seen: Thumbnails) -> Bool:
     """Return (T, C) which pictures repeat one that a camera shows to the end."""
-    late: Bool = np.arange(len(seen.news))[:, None] >= frozen_from(seen.news)
-    return late & np.isfinite(seen.news)
+    late: Bool = np.arange(len(seen.change))[:, None] >= frozen_from(seen.change)
+    return late & np.isfinite(seen.change)
 
 
 def median(grey: F32) -> F32:

@@ -13,16 +13,16 @@ from pydantic import Field, NonNegativeInt, model_validator
 from mocapflow.components import Stage
 from mocapflow.data import Frame
 from mocapflow.errors import RecordingError, alternatives
-from mocapflow.geometry.turned import as_seen
+from mocapflow.geometry.camera_rotation import warped
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import U8
-from mocapflow_robustness import pixels
+from mocapflow_robustness import disturbances
 from mocapflow_robustness.events import Event
-from mocapflow_robustness.hiding import masks, together
-from mocapflow_robustness.tape import Tape
+from mocapflow_robustness.occlusion import occlusion_masks, union
+from mocapflow_robustness.sequential_reader import SequentialReader
 
 Share = Annotated[float, Field(ge=0, le=1)]
-Tapes = dict[tuple[Event, str], Tape]
+Readers = dict[tuple[Event, str], SequentialReader]
 
 
 class Corrupt(Stage):
@@ -77,11 +77,11 @@ class Corruption:
     def frames(self, source: Recording) -> Iterator[Frame]:
         """Yield the disturbed frames."""
         names = [view.lens.name for view in source.views]
-        tapes: Tapes = {}
+        readers: Readers = {}
         for frame in source.frames():
-            yield self._disturbed(frame, names, tapes)
+            yield self._disturbed(frame, names, readers)
 
-    def _disturbed(self, frame: Frame, names: list[str], tapes: Tapes) -> Frame:
+    def _disturbed(self, frame: Frame, names: list[str], readers: Readers) -> Frame:
         images, usable = list(frame.images), frame.usable.copy()
         reasons = list(frame.reasons or [""] * len(names))
         keypoints = None if frame.keypoints is None else list(frame.keypoints)
@@ -93,7 +93,7 @@ class Corruption:
             elif usable[camera]:
                 rng = np.random.default_rng([self.settings.seed, crc32(view.encode()), frame.index])
                 image = images[camera]
-                image = image if event is None else self._instead(event, image, frame, view, rng, tapes)
+                image = image if event is None else self._instead(event, image, frame, view, rng, readers)
                 images[camera] = self._spoiled(image, rng)
             if event is not None and keypoints is not None:
                 keypoints[camera] = keypoints[camera][:0]
@@ -102,7 +102,7 @@ class Corruption:
             images=tuple(images),
             usable=usable,
             reasons=() if usable.all() else tuple(reasons),
-            hidden=together(frame.hidden, masks(events, images)),
+            hidden=union(frame.hidden, occlusion_masks(events, images)),
             keypoints=None if keypoints is None else tuple(keypoints),
         )
 
@@ -119,28 +119,30 @@ class Corruption:
 
     def _noisy(self, image: U8, rng: np.random.Generator) -> U8:
         chosen = self.settings
-        return pixels.noisy(image, chosen.noise, chosen.noise_kind, rng) if chosen.noise else image
+        return disturbances.noisy(image, chosen.noise, chosen.noise_kind, rng) if chosen.noise else image
 
     def _covered(self, image: U8, rng: np.random.Generator) -> U8:
         chosen = self.settings
         if chosen.rectangles[1]:
-            image = pixels.with_rectangles(image, chosen.rectangles, rng)
-        return pixels.with_stripe(image, chosen.stripe, chosen.stripe_centre) if chosen.stripe else image
+            image = disturbances.with_rectangles(image, chosen.rectangles, rng)
+        return disturbances.with_stripe(image, chosen.stripe, chosen.stripe_centre) if chosen.stripe else image
 
-    def _instead(self, event: Event, image: U8, frame: Frame, view: str, rng: np.random.Generator, tapes: Tapes) -> U8:
+    def _instead(
+        self, event: Event, image: U8, frame: Frame, view: str, rng: np.random.Generator, readers: Readers
+    ) -> U8:
         """Return what an event puts in the place of a picture."""
         if event.what == "black":
             return np.zeros_like(image)
         if event.what == "torn":
-            return pixels.torn(image, rng)
+            return disturbances.torn(image, rng)
         if event.what == "covered":
-            return pixels.covered(image, event.first_covered(len(image)), len(image))
+            return disturbances.covered(image, event.first_covered(len(image)), len(image))
         names = [v.lens.name for v in self.whole.views]
         if event.what == "knocked":
-            return as_seen(image, event.homography(self.whole.cameras[names.index(view)]))[0]
+            return warped(image, event.homography(self.whole.cameras[names.index(view)]))[0]
         camera = (names.index(view) + (event.what == "other_camera")) % len(names)
-        tape = tapes.setdefault((event, view), Tape(self.whole.seen_by(camera)))
-        return fitted(tape.at(event.source(frame.index, self.whole.length)).images[0], image)
+        reader = readers.setdefault((event, view), SequentialReader(self.whole.seen_by(camera)))
+        return fitted(reader.at(event.source(frame.index, self.whole.length)).images[0], image)
 
 
 def fitted(image: U8, like: U8) -> U8:

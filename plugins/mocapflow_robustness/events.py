@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, NonNegativeInt, PositiveInt
 
 from mocapflow.assets import Camera
-from mocapflow.geometry.turned import homography
+from mocapflow.geometry.camera_rotation import homography
 from mocapflow.records import F64
 from mocapflow.settings import Settings
 

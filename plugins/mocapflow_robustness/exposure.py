@@ -15,7 +15,7 @@ from mocapflow.errors import PipelineError
 from mocapflow.io.lenses import View, with_levels
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64, U8
-from mocapflow_robustness.steadying import Steadied, multiplied, small
+from mocapflow_robustness.brightness import NormalisedBrightness, block_means, multiplied
 
 LOG = logging.getLogger("mocapflow")
 Factor = Annotated[float, Field(ge=1)]
@@ -56,8 +56,8 @@ class Exposure(Stage):
         usual = typical(recording)
         views = tuple(self._corrected(view, usual.get(view.lens.name)) for view in recording.views)
         levels = {view.lens.name: view.levels for view in views}
-        shown = {name: small(with_levels(image, levels[name])) for name, image in usual.items()}
-        return replace(recording, views=views, changes=(Steadied(self.tolerance, shown),))
+        shown = {name: block_means(with_levels(image, levels[name])) for name, image in usual.items()}
+        return replace(recording, views=views, changes=(NormalisedBrightness(self.tolerance, shown),))
 
     def _corrected(self, view: View, image: U8 | None) -> View:
         """Return the view of a camera set right by a picture (H, W, 3) of it, if any, and warn of what was wrong."""

@@ -12,7 +12,7 @@ from mocapflow.components import Stage
 from mocapflow.data import Frame
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F32, U8, Bool
-from mocapflow_robustness.hiding import together
+from mocapflow_robustness.occlusion import union
 
 
 class Restorer(Stage):
@@ -37,7 +37,7 @@ class Restored:
         """Yield the restored frames."""
         for frame in source.frames():
             images, hidden = zip(*(self.restorer.restore(image) for image in frame.images), strict=True)
-            yield replace(frame, images=images, hidden=together(frame.hidden, hidden))
+            yield replace(frame, images=images, hidden=union(frame.hidden, hidden))
 
 
 def mean_around(image: U8, known: Bool, sigma_px: float) -> tuple[F32, F32]:

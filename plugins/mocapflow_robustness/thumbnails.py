@@ -21,26 +21,26 @@ class Thumbnails:
     """T frames of C cameras."""
 
     grey: F32 = array("T", "C", SIDE, SIDE, unit="grey levels")
-    news: F64 = array("T", "C", unit="grey levels, mean absolute difference to the picture before; NaN without one")
-    there: Bool = array("T", "C", unit="False where there is no picture")
+    change: F64 = array("T", "C", unit="grey levels, mean absolute difference to the picture before; NaN without one")
+    usable: Bool = array("T", "C", unit="False where there is no picture")
 
 
 def thumbnails(recording: Recording, look: Callable[[Frame], None] = lambda frame: None) -> Thumbnails:
     """Return the thumbnails of all frames of a recording; each is shown to `look`, as videos are decoded only once."""
     everything = replace(recording, indices=range(recording.length))
     grey = np.zeros((recording.length, len(recording.views), SIDE, SIDE), np.float32)
-    news, there = np.full(grey.shape[:2], np.nan), np.zeros(grey.shape[:2], bool)
+    change, usable = np.full(grey.shape[:2], np.nan), np.zeros(grey.shape[:2], bool)
     before: list[U8 | None] = [None] * len(recording.views)
     for row, frame in enumerate(everything.frames()):
         look(frame)
-        there[row] = frame.usable
+        usable[row] = frame.usable
         for camera in np.flatnonzero(frame.usable):
             image, last = frame.images[camera], before[camera]
             grey[row, camera] = thumbnail(image)
             if last is not None:
-                news[row, camera] = difference(image, last)
+                change[row, camera] = difference(image, last)
             before[camera] = image
-    return Thumbnails(grey=grey, news=news, there=there)
+    return Thumbnails(grey=grey, change=change, usable=usable)
 
 
 def thumbnail(image: U8) -> F32:

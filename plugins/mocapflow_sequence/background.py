@@ -19,7 +19,7 @@ from mocapflow.io.plates import plate_files
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import U8
 from mocapflow.scene import Scene
-from mocapflow_sequence.commonest import commonest
+from mocapflow_sequence.dominant_colours import dominant_colours
 from mocapflow_sequence.first_frame import LEAST_SHARE, Learnt, empty_scene
 
 LOG = logging.getLogger("mocapflow")
@@ -33,13 +33,13 @@ FLOOR_FRAMES = 4  # in which the person's shadow may tell the height of the floo
 class EmptyScene(Stage):
     """Learns what the cameras see without the person.
 
-    Without clean plates it takes one of the commonest colours of each pixel over the whole recording. If a stage before
+    Without clean plates it takes one of the dominant colours of each pixel over the whole recording. If a stage before
     makes a `Start`, the pose of the first frame and the colours beside the person in it tell which is the room's; else
-    it is the commonest. Nobody knows what is behind a person who stays in place throughout. Memory is bounded by
+    it is the most common one. Nobody knows what is behind a person who stays in place throughout. Memory is bounded by
     `samples` pictures of one camera.
 
     Of a floor without colours it learns the height, too, if the person's shadow tells it: then views can tell grey
-    clothes from shadows together (`mocapflow_levelset.one_floor`).
+    clothes from shadows together (`mocapflow_levelset.shadow_consistency`).
     """
 
     name: ClassVar[str] = "background"
@@ -94,10 +94,10 @@ class EmptyScene(Stage):
         return floor_height(frames, room, scene.cameras, float(body.vertices[:, 2].min()))
 
     def _learnt(self, recording: Recording, scene: Scene, start: Start | None) -> Iterator[Learnt]:
-        """Yield the empty scene of each view; without a start pose the commonest colours, whoever's they are."""
+        """Yield the empty scene of each view; without a start pose the dominant colours, whoever's they are."""
         views = range(len(recording.views))
         if start is None:
-            yield from (self._commonest(self._pictures(recording, c)) for c in views)
+            yield from (self._dominant_colours(self._pictures(recording, c)) for c in views)
             return
         first, body = recording.frame(recording.indices[0]), scene.undressed.surface(start.pose, NO_CLOTH)
         for c in views:
@@ -105,10 +105,10 @@ class EmptyScene(Stage):
             if first.usable[c]:
                 yield empty_scene(pictures, first.images[c], body, scene.cameras[c])
             else:
-                yield self._commonest(pictures)
+                yield self._dominant_colours(pictures)
 
-    def _commonest(self, pictures: U8) -> Learnt:
-        mean, spread, share = commonest(pictures, 1)[0]
+    def _dominant_colours(self, pictures: U8) -> Learnt:
+        mean, spread, share = dominant_colours(pictures, 1)[0]
         return Learnt(mean, np.where(share[..., None] >= LEAST_SHARE, spread, np.float32(np.inf)))
 
     def _pictures(self, recording: Recording, camera: int) -> U8:

@@ -14,13 +14,13 @@ from mocapflow.geometry.cameras import magnification
 from mocapflow.geometry.silhouettes import covered, distance_to
 from mocapflow.records import F32, F64, U8, Bool
 from mocapflow_sequence.colours import DEEP, Colours, alike, every, lab_bins, more_common, shaded
-from mocapflow_sequence.commonest import commonest
+from mocapflow_sequence.dominant_colours import dominant_colours
 
 LEAST_SHARE = 0.06  # of the pictures that has to show a colour
 COLOURS = 4  # of each pixel that are looked at: the room's, of who stands there, of shadows
 REACH_M = 0.15  # from the body at the start pose: limbs may be off by so much, and clothes stand off
 AROUND_M = 0.5  # up to where the room beside the person is looked at
-ROUNDS = 2  # first the body as believed is the person, then what differs there from the room that was found
+ROUNDS = 2  # first the body in its start pose is the person, then what differs there from the room that was found
 
 
 class Learnt(NamedTuple):
@@ -51,18 +51,18 @@ class Evidence(NamedTuple):
 
 
 def empty_scene(pictures: U8, first: U8, body: Surface, camera: Camera) -> Learnt:
-    """Return one view of the empty scene: of the commonest colours of each pixel the first that is the room's.
+    """Return one view of the empty scene: of the dominant colours of each pixel the first that is the room's.
 
-    Away from the body as believed in the first frame, that frame shows the room. Near it a colour is the room's if it
-    is more common beside the body than on it.
+    Away from the body in its start pose, the first frame shows the room. Near it a colour is the room's if it is more
+    common beside the body than on it.
 
     Args:
         pictures: (N, H, W, 3) BGR, from all over the recording.
         first: (H, W, 3) the first frame.
-        body: the person as believed in it.
+        body: the person in it, in the start pose.
         camera: the view.
     """
-    colours, now = commonest(pictures, COLOURS), lab_bins(first)
+    colours, now = dominant_colours(pictures, COLOURS), lab_bins(first)
     usual = np.median(colours[0].spread, axis=(0, 1))
     shown = _shown(first, usual)
     person, away_m = _about(body, camera)

@@ -11,7 +11,7 @@ from pydantic import Field, NonNegativeInt, PositiveFloat
 from mocapflow.assets import Background
 from mocapflow.components import Stage
 from mocapflow.data import Flow, Frame
-from mocapflow.geometry.following import LucasKanade, followed
+from mocapflow.geometry.point_tracking import LucasKanade, track_points
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F32, U8
 from mocapflow.results import ImageFlow, ViewChecks
@@ -75,7 +75,7 @@ class FollowPoints(Stage):
         corners = self._corners(a, np.ones_like(a) if where is None else where)
         if corners is None:
             return NOTHING
-        there, kept = followed(
+        there, kept = track_points(
             a, b, corners, LucasKanade(self.window_px, self.levels, STEPS, REST_PX, self.round_trip_px)
         )
         return Flow(pixel=corners[kept], displacement=(there - corners)[kept])

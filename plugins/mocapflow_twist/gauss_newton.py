@@ -101,7 +101,7 @@ class Task(NamedTuple):
         now = dressed(self.surface, cloth.vertices)
         spacing = self.fitter.spacing_px
         off = misfit(now, self.segmentation, self.model.scene.cameras, spacing).sum() / spacing
-        return 0.5 * (self.weight * float(off) + float(self.precision @ self._from_calm(cloth) ** 2))
+        return 0.5 * (self.weight * float(off) + float(self.precision @ self._from_neutral(cloth) ** 2))
 
     def equations(self, cloth: Cloth) -> Equations:
         """Return the quadratic model of the energy about the parameters of a cloth."""
@@ -110,7 +110,7 @@ class Task(NamedTuple):
         rows = image_rows(matches, cameras)
         worn = rows.part(rows.vertex >= first, rows.weight, first)
         hessian, gradient, energy = dense_equations(worn, cloth.vertices, self._velocity(cloth))
-        off = self._from_calm(cloth)
+        off = self._from_neutral(cloth)
         pull = self.precision * off
         return Equations(hessian + np.diag(self.precision), gradient + pull, energy + 0.5 * float(pull @ off))
 
@@ -127,8 +127,8 @@ class Task(NamedTuple):
         increment[free] = steps.step(part, steps.CLOTH_LEVER / (high - low)[free], damping)
         return self.model.drape(self.estimate.pose, np.clip(parameters + increment, low, high), self.past)
 
-    def _from_calm(self, cloth: Cloth) -> F64:
-        return cloth.parameters - self.model.scene.calm
+    def _from_neutral(self, cloth: Cloth) -> F64:
+        return cloth.parameters - self.model.scene.neutral_parameters
 
     def _velocity(self, cloth: Cloth) -> F64:
         """Return the velocities (W, 3, Q) of the cloth for unit changes of its parameters."""

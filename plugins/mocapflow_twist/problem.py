@@ -12,7 +12,7 @@ from mocapflow.components import Prior
 from mocapflow.data import Cloth, Past, Pose, Residual
 from mocapflow.geometry import twists
 from mocapflow.geometry.kinematics import root_position
-from mocapflow.guards.answers import residual_of
+from mocapflow.guards.outputs import residual_of
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow_twist import normal_equations

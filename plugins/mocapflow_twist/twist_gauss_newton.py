@@ -65,7 +65,7 @@ class TwistGaussNewton(PoseSolver):
         """Return the pose that explains the matches best, its covariance, and what the images told of it."""
         guess = Guess(state.estimate.pose, state.cloth)
         motion = ClothMotion(model, past, self.cloth_unknowns)
-        anchor = Anchor(calmed(guess, model), self._precision(model, guess))
+        anchor = Anchor(with_neutral_cloth(guess, model), self._precision(model, guess))
         surface, damping = model.surface(guess.pose, guess.cloth), self._least_damping(past, turn)
         tried: dict[Pose, Sequence[Residual]] = {}
         found: Quadratic | None = None  # the last quadratic models, for the covariance
@@ -152,6 +152,6 @@ def quadratic(problem: Problem, guess: Guess, motion: ClothMotion) -> Quadratic:
     return problem.quadratic(guess, motion.velocity(guess) if len(problem.data.cloth.vertex) else None)
 
 
-def calmed(guess: Guess, model: ClothedModel) -> Guess:
+def with_neutral_cloth(guess: Guess, model: ClothedModel) -> Guess:
     """Return a guess whose garment hangs without forces: where its parameters are held, however they came about."""
-    return Guess(guess.pose, replace(guess.cloth, parameters=model.scene.calm))
+    return Guess(guess.pose, replace(guess.cloth, parameters=model.scene.neutral_parameters))

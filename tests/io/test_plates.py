@@ -11,7 +11,7 @@ from mocapflow_sequence.background import EmptyScene
 from scipy.spatial.transform import Rotation
 
 from mocapflow.errors import RecordingError
-from mocapflow.geometry.turned import as_seen, homography, shift_px
+from mocapflow.geometry.camera_rotation import homography, shift_px, warped
 from mocapflow.io.plates import toned
 from mocapflow.recordings.first_look import examine_first_frame
 from mocapflow.recordings.recording import open_recording
@@ -209,7 +209,7 @@ def nudged(tmp_path):
     folder = Path(shutil.copytree(DEMO, tmp_path / "recording"))
     camera, file = open_recording(folder).cameras[1], folder / "background" / "cam02.png"
     turn = homography(Rotation.from_euler("xyz", (0.3, 0.2, 0.5), degrees=True).as_matrix(), camera)
-    moved, _ = as_seen(cv2.imread(str(file)), turn)
+    moved, _ = warped(cv2.imread(str(file)), turn)
     cv2.imwrite(str(file), moved)
     return folder, shift_px(np.linalg.inv(turn), camera)
 

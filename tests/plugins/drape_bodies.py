@@ -6,14 +6,14 @@ from functools import cache
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from mocapflow_draping.blowing import blow_batch
+from mocapflow_draping.directions import wind_turns
 from mocapflow_draping.distance import body_distance
 from mocapflow_draping.fields import build_fields
-from mocapflow_draping.frames import blown
 from mocapflow_draping.kinematic import Kinematic
 from mocapflow_draping.parts import posed_parts
 from mocapflow_draping.strands import strands_of
 from mocapflow_draping.swing import fall_batch
+from mocapflow_draping.winds import wind_batch
 from mocapflow_garments.skirt import Skirt
 
 from mocapflow.assets import Body
@@ -173,7 +173,7 @@ def swing(body, roots, facing, count, link, start=90.0, tilts=(0.0,), voxel=VOXE
                parts, values, fallen, lying)  # fmt: skip
     grid, held = np.empty((many, *shape[1:], 3)), np.empty((many, *shape[1:]), np.int32)
     out = np.tile(np.radians(tilts)[:, None], (1, len(roots)))
-    blow_batch(np.zeros(many, np.int32), *blown(facing[[0] * many], out, 0 * out), np.array([SKIN]), links,
+    wind_batch(np.zeros(many, np.int32), *wind_turns(facing[[0] * many], out, 0 * out), np.array([SKIN]), links,
                supported(lying), last, parts, values, fallen, lying, grid, held)  # fmt: skip
     return grid, supported(held)
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 from mocapflow_levelset.evidence import Evidence, gather_planes
-from mocapflow_levelset.evolve import Rhythm, Weights, settle
+from mocapflow_levelset.evolve import Schedule, Weights, settle
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.statistics import Window
 
@@ -38,7 +38,7 @@ def descend(planes, start, prior, steps, shape=0.0, rho=12.0, cell=2, every=1, l
     """Return the level set after some steps with the literal constants of the chapter's specification."""
     weights = Weights(1.5, length, shape, 6.0, 1.0, BAND)
     evidence = from_features(planes, np.ones(start.shape, np.float32))
-    return settle(start, prior, evidence, Window(rho, cell, 0.02), weights, Rhythm(steps, every, 5, to_rest)).level
+    return settle(start, prior, evidence, Window(rho, cell, 0.02), weights, Schedule(steps, every, 5, to_rest)).level
 
 
 def from_features(planes, weight):

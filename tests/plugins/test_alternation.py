@@ -16,7 +16,7 @@ from mocapflow.functional import Functional
 from mocapflow.geometry.kinematics import root_position
 from mocapflow.loop import Steps, settle
 from mocapflow.model import increment_between, moved
-from mocapflow.prediction import believed
+from mocapflow.prediction import initial_state
 from mocapflow.steady import Steady
 from mocapflow.testing import pictures, scenes
 
@@ -39,7 +39,7 @@ def settled():
     cloth = scenes.tiny_cloth(SCENE, START)
     states = []
     result = settle(
-        FRAME, believed(START, cloth.parameters, cloth), Past(), steps, MODEL, lambda *news: states.append(news[2])
+        FRAME, initial_state(START, cloth.parameters, cloth), Past(), steps, MODEL, lambda *news: states.append(news[2])
     )
     return result, states
 
@@ -47,8 +47,8 @@ def settled():
 def test_the_pose_step_lowers_the_area_at_a_fixed_silhouette(settled):
     _, states = settled
     functional = Functional(MODEL, (), Past())
-    before = functional.pull(states[0].segmentation, START, scenes.tiny_cloth(SCENE, START))
-    after = functional.pull(states[0].segmentation, states[0].estimate.pose, states[0].cloth)
+    before = functional.pose_cost(states[0].segmentation, START, scenes.tiny_cloth(SCENE, START))
+    after = functional.pose_cost(states[0].segmentation, states[0].estimate.pose, states[0].cloth)
     assert after < 0.5 * before
 
 
@@ -56,7 +56,7 @@ def test_segmentation_lowers_the_area_at_a_fixed_pose():
     """From silhouettes that are 2 cm off, where the images agree with the model."""
     functional, state = Functional(MODEL, (), Past()), pictures.tiny_state(SCENE, TRUTH, START)
     found = LevelSet().segment(FRAME, state, Past(), SCENE, Turn(index=1))
-    before, after = (functional.pull(each, TRUTH, state.cloth) for each in (state.segmentation, found))
+    before, after = (functional.pose_cost(each, TRUTH, state.cloth) for each in (state.segmentation, found))
     assert after < 0.5 * before
 
 
@@ -78,10 +78,11 @@ def found_from_five_degrees_off(seed, segmenter):
     truth = scenes.tiny_pose(SCENE, seed + 100)
     start = start_near(truth, 5.0, 0.007, seed)
     cloth = scenes.tiny_cloth(SCENE, start)
+    initial = initial_state(start, cloth.parameters, cloth)
     shown, picture = seen(SCENE.surface(truth, scenes.tiny_cloth(SCENE, truth)), SCENE), BLANK
     if not isinstance(segmenter, Given):
-        shown, picture = believed(start, cloth.parameters, cloth).segmentation, pictures.tiny_frame(SCENE, truth, seed)
-    state = replace(believed(start, cloth.parameters, cloth), segmentation=shown)
+        shown, picture = initial.segmentation, pictures.tiny_frame(SCENE, truth, seed)
+    state = replace(initial, segmentation=shown)
     found = settle(picture, state, Past(), steps, MODEL, lambda *_: None).state.estimate.pose
     off = np.abs(increment_between(truth, found))[[0, 1, 2, *range(6, 6 + len(truth.angles))]]
     places = [root_position(SCENE.body, pose.root) for pose in (found, truth)]

@@ -11,7 +11,7 @@ from mocapflow_levelset.plates import Shadow, plate_in
 from mocapflow_levelset.shadows import colourless, floor_around
 from mocapflow_sequence.background import EmptyScene
 from mocapflow_sequence.colours import more_common
-from mocapflow_sequence.commonest import LEAST_SAME, commonest
+from mocapflow_sequence.dominant_colours import LEAST_SAME, dominant_colours
 from mocapflow_sequence.first_frame import empty_scene
 
 from mocapflow.assets import Background
@@ -129,7 +129,7 @@ def test_the_commonest_colour_sees_through_someone_who_walks_by():
     for k in range(15):
         shown[k, 40:180, 15 * k : 15 * k + 40] = (30, 30, 200)
     shown = np.clip(shown + rng.normal(0, 3, shown.shape), 0, 255).astype(np.uint8)
-    mean, spread, share = commonest(shown, 2)[0]
+    mean, spread, share = dominant_colours(shown, 2)[0]
     assert np.abs(mean - room()).mean() < 1.5
     assert np.abs(mean - room()).max() < 8
     assert 2 < np.median(spread) < 5
@@ -141,7 +141,7 @@ def test_colours_are_those_that_most_pictures_agree_about():
     rng = np.random.default_rng(1)
     shown = np.zeros((12, 40, 40, 3), np.uint8)  # most of it stands still, so there is no noise
     shown[:, :9, :8] = rng.choice(np.array([20, 90, 97, 200], np.uint8), (12, 9, 8, 1))
-    first, second = commonest(shown, 2)
+    first, second = dominant_colours(shown, 2)
     for y, x in np.ndindex(9, 8):
         values = shown[:, y, x, 0].astype(int)
         alike = np.abs(values[:, None] - values) <= LEAST_SAME
@@ -229,7 +229,7 @@ def test_who_steps_aside_later_was_before_the_room():
 
 
 def test_who_comes_to_stand_elsewhere_is_not_the_room_there():
-    """The commonest colour there is the person's; the first frame shows the room."""
+    """The most common colour there is the person's; the first frame shows the room."""
     known, off, mask = learnt([0] + [80] * 20)
     there = np.roll(mask, 80, axis=1)
     assert known[there].mean() > 0.97
@@ -287,8 +287,8 @@ def test_as_many_pictures_as_stated_from_all_over_the_recording(tmp_path, monkey
     write_recording(tmp_path, frames=length, cameras=ring(names=("cam01",)))
     seen = []
     monkeypatch.setattr(
-        "mocapflow_sequence.background.commonest",
-        lambda pictures, count: seen.extend(pictures) or commonest(pictures, count),
+        "mocapflow_sequence.background.dominant_colours",
+        lambda pictures, count: seen.extend(pictures) or dominant_colours(pictures, count),
     )
     EmptyScene(samples=25).run(open_recording(tmp_path, stop=3), scenes.tiny_scene(cameras=1))
     numbers = [number_of(picture) for picture in seen]

@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 import pytest
-from mocapflow_robustness import pixels
+from mocapflow_robustness import disturbances
 from mocapflow_robustness.bilateral import Bilateral, mean_clipped, noise_of, roughness, unclipped
 
 SHAPE = (192, 256)
@@ -18,7 +18,7 @@ def scene():
 
 
 def noisy(share):
-    return pixels.noisy(scene(), share, "added", np.random.default_rng(0))
+    return disturbances.noisy(scene(), share, "added", np.random.default_rng(0))
 
 
 @pytest.mark.parametrize(("share", "exact"), [(0.1, 0.03), (0.3, 0.02), (0.6, 0.12)])  # much is cut off

@@ -47,7 +47,7 @@ def masks_of(body, poses, garment=None):
         def segment(self, frame, state, past, scene, turn):
             model = ClothedModel(scene=Scene(cameras=scene.cameras, body=body, garment=garment), draper=Kinematic())
             pose = poses[frame.index]
-            surface = model.surface(pose, model.drape(pose, model.scene.calm, past))
+            surface = model.surface(pose, model.drape(pose, model.scene.neutral_parameters, past))
             distances = [model_distance(surface, camera, 12.0) for camera in scene.cameras]
             return Segmentation(
                 silhouettes=tuple(Silhouette(camera=c, layer="person", distance=d) for c, d in enumerate(distances))
@@ -112,7 +112,7 @@ def test_clothes_are_laid_on_every_pose_that_is_tried(body, poses, tmp_path):
     )  # fmt: skip
     wrong = Scene(cameras=cameras, body=scaled(body, WRONG), garment=garment)
     root, angles = np.stack([p.root for p in start]), np.stack([p.angles for p in start])
-    track = replace(make_track(root, angles), cloth_parameters=np.tile(wrong.calm, (3, 1)))
+    track = replace(make_track(root, angles), cloth_parameters=np.tile(wrong.neutral_parameters, (3, 1)))
     fitted = stage.run(open_recording(folder), wrong, None, track)
     for ends in (("hip_l", "knee_l"), ("knee_r", "ankle_r")):
         assert abs(length(fitted, *ends) - length(body, *ends)) < 0.006  # m: half a pixel, half of what was wrong

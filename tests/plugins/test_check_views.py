@@ -9,8 +9,8 @@ import pytest
 from mocapflow_robustness import check_views
 from mocapflow_robustness.check_views import CheckViews
 from mocapflow_robustness.corrupt import Corrupt
-from mocapflow_robustness.doubts import blank, bridged, bursts
 from mocapflow_robustness.events import Event
+from mocapflow_robustness.picture_checks import blank, bursts, interpolated
 from mocapflow_robustness.thumbnails import thumbnails
 
 from mocapflow.data import Frame
@@ -90,7 +90,7 @@ def test_several_things_at_once(clip):
 def test_a_reason_ends_where_the_name_of_its_camera_does(clip):
     recording = Corrupt(events=(Event(what="other_camera", first=40, views=("cam03",)),)).run(open_recording(clip))
     names = ["the camera behind the door on the left side", "b", "c"]
-    said = check_views.doubted(thumbnails(recording), check_views.rooms(thumbnails(recording), None), 30.0, names)
+    said = check_views.faults(thumbnails(recording), check_views.rooms(thumbnails(recording), None), 30.0, names)
     assert said[45, 2] == f"the picture looks like one of {names[0]}"
 
 
@@ -117,10 +117,10 @@ def test_a_view_that_hangs_for_good(clip, first):
 def test_what_a_codec_draws_anew_is_no_news_of_a_view_that_hangs(clip):
     hung = Corrupt(events=(Event(what="frozen", first=25, views=("cam02",)),)).run(open_recording(clip))
     seen = thumbnails(hung)
-    news = seen.news.copy()
-    news[40, 1] = news[40, 0]
-    seen = replace(seen, news=news)
-    said = check_views.doubted(seen, check_views.rooms(seen, None), 30.0, ["cam01", "cam02", "cam03"])
+    change = seen.change.copy()
+    change[40, 1] = change[40, 0]
+    seen = replace(seen, change=change)
+    said = check_views.faults(seen, check_views.rooms(seen, None), 30.0, ["cam01", "cam02", "cam03"])
     assert np.argwhere(said != "").tolist() == [[row, 1] for row in range(25, FRAMES)]
 
 
@@ -201,7 +201,7 @@ def test_bad_thumbnails_are_interpolated():
     grey = drifting(0, 6, 0)
     spoiled, good = grey.copy(), np.ones((6, 1), bool)
     spoiled[2:4], good[2:4] = 0, False
-    np.testing.assert_allclose(bridged(spoiled, good), grey, rtol=1e-6)
+    np.testing.assert_allclose(interpolated(spoiled, good), grey, rtol=1e-6)
 
 
 def test_a_frame_passes_without_its_wrong_views():

@@ -257,7 +257,7 @@ def test_samples_cover_every_force(model):
     ]  # fmt: skip
     values = samples.in_all_directions(2, 8, np.radians([5.0, 10.0, 20.0]))
     assert values.shape == (25, 2)
-    beside = samples.beside(garment, parameters(model), [2, 3], 0.1)
+    beside = samples.neighbours(garment, parameters(model), [2, 3], 0.1)
     np.testing.assert_array_equal(beside[:, 2:4], 0.1 * np.array([[1, 0], [0, 1], [-1, 0], [0, -1]]))
     assert (np.delete(beside, [2, 3], axis=1) == 0).all()
 

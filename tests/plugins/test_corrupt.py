@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mocapflow_robustness import pixels
+from mocapflow_robustness import disturbances
 from mocapflow_robustness.corrupt import Corrupt
 from mocapflow_robustness.events import Event
-from mocapflow_robustness.hiding import together
+from mocapflow_robustness.occlusion import union
 
 from mocapflow.errors import RecordingError
 from mocapflow.recordings.recording import open_recording
@@ -53,20 +53,20 @@ def test_nothing_is_changed_by_default(clip):
 
 def test_noise_replaces_or_moves_values():
     rng, grey = np.random.default_rng(0), np.full((200, 200, 3), 128, np.uint8)
-    replaced = (pixels.noisy(grey, 0.6, "replaced", rng) != 128).any(axis=2)
+    replaced = (disturbances.noisy(grey, 0.6, "replaced", rng) != 128).any(axis=2)
     assert replaced.mean() == pytest.approx(0.6, abs=0.01)
     neighbours = np.corrcoef(replaced[:, 1:].ravel(), replaced[:, :-1].ravel())[0, 1]
     assert abs(neighbours) < 0.02
-    added = pixels.noisy(grey, 0.2, "added", rng).astype(int) - 128
+    added = disturbances.noisy(grey, 0.2, "added", rng).astype(int) - 128
     assert np.abs(added).max() == 51
     assert added.std() == pytest.approx(51 / np.sqrt(3), rel=0.02)
 
 
 def test_rectangles_and_stripe():
     white, rng = np.full((100, 200, 3), 255, np.uint8), np.random.default_rng(1)
-    behind = (pixels.with_rectangles(white, (3, 8), rng) != 255).any(axis=2).mean()
+    behind = (disturbances.with_rectangles(white, (3, 8), rng) != 255).any(axis=2).mean()
     assert 3 * 0.05**2 < behind < 8 * 0.25**2
-    rows = np.flatnonzero((pixels.with_stripe(white, 0.1, 0.5) == 0).all(axis=(1, 2)))
+    rows = np.flatnonzero((disturbances.with_stripe(white, 0.1, 0.5) == 0).all(axis=(1, 2)))
     assert rows.tolist() == list(range(45, 55))
 
 
@@ -81,7 +81,7 @@ def test_rectangles_are_as_many_and_as_large_as_asked():
     white, rng = np.full((100, 200, 3), 255, np.uint8), np.random.default_rng(3)
     sides = []
     for _ in range(60):
-        behind = (pixels.with_rectangles(white, (1, 1), rng) != 255).any(axis=2)
+        behind = (disturbances.with_rectangles(white, (1, 1), rng) != 255).any(axis=2)
         rows, columns = behind.any(axis=1), behind.any(axis=0)
         np.testing.assert_array_equal(behind, np.outer(rows, columns))
         sides.append([rows.mean(), columns.mean()])
@@ -140,8 +140,8 @@ def test_a_covered_picture_stays_hidden_where_it_was(clip):
     assert (twice.frame(5).hidden_in(0) == once.frame(5).hidden_in(0)).all()
     rows = [np.zeros((4, 2), bool) for _ in range(2)]
     rows[0][1], rows[1][2] = True, True
-    assert together(rows[:1], rows[1:])[0][:, 0].tolist() == [False, True, True, False]
-    assert together((), rows) == tuple(rows) == together(rows, ()) and together((), ()) == ()
+    assert union(rows[:1], rows[1:])[0][:, 0].tolist() == [False, True, True, False]
+    assert union((), rows) == tuple(rows) == union(rows, ()) and union((), ()) == ()
 
 
 def test_a_camera_that_is_not_there_is_named_by_a_plan_too(clip):

@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 import pytest
-from mocapflow_robustness import pixels
+from mocapflow_robustness import disturbances
 from mocapflow_robustness.denoise import CHANCE, Denoise, filled, flat, in_company, least_side, noise_share
 
 SHAPE = (96, 128)
@@ -26,7 +26,7 @@ def off(one, other):
 @pytest.mark.parametrize("share", [0.1, 0.3, 0.6])
 def test_noise_goes_and_thin_things_stay(share):
     clean = scene()
-    noisy = pixels.noisy(clean, share, "replaced", np.random.default_rng(0))
+    noisy = disturbances.noisy(clean, share, "replaced", np.random.default_rng(0))
     image, hidden = Denoise().restore(noisy)
     assert off(noisy, clean).mean() > 0.9 * share
     assert off(image, clean).mean() < 0.05  # edges, mostly
@@ -38,7 +38,7 @@ def test_noise_goes_and_thin_things_stay(share):
 
 def test_most_intact_pixels_are_known_and_random_ones_are_not():
     clean = scene()
-    noisy = pixels.noisy(clean, 0.6, "replaced", np.random.default_rng(0))
+    noisy = disturbances.noisy(clean, 0.6, "replaced", np.random.default_rng(0))
     kept, replaced = in_company(noisy, 2, 16, 2), off(noisy, clean)
     assert kept[~replaced].mean() > 0.97
     assert kept[replaced].mean() < 0.03
@@ -46,7 +46,7 @@ def test_most_intact_pixels_are_known_and_random_ones_are_not():
 
 
 def test_what_noise_does_not_reach_is_hidden():
-    noisy = pixels.noisy(scene(), 0.6, "replaced", np.random.default_rng(0))
+    noisy = disturbances.noisy(scene(), 0.6, "replaced", np.random.default_rng(0))
     noisy[20:44, 30:60] = 77
     noisy[60:70] = 0
     _, hidden = Denoise().restore(noisy)
@@ -60,7 +60,7 @@ def test_what_has_one_colour_under_the_noise_is_hidden():
     covered[20:44, 30:60] = 77  # over the limb
     covered[60:74] = 0
     painted[20:44, 30:60] = painted[60:74] = True
-    _, hidden = Denoise().restore(pixels.noisy(covered, 0.6, "replaced", np.random.default_rng(0)))
+    _, hidden = Denoise().restore(disturbances.noisy(covered, 0.6, "replaced", np.random.default_rng(0)))
     assert hidden[painted].mean() > 0.95
     assert not hidden[~cv2.dilate(painted.astype(np.uint8), np.ones((5, 5), np.uint8)).astype(bool)].any()
 

@@ -16,8 +16,8 @@ from drape_bodies import (
     swing,
 )
 from mocapflow_draping import kinematic
+from mocapflow_draping.directions import tilted
 from mocapflow_draping.forces import thickness, tilts
-from mocapflow_draping.frames import tilted
 from mocapflow_draping.literal import blow_in_steps
 
 from mocapflow.assets import Camera
@@ -152,8 +152,8 @@ def test_wind_turns_with_the_person():
 
 def test_25_winds_share_one_drape(draper, monkeypatch):  # what they cost: benchmarks/draping.py
     scene = skirted()
-    laid = Mock(side_effect=kinematic.lay)
-    monkeypatch.setattr(kinematic, "lay", laid)
+    laid = Mock(side_effect=kinematic.drape_strands)
+    monkeypatch.setattr(kinematic, "drape_strands", laid)
     poses, winds = leg_poses(), np.zeros((35, len(scene.garment.parameter_names)))
     winds[:, 2:4] = np.random.default_rng(0).uniform(-0.3, 0.3, (35, 2))
     rows = np.repeat([0, 3], [25, 10])  # and ten of another pose

@@ -43,8 +43,8 @@ def around(scene, draped):
     """Return the length (B, L) of what goes round the left thigh in each row, over that of its cloth."""
     strands = strands_of(scene.garment, scene.body)
     grid, row = draped[:, strands.vertex], np.arange(strands.vertex.shape[1])
-    linked = (strands.beside >= 0) & (strands.rest[..., 0] > 0)
-    links = np.linalg.norm(grid - grid[:, strands.beside, row], axis=-1)
+    linked = (strands.left >= 0) & (strands.rest[..., 0] > 0)
+    links = np.linalg.norm(grid - grid[:, strands.left, row], axis=-1)
     return (links * linked).sum(axis=1) / (strands.ring_length * linked).sum(axis=0)
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from drape_bodies import EYE, SKIN, SKIRT, leg_poses, legs, lying_cylinder, prepared
-from mocapflow_draping.following import FASTEST, Motion
+from mocapflow_draping.collisions import CLEAR, lift
+from mocapflow_draping.drape_rates import FASTEST, Motion
 from mocapflow_draping.kinematic import Kinematic
-from mocapflow_draping.pushes import CLEAR, lift
 from mocapflow_garments.cylinder import Cylinder
 from mocapflow_garments.skirt import Skirt
 

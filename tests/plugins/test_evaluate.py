@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from mocapflow_evaluation import compare, comparison_plots
 from mocapflow_evaluation.evaluate import Evaluate, evaluate, evaluate_run
-from mocapflow_evaluation.ours import Ours, of_folder, of_track
 from mocapflow_evaluation.references import read_reference
 from mocapflow_evaluation.stick import Stick, constant
+from mocapflow_evaluation.tracked_motion import TrackedMotion, of_folder, of_track
 from mocapflow_export import layout, tables
 from mocapflow_export.export import Export
 from results_scene import DEMO, demo_scene, stepping
@@ -143,9 +143,11 @@ def test_coverage_counts_our_own_intervals() -> None:
     assert row(3 * error, truth)["coverage_90"] < 0.6
 
 
-def columns_only(columns: dict[str, np.ndarray]) -> Ours:
+def columns_only(columns: dict[str, np.ndarray]) -> TrackedMotion:
     """Return our side as it is in a run folder that has nothing but angles."""
-    return Ours(columns=columns, raw=columns, stick=Stick(names=(), places=np.empty((len(columns["frame"]), 0, 3))))
+    return TrackedMotion(
+        columns=columns, raw=columns, stick=Stick(names=(), places=np.empty((len(columns["frame"]), 0, 3)))
+    )
 
 
 @pytest.mark.usefixtures("unrendered")
@@ -167,7 +169,7 @@ def test_our_unsmoothed_curve_is_filtered_as_references_are(tmp_path: Path) -> N
         tables.write_columns(tmp_path / "t.csv", clock | {"knee_flexion_l": truth})
         nothing = Stick(names=(), places=np.empty((count, 0, 3)))
         smoothed, raw = clock | {"knee_flexion_l": truth}, clock | {"knee_flexion_l": ours}
-        (got,) = evaluate(Ours(columns=smoothed, raw=raw, stick=nothing), tmp_path / "t.csv", tmp_path).rows
+        (got,) = evaluate(TrackedMotion(columns=smoothed, raw=raw, stick=nothing), tmp_path / "t.csv", tmp_path).rows
         assert got["rms_lowpassed_deg"] == pytest.approx(wanted, rel=0.02, nan_ok=True)
         assert got["rms_deg"] < 1e-3 and got["rms_unsmoothed_deg"] > 3
 

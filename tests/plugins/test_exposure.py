@@ -5,9 +5,9 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from mocapflow_robustness.brightness import block_means, relative_gain
 from mocapflow_robustness.corrupt import Corrupt
 from mocapflow_robustness.exposure import STEP, Exposure
-from mocapflow_robustness.steadying import brighter, small
 
 from mocapflow.errors import PipelineError
 from mocapflow.help.shipped import shipped
@@ -152,7 +152,7 @@ def test_how_much_brighter_is_told_by_most_of_a_room(noise):
     rng = np.random.default_rng(1)
     room, dim = (each.repeat(8, axis=0).repeat(8, axis=1) for each in (SHADE, dim))
     noisy = (times(each + rng.normal(0, noise, each.shape), 1) for each in (dim, room))
-    np.testing.assert_allclose(brighter(*map(small, noisy)), [0.7, 0.8, 0.9], atol=0.01)
+    np.testing.assert_allclose(relative_gain(*map(block_means, noisy)), [0.7, 0.8, 0.9], atol=0.01)
 
 
 def test_how_much_brighter_is_told_where_light_changes_across_a_room():
@@ -160,7 +160,7 @@ def test_how_much_brighter_is_told_where_light_changes_across_a_room():
     light = np.exp(-0.3 + 0.25 * x - 0.1 * x * y + 0.1 * y**2)[..., None] * [1, 0.95, 0.9]
     dim = SHADE * light
     dim[10:35, 5:15] = (20, 200, 40)  # somebody
-    found = brighter(times(dim, 1), times(SHADE, 1))
+    found = relative_gain(times(dim, 1), times(SHADE, 1))
     assert found.shape == light.shape
     np.testing.assert_allclose(found, light, rtol=0.02)
 
@@ -169,16 +169,16 @@ def test_light_that_changes_across_a_room_is_not_guessed_to_change_more_where_it
     light = np.exp(0.4 * np.linspace(-1, 1, 40))[None, :, None] * np.ones((50, 1, 3))
     room, dark = SHADE.copy(), slice(None, 12)
     room[:, dark] = 10
-    found = brighter(times(room * light, 1), times(room, 1))
+    found = relative_gain(times(room * light, 1), times(room, 1))
     np.testing.assert_allclose(found[:, 12:], light[:, 12:], rtol=0.02)
     assert found[:, dark].min() >= light[:, 12:].min() * 0.98
 
 
 def test_how_much_brighter_nobody_can_tell_of_another_room_or_a_black_one():
     room = times(SHADE, 1)
-    assert brighter(room[::-1], room) is None
-    assert brighter(times(room, 0.1), room) is None
-    assert brighter(room * np.uint8(0), room * np.uint8(0)) is None
+    assert relative_gain(room[::-1], room) is None
+    assert relative_gain(times(room, 0.1), room) is None
+    assert relative_gain(room * np.uint8(0), room * np.uint8(0)) is None
 
 
 @pytest.mark.parametrize(

@@ -124,15 +124,15 @@ def test_normals_count_as_a_distance():
     normals = np.array([[0.0, 1.0], [1.0, 0.0]])
     for weight, found in ((0.0, 0), (3.0, 1)):
         matcher = ContourIcp(normal_px=weight)
-        one = matcher.described(point, normal, np.zeros(1))
-        other = matcher.described(others, normals, np.zeros(2))
+        one = matcher.descriptors(point, normal, np.zeros(1))
+        other = matcher.descriptors(others, normals, np.zeros(2))
         assert nearest_compatible(one, normal, other, normals, 10.0, -1.0)[0] == found
 
 
 def test_curvature_counts_as_a_distance():
     matcher, normal = FourierIcp(curvature_px2=10.0), np.array([[1.0, 0.0]])
-    one = matcher.described(np.zeros((1, 2)), normal, np.array([0.1]))
-    other = matcher.described(np.array([[0.0, 1.0], [0.0, 2.0]]), np.repeat(normal, 2, axis=0), np.array([-0.3, 0.1]))
+    one = matcher.descriptors(np.zeros((1, 2)), normal, np.array([0.1]))
+    other = matcher.descriptors(np.array([[0.0, 1.0], [0.0, 2.0]]), np.repeat(normal, 2, axis=0), np.array([-0.3, 0.1]))
     assert nearest_compatible(one, normal, other, np.repeat(normal, 2, axis=0), 10.0, -1.0)[0] == 1
 
 

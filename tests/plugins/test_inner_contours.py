@@ -10,9 +10,9 @@ import pytest
 from matching_scenes import FIRST
 from mocapflow_levelset import splits
 from mocapflow_levelset.colours import BINS, bins_of
-from mocapflow_levelset.inner import inner_contours, told_apart
+from mocapflow_levelset.inner import findable_edges, inner_contours
 from mocapflow_levelset.inner_edges import inner_edges
-from mocapflow_levelset.layers import COLOURS, layer_of, shown
+from mocapflow_levelset.layers import COLOURS, colour_model, layer_of
 from mocapflow_matching.inner_contours import InnerContours, slipped
 from mocapflow_matching.layered_icp import LayeredIcp, of_another_layer
 from test_layers import CLOTHS, SCENE, SKIN, dressed, learned, painted
@@ -100,8 +100,8 @@ def match(colour_of, believed, true=None, slipped_m=0.0):
     frame, surface = painted(colour_of, pose, lower_m=slipped_m), surface_at(believed)
     past = Past(appearance={COLOURS: learned(frame, pose=pose)})
     segmentation = tiny_segmentation(SCENE, pose)
-    layers, known = layer_of(SCENE), shown(past)
-    told = told_apart(SCENE, layers, known)
+    layers, known = layer_of(SCENE), colour_model(past)
+    told = findable_edges(SCENE, layers, known)
     parts = [
         inner_contours(image, silhouette, surface, camera, layers, told, known, 24)
         for image, silhouette, camera in zip(frame.images, segmentation.silhouettes, SCENE.cameras, strict=True)
@@ -237,7 +237,7 @@ def test_contours_of_another_part_s_colours_make_no_pair():
     )
     assert (right.weight > 0).mean() > 0.95
     assert (wrong.weight > 0).mean() < 0.2
-    assert of_another_layer(right, swapped, shown(past), layer_of(SCENE), 2.0).mean() > 0.8
+    assert of_another_layer(right, swapped, colour_model(past), layer_of(SCENE), 2.0).mean() > 0.8
 
 
 def test_whose_colours_they_are_needs_the_direction_of_a_contour():

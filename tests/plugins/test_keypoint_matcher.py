@@ -18,7 +18,7 @@ from mocapflow.geometry import kinematics
 from mocapflow.geometry.cameras import centre, project
 from mocapflow.io.cameras import read_cameras
 from mocapflow.model import ClothedModel, moved
-from mocapflow.prediction import believed
+from mocapflow.prediction import initial_state
 from mocapflow.scene import Scene
 
 BODY = Scanned().load(DEMO)
@@ -86,7 +86,7 @@ def test_the_pose_is_found_from_keypoints_alone():
     frame, model = frame_of(POSE, noise_px=0.3), ClothedModel(scene=SCENE)
     pose = start
     for index in range(3):
-        state, turn = believed(pose, np.empty(0), NO_CLOTH), Turn(index=index)
+        state, turn = initial_state(pose, np.empty(0), NO_CLOTH), Turn(index=index)
         again = partial(Keypoints().match, frame, NOTHING, past=Past(), scene=SCENE, turn=turn)
         pose = TwistGaussNewton().solve(again, state, model, (), Past(), turn).pose
     places = landmarks(BODY).body

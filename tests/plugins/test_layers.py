@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mocapflow_levelset.colours import BINS, bins_of
 from mocapflow_levelset.layered import Layered
-from mocapflow_levelset.layers import COLOURS, garment_told, gathered, layer_of, shown
+from mocapflow_levelset.layers import COLOURS, colour_model, garment_log_ratio, layer_histograms, layer_of
 
 from mocapflow.data import BODY, CLOTH, Frame, Past, Turn
 from mocapflow.geometry.visibility import front_vertices
@@ -38,7 +38,7 @@ def dressed(layer):
 
 def learned(frame, past=None, keep=0.9, pose=POSE):
     surface = SCENE.surface(pose, tiny_cloth(SCENE, pose))
-    return gathered(frame, tiny_segmentation(SCENE, pose).silhouettes, surface, SCENE, past or Past(), keep, 3)
+    return layer_histograms(frame, tiny_segmentation(SCENE, pose).silhouettes, surface, SCENE, past or Past(), keep, 3)
 
 
 def test_sides_share_a_layer_and_cloth_is_the_last():
@@ -60,29 +60,29 @@ def test_a_layer_has_the_colours_that_it_is_drawn_on():
 def test_what_is_apart_is_told_and_what_is_alike_is_not():
     layers = layer_of(SCENE)
     knee = layers[np.linalg.norm(SCENE.body.vertices - [0.1, 0, 0.3], axis=1).argmin()]
-    told = shown(Past(appearance={COLOURS: learned(painted(dressed))}))
+    told = colour_model(Past(appearance={COLOURS: learned(painted(dressed))}))
     skin, cloth = (int(bins_of(np.array(colour, np.uint8))) for colour in (SKIN, CLOTHS))
-    assert told.apart[knee, layers.max()] and told.apart[layers.max(), knee]
+    assert told.distinct[knee, layers.max()] and told.distinct[layers.max(), knee]
     assert told.ratio[knee, skin] > 2 and told.ratio[knee, cloth] < -2
-    assert not told.apart[:-1, :-1].any()  # all skin
-    same = shown(Past(appearance={COLOURS: learned(painted(lambda layer: SKIN))}))
-    assert not same.apart.any() and not same.ratio.any()
+    assert not told.distinct[:-1, :-1].any()  # all skin
+    same = colour_model(Past(appearance={COLOURS: learned(painted(lambda layer: SKIN))}))
+    assert not same.distinct.any() and not same.ratio.any()
 
 
 def test_the_garment_is_told_from_every_part_outside_of_it_or_not_at_all():
     skin, cloth = (int(bins_of(np.array(colour, np.uint8))) for colour in (SKIN, CLOTHS))
-    told = garment_told(Past(appearance={COLOURS: learned(painted(dressed))}), SCENE)
+    told = garment_log_ratio(Past(appearance={COLOURS: learned(painted(dressed))}), SCENE)
     assert told[cloth] > 2 and told[skin] < -2
     socks = layer_of(SCENE)[SCENE.body.vertices[:, 2].argmin()]  # of the garment's colour
     alike = painted(lambda layer: CLOTHS if layer == socks else dressed(layer))
-    told = garment_told(Past(appearance={COLOURS: learned(alike)}), SCENE)
+    told = garment_log_ratio(Past(appearance={COLOURS: learned(alike)}), SCENE)
     assert told[cloth] < 0.5
-    assert garment_told(Past(), SCENE) is None
+    assert garment_log_ratio(Past(), SCENE) is None
 
 
 def test_a_garment_that_leaves_no_part_outside_is_not_told(monkeypatch):
     monkeypatch.setitem(vars(SCENE), "near_garment", np.ones(len(SCENE.body.vertices), bool))
-    assert garment_told(Past(appearance={COLOURS: learned(painted(dressed))}), SCENE) is None
+    assert garment_log_ratio(Past(appearance={COLOURS: learned(painted(dressed))}), SCENE) is None
 
 
 def test_old_colours_are_forgotten():

@@ -3,7 +3,7 @@
 import numpy as np
 from mocapflow_levelset.channels import features
 from mocapflow_levelset.contact import NEAR_M, contact_zone
-from mocapflow_levelset.evolve import Rhythm
+from mocapflow_levelset.evolve import Schedule
 from mocapflow_levelset.levelset import LevelSet
 from mocapflow_levelset.plates import Shadow
 from mocapflow_levelset.redistance import redistance
@@ -38,7 +38,7 @@ def sole(steps):
     model = np.roll(true, -2, axis=0)
     row, column = np.mgrid[:SIZE, :SIZE]
     zone = (np.abs(row - EDGE) < 8) & (np.abs(column - 80) < 24)
-    contact = Contact(zone, Rhythm(steps, 4, 4), Window(12.0, 8, 0.03)) if steps else None
+    contact = Contact(zone, Schedule(steps, 4, 4), Window(12.0, 8, 0.03)) if steps else None
     segmenter = LevelSet(use_background=False, shape_weight=0.01)
     view = View(image=image, start=model, prior=model, counted=np.ones(model.shape, bool), contact=contact)
     level = find(view, segmenter._levels(warm=False), segmenter._method(Shadow())).level

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 from matching_scenes import CALM, FIRST, FRAME, knee_error_deg, seen
-from mocapflow_matching.carried import carried_points
 from mocapflow_matching.contour_icp import ContourIcp
+from mocapflow_matching.flow_points import flow_points
 from mocapflow_matching.optical_flow import OpticalFlow
 from mocapflow_matching.shape_flow import _relax, register
 from mocapflow_priors.constant_velocity import ConstantVelocity
@@ -190,7 +190,7 @@ def test_pairs_from_flow_lie_on_the_surface_of_the_frame_before():
     before = tiny_pose(SCENE)
     after = moved(before, step(1, 0.05))
     frame, past = textured(SCENE, before, after), tiny_past(SCENE, before)
-    matches = carried_points(frame, past, SCENE)
+    matches = flow_points(frame, past, SCENE)
     images = [project(SCENE.surface(after, NO_CLOTH).vertices, camera) for camera in SCENE.cameras]
     away = np.linalg.norm(np.array(images)[matches.camera, matches.vertex] - matches.pixel, axis=1)
     assert len(away) > 200
@@ -201,14 +201,14 @@ def test_a_lost_view_is_not_used():
     before = tiny_pose(SCENE)
     frame = textured(SCENE, before, before)
     lost = Frame(index=5, time=1 / 6, images=frame.images, usable=np.array([True, False, True, True]), flow=frame.flow)
-    assert 1 not in carried_points(lost, tiny_past(SCENE, before), SCENE).camera
+    assert 1 not in flow_points(lost, tiny_past(SCENE, before), SCENE).camera
 
 
 def test_a_pose_that_nobody_saw_carries_nothing():
     before = tiny_pose(SCENE)
     past = tiny_past(SCENE, before)
     unseen = replace(past.moments[-1], observed=np.zeros(len(before.angles)))
-    assert not len(carried_points(textured(SCENE, before, before), Past(moments=(unseen,)), SCENE).camera)
+    assert not len(flow_points(textured(SCENE, before, before), Past(moments=(unseen,)), SCENE).camera)
 
 
 def test_points_on_cloth_count_less():

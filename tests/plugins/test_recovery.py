@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from mocapflow_levelset.colours import BINS
 from mocapflow_priors.density import Density, write
-from mocapflow_recovery.certain import shrunk, small_room, views
-from mocapflow_recovery.disagreement import FLIES, HANGS, distance, floating_area, uncovered_areas
-from mocapflow_recovery.judge import Fit, Given, Stray, stray_of
-from mocapflow_recovery.leaps import eased, leaping
+from mocapflow_recovery.disagreement import FLYING, HANGING, chamfer_distance, floating_area, uncovered_areas
+from mocapflow_recovery.leaps import leaping, without_overbent
 from mocapflow_recovery.limb_search import LimbSearch
-from mocapflow_recovery.looks import Looks, turned_round
 from mocapflow_recovery.sampling import Plan, Spread, parts, put_back, samples, search, seen_samples, without_idle_parts
-from mocapflow_recovery.suspicion import Suspicion
-from mocapflow_recovery.vain import VAIN
+from mocapflow_recovery.scoring import Fit, Mismatch, StartPose, mismatch_of
+from mocapflow_recovery.search_history import HISTORY
+from mocapflow_recovery.search_triggers import Trigger
+from mocapflow_recovery.searches import Searches, half_turn
+from mocapflow_recovery.trimaps import shrunk, small_room, trimaps
 
 from mocapflow.data import NO_CLOTH, Frame, Past, Pose
 from mocapflow.geometry.cameras import project
@@ -61,11 +61,11 @@ def surface(pose: Pose):
 
 
 def seen(frame=FRAME):
-    return views(frame, surface(POSE), ROOM, 0.35)
+    return trimaps(frame, surface(POSE), ROOM, 0.35)
 
 
-def apart(pose: Pose, looked, cloth=HANGS) -> float:
-    return distance(surface(pose), surface(pose), looked, 0.2, cloth)
+def apart(pose: Pose, looked, cloth=HANGING) -> float:
+    return chamfer_distance(surface(pose), surface(pose), looked, 0.2, cloth)
 
 
 def test_a_small_camera_sees_the_same() -> None:
@@ -81,7 +81,7 @@ def test_person_and_room_are_certain_where_the_truth_says_so() -> None:
         whole, part = quarters.all(axis=(1, 3)), quarters.any(axis=(1, 3))
         assert np.mean(part[view.person]) > 0.98
         assert np.mean(view.person[whole]) > 0.95
-        assert np.mean(view.away[~part] > 0) > 0.9
+        assert np.mean(view.distance[~part] > 0) > 0.9
 
 
 def test_a_shadow_is_neither() -> None:
@@ -93,7 +93,7 @@ def test_a_shadow_is_neither() -> None:
     part = spot[::2, ::2]
     for before, after, _ in zip(lit, dim, SCENE.cameras, strict=True):
         assert np.mean(after.person[part]) < 0.05  # not the person
-        assert np.mean(after.away[part] == 0) > np.mean(before.away[part] == 0) + 0.5  # nor surely the room
+        assert np.mean(after.distance[part] == 0) > np.mean(before.distance[part] == 0) + 0.5  # nor surely the room
 
 
 def test_where_nobody_knows_the_room_it_is_neither() -> None:
@@ -102,9 +102,9 @@ def test_where_nobody_knows_the_room_it_is_neither() -> None:
     for part in spread:
         part[:, :160] = np.inf
     room = small_room(replace(background, spread=spread), SCENE.cameras, 120)
-    for view, _ in zip(views(FRAME, surface(POSE), room, 0.35), SCENE.cameras, strict=True):
+    for view, _ in zip(trimaps(FRAME, surface(POSE), room, 0.35), SCENE.cameras, strict=True):
         assert not view.person[:, :80].any()
-        assert not view.away[:, :80].any()
+        assert not view.distance[:, :80].any()
         assert view.person[:, 80:].any()
 
 
@@ -112,7 +112,7 @@ def test_a_room_shrunk_by_more_than_it_is_wide_then_is_compared() -> None:
     """An image 320 wide is 11 wide if shrunk by 27, but 11 goes 29 times into 320."""
     room = small_room(SCENE.background, SCENE.cameras, 9)
     assert room.factors == (27,) * len(SCENE.cameras)
-    for view, _ in zip(views(FRAME, surface(POSE), room, 0.35), SCENE.cameras, strict=True):
+    for view, _ in zip(trimaps(FRAME, surface(POSE), room, 0.35), SCENE.cameras, strict=True):
         assert view.person.shape == tuple(view.camera.size[::-1])
 
 
@@ -122,7 +122,7 @@ def test_what_hides_the_person_is_neither() -> None:
     images = tuple(np.where(bar[..., None], np.uint8(0), image) for image in FRAME.images)
     for view, _ in zip(seen(replace(FRAME, images=images, hidden=(bar,) * len(images))), SCENE.cameras, strict=True):
         assert not view.person[50:65].any()
-        assert not view.away[50:65].any()
+        assert not view.distance[50:65].any()
 
 
 def test_somebody_far_away_is_not_the_person() -> None:
@@ -147,7 +147,7 @@ def test_a_leg_astray_counts_by_its_area_and_by_its_way(angle) -> None:
 
 @pytest.mark.parametrize(("told", "lost"), [(4.0, False), (-4.0, True)], ids=["the garment's", "a limb's"])
 def test_what_shows_the_colours_of_the_garment_is_told_from_a_limb(told, lost) -> None:
-    looked = views(FRAME, surface(POSE), ROOM, 0.35, np.full(BINS, told))
+    looked = trimaps(FRAME, surface(POSE), ROOM, 0.35, np.full(BINS, told))
     (skin, cloth), (near, _) = uncovered_areas(surface(astray(0.8)), looked, [0.06, 0.03], 0.2)
     assert near > skin if lost else near == 0
     assert (skin > 150e-4 and cloth == 0) if lost else (skin == 0 and cloth > 150e-4)
@@ -159,30 +159,31 @@ def test_a_skirt_that_flies_leads_no_limb_astray() -> None:
     flying = []
     for view in seen():
         flown = mask(outline(surface(astray(0.8)), view.camera), view.camera) & ~view.person
-        away = np.where(flown, 0, view.away)
-        flying.append(view._replace(person=view.person | flown, cloth=flown, away=away))
-    assert apart(astray(0.8), flying, FLIES) > 2 * apart(POSE, flying, FLIES)
-    assert apart(astray(0.8), flying, HANGS) < 1.1 * apart(POSE, flying, HANGS)  # as cloth that hangs it might
+        distance = np.where(flown, 0, view.distance)
+        flying.append(view._replace(person=view.person | flown, cloth=flown, distance=distance))
+    assert apart(astray(0.8), flying, FLYING) > 2 * apart(POSE, flying, FLYING)
+    assert apart(astray(0.8), flying, HANGING) < 1.1 * apart(POSE, flying, HANGING)  # as cloth that hangs it might
 
 
 def test_a_skirt_that_flies_where_the_model_hangs_leads_no_limb_astray() -> None:
     """What the model has where nobody is counts less where it is cloth; skin counts fully, whatever cloth does."""
     skin, low = surface(POSE), surface(astray(0.8))  # as if a hem hung where the leg is astray
-    hangs, flies = (distance(low, skin, seen(), 0.2, cloth) for cloth in (HANGS, FLIES))
+    hangs, flies = (chamfer_distance(low, skin, seen(), 0.2, cloth) for cloth in (HANGING, FLYING))
     assert flies < 0.8 * hangs
-    assert distance(low, low, seen(), 0.2, FLIES) == pytest.approx(hangs)
+    assert chamfer_distance(low, low, seen(), 0.2, FLYING) == pytest.approx(hangs)
 
 
 @pytest.mark.parametrize(("clothed", "given", "doubtful", "near", "far"), [
-    (True, False, True, 0, [HANGS, FLIES]), (False, False, True, 0, [HANGS]), (True, False, False, 0, [HANGS, FLIES]),
-    (True, True, False, 1, []), (True, True, True, 2, [HANGS, HANGS]),
+    (True, False, True, 0, [HANGING, FLYING]), (False, False, True, 0, [HANGING]),
+    (True, False, False, 0, [HANGING, FLYING]),
+    (True, True, False, 1, []), (True, True, True, 2, [HANGING, HANGING]),
 ])  # fmt: skip
 def test_it_is_searched_as_if_cloth_hung_and_as_if_it_flew(clothed, given, doubtful, near, far) -> None:
-    judge = SimpleNamespace(given=given, model=SimpleNamespace(clothed=clothed))
-    looks = Looks(judge, PLAN, POSE, POSE, 0.1, 0.03)
-    ways = LimbSearch()._ways(looks, Suspicion("lost", doubtful, ()))
-    beliefs = [way.keywords["cloth"] for way in ways if "cloth" in way.keywords]
-    assert (len(ways) - len(beliefs), beliefs) == (near, far)
+    scorer = SimpleNamespace(start=given, model=SimpleNamespace(clothed=clothed))
+    searches = Searches(scorer, PLAN, POSE, POSE, 0.1, 0.03)
+    ways = LimbSearch()._strategies(searches, Trigger("lost", doubtful, ()))
+    weights = [way.keywords["cloth_weight"] for way in ways if "cloth_weight" in way.keywords]
+    assert (len(ways) - len(weights), weights) == (near, far)
 
 
 def test_a_limb_that_is_odd_is_looked_for_alone() -> None:
@@ -191,9 +192,9 @@ def test_a_limb_that_is_odd_is_looked_for_alone() -> None:
 
     fitted, leg = Pose(root=POSE.root, angles=POSE.angles + 0.3), parts(SCENE.body)[1]
     model, past = SimpleNamespace(scene=SCENE), scenes.tiny_past(SCENE, fitted)
-    judge = SimpleNamespace(given=None, apart=apart_from_truth, model=model, past=past)
-    looks = Looks(judge, PLAN, fitted, fitted, 0.01, 0.0)
-    (way,) = LimbSearch()._ways(looks, Suspicion("a joint is bent beyond its limits", False, (leg,)))
+    scorer = SimpleNamespace(start=None, distances=apart_from_truth, model=model, past=past)
+    searches = Searches(scorer, PLAN, fitted, fitted, 0.01, 0.0)
+    (way,) = LimbSearch()._strategies(searches, Trigger("a joint is bent beyond its limits", False, (leg,)))
     change = np.abs(way(np.random.default_rng(0)).angles - POSE.angles)
     assert change[leg].mean() < 0.25
     np.testing.assert_allclose(np.delete(change, leg), 0.3)
@@ -314,12 +315,12 @@ def test_doubts_that_last_are_looked_into_now_and_then(index, every, vain, looke
     search, model = LimbSearch(vain_every=4), scenes.tiny_model(SCENE)
     lost = pictures.tiny_state(SCENE, astray(0.9), POSE)
     frame, past = at(index, scenes.tiny_past(SCENE, POSE, POSE, POSE), every)
-    area = stray_of(surface(astray(0.9)), SCENE, search.views(frame, surface(astray(0.9)), past, SCENE)).area
-    past = replace(past, appearance={VAIN: np.array([vain, area])})
+    area = mismatch_of(surface(astray(0.9)), SCENE, search.trimaps(frame, surface(astray(0.9)), past, SCENE)).area
+    past = replace(past, appearance={HISTORY: np.array([vain, area])})
     found = search.recover(frame, lost, settled(lost), past, model, settle)
     assert bool(calls) == looked
     assert found.doubted != looked and ("not searched" in "".join(found.notes)) != looked
-    left = {**past.appearance, **found.state.segmentation.appearance}[VAIN]
+    left = {**past.appearance, **found.state.segmentation.appearance}[HISTORY]
     assert left[0] == (0 if looked else vain)
 
 
@@ -342,7 +343,7 @@ def test_limbs_are_looked_for_where_enough_of_the_room_is_known(columns, looked)
     lost = pictures.tiny_state(SCENE, astray(0.9), POSE)
     shares = [
         view.known
-        for view in views(FRAME, surface(astray(0.9)), small_room(scene.background, SCENE.cameras, 160), 0.35)
+        for view in trimaps(FRAME, surface(astray(0.9)), small_room(scene.background, SCENE.cameras, 160), 0.35)
     ]
     assert (np.mean(shares) > QUICK.least_known) == looked
     model = scenes.tiny_model(scene)
@@ -374,7 +375,7 @@ def test_a_first_pose_that_looks_the_other_way_is_turned_round(caplog) -> None:
     change = np.zeros(len(POSE.angles))
     change[SCENE.body.screw_names.index("knee_l.flexion")] = 1.2  # of no other pose: no knee bends forward
     true = Pose(root=POSE.root, angles=POSE.angles + change)
-    start = pictures.tiny_state(SCENE, turned_round(true, SCENE.body), true)
+    start = pictures.tiny_state(SCENE, half_turn(true, SCENE.body), true)
 
     def settle(pose, parameters):
         return settled(pictures.tiny_state(SCENE, pose, true))
@@ -446,7 +447,7 @@ def test_a_first_frame_is_searched_near_the_pose_it_starts_from(past, found) -> 
 )
 def test_a_doubt_that_is_cured_may_cost_distance(strays, apart, taken) -> None:
     result = settled(pictures.tiny_state(SCENE, POSE, POSE))
-    fit, other = (Fit(result, Stray(area, 0.0, 0.0, 0.0), far) for area, far in ((100.0, 1.0), (strays, apart)))
+    fit, other = (Fit(result, Mismatch(area, 0.0, 0.0, 0.0), far) for area, far in ((100.0, 1.0), (strays, apart)))
     assert (LimbSearch()._better(other, fit) is other) == taken
 
 
@@ -457,16 +458,16 @@ def test_a_doubt_that_is_cured_may_cost_distance(strays, apart, taken) -> None:
 )
 def test_a_hint_that_is_cleared_may_cost_a_little_distance(left, floating, apart, taken) -> None:
     result = settled(pictures.tiny_state(SCENE, POSE, POSE))
-    fit = Fit(result, Stray(0.0, 0.0, 0.0, 25.0), 1.0)
-    other = Fit(result, Stray(0.0, floating, 0.0, left), apart)
+    fit = Fit(result, Mismatch(0.0, 0.0, 0.0, 25.0), 1.0)
+    other = Fit(result, Mismatch(0.0, floating, 0.0, left), apart)
     assert (LimbSearch(hint_cm2=15)._better(other, fit) is other) == taken
 
 
 def test_of_two_fits_alike_the_one_nearer_to_the_start_is_taken() -> None:
-    given = Given(astray(0.2), np.radians(6))
-    others = np.array([given.strain(astray(0.2 + angle)) for angle in (0.0, 0.1, 0.4)])
+    given = StartPose(astray(0.2), np.radians(6))
+    others = np.array([given.penalty(astray(0.2 + angle)) for angle in (0.0, 0.1, 0.4)])
     assert others[0] == 1 and np.all(np.diff(others) > 0)
-    assert given.strain(Pose(root=POSE.root, angles=given.pose.angles + np.radians(6))) == pytest.approx(2)
+    assert given.penalty(Pose(root=POSE.root, angles=given.pose.angles + np.radians(6))) == pytest.approx(2)
 
 
 def test_a_first_frame_that_is_right_says_nothing_of_the_search() -> None:
@@ -490,7 +491,7 @@ def test_a_leap_ends_far_from_what_was_believed_and_from_what_was_seen(believed,
 @pytest.mark.parametrize("found", [True, False])
 def test_cloth_that_strays_calls_for_a_search_and_is_not_doubted(monkeypatch, found) -> None:
     """A raised knee holds a skirt before itself; or the skirt flies, and there is nothing to find."""
-    monkeypatch.setattr("mocapflow_recovery.limb_search.garment_told", lambda *_: np.full(BINS, 4.0))
+    monkeypatch.setattr("mocapflow_recovery.limb_search.garment_log_ratio", lambda *_: np.full(BINS, 4.0))
     lost, past = pictures.tiny_state(SCENE, astray(0.9), POSE), scenes.tiny_past(SCENE, POSE)
     end, search = POSE if found else astray(0.9), LimbSearch(floating_cm2=1e6)
     model = scenes.tiny_model(SCENE)
@@ -524,7 +525,7 @@ def test_a_search_begins_within_the_limits() -> None:
     body = replace(SCENE.body, limits=np.tile([-1.0, 1.0], (len(POSE.angles), 1)))
     other = Pose(root=POSE.root, angles=np.full(len(POSE.angles), 0.1))
     bent = Pose(root=2 * POSE.root, angles=np.where(np.arange(len(POSE.angles)) == 1, 1.2, 0.3))
-    found = eased(bent, other, body)
+    found = without_overbent(bent, other, body)
     assert found.root is bent.root
     assert found.angles[1] == 0.1 and (np.delete(found.angles, 1) == 0.3).all()
 
@@ -561,7 +562,7 @@ def test_a_view_in_which_something_stands_before_the_person_leads_nobody_astray(
     scrap = np.s_[row : row + left, column : column + left]
     hidden[scrap] = FRAME.images[0][scrap]
     looked = seen(replace(FRAME, images=(hidden, *FRAME.images[1:])))
-    assert len(looked) == len(seen()) and not looked[0].shown
+    assert len(looked) == len(seen()) and not looked[0].informative
     assert apart(POSE, looked) == pytest.approx(apart(POSE, seen()[1:]))
     assert apart(POSE, looked) < apart(astray(0.3), looked)
 

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from marker_take import markers_of, write_c3d
-from mocapflow_evaluation import marker_joints, ours
+from mocapflow_evaluation import marker_joints, tracked_motion
 from mocapflow_evaluation.alignment import at_our_frames
 from mocapflow_evaluation.evaluate import Evaluate, chosen, evaluate
 from mocapflow_evaluation.marker_names import landmarks
-from mocapflow_evaluation.ours import Ours
 from mocapflow_evaluation.references import Reference, read_reference
+from mocapflow_evaluation.tracked_motion import TrackedMotion
 from mocapflow_export import layout, tables
 from mocapflow_export.formats import Result, write
 from results_scene import DEMO, demo_scene, make_track, stepping
@@ -31,8 +31,8 @@ LABELS, PLACES = markers_of(SCENE.body, TRACK)
 
 
 @pytest.fixture(scope="module")
-def own() -> Ours:
-    return ours.of_track(TRACK, SCENE)
+def own() -> TrackedMotion:
+    return tracked_motion.of_track(TRACK, SCENE)
 
 
 def read(path: Path, places: np.ndarray = PLACES, rate: float = RATE, first: int = 0) -> Reference:
@@ -40,7 +40,7 @@ def read(path: Path, places: np.ndarray = PLACES, rate: float = RATE, first: int
     return read_reference(write_c3d(path / "markers.c3d", LABELS, places, rate, first))
 
 
-def test_centres_lie_where_the_body_has_them(own: Ours, tmp_path: Path) -> None:
+def test_centres_lie_where_the_body_has_them(own: TrackedMotion, tmp_path: Path) -> None:
     reference = read(tmp_path)
     assert reference.joints is not None
     for joint in ("hip", "knee", "ankle", "toe", "elbow", "wrist"):
@@ -51,7 +51,7 @@ def test_centres_lie_where_the_body_has_them(own: Ours, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["knee_flexion", "hip_flexion", "ankle"])
-def test_angles_from_markers_are_ours(own: Ours, name: str, tmp_path: Path) -> None:
+def test_angles_from_markers_are_ours(own: TrackedMotion, name: str, tmp_path: Path) -> None:
     reference = read(tmp_path)
     for side in ("l", "r"):
         np.testing.assert_allclose(reference.curves[f"{name}_{side}"], own.columns[f"{name}_{side}"], atol=1e-3)
@@ -80,7 +80,7 @@ def test_shoulders_lie_below_the_acromia_along_the_trunk() -> None:
         np.testing.assert_allclose(centres[f"shoulder_{side}"], [[0, sign * 0.2, 1.4 - 0.17 * 0.4]], atol=1e-12)
 
 
-def test_knee_axes_of_both_sides_point_to_the_left(own: Ours) -> None:
+def test_knee_axes_of_both_sides_point_to_the_left(own: TrackedMotion) -> None:
     marks = {name: PLACES[:, k] for name, k in landmarks(LABELS, Path()).items()}
     left = own.stick.places[:, own.stick.names.index("hip_l")] - own.stick.places[:, own.stick.names.index("hip_r")]
     for side in ("l", "r"):
@@ -132,7 +132,7 @@ def measure_wand(folder: Path, scale: float = 1.0) -> None:
 @pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize(("scale", "told"), [(0.997, True), (0.999, False), (1.001, False), (1.003, True)])
 def test_rigs_whose_metres_differ_by_more_than_a_fifth_of_a_percent_are_told(
-    own: Ours, tmp_path: Path, scale: float, told: bool
+    own: TrackedMotion, tmp_path: Path, scale: float, told: bool
 ) -> None:
     read(tmp_path, moved(PLACES)[0])
     measure_wand(tmp_path, scale)
@@ -151,7 +151,7 @@ def test_common_points_that_can_not_be_read_are_told_before_anything_runs(tmp_pa
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_two_rigs_are_brought_together_by_common_points(own: Ours, tmp_path: Path) -> None:
+def test_two_rigs_are_brought_together_by_common_points(own: TrackedMotion, tmp_path: Path) -> None:
     read(tmp_path, moved(PLACES)[0])
     measure_wand(tmp_path)
     got = evaluate(own, tmp_path / "markers.c3d", tmp_path / "run")
@@ -165,7 +165,7 @@ def test_two_rigs_are_brought_together_by_common_points(own: Ours, tmp_path: Pat
 
 @pytest.mark.usefixtures("unrendered")
 @pytest.mark.long
-def test_without_common_points_joint_centres_do(own: Ours, tmp_path: Path) -> None:
+def test_without_common_points_joint_centres_do(own: TrackedMotion, tmp_path: Path) -> None:
     read(tmp_path, moved(PLACES)[0])
     got = evaluate(own, tmp_path / "markers.c3d", tmp_path)
     assert any("registered by joint centres of both systems" in note for note in got.notes)
@@ -176,7 +176,7 @@ def test_without_common_points_joint_centres_do(own: Ours, tmp_path: Path) -> No
 
 
 @pytest.mark.usefixtures("unrendered")
-def test_rigs_without_common_joint_centres_are_not_compared_and_that_is_told(own: Ours, tmp_path: Path) -> None:
+def test_rigs_without_common_joint_centres_are_not_compared_which_is_told(own: TrackedMotion, tmp_path: Path) -> None:
     read(tmp_path, moved(PLACES)[0])
     strange = replace(own.stick, names=tuple(f"{name}_of_another" for name in own.stick.names))
     got = evaluate(replace(own, stick=strange), tmp_path / "markers.c3d", tmp_path)
@@ -185,16 +185,16 @@ def test_rigs_without_common_joint_centres_are_not_compared_and_that_is_told(own
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_the_stick_model_has_the_times_of_the_track(own: Ours, tmp_path: Path) -> None:
+def test_the_stick_model_has_the_times_of_the_track(own: TrackedMotion, tmp_path: Path) -> None:
     read(tmp_path, moved(PLACES)[0])
     columns, raw = ({name: values[10:] for name, values in part.items()} for part in (own.columns, own.raw))
-    late = Ours(columns=columns, raw=raw, stick=replace(own.stick, places=own.stick.places[10:]))
+    late = TrackedMotion(columns=columns, raw=raw, stick=replace(own.stick, places=own.stick.places[10:]))
     evaluate(late, tmp_path / "markers.c3d", tmp_path)
     np.testing.assert_allclose(markers.read_trc(tmp_path / layout.STICK)[2], columns["time"], atol=1e-6)
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_the_stick_model_keeps_its_lengths(own: Ours, tmp_path: Path) -> None:
+def test_the_stick_model_keeps_its_lengths(own: TrackedMotion, tmp_path: Path) -> None:
     """T-OUT1."""
     loose = PLACES + np.random.default_rng(0).normal(scale=0.005, size=PLACES.shape)
     read(tmp_path, loose)
@@ -209,7 +209,7 @@ def test_the_stick_model_keeps_its_lengths(own: Ours, tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("unrendered")
-def test_a_faster_marker_system_that_started_later(own: Ours, tmp_path: Path) -> None:
+def test_a_faster_marker_system_that_started_later(own: TrackedMotion, tmp_path: Path) -> None:
     """Markers at 100 per second from 0.2 s on are met at our times; a lag of 2 frames is found and not applied."""
     time = np.arange(0, 59 / RATE, 0.01)
     fine = np.stack([np.interp(time - 2 / RATE, TRACK.time, column) for column in PLACES.reshape(60, -1).T], axis=1)
@@ -234,7 +234,7 @@ def test_a_run_against_its_own_files_is_off_by_nothing(tmp_path: Path, name: str
     pytest.importorskip("ezc3d")
     track = make_track(TRACK.root[kept], TRACK.angles[kept])
     track = replace(track, frame=TRACK.frame[kept], time=TRACK.time[kept])
-    own = ours.of_track(track, SCENE)
+    own = tracked_motion.of_track(track, SCENE)
     if name == "joints.c3d":
         write("c3d", Result(track=track, scene=SCENE, recording=open_recording(DEMO)), tmp_path)
     elif name == "joints.trc":
@@ -260,13 +260,13 @@ def test_times_that_begin_at_one_sample_are_told(tmp_path: Path, decimals: int) 
         np.testing.assert_allclose(found, curve[1 : 49 - first], atol=0.1)
 
 
-def test_a_reference_without_rows_shares_nothing(own: Ours, tmp_path: Path) -> None:
+def test_a_reference_without_rows_shares_nothing(own: TrackedMotion, tmp_path: Path) -> None:
     markers.write_mot(tmp_path / "m.mot", {"knee_angle_r": np.empty(0)}, np.empty(0))
     assert "shares no angle with the track" in evaluate(own, tmp_path / "m.mot", tmp_path).notes[-1]
 
 
 @pytest.mark.usefixtures("unrendered")
-def test_a_reference_of_other_frames_says_which(own: Ours, tmp_path: Path) -> None:
+def test_a_reference_of_other_frames_says_which(own: TrackedMotion, tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text("frame,knee_flexion_l\n1000,9\n1001,10\n")
     last = len(own.columns["frame"]) - 1
     assert evaluate(own, tmp_path / "t.csv", tmp_path).notes[-1] == (
@@ -276,7 +276,7 @@ def test_a_reference_of_other_frames_says_which(own: Ours, tmp_path: Path) -> No
 
 @pytest.mark.usefixtures("unrendered")
 @pytest.mark.parametrize("first", [0, 1])
-def test_frames_that_count_from_one_are_told_by_their_times(own: Ours, tmp_path: Path, first: int) -> None:
+def test_frames_that_count_from_one_are_told_by_their_times(own: TrackedMotion, tmp_path: Path, first: int) -> None:
     columns = {name: own.columns[name] for name in ("frame", "time", "knee_flexion_l")}
     tables.write_columns(tmp_path / "other.csv", columns | {"frame": columns["frame"] + first})
     notes = evaluate(own, tmp_path / "other.csv", tmp_path).notes
@@ -300,14 +300,16 @@ def tables_of_words(path: Path) -> list[dict[str, str]]:
     return [dict(zip(header, row, strict=True)) for row in rows]
 
 
-def test_our_side_from_files_is_that_from_the_track(own: Ours, tmp_path: Path) -> None:
-    angles_only = {n: v for n, v in own.columns.items() if n not in ours.SIGNED}
+def test_our_side_from_files_is_that_from_the_track(own: TrackedMotion, tmp_path: Path) -> None:
+    angles_only = {n: v for n, v in own.columns.items() if n not in tracked_motion.SIGNED}
     tables.write_columns(layout.place(tmp_path, layout.ANGLES), angles_only)
     markers.write_trc(
         layout.place(tmp_path, layout.JOINTS), own.stick.names, markers.opensim_from_world(own.stick.places), RATE
     )
-    markers.write_mot(layout.place(tmp_path, layout.MOTION), {n: own.columns[n] for n in ours.SIGNED}, TRACK.time)
-    got = ours.of_folder(tmp_path)
+    markers.write_mot(
+        layout.place(tmp_path, layout.MOTION), {n: own.columns[n] for n in tracked_motion.SIGNED}, TRACK.time
+    )
+    got = tracked_motion.of_folder(tmp_path)
     assert set(got.columns) == set(own.columns)
     np.testing.assert_allclose(got.stick.places, own.stick.places, atol=1e-7)
     assert got.frame_rate == pytest.approx(RATE, abs=0.01)

@@ -8,15 +8,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from mocapflow_matching.camouflage import FEET
-from mocapflow_recovery.fits import Fits
 from mocapflow_recovery.limb_search import LimbSearch
-from mocapflow_recovery.second_look import HELD, LED, Hindsight, SecondLook, pictured, windows
+from mocapflow_recovery.refit_windows import LEAD_IN, WINDOW, pictured, windows
+from mocapflow_recovery.revised_track import RevisedTrack
+from mocapflow_recovery.second_look import Refitter, SecondLook
 from results_scene import DEMO, demo_scene, stepping
 
 from mocapflow.config.pipeline import load_pipeline
 from mocapflow.data import NO_CLOTH, Change, FrameResult, Past, Pose
 from mocapflow.help.shipped import shipped
-from mocapflow.prediction import believed
+from mocapflow.prediction import initial_state
 from mocapflow.recordings.recording import open_recording
 from mocapflow.results import Track
 from mocapflow.series import Series
@@ -41,7 +42,7 @@ def astray(*rows: int, by: float = 0.8) -> Track:
 def fitted(pose: Pose, cost: float = 0.5) -> FrameResult:
     """A result of the loop that costs so much by the pictures; those of the track cost 0.5."""
     return FrameResult(
-        state=believed(pose, np.zeros(0), NO_CLOTH), iterations=1, steady=True, oscillating=False,
+        state=initial_state(pose, np.zeros(0), NO_CLOTH), iterations=1, steady=True, oscillating=False,
         change=Change(body=0.0, cloth=0.0, angles=0.0, sigmas=0.0), overlap=np.full(4, 0.8),
         energy=np.array([[cost, 0.0], [np.nan, np.nan], [np.nan, np.nan]]),
         energy_terms=("cam01.data", "rest_pose"),
@@ -52,7 +53,7 @@ def fitted(pose: Pose, cost: float = 0.5) -> FrameResult:
 def stray(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """Of the person off the model, cm²: in the fit that stands, and in the other one."""
     areas = [0.0, 0.0]
-    monkeypatch.setattr(Hindsight, "strays", lambda *given: tuple(areas))
+    monkeypatch.setattr(Refitter, "mismatches", lambda *given: tuple(areas))
     return areas
 
 
@@ -90,8 +91,8 @@ def test_a_frame_that_leaps_is_fitted_again_from_between_its_neighbours(looked):
 
 
 def test_what_a_frame_knows_of_those_before_it_is_their_better_fit():
-    fits, frame = Fits(astray(ROW), SCENE.body), next(RECORDING.frames(since=ROW))
-    fits.take(ROW, frame, fitted(TRUE.pose(ROW)))
+    fits, frame = RevisedTrack(astray(ROW), SCENE.body), next(RECORDING.frames(since=ROW))
+    fits.replace_fit(ROW, frame, fitted(TRUE.pose(ROW)))
     latest = fits.past(ROW + 1, {}).moments[-1]
     assert latest.pose.angles[KNEE] == TRUE.angles[ROW, KNEE] and latest.time == TRUE.time[ROW]
     assert fits.past(ROW + 2, {}).moments[-1].pose.angles[KNEE] == TRUE.angles[ROW + 1, KNEE]
@@ -102,14 +103,14 @@ def test_feet_that_look_like_the_floor_stay_unmatched(looked, monkeypatch):
         known = replace(result.state.segmentation, appearance={FEET: np.ones(3)})
         return replace(result, state=replace(result.state, segmentation=known))
 
-    monkeypatch.setattr(LimbSearch, "feet_told", told)
+    monkeypatch.setattr(LimbSearch, "with_camouflaged_feet", told)
     second_look(astray(ROW))
     colours, *again = (past.appearance for _, past, _ in looked)
     assert FEET not in colours and all(FEET in known for known in again)
 
 
 def test_a_limb_that_was_lost_for_some_frames_is_followed_back(looked):
-    rows = range(ROW, ROW + HELD + LED)  # longer than a window
+    rows = range(ROW, ROW + WINDOW + LEAD_IN)  # longer than a window
     again = second_look(astray(*rows))
     np.testing.assert_array_equal(again.angles, TRUE.angles)
     indices = [index for index, *_ in looked]
@@ -131,7 +132,7 @@ def test_an_end_is_fitted_again_if_the_frame_beside_it_leaps(looked, end):
 def test_of_two_frames_none_leaps():
     track = astray(0)
     two = SimpleNamespace(root=track.root[:2], angles=track.angles[:2], lost=np.zeros(2, bool))
-    assert Fits(two, SCENE.body).leaps().tolist() == [0.0, 0.0]
+    assert RevisedTrack(two, SCENE.body).leaps().tolist() == [0.0, 0.0]
 
 
 def test_a_smooth_track_stays_as_it_is_and_no_picture_is_read(looked, monkeypatch):
@@ -180,7 +181,7 @@ def test_lost_frames_say_nothing_of_their_neighbours(looked, lost):
 
 
 def test_times_say_where_between_a_frame_is():
-    fits = Fits(replace(TRUE, time=np.where(TRUE.frame < 13, TRUE.time, TRUE.time + 2 / 30)), SCENE.body)
+    fits = RevisedTrack(replace(TRUE, time=np.where(TRUE.frame < 13, TRUE.time, TRUE.time + 2 / 30)), SCENE.body)
     quarter = fits.between(12).angles[KNEE]
     assert abs(quarter - (0.75 * TRUE.angles[11, KNEE] + 0.25 * TRUE.angles[13, KNEE])) < 1e-12
 
@@ -189,7 +190,7 @@ def test_leaps_are_what_joints_are_off_by():
     track = replace(TRUE, angles=np.tile(TRUE.angles[:1], (40, 1)))
     root = track.root.copy()
     root[20, :3, 3] += [0.03, 0.0, 0.04]
-    leaps = Fits(replace(track, root=root), SCENE.body).leaps()
+    leaps = RevisedTrack(replace(track, root=root), SCENE.body).leaps()
     np.testing.assert_allclose(leaps[[19, 20, 21]], [0.025, 0.05, 0.025], atol=1e-9)
     assert leaps[:19].max() < 1e-12 and leaps[22:].max() < 1e-12
 
@@ -198,9 +199,9 @@ def test_wide_arrays_stay_on_the_drive():
     track = astray(ROW)
     read = []
     covariance = Series(track.covariance.shape, lambda rows: read.append(rows) or np.asarray(track.covariance)[rows])
-    again = Fits(replace(track, covariance=covariance), SCENE.body)
+    again = RevisedTrack(replace(track, covariance=covariance), SCENE.body)
     read.clear()
-    again.take(ROW, next(RECORDING.frames(since=ROW)), fitted(TRUE.pose(ROW)))
+    again.replace_fit(ROW, next(RECORDING.frames(since=ROW)), fitted(TRUE.pose(ROW)))
     made = again.track()
     assert isinstance(made.covariance, Series) and not read
     assert made.covariance[ROW][0, 0] > 1 > made.covariance[ROW + 1][0, 0]
@@ -211,8 +212,8 @@ def test_windows_overlap_by_the_row_that_shows_colours(count):
     suspect = np.zeros(60, bool)
     suspect[20 : 20 + count] = True
     rows = [window.tolist() for window in windows(suspect)]
-    assert rows[0][0] == 20 - LED and rows[-1][-1] == 20 + count
-    assert all(len(window) <= HELD for window in rows)
+    assert rows[0][0] == 20 - LEAD_IN and rows[-1][-1] == 20 + count
+    assert all(len(window) <= WINDOW for window in rows)
     assert all(one[-1] == other[0] for one, other in zip(rows, rows[1:], strict=False))
     assert {row for window in rows for row in window[:-1]} >= set(range(20, 20 + count))
 

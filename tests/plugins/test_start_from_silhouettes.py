@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from mocapflow_bodies.template import Template
 from mocapflow_fitting.start_from_file import read_pose
-from mocapflow_recovery.placing import centred, heading_between, meeting, placed
-from mocapflow_recovery.start_from_silhouettes import StartFromSilhouettes, scattered, unlike
+from mocapflow_recovery.placing import centred, heading_between, mask_centre, placed
+from mocapflow_recovery.start_from_silhouettes import StartFromSilhouettes, farthest_points, separate_minima
 
 from mocapflow.config.pipeline import load_pipeline
 from mocapflow.data import NO_CLOTH, Pose
@@ -40,11 +40,11 @@ def test_a_body_is_put_where_it_is_wanted_and_turned(bare):
 def test_rays_through_the_middles_of_silhouettes_meet_in_the_middle_of_a_person(bare):
     pose = placed(bare, 0.5, np.zeros(len(bare.body.twists)), np.array([0.1, 0.1, 0.9]))
     surface = bare.surface(pose, NO_CLOTH)
-    found = meeting([covered(surface, camera) for camera in bare.cameras], bare.cameras)
+    found = mask_centre([covered(surface, camera) for camera in bare.cameras], bare.cameras)
     assert np.abs(found - [0.1, 0.1, 0.9]).max() < 0.15  # arms and feet are not in the middle of the box
     shifted = Pose(root=np.block([[np.eye(3), np.array([[0.3], [-0.2], [0.1]])], [np.zeros(3), 1.0]]) @ pose.root,
                    angles=pose.angles)  # fmt: skip
-    there = meeting([covered(bare.surface(shifted, NO_CLOTH), camera) for camera in bare.cameras], bare.cameras)
+    there = mask_centre([covered(bare.surface(shifted, NO_CLOTH), camera) for camera in bare.cameras], bare.cameras)
     np.testing.assert_allclose(there - found, [0.3, -0.2, 0.1], atol=0.02)
 
 
@@ -55,14 +55,14 @@ def test_a_pose_out_of_sight_stays_where_it_is(bare):
     goal = np.array([0.0, 0.1, 0.9])
     moved = bare.surface(centred(here, bare, goal, bare.cameras), NO_CLOTH)
     np.testing.assert_allclose(
-        meeting([covered(moved, camera) for camera in bare.cameras], bare.cameras), goal, atol=0.02
+        mask_centre([covered(moved, camera) for camera in bare.cameras], bare.cameras), goal, atol=0.02
     )
 
 
 def test_the_poses_that_are_tried_are_unlike_each_other():
     poses = np.array([[0.1, 0.0], [1.0, 0.0], [1.1, 0.0], [0.0, 0.9]])
-    np.testing.assert_array_equal(unlike(poses, 3), [[0, 0], [1.1, 0], [0, 0.9]])
-    assert len(unlike(poses, 9)) == 5
+    np.testing.assert_array_equal(farthest_points(poses, 3), [[0, 0], [1.1, 0], [0, 0.9]])
+    assert len(farthest_points(poses, 9)) == 5
 
 
 def test_without_plates_it_says_what_else_there_is(tmp_path):
@@ -88,8 +88,8 @@ def test_an_empty_room_is_an_error(tmp_path):
 
 def test_directions_that_are_searched_lie_apart():
     off = np.array([3.0, 1.0, 2.0, 9.0, 9.0, 4.0, 9.0, 1.5])
-    assert scattered(off, 3) == [1, 7, 5]  # 2 and 0 lie beside better ones
-    assert scattered(off, 9) == [1, 7, 5, 3]
+    assert separate_minima(off, 3) == [1, 7, 5]  # 2 and 0 lie beside better ones
+    assert separate_minima(off, 9) == [1, 7, 5, 3]
 
 
 @pytest.mark.long

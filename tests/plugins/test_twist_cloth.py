@@ -137,7 +137,7 @@ def test_forces_that_nothing_shows_go_to_calm_and_are_as_unsure_as_stated() -> N
     truth, given = make_pose(0), np.array([0.2, 0.3])
     matches, state = make_matches(truth, given, np.arange(0)), clothed_state(truth, given)
     estimate = solve(matches, state, cloth_unknowns=True, cloth_sd=0.06)
-    assert estimate.parameters == pytest.approx(MODEL.scene.calm, abs=1e-9)
+    assert estimate.parameters == pytest.approx(MODEL.scene.neutral_parameters, abs=1e-9)
     assert np.sqrt(np.diag(estimate.covariance))[18:] == pytest.approx(0.06 * np.array([2.0, 0.5]))  # of the ranges
 
 

@@ -13,7 +13,7 @@ from mocapflow_bodies.scanned import Scanned
 from mocapflow_priors.joint_limits import JointLimits
 from mocapflow_priors.rest_pose import RestPose
 from mocapflow_twist.problem import Anchor, Guess, Problem
-from mocapflow_twist.twist_gauss_newton import TwistGaussNewton, calmed
+from mocapflow_twist.twist_gauss_newton import TwistGaussNewton, with_neutral_cloth
 from twist_fixtures import exact_matches, make_pose, make_scene, make_state
 
 from mocapflow.components import Prior
@@ -43,7 +43,7 @@ def energies_of(
 ) -> Mapping[str, float]:
     """What an estimate costs by the matches it was found with, and where the solve began."""
     start = Guess(state.estimate.pose, state.cloth)
-    anchor = Anchor(calmed(start, model), solver._precision(model, start))
+    anchor = Anchor(with_neutral_cloth(start, model), solver._precision(model, start))
     problem = Problem(model, solver._data(matches, model), priors, Past(), anchor, {})
     return problem.energies(Guess(found.pose, model.drape(found.pose, found.parameters, Past())))
 

@@ -7,7 +7,7 @@ from statistics import NormalDist
 
 import numpy as np
 import pytest
-from mocapflow_evaluation.ours import of_track
+from mocapflow_evaluation.tracked_motion import of_track
 from mocapflow_export.uncertainty import DOUBTED, OUTLINE_MM, excess, measured, px_per_mm
 from results_scene import demo_scene, stepping
 

@@ -9,7 +9,7 @@ import pytest
 
 from mocapflow.errors import RecordingError
 from mocapflow.geometry.cameras import centre, project
-from mocapflow.geometry.pencils import pencil_axes, plane_angles
+from mocapflow.geometry.epipolar import pencil_axes, plane_angles
 from mocapflow.io.cameras import write_cameras
 from mocapflow.io.lateness import late_frames, write_late_frames
 from mocapflow.recordings import doctor, paired_views, synchrony
