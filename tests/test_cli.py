@@ -497,8 +497,10 @@ def test_an_export_leaves_what_the_run_folder_remembers(call, tmp_path):
     path = write_pipeline(tmp_path, write_recording(tmp_path / "clip", 3), stages={**STAGES, "export": "export"})
     assert call("run", path.name, "--out", "out", "--set", "stages.note=tiny_export").exit_code == 0
     before = Path("out", FILE).read_text()
-    exported = call("export", "out", "--format", "trc")
+    exported = call("export", "out", "--format", "trc", "--format", "bvh")
     assert exported.exit_code == 0, exported.output
+    files = [Path("out/results/joints.trc"), Path("out/results/motion.bvh")]
+    assert exported.stdout.splitlines()[-2:] == list(map(str, files)) and all(file.is_file() for file in files)
     assert "track: from the store" in exported.stderr and "note: " not in exported.stderr
     assert Path("out", FILE).read_text() == before
     assert "\nnote " in call("status", "out").stdout

@@ -75,10 +75,12 @@ def _comparison(run: Path, truth: Path | None, recording: Path | None) -> tuple[
 
 
 def export(run: Run, format_: Format, recording: Moved = None) -> None:
-    """Write the track of a run in other formats, into the run folder.
+    """Write the track of a run in other formats, into the run folder, and tell the files.
 
     Code may have changed since; pipeline and recording may not.
     """
+    from mocapflow_export.export import files_of
+
     from mocapflow.running.former_code import as_made
 
     _check_formats(format_)
@@ -101,6 +103,9 @@ def export(run: Run, format_: Format, recording: Moved = None) -> None:
                 prepared = as_made(prepared, keys, report)
         prepared.check(run)
         typer.echo(carry_out(prepared, run))
+    for name in format_:
+        for file in files_of(name):
+            typer.echo(run / file)
 
 
 def _check_formats(formats: Sequence[str]) -> None:
