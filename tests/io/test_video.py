@@ -264,10 +264,14 @@ def test_gaps_in_the_time_stamps_are_lost_frames():
     jitter = np.random.default_rng(0).uniform(-0.2, 0.2, 30) * period
     assert number_frames(np.arange(30) * period + jitter).tolist() == list(range(30))
     assert number_frames(np.round(np.arange(3000) * period)).tolist() == list(range(3000))  # times in whole ms
+    kept = np.delete(np.arange(300), [40, 41, 90, 200])
+    for rate in (150, 180):  # whole milliseconds, at which the median is far from the period
+        assert number_frames(np.round(kept * 1000 / rate)).tolist() == kept.tolist()
     late = np.array([0, 1, 2.6, 3, 4.7, 5, 6, 9, 10, 12.6, 13, 14])  # 7, 8 and 11 are lost
     assert number_frames(late).tolist() == [0, 1, 2, 3, 4, 5, 6, 9, 10, 12, 13, 14]
     assert number_frames(np.zeros(4)).tolist() == [0, 1, 2, 3]
     assert number_frames(np.zeros(1)).tolist() == [0]
+    assert number_frames(np.array([0.0, 1, 4])).tolist() == [0, 1, 4]
     assert number_frames(np.array([0.0, 3, 1, 1, 2])).tolist() == [0, 3, 1, 1, 2]
 
 
