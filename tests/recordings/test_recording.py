@@ -257,8 +257,10 @@ def test_a_focal_length_in_millimetres(tmp_path):
     [
         ([[60, 0, 0], [0, 60, 0], [0, 0, 1]], None, "principal point (0, 0) is not in its pictures of 64 x 48 px"),
         (None, [-0.1, 0.1, 0.05, 0.001, 0], "tangential distortion moves pixels by "),
-        (None, [-3, 0, 0, 0, 0], "distortion shows nothing in 86% of the picture, as that of no lens"),
+        (None, [-3, 0, 0, 0, 0], "distortion folds 62% of the undistorted picture, as no lens does"),
         (None, [-0.3, 0.1, 0.002, 0.001, 0], ""),
+        # of a GoPro: it folds what lies beyond the undistorted picture
+        ([[28.6, 0, 32.2], [0, 29.2, 24.7], [0, 0, 1]], [-0.2576, 0.0877, -0.0003, -0.0006, -0.0152], ""),
     ],
 )
 def test_numbers_that_no_lens_has(tmp_path, matrix, distortion, said):
