@@ -43,9 +43,9 @@ def examine_trial(folder: Path, calibration: Path, rig: bool = True) -> list[Fin
     late = attempt(lambda: late_frames(folder, [c.name for c in cameras]), findings)
     videos = _opened(folder, cameras, calibration, findings)
     if videos is None:
-        return findings + (list(examine_rig(cameras)) if rig and all(c.size.all() for c in cameras) else [])
+        return findings + (_examine_rig(cameras) if rig else [])
     lenses, length = _agreed(folder, cameras, videos, calibration, findings)
-    findings += examine_rig(cameras if lenses is None else lenses) if rig else []
+    findings += _examine_rig(cameras if lenses is None else lenses) if rig else []
     findings += [*copies(cameras, videos), *_looked_through(cameras, videos, length)]
     if late is not None:
         delayed = [replace(video, late=frames) for video, frames in zip(videos, late, strict=True)]
@@ -57,6 +57,11 @@ def examine_trial(folder: Path, calibration: Path, rig: bool = True) -> list[Fin
         if lenses is not None:
             _examine_pictures(folder, lenses, videos, findings)
     return findings
+
+
+def _examine_rig(cameras: Sequence[Camera]) -> list[Finding]:
+    """Return how cameras stand; nothing where a size is not known."""
+    return list(examine_rig(cameras)) if all(camera.size.all() for camera in cameras) else []
 
 
 def _opened(

@@ -14,7 +14,7 @@ import pytest
 
 from mocapflow.errors import RecordingError
 from mocapflow.io import rates
-from mocapflow.io.cameras import write_cameras
+from mocapflow.io.cameras import read_cameras, write_cameras
 from mocapflow.io.video import VIDEOS
 from mocapflow.recordings.doctor import examine
 from mocapflow.recordings.recording import open_recording
@@ -252,6 +252,14 @@ def test_a_focal_length_in_millimetres(tmp_path):
     )
 
 
+def test_cameras_whose_size_no_file_tells_are_no_rig_that_is_wrong(tmp_path):
+    folder = changed(tmp_path, [[4.2, 0, 31.5], [0, 4.2, 23.5], [0, 0, 1]])
+    write_easymocap(folder, read_cameras(folder), sizes=False)
+    (folder / "cameras.toml").unlink()
+    (told,) = [finding.message for finding in examine(folder) if finding.severity == "error"]
+    assert told == "camera 'cam02' has a focal length of 4.2 px in pictures of 64"
+
+
 @pytest.mark.parametrize(
     ("matrix", "distortion", "said"),
     [
@@ -398,10 +406,13 @@ def test_a_stated_frame_rate_does_not_hide_that_the_videos_differ(tmp_path):
     assert said.startswith("the videos differ in frame rate (cam01: 25 per second, cam02: 50 per second, cam03: 25")
 
 
+@pytest.mark.parametrize("stated", ["", "[metadata]\nframe_rate = 25\n"])
 @pytest.mark.parametrize(("rate", "apart"), [(25.1, ()), (25.2, ("0.3",))])
-def test_rates_that_are_nearly_one(tmp_path, monkeypatch, rate, apart):
+def test_rates_that_are_nearly_one(tmp_path, monkeypatch, rate, apart, stated):
     monkeypatch.setattr(rates, "OFF", 0.3)
     write_recording(tmp_path, frames=40)
+    with (tmp_path / "cameras.toml").open("a") as file:
+        file.write(stated)
     write_video(tmp_path / "videos" / "cam02.mp4", 40, rate=rate)
     found = open_recording(tmp_path)
     assert found.frame_rate == 25
@@ -423,9 +434,10 @@ def test_a_frame_rate_that_varies(tmp_path):
             file.mux(stream.encode(frame))
         file.mux(stream.encode(None))
     with (tmp_path / "cameras.toml").open("a") as file:
-        file.write("[metadata]\nframe_rate = 25\n")
+        file.write("[metadata]\nframe_rate = 250\n")  # slow motion
     said = open_recording(tmp_path).warnings
     assert said[0].startswith("cam02: its frame rate varies, which puts frames up to ")
+    assert "ffmpeg -i IN -vf fps=25 " in said[0]
     assert said[0] in [finding.message for finding in examine(tmp_path)]
 
 
