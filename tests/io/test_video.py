@@ -217,20 +217,21 @@ def test_a_late_video_ends_earlier_and_is_not_broken(tmp_path):
     assert [reason for image, reason in rows if image is None] == ["the video ends earlier"] * 3
 
 
-def test_sound_that_is_longer_than_the_pictures_is_no_video_that_breaks_off(tmp_path):
-    with av.open(str(tmp_path / "a.mkv"), "w") as file:
-        stream = file.add_stream("mpeg4", rate=25)
+@pytest.mark.parametrize("name", ["a.mkv", "a.mpg"])
+def test_sound_that_is_longer_than_the_pictures_is_no_video_that_breaks_off(tmp_path, name):
+    with av.open(str(tmp_path / name), "w") as file:
+        stream = file.add_stream("mpeg2video", rate=25)
         stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
-        sound = file.add_stream("pcm_s16le", rate=8000, layout="mono")
-        silence = av.AudioFrame.from_ndarray(np.zeros((1, 24000), np.int16), "s16", "mono")
-        silence.sample_rate = 8000
+        sound = file.add_stream("mp2", rate=16000, layout="mono")
+        silence = av.AudioFrame.from_ndarray(np.zeros((1, 48000), np.int16), "s16", "mono")
+        silence.sample_rate = 16000
         file.mux(sound.encode(silence))
         for number in range(10):
             frame = av.VideoFrame.from_ndarray(picture(number), "bgr24")
             frame.pts = number + 2
             file.mux(stream.encode(frame))
         file.mux(stream.encode(None))
-    video = open_video(tmp_path / "a.mkv")
+    video = open_video(tmp_path / name)
     assert (video.frames, video.declared) == (10, 10)
 
 

@@ -157,17 +157,18 @@ def test_two_videos_of_one_camera(tmp_path):
 def test_names_of_files_with_the_dots_of_an_umlaut_apart(tmp_path):
     """As macOS writes them."""
     write_recording(tmp_path, frames=2)
-    (tmp_path / "cameras.toml").write_text((tmp_path / "cameras.toml").read_text().replace("cam02", "T\u00fcr"))
     apart = "Tu\u0308r"
+    (tmp_path / "cameras.toml").write_text((tmp_path / "cameras.toml").read_text().replace("cam02", apart))
     (tmp_path / "videos" / "cam02.mp4").rename(tmp_path / "videos" / f"{apart}.mp4")
-    for folder in (tmp_path / "background" / apart, tmp_path / "keypoints" / f"{apart}_json"):
+    for folder in (tmp_path / "background" / apart, tmp_path / "keypoints" / f"{apart}_json", tmp_path / "occluders"):
         folder.mkdir(parents=True)
     (tmp_path / "recording.json").write_text(json.dumps({"late_frames": {apart: 1}}))
-    cv2.imwrite(str(tmp_path / "background" / apart / "0.png"), picture(0))
+    for place in (f"background/{apart}/0.png", f"occluders/{apart}.png"):
+        cv2.imwrite(str(tmp_path / place), picture(0))
     recording = open_recording(tmp_path)
     assert [recording.lenses[1].name, recording.videos[1].late] == ["T\u00fcr", 1]
     assert recording.keypoint_folders == (None, tmp_path / "keypoints" / f"{apart}_json", None)
-    assert f"background/{apart}/0.png" in recording.content
+    assert {f"background/{apart}/0.png", f"occluders/{apart}.png"} <= set(recording.content)
 
 
 def test_unequal_lengths(tmp_path):
@@ -235,12 +236,12 @@ def test_a_video_turned_by_a_quarter(tmp_path):
     assert "the video is turned by a quarter, perhaps by a mark in the file" in refused(tmp_path)
 
 
-def changed(tmp_path, matrix=None, distortion=None):
-    """Return a recording whose second camera has another matrix or distortion."""
+def changed(tmp_path, matrix=None, distortion=None, fisheye=False):
+    """Return a recording whose second camera has another matrix or lens."""
     cameras = list(ring())
     given = {"intrinsics": matrix, "distortion": distortion}
     new = {key: np.array(value, float) for key, value in given.items() if value is not None}
-    cameras[1] = replace(cameras[1], **new)
+    cameras[1] = replace(cameras[1], fisheye=fisheye, **new)
     return write_recording(tmp_path, frames=2, cameras=cameras)
 
 
@@ -264,6 +265,11 @@ def test_cameras_whose_size_no_file_tells_are_no_rig_that_is_wrong(tmp_path):
     ("matrix", "distortion", "said"),
     [
         ([[60, 0, 0], [0, 60, 0], [0, 0, 1]], None, "principal point (0, 0) is not in its pictures of 64 x 48 px"),
+        (
+            [[60, 0, 63], [0, 60, 23.5], [0, 0, 1]],
+            None,
+            "principal point (63, 23.5) is not in its pictures",
+        ),
         (None, [-0.1, 0.1, 0.05, 0.001, 0], "tangential distortion moves pixels by "),
         (None, [-3, 0, 0, 0, 0], "distortion folds 62% of the undistorted picture, as no lens does"),
         (None, [-0.3, 0.1, 0.002, 0.001, 0], ""),
@@ -274,6 +280,10 @@ def test_cameras_whose_size_no_file_tells_are_no_rig_that_is_wrong(tmp_path):
 def test_numbers_that_no_lens_has(tmp_path, matrix, distortion, said):
     warnings = open_recording(changed(tmp_path, matrix, distortion)).warnings
     assert [text[: len(said) + 11] for text in warnings[:1]] == ([f"cam02: its {said}"] if said else [])
+
+
+def test_a_fisheye_has_no_tangential_coefficients(tmp_path):
+    assert not open_recording(changed(tmp_path, distortion=[-0.1, 0.1, 0.05, 0.001, 0], fisheye=True)).warnings
 
 
 def test_a_run_is_told_of_a_world_that_is_not_z_up(tmp_path):
