@@ -117,15 +117,15 @@ def copies(cameras: Sequence[Camera], videos: Sequence[Video]) -> Iterator[Findi
 
 def _looked_through(cameras: Sequence[Camera], videos: Sequence[Video], length: int) -> Iterator[Finding]:
     """Yield which frames of the videos can't be used, and which cameras hang."""
-    news = np.full((length, len(videos)), np.nan)
-    for column, camera, video in zip(news.T, cameras, videos, strict=True):
+    change = np.full((length, len(videos)), np.nan)
+    for column, camera, video in zip(change.T, cameras, videos, strict=True):
         lost, found = look_through(video)
         column[:] = found[:length]
         if lost := [index for index in lost if index < video.frames]:
             why = "missing, damaged or of another size" if video.path.is_dir() else "can't be decoded"
             hint = "the view is not used in these frames, some perhaps made from damaged ones; others keep their places"
             yield warning(f"{camera.name}: {name_frames(lost)} {why}", hint, video.path)
-    for since, camera, video in zip(frozen_from(news), cameras, videos, strict=True):
+    for since, camera, video in zip(frozen_from(change), cameras, videos, strict=True):
         if since < length:
             when = f"repeats one picture from frame {since} on" if since else "shows one picture from first to last"
             left = ", or does nobody come into its view any more" if since else ""
@@ -138,12 +138,12 @@ def look_through(video: Video) -> tuple[list[int], F64]:
 
     The latter (N,) is in grey levels, NaN without a picture or one before it.
     """
-    lost, news, before = [], np.full(video.declared, np.nan), None
+    lost, change, before = [], np.full(video.declared, np.nan), None
     for index, (image, _) in enumerate(read_frames(video, range(video.declared))):
         if image is None:
             lost.append(index)
             continue
         if before is not None:
-            news[index] = difference(image, before)
+            change[index] = difference(image, before)
         before = image
-    return lost, news
+    return lost, change
