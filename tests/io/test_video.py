@@ -217,6 +217,14 @@ def test_a_late_video_ends_earlier_and_is_not_broken(tmp_path):
     assert [reason for image, reason in rows if image is None] == ["the video ends earlier"] * 3
 
 
+@pytest.mark.parametrize("count", [1, 2])
+@pytest.mark.parametrize("ending", ["mp4", "mkv", "avi"])
+def test_a_video_of_hardly_any_pictures(tmp_path, count, ending):
+    video = open_video(write_video(tmp_path / f"a.{ending}", count))
+    assert (video.frames, video.declared, video.frame_rate, video.uneven) == (count, count, 25.0, 0.0)
+    assert [number_of(image) for image, _ in read_frames(video, range(count))] == list(range(count))
+
+
 @pytest.mark.parametrize("name", ["a.mkv", "a.mpg"])
 def test_sound_that_is_longer_than_the_pictures_is_no_video_that_breaks_off(tmp_path, name):
     with av.open(str(tmp_path / name), "w") as file:
