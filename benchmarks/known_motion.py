@@ -44,10 +44,10 @@ RECORDINGS, OWNER = {"A": "walk_skirt", "B": "kneeup_shorts"}, {"skirt": "A", "s
 
 ABOUT = """# {name}
 
-Rendered four-camera recording of known motion: {take.frames} frames at {rate:g} a second, subject {take.subject},
+Rendered recording of known motion: {take.frames} frames at {rate:g} a second, subject {take.subject},
 motion {take.motion} from its frame {take.start}, {take.garment} simulated with Blender's cloth. Made by
-`benchmarks/known_motion.py`. Format and conventions are those of the recording of the same subject, whose body and
-cameras these are; frames are {tone:g} times as bright as the clean plates.
+`benchmarks/known_motion.py`. Format and conventions are those of the recording of the same subject, whose body this is;
+the cameras are {cameras}; frames are {tone:g} times as bright as the clean plates.
 """
 
 
@@ -247,13 +247,15 @@ def _ramp(length: int, first: bool, last: bool) -> np.ndarray:
 
 def main(name: str, data: Path, to: Path) -> None:
     """Make one take."""
-    out, room, script = to / name, to / TAKES[name].plates, Path(__file__).parent / "known_motion_blender.py"
-    prepare(TAKES[name], data, out)
-    (out / "README.md").write_text(ABOUT.format(name=name, take=TAKES[name], rate=RATE, tone=TONE))
+    take = TAKES[name]
+    out, room, script = to / name, to / take.plates, Path(__file__).parent / "known_motion_blender.py"
+    prepare(take, data, out)
+    cameras = f"the {take.rig} of `benchmarks/known_rigs.py`" if take.rig else "that recording's"
+    (out / "README.md").write_text(ABOUT.format(name=name, take=take, rate=RATE, tone=TONE, cameras=cameras))
     room.mkdir(exist_ok=True)
     blender = ["blender", "-b", "-t", "1", "--python-exit-code", "1", "-P", str(script), "--"]
     subprocess.run([*blender, str(out / "work"), str(room)], check=True)
-    finish(TAKES[name], out, room)
+    finish(take, out, room)
     shutil.rmtree(out / "work")
 
 

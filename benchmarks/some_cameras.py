@@ -1,7 +1,8 @@
 """A recording with some of its cameras only: how many does a track need, and where?
 
 `python benchmarks/some_cameras.py RECORDING OUT CAMERAS…` writes a recording OUT/CAMERAS for each of CAMERAS, which are
-names joined by commas: cam01,cam03. Its files are links to those of RECORDING.
+names joined by commas: cam01,cam03. Its files are links to those of RECORDING, a take of `known_motion.py` or one with
+the same files: no frame rate is stated there, no camera late.
 """
 
 from __future__ import annotations

@@ -75,7 +75,7 @@ def _comparison(run: Path, truth: Path | None, recording: Path | None) -> tuple[
 
 
 def export(run: Run, format_: Format, recording: Moved = None) -> None:
-    """Write the track of a run in other formats, into the run folder, and tell the files.
+    """Write the track of a run in other formats into the run folder, and print where they are.
 
     Code may have changed since; pipeline and recording may not.
     """

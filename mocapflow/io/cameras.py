@@ -103,7 +103,8 @@ def _from_toml(path: Path) -> tuple[Camera, ...]:
     if any("frame_rate" in table for table in (content, *tables.values())):
         hint = "in TOML what follows a [table] belongs to it: write it right below a line [metadata]"
         raise RecordingError("frame_rate is not under [metadata]", where=place(path, "frame_rate"), hint=hint)
-    cameras = {key: table for key, table in tables.items() if set(table) & set(FIELDS)}  # others are of other programs
+    own = set(FIELDS) - {"size"}  # which a calibration board of another program has, too
+    cameras = {key: table for key, table in tables.items() if own & set(table)}
     return tuple(_from_table(key, table, path) for key, table in cameras.items())
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from mocapflow.records import F64, I32
 
+SPREAD = 0.5  # of the median gap, by which usual ones may differ from it; where frames are lost they differ by more
 AHEAD = 8  # pictures, among which those that follow a late one at once catch up
 
 
@@ -18,9 +19,15 @@ def number_frames(times: F64) -> I32:
     moments, place = np.unique(times, return_inverse=True)
     if len(moments) < 2:
         return np.arange(len(times), dtype=np.int32)
-    period = float(np.median(np.diff(moments)))
+    period = _period(np.diff(moments))
     steps = np.maximum(1, np.round(np.diff(_undelayed(moments, period)) / period))
     return np.append(0, np.cumsum(steps)).astype(np.int32)[place]
+
+
+def _period(gaps: F64) -> float:
+    """Return the mean of the usual gaps (N,): their median alone is put off where times are in whole milliseconds."""
+    middle = np.quantile(gaps, 0.5, method="lower")
+    return float(gaps[np.abs(gaps - middle) < SPREAD * middle].mean())
 
 
 def _undelayed(times: F64, period: float) -> F64:

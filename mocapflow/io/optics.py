@@ -15,7 +15,8 @@ from mocapflow.records import F64
 
 SHORT = 0.1  # focal length by the longer side of the picture; with less, a pinhole would see more than 157 degrees
 ASKEW = 0.01  # of the longer side, by which tangential terms may move a pixel; those of a good lens do by 0.002
-FOLDED = 0.05  # share of the picture, beyond which the lens' model is none of this lens
+FOLDED = 0.05  # share of the undistorted picture, beyond which the lens' model is none of this lens
+UNFOLDED = 1.0  # px; a pixel that is shown once is found again nearer than this
 RAYS = 9  # per side of a picture
 ORDER = "the order is k1 k2 p1 p2 k3, a fisheye has k1 k2 k3 k4 and fisheye = true"
 
@@ -45,6 +46,7 @@ def odd_lens(camera: Camera) -> Iterator[str]:
     moved = float(np.linalg.norm(distort(pixels, tangential) - pixels, axis=1).max())
     if moved > ASKEW * camera.size.max():
         yield f"{camera.name}: its tangential distortion moves pixels by {moved:.0f} px, much for a lens; {ORDER}"
-    folded = float(np.isnan(undistort(pixels, camera)[:, 0]).mean())
+    off = np.linalg.norm(undistort(distort(pixels, camera), camera) - pixels, axis=1)
+    folded = float(np.mean(~(off < UNFOLDED)))  # NaN, too
     if folded > FOLDED:
-        yield f"{camera.name}: its distortion shows nothing in {folded:.0%} of the picture, as that of no lens; {ORDER}"
+        yield f"{camera.name}: its distortion folds {folded:.0%} of the undistorted picture, as no lens does; {ORDER}"

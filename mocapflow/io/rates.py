@@ -24,23 +24,24 @@ def common_rate(cameras: Sequence[Camera], videos: Sequence[Video], calibration:
     Raises:
         RecordingError: it is stated as something else than a rate, or the videos differ by more than 1 %.
     """
+    stated, odd = _stated(calibration), _interlaced(cameras, videos)
     rates = {c.name: v.frame_rate for c, v in zip(cameras, videos, strict=True) if v.frame_rate}
-    each = ", ".join(f"{name}: {rate:.6g} per second" for name, rate in rates.items())
-    ratio = max(rates.values()) / min(rates.values()) if rates else 1.0
-    if (stated := _stated(calibration)) is not None:
-        differ = [f"the videos differ in frame rate ({each}): {stated:g} is taken for all"] if ratio > DIFFERENT else []
-        return stated, [*_uneven(cameras, videos, stated), *differ]
     toml = calibration.name if calibration.suffix == ".toml" else "a cameras.toml, which this calibration has to become"
     told = f"frame_rate under [metadata] in {toml}"
     if not rates:
-        return USUAL_RATE, [f"nothing says the frame rate: {USUAL_RATE:g} frames per second assumed; write {told}"]
-    rate = Counter(rates.values()).most_common(1)[0][0]
+        assumed = f"nothing says the frame rate: {USUAL_RATE:g} frames per second assumed; write {told}"
+        return (USUAL_RATE, [*odd, assumed]) if stated is None else (stated, odd)
+    rate, ratio = Counter(rates.values()).most_common(1)[0][0], max(rates.values()) / min(rates.values())
+    each = ", ".join(f"{name}: {rate:.6g} per second" for name, rate in rates.items())
+    odd += _uneven(cameras, videos, rate)
     if ratio > DIFFERENT:
-        hint = f"{each}\nrecord all cameras at one rate, convert to it: {_command(rate)}\nor write the true {told}"
-        raise RecordingError("the videos differ in frame rate", where=str(videos[0].path.parent), hint=hint)
-    apart = (ratio - 1) * max(video.frames for video in videos)
-    drift = f"at their end the videos are {apart:.1f} frames apart ({each}); convert them to one rate: {_command(rate)}"
-    return rate, [*_uneven(cameras, videos, rate), *([drift] if apart > OFF else [])]
+        if stated is None:
+            hint = f"{each}\nrecord all cameras at one rate, convert to it: {_command(rate)}\nor write the true {told}"
+            raise RecordingError("the videos differ in frame rate", where=str(videos[0].path.parent), hint=hint)
+        odd.append(f"the videos differ in frame rate ({each}): {stated:g} is taken for all")
+    elif (apart := (ratio - 1) * max(video.frames for video in videos)) > OFF:
+        odd.append(f"at their end the videos are {apart:.1f} frames apart ({each}); convert them: {_command(rate)}")
+    return rate if stated is None else stated, odd
 
 
 def _stated(calibration: Path) -> float | None:
@@ -58,14 +59,21 @@ def _stated(calibration: Path) -> float | None:
     raise RecordingError(f"frame_rate is {stated!r}", where=place(calibration, "frame_rate"), hint=hint)
 
 
-def _uneven(cameras: Sequence[Camera], videos: Sequence[Video], rate: float) -> list[str]:
-    """Say whose frames are of other moments than their numbers say, as those of a phone that slows down in the dark."""
-    mixed = [
+def _interlaced(cameras: Sequence[Camera], videos: Sequence[Video]) -> list[str]:
+    """Say whose pictures show two moments each."""
+    return [
         f"{camera.name}: its video is interlaced, each picture shows two moments; ffmpeg -i IN -vf bwdif=0 -crf 12 OUT"
         for camera, video in zip(cameras, videos, strict=True)
         if video.interlaced
     ]
-    return mixed + [
+
+
+def _uneven(cameras: Sequence[Camera], videos: Sequence[Video], rate: float) -> list[str]:
+    """Say whose frames are of other moments than their numbers say, as those of a phone that slows down in the dark.
+
+    The rate is that of the videos: who states another one has filmed slow motion.
+    """
+    return [
         f"{camera.name}: its frame rate varies, which puts frames up to {video.uneven:.1f} from their place; "
         f"convert it to an even rate: {_command(rate)}"
         for camera, video in zip(cameras, videos, strict=True)

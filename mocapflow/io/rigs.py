@@ -103,7 +103,7 @@ def _world_up(cameras: Sequence[Camera]) -> Iterator[Finding]:
     up = -np.mean([camera.camera_from_world[1, :3] for camera in cameras], axis=0)
     if np.linalg.norm(up) > UPRIGHT and int(np.argmax(np.abs(up))) != 2:
         axis = "xyz"[int(np.argmax(np.abs(up)))]
-        hint = "the world has to be z up: turn the calibration"
+        hint = "the world has to be z up: turn the calibration, unless cameras lie on their sides or look far down"
         yield warning(f"the images' up is the {axis} axis of the world", hint)
     elif np.linalg.norm(up) > UPRIGHT and up[2] < 0:
         yield warning("the images' up is down in the world", "z has to point up: turn the calibration, or the videos")

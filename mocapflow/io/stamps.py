@@ -105,7 +105,7 @@ def read_stamps(path: Path) -> Stamps:
         first, found = _read_packets(stream)
         times = np.where(np.isnan(found.shown_at), found.decoded_at, found.shown_at)
         starts = find_starts(times, found.key)
-        if container.format.name == "avi" and np.mean(np.diff(times) < 0) < FEW:
+        if container.format.name == "avi" and np.count_nonzero(np.diff(times) < 0) < FEW * (len(times) - 1):
             times = found.decoded_at  # AVI has no times of display
         shown = ~np.isnan(times) & ~found.hidden
         if first is None or not shown.any():

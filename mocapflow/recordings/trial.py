@@ -43,9 +43,9 @@ def examine_trial(folder: Path, calibration: Path, rig: bool = True) -> list[Fin
     late = attempt(lambda: late_frames(folder, [c.name for c in cameras]), findings)
     videos = _opened(folder, cameras, calibration, findings)
     if videos is None:
-        return findings + (list(examine_rig(cameras)) if rig and all(c.size.all() for c in cameras) else [])
+        return findings + (_examine_rig(cameras) if rig else [])
     lenses, length = _agreed(folder, cameras, videos, calibration, findings)
-    findings += examine_rig(cameras if lenses is None else lenses) if rig else []
+    findings += _examine_rig(cameras if lenses is None else lenses) if rig else []
     findings += [*copies(cameras, videos), *_looked_through(cameras, videos, length)]
     if late is not None:
         delayed = [replace(video, late=frames) for video, frames in zip(videos, late, strict=True)]
@@ -57,6 +57,11 @@ def examine_trial(folder: Path, calibration: Path, rig: bool = True) -> list[Fin
         if lenses is not None:
             _examine_pictures(folder, lenses, videos, findings)
     return findings
+
+
+def _examine_rig(cameras: Sequence[Camera]) -> list[Finding]:
+    """Return how cameras stand; nothing where a size is not known."""
+    return list(examine_rig(cameras)) if all(camera.size.all() for camera in cameras) else []
 
 
 def _opened(
@@ -112,15 +117,15 @@ def copies(cameras: Sequence[Camera], videos: Sequence[Video]) -> Iterator[Findi
 
 def _looked_through(cameras: Sequence[Camera], videos: Sequence[Video], length: int) -> Iterator[Finding]:
     """Yield which frames of the videos can't be used, and which cameras hang."""
-    news = np.full((length, len(videos)), np.nan)
-    for column, camera, video in zip(news.T, cameras, videos, strict=True):
+    change = np.full((length, len(videos)), np.nan)
+    for column, camera, video in zip(change.T, cameras, videos, strict=True):
         lost, found = look_through(video)
         column[:] = found[:length]
         if lost := [index for index in lost if index < video.frames]:
             why = "missing, damaged or of another size" if video.path.is_dir() else "can't be decoded"
             hint = "the view is not used in these frames, some perhaps made from damaged ones; others keep their places"
             yield warning(f"{camera.name}: {name_frames(lost)} {why}", hint, video.path)
-    for since, camera, video in zip(frozen_from(news), cameras, videos, strict=True):
+    for since, camera, video in zip(frozen_from(change), cameras, videos, strict=True):
         if since < length:
             when = f"repeats one picture from frame {since} on" if since else "shows one picture from first to last"
             left = ", or does nobody come into its view any more" if since else ""
@@ -133,12 +138,12 @@ def look_through(video: Video) -> tuple[list[int], F64]:
 
     The latter (N,) is in grey levels, NaN without a picture or one before it.
     """
-    lost, news, before = [], np.full(video.declared, np.nan), None
+    lost, change, before = [], np.full(video.declared, np.nan), None
     for index, (image, _) in enumerate(read_frames(video, range(video.declared))):
         if image is None:
             lost.append(index)
             continue
         if before is not None:
-            news[index] = difference(image, before)
+            change[index] = difference(image, before)
         before = image
-    return lost, news
+    return lost, change

@@ -36,7 +36,7 @@ def lookalike(grey: F32, room: F32) -> tuple[Bool, npt.NDArray[np.intp]]:
 
 
 def shows_person(grey: F32, room: F32, good: Bool) -> Bool:
-    """Return (T, C) which thumbnails differ from the empty room (C, S, S): an empty one has no news either.
+    """Return (T, C) which thumbnails differ from the empty room (C, S, S): an empty one hardly changes either.
 
     Args:
         grey: (T, C, S, S) thumbnails.

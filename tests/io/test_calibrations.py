@@ -68,7 +68,7 @@ def test_anipose_names_and_metadata(tmp_path):
     path.write_text(
         '[cam_0]\nname = "A"\nsize = [64, 48]\nmatrix = [[60, 0, 31.5], [0, 60, 23.5], [0, 0, 1]]\n'
         "distortions = [0.1, 0, 0, 0, 0]\nrotation = [0, 0, 0]\ntranslation = [0, 0, 3]\n\n"
-        "[metadata]\nadjusted = false\nframe_rate = 60\n[charuco]\ncolumns = 4\n"
+        "[metadata]\nadjusted = false\nframe_rate = 60\n[charuco]\nsize = [4, 5]\n"
     )
     (camera,) = read_cameras(path)
     assert camera.name == "A"

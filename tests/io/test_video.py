@@ -217,20 +217,29 @@ def test_a_late_video_ends_earlier_and_is_not_broken(tmp_path):
     assert [reason for image, reason in rows if image is None] == ["the video ends earlier"] * 3
 
 
-def test_sound_that_is_longer_than_the_pictures_is_no_video_that_breaks_off(tmp_path):
-    with av.open(str(tmp_path / "a.mkv"), "w") as file:
-        stream = file.add_stream("mpeg4", rate=25)
+@pytest.mark.parametrize("count", [1, 2])
+@pytest.mark.parametrize("ending", ["mp4", "mkv", "avi"])
+def test_a_video_of_hardly_any_pictures(tmp_path, count, ending):
+    video = open_video(write_video(tmp_path / f"a.{ending}", count))
+    assert (video.frames, video.declared, video.frame_rate, video.uneven) == (count, count, 25.0, 0.0)
+    assert [number_of(image) for image, _ in read_frames(video, range(count))] == list(range(count))
+
+
+@pytest.mark.parametrize("name", ["a.mkv", "a.mpg"])
+def test_sound_that_is_longer_than_the_pictures_is_no_video_that_breaks_off(tmp_path, name):
+    with av.open(str(tmp_path / name), "w") as file:
+        stream = file.add_stream("mpeg2video", rate=25)
         stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
-        sound = file.add_stream("pcm_s16le", rate=8000, layout="mono")
-        silence = av.AudioFrame.from_ndarray(np.zeros((1, 24000), np.int16), "s16", "mono")
-        silence.sample_rate = 8000
+        sound = file.add_stream("mp2", rate=16000, layout="mono")
+        silence = av.AudioFrame.from_ndarray(np.zeros((1, 48000), np.int16), "s16", "mono")
+        silence.sample_rate = 16000
         file.mux(sound.encode(silence))
         for number in range(10):
             frame = av.VideoFrame.from_ndarray(picture(number), "bgr24")
             frame.pts = number + 2
             file.mux(stream.encode(frame))
         file.mux(stream.encode(None))
-    video = open_video(tmp_path / "a.mkv")
+    video = open_video(tmp_path / name)
     assert (video.frames, video.declared) == (10, 10)
 
 
@@ -264,10 +273,14 @@ def test_gaps_in_the_time_stamps_are_lost_frames():
     jitter = np.random.default_rng(0).uniform(-0.2, 0.2, 30) * period
     assert number_frames(np.arange(30) * period + jitter).tolist() == list(range(30))
     assert number_frames(np.round(np.arange(3000) * period)).tolist() == list(range(3000))  # times in whole ms
+    kept = np.delete(np.arange(300), [40, 41, 90, 200])
+    for rate in (150, 180):  # whole milliseconds, at which the median is far from the period
+        assert number_frames(np.round(kept * 1000 / rate)).tolist() == kept.tolist()
     late = np.array([0, 1, 2.6, 3, 4.7, 5, 6, 9, 10, 12.6, 13, 14])  # 7, 8 and 11 are lost
     assert number_frames(late).tolist() == [0, 1, 2, 3, 4, 5, 6, 9, 10, 12, 13, 14]
     assert number_frames(np.zeros(4)).tolist() == [0, 1, 2, 3]
     assert number_frames(np.zeros(1)).tolist() == [0]
+    assert number_frames(np.array([0.0, 1, 4])).tolist() == [0, 1, 4]
     assert number_frames(np.array([0.0, 3, 1, 1, 2])).tolist() == [0, 3, 1, 1, 2]
 
 

@@ -267,18 +267,18 @@ def test_a_limb_is_also_sampled_from_each_further_joint_on() -> None:
 
 
 def test_a_leg_stays_where_an_arm_was_lost() -> None:
-    """The leg takes the place of cloth that flies: it lies nearer to the person, but nothing of it had strayed."""
+    """The leg takes the place of cloth that flies: it lies nearer to the person, but nothing of it was off."""
     body = template_body()
     leg, arm = (np.flatnonzero(body.screw_joint == body.joint(name)) for name in ("hip_l", "shoulder_r"))
 
-    def stray(poses):
+    def mismatch(poses):
         return np.array([100.0 * (not p.angles[arm].any()) + 5.0 * (not p.angles[leg].any()) for p in poses])
 
     fitted = Pose(root=POSE.root, angles=np.zeros(len(body.twists)))
     found = Pose(root=POSE.root, angles=fitted.angles + 0.1)
-    kept = without_idle_parts(stray, found, fitted, body, 0.1)
+    kept = without_idle_parts(mismatch, found, fitted, body, 0.1)
     assert kept.angles[arm].all() and not kept.angles[leg].any()
-    assert without_idle_parts(stray, found, fitted, body, 0.01).angles[leg].all()
+    assert without_idle_parts(mismatch, found, fitted, body, 0.01).angles[leg].all()
 
 
 def test_a_foot_does_not_turn_because_its_leg_was_found() -> None:
@@ -441,13 +441,13 @@ def test_a_first_frame_is_searched_near_the_pose_it_starts_from(past, found) -> 
 
 
 @pytest.mark.parametrize(
-    ("strays", "apart", "taken"),
+    ("uncovered", "apart", "taken"),
     [(0.0, 1.9, True), (0.0, 2.1, False), (90.0, 1.9, False), (90.0, 0.8, True)],
     ids=["cured", "cured but far off", "as doubtful", "clearly nearer"],
 )
-def test_a_doubt_that_is_cured_may_cost_distance(strays, apart, taken) -> None:
+def test_a_doubt_that_is_cured_may_cost_distance(uncovered, apart, taken) -> None:
     result = settled(pictures.tiny_state(SCENE, POSE, POSE))
-    fit, other = (Fit(result, Mismatch(area, 0.0, 0.0, 0.0), far) for area, far in ((100.0, 1.0), (strays, apart)))
+    fit, other = (Fit(result, Mismatch(area, 0.0, 0.0, 0.0), far) for area, far in ((100.0, 1.0), (uncovered, apart)))
     assert (LimbSearch()._better(other, fit) is other) == taken
 
 

@@ -22,14 +22,14 @@ def before(frame: int, appearance) -> Past:
     return replace(past, moments=(replace(past.moments[0], time=(frame - 1) / 30),), appearance=appearance)
 
 
-def searched(strays, found: FrameResult = FITTED, every: int = 4) -> list[int]:
-    """Return the frames that are searched if so much (cm²) strays in each, and they stay doubted."""
+def searched(mismatches, found: FrameResult = FITTED, every: int = 4) -> list[int]:
+    """Return the frames that are searched if each has such a mismatch (cm²), and they stay doubted."""
     appearance, frames = {}, []
-    for frame, strayed in enumerate(strays):
+    for frame, mismatch in enumerate(mismatches):
         past = before(frame, appearance)
-        if history_of(past).due(strayed, frame / 30, past, every):
+        if history_of(past).due(mismatch, frame / 30, past, every):
             frames.append(frame)
-            result = with_search(replace(found, doubted=True), FITTED, strayed, past)
+            result = with_search(replace(found, doubted=True), FITTED, mismatch, past)
             appearance = result.state.segmentation.appearance
     return frames
 

@@ -50,7 +50,7 @@ def fitted(pose: Pose, cost: float = 0.5) -> FrameResult:
 
 
 @pytest.fixture(autouse=True)
-def stray(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+def mismatch(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """Of the person off the model, cm²: in the fit that stands, and in the other one."""
     areas = [0.0, 0.0]
     monkeypatch.setattr(Refitter, "mismatches", lambda *given: tuple(areas))
@@ -98,15 +98,17 @@ def test_what_a_frame_knows_of_those_before_it_is_their_better_fit():
     assert fits.past(ROW + 2, {}).moments[-1].pose.angles[KNEE] == TRUE.angles[ROW + 1, KNEE]
 
 
-def test_feet_that_look_like_the_floor_stay_unmatched(looked, monkeypatch):
+@pytest.mark.parametrize("row", [ROW, len(TRUE.frame) - 1])
+def test_feet_that_look_like_the_floor_stay_unmatched(looked, monkeypatch, row):
     def told(finder, frame, result, past, model):
         known = replace(result.state.segmentation, appearance={FEET: np.ones(3)})
         return replace(result, state=replace(result.state, segmentation=known))
 
     monkeypatch.setattr(LimbSearch, "with_camouflaged_feet", told)
-    second_look(astray(ROW))
-    colours, *again = (past.appearance for _, past, _ in looked)
-    assert FEET not in colours and all(FEET in known for known in again)
+    second_look(astray(row))
+    (_, colours, _), *_, (last, known, _) = looked
+    assert FEET not in colours.appearance
+    assert last == row and FEET in known.appearance
 
 
 def test_a_limb_that_was_lost_for_some_frames_is_followed_back(looked):
@@ -115,6 +117,30 @@ def test_a_limb_that_was_lost_for_some_frames_is_followed_back(looked):
     np.testing.assert_array_equal(again.angles, TRUE.angles)
     indices = [index for index, *_ in looked]
     assert set(rows) <= set(indices) and len(indices) < 2 * len(rows)
+
+
+def test_a_frame_is_due_again_when_one_beside_it_has_another_fit(monkeypatch):
+    track, asked = astray(ROW, ROW + 1), []
+
+    def settle(loop, frame, past, model, pose, parameters):
+        asked.append(frame.index)
+        lost = frame.index == ROW + 1 and asked.count(ROW + 1) == 1
+        return fitted((track if lost else TRUE).pose(frame.index), cost=0.49)
+
+    monkeypatch.setattr(CoupledLoop, "settled", settle)
+    np.testing.assert_array_equal(second_look(track).angles, TRUE.angles)
+
+
+def test_a_frame_that_has_another_fit_is_not_fitted_again(monkeypatch):
+    asked, better = [], astray(ROW, ROW + 1, by=0.5)
+
+    def settle(loop, frame, past, model, pose, parameters):
+        asked.append(frame.index)
+        return fitted(better.pose(frame.index), cost=0.49)
+
+    monkeypatch.setattr(CoupledLoop, "settled", settle)
+    np.testing.assert_array_equal(second_look(astray(ROW, ROW + 1)).angles, better.angles)
+    assert asked.count(ROW) == asked.count(ROW + 1) == 1
 
 
 @pytest.mark.parametrize("end", [0, len(TRUE.frame) - 1])
@@ -152,11 +178,11 @@ def test_the_pictures_have_their_say(monkeypatch, cost, kept):
 
 
 @pytest.mark.parametrize(("areas", "kept"), [((0.0, 400.0), True), ((100.0, 0.0), False)])
-def test_what_strays_has_its_say(monkeypatch, stray, areas, kept):
+def test_the_mismatch_has_its_say(monkeypatch, mismatch, areas, kept):
     track = astray(ROW)
     cost = 0.5 if kept else 0.6  # of silhouettes that like the other fit, or do not
     monkeypatch.setattr(CoupledLoop, "settled", lambda *given: fitted(TRUE.pose(given[1].index), cost))
-    stray[:] = areas
+    mismatch[:] = areas
     assert (second_look(track) is track) is kept
 
 
@@ -184,6 +210,8 @@ def test_times_say_where_between_a_frame_is():
     fits = RevisedTrack(replace(TRUE, time=np.where(TRUE.frame < 13, TRUE.time, TRUE.time + 2 / 30)), SCENE.body)
     quarter = fits.between(12).angles[KNEE]
     assert abs(quarter - (0.75 * TRUE.angles[11, KNEE] + 0.25 * TRUE.angles[13, KNEE])) < 1e-12
+    midway = RevisedTrack(TRUE, SCENE.body).between(12)
+    assert fits.leap_of(12, fits.between(12)) < 0.1 * fits.leap_of(12, midway)
 
 
 def test_leaps_are_what_joints_are_off_by():
@@ -193,6 +221,16 @@ def test_leaps_are_what_joints_are_off_by():
     leaps = RevisedTrack(replace(track, root=root), SCENE.body).leaps()
     np.testing.assert_allclose(leaps[[19, 20, 21]], [0.025, 0.05, 0.025], atol=1e-9)
     assert leaps[:19].max() < 1e-12 and leaps[22:].max() < 1e-12
+
+
+@pytest.mark.parametrize("end", [0, len(TRUE.frame) - 1])
+def test_an_end_leaps_by_what_the_frame_beside_it_is_off_by(end):
+    root = np.tile(TRUE.root[:1], (40, 1, 1))
+    root[end, 0, 3] += 0.05
+    fits = RevisedTrack(replace(TRUE, root=root, angles=np.tile(TRUE.angles[:1], (40, 1))), SCENE.body)
+    beside = 1 if end == 0 else end - 1
+    assert fits.leap_of(end, fits.pose(end)) == pytest.approx(0.025)
+    assert fits.leap_of(end, fits.pose(beside)) == pytest.approx(0, abs=1e-12)
 
 
 def test_wide_arrays_stay_on_the_drive():

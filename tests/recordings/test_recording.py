@@ -14,7 +14,7 @@ import pytest
 
 from mocapflow.errors import RecordingError
 from mocapflow.io import rates
-from mocapflow.io.cameras import write_cameras
+from mocapflow.io.cameras import read_cameras, write_cameras
 from mocapflow.io.video import VIDEOS
 from mocapflow.recordings.doctor import examine
 from mocapflow.recordings.recording import open_recording
@@ -157,17 +157,18 @@ def test_two_videos_of_one_camera(tmp_path):
 def test_names_of_files_with_the_dots_of_an_umlaut_apart(tmp_path):
     """As macOS writes them."""
     write_recording(tmp_path, frames=2)
-    (tmp_path / "cameras.toml").write_text((tmp_path / "cameras.toml").read_text().replace("cam02", "T\u00fcr"))
     apart = "Tu\u0308r"
+    (tmp_path / "cameras.toml").write_text((tmp_path / "cameras.toml").read_text().replace("cam02", apart))
     (tmp_path / "videos" / "cam02.mp4").rename(tmp_path / "videos" / f"{apart}.mp4")
-    for folder in (tmp_path / "background" / apart, tmp_path / "keypoints" / f"{apart}_json"):
+    for folder in (tmp_path / "background" / apart, tmp_path / "keypoints" / f"{apart}_json", tmp_path / "occluders"):
         folder.mkdir(parents=True)
     (tmp_path / "recording.json").write_text(json.dumps({"late_frames": {apart: 1}}))
-    cv2.imwrite(str(tmp_path / "background" / apart / "0.png"), picture(0))
+    for place in (f"background/{apart}/0.png", f"occluders/{apart}.png"):
+        cv2.imwrite(str(tmp_path / place), picture(0))
     recording = open_recording(tmp_path)
     assert [recording.lenses[1].name, recording.videos[1].late] == ["T\u00fcr", 1]
     assert recording.keypoint_folders == (None, tmp_path / "keypoints" / f"{apart}_json", None)
-    assert f"background/{apart}/0.png" in recording.content
+    assert {f"background/{apart}/0.png", f"occluders/{apart}.png"} <= set(recording.content)
 
 
 def test_unequal_lengths(tmp_path):
@@ -235,12 +236,12 @@ def test_a_video_turned_by_a_quarter(tmp_path):
     assert "the video is turned by a quarter, perhaps by a mark in the file" in refused(tmp_path)
 
 
-def changed(tmp_path, matrix=None, distortion=None):
-    """Return a recording whose second camera has another matrix or distortion."""
+def changed(tmp_path, matrix=None, distortion=None, fisheye=False):
+    """Return a recording whose second camera has another matrix or lens."""
     cameras = list(ring())
     given = {"intrinsics": matrix, "distortion": distortion}
     new = {key: np.array(value, float) for key, value in given.items() if value is not None}
-    cameras[1] = replace(cameras[1], **new)
+    cameras[1] = replace(cameras[1], fisheye=fisheye, **new)
     return write_recording(tmp_path, frames=2, cameras=cameras)
 
 
@@ -252,13 +253,28 @@ def test_a_focal_length_in_millimetres(tmp_path):
     )
 
 
+def test_cameras_whose_size_no_file_tells_are_no_rig_that_is_wrong(tmp_path):
+    folder = changed(tmp_path, [[4.2, 0, 31.5], [0, 4.2, 23.5], [0, 0, 1]])
+    write_easymocap(folder, read_cameras(folder), sizes=False)
+    (folder / "cameras.toml").unlink()
+    (told,) = [finding.message for finding in examine(folder) if finding.severity == "error"]
+    assert told == "camera 'cam02' has a focal length of 4.2 px in pictures of 64"
+
+
 @pytest.mark.parametrize(
     ("matrix", "distortion", "said"),
     [
         ([[60, 0, 0], [0, 60, 0], [0, 0, 1]], None, "principal point (0, 0) is not in its pictures of 64 x 48 px"),
+        (
+            [[60, 0, 63], [0, 60, 23.5], [0, 0, 1]],
+            None,
+            "principal point (63, 23.5) is not in its pictures",
+        ),
         (None, [-0.1, 0.1, 0.05, 0.001, 0], "tangential distortion moves pixels by "),
-        (None, [-3, 0, 0, 0, 0], "distortion shows nothing in 86% of the picture, as that of no lens"),
+        (None, [-3, 0, 0, 0, 0], "distortion folds 62% of the undistorted picture, as no lens does"),
         (None, [-0.3, 0.1, 0.002, 0.001, 0], ""),
+        # of a GoPro: it folds what lies beyond the undistorted picture
+        ([[28.6, 0, 32.2], [0, 29.2, 24.7], [0, 0, 1]], [-0.2576, 0.0877, -0.0003, -0.0006, -0.0152], ""),
     ],
 )
 def test_numbers_that_no_lens_has(tmp_path, matrix, distortion, said):
@@ -266,11 +282,15 @@ def test_numbers_that_no_lens_has(tmp_path, matrix, distortion, said):
     assert [text[: len(said) + 11] for text in warnings[:1]] == ([f"cam02: its {said}"] if said else [])
 
 
+def test_a_fisheye_has_no_tangential_coefficients(tmp_path):
+    assert not open_recording(changed(tmp_path, distortion=[-0.1, 0.1, 0.05, 0.001, 0], fisheye=True)).warnings
+
+
 def test_a_run_is_told_of_a_world_that_is_not_z_up(tmp_path):
     turned = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
     cameras = [replace(c, camera_from_world=c.camera_from_world @ turned.T) for c in ring()]
     said = open_recording(write_recording(tmp_path, cameras=cameras)).warnings
-    assert said[0] == "the images' up is the y axis of the world: the world has to be z up: turn the calibration"
+    assert said[0].startswith("the images' up is the y axis of the world: the world has to be z up: turn ")
 
 
 def test_a_camera_later_than_the_recording_is_long(tmp_path):
@@ -396,10 +416,13 @@ def test_a_stated_frame_rate_does_not_hide_that_the_videos_differ(tmp_path):
     assert said.startswith("the videos differ in frame rate (cam01: 25 per second, cam02: 50 per second, cam03: 25")
 
 
+@pytest.mark.parametrize("stated", ["", "[metadata]\nframe_rate = 25\n"])
 @pytest.mark.parametrize(("rate", "apart"), [(25.1, ()), (25.2, ("0.3",))])
-def test_rates_that_are_nearly_one(tmp_path, monkeypatch, rate, apart):
+def test_rates_that_are_nearly_one(tmp_path, monkeypatch, rate, apart, stated):
     monkeypatch.setattr(rates, "OFF", 0.3)
     write_recording(tmp_path, frames=40)
+    with (tmp_path / "cameras.toml").open("a") as file:
+        file.write(stated)
     write_video(tmp_path / "videos" / "cam02.mp4", 40, rate=rate)
     found = open_recording(tmp_path)
     assert found.frame_rate == 25
@@ -421,9 +444,10 @@ def test_a_frame_rate_that_varies(tmp_path):
             file.mux(stream.encode(frame))
         file.mux(stream.encode(None))
     with (tmp_path / "cameras.toml").open("a") as file:
-        file.write("[metadata]\nframe_rate = 25\n")
+        file.write("[metadata]\nframe_rate = 250\n")  # slow motion
     said = open_recording(tmp_path).warnings
     assert said[0].startswith("cam02: its frame rate varies, which puts frames up to ")
+    assert "ffmpeg -i IN -vf fps=25 " in said[0]
     assert said[0] in [finding.message for finding in examine(tmp_path)]
 
 
