@@ -79,8 +79,6 @@ def export(run: Run, format_: Format, recording: Moved = None) -> None:
 
     Code may have changed since; pipeline and recording may not.
     """
-    from mocapflow_export.export import files_of
-
     from mocapflow.running.former_code import as_made
 
     _check_formats(format_)
@@ -102,10 +100,9 @@ def export(run: Run, format_: Format, recording: Moved = None) -> None:
             with reporter() as report:
                 prepared = as_made(prepared, keys, report)
         prepared.check(run)
-        typer.echo(carry_out(prepared, run))
-    for name in format_:
-        for file in files_of(name):
-            typer.echo(run / file)
+        summary = carry_out(prepared, run)
+    for line in (summary, *summary.files):
+        typer.echo(line)
 
 
 def _check_formats(formats: Sequence[str]) -> None:

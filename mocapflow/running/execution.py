@@ -20,7 +20,7 @@ from mocapflow.interrupts import check
 from mocapflow.output_checks import of_kind
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import silent
-from mocapflow.results import RunFolder
+from mocapflow.results import Files, RunFolder
 from mocapflow.running.component_failures import LOG, naming_failures
 from mocapflow.running.progress import Progress
 from mocapflow.running.recipes import Step
@@ -67,6 +67,7 @@ class Execution:
         self._results: dict[str, Any] = {}
         self._scenes: dict[tuple[str | None, str | None], Scene] = {}
         self.entries: dict[str, Mapping[str, Any]] = {}  # per finished stage
+        self.files: list[Path] = []  # that stages have written
 
     def finish(self, step: Step) -> None:
         """Make sure that the result of a stage exists; a cached one is usually not even read."""
@@ -134,7 +135,7 @@ class Execution:
     def _whole(self, step: Step) -> Made:
         made = self._run(step)
         begun = self._store.begin(step.label, step.key, step.recipe)
-        with self._naming(step.named.stage):
+        with self._naming_failures(step.named.stage):
             self._store.save(begun, made.value, warnings=made.warnings)
         return made
 
@@ -169,7 +170,7 @@ class Execution:
         self._report(f"{step.label}: running {step.named.stage.name}")
         check()
         cpu, wall, stage = time.process_time(), time.perf_counter(), step.named.stage
-        with warnings_logged(self._pipeline.registry.packages) as said, self._naming(stage, checkpoint):
+        with warnings_logged(self._pipeline.registry.packages) as said, self._naming_failures(stage, checkpoint):
             if checkpoint is not None:
                 checkpoint.keep_warnings(said)
             value = of_kind(stage, stage.run(**inputs), made_by(step.named))
@@ -211,17 +212,19 @@ class Execution:
 
     def _body(self) -> Body:
         model = self._pipeline.body
-        with self._naming(model):
+        with self._naming_failures(model):
             return body_of(model, self._pipeline.recording)
 
     def _sewn(self, garment: Garment, body: Body) -> GarmentMesh:
         try:
-            with self._naming(garment):
+            with self._naming_failures(garment):
                 return mesh_of(garment, body)
         except GarmentError as error:
             raise GarmentError(error.message, where=self._pipeline.garment_where, hint=error.hint) from None
 
-    def _naming(self, component: Component, checkpoint: Checkpoint | None = None) -> AbstractContextManager[None]:
+    def _naming_failures(
+        self, component: Component, checkpoint: Checkpoint | None = None
+    ) -> AbstractContextManager[None]:
         def kept() -> str:
             return checkpoint.kept if checkpoint else ""
 
@@ -237,6 +240,7 @@ class Execution:
 
     def _enter_made(self, step: Step, made: Made) -> Any:
         self._enter(step, made, cached=False)
+        self.files += made.value.paths if isinstance(made.value, Files) else ()
         return made.value
 
     def _enter(self, step: Step, made: Made, cached: bool) -> None:

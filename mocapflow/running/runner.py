@@ -51,6 +51,7 @@ class RunSummary:
     out: Path
     store: Path
     stages: tuple[Mapping[str, Any], ...]
+    files: tuple[Path, ...]  # that stages have written
 
     def __str__(self) -> str:
         spent = ["from the store" if s["cached"] else f"{s['seconds']:.1f} s of CPU" for s in self.stages]
@@ -95,7 +96,9 @@ class Prepared:
             for step in self.steps:
                 if only is None or step.label == only:
                     execution.finish(step)
-        return RunSummary(out=out, store=self.store.path, stages=tuple(execution.entries.values()))
+        return RunSummary(
+            out=out, store=self.store.path, stages=tuple(execution.entries.values()), files=tuple(execution.files)
+        )
 
     def _check_inputs(self, fresh: bool) -> None:
         """Check that everything is there that has to be read; what comes from the store needs nothing.

@@ -12,7 +12,7 @@ from mocapflow.recordings.recording import Recording
 from mocapflow.results import Files, RunFolder, Track, ViewChecks
 from mocapflow.scene import Scene
 from mocapflow_export import layout, runjson, tables
-from mocapflow_export.formats import FILES, Result, need_packages, write
+from mocapflow_export.formats import Result, need_packages, write
 from mocapflow_export.quality_warnings import quality_warnings
 from mocapflow_export.uncertainty import measured
 
@@ -69,12 +69,6 @@ class Export(WriteFormats):
         warnings = (*result.recording.warnings, *scene.warnings, *quality)
         content = runjson.summary(track, scene.body, measured(track, scene), run_folder, warnings)
         return [*paths, runjson.write(layout.place(run_folder.path, layout.RUN), content)]
-
-
-def files_of(name: str) -> tuple[Path, ...]:
-    """Return where the files of a format are in a run folder."""
-    own = {"csv": (layout.ANGLES, layout.RAW_ANGLES, layout.ENERGY), "mot": (layout.MOTION,), "trc": (layout.JOINTS,)}
-    return own[name] if name in own else (layout.RESULTS / FILES[name],)
 
 
 def written(name: str, result: Result, folder: Path) -> list[Path]:
