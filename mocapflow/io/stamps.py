@@ -48,7 +48,7 @@ def open_stream(path: Path) -> Iterator[VideoStream]:
     import av
 
     try:
-        container = av.open(for_opencv(path), metadata_errors="replace")  # some titles are no UTF-8
+        container = av.open(for_opencv(path), **_lenient(av.__version__))
     except av.FFmpegError:
         raise undecodable(path) from None
     with container:
@@ -57,6 +57,11 @@ def open_stream(path: Path) -> Iterator[VideoStream]:
             raise undecodable(path)
         stream.codec_context.thread_count = 1
         yield stream
+
+
+def _lenient(version: str) -> dict[str, Any]:
+    """Return what makes a version of PyAV open a file whose title is no UTF-8; from 19 on it does so by itself."""
+    return {"metadata_errors": "replace"} if int(version.split(".")[0]) < 19 else {}
 
 
 def undecodable(path: Path) -> RecordingError:
