@@ -61,7 +61,7 @@ def open_stream(path: Path) -> Iterator[VideoStream]:
 
 def _lenient(version: str) -> dict[str, Any]:
     """Return what makes a version of PyAV open a file whose title is no UTF-8; from 19 on it does so by itself."""
-    return {"metadata_errors": "replace"} if int(version.split(".")[0]) < 19 else {}
+    return {"metadata_errors": "replace"} if int(version.partition(".")[0]) < 19 else {}
 
 
 def undecodable(path: Path) -> RecordingError:
