@@ -285,6 +285,7 @@ class Start:
 
     pose: Pose
     parameters: F64 = array("Q", unit="by name")
+    others: tuple[Pose, ...] = ()  # that may be right as well: the track begins from the one that fits best
 
 
 def empty_matches() -> Matches:

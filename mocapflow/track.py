@@ -164,10 +164,23 @@ class CoupledLoop(Stage):
         if past.moments:
             pose = pose_of(self.predictor, frame, past, model.scene)
             parameters = past.moments[-1].cloth.parameters
+        elif start.others and seen(frame):
+            pose = self.best_start(frame, start, model)
         watch.lap("predict")
         cloth = model.drape(pose, parameters, past)
         watch.lap("drape")
         return initial_state(pose, parameters, cloth)
+
+    def best_start(self, frame: Frame, start: Start, model: ClothedModel) -> Pose:
+        """Return of the poses that a start leaves open the one that the loop fits best to the first frame."""
+
+        def cost(pose: Pose) -> float:
+            begun = initial_state(pose, start.parameters, model.drape(pose, start.parameters, Past()))
+            near = self.approach(frame, begun, Past(), model)
+            result = settle(frame, near, Past(), self.steps, model, silent)
+            return image_cost(result.energy, result.energy_terms)
+
+        return min((start.pose, *start.others), key=cost)
 
     def approach(self, frame: Frame, state: FrameState, past: Past, model: ClothedModel) -> FrameState:
         """Return a first or second frame's state moved near the person by the first segmenter, if there is one.

@@ -18,6 +18,7 @@ import pytest
 from mocapflow.components import Segmenter
 from mocapflow.errors import ComponentFailed, PipelineError
 from mocapflow.loop import settle
+from mocapflow.prediction import initial_state
 from mocapflow.recordings.recording import Recording
 from mocapflow.running.runner import run
 from mocapflow.storage.store import Store
@@ -228,6 +229,20 @@ def test_what_the_first_segmenter_finds_is_kept_where_images_fit_better_from_the
     given, stayed, approached, kept = begins
     assert stayed is given
     assert kept is (approached if helps else given)
+
+
+@pytest.mark.parametrize("costs", [(1.0, 3.0, 2.0), (3.0, 2.0, 1.0)])
+def test_of_the_poses_that_a_start_leaves_open_the_one_that_fits_best_begins(tmp_path, monkeypatch, begun, costs):
+    """Each is tried on the first frame, and on no other."""
+    told, begins = iter(costs), []
+    monkeypatch.setattr("mocapflow.track.image_cost", lambda *energy: next(told))
+    monkeypatch.setattr(
+        "mocapflow.track.initial_state", lambda *state: begins.append(state[0]) or initial_state(*state)
+    )
+    stages = SHORT | {"start": {"use": "tiny_start", "others": 2}}
+    run_tiny(write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=stages), tmp_path, frames=2)
+    assert begun == [(0, 0)] * 4 + [(1, 1)]
+    assert begins[3] is begins[int(np.argmin(costs))]
 
 
 @pytest.mark.parametrize("without", [True, False])

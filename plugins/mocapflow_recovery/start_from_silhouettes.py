@@ -12,6 +12,7 @@ from mocapflow_draping.kinematic import Kinematic
 from mocapflow_priors.density import Density, Poses, read
 from mocapflow_priors.parzen import SHIPPED
 
+from mocapflow.assets import Body
 from mocapflow.components import Stage
 from mocapflow.data import NO_CLOTH, Past, Pose, Start
 from mocapflow.dressing.roles import Draper
@@ -21,8 +22,9 @@ from mocapflow.model import ClothedModel
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow.scene import Scene
+from mocapflow_recovery.candidates import farthest_points, likely_headings, separate_minima
 from mocapflow_recovery.disagreement import HANGING
-from mocapflow_recovery.placing import centred, heading_between, largest_changes, mask_centre, placed
+from mocapflow_recovery.placing import centred, largest_changes, mask_centre, placed
 from mocapflow_recovery.sampling import SHARES, Cost, Plan, Spread, search
 from mocapflow_recovery.scoring import FACES, Scorer
 from mocapflow_recovery.trimaps import small_room, trimaps
@@ -34,11 +36,9 @@ SAMPLES, SEEN_SAMPLES = 40, 60  # of each part in a round, and of each limb as i
 CANDIDATES = 24  # of the poses that people were seen in, as unlike each other as can be; standing upright is the first
 DIRECTIONS = 16  # in which each of them is turned
 SEARCHES = 4  # from the best pose of as many directions
-REPEATS = 4  # of the best one, as far as that helps
+REPEATS = 4  # of those that may be right, as far as that helps
 NATURAL = np.radians(20.0)  # a pose so far in each angle from all that were seen counts as twice as far off
-OTHERWISE = np.radians(60.0)  # between two directions that a person looks in
 ENOUGH = 0.95  # times the cost before: a search that gains less is the last
-ALIKE = 1.5  # times the least cost: so little worse, and another direction may be the right one
 
 
 class Target(NamedTuple):
@@ -52,8 +52,9 @@ class StartFromSilhouettes(Stage):
     """Finds the pose of the first frame by what differs from the clean plates: the person, and nobody else.
 
     Poses that people were seen in are put where the rays through the middles of the silhouettes meet, and turned all
-    ways. The best of some directions are searched part by part, as `limb_search` does, and the one that ends nearest to
-    the silhouettes again, as long as that helps. The garment is draped on each: bare legs would spread to fill a skirt.
+    ways. The best of some directions are searched part by part, as `limb_search` does, and those that end nearest to
+    the silhouettes again, as long as that helps. If two that look different ways stay alike, the track takes the one
+    that its first frame fits better. The garment is draped on each: bare legs would spread to fill a skirt.
     The farther a pose is from all that were seen the farther it counts: what silhouettes do not tell, such as how an
     arm before the trunk is turned, stays natural. It is some 10° off in each joint; the first frame of a track that has
     `first_segmenter` and `recovery` mends that.
@@ -86,18 +87,14 @@ class StartFromSilhouettes(Stage):
             search(cost, begin, scene.body, plan, np.random.default_rng(number))
             for number, begin in enumerate(self._begins(target, known, cost))
         ]
-        off = cost(ends)
-        best, least = ends[int(off.argmin())], float(off.min())
-        for again in range(REPEATS):
-            best = search(cost, best, scene.body, plan, np.random.default_rng(len(ends) + again))
-            before, least = least, float(cost([best])[0])
-            if least > ENOUGH * before:
-                break
-        LOG.info("first pose: %.1f mm off the silhouettes in the mean", 1000 * least)
-        others = [value for value, end in zip(off, ends, strict=True) if heading_between(end, best) > OTHERWISE]
-        if min(others, default=np.inf) < ALIKE * off.min():
-            LOG.warning("silhouettes of the first frame hardly tell which way the person looks: see the overlay")
-        return Start(pose=best, parameters=scene.neutral_parameters)
+        begins = [ends[row] for row in likely_headings(ends, cost(ends))]
+        found = [repeated(cost, begin, scene.body, plan, len(ends)) for begin in begins]
+        off = cost(found)
+        best, *others = (found[row] for row in likely_headings(found, off))
+        LOG.info("first pose: %.1f mm off the silhouettes in the mean", 1000 * off.min())
+        if others:
+            LOG.info("silhouettes hardly tell which way the person looks: the track tries %d ways", 1 + len(others))
+        return Start(pose=best, parameters=scene.neutral_parameters, others=tuple(others))
 
     def _target(self, recording: Recording, scene: Scene) -> Target:
         frame, background = recording.frame(recording.indices[0]), recording.background()
@@ -150,19 +147,12 @@ def costs(poses: Sequence[Pose], target: Target, known: F64) -> F64:
     return np.asarray(off * (1 + np.array(unusual) / NATURAL))
 
 
-def separate_minima(off: F64, count: int) -> list[int]:
-    """Return the directions, of N around a circle (N,), of least cost, best first; none beside a better one."""
-    chosen: list[int] = []
-    for turn in np.argsort(off):
-        if all(abs(int(turn) - other) not in (1, len(off) - 1) for other in chosen):
-            chosen.append(int(turn))
-    return chosen[:count]
-
-
-def farthest_points(poses: F64, count: int) -> list[F64]:
-    """Return the rest pose and those of N poses (N, D) that are farthest from it and each other."""
-    chosen, away = [np.zeros(poses.shape[1])], np.full(len(poses), np.inf)
-    while len(chosen) < min(count, len(poses) + 1):
-        away = np.minimum(away, ((poses - chosen[-1]) ** 2).sum(axis=1))
-        chosen.append(poses[int(away.argmax())])
-    return chosen
+def repeated(cost: Cost, pose: Pose, body: Body, plan: Plan, number: int) -> Pose:
+    """Return the pose that is searched again and again from one, as long as that helps; by samples from `number` on."""
+    least = float(cost([pose])[0])
+    for again in range(REPEATS):
+        pose = search(cost, pose, body, plan, np.random.default_rng(number + again))
+        before, least = least, float(cost([pose])[0])
+        if least > ENOUGH * before:
+            break
+    return pose

@@ -7,7 +7,7 @@ import pytest
 from mocapflow_bodies.template import Template
 from mocapflow_fitting.start_from_file import read_pose
 from mocapflow_recovery.placing import centred, heading_between, mask_centre, placed
-from mocapflow_recovery.start_from_silhouettes import StartFromSilhouettes, farthest_points, separate_minima
+from mocapflow_recovery.start_from_silhouettes import StartFromSilhouettes
 
 from mocapflow.config.pipeline import load_pipeline
 from mocapflow.data import NO_CLOTH, Pose
@@ -59,12 +59,6 @@ def test_a_pose_out_of_sight_stays_where_it_is(bare):
     )
 
 
-def test_the_poses_that_are_tried_are_unlike_each_other():
-    poses = np.array([[0.1, 0.0], [1.0, 0.0], [1.1, 0.0], [0.0, 0.9]])
-    np.testing.assert_array_equal(farthest_points(poses, 3), [[0, 0], [1.1, 0], [0, 0.9]])
-    assert len(farthest_points(poses, 9)) == 5
-
-
 def test_without_plates_it_says_what_else_there_is(tmp_path):
     (tmp_path / "videos").symlink_to(SKIRT / "videos")
     (tmp_path / "cameras.toml").symlink_to(SKIRT / "cameras.toml")
@@ -84,12 +78,6 @@ def test_an_empty_room_is_an_error(tmp_path):
     scene = Scene(cameras=recording.cameras, body=Template(shape=0.0).load(SKIRT))
     with pytest.raises(RecordingError, match="0 cameras show a person"):
         StartFromSilhouettes().run(recording, scene)
-
-
-def test_directions_that_are_searched_lie_apart():
-    off = np.array([3.0, 1.0, 2.0, 9.0, 9.0, 4.0, 9.0, 1.5])
-    assert separate_minima(off, 3) == [1, 7, 5]  # 2 and 0 lie beside better ones
-    assert separate_minima(off, 9) == [1, 7, 5, 3]
 
 
 @pytest.mark.long

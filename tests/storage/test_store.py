@@ -91,8 +91,10 @@ class Held:
     what: object
 
 
+POSE = Pose(root=np.eye(4), angles=np.array([0.1, np.nan]))
 VALUES = {
-    "start": Start(pose=Pose(root=np.eye(4), angles=np.array([0.1, np.nan])), parameters=np.empty(0)),
+    "start": Start(pose=POSE, parameters=np.empty(0)),
+    "open start": Start(pose=POSE, parameters=np.zeros(2), others=(POSE, POSE)),
     "background": Background(
         mean=(np.ones((2, 3, 3), "f4"), np.zeros((4, 5, 3), "f4")), spread=(np.ones((1, 1, 3), "f4"),)
     ),

@@ -1,0 +1,33 @@
+"""Which poses are searched: unlike each other, and one for each direction that may be right."""
+
+import numpy as np
+from mocapflow_recovery.candidates import farthest_points, likely_headings, separate_minima
+
+from mocapflow.data import Pose
+
+
+def test_the_poses_that_are_tried_are_unlike_each_other():
+    poses = np.array([[0.1, 0.0], [1.0, 0.0], [1.1, 0.0], [0.0, 0.9]])
+    np.testing.assert_array_equal(farthest_points(poses, 3), [[0, 0], [1.1, 0], [0, 0.9]])
+    assert len(farthest_points(poses, 9)) == 5
+
+
+def test_directions_that_are_searched_lie_apart():
+    off = np.array([3.0, 1.0, 2.0, 9.0, 9.0, 4.0, 9.0, 1.5])
+    assert separate_minima(off, 3) == [1, 7, 5]  # 2 and 0 lie beside better ones
+    assert separate_minima(off, 9) == [1, 7, 5, 3]
+
+
+def test_one_pose_for_each_way_that_a_person_may_look():
+    """Of those that hardly cost more than the best; the cheapest of each."""
+    poses = [heading(degrees) for degrees in (170, 10, -20, 90, 180)]
+    assert likely_headings(poses, np.array([1.3, 1.0, 1.2, 1.6, 1.4])) == [1, 0]
+    assert likely_headings(poses, np.array([1.3, 1.0, 1.2, 1.4, 1.1])) == [1, 4, 3]
+    assert likely_headings(poses[:1], np.array([2.0])) == [0]
+
+
+def heading(degrees):
+    """Return a pose turned about the vertical."""
+    root, turn = np.eye(4), np.radians(degrees)
+    root[:2, :2] = [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]
+    return Pose(root=root, angles=np.zeros(0))
