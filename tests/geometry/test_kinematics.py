@@ -116,33 +116,37 @@ def test_three_screws_reach_any_rotation_exactly(body):
     assert {"hip_l", "knee_r", "shoulder_l", "elbow_r", "spine"} <= set(balls)
     for _ in range(5):
         turns = {name: rng.uniform(-1.2, 1.2, 3) for name in balls}
-        back = rotations_from_angles(body, angles_from_rotations(body, turns))
+        angles = angles_from_rotations(body, turns)
+        assert not angles[[body.joint_names[joint] not in balls for joint in body.screw_joint]].any()  # the rest rests
+        back = rotations_from_angles(body, angles)
         for name in balls:
             np.testing.assert_allclose(back[name], turns[name], atol=1e-9)
 
 
-def test_gimbal_lock_still_gives_the_rotation():
-    axes = np.eye(3)
-    rotation = (
-        twists.exp(np.array([0, np.pi / 2, 0, 0, 0, 0.0]))[:3, :3] @ twists.exp(np.array([0, 0, 0.4, 0, 0, 0]))[:3, :3]
-    )
-    a, b, c = decompose(axes, rotation)
-    again = np.eye(3)
-    for axis, angle in zip(axes, (a, b, c), strict=True):
-        again = again @ twists.exp(np.append(angle * axis, np.zeros(3)))[:3, :3]
-    np.testing.assert_allclose(again, rotation, atol=1e-9)
+def composed(axes, angles):
+    """The rotation that turns about axes make up, the first outermost."""
+    made = np.eye(3)
+    for axis, angle in zip(axes, angles, strict=True):
+        made = made @ expm(angle * twists.hat(axis))
+    return made
 
 
-def test_fewer_screws_come_as_near_as_they_can():
-    axes = np.array([[1.0, 0, 0], [0, 1.0, 0]])
+@pytest.mark.parametrize("order", [[0, 1, 2], [1, 0, 2], [2, 1, 0]])  # right-handed and left-handed
+@pytest.mark.parametrize("middle", [-np.pi / 2, -0.7, 0.9, np.pi / 2])  # gimbal lock at both ends
+def test_turns_about_three_axes_are_found_again(order, middle):
+    axes = np.eye(3)[order]
+    rotation = composed(axes, [0.3, middle, 0.4])
+    np.testing.assert_allclose(composed(axes, decompose(axes, rotation)), rotation, atol=1e-9)
+
+
+@pytest.mark.parametrize("first", [0, 1, 2])
+def test_fewer_screws_come_as_near_as_they_can(first):
+    axes = np.eye(3)[[first, (first + 1) % 3]]
     rotation = twists.exp(np.array([0.5, -0.3, 0.2, 0, 0, 0]))[:3, :3]
     best = decompose(axes, rotation)
 
     def miss(angles):
-        made = np.eye(3)
-        for axis, angle in zip(axes, angles, strict=True):
-            made = made @ twists.exp(np.append(angle * axis, np.zeros(3)))[:3, :3]
-        return np.linalg.norm(made - rotation)
+        return np.linalg.norm(composed(axes, angles) - rotation)
 
     for move in np.vstack([np.eye(2), -np.eye(2)]) * 1e-3:
         assert miss(best) < miss(best + move)
