@@ -45,6 +45,14 @@ def test_columns_and_three_point_angles_are_those_of_the_truth(clip: str) -> Non
             assert np.abs(angles.three_point(points) + wish.offset - truth[:, column]).max() < 2e-3
 
 
+def test_centres_of_three_joints_make_the_angle_between_them() -> None:
+    shank, foot = np.array([0.0, 0.0, -0.4]), np.array([[0.2, 0.0, 0.0], [0.1, 0.0, -0.1]])  # flat, and pointed
+    places = {"knee_l": np.zeros((2, 3)), "ankle_l": np.tile(shank, (2, 1)), "toe_l": shank + foot}
+    found = angles.between_centres(places)
+    assert list(found) == ["ankle_l"] and found["ankle_l"] == pytest.approx([0.0, -45.0])
+    assert not angles.between_centres({"hip_l": shank, "knee_l": shank})  # hip flexion is of the pelvis, too
+
+
 def test_what_is_not_measured_is_said() -> None:
     body = stick_body()
     assert angles.unmeasured(body.joint_names) == ""
