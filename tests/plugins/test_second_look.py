@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -117,6 +118,22 @@ def test_a_limb_that_was_lost_for_some_frames_is_followed_back(looked):
     np.testing.assert_array_equal(again.angles, TRUE.angles)
     indices = [index for index, *_ in looked]
     assert set(rows) <= set(indices) and len(indices) < 2 * len(rows)
+
+
+def test_a_row_at_which_a_window_is_cut_is_fitted_in_the_next(looked, monkeypatch):
+    """There the row after it shows the colours; where it is the last, only those before it are at hand."""
+    shown = []  # (fits so far, row that shows colours)
+
+    def appearance(refitter, frame, row):
+        shown.append((len(looked), row))
+        return {}
+
+    monkeypatch.setattr(Refitter, "appearance", appearance)
+    again = second_look(astray(*range(ROW, ROW + 2 * WINDOW, 2)))
+    np.testing.assert_array_equal(again.angles, TRUE.angles)
+    assert len(shown) > 2
+    for (first, row), (after, _) in pairwise([*shown, (len(looked), 0)]):
+        assert all(index < row for index, *_ in looked[first:after])
 
 
 def test_a_frame_is_due_again_when_one_beside_it_has_another_fit(monkeypatch):
