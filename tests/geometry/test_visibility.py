@@ -41,7 +41,13 @@ def test_the_foremost_triangle_is_found():
     np.testing.assert_array_equal(vertex >= 0, face >= 0)
     assert 8 < (vertex >= 0).sum() < 40
     hit = vertex >= 0
-    assert (surface.faces[face[hit]] == vertex[hit, None]).any(axis=1).all()
+    corners = surface.faces[face[hit]]
+    shares = [  # of each corner in the point, on the picture
+        np.linalg.solve(np.vstack([image[each].T, np.ones(3)]), [*point, 1.0])
+        for each, point in zip(corners, points[hit], strict=True)
+    ]
+    nearest = np.take_along_axis(corners, np.argmax(shares, axis=1)[:, None], axis=1)[:, 0]
+    np.testing.assert_array_equal(vertex[hit], nearest)
 
 
 def test_no_points_and_points_beside_the_surface():

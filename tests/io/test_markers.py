@@ -42,6 +42,9 @@ def test_trc_header_is_opensim_s(tmp_path):
     assert lines[3].split("\t") == ["Frame#", "Time", "p", "", "", "q", "", ""]
     assert lines[4].split("\t") == ["", "", "X1", "Y1", "Z1", "X2", "Y2", "Z2"]
     assert lines[6].startswith("1\t0.00000000\t")
+    write_trc(tmp_path / "a.trc", ["p", "q"], np.array([[[1.0, 2.0, 3.0], [np.nan] * 3]]), 60.0)
+    row = (tmp_path / "a.trc").read_text().splitlines()[6].split("\t")
+    assert row[2:] == ["1.00000000", "2.00000000", "3.00000000", "", "", ""]  # what is not seen has no numbers
 
 
 def test_trc_in_mm(tmp_path):
