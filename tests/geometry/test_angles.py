@@ -7,7 +7,7 @@ import pytest
 
 from mocapflow.assets import Body
 from mocapflow.data import Pose
-from mocapflow.geometry import angles, twists
+from mocapflow.geometry import angles, kinematics, twists
 from mocapflow.model import moved
 from mocapflow.scene import Scene
 
@@ -109,6 +109,11 @@ def test_gradients_agree_with_finite_differences() -> None:
     value = angles.measure(body, np.stack([p.root for p in ends]), np.stack([p.angles for p in ends])).value
     numeric = np.radians(value[0::2] - value[1::2]) / (2 * step)  # (S, A)
     root, at = pose.root[None], pose.angles[None]
+    centres = dict(zip(body.joint_names, np.swapaxes(kinematics.joint_centres(body, root, at), 0, 1), strict=True))
+    series = angles.measure(body, root, at)
+    measured = dict(zip(series.names, series.value[0], strict=True))
+    for name, between in angles.between_centres(centres).items():
+        assert measured[name] == pytest.approx(between[0])
     for k in range(size):  # a covariance of one direction gives the size of the gradient in it
         direction = np.zeros((1, size, size))
         direction[0, k, k] = 1.0

@@ -124,6 +124,11 @@ def test_three_screws_reach_any_rotation_exactly(body):
             np.testing.assert_allclose(back[name], turns[name], atol=1e-9)
 
 
+def test_a_joint_without_screws_has_no_angles(body):
+    root = body.joint_names[0]
+    assert 0 not in body.screw_joint and not angles_from_rotations(body, {root: np.ones(3)}).any()
+
+
 def composed(axes, angles):
     """The rotation that turns about axes make up, the first outermost."""
     made = np.eye(3)

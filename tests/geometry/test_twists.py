@@ -56,6 +56,7 @@ def test_motions_are_a_group(size):
     close = dict(atol=1e-12, rtol=0)
     np.testing.assert_allclose(twists.exp(0.3 * twist) @ twists.exp(0.7 * twist), motion, **close)
     np.testing.assert_allclose(twists.exp(-twist), twists.inverse(motion), **close)
+    np.testing.assert_array_equal(twists.log(motion)[1], twists.log(b))  # with any leading axes
     both = twists.exp(twists.log(a @ b))
     np.testing.assert_allclose(both @ c, twists.exp(twists.log(a @ twists.exp(twists.log(b @ c)))), **close)
     rotation = both[:, :3, :3]

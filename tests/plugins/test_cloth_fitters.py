@@ -262,12 +262,53 @@ def test_samples_cover_every_force(model):
     assert (np.delete(beside, [2, 3], axis=1) == 0).all()
 
 
+def task_of(fitter, model, start, truth=None):
+    """What Gauss-Newton is asked for at some parameters, if the garment hangs by the true ones."""
+    surface = model.surface(STANDING, model.drape(STANDING, start, Past()))
+    estimate = Estimate(pose=STANDING, parameters=start, covariance=np.eye(10 + len(start)), observed=np.ones(4))
+    segmentation = seen(model, parameters(model) if truth is None else truth)
+    return Task(fitter, segmentation, estimate, model, model.scene.garment, Past(), surface)
+
+
+def test_a_parameter_costs_by_its_way_from_calm_in_deviations_of_its_range(model):
+    garment = model.scene.garment
+    column, bounds = garment.parameter_names.index("flare_rad"), garment.parameter_bounds.copy()
+    bounds[column] = [0.1, 0.5]  # calm is what is nearest to none
+    narrow = replace(model, scene=replace(model.scene, garment=replace(garment, parameter_bounds=bounds)))
+    start = parameters(narrow, flare_rad=0.3)
+    task = task_of(GaussNewton(cloth_sd=0.25, sigma_px=1e6), narrow, start)  # the outline hardly counts
+    cloth = narrow.drape(STANDING, start, Past())
+    assert task.energy(cloth) == pytest.approx(0.5 * 2**2, abs=1e-6)  # 0.2 off, by 0.25 of 0.4
+    equations = task.equations(cloth)
+    assert equations.energy == pytest.approx(2, abs=1e-6)
+    assert equations.gradient[column] == pytest.approx(2 / 0.1, rel=1e-6)
+    assert equations.hessian[column, column] == pytest.approx(1 / 0.1**2, rel=1e-6)
+
+
+def test_the_outline_costs_by_its_error_and_length_however_densely_it_is_looked_at(model):
+    start, truth = parameters(model), parameters(model, flare_rad=0.15)
+    cloth = model.drape(STANDING, start, Past())
+    cost = {
+        (sigma, spacing): task_of(GaussNewton(sigma_px=sigma, spacing_px=spacing), model, start, truth).energy(cloth)
+        for sigma, spacing in ((1.0, 4.0), (2.0, 4.0), (1.0, 2.0))
+    }
+    assert cost[1.0, 4.0] == pytest.approx(4 * cost[2.0, 4.0])
+    assert cost[1.0, 2.0] == pytest.approx(cost[1.0, 4.0], rel=0.1)
+    apart = task_of(GaussNewton(sigma_px=1.0, correlation_px=30.0), model, start, truth).energy(cloth)
+    assert cost[1.0, 4.0] == pytest.approx(2 * apart)
+
+
+def test_a_force_leaves_the_bound_at_which_it_stands(model):
+    garment = model.scene.garment
+    column, bounds = garment.parameter_names.index("flare_rad"), garment.parameter_bounds.copy()
+    bounds[column] = [0.0, 0.5]
+    tied = replace(model, scene=replace(model.scene, garment=replace(garment, parameter_bounds=bounds)))
+    assert fitted(GaussNewton(), tied, parameters(tied, flare_rad=0.12), parameters(tied)).parameters[column] > 0.01
+
+
 def test_the_slope_that_gauss_newton_follows_is_the_energys(model):
     truth, start = parameters(model, flare_rad=0.1, wind_cos_rad=0.1), parameters(model, thickness_m=0.005)
-    cloth = model.drape(STANDING, start, Past())
-    estimate = Estimate(pose=STANDING, parameters=start, covariance=np.eye(10 + len(start)), observed=np.ones(4))
-    surface = model.surface(STANDING, cloth)
-    task = Task(GaussNewton(spacing_px=1.0), seen(model, truth), estimate, model, model.scene.garment, Past(), surface)
+    task, cloth = task_of(GaussNewton(spacing_px=1.0), model, start, truth), model.drape(STANDING, start, Past())
     slope = task.equations(cloth).gradient[1:6]  # without thickness and take-up
     steps = np.radians(4.0) * np.eye(len(start))[1:6]
     ends = [[task.energy(model.drape(STANDING, start + k * step, Past())) for step in steps] for k in (-1, 1)]

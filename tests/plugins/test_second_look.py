@@ -16,7 +16,7 @@ from mocapflow_recovery.second_look import Refitter, SecondLook
 from results_scene import DEMO, demo_scene, stepping
 
 from mocapflow.config.pipeline import load_pipeline
-from mocapflow.data import NO_CLOTH, Change, FrameResult, Past, Pose
+from mocapflow.data import NO_CLOTH, Change, Cloth, FrameResult, Past, Pose
 from mocapflow.help.shipped import shipped
 from mocapflow.prediction import initial_state
 from mocapflow.recordings.recording import open_recording
@@ -93,7 +93,11 @@ def test_a_frame_that_leaps_is_fitted_again_from_between_its_neighbours(looked):
 
 def test_what_a_frame_knows_of_those_before_it_is_their_better_fit():
     fits, frame = RevisedTrack(astray(ROW), SCENE.body), next(RECORDING.frames(since=ROW))
-    fits.replace_fit(ROW, frame, fitted(TRUE.pose(ROW)))
+    better = fitted(TRUE.pose(ROW))
+    hung = Cloth(vertices=np.ones((4, 3)), parameters=np.array([0.1, 0.2]))
+    fits.replace_fit(ROW, frame, replace(better, state=replace(better.state, cloth=hung)))
+    assert fits.cloth(ROW).parameters.tolist() == [0.1, 0.2] and (fits.cloth(ROW).vertices == 1).all()
+    assert fits.past(ROW + 1, {}).moments[-1].cloth.parameters.tolist() == [0.1, 0.2]
     latest = fits.past(ROW + 1, {}).moments[-1]
     assert latest.pose.angles[KNEE] == TRUE.angles[ROW, KNEE] and latest.time == TRUE.time[ROW]
     assert fits.past(ROW + 2, {}).moments[-1].pose.angles[KNEE] == TRUE.angles[ROW + 1, KNEE]
