@@ -26,7 +26,8 @@ def test_trc_there_and_back(tmp_path):
     points[2, 1] = np.nan
     points[6, 2] = np.nan  # the last cells of the last row
     write_trc(path, ["hip_l", "knee_l", "ankle_l"], points, 30.0, start=0.5)
-    path.write_text(path.read_text(), encoding="utf-8-sig")  # as some programs write text
+    rows = path.read_text().replace("\n", "\t\t\n")  # as some programs write text: cells too many, and a mark
+    path.write_text(rows, encoding="utf-8-sig")
     names, read, time, rate = read_trc(path)
     assert names == ("hip_l", "knee_l", "ankle_l")
     assert rate == 30

@@ -95,10 +95,11 @@ def test_what_a_frame_knows_of_those_before_it_is_their_better_fit():
     fits, frame = RevisedTrack(astray(ROW), SCENE.body), next(RECORDING.frames(since=ROW))
     better = fitted(TRUE.pose(ROW))
     hung = Cloth(vertices=np.ones((4, 3)), parameters=np.array([0.1, 0.2]))
-    fits.replace_fit(ROW, frame, replace(better, state=replace(better.state, cloth=hung)))
+    sure = replace(better.state.estimate, observed=np.full(len(TRUE.angles[ROW]), 0.75))
+    fits.replace_fit(ROW, frame, replace(better, state=replace(better.state, estimate=sure, cloth=hung)))
     assert fits.cloth(ROW).parameters.tolist() == [0.1, 0.2] and (fits.cloth(ROW).vertices == 1).all()
-    assert fits.past(ROW + 1, {}).moments[-1].cloth.parameters.tolist() == [0.1, 0.2]
     latest = fits.past(ROW + 1, {}).moments[-1]
+    assert latest.cloth.parameters.tolist() == [0.1, 0.2] and (latest.observed == 0.75).all()
     assert latest.pose.angles[KNEE] == TRUE.angles[ROW, KNEE] and latest.time == TRUE.time[ROW]
     assert fits.past(ROW + 2, {}).moments[-1].pose.angles[KNEE] == TRUE.angles[ROW + 1, KNEE]
 
