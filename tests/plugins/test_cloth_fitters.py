@@ -12,7 +12,7 @@ from mocapflow_draping.take_up import TakeUp, lowest
 from mocapflow_twist.gauss_newton import GaussNewton, Task
 
 from mocapflow.data import REMEMBERED, Estimate, Frame, Moment, Past, Pose, Segmentation, Silhouette, Turn
-from mocapflow.geometry.misfit import misfit, unclipped
+from mocapflow.geometry.misfit import bilinear, misfit, unclipped
 from mocapflow.geometry.sewing import THICKNESS
 from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.model import ClothedModel
@@ -225,6 +225,20 @@ def test_the_misfit_grows_with_the_distance_between_outlines(model):
         errors.append(misfit(surface, segmentation, model.scene.cameras, 4.0))
     assert (np.diff(errors, axis=0) > 0).all()
     assert errors[0].sum() < 0.1 * errors[1].sum()  # a view that sees strands along a thigh tells little
+
+
+def test_views_without_a_silhouette_have_no_misfit(model):
+    surface = model.surface(STANDING, model.drape(STANDING, parameters(model), Past()))
+    two = Segmentation(silhouettes=seen(model, parameters(model, flare_rad=0.1)).silhouettes[1:3])
+    error = misfit(surface, two, model.scene.cameras, 4.0)
+    assert error[[0, 3]].tolist() == [0, 0] and (error[1:3] > 0).all()
+
+
+def test_a_field_is_linear_between_its_pixels_and_ends_at_the_edge():
+    y, x = np.mgrid[:4, :6]
+    inner, outer = np.array([[1.25, 2.5], [4.9, 0.1]]), np.array([[9.0, 1.5], [-3.0, 2.0], [2.0, 7.0], [4.0, -1.0]])
+    np.testing.assert_allclose(bilinear(2.0 * x + 3.0 * y, inner), inner @ [2.0, 3.0])
+    np.testing.assert_allclose(bilinear(2.0 * x + 3.0 * y, outer), outer.clip(0, [5, 3]) @ [2.0, 3.0], atol=0.01)
 
 
 def test_far_errors_count_by_their_distance_and_near_ones_by_their_square(model):
