@@ -270,7 +270,11 @@ def test_samples_cover_every_force(model):
         ["flare_rad"], ["wind_cos_rad", "wind_sin_rad"], ["two_cos_rad", "two_sin_rad"],
     ]  # fmt: skip
     values = samples.in_all_directions(2, 8, np.radians([5.0, 10.0, 20.0]))
-    assert values.shape == (25, 2)
+    assert values.shape == (25, 2) and not values[0].any()
+    ways = np.exp(1j * np.pi / 4 * np.arange(8))  # every 45 degrees, by each amount
+    expected = np.radians([5.0, 10.0, 20.0])[:, None] * ways
+    np.testing.assert_allclose(values[1:] @ [1, 1j], expected.ravel(), atol=1e-12)
+    assert samples.in_all_directions(1, 8, np.array([0.1, 0.2])).tolist() == [[0.0], [0.1], [0.2], [-0.1], [-0.2]]
     beside = samples.neighbours(garment, parameters(model), [2, 3], 0.1)
     np.testing.assert_array_equal(beside[:, 2:4], 0.1 * np.array([[1, 0], [0, 1], [-1, 0], [0, -1]]))
     assert (np.delete(beside, [2, 3], axis=1) == 0).all()

@@ -203,6 +203,10 @@ def test_gltf_counts_seconds_from_its_first_frame_and_says_how_far_things_reach(
     for sampler in file.animations[0].samplers:
         moments = file.accessors[sampler.input]
         assert (moments.min, moments.max) == ([0.0], [pytest.approx(last)])
+    names = [node.name for node in file.nodes]
+    hanging = [channel.target for channel in file.animations[0].channels if channel.target.path == "weights"]
+    assert [names[target.node] for target in hanging] == ["garment"]
+    assert file.nodes[names.index("body")].skin == 0 and len(file.skins) == 1
     places = file.accessors[next(mesh for mesh in file.meshes if mesh.name == "body").primitives[0].attributes.POSITION]
     vertices = result.scene.body.vertices
     assert (places.min, places.max) == (pytest.approx(vertices.min(axis=0)), pytest.approx(vertices.max(axis=0)))
