@@ -55,6 +55,12 @@ def test_what_half_a_period_explains_does_not_count_the_other_way() -> None:
     assert found.signs == {"a": 1} and abs(found.lag) == pytest.approx(30 * np.pi / 5, abs=0.1)
 
 
+def test_what_is_not_alike_has_no_lag() -> None:
+    ours, theirs = np.random.default_rng(0).normal(size=(2, 120))
+    found = aligned({"a": ours}, {"a": theirs}, TIME)
+    assert np.isnan(found.lag) and found.signs == {"a": 1}
+
+
 def test_one_frame_has_no_lag() -> None:
     one = {"time": TIME[:1], "a": TIME[:1]}
     assert np.isnan(align(one, Reference(curves={"a": TIME[:1]}, at=TIME[:1], by_frame=False), 0.5).lag)

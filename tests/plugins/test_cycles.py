@@ -55,6 +55,11 @@ def test_a_leg_that_is_raised_where_it_is_ahead_takes_no_strides(size: float) ->
     assert gait_cycles(NAMES, places, RATE) == []
 
 
+def test_somebody_who_sways_takes_no_strides() -> None:
+    places = walking(0.0)
+    assert gait_cycles(NAMES, places.mean(axis=0) + 0.2 * (places - places.mean(axis=0)), RATE) == []  # 6 cm either way
+
+
 def test_joints_that_are_not_there_have_no_strides() -> None:
     assert gait_cycles(("hip_l",), np.zeros((5, 1, 3)), RATE) == []
 
