@@ -13,6 +13,7 @@ from mocapflow_twist import steps
 from mocapflow_twist.constraint import line_rows
 from mocapflow_twist.covariance import effective_share
 from mocapflow_twist.motion import ClothMotion
+from mocapflow_twist.normal_equations import Equations
 from mocapflow_twist.problem import Anchor, Guess, Problem
 from mocapflow_twist.twist_gauss_newton import TwistGaussNewton
 from test_twist_solver import EXACT, FREE, start_from
@@ -44,6 +45,14 @@ def test_each_kind_of_move_has_its_cap(column: int, cap: float) -> None:
     assert np.linalg.norm(short[first]) == pytest.approx(cap)
     np.testing.assert_allclose(short, increment * short[column] / increment[column])
     np.testing.assert_array_equal(steps.capped(within, UNKNOWNS - 6, 0.1, 0.05), within)
+
+
+def test_a_step_to_the_lowest_point_gains_half_of_what_the_slope_promises() -> None:
+    root, slope = np.random.default_rng(0).normal(size=(5, 5)), np.arange(1.0, 6.0)
+    equations = Equations(root @ root.T + np.eye(5), slope, 7.0)
+    lowest = -np.linalg.solve(equations.hessian, slope)
+    assert steps.gain(equations, lowest) == pytest.approx(-slope @ lowest / 2)
+    np.testing.assert_allclose(steps.step(equations, np.ones(5), 0.0), lowest)
 
 
 class Grudging(NamedTuple):
