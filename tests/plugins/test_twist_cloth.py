@@ -150,6 +150,14 @@ def test_a_parameter_is_held_where_its_way_down_leads_out_of_its_bounds(swell: f
     assert found.gradient.tolist() == [1.0] * 19 + [0.0 if held else slope]
 
 
+def test_each_parameter_is_held_by_its_own_slope() -> None:
+    guess = Guess(make_pose(0), MODEL.drape(make_pose(0), np.array([-1.0, 0.2]), Past()))
+    found = ClothMotion(MODEL, Past(), True).within_bounds(
+        Equations(np.eye(20), np.append(np.ones(19), -1), 0.0), guess
+    )
+    assert found.gradient[18:].tolist() == [0.0, -1.0]  # only the first stands at a bound
+
+
 def test_a_parameter_without_a_range_is_held() -> None:
     assert at_bound(np.array([0.3]), np.zeros(1), np.array([0.3]), np.array([0.3])).all()
 
