@@ -1,12 +1,13 @@
 """The functional: its terms, and steps that do not raise it."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from mocapflow_priors.rest_pose import RestPose
 
-from mocapflow.data import FrameState, Matches, Past, Pose
+from mocapflow.data import FrameState, Matches, Past, Pose, Residual
 from mocapflow.functional import SHAPE_WEIGHT, Functional, area, contours, halfway, image_cost, unique_names
 from mocapflow.geometry.cameras import project
 from mocapflow.geometry.silhouettes import model_distance
@@ -31,7 +32,8 @@ def test_area_is_the_squared_difference_of_the_distance_fields():
     seen = pictures.tiny_segmentation(SCENE, POSE).silhouettes[0]
     model = model_distance(surface, camera, pictures.BAND)  # narrower than the functional's
     thin = replace(seen, distance=np.minimum(seen.distance, np.float32(2.0)))  # nowhere as deep inside as its band
-    for shown in (seen, thin):
+    tight = replace(seen, distance=np.maximum(seen.distance, np.float32(-2.0)))  # nor outside
+    for shown in (seen, thin, tight):
         squares = np.sum((model - shown.distance) ** 2)
         assert area(surface, shown, camera) == pytest.approx(SHAPE_WEIGHT * squares, rel=1e-4)
 
@@ -62,6 +64,17 @@ def test_every_view_has_its_terms_and_a_lost_one_none():
     assert np.isnan(values["cam02.shape"]) and np.isfinite(values["cam01.shape"])
 
 
+def test_a_pose_costs_its_areas_and_what_the_priors_say_times_their_weight():
+    said = Residual(error=np.zeros(1), jacobian=np.zeros((1, 6 + len(POSE.angles))), energy=7.0)
+    prior = SimpleNamespace(name="stern", weight=2.0, residual=lambda *given: said)
+    seen = pictures.tiny_segmentation(SCENE, off(POSE, 0.02))
+    with_prior, alone = (Functional(MODEL, priors, Past()).pose_cost(seen, POSE, CLOTH) for priors in ((prior,), ()))
+    surface = MODEL.surface(POSE, CLOTH)
+    assert alone == pytest.approx(sum(area(surface, one, SCENE.cameras[one.camera]) for one in seen.of("person")))
+    assert with_prior - alone == pytest.approx(14.0)
+    assert values_of(Functional(MODEL, (prior,), Past()), pictures.tiny_state(SCENE, POSE))[-1] == 14.0
+
+
 def test_the_sum_is_of_all_terms_that_are_there_but_contours():
     functional = Functional(MODEL, (RestPose(weight=2.0),), Past())
     values = np.arange(17.0)
@@ -75,9 +88,11 @@ def test_a_step_that_raises_the_functional_is_halved(shift, halvings, share):
     """From the true pose 5 cm aside costs more however often it is halved; 1 cm towards it costs less."""
     begin = off(POSE, -shift) if shift == 0.01 else POSE
     state, target = pictures.tiny_state(SCENE, begin, POSE), off(begin, shift)
-    estimate = replace(state.estimate, pose=target, parameters=CLOTH.parameters)
-    step = Functional(MODEL, (), Past()).step
-    reached, cloth = step(state, state.segmentation, estimate, scenes.tiny_cloth(SCENE, target), halvings)
+    forced = CLOTH.parameters + [0.2, 0, 0]
+    estimate = replace(state.estimate, pose=target, parameters=forced)
+    step, hung = Functional(MODEL, (), Past()).step, replace(scenes.tiny_cloth(SCENE, target), parameters=forced)
+    reached, cloth = step(state, state.segmentation, estimate, hung, halvings)
+    assert reached.parameters == pytest.approx(CLOTH.parameters + [0.2 * share, 0, 0])
     went = reached.pose.root[:3, 3] - begin.root[:3, 3]
     np.testing.assert_allclose(went, share * (target.root[:3, 3] - begin.root[:3, 3]), atol=1e-12)
     np.testing.assert_allclose(cloth.vertices, scenes.tiny_cloth(SCENE, reached.pose).vertices, atol=1e-9)
@@ -115,5 +130,6 @@ def test_two_priors_of_one_name_are_told_apart():
 
 def test_images_cost_what_the_last_turn_left_of_data_and_length():
     terms = ("cam01.data", "cam01.length", "cam02.data", "cam01.shape", "cam01.contour", "parzen")
-    assert image_cost(np.array([[5.0] * 6, [2.0, 1.0, np.nan, 4, 8, 16], [np.nan] * 6]), terms) == 3
+    energy = np.array([[5.0] * 6, [4.0] * 6, [2.0, 1.0, np.nan, 4, 8, 16], [np.nan] * 6])
+    assert image_cost(energy, terms) == 3
     assert image_cost(np.full((2, 6), np.nan), terms) == 0  # of a lost frame

@@ -58,6 +58,8 @@ def test_converges_and_stops_after_the_wanted_number_of_calm_turns(frame):
     assert (result.steady, result.oscillating, result.iterations) == (True, False, 3)  # arrives, then two calm turns
     assert result.change.body == 0 and result.change.angles == 0
     assert np.allclose(result.state.estimate.pose.angles, 0)
+    assert np.isfinite(result.energy).any(axis=1).tolist() == [True] * 3 + [False] * 5
+    assert go(frame, 0.0).iterations == 2  # the calm turns are two in one that begins at rest, too
 
 
 def test_a_swing_between_two_states_is_told_from_creeping(frame):

@@ -11,7 +11,7 @@ import numpy as np
 
 from mocapflow.records import F64
 
-SMALL_ANGLE = 1e-4  # rad; below it series replace the quotients, which would cancel
+SMALL_ANGLE = 1e-4  # rad; below it series replace the quotients, which would cancel: two terms are exact to rounding
 
 
 def hat(vector: F64) -> F64:
@@ -37,9 +37,9 @@ def _coefficients(angle: F64) -> tuple[F64, F64, F64]:
     small = angle < SMALL_ANGLE
     t = np.where(small, 1.0, angle)
     t2 = angle**2
-    a = np.where(small, 1 - t2 / 6 + t2**2 / 120, np.sin(t) / t)
-    b = np.where(small, 0.5 - t2 / 24 + t2**2 / 720, 0.5 * (np.sin(t / 2) / (t / 2)) ** 2)  # 1 - cos t would cancel
-    c = np.where(small, 1 / 6 - t2 / 120 + t2**2 / 5040, (t - np.sin(t)) / t**3)
+    a = np.where(small, 1 - t2 / 6, np.sin(t) / t)
+    b = np.where(small, 0.5 - t2 / 24, 0.5 * (np.sin(t / 2) / (t / 2)) ** 2)  # 1 - cos t would cancel
+    c = np.where(small, 1 / 6 - t2 / 120, (t - np.sin(t)) / t**3)
     return a, b, c
 
 

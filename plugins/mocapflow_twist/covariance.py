@@ -27,8 +27,8 @@ def effective_share(matches: Matches, correlation_px: float) -> F64:
         return np.ones(len(used))
     weight = np.where(used, matches.weight, 0.0)
     alone, clustered = kernels.clustering(matches.camera, matches.pixel, weight, correlation_px, CELLS)
-    share = alone / np.where(clustered > 0, clustered, 1.0)
-    return np.where(used, share.take(matches.camera), 1.0)
+    share: F64 = alone / np.where(clustered > 0, clustered, 1.0)
+    return share.take(matches.camera)
 
 
 def view_balance(matches: Matches, share: F64) -> F64:

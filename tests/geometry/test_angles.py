@@ -7,7 +7,7 @@ import pytest
 
 from mocapflow.assets import Body
 from mocapflow.data import Pose
-from mocapflow.geometry import angles, twists
+from mocapflow.geometry import angles, kinematics, twists
 from mocapflow.model import moved
 from mocapflow.scene import Scene
 
@@ -43,6 +43,14 @@ def test_columns_and_three_point_angles_are_those_of_the_truth(clip: str) -> Non
         if len(wish.points) == 3:
             points = joints["positions"][:, [names.index(p) for p in wish.points]].astype(np.float64)
             assert np.abs(angles.three_point(points) + wish.offset - truth[:, column]).max() < 2e-3
+
+
+def test_centres_of_three_joints_make_the_angle_between_them() -> None:
+    shank, foot = np.array([0.0, 0.0, -0.4]), np.array([[0.2, 0.0, 0.0], [0.1, 0.0, -0.1]])  # flat, and pointed
+    places = {"knee_l": np.zeros((2, 3)), "ankle_l": np.tile(shank, (2, 1)), "toe_l": shank + foot}
+    found = angles.between_centres(places)
+    assert list(found) == ["ankle_l"] and found["ankle_l"] == pytest.approx([0.0, -45.0])
+    assert not angles.between_centres({"hip_l": shank, "knee_l": shank})  # hip flexion is of the pelvis, too
 
 
 def test_what_is_not_measured_is_said() -> None:
@@ -101,6 +109,11 @@ def test_gradients_agree_with_finite_differences() -> None:
     value = angles.measure(body, np.stack([p.root for p in ends]), np.stack([p.angles for p in ends])).value
     numeric = np.radians(value[0::2] - value[1::2]) / (2 * step)  # (S, A)
     root, at = pose.root[None], pose.angles[None]
+    centres = dict(zip(body.joint_names, np.swapaxes(kinematics.joint_centres(body, root, at), 0, 1), strict=True))
+    series = angles.measure(body, root, at)
+    measured = dict(zip(series.names, series.value[0], strict=True))
+    for name, between in angles.between_centres(centres).items():
+        assert measured[name] == pytest.approx(between[0])
     for k in range(size):  # a covariance of one direction gives the size of the gradient in it
         direction = np.zeros((1, size, size))
         direction[0, k, k] = 1.0

@@ -1,12 +1,16 @@
 """How a nudged camera has turned."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from mocapflow.assets import Camera
-from mocapflow.geometry.camera_rotation import shift_px, turn_between, warped
+from mocapflow.geometry import camera_rotation
+from mocapflow.geometry.camera_rotation import shift_px, turn_between, warped, warped_points
+from mocapflow.geometry.cameras import project
 
 CAMERA = Camera(
     name="cam01",
@@ -49,6 +53,16 @@ def corners_off(found, true):
 def test_the_turn_of_a_camera_is_found(degrees):
     true = homography(degrees)
     assert corners_off(turn_between(room(), seen(true), EVERYWHERE, CAMERA), true) < 0.15
+
+
+def test_pixels_of_a_camera_that_turns_and_zooms_are_those_of_the_camera_it_becomes():
+    turn = Rotation.from_euler("xyz", (3, -5, 8), degrees=True).as_matrix()
+    points = np.array([[0.1, 0.2, 1], [-0.2, 0, 2]])
+    moved = np.eye(4)
+    moved[:3, :3] = turn
+    after = replace(CAMERA, camera_from_world=moved, intrinsics=CAMERA.intrinsics @ np.diag([1.2, 1.2, 1.0]))
+    found = warped_points(project(points, CAMERA)[None], camera_rotation.homography(turn, CAMERA, 1.2))
+    np.testing.assert_allclose(found[0], project(points, after), atol=1e-9)
 
 
 @pytest.mark.parametrize("zoom", [0.99, 1.004])

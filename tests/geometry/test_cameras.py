@@ -45,6 +45,15 @@ def test_points_behind_the_camera_have_no_pixel():
     view = camera()
     behind = cameras.centre(view) - view.camera_from_world[2, :3]
     assert np.isnan(cameras.project(behind[None], view)).all()
+    beside = np.array([[1.0, 2.0, 0.0]])  # in the plane of the camera: neither behind it nor ahead
+    assert np.isnan(cameras.project(beside, replace(view, camera_from_world=np.eye(4)))).all()
+
+
+def test_rays_of_several_rows_of_pixels_are_those_of_each():
+    view, wanted = camera(), pixels(count=6)
+    rays = cameras.directions(wanted.reshape(2, 3, 2), view)
+    np.testing.assert_allclose(cameras.project(cameras.centre(view) + rays.reshape(6, 3), view), wanted, atol=1e-9)
+    np.testing.assert_allclose(rays @ view.camera_from_world[2, :3], 1.0)  # one metre deep
 
 
 @pytest.mark.parametrize("lens", LENSES)

@@ -57,6 +57,7 @@ def test_one_joint_moves_only_its_subtree(body):
     joints, _ = kinematics.chain(body, Pose(root=np.eye(4), angles=angles))
     below = kinematics.descendants(body.parents)[body.joint("knee_l")]
     assert [n for n, b in zip(body.joint_names, below, strict=True) if b] == ["knee_l", "ankle_l", "toe_l"]
+    assert kinematics.descendants(body.parents)[0].all()  # all hang on the root
     moved = np.linalg.norm(kinematics.skin(body, joints, angles) - body.vertices, axis=1)
     share = np.where(below[body.skin_joint], body.skin_weight, 0.0).sum(axis=1)
     assert (moved[share == 0] < 1e-12).all() and moved[share > 0.5].min() > 1e-3
@@ -78,8 +79,8 @@ def test_the_root_is_where_its_joint_is(body, pose):
 def test_morph_changes_the_shape_with_its_angle(body, pose):
     offset = np.random.default_rng(2).normal(scale=0.01, size=body.vertices.shape)
     screw = body.screw_names.index("knee_l.flexion")
-    morphing = replace(body, morph_offset=offset, morph_screw=screw, morph_range=(0.2, 1.2))
-    for angle, share in ((0.0, 0.0), (0.2, 0.0), (0.7, 0.5), (1.2, 1.0), (2.0, 1.0)):
+    morphing = replace(body, morph_offset=offset, morph_screw=screw, morph_range=(0.2, 1.4))
+    for angle, share in ((0.0, 0.0), (0.2, 0.0), (0.8, 0.5), (1.4, 1.0), (2.0, 1.0)):
         angles = np.zeros(len(body.twists))
         angles[screw] = angle
         joints, _ = kinematics.chain(body, Pose(root=pose.root, angles=angles))
@@ -116,33 +117,42 @@ def test_three_screws_reach_any_rotation_exactly(body):
     assert {"hip_l", "knee_r", "shoulder_l", "elbow_r", "spine"} <= set(balls)
     for _ in range(5):
         turns = {name: rng.uniform(-1.2, 1.2, 3) for name in balls}
-        back = rotations_from_angles(body, angles_from_rotations(body, turns))
+        angles = angles_from_rotations(body, turns)
+        assert not angles[[body.joint_names[joint] not in balls for joint in body.screw_joint]].any()  # the rest rests
+        back = rotations_from_angles(body, angles)
         for name in balls:
             np.testing.assert_allclose(back[name], turns[name], atol=1e-9)
 
 
-def test_gimbal_lock_still_gives_the_rotation():
-    axes = np.eye(3)
-    rotation = (
-        twists.exp(np.array([0, np.pi / 2, 0, 0, 0, 0.0]))[:3, :3] @ twists.exp(np.array([0, 0, 0.4, 0, 0, 0]))[:3, :3]
-    )
-    a, b, c = decompose(axes, rotation)
-    again = np.eye(3)
-    for axis, angle in zip(axes, (a, b, c), strict=True):
-        again = again @ twists.exp(np.append(angle * axis, np.zeros(3)))[:3, :3]
-    np.testing.assert_allclose(again, rotation, atol=1e-9)
+def test_a_joint_without_screws_has_no_angles(body):
+    root = body.joint_names[0]
+    assert 0 not in body.screw_joint and not angles_from_rotations(body, {root: np.ones(3)}).any()
 
 
-def test_fewer_screws_come_as_near_as_they_can():
-    axes = np.array([[1.0, 0, 0], [0, 1.0, 0]])
+def composed(axes, angles):
+    """The rotation that turns about axes make up, the first outermost."""
+    made = np.eye(3)
+    for axis, angle in zip(axes, angles, strict=True):
+        made = made @ expm(angle * twists.hat(axis))
+    return made
+
+
+@pytest.mark.parametrize("order", [[0, 1, 2], [1, 0, 2], [2, 1, 0]])  # right-handed and left-handed
+@pytest.mark.parametrize("middle", [-np.pi / 2, -0.7, 0.9, np.pi / 2])  # gimbal lock at both ends
+def test_turns_about_three_axes_are_found_again(order, middle):
+    axes = np.eye(3)[order]
+    rotation = composed(axes, [0.3, middle, 0.4])
+    np.testing.assert_allclose(composed(axes, decompose(axes, rotation)), rotation, atol=1e-9)
+
+
+@pytest.mark.parametrize("first", [0, 1, 2])
+def test_fewer_screws_come_as_near_as_they_can(first):
+    axes = np.eye(3)[[first, (first + 1) % 3]]
     rotation = twists.exp(np.array([0.5, -0.3, 0.2, 0, 0, 0]))[:3, :3]
     best = decompose(axes, rotation)
 
     def miss(angles):
-        made = np.eye(3)
-        for axis, angle in zip(axes, angles, strict=True):
-            made = made @ twists.exp(np.append(angle * axis, np.zeros(3)))[:3, :3]
-        return np.linalg.norm(made - rotation)
+        return np.linalg.norm(composed(axes, angles) - rotation)
 
     for move in np.vstack([np.eye(2), -np.eye(2)]) * 1e-3:
         assert miss(best) < miss(best + move)

@@ -22,6 +22,7 @@ def test_a_rigid_motion_is_recovered(seed: int, count: int) -> None:
     np.testing.assert_allclose(found.translation, shift, atol=1e-6)
     assert found.scale == pytest.approx(1)
     assert found.residual.max() < 1e-6
+    np.testing.assert_allclose(found.apply(np.eye(3)), np.eye(3) @ rotation.T + shift, atol=1e-6)
     assert np.isnan(found.left_out).all() if count == 3 else found.left_out.max() < 1e-6
 
 
@@ -82,7 +83,7 @@ def test_groups_are_left_out_together() -> None:
     assert found.residual[:3].max() < 0.3
 
 
-@pytest.mark.parametrize("points", [np.eye(3)[:2], np.arange(5.0)[:, None] * [1, 2, 3]])
+@pytest.mark.parametrize("points", [np.eye(3)[:2], np.arange(5.0)[:, None] * [1, 2, 3], np.ones((4, 3))])
 def test_what_does_not_tell_is_refused(points: np.ndarray) -> None:
     with pytest.raises(MocapflowError, match="line"):
         register(points, points)

@@ -39,6 +39,12 @@ def test_exp_inverts_log(size):
     np.testing.assert_allclose(twists.exp(twists.log(motion)), motion, atol=1e-12, rtol=0)
 
 
+@pytest.mark.parametrize("axis", np.eye(3))
+def test_log_of_half_a_turn_about_a_coordinate_axis(axis):
+    """T-GEO2: the quaternion has one component alone, from which the others cannot be divided out."""
+    np.testing.assert_allclose(twists.log_rotation(2 * np.outer(axis, axis) - np.eye(3)), np.pi * axis, atol=1e-15)
+
+
 @pytest.mark.parametrize("size", [0.0, 1e-9, 1e-6, 9.9e-5, 1.01e-4, 1e-2, 1.0, 3.14159])
 def test_motions_are_a_group(size):
     """T-GEO2: about one screw angles add up; back is the inverse; what follows each other is rigid, however grouped."""
@@ -50,6 +56,7 @@ def test_motions_are_a_group(size):
     close = dict(atol=1e-12, rtol=0)
     np.testing.assert_allclose(twists.exp(0.3 * twist) @ twists.exp(0.7 * twist), motion, **close)
     np.testing.assert_allclose(twists.exp(-twist), twists.inverse(motion), **close)
+    np.testing.assert_array_equal(twists.log(motion)[1], twists.log(b))  # with any leading axes
     both = twists.exp(twists.log(a @ b))
     np.testing.assert_allclose(both @ c, twists.exp(twists.log(a @ twists.exp(twists.log(b @ c)))), **close)
     rotation = both[:, :3, :3]

@@ -1,7 +1,10 @@
 """What is seen at a pixel, against rays cast at every triangle."""
 
+from dataclasses import replace
+
 import numpy as np
 
+from mocapflow.data import CLOTH, NO_CLOTH
 from mocapflow.geometry.cameras import centre, project
 from mocapflow.geometry.visibility import front_vertices
 from mocapflow.testing import tiny_cloth, tiny_pose, tiny_scene
@@ -41,7 +44,28 @@ def test_the_foremost_triangle_is_found():
     np.testing.assert_array_equal(vertex >= 0, face >= 0)
     assert 8 < (vertex >= 0).sum() < 40
     hit = vertex >= 0
-    assert (surface.faces[face[hit]] == vertex[hit, None]).any(axis=1).all()
+    corners = surface.faces[face[hit]]
+    shares = [  # of each corner in the point, on the picture
+        np.linalg.solve(np.vstack([image[each].T, np.ones(3)]), [*point, 1.0])
+        for each, point in zip(corners, points[hit], strict=True)
+    ]
+    nearest = np.take_along_axis(corners, np.argmax(shares, axis=1)[:, None], axis=1)[:, 0]
+    np.testing.assert_array_equal(vertex[hit], nearest)
+
+
+def test_skin_is_seen_from_outside_alone_and_cloth_from_both_sides():
+    pose = tiny_pose(SCENE)
+    body, camera = SCENE.undressed.surface(pose, NO_CLOTH), SCENE.cameras[0]
+    image = project(body.vertices, camera)
+    points = np.random.default_rng(1).uniform(image.min(axis=0), image.max(axis=0), (200, 2))
+    inside_out = replace(body, faces=np.ascontiguousarray(body.faces[:, ::-1]))
+    outside, inside = (front_vertices(surface, camera, points)[0] for surface in (body, inside_out))
+    hit = (outside >= 0) & (inside >= 0)
+    depth = body.vertices @ camera.camera_from_world[2, :3]
+    assert hit.sum() > 20 and (depth[inside[hit]] > depth[outside[hit]] - 0.01).all()  # the far wall, from within
+    assert np.median(depth[inside[hit]] - depth[outside[hit]]) > 0.05
+    worn = (replace(surface, layer=np.full(len(depth), CLOTH, np.uint8)) for surface in (body, inside_out))
+    np.testing.assert_array_equal(*(front_vertices(surface, camera, points)[0] for surface in worn))
 
 
 def test_no_points_and_points_beside_the_surface():

@@ -26,7 +26,8 @@ def test_trc_there_and_back(tmp_path):
     points[2, 1] = np.nan
     points[6, 2] = np.nan  # the last cells of the last row
     write_trc(path, ["hip_l", "knee_l", "ankle_l"], points, 30.0, start=0.5)
-    path.write_text(path.read_text(), encoding="utf-8-sig")  # as some programs write text
+    rows = path.read_text().replace("\n", "\t\t\n")  # as some programs write text: cells too many, and a mark
+    path.write_text(rows, encoding="utf-8-sig")
     names, read, time, rate = read_trc(path)
     assert names == ("hip_l", "knee_l", "ankle_l")
     assert rate == 30
@@ -42,6 +43,9 @@ def test_trc_header_is_opensim_s(tmp_path):
     assert lines[3].split("\t") == ["Frame#", "Time", "p", "", "", "q", "", ""]
     assert lines[4].split("\t") == ["", "", "X1", "Y1", "Z1", "X2", "Y2", "Z2"]
     assert lines[6].startswith("1\t0.00000000\t")
+    write_trc(tmp_path / "a.trc", ["p", "q"], np.array([[[1.0, 2.0, 3.0], [np.nan] * 3]]), 60.0)
+    row = (tmp_path / "a.trc").read_text().splitlines()[6].split("\t")
+    assert row[2:] == ["1.00000000", "2.00000000", "3.00000000", "", "", ""]  # what is not seen has no numbers
 
 
 def test_trc_in_mm(tmp_path):

@@ -3,6 +3,7 @@
 import os
 import wave
 from dataclasses import replace
+from fractions import Fraction
 from types import SimpleNamespace
 
 import av
@@ -223,6 +224,21 @@ def test_a_video_of_hardly_any_pictures(tmp_path, count, ending):
     video = open_video(write_video(tmp_path / f"a.{ending}", count))
     assert (video.frames, video.declared, video.frame_rate, video.uneven) == (count, count, 25.0, 0.0)
     assert [number_of(image) for image, _ in read_frames(video, range(count))] == list(range(count))
+
+
+def test_frames_that_come_unevenly_are_told_from_a_file(tmp_path):
+    """Every other one a fifth of a frame early, the others as late."""
+    with av.open(str(tmp_path / "a.mkv"), "w") as file:
+        stream = file.add_stream("mpeg4", rate=25)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        stream.codec_context.time_base = Fraction(1, 1000)
+        for number in range(20):
+            frame = av.VideoFrame.from_ndarray(picture(number), "bgr24")
+            frame.pts, frame.time_base = 40 * number + (8 if number % 2 else -8) + 8, Fraction(1, 1000)
+            file.mux(stream.encode(frame))
+        file.mux(stream.encode(None))
+    video = open_video(tmp_path / "a.mkv")
+    assert video.frames == 20 and video.uneven == pytest.approx(0.2, abs=0.03)
 
 
 @pytest.mark.parametrize("name", ["a.mkv", "a.mpg"])

@@ -41,6 +41,31 @@ def test_what_counts_the_other_way_is_found_beside_a_lag() -> None:
     assert found.signs == {"knee_flexion_l": 1, "knee_flexion_r": -1, "hip_flexion_l": 1}
 
 
+@pytest.mark.parametrize(("correlation", "sign"), [(-0.95, -1), (-0.6, 1)])
+def test_a_curve_counts_the_other_way_where_it_is_opposed_and_not_by_chance(correlation: float, sign: int) -> None:
+    phase = 5 * TIME
+    elbow = correlation * np.sin(phase) + np.sqrt(1 - correlation**2) * np.cos(phase)
+    found = aligned(motion(TIME) | {"elbow_l": 2 * np.sin(phase)}, motion(TIME) | {"elbow_l": 3 * elbow}, TIME)
+    assert found.signs == dict.fromkeys(motion(TIME), 1) | {"elbow_l": sign}
+
+
+def test_what_half_a_period_explains_does_not_count_the_other_way() -> None:
+    at = np.arange(-60, 180) / 30
+    found = aligned({"a": np.sin(5 * TIME)}, {"a": -np.sin(5 * at)}, at, longest=0.7)
+    assert found.signs == {"a": 1} and abs(found.lag) == pytest.approx(30 * np.pi / 5, abs=0.1)
+
+
+def test_what_is_not_alike_has_no_lag() -> None:
+    ours, theirs = np.random.default_rng(0).normal(size=(2, 120))
+    found = aligned({"a": ours}, {"a": theirs}, TIME)
+    assert np.isnan(found.lag) and found.signs == {"a": 1}
+
+
+def test_one_frame_has_no_lag() -> None:
+    one = {"time": TIME[:1], "a": TIME[:1]}
+    assert np.isnan(align(one, Reference(curves={"a": TIME[:1]}, at=TIME[:1], by_frame=False), 0.5).lag)
+
+
 def test_what_may_be_chance_is_not_taken_out() -> None:
     random = np.random.default_rng(0)
     ours = motion(TIME) | {"elbow_l": np.cumsum(random.normal(size=120))}

@@ -10,9 +10,10 @@ from mocapflow_draping.kinematic import Kinematic
 from mocapflow_draping.sampled_forces import SampledForces
 from mocapflow_draping.take_up import TakeUp, lowest
 from mocapflow_twist.gauss_newton import GaussNewton, Task
+from mocapflow_twist.normal_equations import Equations
 
 from mocapflow.data import REMEMBERED, Estimate, Frame, Moment, Past, Pose, Segmentation, Silhouette, Turn
-from mocapflow.geometry.misfit import misfit, unclipped
+from mocapflow.geometry.misfit import bilinear, misfit, unclipped
 from mocapflow.geometry.sewing import THICKNESS
 from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.model import ClothedModel
@@ -227,6 +228,20 @@ def test_the_misfit_grows_with_the_distance_between_outlines(model):
     assert errors[0].sum() < 0.1 * errors[1].sum()  # a view that sees strands along a thigh tells little
 
 
+def test_views_without_a_silhouette_have_no_misfit(model):
+    surface = model.surface(STANDING, model.drape(STANDING, parameters(model), Past()))
+    two = Segmentation(silhouettes=seen(model, parameters(model, flare_rad=0.1)).silhouettes[1:3])
+    error = misfit(surface, two, model.scene.cameras, 4.0)
+    assert error[[0, 3]].tolist() == [0, 0] and (error[1:3] > 0).all()
+
+
+def test_a_field_is_linear_between_its_pixels_and_ends_at_the_edge():
+    y, x = np.mgrid[:4, :6]
+    inner, outer = np.array([[1.25, 2.5], [4.9, 0.1]]), np.array([[9.0, 1.5], [-3.0, 2.0], [2.0, 7.0], [4.0, -1.0]])
+    np.testing.assert_allclose(bilinear(2.0 * x + 3.0 * y, inner), inner @ [2.0, 3.0])
+    np.testing.assert_allclose(bilinear(2.0 * x + 3.0 * y, outer), outer.clip(0, [5, 3]) @ [2.0, 3.0], atol=0.01)
+
+
 def test_far_errors_count_by_their_distance_and_near_ones_by_their_square(model):
     segmentation = seen(model, parameters(model))
     surface = model.surface(STANDING, model.drape(STANDING, parameters(model, flare_rad=0.2), Past()))
@@ -256,18 +271,66 @@ def test_samples_cover_every_force(model):
         ["flare_rad"], ["wind_cos_rad", "wind_sin_rad"], ["two_cos_rad", "two_sin_rad"],
     ]  # fmt: skip
     values = samples.in_all_directions(2, 8, np.radians([5.0, 10.0, 20.0]))
-    assert values.shape == (25, 2)
+    assert values.shape == (25, 2) and not values[0].any()
+    ways = np.exp(1j * np.pi / 4 * np.arange(8))  # every 45 degrees, by each amount
+    expected = np.radians([5.0, 10.0, 20.0])[:, None] * ways
+    np.testing.assert_allclose(values[1:] @ [1, 1j], expected.ravel(), atol=1e-12)
+    assert samples.in_all_directions(1, 8, np.array([0.1, 0.2])).tolist() == [[0.0], [0.1], [0.2], [-0.1], [-0.2]]
     beside = samples.neighbours(garment, parameters(model), [2, 3], 0.1)
     np.testing.assert_array_equal(beside[:, 2:4], 0.1 * np.array([[1, 0], [0, 1], [-1, 0], [0, -1]]))
     assert (np.delete(beside, [2, 3], axis=1) == 0).all()
 
 
+def task_of(fitter, model, start, truth=None):
+    """What Gauss-Newton is asked for at some parameters, if the garment hangs by the true ones."""
+    surface = model.surface(STANDING, model.drape(STANDING, start, Past()))
+    estimate = Estimate(pose=STANDING, parameters=start, covariance=np.eye(10 + len(start)), observed=np.ones(4))
+    segmentation = seen(model, parameters(model) if truth is None else truth)
+    return Task(fitter, segmentation, estimate, model, model.scene.garment, Past(), surface)
+
+
+def test_a_parameter_costs_by_its_way_from_calm_in_deviations_of_its_range(model):
+    garment = model.scene.garment
+    column, bounds = garment.parameter_names.index("flare_rad"), garment.parameter_bounds.copy()
+    bounds[column] = [0.1, 0.5]  # calm is what is nearest to none
+    narrow = replace(model, scene=replace(model.scene, garment=replace(garment, parameter_bounds=bounds)))
+    start = parameters(narrow, flare_rad=0.3)
+    task = task_of(GaussNewton(cloth_sd=0.25, sigma_px=1e6), narrow, start)  # the outline hardly counts
+    cloth = narrow.drape(STANDING, start, Past())
+    assert task.energy(cloth) == pytest.approx(0.5 * 2**2, abs=1e-6)  # 0.2 off, by 0.25 of 0.4
+    equations = task.equations(cloth)
+    assert equations.energy == pytest.approx(2, abs=1e-6)
+    assert equations.gradient[column] == pytest.approx(2 / 0.1, rel=1e-6)
+    assert equations.hessian[column, column] == pytest.approx(1 / 0.1**2, rel=1e-6)
+
+
+def test_the_outline_costs_by_its_error_and_length_however_densely_it_is_looked_at(model):
+    start, truth = parameters(model), parameters(model, flare_rad=0.15)
+    cloth = model.drape(STANDING, start, Past())
+    cost = {
+        (sigma, spacing): task_of(GaussNewton(sigma_px=sigma, spacing_px=spacing), model, start, truth).energy(cloth)
+        for sigma, spacing in ((1.0, 4.0), (2.0, 4.0), (1.0, 2.0))
+    }
+    assert cost[1.0, 4.0] == pytest.approx(4 * cost[2.0, 4.0])
+    assert cost[1.0, 2.0] == pytest.approx(cost[1.0, 4.0], rel=0.1)
+    apart = task_of(GaussNewton(sigma_px=1.0, correlation_px=30.0), model, start, truth).energy(cloth)
+    assert cost[1.0, 4.0] == pytest.approx(2 * apart)
+
+
+def test_a_force_leaves_the_bound_at_which_it_stands(model):
+    garment = model.scene.garment
+    column, bounds = garment.parameter_names.index("flare_rad"), garment.parameter_bounds.copy()
+    bounds[column] = [0.0, 0.5]
+    tied = replace(model, scene=replace(model.scene, garment=replace(garment, parameter_bounds=bounds)))
+    task, cloth = task_of(GaussNewton(), tied, parameters(tied)), tied.drape(STANDING, parameters(tied), Past())
+    for slope, step in ((-0.1, 0.1), (0.1, 0.0)):  # inwards is downhill, or outwards
+        equations = Equations(np.eye(len(bounds)), slope * np.eye(len(bounds))[column], 0.0)
+        assert task.moved(cloth, equations, 0.0).parameters[column] == pytest.approx(step)
+
+
 def test_the_slope_that_gauss_newton_follows_is_the_energys(model):
     truth, start = parameters(model, flare_rad=0.1, wind_cos_rad=0.1), parameters(model, thickness_m=0.005)
-    cloth = model.drape(STANDING, start, Past())
-    estimate = Estimate(pose=STANDING, parameters=start, covariance=np.eye(10 + len(start)), observed=np.ones(4))
-    surface = model.surface(STANDING, cloth)
-    task = Task(GaussNewton(spacing_px=1.0), seen(model, truth), estimate, model, model.scene.garment, Past(), surface)
+    task, cloth = task_of(GaussNewton(spacing_px=1.0), model, start, truth), model.drape(STANDING, start, Past())
     slope = task.equations(cloth).gradient[1:6]  # without thickness and take-up
     steps = np.radians(4.0) * np.eye(len(start))[1:6]
     ends = [[task.energy(model.drape(STANDING, start + k * step, Past())) for step in steps] for k in (-1, 1)]

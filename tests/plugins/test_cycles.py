@@ -55,6 +55,11 @@ def test_a_leg_that_is_raised_where_it_is_ahead_takes_no_strides(size: float) ->
     assert gait_cycles(NAMES, places, RATE) == []
 
 
+def test_somebody_who_sways_takes_no_strides() -> None:
+    places = walking(0.0)
+    assert gait_cycles(NAMES, places.mean(axis=0) + 0.2 * (places - places.mean(axis=0)), RATE) == []  # 6 cm either way
+
+
 def test_joints_that_are_not_there_have_no_strides() -> None:
     assert gait_cycles(("hip_l",), np.zeros((5, 1, 3)), RATE) == []
 
@@ -64,11 +69,13 @@ def test_every_stride_of_its_own_side_has_a_row() -> None:
     curve = 30 * np.sin(frame / 8)
     known = {"knee_flexion_l": np.where(frame < 90, curve - 2, np.nan), "knee_flexion_r": curve}
     own = {"frame": frame + 7, "knee_flexion_l": curve, "knee_flexion_r": curve}
-    rows = cycles.rows([Cycle("l", 0, 50), Cycle("r", 25, 75), Cycle("l", 50, 99)], own, known)
+    strides = [Cycle("l", 0, 50), Cycle("r", 25, 75), Cycle("l", 50, 99), Cycle("l", 92, 99)]  # none known of the last
+    rows = cycles.rows(strides, own, known)
     assert [(row["angle"], row["cycle"], row["first_frame"], row["frames"]) for row in rows] == [
         ("knee_flexion_l", 1, 7, 51), ("knee_flexion_l", 2, 57, 40), ("knee_flexion_r", 1, 32, 51),
     ]  # fmt: skip
-    assert rows[0]["rms_deg"] == pytest.approx(2)
+    assert rows[0]["rms_deg"] == pytest.approx(2) and rows[0]["offset_deg"] == pytest.approx(2)
+    assert rows[1]["rom_deg"] == rows[1]["rom_reference_deg"] == pytest.approx(np.ptp(curve[50:90]))
     assert rows[0]["peak_deg"] - rows[0]["peak_reference_deg"] == pytest.approx(2)
     assert rows[2]["cmc"] == pytest.approx(1)
 
@@ -78,6 +85,18 @@ def test_a_stride_is_stretched_to_a_hundred_per_cent() -> None:
     (stretched,) = cycles.normalised([Cycle("l", 20, 70)], curve, "ankle_l")
     np.testing.assert_allclose(stretched, np.linspace(20, 70, 101))
     assert np.isnan(cycles.across([], curve, curve, "ankle_l"))
+
+
+def test_across_strides_counts_those_that_both_have() -> None:
+    curve, strides = 20 * np.sin(np.arange(100) / 8), [Cycle("l", 0, 50), Cycle("l", 50, 99), Cycle("r", 0, 50)]
+    assert cycles.across(strides, curve, curve, "ankle_l") == pytest.approx(1)
+    partly = np.where(np.arange(100) < 80, curve - 3, np.nan)
+    (stretched,) = cycles.normalised(strides[:1], curve, "ankle_l")
+    expected = compare.cmc(np.stack([stretched, stretched - 3])[None])
+    assert cycles.across(strides, curve, partly, "ankle_l") == pytest.approx(expected)
+    assert cycles.across(strides, curve, curve - 3, "ankle_l") == pytest.approx(
+        compare.cmc(np.stack([cycles.normalised(strides[:2], each, "ankle_l") for each in (curve, curve - 3)], axis=1))
+    )
 
 
 def test_cmc_is_one_for_equal_curves_and_falls_with_an_offset() -> None:
@@ -106,4 +125,5 @@ def test_limits_of_agreement_hold_95_per_cent() -> None:
 
 def test_shared_angles_are_those_that_both_have() -> None:
     curve, nothing = np.ones(3), np.full(3, np.nan)
-    assert list(cycles.shared({"frame": curve, "a": curve, "b": curve}, {"a": nothing, "b": curve})) == ["b"]
+    ours = {"frame": curve, "a": curve, "b": curve}
+    assert list(cycles.shared(ours, {"a": nothing, "b": np.array([1, np.nan, 1])})) == ["b"]  # somewhere

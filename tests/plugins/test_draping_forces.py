@@ -17,7 +17,7 @@ from drape_bodies import (
 )
 from mocapflow_draping import kinematic
 from mocapflow_draping.directions import tilted
-from mocapflow_draping.forces import thickness, tilts
+from mocapflow_draping.forces import thickness, tilts, wind
 from mocapflow_draping.literal import blow_in_steps
 
 from mocapflow.assets import Camera
@@ -105,6 +105,21 @@ def test_order_one_is_a_wind_that_turns_every_strand_alike(towards):
     down = tilted(np.broadcast_to(DOWN, facing.shape), facing, out[0], aside[0])
     force = np.array([np.cos(towards), np.sin(towards), 0])
     np.testing.assert_allclose(down, np.broadcast_to(np.cos(0.3) * DOWN + np.sin(0.3) * force, down.shape), atol=1e-12)
+
+
+def test_a_flare_lifts_all_tails_outwards():
+    garment = skirted().garment
+    out, aside = tilts(garment, parameters(garment, flare_rad=0.2), np.linspace(0, 6, 7))
+    np.testing.assert_allclose([out[0], aside[0]], np.outer([0.2, 0.0], np.ones(7)))
+
+
+def test_the_chapters_wind_turns_with_what_carries_the_garment():
+    garment, amounts = skirted().garment, np.array([0.0, 0.05, 0.6])
+    blown = np.concatenate([parameters(garment, wind_sin_rad=amount) for amount in amounts])
+    quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # from y to -x
+    direction, amount = wind(garment, blown, np.stack([np.eye(3), quarter, np.eye(3)]))
+    np.testing.assert_allclose(direction, [[0, 0, 0], [-1, 0, 0], [0, 1, 0]], atol=1e-12)
+    np.testing.assert_allclose(amount, amounts)
 
 
 def test_a_bulge_does_not_stretch_its_ring():

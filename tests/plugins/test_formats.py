@@ -122,7 +122,11 @@ def test_bvh_by_another_reader(result: Result, tmp_path: Path) -> None:
     text = Bvh(write("bvh", result, tmp_path).read_text())
     assert text.nframes == 5
     assert text.frame_time == pytest.approx(1 / result.track.frame_rate, abs=1e-6)
-    assert set(text.get_joints_names()) == set(result.scene.body.joint_names)
+    body = result.scene.body
+    assert set(text.get_joints_names()) == set(body.joint_names)
+    ends = re.findall(r"End Site\n\s*{\n\s*OFFSET (.*)\n", (tmp_path / FILES["bvh"]).read_text())
+    assert len(ends) == len(set(range(len(body.parents))) - set(body.parents.tolist()))  # of each limb
+    assert np.linalg.norm([np.array(end.split(), float) for end in ends], axis=1) == pytest.approx(5.0, abs=1e-4)  # cm
 
 
 @pytest.mark.filterwarnings("ignore:No analog data")
@@ -190,6 +194,23 @@ def test_gltf_opens_and_moves_body_and_garment(result: Result, tmp_path: Path) -
         np.testing.assert_allclose(played.garment(row), result.track.cloth[row], atol=NEAR)
         off = np.linalg.norm(played.skinned(row) - result.bare(row).vertices, axis=1)
         assert off.max() < 2e-3  # the format has four joints a vertex, ours five
+
+
+def test_gltf_counts_seconds_from_its_first_frame_and_says_how_far_things_reach(result: Result, tmp_path: Path) -> None:
+    late = replace(result, track=replace(result.track, time=result.track.time + 2.0))
+    file = readers.Gltf(write("gltf", late, tmp_path)).file
+    last = result.track.time[-1] - result.track.time[0]
+    for sampler in file.animations[0].samplers:
+        moments = file.accessors[sampler.input]
+        assert (moments.min, moments.max) == ([0.0], [pytest.approx(last)])
+    names = [node.name for node in file.nodes]
+    hanging = [channel.target for channel in file.animations[0].channels if channel.target.path == "weights"]
+    assert [names[target.node] for target in hanging] == ["garment"]
+    assert file.nodes[names.index("body")].skin == 0 and len(file.skins) == 1
+    places = file.accessors[next(mesh for mesh in file.meshes if mesh.name == "body").primitives[0].attributes.POSITION]
+    vertices = result.scene.body.vertices
+    assert (places.min, places.max) == (pytest.approx(vertices.min(axis=0)), pytest.approx(vertices.max(axis=0)))
+    assert all(0 <= node.mesh < len(file.meshes) for node in file.nodes if getattr(node, "mesh", None) is not None)
 
 
 def test_turns_go_the_shorter_way_and_past_a_half_turn() -> None:

@@ -10,6 +10,7 @@ from results_scene import demo_scene, stepping
 
 from mocapflow.errors import PipelineError
 from mocapflow.geometry.twists import exp
+from mocapflow.series import Series
 
 SCENE = demo_scene()
 WHOLE = stepping(SCENE.body)  # 40 frames
@@ -29,6 +30,18 @@ def test_parts_that_agree_are_the_whole():
     for name in ("frame", "time", "root", "angles", "covariance", "cloth", "iterations", "seconds", "energy"):
         np.testing.assert_array_equal(getattr(joined, name), getattr(WHOLE, name))
     assert [note.partition(", ")[0] for note in joined.notes] == ["frame 15: parts joined", "frame 28: parts joined"]
+
+
+@pytest.mark.parametrize("wide", [0, 1])
+def test_what_is_wide_is_joined_in_order_and_stays_on_the_drive(wide):
+    parts = [part(0, 20), part(15, 40)]
+    numbered = [np.arange(len(each.frame))[:, None, None] + each.frame[0] + 0 * each.covariance for each in parts]
+    given = list(numbered)
+    given[wide] = Series(numbered[wide].shape, lambda rows: numbered[wide][rows])
+    parts = [replace(each, covariance=covariance) for each, covariance in zip(parts, given, strict=True)]
+    joined = Join().run(tuple(parts), SCENE).covariance
+    assert isinstance(joined, Series)
+    np.testing.assert_array_equal(np.asarray(joined)[:, 0, 0], np.arange(40))
 
 
 def test_parts_are_joined_where_they_agree_best():

@@ -159,6 +159,11 @@ def test_an_unseen_leg_comes_to_rest_in_a_training_pose(tmp_path: Path) -> None:
     assert (unknown > 100).all()  # rad: the damping alone
 
 
+def test_training_poses_are_put_where_a_body_has_their_angles() -> None:
+    density = Density(names=("knee", "hip"), poses=np.array([[0.1, 0.2], [0.3, 0.4]]), bandwidth=0.1)
+    np.testing.assert_array_equal(density.on(["hip", "elbow", "knee"]), [[0.2, np.nan, 0.1], [0.4, np.nan, 0.3]])
+
+
 def test_angles_the_body_lacks_are_left_out(tmp_path: Path) -> None:
     density = gait((*LEG, "tail.wag"))
     write(tmp_path / "poses.npz", density)

@@ -67,6 +67,15 @@ def test_an_angle_that_jumped_does_not_go_on() -> None:
     assert np.allclose(np.degrees(guess.angles - FIRST.angles)[:3], [70.0, 45.0, 0.0])
 
 
+@pytest.mark.parametrize(("speed_deg_s", "goes_on"), [(1150.0, True), (1250.0, False)])
+def test_an_angle_jumps_if_it_is_faster_than_a_kick_however_late_that_is(speed_deg_s: float, goes_on: bool) -> None:
+    turned = np.eye(len(FIRST.angles))[2] * np.radians(speed_deg_s) / 30
+    poses = (FIRST, Pose(root=FIRST.root, angles=FIRST.angles + turned))
+    late = Past(moments=tuple(Moment(time=20 + k / 30, pose=pose, cloth=NO_CLOTH) for k, pose in enumerate(poses)))
+    predicted = ConstantVelocity().predict(frame(20 + 2 / 30), late, make_scene())
+    np.testing.assert_allclose(predicted.angles, FIRST.angles + (2 if goes_on else 1) * turned, atol=1e-9)
+
+
 def test_an_angle_that_is_seen_again_does_not_go_on() -> None:
     """Where it was before is what the priors said."""
     hidden = np.arange(12) < 3

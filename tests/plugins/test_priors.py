@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mocapflow_priors.joint_limits import JointLimits
 from mocapflow_priors.rest_pose import RestPose
-from mocapflow_priors.smooth_motion import SmoothMotion
+from mocapflow_priors.smooth_motion import SmoothMotion, turn_rate
 from mocapflow_priors.spine_coupling import SpineCoupling
 from twist_fixtures import make_pose, make_scene
 
@@ -95,6 +95,17 @@ def test_a_half_turn_between_pose_and_expectation_is_finite() -> None:
     scene, pose = make_scene(), make_pose(0)
     turned = Pose(root=pose.root @ twists.exp(np.array([0, 0, np.pi, 0, 0, 0])), angles=pose.angles)
     assert np.isfinite(SmoothMotion().residual(turned, make_past(pose, pose), scene).jacobian).all()
+
+
+@pytest.mark.parametrize("angle", [0.0, 9e-5, 1.1e-4, 0.3, 2.0])
+def test_the_rate_of_a_rotation_vector_inverts_that_of_its_exponential(angle: float) -> None:
+    """Against the series of the left Jacobian, the sum over w^n / (n + 1)!."""
+    w = angle * twists.hat(np.array([0.6, 0.0, 0.8]))
+    term, left = np.eye(3), np.eye(3)
+    for n in range(1, 30):
+        term = term @ w / (n + 1)
+        left = left + term
+    np.testing.assert_allclose(turn_rate(angle * np.array([0.6, 0.0, 0.8])) @ left, np.eye(3), atol=2e-8)
 
 
 def test_the_spine_bends_like_the_chest() -> None:

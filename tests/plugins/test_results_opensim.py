@@ -75,6 +75,30 @@ def test_one_turn_moves_one_coordinate(upright: Body, turn: str, coordinate: str
     assert max(abs(found[n] - rest[n]) for n in others) < 1e-9
 
 
+def with_forearms(body: Body, right: np.ndarray) -> Body:
+    """The body with another way (3,) m from the right elbow to its wrist at rest, and the left one's mirror image."""
+    places = body.positions.copy()
+    for side, mirror in (("r", 1), ("l", -1)):
+        places[body.joint(f"wrist_{side}")] = places[body.joint(f"elbow_{side}")] + right * [mirror, 1, 1]
+    return replace(body, positions=places)
+
+
+@pytest.mark.parametrize("inward_deg", [0.0, 25.0])
+def test_an_arm_that_is_bent_at_rest_shows_how_it_is_turned(upright: Body, inward_deg: float) -> None:
+    """The elbow is a hinge: about the upper arm it is turned as far as the forearm points inward."""
+    inward, ahead = np.sin(np.radians(inward_deg)), np.cos(np.radians(inward_deg))
+    found = turned(with_forearms(upright, np.array([0.1 * inward, -0.1 * ahead, -0.2])))
+    assert [found["arm_rot_r"], found["arm_rot_l"]] == pytest.approx([inward_deg] * 2, abs=1e-9)
+    assert [found["arm_flex_r"], found["arm_add_l"]] == pytest.approx([0, 0], abs=1e-9)
+
+
+def test_arms_that_hang_straight_are_at_zero(upright: Body) -> None:
+    body = with_forearms(upright, np.array([0, 0, -0.2]))
+    found = turned(body)
+    assert [value for name, value in found.items() if "arm_" in name or "elbow" in name] == pytest.approx([0] * 8)
+    assert turned(body, shoulder_r_x=-20)["arm_flex_r"] == pytest.approx(20)
+
+
 def test_hip_flexion_of_a_lifted_knee_is_positive(upright: Body) -> None:
     assert turned(upright, hip_r_x=-60)["hip_flexion_r"] == pytest.approx(60)
     assert turned(upright, elbow_r_x=-30)["elbow_flex_r"] == pytest.approx(30 + np.degrees(np.arctan2(0.1, 0.2)))

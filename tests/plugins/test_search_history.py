@@ -61,3 +61,5 @@ def test_a_fit_that_is_not_doubted_ends_it_and_all_else_that_is_known_stays():
     known = without_history(FITTED, past).state.segmentation.appearance
     assert history_of(before(6, known)).searches == 0 and (known["colours"] == 1).all()
     assert without_history(FITTED, before(5, COLOURS)) is FITTED
+    ended = with_search(replace(OTHER, doubted=False), FITTED, 400.0, past).state.segmentation.appearance
+    assert history_of(before(6, ended)).searches == 0 and (ended["colours"] == 1).all()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,7 +16,7 @@ from mocapflow_recovery.second_look import Refitter, SecondLook
 from results_scene import DEMO, demo_scene, stepping
 
 from mocapflow.config.pipeline import load_pipeline
-from mocapflow.data import NO_CLOTH, Change, FrameResult, Past, Pose
+from mocapflow.data import NO_CLOTH, Change, Cloth, FrameResult, Past, Pose
 from mocapflow.help.shipped import shipped
 from mocapflow.prediction import initial_state
 from mocapflow.recordings.recording import open_recording
@@ -92,8 +93,13 @@ def test_a_frame_that_leaps_is_fitted_again_from_between_its_neighbours(looked):
 
 def test_what_a_frame_knows_of_those_before_it_is_their_better_fit():
     fits, frame = RevisedTrack(astray(ROW), SCENE.body), next(RECORDING.frames(since=ROW))
-    fits.replace_fit(ROW, frame, fitted(TRUE.pose(ROW)))
+    better = fitted(TRUE.pose(ROW))
+    hung = Cloth(vertices=np.ones((4, 3)), parameters=np.array([0.1, 0.2]))
+    sure = replace(better.state.estimate, observed=np.full(len(TRUE.angles[ROW]), 0.75))
+    fits.replace_fit(ROW, frame, replace(better, state=replace(better.state, estimate=sure, cloth=hung)))
+    assert fits.cloth(ROW).parameters.tolist() == [0.1, 0.2] and (fits.cloth(ROW).vertices == 1).all()
     latest = fits.past(ROW + 1, {}).moments[-1]
+    assert latest.cloth.parameters.tolist() == [0.1, 0.2] and (latest.observed == 0.75).all()
     assert latest.pose.angles[KNEE] == TRUE.angles[ROW, KNEE] and latest.time == TRUE.time[ROW]
     assert fits.past(ROW + 2, {}).moments[-1].pose.angles[KNEE] == TRUE.angles[ROW + 1, KNEE]
 
@@ -117,6 +123,22 @@ def test_a_limb_that_was_lost_for_some_frames_is_followed_back(looked):
     np.testing.assert_array_equal(again.angles, TRUE.angles)
     indices = [index for index, *_ in looked]
     assert set(rows) <= set(indices) and len(indices) < 2 * len(rows)
+
+
+def test_a_row_at_which_a_window_is_cut_is_fitted_in_the_next(looked, monkeypatch):
+    """There the row after it shows the colours; where it is the last, only those before it are at hand."""
+    shown = []  # (fits so far, row that shows colours)
+
+    def appearance(refitter, frame, row):
+        shown.append((len(looked), row))
+        return {}
+
+    monkeypatch.setattr(Refitter, "appearance", appearance)
+    again = second_look(astray(*range(ROW, ROW + WINDOW, 2)))
+    np.testing.assert_array_equal(again.angles, TRUE.angles)
+    assert len(shown) > 1
+    for (first, row), (after, _) in pairwise([*shown, (len(looked), 0)]):
+        assert all(index < row for index, *_ in looked[first:after])
 
 
 def test_a_frame_is_due_again_when_one_beside_it_has_another_fit(monkeypatch):

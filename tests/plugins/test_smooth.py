@@ -202,6 +202,16 @@ def test_two_frames_are_returned_as_they_are() -> None:
     assert (smoothed_by_default(track).angles == track.angles).all()
 
 
+def test_three_frames_bend_less() -> None:
+    """As in a parabola through them all move alike, the middle twice as far, the other way."""
+    body = ball_body(("pelvis", "hip_l", "knee_l", "ankle_l"))
+    pose = start_pose(body)
+    angles = pose.angles + np.radians([[0.0], [1.0], [0.0]]) * np.eye(len(pose.angles))[0]
+    track = make_track(np.tile(pose.root, (3, 1, 1)), angles)
+    before, middle, after = np.degrees(smoothed_by_default(track).angles - track.angles)[:, 0]
+    assert (before, after) == pytest.approx((-middle / 2, -middle / 2)) and -2 / 3 < middle < -0.01
+
+
 def test_a_variance_that_rounding_left_below_zero_is_no_hindrance() -> None:
     curves = true_curves("skirt_steps")[:20]
     track = make_track(np.tile(np.eye(4), (20, 1, 1)), curves, sd=np.radians(1.0))

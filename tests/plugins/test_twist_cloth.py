@@ -8,7 +8,10 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 from mocapflow_twist.constraint import image_rows
-from mocapflow_twist.normal_equations import dense_equations
+from mocapflow_twist.motion import ClothMotion
+from mocapflow_twist.normal_equations import Equations, dense_equations
+from mocapflow_twist.problem import Guess
+from mocapflow_twist.steps import at_bound
 from mocapflow_twist.twist_gauss_newton import TwistGaussNewton
 from test_twist_solver import EXACT, TURN, energies_of
 from twist_fixtures import exact_matches, make_pose, make_scene, make_state
@@ -131,6 +134,32 @@ def test_cloth_parameters_stay_within_their_bounds() -> None:
     assert estimate.parameters[1] == pytest.approx(0.5)
     costs = [energies_of(before, MODEL, matches, state, found)["data"] for found in (estimate, unmoved)]
     assert costs[0] < costs[1]
+
+
+@pytest.mark.parametrize(
+    ("swell", "slope", "held"),  # of the energy by the second parameter, from 0 to 0.5
+    [(0.0, 1.0, True), (0.0, -1.0, False), (0.5, -1.0, True), (0.5, 1.0, False), (0.2, 1.0, False)],
+)
+def test_a_parameter_is_held_where_its_way_down_leads_out_of_its_bounds(swell: float, slope: float, held: bool) -> None:
+    root = np.random.default_rng(0).normal(size=(20, 20))
+    whole = Equations(root @ root.T, np.append(np.ones(19), slope), 3.0)
+    guess = Guess(make_pose(0), MODEL.drape(make_pose(0), np.array([0.2, swell]), Past()))
+    found = ClothMotion(MODEL, Past(), True).within_bounds(whole, guess)
+    alone = np.outer(np.arange(20) != 19, np.arange(20) != 19) | (np.eye(20) > 0)  # it is coupled to nothing
+    np.testing.assert_array_equal(found.hessian, np.where(alone, whole.hessian, 0.0) if held else whole.hessian)
+    assert found.gradient.tolist() == [1.0] * 19 + [0.0 if held else slope]
+
+
+def test_each_parameter_is_held_by_its_own_slope() -> None:
+    guess = Guess(make_pose(0), MODEL.drape(make_pose(0), np.array([-1.0, 0.2]), Past()))
+    found = ClothMotion(MODEL, Past(), True).within_bounds(
+        Equations(np.eye(20), np.append(np.ones(19), -1), 0.0), guess
+    )
+    assert found.gradient[18:].tolist() == [0.0, -1.0]  # only the first stands at a bound
+
+
+def test_a_parameter_without_a_range_is_held() -> None:
+    assert at_bound(np.array([0.3]), np.zeros(1), np.array([0.3]), np.array([0.3])).all()
 
 
 def test_forces_that_nothing_shows_go_to_calm_and_are_as_unsure_as_stated() -> None:

@@ -42,6 +42,12 @@ def test_matches_far_apart_count_whole() -> None:
     assert effective_share(contour((3.0, 3.0), (900.0, 3.0), 31.0), 15.0) == pytest.approx(1.0)
 
 
+def test_matches_in_one_place_are_worth_less_the_more_alike_their_weights() -> None:
+    """Of their sum squared, what their squares sum up to: a strong one beside a weak one is nearly alone."""
+    both = replace(contour((3.0, 3.0), (4.0, 3.0), 0.5), weight=np.array([1.0, 3.0]))
+    assert effective_share(both, 15.0) == pytest.approx((1 + 9) / (1 + 3) ** 2)
+
+
 def test_each_view_is_counted_for_itself_and_rejected_matches_do_not_count() -> None:
     one = contour((3.0, 3.0), (600.0, 3.0), 1.0)
     far = replace(contour((3.0, 3.0), (900.0, 3.0), 31.0), camera=np.full(29, 2, np.int16))

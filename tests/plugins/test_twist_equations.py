@@ -64,6 +64,17 @@ def test_image_rows_are_distances_in_the_image() -> None:
         assert np.abs(error - expected).max() < 1e-9
 
 
+def test_a_direction_along_an_axis_of_the_image_is_one() -> None:
+    scene, vertices = make_scene(), np.arange(0, 300, 30)
+    matches = noisy_matches(scene, make_pose(0), True, vertices)
+    along = replace(matches, direction=np.eye(2)[np.arange(len(matches.camera)) % 2])
+    rows = image_rows(along, scene.cameras)
+    assert rows.match.tolist() == list(range(len(matches.camera)))
+    error, _ = normal_equations.point_errors(rows, points_of(scene, make_pose(0), rows))
+    seen = cameras.project_each(points_of(scene, make_pose(0), rows), along.camera, scene.cameras)
+    np.testing.assert_allclose(error, np.sum((seen - along.pixel) * along.direction, axis=1), atol=1e-9)
+
+
 def test_line_rows_are_the_chapters_error_vectors() -> None:
     scene, pose = make_scene(), make_pose(0)
     matches = noisy_matches(scene, pose, False, np.arange(0, 300, 7))

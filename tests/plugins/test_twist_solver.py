@@ -213,6 +213,10 @@ def test_a_step_is_capped() -> None:
     pose = solve(TwistGaussNewton(iterations=1, cap_deg=2.0, cap_mm=5.0), scene, start, matches).pose
     assert np.degrees(np.abs(pose.angles - start.angles)).max() <= 2.0 + 1e-9
     assert np.linalg.norm(pose.root[:3, 3] - start.root[:3, 3]) <= 0.005 + 1e-9
+    short = TwistGaussNewton(iterations=1, cap_deg=90.0, cap_mm=5.0, damping=1e-12)
+    roots = (solve(short, scene, start, matches).pose.root, start.root)
+    places = [kinematics.root_position(scene.body, root) for root in roots]
+    assert np.linalg.norm(places[0] - places[1]) == pytest.approx(0.005, rel=1e-3)
 
 
 def test_growing_damping_shortens_the_steps_of_later_turns() -> None:

@@ -13,12 +13,13 @@ from mocapflow_twist import steps
 from mocapflow_twist.constraint import line_rows
 from mocapflow_twist.covariance import effective_share
 from mocapflow_twist.motion import ClothMotion
+from mocapflow_twist.normal_equations import Equations
 from mocapflow_twist.problem import Anchor, Guess, Problem
 from mocapflow_twist.twist_gauss_newton import TwistGaussNewton
 from test_twist_solver import EXACT, FREE, start_from
 from twist_fixtures import exact_matches, make_pose, make_scene, make_state
 
-from mocapflow.data import NO_CLOTH, Moment, Past, Turn
+from mocapflow.data import NO_CLOTH, Cloth, Moment, Past, Residual, Turn
 from mocapflow.model import ClothedModel, moved
 
 SCENE, TRUTH = make_scene(), make_pose(1)
@@ -33,17 +34,25 @@ def problem_of(solver: TwistGaussNewton, start: Guess, priors: tuple[SmoothMotio
     return Problem(MODEL, data, priors, past or Past(), anchor, {})
 
 
-@pytest.mark.parametrize(("column", "cap"), [(1, 0.1), (4, 0.05), (9, 0.1)], ids=["turn", "shift", "angle"])
+@pytest.mark.parametrize(("column", "cap"), [(1, 0.1), (4, 0.05), (9, 0.1), (UNKNOWNS - 1, 0.1)])
 def test_each_kind_of_move_has_its_cap(column: int, cap: float) -> None:
-    """What is too large alone shortens the whole step, and to the cap; the rest of it is small."""
-    increment = np.full(UNKNOWNS, 1e-3)
+    """What is too large alone shortens the whole step, and to the cap; cloth has none, the rest of it is small."""
+    within = np.append(np.full(UNKNOWNS, 0.02), 9.0)
+    increment = within.copy()
     increment[column] = -5.0
     short = steps.capped(increment, UNKNOWNS - 6, 0.1, 0.05)
     first = slice(3 * (column // 3), 3 * (column // 3) + 3) if column < 6 else [column]
     assert np.linalg.norm(short[first]) == pytest.approx(cap)
     np.testing.assert_allclose(short, increment * short[column] / increment[column])
-    within = np.full(UNKNOWNS, 1e-3)
     np.testing.assert_array_equal(steps.capped(within, UNKNOWNS - 6, 0.1, 0.05), within)
+
+
+def test_a_step_to_the_lowest_point_gains_half_of_what_the_slope_promises() -> None:
+    root, slope = np.random.default_rng(0).normal(size=(5, 5)), np.arange(1.0, 6.0)
+    equations = Equations(root @ root.T + np.eye(5), slope, 7.0)
+    lowest = -np.linalg.solve(equations.hessian, slope)
+    assert steps.gain(equations, lowest) == pytest.approx(-slope @ lowest / 2)
+    np.testing.assert_allclose(steps.step(equations, np.ones(5), 0.0), lowest)
 
 
 class Grudging(NamedTuple):
@@ -102,6 +111,32 @@ def test_the_damping_pulls_about_the_root_as_its_energy_says() -> None:
     assert prior.gradient == pytest.approx(slope, rel=1e-6)
     sd = np.repeat([np.radians(20), 0.05, np.radians(30)], [3, 3, UNKNOWNS - 6])
     assert prior.hessian == pytest.approx(np.diag(sd**-2))
+
+
+def test_cloth_is_held_by_its_damping_alone() -> None:
+    """Priors know nothing of it: theirs are the columns (omega, v, angles), more if they like."""
+    start = Guess(start_from(TRUTH, 2), Cloth(vertices=np.empty((0, 3)), parameters=np.array([0.3, -0.2])))
+    precision = np.append(np.full(UNKNOWNS, 1e-3), [4.0, 9.0])
+    empty = problem_of(TwistGaussNewton(), start)
+    wide, narrow = Mock(weight=1.0), Mock(weight=1.0)
+    jacobian = np.random.default_rng(0).normal(size=(5, UNKNOWNS + 2))
+    wide.residual.return_value = Residual(error=np.ones(5), jacobian=jacobian, energy=2.5)
+    narrow.residual.return_value = Residual(error=np.ones(5), jacobian=jacobian[:, :UNKNOWNS], energy=2.5)
+    held = empty._replace(priors=(narrow,), anchor=Anchor(start, precision), tried={})
+    at_rest = held.quadratic(start, None).prior
+    np.testing.assert_array_equal(at_rest.gradient[UNKNOWNS:], 0.0)
+    np.testing.assert_array_equal(at_rest.hessian[UNKNOWNS:], np.diag(precision)[UNKNOWNS:])
+    swollen = start._replace(cloth=Cloth(vertices=np.empty((0, 3)), parameters=np.array([0.8, -0.2])))
+    pulled = held.quadratic(swollen, None).prior
+    assert pulled.gradient[UNKNOWNS:] == pytest.approx([4.0 * 0.5, 0.0])
+    assert pulled.energy - at_rest.energy == pytest.approx(0.5 * 4.0 * 0.5**2)
+    given, wider = (empty._replace(priors=(prior,), tried={}).quadratic(start, None).prior for prior in (narrow, wide))
+    np.testing.assert_array_equal(given.hessian, wider.hessian)
+
+
+def test_the_range_of_a_cloth_parameter_moves_the_surface_as_far_whatever_its_unit() -> None:
+    ranges = np.array([0.05, 3.0])
+    assert steps.levers(2, ranges)[8:] * ranges == pytest.approx(steps.CLOTH_LEVER)
 
 
 def test_distances_to_rays_count_by_the_weight_of_their_pair() -> None:

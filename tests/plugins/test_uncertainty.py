@@ -13,6 +13,7 @@ from results_scene import demo_scene, stepping
 
 from mocapflow.geometry import angles
 from mocapflow.geometry.cameras import scaled
+from mocapflow.geometry.kinematics import root_position
 
 SCRIPT = Path(__file__).parents[2] / "benchmarks" / "calibrate_uncertainty.py"
 
@@ -49,6 +50,20 @@ def test_what_images_contradict_is_less_sure():
     stated = measured(replace(track, doubted=np.array([False, False, True, False, False])), scene)
     ratio = stated.sd / measured(track, scene).sd
     np.testing.assert_allclose(ratio, np.tile([[1], [1], [DOUBTED], [1], [1]], ratio.shape[1]))
+
+
+def test_deviations_are_those_of_the_fit_widened_by_what_images_of_that_size_leave_open():
+    scene = demo_scene()
+    track = stepping(scene.body, 3)
+    size = px_per_mm(root_position(scene.body, track.root), scene.cameras)
+    fit = angles.measure(scene.body, track.root, track.angles, track.covariance).sd
+    np.testing.assert_allclose(measured(track, scene).sd, (1 + OUTLINE_MM * size[:, None]) * fit)
+
+
+def test_a_metre_is_shown_as_large_as_the_focal_length_over_the_distance():
+    view = replace(demo_scene().cameras[0], camera_from_world=np.eye(4))
+    focal = view.intrinsics[0, 0]
+    assert px_per_mm(np.array([[0.3, 0.1, 2.0], [0.0, 0.0, 4.0]]), [view]) == pytest.approx([focal / 2e3, focal / 4e3])
 
 
 def test_larger_images_tell_more_of_pixels_but_not_of_millimetres():

@@ -63,6 +63,19 @@ def test_two_cameras_see_a_point_in_the_same_plane():
     angles = [plane_angles(project(points, camera), camera, axes) for camera in (one, other)]
     np.testing.assert_allclose(angles[0], angles[1], atol=1e-9)
     assert np.ptp(angles[0]) > 0.1
+    looked_at = np.array([[0.0, 0.0, 1.0]])  # there the angle is zero
+    assert [plane_angles(project(looked_at, camera), camera, axes)[0] for camera in (one, other)] == pytest.approx(
+        [0, 0]
+    )
+
+
+def test_cameras_that_face_each_other_agree_on_a_plane_too():
+    one, other = (look_at(name, np.array([x, 0.0, 1.0]), SIZE, focal=150.0) for name, x in (("a", 3.0), ("b", -2.0)))
+    axes = pencil_axes(one, other)
+    np.testing.assert_allclose(axes @ np.column_stack([axes.T, [1.0, 0, 0]]), np.eye(2, 3), atol=1e-12)
+    points = ball(np.arange(10))
+    angles = [plane_angles(project(points, camera), camera, axes) for camera in (one, other)]
+    np.testing.assert_allclose(angles[0], angles[1], atol=1e-9)
 
 
 @pytest.mark.parametrize("lag", [0, 3, -2.4])
