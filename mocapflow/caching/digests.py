@@ -142,7 +142,7 @@ class Digests:
         try:
             return str(self._remembered(path, "", read)[0])
         except OSError as error:
-            raise RecordingError(f"can't read {path}: {error.strerror}", where=str(path)) from error
+            raise RecordingError(f"can't be read: {error.strerror}", where=str(path)) from error
 
     def _loaded(self, name: str, path: Path) -> tuple[str, list[str]]:
         """Return `_source` of a module, if that is what runs: else old code would make results under a new key.

@@ -192,9 +192,9 @@ def _with_frames(document: Document, part: slice) -> Document:
 
 
 def _parts(said: PartsFile, resolver: Resolver) -> Parts | None:
+    start = None if said.start is None else resolver.component("stage", said.start, ("parts", "start"))
     if said.count == 1:
         return None
-    start = None if said.start is None else resolver.component("stage", said.start, ("parts", "start"))
     join = resolver.component("stage", said.join, ("parts", "join"))
     return Parts(count=said.count, overlap=said.overlap, start=start, join=join)
 

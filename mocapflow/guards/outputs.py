@@ -1,4 +1,4 @@
-"""What components return to the loop, checked where it comes in: who returns it wrong is named, not who uses it."""
+"""What components return, checked where it comes in: who returns it wrong is named, not who uses it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mocapflow.components import ClothFitter, Matcher, PoseSolver, Predictor, Prior, Recovery, Segmenter
+from mocapflow.components import ClothFitter, Matcher, PoseSolver, Predictor, Prior, Recovery, Segmenter, Stage
 from mocapflow.data import (
     LAYERS,
     Cloth,
@@ -20,12 +20,14 @@ from mocapflow.data import (
     Pose,
     Residual,
     Segmentation,
+    Start,
     Surface,
     Turn,
 )
 from mocapflow.dressing.guards import worn
-from mocapflow.output_checks import UNIT, InvalidOutput, array_of, finite, of_kind
+from mocapflow.output_checks import UNIT, InvalidOutput, Output, array_of, finite, of_kind
 from mocapflow.records import F64, out_of_range
+from mocapflow.results import Track
 from mocapflow.scene import Scene
 from mocapflow.settings import Component
 
@@ -219,6 +221,19 @@ def result_of(recovery: Recovery, found: Any, looped: FrameResult, scene: Scene)
     if not isinstance(result.notes, tuple):
         raise InvalidOutput(recovery, f"notes as a {type(result.notes).__name__}, not a tuple of them")
     return result
+
+
+def made_of(stage: Stage, made: Any, kind: type[Output]) -> Output:
+    """Return what a stage has made.
+
+    Raises:
+        InvalidOutput: it is of another kind, or a track or a first pose that is not finite.
+    """
+    found = of_kind(stage, made, kind)
+    motion = found.pose if isinstance(found, Start) else found
+    if isinstance(motion, Pose | Track) and not (finite(motion.root) and finite(motion.angles)):
+        raise InvalidOutput(stage, "a pose that is not finite")
+    return found
 
 
 def _squares(values: F64) -> bool:

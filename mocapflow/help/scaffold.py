@@ -50,7 +50,7 @@ def write_plugin(name: str, role: str, folder: Path) -> list[Path]:
     words = {
         "name": name,
         "module": module,
-        "Class": name.title().replace("-", ""),
+        "Class": f"{name}-{role}".title().replace("-", ""),  # the role: else `residual` would hide what it imports
         "title": name.replace("-", " ").capitalize(),
         "role": role,
         "usage": Template(kind.usage).substitute(module=module),

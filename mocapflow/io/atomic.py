@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from uuid import uuid4
 
@@ -26,7 +26,8 @@ def atomic_write(path: Path) -> Iterator[Path]:
             error.filename = str(path)  # by which people know the file
         raise
     finally:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):  # a drive that can't be written does not say that there is nothing to remove
+            part.unlink()
 
 
 def forget_parts(folder: Path) -> None:

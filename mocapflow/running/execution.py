@@ -16,8 +16,8 @@ from mocapflow.data import FrameResult
 from mocapflow.dressing.guards import body_of, mesh_of
 from mocapflow.dressing.roles import Garment
 from mocapflow.errors import GarmentError
+from mocapflow.guards.outputs import made_of
 from mocapflow.interrupts import check
-from mocapflow.output_checks import of_kind
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import silent
 from mocapflow.results import Files, RunFolder
@@ -173,7 +173,7 @@ class Execution:
         with warnings_logged(self._pipeline.registry.packages) as said, self._naming_failures(stage, checkpoint):
             if checkpoint is not None:
                 checkpoint.keep_warnings(said)
-            value = of_kind(stage, stage.run(**inputs), made_by(step.named))
+            value = made_of(stage, stage.run(**inputs), made_by(step.named))
             self._store.digests.check_inputs()
         told = said if checkpoint is None else checkpoint.warnings
         return Made(value, [*told, *mixed], time.process_time() - cpu, time.perf_counter() - wall)

@@ -46,11 +46,12 @@ class Store:
         """Make the folder, if there is none.
 
         Raises:
-            StoreError: it can't be written, or holds files of others.
+            StoreError: it can't be written.
+            MocapflowError: it holds files of others.
         """
         if strangers := self._strangers():
             hint = f"give stored results a folder of their own: --store {self.path / 'store.zarr'}"
-            raise StoreError(f"this folder is no store: it holds {strangers[0]}", where=str(self.path), hint=hint)
+            raise MocapflowError(f"this folder is no store: it holds {strangers[0]}", where=str(self.path), hint=hint)
         about = {"unit": "1", "about": "locks, digests and damaged results of mocapflow; no data"}
         state = array_meta((0,), (1,), np.dtype(np.uint8), 0, ("nothing",), about)
         with writing(self.path):

@@ -99,7 +99,8 @@ def read_angles(path: Path, body: Body) -> Angles:
     except MocapflowError:
         raise
     except Exception as error:  # of bvhio, numpy, zipfile, zlib and tokenize
-        raise RecordingError(f"cannot be read as {path.suffix}: {error}", where=str(path)) from error
+        hint = "it is damaged, or of another kind; an .npz holds joint_names (J) and rotation_vectors (T, J, 3)"
+        raise RecordingError(f"cannot be read as {path.suffix}: {error}", where=str(path), hint=hint) from error
 
 
 def from_rotations(path: Path, body: Body) -> Angles:

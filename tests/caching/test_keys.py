@@ -15,7 +15,7 @@ from mocapflow.caching import digests, sources
 from mocapflow.caching.digests import Digests
 from mocapflow.caching.keys import _plain, all_changes, explain, key_of
 from mocapflow.data import Start
-from mocapflow.errors import PluginError
+from mocapflow.errors import PluginError, RecordingError
 from mocapflow.running import recipes
 from mocapflow.running.recipes import steps_of
 from tests.fixtures.stores import PLUGIN, STAGES, load, write_pipeline, write_recording
@@ -477,3 +477,9 @@ def test_a_causal_input_of_a_track_need_not_read_the_recording():
         }.items()
     }
     assert keys["short"] == keys["long"] and set(keys["none"]) == {"key"}
+
+
+def test_a_file_that_is_not_there_is_named_once(tmp_path):
+    with pytest.raises(RecordingError) as caught:
+        Digests().file(tmp_path / "cam01.png")
+    assert str(caught.value) == f"{tmp_path / 'cam01.png'}  can't be read: No such file or directory"

@@ -129,6 +129,11 @@ def test_a_plugin_file_is_named_once(folder):
     assert str(caught.value) == "skirt.yaml:1:21  plugins.1: this file is named twice"
 
 
+def test_what_starts_parts_is_looked_up_though_there_are_none(folder):
+    with pytest.raises(MocapflowError, match=r"parts\.start: no stage named 'strat'\n       available: "):
+        load("parts.start=strat")
+
+
 def test_a_stage_is_left_out_by_null(folder):
     assert [named.label for named in load("stages.smooth=null").stages] == ["start", "track", "export"]
 

@@ -9,16 +9,27 @@ import pytest
 from typer.testing import CliRunner
 
 from mocapflow.cli import app
-from mocapflow.components import ClothFitter, Matcher, PoseSolver, Predictor, Prior, Recovery, Segmenter
-from mocapflow.data import NO_CLOTH, Matches, Past, Pose, Residual, Turn
+from mocapflow.components import ClothFitter, Matcher, PoseSolver, Predictor, Prior, Recovery, Segmenter, Stage
+from mocapflow.data import NO_CLOTH, Matches, Past, Pose, Residual, Start, Turn
 from mocapflow.dressing.guards import body_of, mesh_of
 from mocapflow.dressing.roles import BodyModel, Draper, Garment
 from mocapflow.errors import MocapflowError
-from mocapflow.guards.outputs import cloth_of, estimate_of, matches_of, pose_of, residual_of, result_of, segmentation_of
+from mocapflow.guards.outputs import (
+    cloth_of,
+    estimate_of,
+    made_of,
+    matches_of,
+    pose_of,
+    residual_of,
+    result_of,
+    segmentation_of,
+)
 from mocapflow.output_checks import InvalidOutput, of_kind
+from mocapflow.results import Track
 from mocapflow.testing import pictures, scenes
 from mocapflow.testing.recovery import settled
 from tests.fixtures.stores import STAGES, load, run_tiny, write_pipeline, write_recording
+from tests.plugins.results_scene import stepping
 
 SCENE = scenes.tiny_scene()
 POSE = scenes.tiny_pose(SCENE)
@@ -437,3 +448,22 @@ def test_a_recovery_that_leaves_the_cloth_behind():
     assert result_of(Lost(), left, left, SCENE) is left  # what the loop found was looked at there
     with pytest.raises(InvalidOutput, match=r"recovery 'lost' returned cloth 1.* m from the body"):
         result_of(Lost(), left, worn, SCENE)
+
+
+class Idle(Stage):
+    """Is given what it is said to have made."""
+
+    name = "idle"
+
+
+@pytest.mark.parametrize("field", ["root", "angles"])
+def test_a_stage_that_makes_motion_that_is_not_finite(field):
+    lost = {field: np.nan * getattr(POSE, field)}
+    start = Start(pose=POSE, parameters=np.empty(0))
+    track = stepping(SCENE.body, count=2)
+    broken = replace(track, **{field: np.nan * getattr(track, field)})
+    assert made_of(Idle(), start, Start) is start
+    assert made_of(Idle(), track, Track) is track
+    for made in (replace(start, pose=replace(POSE, **lost)), broken):
+        with pytest.raises(InvalidOutput, match="stage 'idle' returned a pose that is not finite"):
+            made_of(Idle(), made, type(made))

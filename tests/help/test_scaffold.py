@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from mocapflow import load_registry
 from mocapflow.cli import app
-from mocapflow.data import NO_CLOTH, Past, Turn
+from mocapflow.data import NO_CLOTH, Past, Residual, Turn
 from mocapflow.errors import PluginError
 from mocapflow.help.scaffold import KINDS, write_plugin
 from mocapflow.testing import same, tiny_frame, tiny_pose, tiny_scene, tiny_segmentation
@@ -76,6 +76,14 @@ def test_a_new_matcher_leaves_silhouettes_of_other_layers_alone(tmp_path: Path) 
     frame = tiny_frame(scene, pose)
     found = matcher.match(frame, replace(seen, silhouettes=(*seen.silhouettes, *skin)), *asked)
     assert same(found, matcher.match(frame, seen, *asked))
+
+
+@pytest.mark.parametrize("name", ["prior", "residual", "pose"])
+def test_a_plugin_may_be_called_like_a_type_it_needs(name: str, tmp_path: Path) -> None:
+    write_plugin(name, "prior", tmp_path / "new")
+    prior: Any = load_registry([tmp_path / "new" / f"mocapflow_{name}.py"]).get("prior", name)()
+    scene = tiny_scene()
+    assert isinstance(prior.residual(tiny_pose(scene), Past(), scene), Residual)
 
 
 def test_the_command_to_go_on_with_can_be_typed(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 import errno
 import os
+from pathlib import Path
 
 import pytest
 
@@ -45,4 +46,15 @@ def test_an_error_of_a_full_drive_names_the_file(tmp_path):
     path = tmp_path / "angles.csv"
     with pytest.raises(OSError, match="No space left") as caught, atomic_write(path):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))  # as `write` does
+    assert caught.value.filename == str(path)
+
+
+def test_an_error_of_a_drive_that_can_only_be_read_names_the_file(tmp_path, monkeypatch):
+    def refused(path, missing_ok=False):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(path))  # whether it is there or not
+
+    monkeypatch.setattr(Path, "unlink", refused)
+    path = tmp_path / "angles.csv"
+    with pytest.raises(OSError, match="Read-only") as caught, atomic_write(path) as part:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(part))
     assert caught.value.filename == str(path)

@@ -217,8 +217,9 @@ def test_files_of_another_kind(body: Body, tmp_path: Path) -> None:
     np.savez(tmp_path / "headless.npz", joint_names=np.array(["knee_l"]))
     broken = (tmp_path / "headless.npz").read_bytes().replace(b"}", b" ")
     (tmp_path / "headless.npz").write_bytes(broken)
+    told = r"cannot be read as \.(bvh|npz): .*\n.*damaged, or of another kind"
     for name in ("take.bvh", "take.npz", "headless.npz"):
-        with pytest.raises(RecordingError, match=rf"{name}  cannot be read as \.(bvh|npz): "):
+        with pytest.raises(RecordingError, match=f"{name}  {told}"):
             training.read_angles(tmp_path / name, body)
 
 

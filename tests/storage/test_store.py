@@ -317,8 +317,10 @@ def test_a_folder_with_other_things_becomes_no_store(tmp_path):
         folder.mkdir()
         (folder / name).write_text("")
     Store(empty).create()
-    with pytest.raises(StoreError, match=r"this folder is no store: it holds letter.txt(.|\n)*--store .*store\.zarr"):
+    told = r"this folder is no store: it holds letter.txt(.|\n)*--store .*store\.zarr"
+    with pytest.raises(MocapflowError, match=told) as caught:
         Store(papers).create()
+    assert caught.value.exit_status == 2
 
 
 def test_a_store_elsewhere_on_the_net_is_refused():
