@@ -230,8 +230,8 @@ def made_of(stage: Stage, made: Any, kind: type[Output]) -> Output:
         InvalidOutput: it is of another kind, or a track or a first pose that is not finite.
     """
     found = of_kind(stage, made, kind)
-    motion = found.pose if isinstance(found, Start) else found
-    if isinstance(motion, Pose | Track) and not (finite(motion.root) and finite(motion.angles)):
+    motions = (found.pose, *found.others) if isinstance(found, Start) else (found,)
+    if not all(finite(m.root) and finite(m.angles) for m in motions if isinstance(m, Pose | Track)):
         raise InvalidOutput(stage, "a pose that is not finite")
     return found
 

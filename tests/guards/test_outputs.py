@@ -464,6 +464,7 @@ def test_a_stage_that_makes_motion_that_is_not_finite(field):
     broken = replace(track, **{field: np.nan * getattr(track, field)})
     assert made_of(Idle(), start, Start) is start
     assert made_of(Idle(), track, Track) is track
-    for made in (replace(start, pose=replace(POSE, **lost)), broken):
+    nowhere = replace(POSE, **lost)
+    for made in (replace(start, pose=nowhere), replace(start, others=(POSE, nowhere)), broken):
         with pytest.raises(InvalidOutput, match="stage 'idle' returned a pose that is not finite"):
             made_of(Idle(), made, type(made))
