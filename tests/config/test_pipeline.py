@@ -130,8 +130,8 @@ def test_a_plugin_file_is_named_once(folder):
 
 
 def test_what_starts_parts_is_looked_up_though_there_are_none(folder):
-    with pytest.raises(MocapflowError, match=r"parts\.start: no stage named 'strat'\n       available: "):
-        load("parts.start=strat")
+    with pytest.raises(MocapflowError, match=r"parts\.start: no stage named 'nothing'\n       available: "):
+        load("parts.start=nothing")
 
 
 def test_a_stage_is_left_out_by_null(folder):
