@@ -172,15 +172,14 @@ class CoupledLoop(Stage):
         return initial_state(pose, parameters, cloth)
 
     def best_start(self, frame: Frame, start: Start, model: ClothedModel) -> Pose:
-        """Return of the poses that a start leaves open the one that the loop fits best to the first frame."""
+        """Return of the poses that a start leaves open the one from which the first frame is fitted best."""
 
-        def cost(pose: Pose) -> float:
-            begun = initial_state(pose, start.parameters, model.drape(pose, start.parameters, Past()))
-            near = self.approach(frame, begun, Past(), model)
-            result = settle(frame, near, Past(), self.steps, model, silent)
-            return image_cost(result.energy, result.energy_terms)
+        def badness(pose: Pose) -> tuple[bool, float]:
+            alone = replace(start, pose=pose, others=())
+            result = self.fit(frame, Past(), alone, model, silent, Stopwatch(TIMED))
+            return result.doubted, image_cost(result.energy, result.energy_terms)
 
-        return min((start.pose, *start.others), key=cost)
+        return min((start.pose, *start.others), key=badness)
 
     def approach(self, frame: Frame, state: FrameState, past: Past, model: ClothedModel) -> FrameState:
         """Return a first or second frame's state moved near the person by the first segmenter, if there is one.

@@ -11,7 +11,7 @@ from mocapflow.records import F64
 from mocapflow_recovery.placing import heading_between
 
 ALIKE = 1.5  # times the least cost: so little worse, and another direction may be the right one
-OTHERWISE = np.radians(60.0)  # between two directions that a person looks in
+OTHERWISE = np.radians(30.0)  # between two directions that a person looks in
 
 
 def likely_headings(poses: Sequence[Pose], off: F64) -> list[int]:
