@@ -230,8 +230,12 @@ def made_of(stage: Stage, made: Any, kind: type[Output]) -> Output:
         InvalidOutput: it is of another kind, or a track or a first pose that is not finite.
     """
     found = of_kind(stage, made, kind)
-    motions = (found.pose, *found.others) if isinstance(found, Start) else (found,)
-    if not all(finite(m.root) and finite(m.angles) for m in motions if isinstance(m, Pose | Track)):
+    motions: tuple[Pose | Track, ...] = ()
+    if isinstance(found, Start):
+        motions = (found.pose, *found.others)
+    elif isinstance(found, Track):
+        motions = (found,)
+    if not all(finite(motion.root) and finite(motion.angles) for motion in motions):
         raise InvalidOutput(stage, "a pose that is not finite")
     return found
 
