@@ -17,7 +17,7 @@ OTHERWISE = np.radians(30.0)  # between two directions that a person looks in
 def likely_headings(poses: Sequence[Pose], off: F64) -> list[int]:
     """Return which of some poses may be right by their costs (B,), best first: one of each way that a person looks."""
     chosen: list[int] = []
-    for row in np.argsort(off)[: np.count_nonzero(off < ALIKE * off.min())]:
+    for row in np.argsort(off)[: np.count_nonzero(off <= ALIKE * off.min())]:
         if all(heading_between(poses[row], poses[other]) > OTHERWISE for other in chosen):
             chosen.append(int(row))
     return chosen

@@ -24,6 +24,7 @@ def test_one_pose_for_each_way_that_a_person_may_look():
     assert likely_headings(poses, np.array([1.3, 1.0, 1.2, 1.6, 1.4])) == [1, 0]
     assert likely_headings(poses, np.array([1.3, 1.0, 1.2, 1.4, 1.1])) == [1, 4, 3]
     assert likely_headings(poses[:1], np.array([2.0])) == [0]
+    assert likely_headings(poses, np.arange(5.0)) == [0]  # nothing is left to lessen
 
 
 def heading(degrees):
