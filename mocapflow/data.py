@@ -285,7 +285,7 @@ class Start:
 
     pose: Pose
     parameters: F64 = array("Q", unit="by name")
-    others: tuple[Pose, ...] = ()  # that may be right as well: the track begins from the one that fits best
+    others: tuple[Pose, ...] = ()  # that may be right as well: the track begins from the one it fits best
 
 
 def empty_matches() -> Matches:

@@ -172,7 +172,10 @@ class CoupledLoop(Stage):
         return initial_state(pose, parameters, cloth)
 
     def best_start(self, frame: Frame, start: Start, model: ClothedModel) -> Pose:
-        """Return of the poses that a start leaves open the one from which the first frame is fitted best."""
+        """Return of the poses that a start leaves open the one from which the first frame is fitted best.
+
+        From that one it is fitted once more: onlookers, and a trace, see the turns of one fit.
+        """
 
         def badness(pose: Pose) -> tuple[bool, float]:
             alone = replace(start, pose=pose, others=())
