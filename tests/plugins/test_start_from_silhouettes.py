@@ -1,11 +1,13 @@
 """The first pose from silhouettes alone."""
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from mocapflow_bodies.template import Template
 from mocapflow_fitting.start_from_file import read_pose
+from mocapflow_recovery import start_from_silhouettes
 from mocapflow_recovery.placing import centred, heading_between, mask_centre, placed
 from mocapflow_recovery.start_from_silhouettes import StartFromSilhouettes
 
@@ -80,10 +82,25 @@ def test_an_empty_room_is_an_error(tmp_path):
         StartFromSilhouettes().run(recording, scene)
 
 
+def test_a_pose_that_fits_badly_is_warned_of(monkeypatch, caplog):
+    """One that nobody has searched from."""
+    for name, value in {
+        "DIRECTIONS": 4,
+        "CANDIDATES": 1,
+        "SEARCHES": 1,
+        "search": lambda cost, begin, *_: begin,
+    }.items():
+        monkeypatch.setattr(start_from_silhouettes, name, value)
+    recording = open_recording(SKIRT)
+    scene = Scene(cameras=recording.cameras, body=Template(shape=0.0).load(SKIRT))
+    StartFromSilhouettes(draper=None).run(recording, scene)
+    assert re.search(r"first pose: \d+\.\d mm off the silhouettes .* may be wrong; .* start_from_file", caplog.text)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("clip", ["skirt_steps", "shorts_steps"])
 @pytest.mark.parametrize("frame", [0, 30])
-def test_a_person_is_found_without_any_hint(clip, frame):
+def test_a_person_is_found_without_any_hint(clip, frame, caplog):
     """As near as a track needs: it looks the right way, and no joint is far off (a knee 28° at most)."""
     pipeline = load_pipeline(shipped("pipelines", "skirt.yaml"), recording=DATA / clip)
     recording, body = open_recording(DATA / clip, start=frame), pipeline.body.load(DATA / clip)
@@ -96,3 +113,4 @@ def test_a_person_is_found_without_any_hint(clip, frame):
     truth = dict(zip(lines[0].split(","), map(float, lines[1 + frame].split(",")), strict=True))
     off = [value - truth[name] for name, value in zip(found.names, found.value[0], strict=True) if name in truth]
     assert np.sqrt(np.mean(np.square(off))) < 15
+    assert "may be wrong" not in caplog.text
