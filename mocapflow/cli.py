@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 import shlex
 import sys
 import warnings
 from collections.abc import Callable
 from io import TextIOWrapper
+from itertools import pairwise
 from typing import Annotated, Any
 
 import typer
@@ -19,11 +21,20 @@ from mocapflow.errors import MocapflowError, uncompilable, unwritable
 from mocapflow.interrupts import Interrupts, interrupted
 
 INTERRUPTED = 130  # the exit status
+NO_VALUE = re.compile("--[a-z-]+=")  # an option with an empty value
 QUIET = {"OPENCV_LOG_LEVEL": "ERROR", "OPENCV_FFMPEG_LOGLEVEL": "-8"}  # what can't be decoded is told by mocapflow
 
 
 class Commands(typer.core.TyperGroup):
     """Prints a problem the user can mend without a traceback; anything else is a bug and shows its own."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Return the words that are left; none may be empty, for an empty path is the working directory."""
+        for before, word in pairwise(["mocapflow", *args]):
+            if not word or NO_VALUE.fullmatch(word):
+                ctx.fail(f"nothing stands behind {word or before}; is a shell variable not set?")
+        words: list[str] = super().parse_args(ctx, args)
+        return words
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command and turn errors into exit status 1 or 2, an interrupt or SIGTERM into 130."""

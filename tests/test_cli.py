@@ -259,6 +259,13 @@ def test_days_that_are_no_age_prune_nothing(call, days):
     assert "0 results" in call("cache", "prune", "--days", "inf").stdout
 
 
+@pytest.mark.parametrize("words", [["--out", ""], ["--out="], ["--recording", ""]])
+def test_an_empty_path_is_not_the_working_directory(call, words):
+    done = call("run", "start.yaml", *words)
+    assert done.exit_code == 2 and f"nothing stands behind {words[0]}; is a shell variable not set?" in done.stderr
+    assert [path.name for path in Path().iterdir()] == ["start.yaml"]
+
+
 def test_a_run_that_does_not_begin_leaves_no_folder(call):
     assert call("run", "start.yaml", "--frames", "90:100").exit_code == 2
     assert not Path("runs/start").exists()
