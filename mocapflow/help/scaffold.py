@@ -25,6 +25,7 @@ class Kind(NamedTuple):
 
 
 KINDS: Mapping[str, Kind] = {
+    "cloth_fitter": Kind("ClothFitterConformance", "`stages.track.cloth_fitter: $module`"),
     "draper": Kind("DraperConformance", "`stages.track.draper: $module`"),
     "garment": Kind(
         "GarmentConformance",
@@ -33,7 +34,10 @@ KINDS: Mapping[str, Kind] = {
         "\n    make_body = staticmethod(template_body)  # the usual body for tests has no shoulders",
     ),
     "matcher": Kind("MatcherConformance", "add `$module` to `stages.track.matchers`"),
+    "predictor": Kind("PredictorConformance", "`stages.track.predictor: $module`"),
     "prior": Kind("PriorConformance", "add `$module` to `stages.track.priors`"),
+    "segmenter": Kind("SegmenterConformance", "`stages.track.segmenter: $module`"),
+    "stage": Kind("StageConformance", "a stage behind `smooth`, or `--set stages.$module=$module`"),
 }
 
 
@@ -50,7 +54,7 @@ def write_plugin(name: str, role: str, folder: Path) -> list[Path]:
     words = {
         "name": name,
         "module": module,
-        "Class": f"{name}-{role}".title().replace("-", ""),  # the role: else `residual` would hide what it imports
+        "Class": re.sub("[-_]", "", f"{name}-{role}".title()),  # the role: else `residual` would hide what it imports
         "title": name.replace("-", " ").capitalize(),
         "role": role,
         "usage": Template(kind.usage).substitute(module=module),

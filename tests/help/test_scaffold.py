@@ -25,7 +25,8 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """A new plugin of each role, under names of their own."""
     made = {role: tmp_path_factory.mktemp("new") / f"mocapflow-my-{role}" for role in KINDS}
     for role, folder in made.items():
-        said = CliRunner().invoke(app, ["new", "plugin", f"my-{role}", "--role", role, "--out", str(folder)])
+        name = f"my-{role.replace('_', '-')}"
+        said = CliRunner().invoke(app, ["new", "plugin", name, "--role", role, "--out", str(folder)])
         assert said.exit_code == 0, said.output
     return made
 
@@ -101,5 +102,5 @@ def test_errors(tmp_path: Path) -> None:
         write_plugin("levelset", "matcher", tmp_path / "other")
     with pytest.raises(PluginError, match=r"there is a garment 'skirt' already\n.*another name"):
         write_plugin("skirt", "garment", tmp_path / "other")
-    with pytest.raises(PluginError, match=r"there are no templates for a stage\n.*garment"):
-        write_plugin("dress", "stage", tmp_path / "new")
+    with pytest.raises(PluginError, match=r"there are no templates for a recovery\n.*garment"):
+        write_plugin("dress", "recovery", tmp_path / "new")
