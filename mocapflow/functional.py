@@ -122,7 +122,7 @@ def overlaps(surface: Surface, segmentation: Segmentation, cameras: Sequence[Cam
     overlap = np.full(len(cameras), np.nan)
     for silhouette in segmentation.of("person"):
         camera = cameras[silhouette.camera]
-        covered = silhouettes.mask(silhouettes.outline(surface, camera), camera)
+        covered = silhouettes.covered(surface, camera)
         overlap[silhouette.camera] = silhouettes.intersection_over_union(covered, silhouette.distance > 0)
     return overlap
 

@@ -70,12 +70,11 @@ class OpticalFlow(Matcher):
     def registered(self, silhouette: Silhouette, surface: Surface, scene: Scene) -> Matches:
         """Return the pairs of one view by flow between distance images."""
         camera = scene.cameras[silhouette.camera]
-        boundary = silhouettes.outline(surface, camera)
-        model = silhouettes.samples(boundary, surface, camera, self.spacing_px)
+        model = silhouettes.occluding_contour(surface, camera, self.spacing_px)
         if not len(model.pixel):  # it has left the view
             return empty_matches()
         shrink = int(np.ceil(camera.size.max() / WORKING_SIDE))
-        covered, shown = silhouettes.mask(boundary, camera), silhouette.distance > 0
+        covered, shown = silhouettes.covered(surface, camera), silhouette.distance > 0
         here, there = (silhouettes.mask_distance(_shrunk(mask, shrink)) for mask in (covered, shown))
         flow = register(here, there, SMOOTHNESS, LEVELS, BAND * max(here.shape))
         middle = (shrink - 1) / 2  # pixel centres are on integers in both sizes

@@ -11,7 +11,7 @@ from mocapflow_levelset.crops import around
 from mocapflow.data import Surface
 from mocapflow.geometry.cameras import projection
 from mocapflow.geometry.silhouette_kernels import project
-from mocapflow.geometry.silhouettes import covered, distance_to, mask, outline
+from mocapflow.geometry.silhouettes import covered, distance_to
 from mocapflow.records import F32, F64, I32
 from mocapflow_recovery.trimaps import Trimap
 
@@ -56,7 +56,7 @@ def uncovered_areas(surface: Surface, trimaps: Sequence[Trimap], reaches_m: Sequ
     """
     areas = np.zeros((len(reaches_m), 2))
     for trimap in trimaps:
-        off = distance_to(mask(outline(surface, trimap.camera), trimap.camera))
+        off = distance_to(covered(surface, trimap.camera))
         loose = trimap.person & (_from_cloth(surface, trimap) > cloth_m / trimap.pixel_m)
         for row, reach_m in enumerate(reaches_m):
             uncovered = loose & (off > reach_m / trimap.pixel_m)

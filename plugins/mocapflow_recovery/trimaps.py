@@ -15,7 +15,7 @@ from mocapflow_levelset.shadows import floor_around
 from mocapflow.assets import Background, Camera
 from mocapflow.data import Frame, Surface
 from mocapflow.geometry.cameras import magnification, shrunk
-from mocapflow.geometry.silhouettes import distance_to, mask, outline
+from mocapflow.geometry.silhouettes import covered, distance_to
 from mocapflow.memo import memoised
 from mocapflow.records import F32, F64, U8, Bool
 
@@ -80,7 +80,7 @@ def trimaps(
     found, middle = [], surface.vertices.mean(axis=0)
     for number in np.flatnonzero(frame.usable):
         camera, factor, plate = room.cameras[number], room.factors[number], room.plates[number]
-        model, size = mask(outline(surface, camera), camera), 1 / magnification(camera, middle)
+        model, size = covered(surface, camera), 1 / magnification(camera, middle)
         image, hidden = frame.images[number], frame.hidden_in(int(number))
         small = crops.shrink(image, factor)
         floor = floor_around(surface, camera)

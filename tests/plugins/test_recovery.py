@@ -23,7 +23,7 @@ from mocapflow_recovery.trimaps import shrunk, small_room, trimaps
 
 from mocapflow.data import NO_CLOTH, Frame, Past, Pose
 from mocapflow.geometry.cameras import project
-from mocapflow.geometry.silhouettes import mask, outline
+from mocapflow.geometry.silhouettes import covered
 from mocapflow.testing import pictures, recovery, scenes, template_body
 
 SCENE = scenes.tiny_scene()
@@ -158,7 +158,7 @@ def test_a_skirt_that_flies_leads_no_limb_astray() -> None:
     """Cloth where a spread leg would be brings that leg no nearer to the person, though it would explain it."""
     flying = []
     for view in seen():
-        flown = mask(outline(surface(astray(0.8)), view.camera), view.camera) & ~view.person
+        flown = covered(surface(astray(0.8)), view.camera) & ~view.person
         distance = np.where(flown, 0, view.distance)
         flying.append(view._replace(person=view.person | flown, cloth=flown, distance=distance))
     assert apart(astray(0.8), flying, FLYING) > 2 * apart(POSE, flying, FLYING)
@@ -558,7 +558,7 @@ def test_seen_samples_bend_what_was_seen_and_nothing_else() -> None:
 def test_a_view_in_which_something_stands_before_the_person_leads_nobody_astray(left) -> None:
     """Its picture shows the empty room, or a scrap of the person."""
     hidden = SCENE.background.mean[0].round().astype(np.uint8)
-    row, column = np.argwhere(mask(outline(surface(POSE), SCENE.cameras[0]), SCENE.cameras[0])).mean(axis=0).astype(int)
+    row, column = np.argwhere(covered(surface(POSE), SCENE.cameras[0])).mean(axis=0).astype(int)
     scrap = np.s_[row : row + left, column : column + left]
     hidden[scrap] = FRAME.images[0][scrap]
     looked = seen(replace(FRAME, images=(hidden, *FRAME.images[1:])))
