@@ -21,7 +21,7 @@ from mocapflow.interrupts import check
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import silent
 from mocapflow.results import Files, RunFolder
-from mocapflow.running.component_failures import LOG, naming_failures
+from mocapflow.running.component_failures import FAILURE_LOG, naming_failures
 from mocapflow.running.progress import Progress
 from mocapflow.running.recipes import Step
 from mocapflow.running.warning_log import warnings_logged
@@ -225,10 +225,7 @@ class Execution:
     def _naming_failures(
         self, component: Component, checkpoint: Checkpoint | None = None
     ) -> AbstractContextManager[None]:
-        def kept() -> str:
-            return checkpoint.kept if checkpoint else ""
-
-        return naming_failures(component, self._pipeline.registry, kept, self._out / LOG)
+        return naming_failures(component, self._pipeline.registry, self._out / FAILURE_LOG, checkpoint)
 
     def _enter_found(self, step: Step, found: Artifact) -> None:
         if step.label in self.entries:
