@@ -68,7 +68,7 @@ def settle(level: F32, prior: F32, evidence: Evidence, window: Window, weights: 
     """
     stride = evidence.stride
     weight = np.ascontiguousarray(evidence.weight[::stride, ::stride])
-    grid = Window(window.rho_px / stride, max(window.cell_px // stride, 1), window.floor)
+    grid = Window(window.rho_px / stride, max(window.cell_px // stride, 1), window.least_sd)
     first = (grid.cell_px - 1) * stride // 2
     reach = FRONT * weights.sigma_px / stride + 3 * grid.cell_px
     sums = totals(evidence.sparse, weight, grid.cell_px)

@@ -27,7 +27,7 @@ REACH_M = 2.0  # from the person, where their shadow may fall
 class ShadowAware(Segmenter):
     """A segmenter that compares pixels with the empty scene, lit and in the person's shadow."""
 
-    spread_floor: PositiveFloat = USUAL.floor  # smallest standard deviation of the empty scene, share of the range
+    spread_floor: PositiveFloat = USUAL.least_sd  # smallest standard deviation of the empty scene, share of the range
     shadow_share: Annotated[float, Field(ge=0, lt=1)] = USUAL.share  # prior share of shadows; 0: they count as changes
     darkest_shadow: Annotated[float, Field(gt=0, lt=1)] = USUAL.darkest  # least factor of a shadow on L + 16, a, b
     darkest_grey_shadow: Annotated[float, Field(gt=0, lt=1)] = 0.8  # the same in pictures without colours to tell it by

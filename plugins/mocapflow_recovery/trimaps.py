@@ -110,7 +110,7 @@ def _compared(image: U8, plate: Plate, floor: Bool) -> tuple[Bool, Bool]:
     Where nobody knows the room, it is neither.
     """
     values = features(image, CHANNELS)
-    off = np.sum((values - plate.planes) ** 2, axis=0) / np.maximum(plate.spread, USUAL.floor) ** 2
+    off = np.sum((values - plate.planes) ** 2, axis=0) / np.maximum(plate.spread, USUAL.least_sd) ** 2
     changed = density_image(values, plate, floor, CHANNELS, USUAL) < 0
     return changed, (off < EMPTY**2) & np.isfinite(plate.spread)
 
