@@ -29,9 +29,9 @@ from mocapflow_recovery.limb_visibility import camouflaged_feet, warn_of_camoufl
 from mocapflow_recovery.sampling import SHARES, Plan, Spread
 from mocapflow_recovery.scoring import FACES, Fit, Mismatch, Scorer, StartPose, mismatch_of, surface_of
 from mocapflow_recovery.search_history import history_of, one_frame_of, with_search, without_history
-from mocapflow_recovery.search_triggers import Thresholds, Trigger, search_trigger
+from mocapflow_recovery.search_triggers import Thresholds, Trigger, search_trigger, stay_overbent
 from mocapflow_recovery.searches import Searches
-from mocapflow_recovery.trimaps import Trimap, small_room, trimaps
+from mocapflow_recovery.trimaps import Trimap, small_rooms, trimaps
 
 LOG = logging.getLogger("mocapflow")
 UNDOUBTED = 2.0  # times as distant may be a fit that is doubted no more: a leg lay where a skirt flew
@@ -152,14 +152,14 @@ class LimbSearch(Recovery):
         """Return whether a fit is searched in this frame: what lasts is searched only now and then."""
         if trigger.doubtful:
             return history_of(past).due(mismatch.area, time, past, self.vain_every)
-        return not self.thresholds.stay_overbent(past, body) or one_frame_of(self.vain_every, time, past)
+        return not stay_overbent(past, body) or one_frame_of(self.vain_every, time, past)
 
     def trimaps(self, frame: Frame, surface: Surface, past: Past, scene: Scene) -> list[Trimap]:
         """Return the trimaps of a frame around a surface, in a scene whose empty room is known."""
         assert scene.background is not None
-        room = small_room(scene.background, scene.cameras)
+        rooms = small_rooms(scene.background, scene.cameras)
         no_shadow = no_shadows(frame, scene.background, scene.cameras)
-        return trimaps(frame, surface, room, NEAR_M, garment_log_ratio(past, scene), no_shadow)
+        return trimaps(frame, surface, rooms, NEAR_M, garment_log_ratio(past, scene), no_shadow)
 
     def _searched(self, index: int, fit: Fit, searches: Searches, trigger: Trigger, settle: Settle) -> FrameResult:
         """Return the result of the best pose that is found, or that of the fit where none is better."""

@@ -25,7 +25,7 @@ from mocapflow_recovery.disagreement import HANGING
 from mocapflow_recovery.placing import centred, largest_changes, mask_centre, placed
 from mocapflow_recovery.sampling import SHARES, Plan, Spread, search
 from mocapflow_recovery.scoring import FACES, Scorer
-from mocapflow_recovery.trimaps import small_room, trimaps
+from mocapflow_recovery.trimaps import small_rooms, trimaps
 
 LOG = logging.getLogger("mocapflow")
 NEAR_M = 0.6  # what differs from the room farther from somebody who stands upright there is somebody else
@@ -130,11 +130,11 @@ class StartFromSilhouettes(Stage):
     def _target(self, recording: Recording, scene: Scene) -> Target:
         frame, background = recording.frame(recording.indices[0]), recording.background()
         assert background is not None
-        dressed, room = scene if self.draper else scene.undressed, small_room(background, scene.cameras)
+        dressed, rooms = scene if self.draper else scene.undressed, small_rooms(background, scene.cameras)
         coarse = dressed.simplified(FACES)
         bare = coarse.undressed
-        upright = placed(bare, 0.0, np.zeros(len(bare.body.twists)), mask_centre(*largest_changes(frame, room)))
-        every = trimaps(frame, bare.surface(upright, NO_CLOTH), room, NEAR_M)
+        upright = placed(bare, 0.0, np.zeros(len(bare.body.twists)), mask_centre(*largest_changes(frame, rooms)))
+        every = trimaps(frame, bare.surface(upright, NO_CLOTH), rooms, NEAR_M)
         found = [trimap for trimap in every if trimap.informative]
         if len(found) < 2:
             raise RecordingError(
