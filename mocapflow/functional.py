@@ -43,7 +43,7 @@ class Functional:
 
         Source: Rosenhahn 2008, section 12.4
         """
-        surface, cameras = self.model.surface(state.estimate.pose, state.cloth), self.model.scene.cameras
+        surface, cameras = self.model.scene.surface_of(state), self.model.scene.cameras
         said = state.segmentation.energies
         views = np.array([[said.get(f"{camera.name}.{term}", np.nan) for term in IN_VIEW] for camera in cameras])
         matched = contours(surface, state.matches, cameras)

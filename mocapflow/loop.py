@@ -53,7 +53,7 @@ def settle(
             state = take_turn(frame, state, past, steps, functional, turn, watch)
             energy[index] = functional.values(state)
         last_cost, cost = cost, functional.total(energy[index])
-        change = measure_change(recent[-1], state, model)
+        change = measure_change(recent[-1], state, model.scene)
         recent.append(state)
         if index == 0 and steady.far(change):
             far, steady = True, steady.beginning
@@ -63,14 +63,14 @@ def settle(
         if at_rest >= steady.turns or index + 1 >= steady.max_turns:
             break
     assert change is not None
-    swing = measure_change(recent[0], state, model)  # over the last two turns
+    swing = measure_change(recent[0], state, model.scene)  # over the last two turns
     return FrameResult(
         state=state,
         iterations=index + 1,
         steady=at_rest >= steady.turns,
         oscillating=at_rest == 0 and index > 1 and steady.holds(swing, index + 1),
         change=change,
-        overlap=overlaps(model.surface(state.estimate.pose, state.cloth), state.segmentation, model.scene.cameras),
+        overlap=overlaps(model.scene.surface_of(state), state.segmentation, model.scene.cameras),
         energy=energy,
         energy_terms=functional.terms,
         seconds=watch.seconds,

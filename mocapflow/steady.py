@@ -6,8 +6,9 @@ import numpy as np
 from pydantic import NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
 from mocapflow.data import Change, FrameState, Pose
-from mocapflow.model import ClothedModel, increment_between
+from mocapflow.model import increment_between
 from mocapflow.records import F64
+from mocapflow.scene import Scene
 from mocapflow.settings import PositiveOrInf, Settings
 
 
@@ -53,13 +54,13 @@ class Steady(Settings):
         return self.energy_share == float("inf") or abs(now - before) <= self.energy_share * abs(before)
 
 
-def measure_change(old: FrameState, new: FrameState, model: ClothedModel) -> Change:
+def measure_change(old: FrameState, new: FrameState, scene: Scene) -> Change:
     """Return how far body, cloth and joint angles moved between two states.
 
     The covariance of the new one weighs the move in `sigmas`: along a direction that no image shows even a long way
     counts little, along one that all images show even a short way counts.
     """
-    before, now = (model.surface(state.estimate.pose, state.cloth) for state in (old, new))
+    before, now = map(scene.surface_of, (old, new))
     shift = now.vertices - before.vertices
     squared = np.einsum("va,va->v", shift, shift)
     worn = now.cloth

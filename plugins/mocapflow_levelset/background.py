@@ -61,7 +61,7 @@ class BackgroundDifference(ShadowAware):
                 "the segmenter 'background' needs the empty scene, and none is known",
                 hint="put the stage 'background' before 'track', or choose the segmenter 'levelset'",
             )
-        surface = scene.surface(state.estimate.pose, state.cloth)
+        surface = scene.surface_of(state)
         silhouettes = []
         for c, camera in enumerate(scene.cameras):
             if not frame.usable[c]:

@@ -33,7 +33,7 @@ class GrabCut(Segmenter):
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
         """Return the person's silhouette in each usable view."""
-        surface = scene.surface(state.estimate.pose, state.cloth)
+        surface = scene.surface_of(state)
         silhouettes = []
         for c, camera in enumerate(scene.cameras):
             if not frame.usable[c]:

@@ -48,7 +48,7 @@ class Layered(LevelSet):
         found = super().segment(frame, state, past, scene, turn)
         if found is state.segmentation and turn.index > 1 and turn.calm(KEEP_MM):
             return found
-        surface = scene.surface(state.estimate.pose, state.cloth)
+        surface = scene.surface_of(state)
         colours = dict(state.segmentation.appearance if turn.index > 1 else past.appearance)
         if turn.index == 1:
             colours[COLOURS] = layer_histograms(frame, found.of(PERSON), surface, scene, past, KEPT, GRID_PX)

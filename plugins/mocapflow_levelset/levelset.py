@@ -76,7 +76,7 @@ class LevelSet(ShadowAware):
         outline has hardly moved these stay as they are; in a frame that began far off only from the third turn on, for
         the contour may have had farther to go than its steps reached.
         """
-        surface = scene.surface(state.estimate.pose, state.cloth)
+        surface = scene.surface_of(state)
         # a view in which nobody was begins anew from the model, which may stand in it by now
         last = {s.camera: s for s in state.segmentation.of(PERSON) if len(s.zero_level[0])} if turn.index else {}
         parts = {c: self._moved(surface, scene.cameras[c], turn) for c in last}

@@ -23,7 +23,7 @@ from mocapflow.track import CoupledLoop, prepared
 from mocapflow_recovery.limb_search import LimbSearch
 from mocapflow_recovery.refit_windows import pictured, windows
 from mocapflow_recovery.revised_track import RevisedTrack
-from mocapflow_recovery.scoring import mismatch_of, surface_of
+from mocapflow_recovery.scoring import mismatch_of
 
 LOG = logging.getLogger("mocapflow")
 OTHER_MM = 10.0  # of a joint, between two fits: less, and they are the same
@@ -134,7 +134,8 @@ class Refitter(NamedTuple):
     def mismatches(self, frame: Frame, row: int, past: Past, result: FrameResult) -> tuple[float, float]:
         """Return the mismatch (cm²) of person and model in the fit that stands, and in another one."""
         finder = self.loop.recovery if isinstance(self.loop.recovery, LimbSearch) else LimbSearch()
-        surfaces = self.model.surface(self.revised.pose(row), self.revised.cloth(row)), surface_of(self.model, result)
-        trimaps = finder.trimaps(frame, surfaces[0], past, self.model.scene)
-        before, now = (mismatch_of(surface, self.model.scene, trimaps) for surface in surfaces)
+        scene = self.model.scene
+        surfaces = scene.surface(self.revised.pose(row), self.revised.cloth(row)), scene.surface_of(result.state)
+        trimaps = finder.trimaps(frame, surfaces[0], past, scene)
+        before, now = (mismatch_of(surface, scene, trimaps) for surface in surfaces)
         return before.hint + before.floating, now.hint + now.floating
