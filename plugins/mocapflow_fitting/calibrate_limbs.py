@@ -84,15 +84,15 @@ class CalibrateLimbs(Stage):
             LOG.warning("shape: this body does not know how people differ, so only its proportions are fitted")
         spreads: Spreads = dict.fromkeys(self.proportions, self.spread) | dict.fromkeys(modes, 1.0)
         share = self.independent / len(indices)  # contours err alike in all frames: more of them tell no more
-        solution = Solution(np.zeros(len(spreads)), tuple(poses))
+        solution = Solution(spreads, np.zeros(len(spreads)), tuple(poses))
         for done in range(self.passes):
-            model = self._model(scene, scaled(body, solution.factors(spreads)))
+            model = self._model(scene, scaled(body, solution.factors))
             part = _in_pass(done, self.passes, recording)
             views = self._segmented(part, checks, model, indices, solution.poses, clothes)
             turn = Turn(index=done, change=AT_REST if done else None)
             matchers = [partial(self._match, scene, *view, turn) for view in views]
-            solution = refine(body, matchers, solution, scene.cameras, spreads, share, self.rounds)
-        return fitted(body, solution.factors(spreads))
+            solution = refine(body, matchers, solution, scene.cameras, share, self.rounds)
+        return fitted(body, solution.factors)
 
     def _from_track(self, track: Track) -> tuple[list[int], list[Pose], list[F64]]:
         """Return the frames that are fitted, with poses and clothes: the best, if there are enough of them."""
