@@ -112,8 +112,7 @@ class TwistGaussNewton(PoseSolver):
         turn, bend = np.radians(self.root_sd_deg), np.radians(self.angle_sd_deg)
         pose = np.repeat([turn, self.root_sd_m, bend], [3, 3, len(guess.pose.angles)])
         cloth = self.cloth_sd * np.ptp(motion.bounds, axis=1)
-        precision: F64 = np.concatenate([pose, np.maximum(cloth, 1e-12)]) ** -2.0
-        return precision
+        return np.concatenate([pose, np.maximum(cloth, 1e-12)]) ** -2.0
 
     def _descend(self, problem: Problem, guess: Guess, equations: Equations, damping: float) -> tuple[Guess, float]:
         """Return a guess of lower energy for the same matches, or the same guess where there is none worth a step."""
