@@ -16,7 +16,7 @@ from mocapflow.scene import Scene
 from mocapflow_levelset.channels import ChannelName, features
 from mocapflow_levelset.evidence import smoothed
 from mocapflow_levelset.evolve import Schedule, Weights
-from mocapflow_levelset.levelset import INNER_BAND_PX, PERSON, RATIO_CLIP
+from mocapflow_levelset.levelset import INNER_BAND_PX, RATIO_CLIP
 from mocapflow_levelset.masks import counted
 from mocapflow_levelset.plates import Plate, Shadow, density_image, plate_in
 from mocapflow_levelset.shadows import ShadowAware, shadowed
@@ -69,7 +69,7 @@ class BackgroundDifference(ShadowAware):
             model = model_distance(surface, camera, BAND_PX)
             floor = shadowed(frame, surface, scene, c)
             distance = self.find(frame.images[c], model, floor, scene.background, c, frame.hidden_in(c))
-            silhouettes.append(Silhouette(camera=c, layer=PERSON, distance=distance))
+            silhouettes.append(Silhouette(camera=c, layer="person", distance=distance))
         return Segmentation(silhouettes=tuple(silhouettes))
 
     def find(

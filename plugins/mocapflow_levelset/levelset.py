@@ -26,7 +26,6 @@ from mocapflow_levelset.view import BAND_PX, Contact, Empty, Level, Matte, Metho
 
 Share = Annotated[float, Field(ge=0, lt=1)]
 
-PERSON = "person"
 INNER_BAND_PX = 7.0  # half width of the band while the contour moves: only what is within 3.5 sigma of it, 5.3 px, does
 BORDER_PX = 3  # of the image that is left out
 REDUCED_RHO_PX = 8.0  # Gaussian window of the local statistics at reduced sizes, in px of the shrunken image
@@ -78,7 +77,7 @@ class LevelSet(ShadowAware):
         """
         surface = scene.surface_of(state)
         # a view in which nobody was begins anew from the model, which may stand in it by now
-        last = {s.camera: s for s in state.segmentation.of(PERSON) if len(s.zero_level[0])} if turn.index else {}
+        last = {s.camera: s for s in state.segmentation.of("person") if len(s.zero_level[0])} if turn.index else {}
         parts = {c: self._moved(surface, scene.cameras[c], turn) for c in last}
         due = [c for c in np.flatnonzero(frame.usable).tolist() if (part := parts.get(c)) is None or part.any()]
         if last and not due:
@@ -91,7 +90,7 @@ class LevelSet(ShadowAware):
                 view = view._replace(start=last[c].distance, moved=parts[c])
             shadow = self.shadow(view.image, self._background(scene), c)
             found = find(view, levels, self._method(shadow))
-            silhouettes[c] = Silhouette(camera=c, layer=PERSON, distance=found.level)
+            silhouettes[c] = Silhouette(camera=c, layer="person", distance=found.level)
             for term, cost in found.costs._asdict().items():
                 key = f"{scene.cameras[c].name}.{term}"
                 energies[key] = cost if view.moved is None else energies.get(key, np.nan) + cost
