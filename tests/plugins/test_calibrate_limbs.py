@@ -176,7 +176,7 @@ def test_few_good_frames_are_better_than_bad_ones(body, poses, good, looked):
     track = make_track(np.tile(poses[0].root, (6, 1, 1)), np.tile(poses[0].angles, (6, 1)))
     track = replace(track, doubted=~np.isin(track.frame, good))
     stage = CalibrateLimbs(segmenter=masks_of(body, poses), matchers=(ContourIcp(),), frames=3)
-    assert stage._from_track(track)[0] == looked
+    assert list(stage._from_track(track)[0]) == looked
 
 
 @pytest.mark.parametrize(
@@ -190,7 +190,7 @@ def test_the_best_frames_are_taken_only_where_there_are_enough(body, poses, rest
     usable[:, 0] = np.isin(track.frame, whole)
     track = replace(track, doubted=track.frame == 5, steady=np.isin(track.frame, resting), usable=usable)
     stage = CalibrateLimbs(segmenter=masks_of(body, poses), matchers=(ContourIcp(),), frames=3)
-    assert stage._from_track(track)[0] == looked
+    assert list(stage._from_track(track)[0]) == looked
 
 
 def test_velocities_of_skin(body, poses):
