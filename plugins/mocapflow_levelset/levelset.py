@@ -16,13 +16,15 @@ from mocapflow.scene import Scene
 from mocapflow.settings import PositiveOrInf
 from mocapflow_levelset.channels import ChannelName
 from mocapflow_levelset.contact import contact_zone
+from mocapflow_levelset.crops import shrink_mask
+from mocapflow_levelset.evidence import Room
 from mocapflow_levelset.evolve import Schedule, Weights
 from mocapflow_levelset.masks import counted, without_cut
 from mocapflow_levelset.moved import moved_outline
-from mocapflow_levelset.plates import Shadow, plate_in
+from mocapflow_levelset.plates import plate_in
 from mocapflow_levelset.shadows import ShadowAware, shadowed
 from mocapflow_levelset.statistics import Window
-from mocapflow_levelset.view import BAND_PX, Contact, Empty, Level, Matte, Method, View, find
+from mocapflow_levelset.view import BAND_PX, Contact, Level, Matte, Method, View, find
 
 Share = Annotated[float, Field(ge=0, lt=1)]
 
@@ -88,8 +90,7 @@ class LevelSet(ShadowAware):
             view = self._view(frame, surface, past, scene, c, levels)
             if c in last:
                 view = view._replace(start=last[c].distance, moved=parts[c])
-            shadow = self.shadow(view.image, self._background(scene), c)
-            found = find(view, levels, self._method(shadow))
+            found = find(view, levels, self._method())
             silhouettes[c] = Silhouette(camera=c, layer="person", distance=found.level)
             for term, cost in found.costs._asdict().items():
                 key = f"{scene.cameras[c].name}.{term}"
@@ -108,7 +109,7 @@ class LevelSet(ShadowAware):
             start=model,
             prior=model,
             counted=without_cut(counts, model, scene.body, surface, lens),
-            empty=self._empty(frame, surface, scene, camera, levels),
+            rooms=self._rooms(frame, surface, scene, camera, levels),
             colours=self._colours(past, camera),
             contact=self._contact(surface, lens),
             matte=self._matte(scene, camera),
@@ -120,15 +121,17 @@ class LevelSet(ShadowAware):
             return None
         return moved_outline(surface, turn.change, camera, self.keep_px)
 
-    def _empty(
+    def _rooms(
         self, frame: Frame, surface: Surface, scene: Scene, camera: int, levels: Sequence[Level]
-    ) -> Empty | None:
+    ) -> dict[int, Room] | None:
         background = self._background(scene)
         if background is None:
             return None
-        factors = [level.factor for level in levels if level.use_plate]
-        plates = {factor: plate_in(background, camera, self.channels, factor) for factor in factors}
-        return Empty(plates, shadowed(frame, surface, scene, camera))
+        floor, shadow = shadowed(frame, surface, scene, camera), self.shadow(frame.images[camera], background, camera)
+        return {
+            factor: Room(plate_in(background, camera, self.channels, factor), shrink_mask(floor, factor), shadow)
+            for factor in (level.factor for level in levels if level.use_plate)
+        }  # the empty room is compared with small images alone, which are smooth
 
     def _colours(self, past: Past, camera: int) -> F32 | None:
         """Return what colours tell of person and room in a view (BINS,); None: nothing is learned."""
@@ -163,7 +166,7 @@ class LevelSet(ShadowAware):
     def _schedule(self, steps: int, to_rest: bool = False) -> Schedule:
         return Schedule(steps, self.statistics_every, self.redistance_every, to_rest)
 
-    def _method(self, shadow: Shadow) -> Method:
+    def _method(self) -> Method:
         return Method(
             channels=self.channels,
             weights=Weights(
@@ -175,8 +178,6 @@ class LevelSet(ShadowAware):
                 step=1.0,  # `length_weight` is stable with it
                 band_px=INNER_BAND_PX,
             ),
-            shadow=shadow,
-            smooth_px=0.0,  # the empty scene is compared with small images alone, which are smooth
             decorrelate=self.decorrelate,
             stride=self.stride_px,
             margin_px=self.margin_px,

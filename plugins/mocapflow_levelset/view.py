@@ -16,23 +16,10 @@ from mocapflow_levelset.evidence import Evidence, Room, from_image, in_room
 from mocapflow_levelset.evolve import Costs, Schedule, Settled, Weights, costs, settle
 from mocapflow_levelset.islands import without_islands
 from mocapflow_levelset.matting import NEAR_PX, sharpened
-from mocapflow_levelset.plates import Plate, Shadow
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.statistics import Window
 
 BAND_PX = 12.0  # half width of the band in which a silhouette's distances are computed
-
-
-class Empty(NamedTuple):
-    """What is known of the empty scene in one view."""
-
-    plates: Mapping[int, Plate]  # by how much it is shrunk
-    floor: Bool  # (H, W) True where shadows may fall
-
-    def of(self, crop: Crop) -> Empty:
-        """Return what is known of a rectangle of the view."""
-        plates = {factor: plate.of(crop.at(factor)) for factor, plate in self.plates.items()}
-        return Empty(plates, crop.of(self.floor))
 
 
 class Contact(NamedTuple):
@@ -58,7 +45,7 @@ class View(NamedTuple):
     start: F32  # (H, W) signed distance to the start contour, positive inside; only its zero contour counts
     prior: F32  # (H, W) px, signed distance to the model's outline
     counted: Bool  # (H, W) True where a pixel counts
-    empty: Empty | None = None
+    rooms: Mapping[int, Room] | None = None  # the empty room, by how much it is shrunk
     colours: F32 | None = None  # (BINS,) log ratio of each colour on the person and in the room, by earlier frames
     contact: Contact | None = None
     matte: Matte | None = None
@@ -66,10 +53,11 @@ class View(NamedTuple):
 
     def of(self, crop: Crop) -> View:
         """Return what is given of a rectangle of the view."""
-        contact, matte = self.contact, self.matte
+        rooms, contact, matte = self.rooms, self.contact, self.matte
         return self._replace(
             image=crop.of(self.image), start=crop.of(self.start), prior=crop.of(self.prior),
-            counted=crop.of(self.counted), empty=self.empty and self.empty.of(crop),
+            counted=crop.of(self.counted),
+            rooms=rooms and {factor: room.of(crop.at(factor)) for factor, room in rooms.items()},
             contact=contact and contact._replace(zone=crop.of(contact.zone)),
             matte=matte and matte._replace(room=crop.of(matte.room), known=crop.of(matte.known)),
             moved=None if self.moved is None else crop.of(self.moved),
@@ -90,9 +78,7 @@ class Method(NamedTuple):
 
     channels: Sequence[ChannelName]
     weights: Weights
-    shadow: Shadow
     decorrelate: bool
-    smooth_px: float  # smoothing of the full image before it is compared with the empty scene
     stride: int  # of the pixels of the full image that the statistics are taken from
     margin_px: int
 
@@ -199,12 +185,11 @@ def _brought(level: F32, factor: int, wanted: int, band_px: float) -> F32:
 def _evidence(small: U8, view: View, level: Level, method: Method) -> Evidence:
     """Return what the image says at one resolution, to which it is shrunk."""
     factor = level.factor
-    empty = view.empty if level.use_plate else None
+    room = view.rooms[factor] if view.rooms and level.use_plate else None
     weight = crops.shrink_mask(view.counted, factor).astype(np.float32)
-    turned = method.decorrelate and empty is None
+    turned = method.decorrelate and room is None
     evidence = from_image(small, weight, method.channels, max(method.stride // factor, 1), turned)
-    if empty is not None:
-        room = Room(empty.plates[factor], crops.shrink_mask(empty.floor, factor), method.shadow, method.smooth_px)
+    if room is not None:
         evidence = in_room(evidence, small, method.channels, room)
     if view.colours is None:
         return evidence
