@@ -94,7 +94,7 @@ def differing(state: FrameState, cloth: Cloth, model: ClothedModel, view: int) -
     """Return how many pixels of a view only one of the two silhouettes covers."""
     seen = next(s for s in state.segmentation.of("person") if s.camera == view)
     camera, surface = model.scene.cameras[view], model.surface(state.estimate.pose, cloth)
-    covered = silhouettes.mask(silhouettes.outline(surface, camera), camera)
+    covered = silhouettes.covered(surface, camera)
     return int(np.count_nonzero(covered != (seen.distance > 0)))
 
 

@@ -15,12 +15,13 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
+from mocapflow_levelset.evidence import Room
 from mocapflow_levelset.grabcut import GrabCut
 from mocapflow_levelset.levelset import BORDER_PX, LevelSet
 from mocapflow_levelset.masks import counted
 from mocapflow_levelset.plates import Plate, Shadow, plate_of
 from mocapflow_levelset.redistance import redistance
-from mocapflow_levelset.view import BAND_PX, Empty, View, find
+from mocapflow_levelset.view import BAND_PX, View, find
 from skimage.segmentation import chan_vese, morphological_chan_vese
 
 from mocapflow.records import F32, U8, Bool
@@ -89,9 +90,9 @@ def shifted(truth: F32, pixels: int) -> F32:
 def levelset(task: Task, start: F32, known: bool = False) -> Bool:
     segmenter = LevelSet(shape_weight=0.0)
     levels = segmenter._levels(warm=False)
-    empty = Empty(task.plates, np.zeros((HEIGHT, WIDTH), bool)) if known else None
-    view = View(task.image, start, start, counted(start.shape, BORDER_PX), empty)
-    return find(view, levels, segmenter._method(Shadow())).level > 0
+    rooms = {factor: Room(plate, np.zeros_like(plate.spread, bool), Shadow()) for factor, plate in task.plates.items()}
+    view = View(task.image, start, start, counted(start.shape, BORDER_PX), rooms if known else None)
+    return find(view, levels, segmenter._method()).level > 0
 
 
 def grabcut(task: Task, start: F32, iterations: int) -> Bool:

@@ -29,7 +29,7 @@ from mocapflow.scene import Scene
 CLIP = shipped("examples", "data", "skirt_steps")
 SIZE = np.array([640, 800])  # px
 SPACING, BAND = 4.0, 8.0  # px, as in tracking
-outline = unwrap(silhouettes.outline)  # which is otherwise computed once for a surface
+occluding_edges = unwrap(silhouettes._occluding_edges)  # which are otherwise computed once for a surface
 
 
 def at_full_size(camera: Camera) -> Camera:
@@ -97,9 +97,13 @@ def steps_of(surface: Surface, camera: Camera) -> dict[str, Callable[[], object]
     }
 
 
+def outline(surface: Surface, camera: Camera) -> silhouettes.Outline:
+    return silhouettes._bounded(occluding_edges(surface, camera), camera)
+
+
 def both(surface: Surface, camera: Camera) -> object:
     boundary = outline(surface, camera)
-    return silhouettes.mask(boundary, camera), silhouettes.samples(boundary, surface, camera, SPACING)
+    return silhouettes.covered(surface, camera), silhouettes.samples(boundary, surface, camera, SPACING)
 
 
 def main() -> None:

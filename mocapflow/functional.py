@@ -38,12 +38,12 @@ class Functional:
         views = [f"{camera.name}.{term}" for camera in self.model.scene.cameras for term in IN_VIEW]
         return (*views, *unique_names([prior.name for prior in self.priors]))
 
-    def values(self, state: FrameState, surface: Surface) -> F64:
-        """Return the terms (E,) of a state with its surface; NaN where a view is not seen or has no such energy.
+    def values(self, state: FrameState) -> F64:
+        """Return the terms (E,) of a state; NaN where a view is not seen or has no such energy.
 
         Source: Rosenhahn 2008, section 12.4
         """
-        cameras = self.model.scene.cameras
+        surface, cameras = self.model.scene.surface_of(state), self.model.scene.cameras
         said = state.segmentation.energies
         views = np.array([[said.get(f"{camera.name}.{term}", np.nan) for term in IN_VIEW] for camera in cameras])
         matched = contours(surface, state.matches, cameras)
@@ -122,7 +122,7 @@ def overlaps(surface: Surface, segmentation: Segmentation, cameras: Sequence[Cam
     overlap = np.full(len(cameras), np.nan)
     for silhouette in segmentation.of("person"):
         camera = cameras[silhouette.camera]
-        covered = silhouettes.mask(silhouettes.outline(surface, camera), camera)
+        covered = silhouettes.covered(surface, camera)
         overlap[silhouette.camera] = silhouettes.intersection_over_union(covered, silhouette.distance > 0)
     return overlap
 

@@ -16,7 +16,7 @@ from mocapflow.guards.outputs import cloth_of, estimate_of, segmentation_of
 from mocapflow.model import ClothedModel
 from mocapflow.pooling import pool_matches
 from mocapflow.records import record
-from mocapflow.steady import PosedSurface, Steady, measure_change
+from mocapflow.steady import Steady, measure_change
 from mocapflow.timing import Stopwatch
 
 LAPS = ("segment", "solve", "cloth", "energy")  # of a turn, timed
@@ -45,17 +45,16 @@ def settle(
     far = not past.moments
     steady = steps.steady.beginning if far else steps.steady
     at_rest, change = 0, None
-    recent = deque([PosedSurface(state.estimate.pose, model.surface(state.estimate.pose, state.cloth))], maxlen=3)
+    recent = deque([state], maxlen=3)
     energy, cost = np.full((steady.cap, len(functional.terms)), np.nan), np.nan
     for index in range(steady.cap):
         turn = Turn(index=index, change=change, far=far)
         with noting(f"frame {frame.index}, iteration {index + 1}"):
             state = take_turn(frame, state, past, steps, functional, turn, watch)
-            now = PosedSurface(state.estimate.pose, model.surface(state.estimate.pose, state.cloth))
-            energy[index] = functional.values(state, now.surface)
+            energy[index] = functional.values(state)
         last_cost, cost = cost, functional.total(energy[index])
-        change = measure_change(recent[-1], now, state.estimate.covariance)
-        recent.append(now)
+        change = measure_change(recent[-1], state, model.scene)
+        recent.append(state)
         if index == 0 and steady.far(change):
             far, steady = True, steady.beginning
         watch.lap("energy")
@@ -64,14 +63,14 @@ def settle(
         if at_rest >= steady.turns or index + 1 >= steady.max_turns:
             break
     assert change is not None
-    swing = measure_change(recent[0], now, state.estimate.covariance)  # over the last two turns
+    swing = measure_change(recent[0], state, model.scene)  # over the last two turns
     return FrameResult(
         state=state,
         iterations=index + 1,
         steady=at_rest >= steady.turns,
         oscillating=at_rest == 0 and index > 1 and steady.holds(swing, index + 1),
         change=change,
-        overlap=overlaps(now.surface, state.segmentation, model.scene.cameras),
+        overlap=overlaps(model.scene.surface_of(state), state.segmentation, model.scene.cameras),
         energy=energy,
         energy_terms=functional.terms,
         seconds=watch.seconds,

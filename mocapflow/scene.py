@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from mocapflow.assets import Background, Body, Camera, GarmentMesh
-from mocapflow.data import BODY, CLOTH, Cloth, Pose, Surface
+from mocapflow.data import BODY, CLOTH, Cloth, FrameState, Pose, Surface
 from mocapflow.geometry import kinematics, meshes, sewing, simplify
 from mocapflow.geometry.angles import unmeasured
 from mocapflow.memo import memoised
@@ -130,6 +130,10 @@ class Scene:
     def surface(self, pose: Pose, cloth: Cloth) -> Surface:
         """Return body and garment posed in the world."""
         return _posed(pose, cloth, self)
+
+    def surface_of(self, state: FrameState) -> Surface:
+        """Return body and garment as a state has them."""
+        return self.surface(state.estimate.pose, state.cloth)
 
 
 @memoised

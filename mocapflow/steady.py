@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from pydantic import NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
-from mocapflow.data import Change, Pose, Surface
+from mocapflow.data import Change, FrameState, Pose
 from mocapflow.model import increment_between
 from mocapflow.records import F64
+from mocapflow.scene import Scene
 from mocapflow.settings import PositiveOrInf, Settings
 
 
@@ -55,29 +54,23 @@ class Steady(Settings):
         return self.energy_share == float("inf") or abs(now - before) <= self.energy_share * abs(before)
 
 
-class PosedSurface(NamedTuple):
-    """A pose with the surface it has."""
+def measure_change(old: FrameState, new: FrameState, scene: Scene) -> Change:
+    """Return how far body, cloth and joint angles moved between two states.
 
-    pose: Pose
-    surface: Surface
-
-
-def measure_change(old: PosedSurface, new: PosedSurface, covariance: F64) -> Change:
-    """Return how far body, cloth and joint angles moved between two poses.
-
-    The covariance (S, S) weighs the move in `sigmas`: along a direction that no image shows even a long way counts
-    little, along one that all images show even a short way counts.
+    The covariance of the new one weighs the move in `sigmas`: along a direction that no image shows even a long way
+    counts little, along one that all images show even a short way counts.
     """
-    shift = new.surface.vertices - old.surface.vertices
+    before, now = map(scene.surface_of, (old, new))
+    shift = now.vertices - before.vertices
     squared = np.einsum("va,va->v", shift, shift)
-    worn = new.surface.cloth
+    worn = now.cloth
     body, cloth = squared[~worn], squared[worn]
-    angles = np.abs(new.pose.angles - old.pose.angles)
+    angles = np.abs(new.estimate.pose.angles - old.estimate.pose.angles)
     return Change(
         body=float(np.sqrt(body.max())),
         cloth=float(np.sqrt(cloth.mean())) if len(cloth) else 0.0,
         angles=float(angles.max(initial=0)),
-        sigmas=_sigmas(old.pose, new.pose, covariance),
+        sigmas=_sigmas(old.estimate.pose, new.estimate.pose, new.estimate.covariance),
         shift=shift,
     )
 

@@ -48,19 +48,15 @@ def test_contour_is_half_the_weighted_squared_error_along_the_direction_or_in_fu
     assert contours(surface, matches, [camera, camera]) == pytest.approx([0, 0.5 * (2 * 9 + 25)])
 
 
-def values_of(functional, state):
-    return functional.values(state, MODEL.surface(state.estimate.pose, state.cloth))
-
-
 def test_every_view_has_its_terms_and_a_lost_one_none():
     functional, state = Functional(MODEL, (), Past()), pictures.tiny_state(SCENE, POSE)
     aside = pictures.tiny_state(SCENE, off(POSE, 0.05), POSE)
-    values = dict(zip(functional.terms, values_of(functional, state), strict=True))
+    values = dict(zip(functional.terms, functional.values(state), strict=True))
     assert set(values) == {f"cam0{c}.{term}" for c in (1, 2, 3, 4) for term in ("data", "length", "shape", "contour")}
     assert np.isnan(values["cam01.data"])  # these silhouettes are drawn, nothing was segmented
-    assert 0 < values["cam01.shape"] < 0.1 * values_of(functional, aside)[functional.terms.index("cam01.shape")]
+    assert 0 < values["cam01.shape"] < 0.1 * functional.values(aside)[functional.terms.index("cam01.shape")]
     lost = FrameState(**{**vars(state), "segmentation": pictures.without_silhouette(state.segmentation, 1)})
-    values = dict(zip(functional.terms, values_of(functional, lost), strict=True))
+    values = dict(zip(functional.terms, functional.values(lost), strict=True))
     assert np.isnan(values["cam02.shape"]) and np.isfinite(values["cam01.shape"])
 
 
@@ -72,7 +68,7 @@ def test_a_pose_costs_its_areas_and_what_the_priors_say_times_their_weight():
     surface = MODEL.surface(POSE, CLOTH)
     assert alone == pytest.approx(sum(area(surface, one, SCENE.cameras[one.camera]) for one in seen.of("person")))
     assert with_prior - alone == pytest.approx(14.0)
-    assert values_of(Functional(MODEL, (prior,), Past()), pictures.tiny_state(SCENE, POSE))[-1] == 14.0
+    assert Functional(MODEL, (prior,), Past()).values(pictures.tiny_state(SCENE, POSE))[-1] == 14.0
 
 
 def test_the_sum_is_of_all_terms_that_are_there_but_contours():

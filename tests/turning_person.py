@@ -59,7 +59,7 @@ def pose(body, index, axis):
 def frame(scene, index, axis):
     """The pictures of a frame: an even person in an even room, a box before the legs while they are not seen."""
     surface = scene.surface(pose(scene.body, index, axis), NO_CLOTH)
-    masks = [silhouettes.mask(silhouettes.outline(surface, view), view) for view in scene.cameras]
+    masks = [silhouettes.covered(surface, view) for view in scene.cameras]
     boxes = [
         around_legs(scene, surface, view) if index in UNSEEN else np.zeros((SIDE, SIDE), bool) for view in scene.cameras
     ]

@@ -45,7 +45,7 @@ def draw_garment(registry: Registry, name: str, recording: Path | None, draper: 
     resolver = Resolver(Document({}, {(): Place(f"show garment {name}", Path())}), registry)
     garment: Any = garment_of(name, recording, resolver)
     lays = resolver.component("draper", draper, ())
-    with naming_failures(garment, registry, lambda: "", out.with_suffix(".log")):
+    with naming_failures(garment, registry, out.with_suffix(".log")):
         body, scanned = wearer(recording, registry)
         scene = Scene(cameras=(), body=body, garment=mesh_of(garment, body))
         image = poster(scene, garment, lays)

@@ -133,9 +133,9 @@ def track(invocation: Invocation, out: Path, label: str) -> None:
 
 def begin(invocation: Invocation, out: Path, steps: Sequence[Step]) -> None:
     """Have a run folder remember what is run in it; what lies there of another run is set aside."""
-    from mocapflow.running.component_failures import LOG
+    from mocapflow.running.component_failures import FAILURE_LOG
 
-    (out / LOG).unlink(missing_ok=True)
+    (out / FAILURE_LOG).unlink(missing_ok=True)
     before, now = recalled_keys(out), {step.label: step.key for step in steps}
     another = holds_results(out) if before is None else differing(before, now)
     if another and (former := set_aside(out)):

@@ -41,14 +41,12 @@ def project_each(points: F64, view: I16, cameras: Sequence[Camera]) -> F64:
 
 def _divided(homogeneous: F64) -> F64:
     """Return the pixels (M, 2) of homogeneous ones (M, 3); NaN for those behind the camera."""
-    pixels: F64 = homogeneous[:, :2] / np.where(homogeneous[:, 2:] > 0, homogeneous[:, 2:], np.nan)
-    return pixels
+    return homogeneous[:, :2] / np.where(homogeneous[:, 2:] > 0, homogeneous[:, 2:], np.nan)
 
 
 def centre(camera: Camera) -> F64:
     """Return the projection centre (3,) in m."""
-    position: F64 = -camera.camera_from_world[:3, :3].T @ camera.camera_from_world[:3, 3]
-    return position
+    return -camera.camera_from_world[:3, :3].T @ camera.camera_from_world[:3, 3]
 
 
 def directions(pixels: F64, camera: Camera) -> F64:
@@ -120,8 +118,7 @@ def _undistort_radial(pixels: F64, camera: Camera) -> F64:
         x, y = new_x, new_y
         if moved < UNDISTORT_TOLERANCE:
             break
-    ideal: F64 = (np.column_stack([x, y, np.ones(len(x))]) @ camera.intrinsics.T)[:, :2]
-    return ideal
+    return (np.column_stack([x, y, np.ones(len(x))]) @ camera.intrinsics.T)[:, :2]
 
 
 def distort(pixels: F64, camera: Camera) -> F64:

@@ -86,8 +86,7 @@ def screw_velocities(screws: F64, points: F64, share: F64 | Bool) -> F64:
             of the joint in place of 1.
     """
     rate = (np.cross(screws[None, :, :3], points[:, None]) + screws[None, :, 3:]) * share[..., None]
-    velocities: F64 = np.swapaxes(rate, 1, 2)
-    return velocities
+    return np.swapaxes(rate, 1, 2)
 
 
 def skin_velocities(body: Body, joints: F64, screws: F64, angles: F64, vertices: I32 | None = None) -> F64:

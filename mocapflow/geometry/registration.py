@@ -23,8 +23,7 @@ class Registration:
 
     def apply(self, points: F64) -> F64:
         """Return points (..., 3) of the first rig in the second."""
-        moved: F64 = points @ self.rotation.T + self.translation
-        return moved
+        return points @ self.rotation.T + self.translation
 
 
 def register(source: F64, target: F64, groups: npt.ArrayLike | None = None) -> Registration:

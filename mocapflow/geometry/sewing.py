@@ -105,16 +105,14 @@ def grid_faces(grid: I32, closed: bool = True) -> I32:
     right = np.roll(grid, -1, axis=0) if closed else grid[1:]
     left = grid if closed else grid[:-1]
     a, b, c, d = left[:, :-1], right[:, :-1], right[:, 1:], left[:, 1:]
-    faces: I32 = np.concatenate([np.stack(t, axis=-1).reshape(-1, 3) for t in ((a, d, b), (b, d, c))])
-    return faces
+    return np.concatenate([np.stack(t, axis=-1).reshape(-1, 3) for t in ((a, d, b), (b, d, c))])
 
 
 def nearest_skin(body: Body, points: F64) -> I32:
     """Return the body vertex nearest to each point (N, 3)."""
     from scipy.spatial import cKDTree
 
-    nearest: I32 = np.asarray(cKDTree(body.vertices).query(points)[1], np.int32)
-    return nearest
+    return np.asarray(cKDTree(body.vertices).query(points)[1], np.int32)
 
 
 def carrier(body: Body, vertices: I32) -> int:

@@ -8,6 +8,8 @@ triangles, and nothing is drawn to tell which edges bound it. Cloth is two-sided
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from mocapflow.assets import Camera
@@ -21,14 +23,21 @@ from mocapflow.records import F32, F64, I8, I32, Bool, array, record
 PIECE = 4.0  # px; longer edges are judged piece by piece, for a part of one may be hidden
 
 
+class OccludingEdges(NamedTuple):
+    """The directed occluding edges of a surface in one view, and where they cross the rows of the image."""
+
+    vertex: I32  # (E, 2) surface vertex index of the two ends
+    image: F64  # (E, 2, 2) px, where these project
+    layers: I32  # (E,) how many layers of the surface end there
+    crossings: tuple[I32, I32, I32]  # see the kernel
+
+
 @record
 class Outline:
     """The silhouette of a surface in one view: its directed occluding edges, what they cover, and where that ends."""
 
     vertex: I32 = array("E", 2, unit="surface vertex index of the two ends of an edge")
     image: F64 = array("E", 2, 2, unit="px, where these project")
-    layers: I32 = array("E", unit="how many layers of the surface end there")
-    crossings: tuple[I32, I32, I32]  # of the edges with the rows of the image: see the kernel
     first: I32 = array("H", unit="index of the first span in each row of the image, then how many there are")
     span: I32 = array("S", 2, unit="px, covered in a row: the first column, and the one after the last")
     edge: I32 = array("B", unit="index of the edge that a piece of the boundary belongs to")
@@ -60,54 +69,38 @@ def outline(surface: Surface, camera: Camera) -> Outline:
 
     Edges that lie inside the silhouette (a leg before the other) are not part of the boundary.
     """
-    vertex, image, layers, crossings = _crossed(surface, camera)
-    return _bounded(vertex, image, layers, crossings, camera)
+    return _bounded(_occluding_edges(surface, camera), camera)
 
 
 @memoised
 def skin_outline(surface: Surface, camera: Camera) -> Outline:
     """Return the boundary of the silhouette that the body of a surface has without its cloth."""
-    whole = outline(surface, camera)
-    layers = np.where(surface.layer.take(whole.vertex[:, 0]) == CLOTH, np.int32(0), whole.layers)
-    return _bounded(whole.vertex, whole.image, layers, whole.crossings, camera)
-
-
-def _bounded(vertex: I32, image: F64, layers: I32, crossings: tuple[I32, I32, I32], camera: Camera) -> Outline:
-    first, spans = span_kernels.covered(*crossings, layers, camera.size[0])
-    edge, pieces = kernels.boundary(image, layers, first, spans, PIECE)
-    return Outline(
-        vertex=vertex, image=image, layers=layers, crossings=crossings, first=first, span=spans, edge=edge, pixel=pieces
-    )
+    edges = _occluding_edges(surface, camera)
+    layers = np.where(surface.layer.take(edges.vertex[:, 0]) == CLOTH, np.int32(0), edges.layers)
+    return _bounded(edges._replace(layers=layers), camera)
 
 
 def covered(surface: Surface, camera: Camera) -> Bool:
-    """Return the silhouette of a surface that is looked at once as a mask (H, W), without the pieces of its outline.
-
-    Where the outline is needed, too, it is remembered, and its `mask` costs less.
-    """
-    _, _, layers, crossings = _crossed(surface, camera)
-    first, spans = span_kernels.covered(*crossings, layers, camera.size[0])
-    return _filled(first, spans, camera)
+    """Return the silhouette of a surface as a mask (H, W)."""
+    edges, mask = _occluding_edges(surface, camera), np.zeros((camera.size[1], camera.size[0]), bool)
+    first, span = span_kernels.covered(*edges.crossings, edges.layers, camera.size[0])
+    span_kernels.fill(first, span, mask)
+    return mask
 
 
-def _crossed(surface: Surface, camera: Camera) -> tuple[I32, F64, I32, tuple[I32, I32, I32]]:
-    """Return the occluding edges, as `Outline` has them, with their layers, and where they cross rows of the image."""
+@memoised
+def _occluding_edges(surface: Surface, camera: Camera) -> OccludingEdges:
     view = projected(surface, camera)
     vertex, layers = kernels.occluding_edges(surface.edges, view.facing, surface.cloth)
     image = view.image.take(vertex, axis=0)  # several times faster than view.image[vertex]
     image.setflags(write=False)  # as in an `Outline`: kernels are compiled anew for arrays that may be written
-    return vertex, image, layers, span_kernels.crossings(image, camera.size)
+    return OccludingEdges(vertex, image, layers, span_kernels.crossings(image, camera.size))
 
 
-def mask(boundary: Outline, camera: Camera) -> Bool:
-    """Return the silhouette as a mask (H, W)."""
-    return _filled(boundary.first, boundary.span, camera)
-
-
-def _filled(first: I32, spans: I32, camera: Camera) -> Bool:
-    full = np.zeros((camera.size[1], camera.size[0]), bool)
-    span_kernels.fill(first, spans, full)
-    return full
+def _bounded(edges: OccludingEdges, camera: Camera) -> Outline:
+    first, span = span_kernels.covered(*edges.crossings, edges.layers, camera.size[0])
+    edge, pieces = kernels.boundary(edges.image, edges.layers, first, span, PIECE)
+    return Outline(vertex=edges.vertex, image=edges.image, first=first, span=span, edge=edge, pixel=pieces)
 
 
 def distance_to(inside: Bool) -> F32:

@@ -85,8 +85,7 @@ def _seen_space(camera: Camera) -> F64:
     """Return points (P, 3) m all over what a camera sees."""
     grid = np.stack(np.meshgrid(*(np.linspace(0, n - 1, RAYS) for n in camera.size)), -1).reshape(-1, 2)
     rays = directions(undistort(grid, camera), camera)
-    points: F64 = (DEPTHS[:, None, None] * rays).reshape(-1, 3) + centre(camera)
-    return points
+    return (DEPTHS[:, None, None] * rays).reshape(-1, 3) + centre(camera)
 
 
 def _sees(camera: Camera, points: F64) -> Bool:

@@ -25,8 +25,7 @@ def repeated(change: F64) -> Bool:
         change: (T, C) differences to the picture before, NaN without one.
     """
     shares = _shares(change)
-    old: Bool = (shares < NO_CHANGE) & _moving(shares)[:, None]
-    return old
+    return (shares < NO_CHANGE) & _moving(shares)[:, None]
 
 
 def frozen_from(change: F64) -> npt.NDArray[np.intp]:

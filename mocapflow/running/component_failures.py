@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType, TracebackType
@@ -26,19 +26,22 @@ from mocapflow.interrupts import interrupted
 from mocapflow.output_checks import InvalidOutput
 from mocapflow.registry import Registry
 from mocapflow.settings import Component
+from mocapflow.storage.checkpoint import Checkpoint
 
-LOG = "failed.log"  # in the run folder, the traceback of the last failure
+FAILURE_LOG = "failed.log"  # in the run folder, the traceback of the last failure
 
 
 @contextmanager
-def naming_failures(component: Component, registry: Registry, kept: Callable[[], str], log: Path) -> Iterator[None]:
+def naming_failures(
+    component: Component, registry: Registry, log: Path, checkpoint: Checkpoint | None = None
+) -> Iterator[None]:
     """If a component raises, say who it was, what is saved and how to go on.
 
     Args:
         component: what is running, or what it runs.
         registry: knows which packages are plugins.
-        kept: says what is saved, and how to go on.
         log: where to write the whole traceback.
+        checkpoint: knows what is saved, and how to go on; None: nothing is.
     """
     try:
         yield
@@ -53,7 +56,7 @@ def naming_failures(component: Component, registry: Registry, kept: Callable[[],
             raise
         if isinstance(error, OSError) and _nobodys(error, log.parent) and (said := unwritable(error)):
             raise said from error
-        raise _failure(error, component, registry, kept(), log) from error
+        raise _failure(error, component, registry, checkpoint.kept if checkpoint else "", log) from error
 
 
 def _nobodys(error: OSError, out: Path) -> bool:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,13 +21,12 @@ from mocapflow.interrupts import check
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import silent
 from mocapflow.results import Files, RunFolder
-from mocapflow.running.component_failures import LOG, naming_failures
+from mocapflow.running.component_failures import FAILURE_LOG, naming_failures
 from mocapflow.running.progress import Progress
 from mocapflow.running.recipes import Step
 from mocapflow.running.warning_log import warnings_logged
 from mocapflow.running.wiring import Itself, Source, made_by
 from mocapflow.scene import Scene
-from mocapflow.settings import Component
 from mocapflow.storage.artifacts import Artifact, made_otherwise, versions, with_versions
 from mocapflow.storage.checkpoint import Checkpoint
 from mocapflow.storage.locks import Lock
@@ -64,6 +63,7 @@ class Execution:
         self._pipeline, self._store, self._out = pipeline, store, out
         self._steps = {step.label: step for step in steps}
         self._fresh, self._report = fresh, report
+        self._naming_failures = partial(naming_failures, registry=pipeline.registry, log=out / FAILURE_LOG)
         self._results: dict[str, Any] = {}
         self._scenes: dict[tuple[str | None, str | None], Scene] = {}
         self.entries: dict[str, Mapping[str, Any]] = {}  # per finished stage
@@ -170,7 +170,10 @@ class Execution:
         self._report(f"{step.label}: running {step.named.stage.name}")
         check()
         cpu, wall, stage = time.process_time(), time.perf_counter(), step.named.stage
-        with warnings_logged(self._pipeline.registry.packages) as said, self._naming_failures(stage, checkpoint):
+        with (
+            warnings_logged(self._pipeline.registry.packages) as said,
+            self._naming_failures(stage, checkpoint=checkpoint),
+        ):
             if checkpoint is not None:
                 checkpoint.keep_warnings(said)
             value = made_of(stage, stage.run(**inputs), made_by(step.named))
@@ -221,14 +224,6 @@ class Execution:
                 return mesh_of(garment, body)
         except GarmentError as error:
             raise GarmentError(error.message, where=self._pipeline.garment_where, hint=error.hint) from None
-
-    def _naming_failures(
-        self, component: Component, checkpoint: Checkpoint | None = None
-    ) -> AbstractContextManager[None]:
-        def kept() -> str:
-            return checkpoint.kept if checkpoint else ""
-
-        return naming_failures(component, self._pipeline.registry, kept, self._out / LOG)
 
     def _enter_found(self, step: Step, found: Artifact) -> None:
         if step.label in self.entries:

@@ -29,8 +29,8 @@ class PlanLine:
 
     label: str
     action: str  # hit, resume or run
-    key: str
     why: str
+    key: str
     sources: Mapping[str, Source]  # parameter -> the stage it comes from
 
     def __str__(self) -> str:
@@ -70,7 +70,7 @@ class Prepared:
     def plan(self) -> list[PlanLine]:
         """Return for each stage whether its result is there, can be continued, or has to be made, and why."""
         self._check_inputs(fresh=False)
-        return [_plan_line(step, self.store) for step in self.steps]
+        return [PlanLine(step.label, *_outlook(step, self.store), step.key, step.sources) for step in self.steps]
 
     def check(self, out: Path, fresh: bool = False) -> None:
         """Check that a run can begin: inputs are there, the run folder can be named, the store written or made.
@@ -180,12 +180,8 @@ def check_apart(out: Path, store: Path, recording: Path) -> None:
             raise PipelineError(f"the {what} would lie among the files of the recording", where=str(path), hint=hint)
 
 
-def _plan_line(step: Step, store: Store) -> PlanLine:
-    action, why = _outlook(step, store)
-    return PlanLine(step.label, action, step.key, why, step.sources)
-
-
 def _outlook(step: Step, store: Store) -> tuple[str, str]:
+    """Return what a run would do with a stage, and why."""
     if step.passes_frames:
         return "run", "changes frames as they are read"
     if not step.stored:

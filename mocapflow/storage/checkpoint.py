@@ -7,7 +7,7 @@ counts once `frames_done` says so, which is written last and in one step, when t
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -197,11 +197,10 @@ class Checkpoint:
         self._attributes["cloth_vertices"] = len(result.state.cloth.vertices)
 
     def _moment(self, numbers: F64, vertices: F64) -> Moment:
-        pose = Pose(root=column(self._columns, numbers, "root"), angles=column(self._columns, numbers, "angles"))
-        parameters = column(self._columns, numbers, "cloth_parameters")
-        time = float(column(self._columns, numbers, "time"))
-        observed = column(self._columns, numbers, "observed")
-        return Moment(time=time, pose=pose, cloth=Cloth(vertices=vertices, parameters=parameters), observed=observed)
+        value = partial(column, self._columns, numbers)
+        pose = Pose(root=value("root"), angles=value("angles"))
+        cloth = Cloth(vertices=vertices, parameters=value("cloth_parameters"))
+        return Moment(time=float(value("time")), pose=pose, cloth=cloth, observed=value("observed"))
 
     def _cloth(self, row: int) -> F64:
         return self._growing.cloth(row) if self._attributes["cloth_vertices"] else _copy(NO_CLOTH.vertices)

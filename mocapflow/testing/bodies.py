@@ -80,8 +80,7 @@ def tiny_garment(body: Body) -> GarmentMesh:
 def _rings(flat: F64, radius: F64, height: F64) -> F64:
     around = radius[:, None, None] * flat
     level = np.broadcast_to(height[:, None, None], (*around.shape[:2], 1))
-    stacked: F64 = np.concatenate([around, level], axis=2).reshape(-1, 3)
-    return stacked
+    return np.concatenate([around, level], axis=2).reshape(-1, 3)
 
 
 def _tube(x: float, height: F64, radius: F64, around: int) -> tuple[F64, I32]:

@@ -53,7 +53,7 @@ class RecoveryConformance(Conformance):
 
 def settled(state: FrameState, scene: Scene) -> FrameResult:
     """Return a state as what the loop hands over."""
-    surface = scene.surface(state.estimate.pose, state.cloth)
+    surface = scene.surface_of(state)
     return FrameResult(
         state=state,
         iterations=1,

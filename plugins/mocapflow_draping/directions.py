@@ -58,8 +58,7 @@ def tilted(down: F64, facing: F64, out: F64, aside: F64) -> F64:
     left = np.cross(facing, down)
     amount = np.hypot(out, aside)[..., None]
     sideways = out[..., None] * facing + aside[..., None] * left
-    turned: F64 = np.cos(amount) * down + np.sinc(amount / np.pi) * sideways
-    return turned
+    return np.cos(amount) * down + np.sinc(amount / np.pi) * sideways
 
 
 def skinned_strands(strands: Strands, chain: F64, links: F64, out: F64, aside: F64) -> F64:
@@ -87,5 +86,4 @@ def standing(strands: Strands, chain: F64, links: F64) -> F64:
         still = np.zeros((len(chain), len(strands.facing)))
         return skinned_strands(strands, chain, links, still, still)
     reach = np.concatenate([np.zeros((*links.shape[:2], 1)), np.cumsum(links, axis=2)], axis=2)
-    grid: F64 = roots(strands, chain)[:, :, None] + reach[..., None] * standing_out(strands, chain)[:, :, None]
-    return grid
+    return roots(strands, chain)[:, :, None] + reach[..., None] * standing_out(strands, chain)[:, :, None]

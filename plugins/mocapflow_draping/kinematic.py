@@ -85,8 +85,7 @@ class Kinematic(Draper):
             grid = drape_strands(strands, fitting.fields, starts, winds, source, skin, parts).grid
         if self.sweeps:
             self._close(fitting, grid, first, links[source], chain[source], skin[source], parts[source])
-        vertices: F64 = grid.reshape(len(grid), -1, 3)[:, strands.particle]
-        return vertices
+        return grid.reshape(len(grid), -1, 3)[:, strands.particle]
 
     def velocity(self, pose: Pose, parameters: F64, vertices: I32, past: Past, scene: Scene) -> F64:
         """Return the velocities (M, 3, 6 + D + Q) of cloth vertices (M,); contacts and taut links stay as they are."""

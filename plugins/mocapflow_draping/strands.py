@@ -155,8 +155,7 @@ def _levels(a: I32, b: I32, step: I32, count: int) -> I32:
 
 def _valid(first: I32, last: I32, rows: int) -> Bool:
     row = np.arange(rows)
-    valid: Bool = (row >= first[:, None]) & (row <= last[:, None])
-    return valid
+    return (row >= first[:, None]) & (row <= last[:, None])
 
 
 def _pinned_skin(garment: GarmentMesh, roots: I32) -> I32:

@@ -44,8 +44,7 @@ def resampled(at: F64, values: F64, wanted: F64, step: float) -> F64:
     left = np.maximum(right - 1, 0)
     near = np.minimum(np.abs(wanted - at[left]), np.abs(wanted - at[right])) <= SLACK * step
     bridged = (at[left] <= wanted) & (wanted <= at[right]) & (at[right] - at[left] <= GAP * step)
-    found: F64 = np.where(near | bridged, np.interp(wanted, at, values), np.nan)
-    return found
+    return np.where(near | bridged, np.interp(wanted, at, values), np.nan)
 
 
 def at_our_frames(reference: Reference, columns: Mapping[str, F64], lag: float = 0.0) -> dict[str, F64]:

@@ -104,8 +104,7 @@ def drawn_blocks(count: int, rate: float) -> npt.NDArray[np.intp]:
     """Return row numbers (DRAWS, count) of a circular block bootstrap of so many rows per second, always the same."""
     block = min(max(round(BLOCK_S * rate), 1), -(-count // LEAST_BLOCKS))
     starts = np.random.default_rng(SEED).integers(0, count, size=(DRAWS, -(-count // block)))
-    rows: npt.NDArray[np.intp] = (starts[:, :, None] + np.arange(block)).reshape(DRAWS, -1)[:, :count] % count
-    return rows
+    return (starts[:, :, None] + np.arange(block)).reshape(DRAWS, -1)[:, :count] % count
 
 
 def correlation(ours: F64, truth: F64) -> float:

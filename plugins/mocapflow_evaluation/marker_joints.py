@@ -87,8 +87,7 @@ def _shoulder_centres(marks: Mapping[str, F64], centres: Mapping[str, F64]) -> d
 
 
 def _midway(marks: Mapping[str, F64], name: str) -> F64:
-    middle: F64 = (marks[f"{name}_l"] + marks[f"{name}_r"]) / 2
-    return middle
+    return (marks[f"{name}_l"] + marks[f"{name}_r"]) / 2
 
 
 def _unit(vectors: F64) -> F64:

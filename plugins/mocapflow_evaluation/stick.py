@@ -103,5 +103,4 @@ def common(ours: Stick, theirs: Stick) -> list[str]:
 
 
 def _picked(stick: Stick, names: Sequence[str]) -> F64:
-    picked: F64 = stick.places[:, [stick.names.index(name) for name in names]]
-    return picked
+    return stick.places[:, [stick.names.index(name) for name in names]]

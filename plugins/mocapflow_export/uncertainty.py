@@ -39,8 +39,7 @@ def excess(size: F64, outline_mm: float) -> F64:
     An outline is off by a pixel and, however large the image, by some millimetres: shadows, socks before a light floor,
     cloth and skin that are not quite the model's. They err alike along whole limbs and for a third of a second.
     """
-    scale: F64 = 1.0 + outline_mm * size
-    return scale
+    return 1.0 + outline_mm * size
 
 
 def px_per_mm(places: F64, cameras: Sequence[Camera]) -> F64:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Annotated, ClassVar
@@ -77,53 +77,52 @@ class CalibrateLimbs(Stage):
             RecordingError: neither a track nor keypoints say where the person is.
         """
         scene = (scene if self.draper else scene.undressed).with_background(background)
-        indices, poses, clothes = self._from_track(track) if track else self._from_keypoints(recording, scene)
+        clothes, poses = self._from_track(track) if track else self._from_keypoints(recording, scene)
         body = scene.body
         modes = modes_of(body) if self.shape else ()
         if self.shape and not modes:
             LOG.warning("shape: this body does not know how people differ, so only its proportions are fitted")
         spreads: Spreads = dict.fromkeys(self.proportions, self.spread) | dict.fromkeys(modes, 1.0)
-        share = self.independent / len(indices)  # contours err alike in all frames: more of them tell no more
-        solution = Solution(np.zeros(len(spreads)), tuple(poses))
+        share = self.independent / len(clothes)  # contours err alike in all frames: more of them tell no more
+        solution = Solution(spreads, np.zeros(len(spreads)), tuple(poses))
         for done in range(self.passes):
-            model = self._model(scene, scaled(body, solution.factors(spreads)))
+            model = self._model(scene, scaled(body, solution.factors))
             part = _in_pass(done, self.passes, recording)
-            views = self._segmented(part, checks, model, indices, solution.poses, clothes)
+            views = self._segmented(part, checks, model, clothes, solution.poses)
             turn = Turn(index=done, change=AT_REST if done else None)
             matchers = [partial(self._match, scene, *view, turn) for view in views]
-            solution = refine(body, matchers, solution, scene.cameras, spreads, share, self.rounds)
-        return fitted(body, solution.factors(spreads))
+            solution = refine(body, matchers, solution, scene.cameras, share, self.rounds)
+        return fitted(body, solution.factors)
 
-    def _from_track(self, track: Track) -> tuple[list[int], list[Pose], list[F64]]:
-        """Return the frames that are fitted, with poses and clothes: the best, if there are enough of them."""
+    def _from_track(self, track: Track) -> tuple[dict[int, F64], list[Pose]]:
+        """Return cloth parameters by the frames that are fitted, and poses: the best, if there are enough of them."""
         found = ~track.doubted & ~track.lost
         whole = found & track.usable.all(axis=1)
         for good in (whole & track.steady, whole, found):  # those of a rough track seldom come to rest
             if good.sum() >= self.frames:
                 break
         rows = spaced_evenly(np.flatnonzero(good).tolist() or range(len(track.frame)), self.frames)
-        clothes = [track.cloth_parameters[r].copy() for r in rows]
-        return [int(track.frame[r]) for r in rows], [track.pose(r) for r in rows], clothes
+        return {int(track.frame[r]): track.cloth_parameters[r].copy() for r in rows}, [track.pose(r) for r in rows]
 
-    def _from_keypoints(self, recording: Recording, scene: Scene) -> tuple[list[int], list[Pose], list[F64]]:
+    def _from_keypoints(self, recording: Recording, scene: Scene) -> tuple[dict[int, F64], list[Pose]]:
         indices, names = spaced_evenly(recording.indices, self.frames), landmarks(scene.body).names
         found = frames_seen(recording, indices, scene.cameras, names)
         _, poses = fit(scene.body, list(found.values()), scene.cameras)
-        return list(found), list(poses), [scene.neutral_parameters] * len(found)
+        return dict.fromkeys(found, scene.neutral_parameters), list(poses)
 
     def _model(self, scene: Scene, body: Body) -> ClothedModel:
         return ClothedModel(scene=replace(scene, body=body), draper=self.draper)
 
     def _segmented(
-        self, recording: Recording, checks: ViewChecks | None, model: ClothedModel, indices: Sequence[int],
-        poses: Sequence[Pose], clothes: Sequence[F64],
+        self, recording: Recording, checks: ViewChecks | None, model: ClothedModel, clothes: Mapping[int, F64],
+        poses: Sequence[Pose],
     ) -> list[tuple[Frame, Segmentation, F64]]:  # fmt: skip
         """Return the silhouettes of the chosen frames; the images are let go at once."""
         views, past = [], Past()
-        wanted = {index: (pose, cloth) for index, pose, cloth in zip(indices, poses, clothes, strict=True)}
-        for frame in recording.until(max(indices)).frames(since=min(indices)):
+        wanted = dict(zip(clothes, poses, strict=True))
+        for frame in recording.until(max(clothes)).frames(since=min(clothes)):
             if frame.index in wanted:
-                pose, cloth = wanted[frame.index]
+                pose, cloth = wanted[frame.index], clothes[frame.index]
                 state = initial_state(pose, cloth, model.drape(pose, cloth, past))
                 passed = prepared(frame, checks, flow=None)
                 found = segmentation_of(self.segmenter, passed, state, past, model.scene, Turn(index=0))

@@ -43,11 +43,11 @@ def fit(
     """
     marks, spreads = landmarks(body), dict(spreads or {})
     poses = tuple(Pose(root=_first_root(marks, seen), angles=np.zeros(len(body.twists))) for seen in frames)
-    solution = Solution(np.zeros(len(spreads)), poses)
+    solution = Solution(spreads, np.zeros(len(spreads)), poses)
     for look in (in_space, partial(in_images, cameras=cameras)):
         views = [View(marks.body, partial(look, seen=seen, spread=marks.spread)) for seen in frames]
-        solution = descend(views, solution, spreads)
-    return solution.factors(spreads), solution.poses
+        solution = descend(views, solution)
+    return solution.factors, solution.poses
 
 
 def in_space(points: F64, seen: Seen, spread: F64) -> Observed:

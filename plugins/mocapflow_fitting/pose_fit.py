@@ -43,14 +43,16 @@ class View(NamedTuple):
 
 
 class Solution(NamedTuple):
-    """Shared log proportions and deviations of the shape (P,), and the pose of each moment."""
+    """Shared log proportions and deviations of the shape (P,), named as their spreads, and the pose of each moment."""
 
+    spreads: Spreads
     logs: F64
     poses: tuple[Pose, ...]
 
-    def factors(self, spreads: Spreads) -> Mapping[str, float]:
-        """Return the proportions, and the deviations of the shape, by name."""
-        values = zip(spreads, self.logs.tolist(), strict=True)
+    @property
+    def factors(self) -> Mapping[str, float]:
+        """The proportions, and the deviations of the shape, by name."""
+        values = zip(self.spreads, self.logs.tolist(), strict=True)
         return {name: value if name.startswith(SHAPE) else math.exp(value) for name, value in values}
 
 
@@ -67,14 +69,14 @@ def projected(points: F64, matrices: F64) -> tuple[F64, F64, F64]:
     return pixel, slope, depth
 
 
-def descend(views: Sequence[View], solution: Solution, spreads: Spreads, rounds: int = 80) -> Solution:
+def descend(views: Sequence[View], solution: Solution, rounds: int = 80) -> Solution:
     """Levenberg-Marquardt over all moments at once; the poses are eliminated one by one (Schur complement)."""
-    damping, cost = 1e-3, _cost(views, solution, spreads)
+    damping, cost = 1e-3, _cost(views, solution)
     for _ in range(rounds):
-        blocks = [_normal(view, pose, solution.logs, spreads) for view, pose in zip(views, solution.poses, strict=True)]
+        blocks = [_normal(view, pose, solution) for view, pose in zip(views, solution.poses, strict=True)]
         while damping < 1e8:
-            trial = _step(blocks, solution, spreads, damping)
-            lower = _cost(views, trial, spreads)
+            trial = _step(blocks, solution, damping)
+            lower = _cost(views, trial)
             if lower <= cost:
                 break
             damping *= 8
@@ -86,9 +88,9 @@ def descend(views: Sequence[View], solution: Solution, spreads: Spreads, rounds:
     return solution
 
 
-def _step(blocks: Sequence[tuple[F64, F64]], solution: Solution, spreads: Spreads, damping: float) -> Solution:
-    shared = len(spreads)
-    precision = np.array([1 / sd**2 for sd in spreads.values()])
+def _step(blocks: Sequence[tuple[F64, F64]], solution: Solution, damping: float) -> Solution:
+    shared = len(solution.logs)
+    precision = np.array([1 / sd**2 for sd in solution.spreads.values()])
     left, right = np.diag(precision * (1 + damping)), -precision * solution.logs
     solved = []
     for matrix, vector in blocks:
@@ -100,29 +102,29 @@ def _step(blocks: Sequence[tuple[F64, F64]], solution: Solution, spreads: Spread
     logs = np.linalg.solve(left, right) if shared else np.empty(0)
     steps = [np.asarray(both[:, -1] - both[:, :shared] @ logs, np.float64) for both in solved]
     poses = tuple(moved(pose, step) for pose, step in zip(solution.poses, steps, strict=True))
-    return Solution(solution.logs + logs, poses)
+    return solution._replace(logs=solution.logs + logs, poses=poses)
 
 
-def _normal(view: View, pose: Pose, logs: F64, spreads: Spreads) -> tuple[F64, F64]:
+def _normal(view: View, pose: Pose, solution: Solution) -> tuple[F64, F64]:
     """Return the normal matrix and gradient of one moment over (log proportions, root, angles)."""
-    points, moves = velocities(view.body, pose, logs, spreads)
+    points, moves = velocities(view.body, pose, solution)
     observed = view.look(points)
     jacobian = np.einsum("nmi,nis->nms", observed.slope, moves[observed.point])
     weight = observed.precision**2 / (1 + _squared(observed) / CAUCHY**2)
     rows = (np.sqrt(weight)[:, None, None] * jacobian).reshape(-1, moves.shape[2])
     errors = (np.sqrt(weight)[:, None] * observed.error).ravel()
     matrix, vector = rows.T @ rows, rows.T @ errors
-    angles = slice(len(spreads) + 6, None)
+    angles = slice(len(solution.logs) + 6, None)
     error, precision = _prior(view.body, pose.angles)
     matrix[angles, angles] += np.diag((precision**2).sum(axis=0))
     vector[angles] += (precision**2 * error).sum(axis=0)
     return matrix + 1e-6 * np.eye(len(vector)), vector
 
 
-def _cost(views: Sequence[View], solution: Solution, spreads: Spreads) -> float:
-    cost = 0.5 * sum((log / sd) ** 2 for log, sd in zip(solution.logs, spreads.values(), strict=True))
+def _cost(views: Sequence[View], solution: Solution) -> float:
+    cost = 0.5 * sum((log / sd) ** 2 for log, sd in zip(solution.logs, solution.spreads.values(), strict=True))
     for view, pose in zip(views, solution.poses, strict=True):
-        body = scaled(view.body, solution.factors(spreads))
+        body = scaled(view.body, solution.factors)
         observed = view.look(kinematics.skin(body, kinematics.chain(body, pose)[0], pose.angles))
         error, precision = _prior(body, pose.angles)
         cost += 0.5 * CAUCHY**2 * np.log1p(_squared(observed) / CAUCHY**2).sum()
@@ -141,15 +143,15 @@ def _prior(body: Body, angles: F64) -> tuple[F64, F64]:
     return np.stack([angles, beyond]), np.stack([1 / spread, np.where(beyond == 0, 0.0, 1 / LIMIT_SPREAD)])
 
 
-def velocities(body: Body, pose: Pose, logs: F64, spreads: Spreads) -> tuple[F64, F64]:
+def velocities(body: Body, pose: Pose, solution: Solution) -> tuple[F64, F64]:
     """Return the vertices (V, 3) m of the scaled body and their velocities (V, 3, P + 6 + D)."""
 
     def at(shift: F64) -> tuple[Body, F64, F64, F64]:
-        other = scaled(body, Solution(logs + shift, ()).factors(spreads))
+        other = scaled(body, solution._replace(logs=solution.logs + shift).factors)
         joints, screws = kinematics.chain(other, pose)
         return other, kinematics.skin(other, joints, pose.angles), joints, screws
 
-    now, points, joints, screws = at(np.zeros(len(logs)))
-    by_logs = [(at(step)[1] - at(-step)[1]) / (2 * STEP) for step in STEP * np.eye(len(logs))]
+    now, points, joints, screws = at(np.zeros(len(solution.logs)))
+    by_logs = [(at(step)[1] - at(-step)[1]) / (2 * STEP) for step in STEP * np.eye(len(solution.logs))]
     by_pose = kinematics.skin_velocities(now, joints, screws, pose.angles)
     return points, np.concatenate([*(rate[..., None] for rate in by_logs), by_pose], axis=2)

@@ -12,7 +12,7 @@ from mocapflow.data import Matches, Pose
 from mocapflow.geometry.cameras import projections
 from mocapflow.geometry.kinematics import part_of
 from mocapflow.records import F64, I32
-from mocapflow_fitting.pose_fit import Observed, Solution, Spreads, View, descend, projected
+from mocapflow_fitting.pose_fit import Observed, Solution, View, descend, projected
 from mocapflow_fitting.proportions import scaled
 
 STEPS = 4  # Gauss-Newton steps between two matchings
@@ -21,8 +21,8 @@ Match = Callable[[Body, Pose], Matches]  # pairs of one moment for a body in a p
 
 
 def refine(
-    body: Body, matchers: Sequence[Match], solution: Solution, cameras: Sequence[Camera], spreads: Spreads,
-    independent: float, rounds: int,
+    body: Body, matchers: Sequence[Match], solution: Solution, cameras: Sequence[Camera], independent: float,
+    rounds: int,
 ) -> Solution:  # fmt: skip
     """Return log proportions and poses with which the contours of the body meet those in the images.
 
@@ -31,15 +31,14 @@ def refine(
         matchers: per moment, how contours are paired.
         solution: where to start.
         cameras: pinhole cameras.
-        spreads: the proportions to fit, with the standard deviation of their logarithm about zero.
         independent: share of the pairs that count, as the errors of neighbouring contour points agree.
         rounds: times that contours are paired anew.
     """
     for _ in range(rounds):
-        now = scaled(body, solution.factors(spreads))
+        now = scaled(body, solution.factors)
         pairs = [match(now, pose) for match, pose in zip(matchers, solution.poses, strict=True)]
         views = [paired(body, found, cameras, independent) for found in pairs]
-        solution = descend(views, solution, spreads, STEPS)
+        solution = descend(views, solution, STEPS)
     return solution
 
 

@@ -21,13 +21,11 @@ class Plane:
     @property
     def normal(self) -> F64:
         """The unit normal of the plane."""
-        normal: F64 = np.cross(self.across[0], self.across[1])
-        return normal
+        return np.cross(self.across[0], self.across[1])
 
     def lift(self, flat: F64) -> F64:
         """Return the points (..., 3) in the world of points (..., 2) in the plane."""
-        lifted: F64 = self.point + flat @ self.across
-        return lifted
+        return self.point + flat @ self.across
 
 
 def level(height: float, towards: float = 0.0) -> Plane:
@@ -58,8 +56,7 @@ def sections(body: Body, plane: Plane) -> list[F64]:
 
 def outline(points: F64) -> F64:
     """Return the convex outline (N, 2) of points, counter-clockwise: what a taut band lies on."""
-    outline: F64 = points[ConvexHull(points).vertices]
-    return outline
+    return points[ConvexHull(points).vertices]
 
 
 def outlines(body: Body, plane: Plane) -> list[F64]:

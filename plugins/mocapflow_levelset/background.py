@@ -14,25 +14,23 @@ from mocapflow.geometry.silhouettes import distance_to, model_distance
 from mocapflow.records import F32, U8, Bool
 from mocapflow.scene import Scene
 from mocapflow_levelset.channels import ChannelName, features
-from mocapflow_levelset.evidence import smoothed
+from mocapflow_levelset.evidence import Room, smoothed
 from mocapflow_levelset.evolve import Schedule, Weights
-from mocapflow_levelset.levelset import INNER_BAND_PX, PERSON, RATIO_CLIP
+from mocapflow_levelset.levelset import INNER_BAND_PX, RATIO_CLIP
 from mocapflow_levelset.masks import counted
 from mocapflow_levelset.plates import Plate, Shadow, density_image, plate_in
 from mocapflow_levelset.shadows import ShadowAware, shadowed
 from mocapflow_levelset.statistics import Window
-from mocapflow_levelset.view import BAND_PX, Empty, Level, Method, View, find
+from mocapflow_levelset.view import BAND_PX, Level, Method, View, find
 
 CHANNELS: tuple[ChannelName, ...] = ("lab",)
 SMOOTH_PX = 1.0  # of the evidence before it is cut
 REFINE_STEPS = 4  # against the plate, then as many with local statistics on both sides
 HOLE_PX2 = 120  # area up to which holes are filled
 SMALLEST_PART = 0.01  # of the largest part's area; smaller parts are noise
-METHOD = Method(  # of the refinement; the shadow is that of the image
+METHOD = Method(  # of the refinement
     channels=CHANNELS,
     weights=Weights(sigma_px=1.5, length=0.5, shape=0.0, clip=RATIO_CLIP, step=1.0, band_px=INNER_BAND_PX),
-    shadow=Shadow(),
-    smooth_px=SMOOTH_PX,
     decorrelate=False,
     stride=2,
     margin_px=40,
@@ -61,7 +59,7 @@ class BackgroundDifference(ShadowAware):
                 "the segmenter 'background' needs the empty scene, and none is known",
                 hint="put the stage 'background' before 'track', or choose the segmenter 'levelset'",
             )
-        surface = scene.surface(state.estimate.pose, state.cloth)
+        surface = scene.surface_of(state)
         silhouettes = []
         for c, camera in enumerate(scene.cameras):
             if not frame.usable[c]:
@@ -69,7 +67,7 @@ class BackgroundDifference(ShadowAware):
             model = model_distance(surface, camera, BAND_PX)
             floor = shadowed(frame, surface, scene, c)
             distance = self.find(frame.images[c], model, floor, scene.background, c, frame.hidden_in(c))
-            silhouettes.append(Silhouette(camera=c, layer=PERSON, distance=distance))
+            silhouettes.append(Silhouette(camera=c, layer="person", distance=distance))
         return Segmentation(silhouettes=tuple(silhouettes))
 
     def find(
@@ -87,10 +85,10 @@ class BackgroundDifference(ShadowAware):
         """
         plate, shadow = plate_in(background, camera, CHANNELS), self.shadow(image, background, camera)
         start = self._start(image, model, plate, floor, shadow, hidden)
-        view = View(image, start, start, counted(start.shape, 0, hidden), Empty({1: plate}, floor))
+        view = View(image, start, start, counted(start.shape, 0, hidden), {1: Room(plate, floor, shadow, SMOOTH_PX)})
         against_plate = Level(1, Schedule(REFINE_STEPS, 3, 3), Window(12.0, 8, 0.02))
         levels = [against_plate, against_plate._replace(use_plate=False)]
-        return find(view, levels, METHOD._replace(shadow=shadow)).level
+        return find(view, levels, METHOD).level
 
     def _start(self, image: U8, model: F32, plate: Plate, floor: Bool, shadow: Shadow, hidden: Bool | None) -> F32:
         """Return a level set (H, W), not a distance: positive where the image is unlike the plate."""

@@ -38,8 +38,7 @@ def curvature(distance: F32 | F64) -> F64:
     dxx, dyy = right - 2 * centre + left, down - 2 * centre + up
     dxy = (padded[2:, 2:] - padded[2:, :-2] - padded[:-2, 2:] + padded[:-2, :-2]) / 4
     square = dx**2 + dy**2 + 1e-6
-    bend: F64 = (dxx * dy**2 - 2 * dx * dy * dxy + dyy * dx**2) / square**1.5
-    return bend
+    return (dxx * dy**2 - 2 * dx * dy * dxy + dyy * dx**2) / square**1.5
 
 
 def energy(
@@ -77,5 +76,4 @@ def descent(
     Source: Rosenhahn 2008, Eq. (12.10)
     """
     push = log_ratio + length_weight * curvature(distance)
-    flow: F64 = delta(distance, sigma_px) * push + 2 * shape_weight * (np.asarray(prior, np.float64) - distance)
-    return flow
+    return delta(distance, sigma_px) * push + 2 * shape_weight * (np.asarray(prior, np.float64) - distance)

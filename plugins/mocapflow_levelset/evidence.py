@@ -10,6 +10,7 @@ import numpy as np
 
 from mocapflow.records import F32, I32, U8, Bool
 from mocapflow_levelset.channels import LAG_PX, ChannelName, decorrelation, features
+from mocapflow_levelset.crops import Crop
 from mocapflow_levelset.plates import Plate, Shadow, density_of
 
 POINTWISE = ("grey", "lab", "chromaticity")  # channels that depend on one pixel only
@@ -27,12 +28,16 @@ class Evidence(NamedTuple):
 
 
 class Room(NamedTuple):
-    """The empty room at the size of an image, and how pixels are compared with it."""
+    """The empty room in one view at one size, and how pixels are compared with it."""
 
     plate: Plate
     floor: Bool  # (H, W) True where a shadow may fall
     shadow: Shadow
     smooth_px: float = 0.0  # smoothing of the image before
+
+    def of(self, crop: Crop) -> Room:
+        """Return a rectangle of it."""
+        return self._replace(plate=self.plate.of(crop), floor=crop.of(self.floor))
 
 
 def from_image(

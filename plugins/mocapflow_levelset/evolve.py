@@ -68,7 +68,7 @@ def settle(level: F32, prior: F32, evidence: Evidence, window: Window, weights: 
     """
     stride = evidence.stride
     weight = np.ascontiguousarray(evidence.weight[::stride, ::stride])
-    grid = Window(window.rho_px / stride, max(window.cell_px // stride, 1), window.floor)
+    grid = Window(window.rho_px / stride, max(window.cell_px // stride, 1), window.least_sd)
     first = (grid.cell_px - 1) * stride // 2
     reach = FRONT * weights.sigma_px / stride + 3 * grid.cell_px
     sums = totals(evidence.sparse, weight, grid.cell_px)
@@ -87,7 +87,7 @@ def settle(level: F32, prior: F32, evidence: Evidence, window: Window, weights: 
             sparse = np.ascontiguousarray(level[::stride, ::stride]) / np.float32(stride)
             gaussians = local_gaussians(evidence.sparse, weight, sparse, sums, grid, weights.sigma_px / stride, reach)
             runs = near(level, weights, first) if step else runs
-            log_ratio(runs, evidence, gaussians, grid.cell_px * stride, stride, weights, ratio)
+            log_ratio(runs, evidence, gaussians, grid.cell_px, weights, ratio)
             if evidence.prior_ratio is not None:
                 ratio = np.clip(ratio + evidence.prior_ratio, -weights.clip, weights.clip)
         advance(level, ratio, prior, runs, change, weights)
@@ -113,11 +113,10 @@ def near(level: F32, weights: Weights, first: int = 0) -> I32:
     return runs
 
 
-def log_ratio(
-    runs: I32, evidence: Evidence, gaussians: F32, cell_px: int, stride: int, weights: Weights, out: F32
-) -> None:
+def log_ratio(runs: I32, evidence: Evidence, gaussians: F32, cell: int, weights: Weights, out: F32) -> None:
     """Write log p1 - log p2, clipped, into `out` (H, W) along the runs; masked pixels get 0.
 
+    The Gaussians are of cells of `cell` times `cell` pixels of the sparse features.
     Outside, the empty scene speaks where it is known (no NaN), else the local statistics. Beside it no colour is less
     likely on the person than `any_colour`: what the room surely does not show is the person, seen there before or not.
     """
@@ -126,9 +125,10 @@ def log_ratio(
     values = evidence.along(runs)
     known = evidence.outside is not None
     outside = evidence.outside(runs, values) if evidence.outside else np.empty(0, np.float32)
-    first = np.float32((cell_px // stride - 1) * stride / 2)  # centre of the first cell's pixels
+    first = np.float32((cell - 1) * evidence.stride / 2)  # centre of the first cell's pixels
     bounds = np.float32(weights.clip), np.float32(weights.any_colour)
-    kernels.log_ratio(runs, values, evidence.weight, outside, known, gaussians, cell_px, first, *bounds, out)
+    size = cell * evidence.stride
+    kernels.log_ratio(runs, values, evidence.weight, outside, known, gaussians, size, first, *bounds, out)
 
 
 def advance(level: F32, ratio: F32, prior: F32, runs: I32, change: F32, weights: Weights) -> None:

@@ -13,7 +13,6 @@ from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.records import F32, U8, Bool
 from mocapflow.scene import Scene
 from mocapflow_levelset import crops
-from mocapflow_levelset.levelset import PERSON
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.view import BAND_PX
 
@@ -33,13 +32,13 @@ class GrabCut(Segmenter):
 
     def segment(self, frame: Frame, state: FrameState, past: Past, scene: Scene, turn: Turn) -> Segmentation:
         """Return the person's silhouette in each usable view."""
-        surface = scene.surface(state.estimate.pose, state.cloth)
+        surface = scene.surface_of(state)
         silhouettes = []
         for c, camera in enumerate(scene.cameras):
             if not frame.usable[c]:
                 continue
             distance = self.find(frame.images[c], model_distance(surface, camera, UNSURE_PX + 1), frame.hidden_in(c))
-            silhouettes.append(Silhouette(camera=c, layer=PERSON, distance=distance))
+            silhouettes.append(Silhouette(camera=c, layer="person", distance=distance))
         return Segmentation(silhouettes=tuple(silhouettes))
 
     def find(self, image: U8, model: F32, hidden: Bool | None = None) -> F32:

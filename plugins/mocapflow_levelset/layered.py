@@ -14,7 +14,7 @@ from mocapflow.records import F32
 from mocapflow.scene import Scene
 from mocapflow_levelset.inner import findable_edges, inner_contours
 from mocapflow_levelset.layers import COLOURS, colour_model, layer_histograms, layer_of
-from mocapflow_levelset.levelset import PERSON, LevelSet
+from mocapflow_levelset.levelset import LevelSet
 from mocapflow_levelset.room_colours import ROOM, person_log_ratio, room_histograms
 
 GRID_PX = 4  # colours are taken every so many px, so far from borders
@@ -48,12 +48,12 @@ class Layered(LevelSet):
         found = super().segment(frame, state, past, scene, turn)
         if found is state.segmentation and turn.index > 1 and turn.calm(KEEP_MM):
             return found
-        surface = scene.surface(state.estimate.pose, state.cloth)
+        surface = scene.surface_of(state)
         colours = dict(state.segmentation.appearance if turn.index > 1 else past.appearance)
         if turn.index == 1:
-            colours[COLOURS] = layer_histograms(frame, found.of(PERSON), surface, scene, past, KEPT, GRID_PX)
+            colours[COLOURS] = layer_histograms(frame, found.of("person"), surface, scene, past, KEPT, GRID_PX)
             if self.colour_weight:
-                colours[ROOM] = room_histograms(frame, found.of(PERSON), past, KEPT, GRID_PX, self.margin_px)
+                colours[ROOM] = room_histograms(frame, found.of("person"), past, KEPT, GRID_PX, self.margin_px)
         return replace(found, inner=self._inner(frame, found, surface, past, scene, turn), appearance=colours)
 
     def _inner(
@@ -67,7 +67,7 @@ class Layered(LevelSet):
             inner_contours(
                 frame.images[s.camera], s, surface, scene.cameras[s.camera], layers, findable, known, reach_px
             )
-            for s in found.of(PERSON)
+            for s in found.of("person")
         ]
         return pool(parts) if parts else None
 

@@ -16,17 +16,18 @@ from mocapflow.scene import Scene
 from mocapflow.settings import PositiveOrInf
 from mocapflow_levelset.channels import ChannelName
 from mocapflow_levelset.contact import contact_zone
+from mocapflow_levelset.crops import shrink_mask
+from mocapflow_levelset.evidence import Room
 from mocapflow_levelset.evolve import Schedule, Weights
 from mocapflow_levelset.masks import counted, without_cut
 from mocapflow_levelset.moved import moved_outline
-from mocapflow_levelset.plates import Shadow, plate_in
+from mocapflow_levelset.plates import plate_in
 from mocapflow_levelset.shadows import ShadowAware, shadowed
 from mocapflow_levelset.statistics import Window
-from mocapflow_levelset.view import BAND_PX, Contact, Empty, Level, Matte, Method, View, find
+from mocapflow_levelset.view import BAND_PX, Contact, Level, Matte, Method, View, find
 
 Share = Annotated[float, Field(ge=0, lt=1)]
 
-PERSON = "person"
 INNER_BAND_PX = 7.0  # half width of the band while the contour moves: only what is within 3.5 sigma of it, 5.3 px, does
 BORDER_PX = 3  # of the image that is left out
 REDUCED_RHO_PX = 8.0  # Gaussian window of the local statistics at reduced sizes, in px of the shrunken image
@@ -76,9 +77,9 @@ class LevelSet(ShadowAware):
         outline has hardly moved these stay as they are; in a frame that began far off only from the third turn on, for
         the contour may have had farther to go than its steps reached.
         """
-        surface = scene.surface(state.estimate.pose, state.cloth)
+        surface = scene.surface_of(state)
         # a view in which nobody was begins anew from the model, which may stand in it by now
-        last = {s.camera: s for s in state.segmentation.of(PERSON) if len(s.zero_level[0])} if turn.index else {}
+        last = {s.camera: s for s in state.segmentation.of("person") if len(s.zero_level[0])} if turn.index else {}
         parts = {c: self._moved(surface, scene.cameras[c], turn) for c in last}
         due = [c for c in np.flatnonzero(frame.usable).tolist() if (part := parts.get(c)) is None or part.any()]
         if last and not due:
@@ -89,9 +90,8 @@ class LevelSet(ShadowAware):
             view = self._view(frame, surface, past, scene, c, levels)
             if c in last:
                 view = view._replace(start=last[c].distance, moved=parts[c])
-            shadow = self.shadow(view.image, self._background(scene), c)
-            found = find(view, levels, self._method(shadow))
-            silhouettes[c] = Silhouette(camera=c, layer=PERSON, distance=found.level)
+            found = find(view, levels, self._method())
+            silhouettes[c] = Silhouette(camera=c, layer="person", distance=found.level)
             for term, cost in found.costs._asdict().items():
                 key = f"{scene.cameras[c].name}.{term}"
                 energies[key] = cost if view.moved is None else energies.get(key, np.nan) + cost
@@ -109,7 +109,7 @@ class LevelSet(ShadowAware):
             start=model,
             prior=model,
             counted=without_cut(counts, model, scene.body, surface, lens),
-            empty=self._empty(frame, surface, scene, camera, levels),
+            rooms=self._rooms(frame, surface, scene, camera, levels),
             colours=self._colours(past, camera),
             contact=self._contact(surface, lens),
             matte=self._matte(scene, camera),
@@ -121,15 +121,17 @@ class LevelSet(ShadowAware):
             return None
         return moved_outline(surface, turn.change, camera, self.keep_px)
 
-    def _empty(
+    def _rooms(
         self, frame: Frame, surface: Surface, scene: Scene, camera: int, levels: Sequence[Level]
-    ) -> Empty | None:
+    ) -> dict[int, Room] | None:
         background = self._background(scene)
         if background is None:
             return None
-        factors = [level.factor for level in levels if level.use_plate]
-        plates = {factor: plate_in(background, camera, self.channels, factor) for factor in factors}
-        return Empty(plates, shadowed(frame, surface, scene, camera))
+        floor, shadow = shadowed(frame, surface, scene, camera), self.shadow(frame.images[camera], background, camera)
+        return {
+            factor: Room(plate_in(background, camera, self.channels, factor), shrink_mask(floor, factor), shadow)
+            for factor in (level.factor for level in levels if level.use_plate)
+        }  # the empty room is compared with small images alone, which are smooth
 
     def _colours(self, past: Past, camera: int) -> F32 | None:
         """Return what colours tell of person and room in a view (BINS,); None: nothing is learned."""
@@ -164,7 +166,7 @@ class LevelSet(ShadowAware):
     def _schedule(self, steps: int, to_rest: bool = False) -> Schedule:
         return Schedule(steps, self.statistics_every, self.redistance_every, to_rest)
 
-    def _method(self, shadow: Shadow) -> Method:
+    def _method(self) -> Method:
         return Method(
             channels=self.channels,
             weights=Weights(
@@ -176,8 +178,6 @@ class LevelSet(ShadowAware):
                 step=1.0,  # `length_weight` is stable with it
                 band_px=INNER_BAND_PX,
             ),
-            shadow=shadow,
-            smooth_px=0.0,  # the empty scene is compared with small images alone, which are smooth
             decorrelate=self.decorrelate,
             stride=self.stride_px,
             margin_px=self.margin_px,

@@ -28,7 +28,7 @@ LOG_ROOT = np.float32(-0.5 * np.log(2 * np.pi))
 class Shadow(NamedTuple):
     """What counts as background, lit or in a shadow."""
 
-    floor: float = 0.012  # smallest standard deviation of the empty scene, share of a channel's range
+    least_sd: float = 0.012  # smallest standard deviation of the empty scene, share of a channel's range
     share: float = 0.2  # prior share of shadow on the background; 0 switches the suppression off
     darkest: float = 0.5  # smallest factor k of (L + 16, a, b)
     chroma: float = 0.005  # standard deviation of the distance to the ray, share of a channel's range
@@ -94,13 +94,13 @@ def first_lab(channels: Sequence[ChannelName]) -> int:
 
 @numba.njit(cache=True, error_model="numpy")
 def _densities(values, plate, spread, may_fall, shadow, lab, out):  # type: ignore[no-untyped-def]
-    floor = shadow[0]
+    least_sd = shadow[0]
     channels = values.shape[0]
     for n in range(out.size):
         if np.isinf(spread[n]):
             out[n] = np.nan
             continue
-        variance = max(spread[n] * spread[n], floor * floor)
+        variance = max(spread[n] * spread[n], least_sd * least_sd)
         inverse = np.float32(0.5) / variance
         norm = LOG_ROOT - np.float32(0.5) * np.log(variance)
         lit, others = np.float32(0), np.float32(0)

@@ -27,7 +27,7 @@ REACH_M = 2.0  # from the person, where their shadow may fall
 class ShadowAware(Segmenter):
     """A segmenter that compares pixels with the empty scene, lit and in the person's shadow."""
 
-    spread_floor: PositiveFloat = USUAL.floor  # smallest standard deviation of the empty scene, share of the range
+    spread_floor: PositiveFloat = USUAL.least_sd  # smallest standard deviation of the empty scene, share of the range
     shadow_share: Annotated[float, Field(ge=0, lt=1)] = USUAL.share  # prior share of shadows; 0: they count as changes
     darkest_shadow: Annotated[float, Field(gt=0, lt=1)] = USUAL.darkest  # least factor of a shadow on L + 16, a, b
     darkest_grey_shadow: Annotated[float, Field(gt=0, lt=1)] = 0.8  # the same in pictures without colours to tell it by
@@ -53,12 +53,12 @@ def _grey_room(background: Background, camera: int) -> bool:
 
 
 @memoised
-def _circle(surface: Surface, radius_m: float) -> F64:
+def _circle(surface: Surface) -> F64:
     """Return points (CORNERS, 3) m of a circle around the person, on the floor."""
     feet = surface.vertices[:, 2].min()
     middle = surface.vertices[:, :2].mean(axis=0)
     angles = np.linspace(0, 2 * np.pi, CORNERS, endpoint=False)
-    circle = middle + radius_m * np.column_stack([np.cos(angles), np.sin(angles)])
+    circle = middle + REACH_M * np.column_stack([np.cos(angles), np.sin(angles)])
     return np.column_stack([circle, np.full(CORNERS, feet)])
 
 
@@ -69,7 +69,7 @@ def shadowed(frame: Frame, surface: Surface, scene: Scene, camera: int) -> Bool:
     return floor if others is None else floor & ~others[camera]
 
 
-def floor_around(surface: Surface, camera: Camera, reach_m: float = REACH_M) -> Bool:
+def floor_around(surface: Surface, camera: Camera) -> Bool:
     """Return True for pixels (H, W) that show the floor within reach of the person.
 
     The floor is the horizontal plane through the lowest point of the posed surface. Elsewhere, a darker pixel of
@@ -77,7 +77,7 @@ def floor_around(surface: Surface, camera: Camera, reach_m: float = REACH_M) -> 
     """
     import cv2
 
-    pixels = project(_circle(surface, reach_m), camera)
+    pixels = project(_circle(surface), camera)
     mask = np.zeros((camera.size[1], camera.size[0]), np.uint8)
     if not np.isfinite(pixels).all():  # the camera stands within reach
         mask[:] = 1

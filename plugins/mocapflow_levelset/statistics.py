@@ -23,7 +23,7 @@ class Window(NamedTuple):
 
     rho_px: float  # standard deviation of the Gaussian window; inf: one Gaussian per region
     cell_px: int  # edge of the cells the sums are taken over, a multiple of the stride of the features
-    floor: float  # smallest standard deviation, as a share of the channel's range
+    least_sd: float  # smallest standard deviation, as a share of the channel's range
 
 
 @cache
@@ -67,8 +67,8 @@ def local_gaussians(
     both = np.concatenate([inside, sums - inside], axis=2)
     everywhere = both.reshape(-1, both.shape[2]).sum(axis=0, dtype=np.float64).astype(np.float32)
     smooth = _smooth(both, window)
-    scale, floor = np.float32(1 / window.cell_px**2), np.float32(window.floor**2)
-    gaussians: F32 = kernels.gaussians(smooth, everywhere, level, window.cell_px, np.float32(reach_px), scale, floor)
+    scale, least = np.float32(1 / window.cell_px**2), np.float32(window.least_sd**2)
+    gaussians: F32 = kernels.gaussians(smooth, everywhere, level, window.cell_px, np.float32(reach_px), scale, least)
     return gaussians
 
 

@@ -65,7 +65,7 @@ def inside_sums(features, weight, level, sums, cell, table, sigma):  # type: ign
 
 
 @numba.njit(cache=True, error_model="numpy")
-def gaussians(smooth, everywhere, level, cell, reach, scale, floor):  # type: ignore[no-untyped-def]
+def gaussians(smooth, everywhere, level, cell, reach, scale, least_variance):  # type: ignore[no-untyped-def]
     """Return log norm, means and 1 / (2 variance) of both regions, blended to global where the window is empty.
 
     Cells further than `reach` from the contour are left zero.
@@ -95,7 +95,7 @@ def gaussians(smooth, everywhere, level, cell, reach, scale, floor):  # type: ig
                     mean = smooth[i, j, at + first] * inverse
                     variance = smooth[i, j, at + second] * inverse - mean * mean
                     mean = trust * mean + (one - trust) * far_mean
-                    variance = max(trust * variance + (one - trust) * far_variance, floor)
+                    variance = max(trust * variance + (one - trust) * far_variance, least_variance)
                     out[i, j, region, first] = mean
                     out[i, j, region, second] = np.float32(0.5) / variance
                     product *= two_pi * variance

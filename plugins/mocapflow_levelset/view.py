@@ -16,18 +16,10 @@ from mocapflow_levelset.evidence import Evidence, Room, from_image, in_room
 from mocapflow_levelset.evolve import Costs, Schedule, Settled, Weights, costs, settle
 from mocapflow_levelset.islands import without_islands
 from mocapflow_levelset.matting import NEAR_PX, sharpened
-from mocapflow_levelset.plates import Plate, Shadow
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.statistics import Window
 
 BAND_PX = 12.0  # half width of the band in which a silhouette's distances are computed
-
-
-class Empty(NamedTuple):
-    """What is known of the empty scene in one view."""
-
-    plates: Mapping[int, Plate]  # by how much it is shrunk
-    floor: Bool  # (H, W) True where shadows may fall
 
 
 class Contact(NamedTuple):
@@ -53,11 +45,23 @@ class View(NamedTuple):
     start: F32  # (H, W) signed distance to the start contour, positive inside; only its zero contour counts
     prior: F32  # (H, W) px, signed distance to the model's outline
     counted: Bool  # (H, W) True where a pixel counts
-    empty: Empty | None = None
+    rooms: Mapping[int, Room] | None = None  # the empty room, by how much it is shrunk
     colours: F32 | None = None  # (BINS,) log ratio of each colour on the person and in the room, by earlier frames
     contact: Contact | None = None
     matte: Matte | None = None
     moved: Bool | None = None  # (H, W) True around where the contour is found anew; None: all of it
+
+    def of(self, crop: Crop) -> View:
+        """Return what is given of a rectangle of the view."""
+        rooms, contact, matte = self.rooms, self.contact, self.matte
+        return self._replace(
+            image=crop.of(self.image), start=crop.of(self.start), prior=crop.of(self.prior),
+            counted=crop.of(self.counted),
+            rooms=rooms and {factor: room.of(crop.at(factor)) for factor, room in rooms.items()},
+            contact=contact and contact._replace(zone=crop.of(contact.zone)),
+            matte=matte and matte._replace(room=crop.of(matte.room), known=crop.of(matte.known)),
+            moved=None if self.moved is None else crop.of(self.moved),
+        )  # fmt: skip
 
 
 class Level(NamedTuple):
@@ -74,9 +78,7 @@ class Method(NamedTuple):
 
     channels: Sequence[ChannelName]
     weights: Weights
-    shadow: Shadow
     decorrelate: bool
-    smooth_px: float  # smoothing of the full image before it is compared with the empty scene
     stride: int  # of the pixels of the full image that the statistics are taken from
     margin_px: int
 
@@ -96,13 +98,14 @@ def find(view: View, levels: Sequence[Level], method: Method) -> Found:
         levels: coarse to fine; the last is of the image as it is.
         method: the constants.
     """
-    part, multiple = view.start if view.moved is None else view.moved, max(level.factor for level in levels)
-    crop = crops.around(part, method.margin_px, multiple)
+    due, multiple = view.start if view.moved is None else view.moved, max(level.factor for level in levels)
+    crop = crops.around(due, method.margin_px, multiple)
     whole = np.full(view.start.shape, -BAND_PX, np.float32) if view.moved is None else view.start.copy()
     if crop is None:
         return Found(whole, Costs(0.0, 0.0, 0.0))
-    settled, prior = _settled(view, crop, levels, method)
-    new = redistance(_refined(settled.level, view, crop, method), BAND_PX)
+    part = view.of(crop)
+    settled, prior = _settled(part, levels, method)
+    new = redistance(_refined(settled.level, part, method), BAND_PX)
     # near the rim of a part its statistics lack a side
     kept = crop if view.moved is None else crops.around(view.moved, method.margin_px // 2, multiple)
     assert kept is not None
@@ -110,37 +113,37 @@ def find(view: View, levels: Sequence[Level], method: Method) -> Found:
     now = _costs(crop.of(whole), settled, prior, method)
     if view.moved is None:
         return Found(whole, now)
-    before = _costs(crop.of(view.start), settled, prior, method)
+    before = _costs(part.start, settled, prior, method)
     return Found(whole, Costs(*(new - old for new, old in zip(now, before, strict=True))))
 
 
-def _settled(view: View, crop: Crop, levels: Sequence[Level], method: Method) -> tuple[Settled, F32]:
-    """Return where the descent within a crop ended, coarse to fine, and the prior that it kept near."""
-    images = crops.pyramid(crop.of(view.image), [level.factor for level in levels])
-    front, factor = crop.of(view.start), 1
+def _settled(view: View, levels: Sequence[Level], method: Method) -> tuple[Settled, F32]:
+    """Return where the descent ended, coarse to fine, and the prior that it kept near."""
+    images = crops.pyramid(view.image, [level.factor for level in levels])
+    front, factor = view.start, 1
     for level in levels:
-        prior = crops.coarser(crop.of(view.prior), level.factor)
+        prior = crops.coarser(view.prior, level.factor)
         front = _brought(front, factor, level.factor, method.weights.band_px)
-        evidence = _evidence(images[level.factor], view, crop, level, method)
+        evidence = _evidence(images[level.factor], view, level, method)
         begin = without_islands(front, evidence)
         settled = settle(begin, prior, evidence, level.window, method.weights, level.schedule)
         front, factor = settled.level, level.factor
     return settled, prior
 
 
-def _refined(front: F32, view: View, crop: Crop, method: Method) -> F32:
-    """Return a level set within a crop that has gone on where the body meets the floor, and within its pixels.
+def _refined(front: F32, view: View, method: Method) -> F32:
+    """Return a level set that has gone on where the body meets the floor, and within its pixels.
 
     A matte does not move it where a shadow that the empty room lacks ends at the foot.
     """
-    movable = crop.of(view.counted)
+    movable = view.counted
     if view.contact is not None:
-        front = _by_chromaticity(front, view, view.contact, crop, method)
-        movable = movable & ~crop.of(view.contact.zone)
+        front = _by_chromaticity(front, view, view.contact, method)
+        movable = movable & ~view.contact.zone
     if view.matte is None:
         return front
-    room, movable = crop.of(view.matte.room), crop.of(view.matte.known) & movable
-    return sharpened(redistance(front, NEAR_PX), crop.of(view.image), room, movable, view.matte.reach_px)
+    movable = movable & view.matte.known
+    return sharpened(redistance(front, NEAR_PX), view.image, view.matte.room, movable, view.matte.reach_px)
 
 
 def _costs(level: F32, settled: Settled, prior: F32, method: Method) -> Costs:
@@ -149,23 +152,23 @@ def _costs(level: F32, settled: Settled, prior: F32, method: Method) -> Costs:
     return costs(settled._replace(level=np.clip(level, -band, band)), prior, method.weights)
 
 
-def _by_chromaticity(front: F32, view: View, contact: Contact, crop: Crop, method: Method) -> F32:
+def _by_chromaticity(front: F32, view: View, contact: Contact, method: Method) -> F32:
     """Return a level set that has gone on by chromaticity where the body meets the floor, and stays elsewhere.
 
     The edge of a foot that stands is dark, and so is the floor below it: by brightness the contour runs a pixel or
     two inside the foot, which then seems to stand higher than it does.
     """
-    zone = crop.of(contact.zone)
-    near = crops.around(zone, round(min(2 * contact.window.rho_px, method.margin_px)), 1)
+    near = crops.around(contact.zone, round(min(2 * contact.window.rho_px, method.margin_px)), 1)
     if near is None:
         return front
-    image, weight = near.of(crop.of(view.image)), near.of(crop.of(view.counted)).astype(np.float32)
+    image, weight = near.of(view.image), near.of(view.counted).astype(np.float32)
     evidence = from_image(image, weight, ("chromaticity",), method.stride, method.decorrelate)
     start = redistance(np.ascontiguousarray(near.of(front)), method.weights.band_px)
-    prior = np.ascontiguousarray(near.of(crop.of(view.prior)))
+    prior = np.ascontiguousarray(near.of(view.prior))
     found = settle(start, prior, evidence, contact.window, method.weights, contact.schedule).level
     whole = front.copy()
-    near.of(whole)[near.of(zone)] = found[near.of(zone)]
+    zone = near.of(contact.zone)
+    near.of(whole)[zone] = found[zone]
     return whole
 
 
@@ -179,16 +182,15 @@ def _brought(level: F32, factor: int, wanted: int, band_px: float) -> F32:
     return redistance(crops.coarser(level, wanted // factor), band_px)
 
 
-def _evidence(small: U8, view: View, crop: Crop, level: Level, method: Method) -> Evidence:
-    """Return what the image within the crop says at one resolution, to which it is shrunk."""
+def _evidence(small: U8, view: View, level: Level, method: Method) -> Evidence:
+    """Return what the image says at one resolution, to which it is shrunk."""
     factor = level.factor
-    empty = view.empty if level.use_plate else None
-    weight = crops.shrink_mask(crop.of(view.counted), factor).astype(np.float32)
-    turned = method.decorrelate and empty is None
+    room = view.rooms[factor] if view.rooms and level.use_plate else None
+    weight = crops.shrink_mask(view.counted, factor).astype(np.float32)
+    turned = method.decorrelate and room is None
     evidence = from_image(small, weight, method.channels, max(method.stride // factor, 1), turned)
-    if empty is not None:
-        plate, floor = empty.plates[factor].of(crop.at(factor)), crops.shrink_mask(crop.of(empty.floor), factor)
-        evidence = in_room(evidence, small, method.channels, Room(plate, floor, method.shadow, method.smooth_px))
+    if room is not None:
+        evidence = in_room(evidence, small, method.channels, room)
     if view.colours is None:
         return evidence
     return evidence._replace(prior_ratio=evidence.weight * view.colours[bins_of(small)])

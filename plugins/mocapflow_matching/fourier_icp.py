@@ -46,7 +46,7 @@ class FourierIcp(ContourIcp):
         if np.median(np.abs(at_nearest(silhouette.distance, model.contour.pixel))) < self.near_px:
             return image, model
         camera = scene.cameras[silhouette.camera]
-        covered = silhouettes.mask(silhouettes.outline(surface, camera), camera)
+        covered = silhouettes.covered(surface, camera)
         curves = self._comparable(silhouette.distance > 0, covered, self.harmonics[turn.index])
         if curves is None:
             return image, model

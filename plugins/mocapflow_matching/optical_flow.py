@@ -26,6 +26,7 @@ LEVELS = 3  # of the pyramid of distance images
 ON_CONTOUR = 1.0  # px from the image contour within which a target has to end
 LATER_SHARE = 0.25  # of points followed, after the turns in which shapes are registered: 0.2 to contour_icp's 0.8
 CONTOUR_SIGMA_PX = 1.0  # standard deviation of a pair of contour points on skin
+HEM_GUARD_PX = 12.0  # as contour_icp has it: skin so near to cloth counts as cloth
 
 
 class OpticalFlow(Matcher):
@@ -70,12 +71,11 @@ class OpticalFlow(Matcher):
     def registered(self, silhouette: Silhouette, surface: Surface, scene: Scene) -> Matches:
         """Return the pairs of one view by flow between distance images."""
         camera = scene.cameras[silhouette.camera]
-        boundary = silhouettes.outline(surface, camera)
-        model = silhouettes.samples(boundary, surface, camera, self.spacing_px)
+        model = silhouettes.occluding_contour(surface, camera, self.spacing_px)
         if not len(model.pixel):  # it has left the view
             return empty_matches()
         shrink = int(np.ceil(camera.size.max() / WORKING_SIDE))
-        covered, shown = silhouettes.mask(boundary, camera), silhouette.distance > 0
+        covered, shown = silhouettes.covered(surface, camera), silhouette.distance > 0
         here, there = (silhouettes.mask_distance(_shrunk(mask, shrink)) for mask in (covered, shown))
         flow = register(here, there, SMOOTHNESS, LEVELS, BAND * max(here.shape))
         middle = (shrink - 1) / 2  # pixel centres are on integers in both sizes
@@ -84,7 +84,7 @@ class OpticalFlow(Matcher):
         target = _snapped(target, silhouette.distance)
         on = np.abs(_sampled(silhouette.distance, target)) < ON_CONTOUR
         away = np.linalg.norm(target - model.pixel, axis=1)
-        sigma = contour_sigma(model, surface, scene, CONTOUR_SIGMA_PX, self.cloth_sigma_px_per_m)
+        sigma = contour_sigma(model, surface, scene, CONTOUR_SIGMA_PX, self.cloth_sigma_px_per_m, HEM_GUARD_PX)
         return Matches(
             camera=np.full(int(on.sum()), silhouette.camera, np.int16),
             pixel=(target - (model.pixel - model.anchor))[on],

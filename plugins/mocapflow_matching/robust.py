@@ -22,8 +22,7 @@ def robust_weights(distance: F64, loss: Loss, scale: float) -> F64:
     if loss == "huber":
         return scale / np.maximum(distance, scale)
     if loss == "geman_mcclure":
-        factor: F64 = (scale**2 / (scale**2 + distance**2)) ** 2
-        return factor
+        return (scale**2 / (scale**2 + distance**2)) ** 2
     if loss == "zhang":
         return zhang_keeps(distance, scale).astype(np.float64)
     return np.ones_like(distance)
@@ -34,8 +33,7 @@ def robust_precision(distance: F64, sigma: F64 | float, loss: Loss, scale: float
 
     One over the variance, times the robust factor; `scale` is in standard deviations, see `robust_weights`.
     """
-    weight: F64 = robust_weights(distance / sigma, loss, scale) / sigma**2
-    return weight
+    return robust_weights(distance / sigma, loss, scale) / sigma**2
 
 
 def zhang_keeps(distance: F64, good: float) -> Bool:

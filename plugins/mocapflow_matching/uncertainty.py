@@ -14,7 +14,7 @@ ANY_DIRECTION = -1.0  # least cosine between normals
 
 
 def contour_sigma(
-    model: Contour, surface: Surface, scene: Scene, skin_px: float, cloth_px_per_m: float, hem_guard_px: float = 12.0
+    model: Contour, surface: Surface, scene: Scene, skin_px: float, cloth_px_per_m: float, hem_guard_px: float
 ) -> F64:
     """Return the standard deviation (K,) px of model points: large on cloth, and on skin where a hem may be.
 

@@ -46,8 +46,7 @@ def _without(edges: I32, known: I32) -> I32:
     """Return the sorted edges that are not among the known ones."""
     size = int(edges.max()) + 1
     low, high = np.sort(known, axis=1).T
-    kept: I32 = edges[~np.isin(edges[:, 0].astype(np.int64) * size + edges[:, 1], low.astype(np.int64) * size + high)]
-    return kept
+    return edges[~np.isin(edges[:, 0].astype(np.int64) * size + edges[:, 1], low.astype(np.int64) * size + high)]
 
 
 def pull_of(strands: Strands, garment: GarmentMesh, parameters: F64, chain: F64) -> F64:
@@ -61,8 +60,7 @@ def pull_of(strands: Strands, garment: GarmentMesh, parameters: F64, chain: F64)
 
 def pins_at(strands: Strands, chain: F64) -> F64:
     """Return where the pinned particles are (B, P, 3) m, in the order of the garment's vertices."""
-    held: F64 = roots(strands, chain)[:, np.argsort(strands.vertex[:, 0])]
-    return held
+    return roots(strands, chain)[:, np.argsort(strands.vertex[:, 0])]
 
 
 def pinned_of(strands: Strands, garment: GarmentMesh) -> Bool:

@@ -53,8 +53,7 @@ class SmoothMotion(Prior):
             np.full(3, self.root_sd_mm / 1000),
             np.full(angles, np.radians(self.angle_sd_deg)),
         ]
-        sharpness: F64 = 1.0 / (np.concatenate(sd) * (step * RATE) ** 2)
-        return sharpness
+        return 1.0 / (np.concatenate(sd) * (step * RATE) ** 2)
 
 
 def turn_rate(turn: F64) -> F64:
@@ -65,5 +64,4 @@ def turn_rate(turn: F64) -> F64:
         bend = 1 / 12 + angle**2 / 720
     else:
         bend = 1 / angle**2 - np.sin(angle) / (2 * angle * (1 - np.cos(angle)))
-    rate: F64 = np.eye(3) - 0.5 * w + bend * (w @ w)
-    return rate
+    return np.eye(3) - 0.5 * w + bend * (w @ w)

@@ -106,8 +106,7 @@ def pelvis_axes(places: Mapping[str, F64], rest: Mapping[str, F64]) -> F64:
     up = np.where(np.arange(3) == np.abs(along).argmax(), np.sign(along), 0.0)
     forward = np.cross(rest["hip_l"] - rest["hip_r"], up)
     axes = np.stack([forward / np.linalg.norm(forward), up])
-    turned: F64 = axes @ pelvis_frame(rest).T @ pelvis_frame(places)
-    return turned
+    return axes @ pelvis_frame(rest).T @ pelvis_frame(places)
 
 
 def pelvis_frame(places: Mapping[str, F64]) -> F64:

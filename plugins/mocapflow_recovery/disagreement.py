@@ -11,7 +11,7 @@ from mocapflow_levelset.crops import around
 from mocapflow.data import Surface
 from mocapflow.geometry.cameras import projection
 from mocapflow.geometry.silhouette_kernels import project
-from mocapflow.geometry.silhouettes import covered, distance_to, mask, outline
+from mocapflow.geometry.silhouettes import covered, distance_to
 from mocapflow.records import F32, F64, I32
 from mocapflow_recovery.trimaps import Trimap
 
@@ -56,7 +56,7 @@ def uncovered_areas(surface: Surface, trimaps: Sequence[Trimap], reaches_m: Sequ
     """
     areas = np.zeros((len(reaches_m), 2))
     for trimap in trimaps:
-        off = distance_to(mask(outline(surface, trimap.camera), trimap.camera))
+        off = distance_to(covered(surface, trimap.camera))
         loose = trimap.person & (_from_cloth(surface, trimap) > cloth_m / trimap.pixel_m)
         for row, reach_m in enumerate(reaches_m):
             uncovered = loose & (off > reach_m / trimap.pixel_m)
@@ -72,7 +72,7 @@ def floating_area(bare: Surface, trimaps: Sequence[Trimap], reach_m: float) -> f
     """
     empty = np.zeros(len(bare.vertices), int)
     for trimap in trimaps:
-        rows, column, row = _pixels(bare.vertices, trimap)
+        rows, column, row = pixels_of(bare.vertices, trimap)
         empty[rows] += trimap.distance[row, column] > reach_m / trimap.pixel_m
     if not (empty >= 2).any():
         return 0.0
@@ -84,14 +84,14 @@ def floating_area(bare: Surface, trimaps: Sequence[Trimap], reach_m: float) -> f
 def _from_cloth(surface: Surface, trimap: Trimap) -> F32:
     """Return the distance (h, w) px of every pixel from the garment's vertices; far where there is no garment."""
     cloth = np.zeros(trimap.person.shape, bool)
-    _, column, row = _pixels(surface.vertices[surface.cloth], trimap)
+    _, column, row = pixels_of(surface.vertices[surface.cloth], trimap)
     if not len(row):
         return np.full(cloth.shape, np.inf, np.float32)
     cloth[row, column] = True
     return distance_to(cloth)
 
 
-def _pixels(points: F64, trimap: Trimap) -> tuple[I32, I32, I32]:
+def pixels_of(points: F64, trimap: Trimap) -> tuple[I32, I32, I32]:
     """Return which of the points (K, 3) lie in the image, and the column and row of the pixels nearest to them."""
     pixels, depth = np.empty((len(points), 2)), np.empty(len(points))
     project(points, projection(trimap.camera), pixels, depth)

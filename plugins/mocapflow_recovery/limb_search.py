@@ -27,11 +27,11 @@ from mocapflow.settings import PositiveOrInf
 from mocapflow_recovery.disagreement import FLYING, HANGING
 from mocapflow_recovery.limb_visibility import camouflaged_feet, warn_of_camouflage, warn_of_occluders
 from mocapflow_recovery.sampling import SHARES, Plan, Spread
-from mocapflow_recovery.scoring import FACES, Fit, Mismatch, Scorer, StartPose, mismatch_of, surface_of
+from mocapflow_recovery.scoring import FACES, Fit, Mismatch, Scorer, StartPose, mismatch_of
 from mocapflow_recovery.search_history import history_of, one_frame_of, with_search, without_history
-from mocapflow_recovery.search_triggers import Thresholds, Trigger, search_trigger
+from mocapflow_recovery.search_triggers import Thresholds, Trigger, search_trigger, stay_overbent
 from mocapflow_recovery.searches import Searches
-from mocapflow_recovery.trimaps import Trimap, small_room, trimaps
+from mocapflow_recovery.trimaps import Trimap, small_rooms, trimaps
 
 LOG = logging.getLogger("mocapflow")
 UNDOUBTED = 2.0  # times as distant may be a fit that is doubted no more: a leg lay where a skirt flew
@@ -113,7 +113,7 @@ class LimbSearch(Recovery):
 
     def with_camouflaged_feet(self, frame: Frame, result: FrameResult, past: Past, model: ClothedModel) -> FrameResult:
         """Return the result of a frame; if feet look like a floor without colours in it, it says so to later ones."""
-        background, surface = model.scene.background, surface_of(model, result)
+        background, surface = model.scene.background, model.scene.surface_of(result.state)
         if background is None or background.floor_m is None:
             return result
         trimaps = self.trimaps(frame, surface, past, model.scene)
@@ -126,14 +126,14 @@ class LimbSearch(Recovery):
     def _recovered(
         self, frame: Frame, state: FrameState, result: FrameResult, past: Past, model: ClothedModel, settle: Settle
     ) -> FrameResult:
-        surface, scene = surface_of(model, result), model.scene
+        scene, surface = model.scene, model.scene.surface_of(result.state)
         trimaps = self.trimaps(frame, surface, past, scene)
         if not trimaps:
             return noted(result, UNSEEN, doubted=True)
         if np.mean([trimap.known for trimap in trimaps]) < self.least_known:
             return result if past.moments else noted(result, UNKNOWN, doubted=False)
         if not past.moments:
-            given = scene.surface(state.estimate.pose, state.cloth)
+            given = scene.surface_of(state)
             warn_of_camouflage(surface, trimaps, scene.body)
             warn_of_occluders(given, self.trimaps(frame, given, past, scene), scene.body)
         mismatch = mismatch_of(surface, scene, trimaps)
@@ -152,14 +152,14 @@ class LimbSearch(Recovery):
         """Return whether a fit is searched in this frame: what lasts is searched only now and then."""
         if trigger.doubtful:
             return history_of(past).due(mismatch.area, time, past, self.vain_every)
-        return not self.thresholds.stay_overbent(past, body) or one_frame_of(self.vain_every, time, past)
+        return not stay_overbent(past, body) or one_frame_of(self.vain_every, time, past)
 
     def trimaps(self, frame: Frame, surface: Surface, past: Past, scene: Scene) -> list[Trimap]:
         """Return the trimaps of a frame around a surface, in a scene whose empty room is known."""
         assert scene.background is not None
-        room = small_room(scene.background, scene.cameras)
+        rooms = small_rooms(scene.background, scene.cameras)
         no_shadow = no_shadows(frame, scene.background, scene.cameras)
-        return trimaps(frame, surface, room, NEAR_M, garment_log_ratio(past, scene), no_shadow)
+        return trimaps(frame, surface, rooms, NEAR_M, garment_log_ratio(past, scene), no_shadow)
 
     def _searched(self, index: int, fit: Fit, searches: Searches, trigger: Trigger, settle: Settle) -> FrameResult:
         """Return the result of the best pose that is found, or that of the fit where none is better."""

@@ -9,9 +9,9 @@ import numpy as np
 
 from mocapflow.assets import Body
 from mocapflow.data import Surface
-from mocapflow.geometry.cameras import project
 from mocapflow.geometry.kinematics import descendants
 from mocapflow.records import F64, Bool
+from mocapflow_recovery.disagreement import pixels_of
 from mocapflow_recovery.trimaps import Trimap
 
 LOG = logging.getLogger("mocapflow")
@@ -94,9 +94,7 @@ def _share_of_views(surface: Surface, trimaps: Sequence[Trimap], body: Body) -> 
 
 def _seen_by(trimap: Trimap, shown: Bool, surface: Surface, beyond: bool) -> Bool:
     """Return what a trimap shows (h, w) where vertices lie: (N,), or else what holds beyond its edges."""
-    pixels, found = project(surface.vertices, trimap.camera), np.full(len(surface.vertices), beyond)
-    size = np.array(shown.shape[::-1])
-    inside = ((pixels > -0.5) & (pixels < size - 0.5)).all(axis=1)  # NaN is not
-    column, row = np.rint(pixels[inside]).astype(int).T
-    found[inside] = shown[row, column]
+    found = np.full(len(surface.vertices), beyond)
+    rows, column, row = pixels_of(surface.vertices, trimap)
+    found[rows] = shown[row, column]
     return found

@@ -12,7 +12,7 @@ from mocapflow.data import NO_CLOTH, Frame, Pose
 from mocapflow.geometry.silhouettes import covered
 from mocapflow.records import F64, Bool
 from mocapflow.scene import Scene
-from mocapflow_recovery.trimaps import Room, changes
+from mocapflow_recovery.trimaps import SmallRoom, changes
 
 
 def placed(bare: Scene, turn: float, angles: F64, middle: F64) -> Pose:
@@ -41,18 +41,18 @@ def mask_centre(masks: Sequence[Bool], cameras: Sequence[Camera]) -> F64:
     return position
 
 
-def largest_changes(frame: Frame, room: Room) -> tuple[list[Bool], list[Camera]]:
+def largest_changes(frame: Frame, rooms: Sequence[SmallRoom]) -> tuple[list[Bool], list[Camera]]:
     """Return the largest part (h, w) of each usable view that differs from the room, and the views' cameras."""
     import cv2
 
     masks, cameras = [], []
-    for number in np.flatnonzero(frame.usable):
-        changed = changes(frame, int(number), room)
+    for number in np.flatnonzero(frame.usable).tolist():
+        changed = changes(frame.images[number], rooms[number])
         opened = cv2.morphologyEx(changed.view(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
         _, label, stats, _ = cv2.connectedComponentsWithStats(opened, connectivity=8)
         stats[0, cv2.CC_STAT_AREA] = 0
         masks.append((label == stats[:, cv2.CC_STAT_AREA].argmax()) & (opened > 0))
-        cameras.append(room.cameras[number])
+        cameras.append(rooms[number].camera)
     return masks, cameras
 
 

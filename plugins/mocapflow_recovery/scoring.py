@@ -80,7 +80,7 @@ class Scorer(NamedTuple):
 
     def score(self, result: FrameResult) -> Fit:
         """Return a result scored by its full surface."""
-        pose, surface = result.state.estimate.pose, surface_of(self.model, result)
+        pose, surface = result.state.estimate.pose, self.model.scene.surface_of(result.state)
         mismatch = mismatch_of(surface, self.model.scene, self.trimaps)
         return Fit(result, mismatch, self._distance(pose, surface, self.model.scene))
 
@@ -100,11 +100,6 @@ class Scorer(NamedTuple):
     def _surfaces(self, poses: Sequence[Pose]) -> list[Surface]:
         clothes = drapes(self.model, poses, self.parameters, self.past)
         return [self.coarse.surface(pose, cloth) for pose, cloth in zip(poses, clothes, strict=True)]
-
-
-def surface_of(model: ClothedModel, result: FrameResult) -> Surface:
-    """Return the surface of a result."""
-    return model.surface(result.state.estimate.pose, result.state.cloth)
 
 
 def drapes(model: ClothedModel, poses: Sequence[Pose], parameters: F64, past: Past) -> list[Cloth]:

@@ -30,11 +30,6 @@ class Thresholds(NamedTuple):
         """Return whether the images contradict a fit."""
         return mismatch.uncovered > self.uncovered or mismatch.floating > self.floating
 
-    def stay_overbent(self, past: Past, body: Body) -> bool:
-        """Return whether all frames that are remembered have a joint beyond its limits."""
-        bent = [bool(overbent(moment.pose, body, OVERBENT)) for moment in past.moments]
-        return len(bent) == REMEMBERED and all(bent)
-
 
 class Trigger(NamedTuple):
     """Why limbs are looked for, and which."""
@@ -42,6 +37,12 @@ class Trigger(NamedTuple):
     reason: str
     doubtful: bool  # the images contradict the fit
     limbs: Sequence[I32]  # none: all
+
+
+def stay_overbent(past: Past, body: Body) -> bool:
+    """Return whether all frames that are remembered have a joint beyond its limits."""
+    bent = [bool(overbent(moment.pose, body, OVERBENT)) for moment in past.moments]
+    return len(bent) == REMEMBERED and all(bent)
 
 
 def search_trigger(

@@ -23,7 +23,7 @@ from mocapflow.track import CoupledLoop, prepared
 from mocapflow_recovery.limb_search import LimbSearch
 from mocapflow_recovery.refit_windows import pictured, windows
 from mocapflow_recovery.revised_track import RevisedTrack
-from mocapflow_recovery.scoring import mismatch_of, surface_of
+from mocapflow_recovery.scoring import mismatch_of
 
 LOG = logging.getLogger("mocapflow")
 OTHER_MM = 10.0  # of a joint, between two fits: less, and they are the same
@@ -64,13 +64,27 @@ class SecondLook(Stage):
             LOG.warning("second_look needs the empty scene, which no stage before makes: no frame is looked at again")
             return track
         model, tried = loop.model_of(scene, background), np.zeros(len(track.frame), bool)
-        refitter = Refitter(loop, model, RevisedTrack(track, model.scene.body))
-        while (suspect := self._leaping(refitter.revised) & ~tried).any():
-            for rows, pictures in pictured(recording, track.frame, windows(suspect)):
-                self._refit(rows, [prepared(picture, checks, flow) for picture in pictures], tried, refitter)
+        refitter = Refitter(loop, model, RevisedTrack(track, model.scene.body), self.leap_mm / 1000, tried)
+        while (due := refitter.due()).any():
+            for rows, pictures in pictured(recording, track.frame, windows(due)):
+                refitter.refit(rows, [prepared(picture, checks, flow) for picture in pictures])
         return refitter.revised.track()
 
-    def _refit(self, rows: I32, frames: Sequence[Frame], tried: Bool, refitter: Refitter) -> None:
+
+class Refitter(NamedTuple):
+    """Fits frames of a track again, with the loop that has made it."""
+
+    loop: CoupledLoop
+    model: ClothedModel
+    revised: RevisedTrack
+    leap_m: float  # more is fitted again
+    tried: Bool  # (T,) True where it was since a fit beside it has changed
+
+    def due(self) -> Bool:
+        """Return the rows (T,) that are to be fitted again."""
+        return np.asarray((self.revised.leaps() > self.leap_m) & ~self.tried)
+
+    def refit(self, rows: I32, frames: Sequence[Frame]) -> None:
         """Fit again the rows of a window that leap; neighbours of one that changes are due again.
 
         The last row shows the colours for those before it. Only the end of the track is fitted again itself, at last.
@@ -78,56 +92,36 @@ class SecondLook(Stage):
         shown, appearance = dict(zip(rows.tolist(), frames, strict=True)), None
         *inner, last = shown
         for row in reversed(inner):
-            if self._due(row, tried, refitter):
-                appearance = refitter.appearance(shown[row + 1], row + 1) if appearance is None else appearance
-                self._fit_again(row, shown[row], appearance, tried, refitter)
-        if last + 1 == len(tried) and self._due(last, tried, refitter):
-            appearance = refitter.appearance(shown[last - 1], last - 1)
-            self._fit_again(last, shown[last], appearance, tried, refitter)
+            if self.due()[row]:
+                appearance = self.appearance(shown[row + 1], row + 1) if appearance is None else appearance
+                self._fit_again(row, shown[row], appearance)
+        if last + 1 == len(self.tried) and self.due()[last]:
+            self._fit_again(last, shown[last], self.appearance(shown[last - 1], last - 1))
 
-    def _due(self, row: int, tried: Bool, refitter: Refitter) -> bool:
-        return not tried[row] and bool(self._leaping(refitter.revised)[row])
-
-    def _fit_again(
-        self, row: int, frame: Frame, appearance: Mapping[str, F64], tried: Bool, refitter: Refitter
-    ) -> None:
+    def _fit_again(self, row: int, frame: Frame, appearance: Mapping[str, F64]) -> None:
         """Let the better of two fits of a row stand."""
-        revised, past = refitter.revised, refitter.revised.past(row, appearance)
-        begin = revised.between(row) if row + 1 < len(tried) else refitter.predicted(frame, past)
-        result = refitter.settled(frame, row, past, begin)
-        tried[row] = True
+        revised, past = self.revised, self.revised.past(row, appearance)
+        inner = row + 1 < len(self.tried)
+        begin = revised.between(row) if inner else pose_of(self.loop.predictor, frame, past, self.model.scene)
+        result = self.settled(frame, row, past, begin)
+        self.tried[row] = True
         same = revised.largest_move(row, result.state.estimate.pose) < OTHER_MM / 1000
-        if not same and self._preferred(result, row, revised, refitter.mismatches(frame, row, past, result)):
+        if not same and self._preferred(result, row, self.mismatches(frame, row, past, result)):
             revised.replace_fit(row, frame, result)
             beside = revised.beside(row)
-            tried[beside] = [revised.replaced(other) for other in beside]
+            self.tried[beside] = [revised.replaced(other) for other in beside]
 
-    def _leaping(self, revised: RevisedTrack) -> Bool:
-        return np.asarray(revised.leaps() > self.leap_mm / 1000)
-
-    def _preferred(self, result: FrameResult, row: int, revised: RevisedTrack, mismatch: tuple[float, float]) -> bool:
+    def _preferred(self, result: FrameResult, row: int, mismatch: tuple[float, float]) -> bool:
         """Return whether another fit of a frame is better, by silhouettes, leaps and mismatch (cm², before, now)."""
-        pose, first = result.state.estimate.pose, revised.before
+        pose, revised, first = result.state.estimate.pose, self.revised, self.revised.before
         cost = image_cost(first.energy[row], first.energy_terms)
         dearer = (image_cost(result.energy, result.energy_terms) - cost) / max(abs(cost), 1.0)
         farther = np.log(max(revised.leap_of(row, pose), 1e-9) / revised.leap_of(row, revised.pose(row)))
         return bool(dearer + LEAP_WEIGHT * farther + MISMATCH_WEIGHT * (mismatch[1] - mismatch[0]) < 0)
 
-
-class Refitter(NamedTuple):
-    """The loop that has made a track, and its fits as they stand."""
-
-    loop: CoupledLoop
-    model: ClothedModel
-    revised: RevisedTrack
-
     def settled(self, frame: Frame, row: int, past: Past, begin: Pose) -> FrameResult:
         """Return what the loop makes of a frame from a pose."""
         return self.loop.settled(frame, past, self.model, begin, self.revised.cloth(row).parameters)
-
-    def predicted(self, frame: Frame, past: Past) -> Pose:
-        """Return where the loop would begin a frame."""
-        return pose_of(self.loop.predictor, frame, past, self.model.scene)
 
     def appearance(self, frame: Frame, row: int) -> Mapping[str, F64]:
         """Return what a frame shows of the person's colours and of feet like the floor; a track does not keep it."""
@@ -140,7 +134,8 @@ class Refitter(NamedTuple):
     def mismatches(self, frame: Frame, row: int, past: Past, result: FrameResult) -> tuple[float, float]:
         """Return the mismatch (cm²) of person and model in the fit that stands, and in another one."""
         finder = self.loop.recovery if isinstance(self.loop.recovery, LimbSearch) else LimbSearch()
-        surfaces = self.model.surface(self.revised.pose(row), self.revised.cloth(row)), surface_of(self.model, result)
-        trimaps = finder.trimaps(frame, surfaces[0], past, self.model.scene)
-        before, now = (mismatch_of(surface, self.model.scene, trimaps) for surface in surfaces)
+        scene = self.model.scene
+        surfaces = scene.surface(self.revised.pose(row), self.revised.cloth(row)), scene.surface_of(result.state)
+        trimaps = finder.trimaps(frame, surfaces[0], past, scene)
+        before, now = (mismatch_of(surface, scene, trimaps) for surface in surfaces)
         return before.hint + before.floating, now.hint + now.floating

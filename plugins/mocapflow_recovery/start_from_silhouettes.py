@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from functools import cached_property, partial
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 from mocapflow_draping.kinematic import Kinematic
-from mocapflow_priors.density import Density, Poses, read
+from mocapflow_priors.density import Poses, read
 from mocapflow_priors.parzen import SHIPPED
 
-from mocapflow.assets import Body
 from mocapflow.components import Stage
 from mocapflow.data import NO_CLOTH, Past, Pose, Start
 from mocapflow.dressing.roles import Draper
@@ -25,9 +23,9 @@ from mocapflow.scene import Scene
 from mocapflow_recovery.candidates import farthest_points, likely_headings, separate_minima
 from mocapflow_recovery.disagreement import HANGING
 from mocapflow_recovery.placing import centred, largest_changes, mask_centre, placed
-from mocapflow_recovery.sampling import SHARES, Cost, Plan, Spread, search
+from mocapflow_recovery.sampling import SHARES, Plan, Spread, search
 from mocapflow_recovery.scoring import FACES, Scorer
-from mocapflow_recovery.trimaps import small_room, trimaps
+from mocapflow_recovery.trimaps import small_rooms, trimaps
 
 LOG = logging.getLogger("mocapflow")
 NEAR_M = 0.6  # what differs from the room farther from somebody who stands upright there is somebody else
@@ -48,6 +46,44 @@ class Target(NamedTuple):
 
     scorer: Scorer  # of the clothed person, by the views
     middle: F64  # (3,) m, where the rays through the middles of the silhouettes meet
+    seen: F64  # (N, D) rad, poses that people were seen in; NaN where an angle is not known
+
+    def begins(self) -> list[Pose]:
+        """Return the best poses of some directions, best first."""
+        turns = np.linspace(0, 2 * np.pi, DIRECTIONS, endpoint=False)
+        angles = farthest_points(np.nan_to_num(self.seen), CANDIDATES)
+        bare, cameras = self.scorer.coarse.undressed, [trimap.camera for trimap in self.scorer.trimaps]
+
+        def there(turn: float, bent: F64) -> Pose:
+            return centred(placed(bare, turn, bent, self.middle), bare, self.middle, cameras)
+
+        poses = [[there(turn, bent) for bent in angles] for turn in turns]
+        off = np.array([self.costs(those) for those in poses])
+        return [poses[turn][int(off[turn].argmin())] for turn in separate_minima(off.min(axis=1), SEARCHES)]
+
+    def searched(self, begin: Pose, seed: int) -> Pose:
+        """Return the best pose that is found around one."""
+        plan = Plan(SPREAD, SHARES, SAMPLES, self.seen, SEEN_SAMPLES)
+        return search(self.costs, begin, self.scorer.coarse.body, plan, np.random.default_rng(seed))
+
+    def searched_again(self, pose: Pose, seed: int) -> Pose:
+        """Return the pose that is searched again and again from one, as long as that helps; by seeds from `seed` on."""
+        least = float(self.costs([pose])[0])
+        for again in range(REPEATS):
+            pose = self.searched(pose, seed + again)
+            before, least = least, float(self.costs([pose])[0])
+            if least > ENOUGH * before:
+                break
+        return pose
+
+    def costs(self, poses: Sequence[Pose]) -> F64:
+        """Return how far poses (B,) are from the silhouettes, m per unit of the person's area.
+
+        They count as farther the farther they are from all that people were seen in.
+        """
+        known = np.concatenate([np.zeros((1, self.seen.shape[1])), np.nan_to_num(self.seen)])
+        unusual = [np.sqrt(((known - pose.angles) ** 2).mean(axis=1).min()) for pose in poses]
+        return np.asarray(self.scorer.distances(poses) * (1 + np.array(unusual) / NATURAL))
 
 
 class StartFromSilhouettes(Stage):
@@ -82,16 +118,11 @@ class StartFromSilhouettes(Stage):
             RecordingError: there are no clean plates, or fewer than two cameras see a person in the first frame.
         """
         self.need(recording)
-        target, known = self._target(recording, scene), self._density.on(scene.body.screw_names)
-        cost = partial(costs, target=target, known=known)
-        plan = Plan(SPREAD, SHARES, SAMPLES, known, SEEN_SAMPLES)
-        ends = [
-            search(cost, begin, scene.body, plan, np.random.default_rng(number))
-            for number, begin in enumerate(self._begins(target, known, cost))
-        ]
-        begins = [ends[row] for row in likely_headings(ends, cost(ends))]
-        found = [repeated(cost, begin, scene.body, plan, len(ends)) for begin in begins]
-        off = cost(found)
+        target = self._target(recording, scene)
+        ends = [target.searched(begin, number) for number, begin in enumerate(target.begins())]
+        begins = [ends[row] for row in likely_headings(ends, target.costs(ends))]
+        found = [target.searched_again(begin, len(ends)) for begin in begins]
+        off = target.costs(found)
         best, *others = (found[row] for row in likely_headings(found, off))
         told = f"first pose: {1000 * off.min():.1f} mm off the silhouettes in the mean"
         if off.min() > FAR_M:
@@ -105,11 +136,11 @@ class StartFromSilhouettes(Stage):
     def _target(self, recording: Recording, scene: Scene) -> Target:
         frame, background = recording.frame(recording.indices[0]), recording.background()
         assert background is not None
-        dressed, room = scene if self.draper else scene.undressed, small_room(background, scene.cameras)
+        dressed, rooms = scene if self.draper else scene.undressed, small_rooms(background, scene.cameras)
         coarse = dressed.simplified(FACES)
         bare = coarse.undressed
-        upright = placed(bare, 0.0, np.zeros(len(bare.body.twists)), mask_centre(*largest_changes(frame, room)))
-        every = trimaps(frame, bare.surface(upright, NO_CLOTH), room, NEAR_M)
+        upright = placed(bare, 0.0, np.zeros(len(bare.body.twists)), mask_centre(*largest_changes(frame, rooms)))
+        every = trimaps(frame, bare.surface(upright, NO_CLOTH), rooms, NEAR_M)
         found = [trimap for trimap in every if trimap.informative]
         if len(found) < 2:
             raise RecordingError(
@@ -119,46 +150,5 @@ class StartFromSilhouettes(Stage):
             )
         model = ClothedModel(scene=dressed, draper=self.draper)
         scorer = Scorer(model, coarse, found, scene.neutral_parameters, Past(), start=None, cloth_weight=HANGING)
-        return Target(scorer, mask_centre([trimap.person for trimap in found], [trimap.camera for trimap in found]))
-
-    def _begins(self, target: Target, known: F64, cost: Cost) -> list[Pose]:
-        """Return the best poses of some directions, best first."""
-        turns = np.linspace(0, 2 * np.pi, DIRECTIONS, endpoint=False)
-        angles = farthest_points(np.nan_to_num(known), CANDIDATES)
-        bare, cameras = target.scorer.coarse.undressed, [trimap.camera for trimap in target.scorer.trimaps]
-
-        def there(turn: float, bent: F64) -> Pose:
-            return centred(placed(bare, turn, bent, target.middle), bare, target.middle, cameras)
-
-        poses = [[there(turn, bent) for bent in angles] for turn in turns]
-        off = np.array([cost(those) for those in poses])
-        return [poses[turn][int(off[turn].argmin())] for turn in separate_minima(off.min(axis=1), SEARCHES)]
-
-    @cached_property
-    def _density(self) -> Density:
-        return read(self.poses)
-
-
-def costs(poses: Sequence[Pose], target: Target, known: F64) -> F64:
-    """Return how far poses (B,) are from the silhouettes, m per unit of the person's area, more if nobody was seen so.
-
-    Args:
-        poses: to compare.
-        target: what they are compared with.
-        known: (N, D) rad, poses that people were seen in; NaN where an angle is not known.
-    """
-    off = target.scorer.distances(poses)
-    known = np.concatenate([np.zeros((1, known.shape[1])), np.nan_to_num(known)])
-    unusual = [np.sqrt(((known - pose.angles) ** 2).mean(axis=1).min()) for pose in poses]
-    return np.asarray(off * (1 + np.array(unusual) / NATURAL))
-
-
-def repeated(cost: Cost, pose: Pose, body: Body, plan: Plan, number: int) -> Pose:
-    """Return the pose that is searched again and again from one, as long as that helps; by samples from `number` on."""
-    least = float(cost([pose])[0])
-    for again in range(REPEATS):
-        pose = search(cost, pose, body, plan, np.random.default_rng(number + again))
-        before, least = least, float(cost([pose])[0])
-        if least > ENOUGH * before:
-            break
-    return pose
+        middle = mask_centre([trimap.person for trimap in found], [trimap.camera for trimap in found])
+        return Target(scorer, middle, read(self.poses).on(scene.body.screw_names))

@@ -15,7 +15,7 @@ from mocapflow_levelset.shadows import floor_around
 from mocapflow.assets import Background, Camera
 from mocapflow.data import Frame, Surface
 from mocapflow.geometry.cameras import magnification, shrunk
-from mocapflow.geometry.silhouettes import distance_to, mask, outline
+from mocapflow.geometry.silhouettes import covered, distance_to
 from mocapflow.memo import memoised
 from mocapflow.records import F32, F64, U8, Bool
 
@@ -29,12 +29,12 @@ SURELY = 1.0  # log density of a colour on the garment over that elsewhere from 
 SEAM = np.ones((5, 5), np.uint8)  # gaps in the person so narrow are the person's
 
 
-class Room(NamedTuple):
-    """The empty room as small cameras see it."""
+class SmallRoom(NamedTuple):
+    """The empty room as a small camera sees it."""
 
-    cameras: tuple[Camera, ...]
-    factors: tuple[int, ...]  # by which they are smaller than the recording's
-    plates: tuple[Plate, ...]
+    camera: Camera
+    factor: int  # by which it is smaller than the recording's
+    plate: Plate
 
 
 class Trimap(NamedTuple):
@@ -50,17 +50,19 @@ class Trimap(NamedTuple):
 
 
 @memoised
-def small_room(background: Background, cameras: tuple[Camera, ...], rows: int = ROWS) -> Room:
-    """Return the empty room in images of about so many rows; made once, forgotten with the background."""
-    factors = tuple(max(round(camera.size[1] / rows), 1) for camera in cameras)
-    plates = (plate_in(background, number, CHANNELS, factor) for number, factor in enumerate(factors))
-    return Room(tuple(map(shrunk, cameras, factors)), factors, tuple(plates))
+def small_rooms(background: Background, cameras: tuple[Camera, ...], rows: int = ROWS) -> tuple[SmallRoom, ...]:
+    """Return the empty room in images of about so many rows, by camera; made once, forgotten with the background."""
+    rooms = []
+    for number, camera in enumerate(cameras):
+        factor = max(round(camera.size[1] / rows), 1)
+        rooms.append(SmallRoom(shrunk(camera, factor), factor, plate_in(background, number, CHANNELS, factor)))
+    return tuple(rooms)
 
 
 def trimaps(
     frame: Frame,
     surface: Surface,
-    room: Room,
+    rooms: Sequence[SmallRoom],
     near_m: float,
     garment: F64 | None = None,
     no_shadow: Sequence[Bool] | None = None,
@@ -72,20 +74,20 @@ def trimaps(
     Args:
         frame: the images, in full size.
         surface: the person as predicted or fitted: parts further away than `near_m` in the image are somebody else.
-        room: the empty room, small.
+        rooms: the empty room by camera.
         near_m: see `surface`.
         garment: (BINS,) log density of colours on the garment over that on parts outside of it; None: it is not known.
         no_shadow: (H, W) by camera, in full size, True where other views see that there is none; None: nobody knows.
     """
     found, middle = [], surface.vertices.mean(axis=0)
-    for number in np.flatnonzero(frame.usable):
-        camera, factor, plate = room.cameras[number], room.factors[number], room.plates[number]
-        model, size = mask(outline(surface, camera), camera), 1 / magnification(camera, middle)
-        image, hidden = frame.images[number], frame.hidden_in(int(number))
+    for number in np.flatnonzero(frame.usable).tolist():
+        camera, factor, plate = rooms[number]
+        model, size = covered(surface, camera), 1 / magnification(camera, middle)
+        image, hidden = frame.images[number], frame.hidden_in(number)
         small = crops.shrink(image, factor)
         floor = floor_around(surface, camera)
         if no_shadow is not None:
-            floor = floor & ~crops.shrink_mask(no_shadow[int(number)], factor)
+            floor = floor & ~crops.shrink_mask(no_shadow[number], factor)
         changed, same = _compared(small, plate, floor)
         visible = True if hidden is None else crops.shrink(hidden.astype(np.float32), factor) == 0
         person = _near(changed & visible, model, near_m / size)
@@ -98,10 +100,10 @@ def trimaps(
     return found
 
 
-def changes(frame: Frame, number: int, room: Room) -> Bool:
-    """Return where (h, w) a small view differs from the empty room, the shadows of whoever is there included."""
-    small = crops.shrink(frame.images[number], room.factors[number])
-    return _compared(small, room.plates[number], np.zeros(small.shape[:2], bool))[0]
+def changes(image: U8, room: SmallRoom) -> Bool:
+    """Return where (h, w) an image (H, W, 3) differs from the empty room, the shadows of whoever is there included."""
+    small = crops.shrink(image, room.factor)
+    return _compared(small, room.plate, np.zeros(small.shape[:2], bool))[0]
 
 
 def _compared(image: U8, plate: Plate, floor: Bool) -> tuple[Bool, Bool]:
@@ -110,7 +112,7 @@ def _compared(image: U8, plate: Plate, floor: Bool) -> tuple[Bool, Bool]:
     Where nobody knows the room, it is neither.
     """
     values = features(image, CHANNELS)
-    off = np.sum((values - plate.planes) ** 2, axis=0) / np.maximum(plate.spread, USUAL.floor) ** 2
+    off = np.sum((values - plate.planes) ** 2, axis=0) / np.maximum(plate.spread, USUAL.least_sd) ** 2
     changed = density_image(values, plate, floor, CHANNELS, USUAL) < 0
     return changed, (off < EMPTY**2) & np.isfinite(plate.spread)
 

@@ -66,8 +66,7 @@ def _text_size(image: U8) -> float:
 def bones(parents: Any, places: F64) -> F64:
     """Return the segments (B, 2, K) from each joint's parent to the joint, of joint places (J, K)."""
     children = np.flatnonzero(np.asarray(parents) >= 0)
-    pairs: F64 = np.stack([places[np.asarray(parents)[children]], places[children]], axis=1)
-    return pairs
+    return np.stack([places[np.asarray(parents)[children]], places[children]], axis=1)
 
 
 class Video:

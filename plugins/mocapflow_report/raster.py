@@ -81,8 +81,7 @@ class Canvas:
 
     def _opengl_pose(self) -> F64:
         """Return camera_from_world with y up and z backwards."""
-        pose: F64 = np.diag([1.0, -1.0, -1.0, 1.0]) @ self._camera.camera_from_world
-        return pose
+        return np.diag([1.0, -1.0, -1.0, 1.0]) @ self._camera.camera_from_world
 
 
 def floor_points(camera: Camera, height: float) -> F64:

@@ -23,8 +23,7 @@ def contrast(grey: F32) -> F64:
 
 def blank(grey: F32, room: F32) -> Bool:
     """Return (T, C) which thumbnails (T, C, S, S) show nothing, by what the empty room (C, S, S) shows."""
-    empty: Bool = contrast(grey) < np.maximum(LEAST_CONTRAST, FAINT * contrast(room))
-    return empty
+    return contrast(grey) < np.maximum(LEAST_CONTRAST, FAINT * contrast(room))
 
 
 def lookalike(grey: F32, room: F32) -> tuple[Bool, npt.NDArray[np.intp]]:
@@ -45,8 +44,7 @@ def shows_person(grey: F32, room: F32, good: Bool) -> Bool:
     """
     off = contrast(grey - room)  # a person dims the whole room, too
     usual = [np.percentile(off[rows, camera], 90) if rows.any() else 0.0 for camera, rows in enumerate(good.T)]
-    shown: Bool = off > NOBODY * np.array(usual)
-    return shown
+    return off > NOBODY * np.array(usual)
 
 
 def bursts(grey: F32, longest: int, strong: float, weak: float) -> Bool:

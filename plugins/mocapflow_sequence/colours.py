@@ -28,8 +28,7 @@ class Colours(NamedTuple):
 
 def more_common(beside: I32, on: I32) -> Bool:
     """Return for each colour whether it is more common among some pixels (N,) than among others (M,)."""
-    found: Bool = _density(beside) > ROOM * (_density(on) + RARE)
-    return found
+    return _density(beside) > ROOM * (_density(on) + RARE)
 
 
 def alike(colour: Colours, other: F32) -> Bool:
@@ -62,8 +61,7 @@ def _density(bins: I32) -> F64:
     from scipy.ndimage import gaussian_filter
 
     counts = np.bincount(bins, minlength=int(np.prod(BINS))).astype(np.float64).reshape(BINS)
-    found: F64 = gaussian_filter(counts, SMOOTH).ravel() / max(len(bins), 1)
-    return found
+    return gaussian_filter(counts, SMOOTH).ravel() / max(len(bins), 1)
 
 
 def every(channels: Bool) -> Bool:

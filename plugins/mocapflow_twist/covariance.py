@@ -77,13 +77,11 @@ def observed(spread: F64, prior: F64) -> F64:
         spread: (S, S) covariance given data and priors.
         prior: (S, S) precision of the priors, positive definite.
     """
-    share: F64 = np.clip(1.0 - np.diag(spread) / np.diag(_inverse(prior)), 0.0, 1.0)
-    return share
+    return np.clip(1.0 - np.diag(spread) / np.diag(_inverse(prior)), 0.0, 1.0)
 
 
 def _inverse(precision: F64) -> F64:
     """Return the inverse of a positive definite matrix, scaled to a unit diagonal first: units differ widely."""
     scale = np.sqrt(np.diag(precision))
     inverse = np.linalg.inv(precision / scale / scale[:, None])
-    symmetric: F64 = 0.5 * (inverse + inverse.T) / scale / scale[:, None]
-    return symmetric
+    return 0.5 * (inverse + inverse.T) / scale / scale[:, None]

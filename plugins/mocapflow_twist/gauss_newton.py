@@ -140,8 +140,7 @@ class Task(NamedTuple):
         still = np.zeros(len(body.parents), bool)  # the pose is fixed: no joint is tried
         bounds = self.garment.parameter_bounds
         velocity = drape_differences(drape, body, still, bounds, pose, cloth.parameters)
-        parameters: F64 = velocity[..., 6 + len(pose.angles) :]
-        return parameters
+        return velocity[..., 6 + len(pose.angles) :]
 
     def _matches(self, surface: Surface) -> Matches:
         """Return the points of the outline, each with where the distance field says the silhouette is."""

@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from mocapflow.data import Past
+from mocapflow.data import Cloth, Past, Pose
 from mocapflow.geometry.sewing import TAKE_UP, THICKNESS
 from mocapflow.model import ClothedModel, moved
 from mocapflow.records import F64, Bool
 from mocapflow_twist.normal_equations import Equations
-from mocapflow_twist.problem import Guess
 from mocapflow_twist.steps import at_bound
+
+
+class Guess(NamedTuple):
+    """A pose with the cloth on it."""
+
+    pose: Pose
+    cloth: Cloth
 
 
 @dataclass
@@ -71,13 +78,8 @@ class ClothMotion:
 
     @property
     def bounds(self) -> F64:
-        """The bounds (Q, 2) of the cloth parameters that are solved for."""
-        return solved_bounds(self.model, self.unknowns)
-
-
-def solved_bounds(model: ClothedModel, unknowns: bool) -> F64:
-    """Return the bounds (Q, 2) of the cloth parameters that are solved for: of all or of none."""
-    garment = model.scene.garment
-    if not unknowns or model.draper is None or garment is None:
-        return np.empty((0, 2))
-    return garment.parameter_bounds
+        """The bounds (Q, 2) of the cloth parameters that are solved for: of all or of none."""
+        garment = self.model.scene.garment
+        if not self.unknowns or self.model.draper is None or garment is None:
+            return np.empty((0, 2))
+        return garment.parameter_bounds

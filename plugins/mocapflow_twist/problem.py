@@ -9,23 +9,17 @@ import numpy as np
 
 from mocapflow.assets import Body
 from mocapflow.components import Prior
-from mocapflow.data import Cloth, Past, Pose, Residual
+from mocapflow.data import Pose, Residual
 from mocapflow.geometry import twists
 from mocapflow.geometry.kinematics import root_position
 from mocapflow.guards.outputs import residual_of
-from mocapflow.model import ClothedModel
 from mocapflow.records import F64
+from mocapflow.scene import Scene
 from mocapflow_twist import normal_equations
 from mocapflow_twist.constraint import Rows
+from mocapflow_twist.motion import ClothMotion, Guess
 from mocapflow_twist.normal_equations import Equations
 from mocapflow_twist.steps import about_origin
-
-
-class Guess(NamedTuple):
-    """A pose with the cloth on it."""
-
-    pose: Pose
-    cloth: Cloth
 
 
 class Data(NamedTuple):
@@ -69,12 +63,16 @@ class Quadratic(NamedTuple):
 class Problem(NamedTuple):
     """All terms of the energy for one set of matches."""
 
-    model: ClothedModel
+    motion: ClothMotion
     data: Data
     priors: Sequence[Prior]
-    past: Past
     anchor: Anchor
     tried: dict[Pose, Sequence[Residual]]  # what the priors say of poses that have been tried
+
+    @property
+    def scene(self) -> Scene:
+        """The cameras and the person."""
+        return self.motion.model.scene
 
     @property
     def unknowns(self) -> int:
@@ -83,11 +81,11 @@ class Problem(NamedTuple):
 
     def centre(self, guess: Guess) -> F64:
         """Return the position of the root joint (3,) m, about which increments are solved."""
-        return root_position(self.model.scene.body, guess.pose.root)
+        return root_position(self.scene.body, guess.pose.root)
 
     def energies(self, guess: Guess) -> Mapping[str, float]:
         """Return each term of the energy at a guess."""
-        body = self.model.scene.body
+        body = self.scene.body
         data = normal_equations.body_energy(self.data.body, body, guess.pose)
         worn = self.data.cloth
         if len(worn.vertex):
@@ -98,29 +96,24 @@ class Problem(NamedTuple):
             terms[prior.name] = terms.get(prior.name, 0.0) + prior.weight * residual.energy
         return terms
 
-    def quadratic(self, guess: Guess, velocity: F64 | None) -> Quadratic:
-        """Return the quadratic models at a guess.
+    def quadratic(self, guess: Guess) -> Quadratic:
+        """Return the quadratic models at a guess."""
+        return Quadratic(self._data_equations(guess), self._prior_equations(guess))
 
-        Args:
-            guess: the pose and cloth to linearise at.
-            velocity: (W, 3, S) of the cloth for unit increments about the world's origin; None where it has no rows.
-        """
-        return Quadratic(self._data_equations(guess, velocity), self._prior_equations(guess))
-
-    def _data_equations(self, guess: Guess, velocity: F64 | None) -> Equations:
-        skin = normal_equations.body_equations(self.data.body, self.model.scene.body, guess.pose)
+    def _data_equations(self, guess: Guess) -> Equations:
+        skin = normal_equations.body_equations(self.data.body, self.scene.body, guess.pose)
         hessian, gradient = np.zeros((self.unknowns, self.unknowns)), np.zeros(self.unknowns)
         moved = len(skin.gradient)
         hessian[:moved, :moved], gradient[:moved] = skin.hessian, skin.gradient
-        if velocity is None:
+        if not len(self.data.cloth.vertex):
             return Equations(hessian, gradient, skin.energy)
-        worn = normal_equations.dense_equations(self.data.cloth, guess.cloth.vertices, velocity)
+        worn = normal_equations.dense_equations(self.data.cloth, guess.cloth.vertices, self.motion.velocity(guess))
         move = about_origin(self.centre(guess), self.unknowns)
         hessian += move.T @ worn.hessian @ move
         return Equations(hessian, gradient + move.T @ worn.gradient, skin.energy + worn.energy)
 
     def _prior_equations(self, guess: Guess) -> Equations:
-        hessian, gradient, energy = self.anchor.equations(guess, self.model.scene.body)
+        hessian, gradient, energy = self.anchor.equations(guess, self.scene.body)
         residuals = self._residuals(guess)
         rows = np.zeros((sum(len(residual.error) for residual in residuals), self.unknowns))
         error, weight = np.empty(len(rows)), np.empty(len(rows))
@@ -137,5 +130,5 @@ class Problem(NamedTuple):
 
     def _residuals(self, guess: Guess) -> Sequence[Residual]:
         if guess.pose not in self.tried:
-            self.tried[guess.pose] = [residual_of(p, guess.pose, self.past, self.model.scene) for p in self.priors]
+            self.tried[guess.pose] = [residual_of(p, guess.pose, self.motion.past, self.scene) for p in self.priors]
         return self.tried[guess.pose]

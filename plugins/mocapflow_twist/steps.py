@@ -46,8 +46,7 @@ def step(equations: Equations, lever: F64, damping: float) -> F64:
     scale = 1.0 / np.sqrt(damped)
     matrix = equations.hessian * scale[:, None] * scale
     np.fill_diagonal(matrix, 1.0)
-    solution: F64 = -scale * np.linalg.solve(matrix, scale * equations.gradient)
-    return solution
+    return -scale * np.linalg.solve(matrix, scale * equations.gradient)
 
 
 def capped(increment: F64, angles: int, max_angle: float, max_shift: float) -> F64:

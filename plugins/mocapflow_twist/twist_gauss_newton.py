@@ -16,9 +16,9 @@ from mocapflow.records import F64
 from mocapflow_twist import steps
 from mocapflow_twist.constraint import image_rows, line_rows
 from mocapflow_twist.covariance import covariance, effective_share, observed, view_balance
-from mocapflow_twist.motion import ClothMotion, solved_bounds
+from mocapflow_twist.motion import ClothMotion, Guess
 from mocapflow_twist.normal_equations import Equations
-from mocapflow_twist.problem import Anchor, Data, Guess, Problem, Quadratic
+from mocapflow_twist.problem import Anchor, Data, Problem, Quadratic
 
 LINE_SIGMA = 0.003  # m, standard deviation of the distance to a projection ray, of a match known to one pixel
 TRIALS = 8  # times that the damping is raised before a step is given up
@@ -65,24 +65,24 @@ class TwistGaussNewton(PoseSolver):
         """Return the pose that explains the matches best, its covariance, and what the images told of it."""
         guess = Guess(state.estimate.pose, state.cloth)
         motion = ClothMotion(model, past, self.cloth_unknowns)
-        anchor = Anchor(with_neutral_cloth(guess, model), self._precision(model, guess))
+        anchor = Anchor(with_neutral_cloth(guess, model), self._precision(motion, guess))
         surface, damping = model.surface(guess.pose, guess.cloth), self._least_damping(past, turn)
         tried: dict[Pose, Sequence[Residual]] = {}
         found: Quadratic | None = None  # the last quadratic models, for the covariance
         for _ in range(max(self.iterations, self.far_iterations) if turn.far else self.iterations):
             matches, found = match(surface), None
-            problem = Problem(model, self._data(matches, model), priors, past, anchor, tried)
+            problem = Problem(motion, self._data(matches, model), priors, anchor, tried)
             if problem.data.measurements == 0:
                 break
             before = guess
             for _ in range(self.steps_per_match):
-                found = quadratic(problem, guess, motion)
-                guess, damping = self._descend(problem, guess, found.total, motion, damping)
+                found = problem.quadratic(guess)
+                guess, damping = self._descend(problem, guess, found.total, damping)
                 damping = max(damping, self._least_damping(past, turn))
             if guess is before:
                 break
             surface = model.surface(guess.pose, guess.cloth)
-        return self._estimate(problem, guess, found or quadratic(problem, guess, motion), matches)
+        return self._estimate(problem, guess, found or problem.quadratic(guess), matches)
 
     def _data(self, matches: Matches, model: ClothedModel) -> Data:
         """Return the matches as rows, weighted by how many independent measurements they hold."""
@@ -107,20 +107,17 @@ class TwistGaussNewton(PoseSolver):
             return least
         return max(least, self.first_damping * FIRST_DAMPING_PER_TURN**turn.index)
 
-    def _precision(self, model: ClothedModel, guess: Guess) -> F64:
+    def _precision(self, motion: ClothMotion, guess: Guess) -> F64:
         """Return one over the variance of the damping of every unknown."""
         turn, bend = np.radians(self.root_sd_deg), np.radians(self.angle_sd_deg)
         pose = np.repeat([turn, self.root_sd_m, bend], [3, 3, len(guess.pose.angles)])
-        cloth = self.cloth_sd * np.ptp(solved_bounds(model, self.cloth_unknowns), axis=1)
-        precision: F64 = np.concatenate([pose, np.maximum(cloth, 1e-12)]) ** -2.0
-        return precision
+        cloth = self.cloth_sd * np.ptp(motion.bounds, axis=1)
+        return np.concatenate([pose, np.maximum(cloth, 1e-12)]) ** -2.0
 
-    def _descend(
-        self, problem: Problem, guess: Guess, equations: Equations, motion: ClothMotion, damping: float
-    ) -> tuple[Guess, float]:
+    def _descend(self, problem: Problem, guess: Guess, equations: Equations, damping: float) -> tuple[Guess, float]:
         """Return a guess of lower energy for the same matches, or the same guess where there is none worth a step."""
+        motion, angles = problem.motion, len(guess.pose.angles)
         equations = motion.within_bounds(equations, guess)
-        angles = len(guess.pose.angles)
         lever = steps.levers(angles, np.ptp(motion.bounds, axis=1))
         least = max(LEAST_GAIN * equations.energy, 0.5 * problem.unknowns * self.stop_sigmas**2)
         for _ in range(TRIALS):
@@ -145,11 +142,6 @@ class TwistGaussNewton(PoseSolver):
             observed=observed(about_root, prior.hessian)[6 : 6 + len(guess.pose.angles)],
             matches=matches,
         )
-
-
-def quadratic(problem: Problem, guess: Guess, motion: ClothMotion) -> Quadratic:
-    """Return the quadratic models at a guess; how the cloth moves is measured only if it has a match."""
-    return problem.quadratic(guess, motion.velocity(guess) if len(problem.data.cloth.vertex) else None)
 
 
 def with_neutral_cloth(guess: Guess, model: ClothedModel) -> Guess:

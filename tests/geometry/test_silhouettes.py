@@ -82,8 +82,7 @@ def test_normals_of_a_sphere_point_outward() -> None:
 
 
 def test_a_sphere_covers_its_disc_once() -> None:
-    boundary = silhouettes.outline(surface(*sphere((0, DISTANCE, 0))), camera())
-    mask = silhouettes.mask(boundary, camera())
+    mask = silhouettes.covered(surface(*sphere((0, DISTANCE, 0))), camera())
     expected = circle_distance() > 0
     assert (mask ^ expected).sum() < 0.002 * expected.sum()
 
@@ -117,8 +116,9 @@ def test_an_open_sheet_of_cloth_is_seen_from_both_sides() -> None:
     grid = np.array([[x, DISTANCE, z] for z in np.linspace(0.3, -0.3, 7) for x in np.linspace(-0.3, 0.3, 7)])
     faces = sheet_faces(7, 7)
     for turned in (faces, faces[:, ::-1].copy()):
-        boundary = silhouettes.outline(surface(grid, turned, CLOTH), camera())
-        assert silhouettes.mask(boundary, camera()).sum() == pytest.approx((0.6 * FOCAL / DISTANCE) ** 2, rel=0.03)
+        sheet, view = surface(grid, turned, CLOTH), camera()
+        boundary = silhouettes.outline(sheet, view)
+        assert silhouettes.covered(sheet, view).sum() == pytest.approx((0.6 * FOCAL / DISTANCE) ** 2, rel=0.03)
         assert len(np.unique(boundary.vertex[boundary.edge], axis=0)) == 24
 
 
@@ -131,9 +131,9 @@ def test_a_folded_sheet_ends_at_its_fold() -> None:
 
 
 def test_a_surface_behind_the_camera_has_no_outline() -> None:
-    boundary = silhouettes.outline(surface(*sphere((0, -DISTANCE, 0))), camera())
-    assert len(boundary.pixel) == 0
-    assert not silhouettes.mask(boundary, camera()).any()
+    behind, view = surface(*sphere((0, -DISTANCE, 0))), camera()
+    assert len(silhouettes.outline(behind, view).pixel) == 0
+    assert not silhouettes.covered(behind, view).any()
 
 
 def test_the_visible_part_of_a_long_half_hidden_edge_stays() -> None:

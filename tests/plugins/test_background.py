@@ -361,7 +361,7 @@ def test_shadows_may_fall_around_the_feet_only():
     pose = scenes.tiny_pose(scene)
     surface = scene.surface(pose, scenes.tiny_cloth(scene, pose))
     for camera in scene.cameras:
-        floor = floor_around(surface, camera, 1.0)
+        floor = floor_around(surface, camera)
         feet = surface.vertices[surface.vertices[:, 2].argmin()]
         column, row = np.clip(np.rint(project(feet[None], camera)[0]).astype(int), 0, [319, 239])
         assert floor[row, column] == 1

@@ -50,7 +50,7 @@ def from_the_front(scene, cloth):
         camera_from_world=np.array([[1.0, 0, 0, 0], [0, 0, -1, 0.75], [0, 1, 0, 40], [0, 0, 0, 1]]),
     )  # fmt: skip
     surface = scene.surface(Pose(root=np.eye(4), angles=np.zeros(4)), cloth)
-    return silhouettes.mask(silhouettes.outline(surface, camera), camera)
+    return silhouettes.covered(surface, camera)
 
 
 def blown(body, grid, force, degrees, fixed=(0,)):

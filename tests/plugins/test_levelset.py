@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from levelset_scenes import ellipse
+from mocapflow_levelset.evidence import Room
 from mocapflow_levelset.grabcut import GrabCut
 from mocapflow_levelset.layered import Layered
 from mocapflow_levelset.levelset import LevelSet
@@ -12,7 +13,7 @@ from mocapflow_levelset.masks import counted, without_cut
 from mocapflow_levelset.moved import moved_outline
 from mocapflow_levelset.plates import Shadow, plate_of
 from mocapflow_levelset.redistance import redistance
-from mocapflow_levelset.view import Empty, View, find
+from mocapflow_levelset.view import View, find
 
 from mocapflow.data import Change, Moment, Past, Turn
 from mocapflow.geometry.cameras import project
@@ -143,7 +144,7 @@ def test_a_part_says_what_it_costs_more_than_the_start():
     moved[60:100, 44] = True
     levels, method, view = (
         segmenter._levels(warm=False),
-        segmenter._method(Shadow()),
+        segmenter._method(),
         View(image, start, start, counted(start.shape, 3)),
     )
     part, whole = (find(each, levels, method) for each in (view._replace(moved=moved), view))
@@ -225,10 +226,11 @@ def test_the_contour_is_sub_pixel():
     empty = np.full((160, 160, 3), (140, 130, 120), np.float32)
     start = redistance(np.roll(exact, 4, axis=1), 12.0)
     plates = {factor: plate_of(empty, np.full_like(empty, 3), ("lab",), factor) for factor in (1, 2, 4)}
-    for scene in (Empty(plates, np.ones((160, 160), bool)), None):
+    rooms = {factor: Room(plate, np.ones(plate.spread.shape, bool), Shadow()) for factor, plate in plates.items()}
+    for known in (rooms, None):
         segmenter = LevelSet(shape_weight=0.0)
-        view = View(image, start, start, counted(start.shape, 3), scene)
-        found = find(view, segmenter._levels(warm=False), segmenter._method(Shadow())).level
+        view = View(image, start, start, counted(start.shape, 3), known)
+        found = find(view, segmenter._levels(warm=False), segmenter._method()).level
         at = np.abs(found) < 0.7
         assert abs((found - exact)[at].mean()) < 0.15
         assert np.abs((found - exact)[at]).mean() < 0.35
@@ -275,7 +277,7 @@ def test_the_start_may_touch_the_image_border():
     image = np.random.default_rng(0).integers(0, 256, (160, 160, 3), dtype=np.uint8)
     segmenter = LevelSet()
     view = View(image, start, start, counted(start.shape, 3))
-    found = find(view, segmenter._levels(warm=False), segmenter._method(Shadow()))
+    found = find(view, segmenter._levels(warm=False), segmenter._method())
     assert np.isfinite(found.level).all() and found.level.shape == start.shape
 
 

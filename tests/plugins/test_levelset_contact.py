@@ -5,7 +5,6 @@ from mocapflow_levelset.channels import features
 from mocapflow_levelset.contact import NEAR_M, contact_zone
 from mocapflow_levelset.evolve import Schedule
 from mocapflow_levelset.levelset import LevelSet
-from mocapflow_levelset.plates import Shadow
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.statistics import Window
 from mocapflow_levelset.view import Contact, View, find
@@ -41,7 +40,7 @@ def sole(steps):
     contact = Contact(zone, Schedule(steps, 4, 4), Window(12.0, 8, 0.03)) if steps else None
     segmenter = LevelSet(use_background=False, shape_weight=0.01)
     view = View(image=image, start=model, prior=model, counted=np.ones(model.shape, bool), contact=contact)
-    level = find(view, segmenter._levels(warm=False), segmenter._method(Shadow())).level
+    level = find(view, segmenter._levels(warm=False), segmenter._method()).level
     return np.mean([EDGE - 20 + np.flatnonzero(level[EDGE - 20 :, x] < 0)[0] for x in range(65, 96)]) - 0.5
 
 

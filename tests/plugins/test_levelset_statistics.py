@@ -57,7 +57,7 @@ def test_coarse_cells_give_nearly_the_same():
         gaussians = local_gaussians(planes, ONES, level, totals(planes, ONES, cell), window, SIGMA)
         ratio = np.zeros_like(level)
         runs = near(level, weights, (cell - 1) // 2)
-        log_ratio(runs, from_features(planes, ONES), gaussians, cell, 1, weights, ratio)
+        log_ratio(runs, from_features(planes, ONES), gaussians, cell, weights, ratio)
         ratios.append(ratio[np.abs(level) < 4])
     assert np.sqrt(np.mean((ratios[0] - ratios[1]) ** 2)) < 0.06 * ratios[0].std()
 
@@ -83,7 +83,7 @@ def test_known_gaussians_give_the_known_ratio():
     ratio = np.zeros_like(level)
     weights = Weights(SIGMA, 0.5, 0.0, 100.0, 1.0, 7.0)
     runs = near(level, weights)
-    log_ratio(runs, from_features(planes, ONES), gaussians, 1, 1, weights, ratio)
+    log_ratio(runs, from_features(planes, ONES), gaussians, 1, weights, ratio)
     at = np.abs(level) < 4
     np.testing.assert_allclose(ratio[at], known[at], rtol=1e-3, atol=5e-3)
 

@@ -8,7 +8,7 @@ from mocapflow_matching.camouflage import FEET
 from mocapflow_recovery import limb_search
 from mocapflow_recovery.limb_search import LimbSearch
 from mocapflow_recovery.limb_visibility import camouflaged_feet, camouflaged_limbs, occluded_legs
-from mocapflow_recovery.trimaps import small_room, trimaps
+from mocapflow_recovery.trimaps import small_rooms, trimaps
 
 from mocapflow.data import NO_CLOTH
 from mocapflow.geometry.cameras import project
@@ -32,7 +32,7 @@ def without_feet():
 
 
 def seen(frame):
-    return trimaps(frame, SURFACE, small_room(SCENE.background, SCENE.cameras, 120), 0.35)
+    return trimaps(frame, SURFACE, small_rooms(SCENE.background, SCENE.cameras, 120), 0.35)
 
 
 def test_limbs_that_differ_from_the_room_are_not_told():

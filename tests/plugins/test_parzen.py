@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from mocapflow_priors.density import Density, bandwidth, log_density, read, write
 from mocapflow_priors.parzen import SHIPPED, Parzen
-from mocapflow_twist.problem import Anchor, Guess, Problem
+from mocapflow_twist.motion import ClothMotion, Guess
+from mocapflow_twist.problem import Anchor, Problem
 from mocapflow_twist.twist_gauss_newton import TwistGaussNewton
 from pydantic import ValidationError
 from twist_fixtures import exact_matches, make_pose, make_scene, make_state
@@ -119,15 +120,15 @@ def test_an_unseen_leg_leaves_no_direction_free(tmp_path: Path) -> None:
     scene, truth = make_scene(), make_pose(1)
     write(tmp_path / "poses.npz", gait(LEG))
     prior, model, solver = Parzen(poses=tmp_path / "poses.npz"), ClothedModel(scene=scene), TwistGaussNewton()
-    guess = Guess(truth, NO_CLOTH)
+    guess, motion = Guess(truth, NO_CLOTH), ClothMotion(model, Past(), False)
 
     def equations(matches: Matches, priors: Sequence[Parzen], precision: F64) -> F64:
         data = solver._data(matches, model)
-        found = Problem(model, data, priors, Past(), Anchor(guess, precision), {}).quadratic(guess, None).total.hessian
+        found = Problem(motion, data, priors, Anchor(guess, precision), {}).quadratic(guess).total.hessian
         scale = 1 / np.sqrt(np.maximum(np.diag(found), 1e-12))
         return found * scale * scale[:, None]
 
-    undamped, damped, seen = np.zeros(18), solver._precision(model, guess), without_the_leg(scene, truth)
+    undamped, damped, seen = np.zeros(18), solver._precision(motion, guess), without_the_leg(scene, truth)
     ranks = [
         np.linalg.matrix_rank(equations(matches, priors, precision), tol=1e-9)
         for matches, priors, precision in (

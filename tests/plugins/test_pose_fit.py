@@ -23,7 +23,7 @@ def test_eliminating_the_poses_solves_the_whole_system(damping: float, names: tu
         blocks.append((rows.T @ rows, 1e-3 * random.normal(size=shared + unknowns)))
     logs = np.array([0.02, -0.01])[:shared]
     poses = tuple(Pose(root=twists.exp(random.normal(size=6)), angles=random.normal(size=2)) for _ in blocks)
-    found = _step(blocks, Solution(logs, poses), spreads, damping)
+    found = _step(blocks, Solution(spreads, logs, poses), damping)
 
     size = shared + unknowns * len(blocks)
     precision = np.array([sd**-2 for sd in spreads.values()])

@@ -19,18 +19,18 @@ from mocapflow_recovery.scoring import Fit, Mismatch, StartPose, mismatch_of
 from mocapflow_recovery.search_history import HISTORY
 from mocapflow_recovery.search_triggers import Trigger
 from mocapflow_recovery.searches import Searches, half_turn
-from mocapflow_recovery.trimaps import shrunk, small_room, trimaps
+from mocapflow_recovery.trimaps import shrunk, small_rooms, trimaps
 
 from mocapflow.data import NO_CLOTH, Frame, Past, Pose
 from mocapflow.geometry.cameras import project
-from mocapflow.geometry.silhouettes import mask, outline
+from mocapflow.geometry.silhouettes import covered
 from mocapflow.testing import pictures, recovery, scenes, template_body
 
 SCENE = scenes.tiny_scene()
 settled = partial(recovery.settled, scene=SCENE)
 POSE = scenes.tiny_pose(SCENE, 3, 0.1)
 FRAME = pictures.tiny_frame(SCENE, POSE)
-ROOM = small_room(SCENE.background, SCENE.cameras, 120)
+ROOM = small_rooms(SCENE.background, SCENE.cameras, 120)
 SPREAD = Spread(np.radians(25), np.radians(8), 0.06)
 FEW = {"samples": 10, "seen_samples": 0}
 QUICK = LimbSearch(**FEW)  # where what a search finds does not matter, or is found in ten samples
@@ -101,7 +101,7 @@ def test_where_nobody_knows_the_room_it_is_neither() -> None:
     spread = tuple(part.copy() for part in background.spread)
     for part in spread:
         part[:, :160] = np.inf
-    room = small_room(replace(background, spread=spread), SCENE.cameras, 120)
+    room = small_rooms(replace(background, spread=spread), SCENE.cameras, 120)
     for view, _ in zip(trimaps(FRAME, surface(POSE), room, 0.35), SCENE.cameras, strict=True):
         assert not view.person[:, :80].any()
         assert not view.distance[:, :80].any()
@@ -110,8 +110,8 @@ def test_where_nobody_knows_the_room_it_is_neither() -> None:
 
 def test_a_room_shrunk_by_more_than_it_is_wide_then_is_compared() -> None:
     """An image 320 wide is 11 wide if shrunk by 27, but 11 goes 29 times into 320."""
-    room = small_room(SCENE.background, SCENE.cameras, 9)
-    assert room.factors == (27,) * len(SCENE.cameras)
+    room = small_rooms(SCENE.background, SCENE.cameras, 9)
+    assert [view.factor for view in room] == [27] * len(SCENE.cameras)
     for view, _ in zip(trimaps(FRAME, surface(POSE), room, 0.35), SCENE.cameras, strict=True):
         assert view.person.shape == tuple(view.camera.size[::-1])
 
@@ -158,7 +158,7 @@ def test_a_skirt_that_flies_leads_no_limb_astray() -> None:
     """Cloth where a spread leg would be brings that leg no nearer to the person, though it would explain it."""
     flying = []
     for view in seen():
-        flown = mask(outline(surface(astray(0.8)), view.camera), view.camera) & ~view.person
+        flown = covered(surface(astray(0.8)), view.camera) & ~view.person
         distance = np.where(flown, 0, view.distance)
         flying.append(view._replace(person=view.person | flown, cloth=flown, distance=distance))
     assert apart(astray(0.8), flying, FLYING) > 2 * apart(POSE, flying, FLYING)
@@ -343,7 +343,7 @@ def test_limbs_are_looked_for_where_enough_of_the_room_is_known(columns, looked)
     lost = pictures.tiny_state(SCENE, astray(0.9), POSE)
     shares = [
         view.known
-        for view in trimaps(FRAME, surface(astray(0.9)), small_room(scene.background, SCENE.cameras, 160), 0.35)
+        for view in trimaps(FRAME, surface(astray(0.9)), small_rooms(scene.background, SCENE.cameras, 160), 0.35)
     ]
     assert (np.mean(shares) > QUICK.least_known) == looked
     model = scenes.tiny_model(scene)
@@ -558,7 +558,7 @@ def test_seen_samples_bend_what_was_seen_and_nothing_else() -> None:
 def test_a_view_in_which_something_stands_before_the_person_leads_nobody_astray(left) -> None:
     """Its picture shows the empty room, or a scrap of the person."""
     hidden = SCENE.background.mean[0].round().astype(np.uint8)
-    row, column = np.argwhere(mask(outline(surface(POSE), SCENE.cameras[0]), SCENE.cameras[0])).mean(axis=0).astype(int)
+    row, column = np.argwhere(covered(surface(POSE), SCENE.cameras[0])).mean(axis=0).astype(int)
     scrap = np.s_[row : row + left, column : column + left]
     hidden[scrap] = FRAME.images[0][scrap]
     looked = seen(replace(FRAME, images=(hidden, *FRAME.images[1:])))

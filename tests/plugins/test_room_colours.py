@@ -10,7 +10,7 @@ from mocapflow_levelset.layers import CLIP, COLOURS, layer_of
 from mocapflow_levelset.room_colours import ROOM, person_log_ratio, room_histograms
 
 from mocapflow.data import Frame, Past, Pose, Turn
-from mocapflow.geometry.silhouettes import intersection_over_union, mask, outline
+from mocapflow.geometry.silhouettes import covered, intersection_over_union
 from mocapflow.testing import tiny_cloth, tiny_pose, tiny_scene, tiny_segmentation, tiny_state
 
 SCENE = tiny_scene()
@@ -20,7 +20,7 @@ GRID, REACH = 2, 30
 
 
 def silhouette(pose, camera):
-    return mask(outline(SCENE.surface(pose, tiny_cloth(SCENE, pose)), camera), camera)
+    return covered(SCENE.surface(pose, tiny_cloth(SCENE, pose)), camera)
 
 
 def pictures(pose):

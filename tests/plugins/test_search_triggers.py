@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mocapflow_priors.density import Density
 from mocapflow_recovery.scoring import Mismatch
-from mocapflow_recovery.search_triggers import OVERBENT, Thresholds, search_trigger
+from mocapflow_recovery.search_triggers import OVERBENT, Thresholds, search_trigger, stay_overbent
 
 from mocapflow.assets import Body
 from mocapflow.data import NO_CLOTH, REMEMBERED, Moment, Past, Pose
@@ -71,6 +71,6 @@ def test_a_limb_that_leapt_is_looked_for_alone(body) -> None:
 
 def test_limbs_stay_overbent_where_all_frames_that_are_remembered_show_it(body) -> None:
     bent, straight = standing(body, int(np.flatnonzero(body.screw_joint == body.joint("knee_l"))[0])), standing(body)
-    assert LIMITS.stay_overbent(past_of(*[bent] * REMEMBERED), body)
-    assert not LIMITS.stay_overbent(past_of(*[bent] * (REMEMBERED - 1)), body)
-    assert not LIMITS.stay_overbent(past_of(straight, *[bent] * (REMEMBERED - 1)), body)
+    assert stay_overbent(past_of(*[bent] * REMEMBERED), body)
+    assert not stay_overbent(past_of(*[bent] * (REMEMBERED - 1)), body)
+    assert not stay_overbent(past_of(straight, *[bent] * (REMEMBERED - 1)), body)

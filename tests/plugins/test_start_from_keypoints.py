@@ -10,7 +10,7 @@ from mocapflow_fitting.detections import frames_seen, person_at
 from mocapflow_fitting.keypoint_layouts import LAYOUTS, layout_of
 from mocapflow_fitting.landmarks import landmarks
 from mocapflow_fitting.person import find_person
-from mocapflow_fitting.pose_fit import velocities
+from mocapflow_fitting.pose_fit import Solution, velocities
 from mocapflow_fitting.start_from_file import read_pose
 from mocapflow_fitting.start_from_keypoints import StartFromKeypoints
 from mocapflow_fitting.triangulate import triangulate
@@ -124,12 +124,14 @@ def test_landmarks_lie_where_their_names_say(body):
 def test_derivatives_of_landmarks(body, pose):
     marks, spreads = landmarks(body), {"stature": 0.1, "thigh": 0.1, "trunk": 0.1}
     logs = np.array([0.05, -0.02, 0.03])
-    points, moves = velocities(marks.body, pose, logs, spreads)
+    points, moves = velocities(marks.body, pose, Solution(spreads, logs, ()))
     rng, step = np.random.default_rng(3), 1e-6
     for _ in range(5):
         shift = rng.normal(size=moves.shape[2])
         ends = [
-            velocities(marks.body, moved(pose, s * step * shift[3:]), logs + s * step * shift[:3], spreads)[0]
+            velocities(
+                marks.body, moved(pose, s * step * shift[3:]), Solution(spreads, logs + s * step * shift[:3], ())
+            )[0]
             for s in (1, -1)
         ]
         np.testing.assert_allclose((ends[0] - ends[1]) / (2 * step), moves @ shift, atol=1e-6)

@@ -8,9 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 from mocapflow_twist.constraint import image_rows
-from mocapflow_twist.motion import ClothMotion
+from mocapflow_twist.motion import ClothMotion, Guess
 from mocapflow_twist.normal_equations import Equations, dense_equations
-from mocapflow_twist.problem import Guess
 from mocapflow_twist.steps import at_bound
 from mocapflow_twist.twist_gauss_newton import TwistGaussNewton
 from test_twist_solver import EXACT, TURN, energies_of

@@ -12,7 +12,8 @@ import pytest
 from mocapflow_bodies.scanned import Scanned
 from mocapflow_priors.joint_limits import JointLimits
 from mocapflow_priors.rest_pose import RestPose
-from mocapflow_twist.problem import Anchor, Guess, Problem
+from mocapflow_twist.motion import ClothMotion, Guess
+from mocapflow_twist.problem import Anchor, Problem
 from mocapflow_twist.twist_gauss_newton import TwistGaussNewton, with_neutral_cloth
 from twist_fixtures import exact_matches, make_pose, make_scene, make_state
 
@@ -43,8 +44,9 @@ def energies_of(
 ) -> Mapping[str, float]:
     """What an estimate costs by the matches it was found with, and where the solve began."""
     start = Guess(state.estimate.pose, state.cloth)
-    anchor = Anchor(with_neutral_cloth(start, model), solver._precision(model, start))
-    problem = Problem(model, solver._data(matches, model), priors, Past(), anchor, {})
+    motion = ClothMotion(model, Past(), solver.cloth_unknowns)
+    anchor = Anchor(with_neutral_cloth(start, model), solver._precision(motion, start))
+    problem = Problem(motion, solver._data(matches, model), priors, anchor, {})
     return problem.energies(Guess(found.pose, model.drape(found.pose, found.parameters, Past())))
 
 

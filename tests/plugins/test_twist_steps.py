@@ -12,9 +12,9 @@ from mocapflow_priors.smooth_motion import SmoothMotion
 from mocapflow_twist import steps
 from mocapflow_twist.constraint import line_rows
 from mocapflow_twist.covariance import effective_share
-from mocapflow_twist.motion import ClothMotion
+from mocapflow_twist.motion import ClothMotion, Guess
 from mocapflow_twist.normal_equations import Equations
-from mocapflow_twist.problem import Anchor, Guess, Problem
+from mocapflow_twist.problem import Anchor, Problem
 from mocapflow_twist.twist_gauss_newton import TwistGaussNewton
 from test_twist_solver import EXACT, FREE, start_from
 from twist_fixtures import exact_matches, make_pose, make_scene, make_state
@@ -30,8 +30,8 @@ UNKNOWNS = 6 + len(TRUTH.angles)
 def problem_of(solver: TwistGaussNewton, start: Guess, priors: tuple[SmoothMotion, ...] = (), past: Past | None = None):
     """The problem of exact matches of the true pose."""
     data = solver._data(exact_matches(SCENE, TRUTH, np.arange(0, 300, 9), directed=False), MODEL)
-    anchor = Anchor(start, solver._precision(MODEL, start))
-    return Problem(MODEL, data, priors, past or Past(), anchor, {})
+    motion = ClothMotion(MODEL, past or Past(), False)
+    return Problem(motion, data, priors, Anchor(start, solver._precision(motion, start)), {})
 
 
 @pytest.mark.parametrize(("column", "cap"), [(1, 0.1), (4, 0.05), (9, 0.1), (UNKNOWNS - 1, 0.1)])
@@ -74,9 +74,7 @@ class Grudging(NamedTuple):
 def test_a_worse_step_is_damped_ten_times_more_and_a_better_one_as_much_less(refusals: int, factor: float) -> None:
     solver, start = TwistGaussNewton(), Guess(start_from(TRUTH, 1), NO_CLOTH)
     problem = Grudging(problem_of(solver, start), Mock(), refusals)
-    motion = ClothMotion(MODEL, Past(), False)
-    total = problem.problem.quadratic(start, None).total
-    found, damping = solver._descend(problem, start, total, motion, 1e-3)
+    found, damping = solver._descend(problem, start, problem.problem.quadratic(start).total, 1e-3)
     assert damping == pytest.approx(1e-3 * factor)
     assert (found is start) == (refusals == 8)
     assert found is start or found is problem.tried.call_args.args[0]
@@ -94,7 +92,7 @@ def test_priors_on_the_root_pull_about_the_root_as_their_energy_says() -> None:
         return problem.energies(Guess(moved(TRUTH, step), NO_CLOTH))["smooth_motion"]
 
     slope = [(energy(1e-5 * c) - energy(-1e-5 * c)) / 2e-5 for c in columns]
-    assert problem.quadratic(guess, None).prior.gradient == pytest.approx(slope, rel=1e-5, abs=1e-3)
+    assert problem.quadratic(guess).prior.gradient == pytest.approx(slope, rel=1e-5, abs=1e-3)
     assert np.abs(slope[3:6]).max() > 1  # of which the lever would make turns
 
 
@@ -107,7 +105,7 @@ def test_the_damping_pulls_about_the_root_as_its_energy_says() -> None:
         return problem.energies(Guess(moved(TRUTH, step), NO_CLOTH))["damping"]
 
     slope = [(energy(1e-5 * c) - energy(-1e-5 * c)) / 2e-5 for c in columns]
-    prior = problem.quadratic(guess, None).prior
+    prior = problem.quadratic(guess).prior
     assert prior.gradient == pytest.approx(slope, rel=1e-6)
     sd = np.repeat([np.radians(20), 0.05, np.radians(30)], [3, 3, UNKNOWNS - 6])
     assert prior.hessian == pytest.approx(np.diag(sd**-2))
@@ -123,14 +121,14 @@ def test_cloth_is_held_by_its_damping_alone() -> None:
     wide.residual.return_value = Residual(error=np.ones(5), jacobian=jacobian, energy=2.5)
     narrow.residual.return_value = Residual(error=np.ones(5), jacobian=jacobian[:, :UNKNOWNS], energy=2.5)
     held = empty._replace(priors=(narrow,), anchor=Anchor(start, precision), tried={})
-    at_rest = held.quadratic(start, None).prior
+    at_rest = held.quadratic(start).prior
     np.testing.assert_array_equal(at_rest.gradient[UNKNOWNS:], 0.0)
     np.testing.assert_array_equal(at_rest.hessian[UNKNOWNS:], np.diag(precision)[UNKNOWNS:])
     swollen = start._replace(cloth=Cloth(vertices=np.empty((0, 3)), parameters=np.array([0.8, -0.2])))
-    pulled = held.quadratic(swollen, None).prior
+    pulled = held.quadratic(swollen).prior
     assert pulled.gradient[UNKNOWNS:] == pytest.approx([4.0 * 0.5, 0.0])
     assert pulled.energy - at_rest.energy == pytest.approx(0.5 * 4.0 * 0.5**2)
-    given, wider = (empty._replace(priors=(prior,), tried={}).quadratic(start, None).prior for prior in (narrow, wide))
+    given, wider = (empty._replace(priors=(prior,), tried={}).quadratic(start).prior for prior in (narrow, wide))
     np.testing.assert_array_equal(given.hessian, wider.hessian)
 
 
