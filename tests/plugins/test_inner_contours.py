@@ -188,6 +188,8 @@ def test_a_waistband_that_sits_lower_than_the_tape_says_pulls_at_nothing():
     cloth = SCENE.layer[slid.vertex] == CLOTH
     assert cloth.sum() > 10
     assert abs(np.median(off(slid, pose)[cloth])) < 0.3
+    there = match(dressed, pose, pose)
+    assert np.median(slid.weight[cloth]) > 0.5 * np.median(there.weight[SCENE.layer[there.vertex] == CLOTH])
 
 
 @pytest.mark.parametrize("sigma", [1.0, 1.5])
