@@ -1,9 +1,11 @@
-"""The empty scene as a density: Gaussian where it is lit, along the ray to black where it lies in a shadow."""
+"""The empty scene as a density, lit or along the ray to black, and what of an image is compared with it."""
 
 import numpy as np
 import pytest
 from mocapflow_levelset.channels import features
+from mocapflow_levelset.colours import bin_at, bins_of
 from mocapflow_levelset.evidence import Room, from_image, in_room, smoothed
+from mocapflow_levelset.masks import counted
 from mocapflow_levelset.plates import BENDING, BLACK, Shadow, density_of, plate_of
 from scipy.stats import norm
 
@@ -79,6 +81,27 @@ def test_features_along_runs_are_those_of_the_whole_image(channels):
     found, planes = from_image(image, np.ones(image.shape[:2], np.float32), channels, 3), features(image, channels)
     np.testing.assert_allclose(found.along(RUNS), along_runs(planes), atol=1e-6)
     np.testing.assert_allclose(found.sparse, planes[:, ::3, ::3], atol=1e-6)
+
+
+def test_decorrelated_features_along_runs_are_those_of_the_grid():
+    image, weight = picture(), np.ones((10, 12), np.float32)
+    found, plain = (from_image(image, weight, ("lab",), 1, turned) for turned in (True, False))
+    assert found.weight is weight and not np.allclose(found.sparse, plain.sparse, atol=0.01)
+    np.testing.assert_allclose(found.along(RUNS), along_runs(found.sparse), atol=1e-6)
+
+
+def test_a_colour_has_one_bin_for_pictures_and_for_pixels():
+    image = picture()
+    found = bins_of(image)
+    assert bins_of(np.array([20, 35, 255], np.uint8)) == (1 * 16 + 2) * 16 + 15
+    np.testing.assert_array_equal(found, [[bin_at(image, row, column) for column in range(12)] for row in range(10)])
+
+
+def test_what_is_hidden_and_the_border_do_not_count():
+    hidden = np.zeros((5, 7), bool)
+    hidden[2, 3] = True
+    assert np.argwhere(~counted((5, 7), 2, hidden)[2:-2, 2:-2]).tolist() == [[0, 1]]
+    assert counted((5, 7), 2).sum() == 3 and counted((5, 7), 0).all()
 
 
 @pytest.mark.parametrize("smooth_px", [0.0, 1.5])
