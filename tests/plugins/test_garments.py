@@ -88,6 +88,19 @@ def test_shorts_have_two_legs_with_their_measures():
     assert abs(garment.ring_length[openings].sum() - 2 * 0.65) < 1e-9
 
 
+def test_a_cylinder_has_its_measures_and_runs_down_its_limb():
+    garment = Cylinder(upper_circumference_m=0.60, lower_circumference_m=0.56, strands=40, rings=20).sew(BODY)
+    grid, lengths = garment.vertices[garment.strands], garment.ring_length.reshape(20, 40).sum(axis=1)
+    assert (lengths[0], lengths[-1]) == (pytest.approx(0.60), pytest.approx(0.56))
+    assert around(garment, grid[:, 0]) == pytest.approx(0.60, abs=0.005)
+    assert around(garment, grid[:, -1]) == pytest.approx(0.56, abs=0.01)
+    np.testing.assert_allclose(np.linalg.norm(np.diff(grid, axis=1), axis=2).sum(axis=1), 0.40, atol=1e-12)
+    hip, knee = (BODY.positions[BODY.joint(name)] for name in ("hip_l", "knee_l"))
+    np.testing.assert_allclose(grid[:, 0].mean(axis=0), hip + 0.3 * (knee - hip), atol=0.01)
+    down = grid[:, -1].mean(axis=0) - grid[:, 0].mean(axis=0)
+    assert down @ (knee - hip) / np.linalg.norm(knee - hip) == pytest.approx(0.40, abs=0.005)
+
+
 def test_a_band_has_its_length_and_faces_outwards():
     square = np.array([[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.1, 0.1]])
     ring, facing = sections.band(square, 0.05, 400)
