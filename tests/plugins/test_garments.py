@@ -88,6 +88,19 @@ def test_shorts_have_two_legs_with_their_measures():
     assert abs(garment.ring_length[openings].sum() - 2 * 0.65) < 1e-9
 
 
+def test_shorts_lie_outside_of_hips_that_bulge_below_the_waist():
+    wider = 1 + 0.25 * np.exp(-(((BODY.vertices[:, 2:] - 1.0) / 0.04) ** 2))
+    body = replace(BODY, vertices=BODY.vertices * np.hstack([wider, wider, np.ones_like(wider)]))
+    sewn = Shorts(**{**SHORTS, "hip_circumference_m": 1.3}).sew(body)
+    grid = sewn.vertices[sewn.strands[(sewn.strands >= 0).all(axis=1)]]
+    for row in range(1, 5):
+        for x, y, z in grid[:, row]:
+            closed = max(sections.outlines(body, sections.level(z)), key=sections.perimeter)
+            edge = np.roll(closed, -1, axis=0) - closed
+            outward = np.stack([edge[:, 1], -edge[:, 0]], axis=1) / np.linalg.norm(edge, axis=1, keepdims=True)
+            assert np.max(np.sum(outward * ([x, y] - closed), axis=1)) > -0.003  # m; links are made even afterwards
+
+
 def test_a_cylinder_has_its_measures_and_runs_down_its_limb():
     garment = Cylinder(upper_circumference_m=0.60, lower_circumference_m=0.56, strands=40, rings=20).sew(BODY)
     grid, lengths = garment.vertices[garment.strands], garment.ring_length.reshape(20, 40).sum(axis=1)
