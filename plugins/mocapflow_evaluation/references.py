@@ -39,7 +39,7 @@ class Reference:
     joint_names: tuple[str, ...] = ()
     joints: F64 | None = array("T", "J", 3, unit="m, in the axes of its own rig, z up", default=None)
     notes: tuple[str, ...] = ()  # how it was read, where that is not plain
-    time: F64 | None = array("T", unit="s, where rows belong to frames and have times too", default=None)
+    time: F64 | None = array("T", unit="s, where a table has times", default=None)
     counted_from: float = 0.0  # s; some programs begin to count time at one sample
 
     @property
@@ -98,10 +98,7 @@ def _table(path: Path) -> Reference:
     if clock is None:
         raise RecordingError("the reference has neither a column frame nor time", where=str(path))
     curves = {name: columns[name] for name in tables.angle_names(columns)}
-    by_frame = clock == "frame"
-    return Reference(
-        curves=curves, at=columns[clock], by_frame=by_frame, time=columns.get("time") if by_frame else None
-    )
+    return Reference(curves=curves, at=columns[clock], by_frame=clock == "frame", time=columns.get("time"))
 
 
 def _motion(path: Path) -> Reference:

@@ -4,8 +4,10 @@ import ast
 import importlib
 import json
 import os
+import re
 import shutil
 import sys
+from enum import Enum
 from types import SimpleNamespace
 
 import numpy as np
@@ -44,6 +46,33 @@ def test_fractions_are_numbers_in_a_recipe_and_keys_are_as_before(tmp_path, clip
     as_text = json.loads(json.dumps(track.recipe), parse_float=str)
     assert key_of(as_text) == track.key and explain(as_text, track.recipe) == ""
     assert [_plain(value, "", None, SHARED) for value in (np.inf, np.nan, np.float64(0.5))] == ["inf", "nan", 0.5]
+
+
+def test_every_kind_of_setting_is_in_a_key_by_what_it_says(tmp_path):
+    def plain(value):
+        return _plain(value, "Stage.setting", None, Digests())
+
+    side, file = Enum("Side", ["LEFT", "RIGHT"]).RIGHT, tmp_path / "a.txt"
+    assert [plain(value) for value in (None, True, 3, "a", side)] == [None, True, 3, "a", "RIGHT"]
+    assert plain(file) == "no file a.txt"
+    contents = []
+    for text in ("one", "another"):
+        file.write_text(text)
+        contents.append(plain(file))
+    assert contents[0] != contents[1] and all(said.startswith(digests.MARK) for said in contents)
+    assert plain(np.arange(3)) == digests.digest_array(np.arange(3)) != plain(np.arange(4))
+    assert plain({1: (0.5, side)}) == {"1": [0.5, "RIGHT"]}
+    assert plain({"b", "a"}) == plain(frozenset("ab")) == ['"a"', '"b"']
+    with pytest.raises(PluginError, match=r"setting Stage\.setting is a object, which has no place in a cache key"):
+        plain(object())
+
+
+def test_a_key_does_not_hang_on_order_or_on_where_content_lies():
+    content = {"a": 0.5, "b": ["blake2b:12 here.png"]}
+    assert key_of(content) == key_of({"b": ["blake2b:12 there.png"], "a": 0.5})
+    for other in ({**content, "b": ["blake2b:13 here.png"]}, {**content, "a": 0.25}, {**content, "c": None}):
+        assert key_of(other) != key_of(content)
+    assert re.fullmatch("[0-9a-f]{32}", key_of(content))
 
 
 @pytest.mark.parametrize(

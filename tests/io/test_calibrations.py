@@ -184,6 +184,8 @@ def test_nan(tmp_path):
         ("rotation = [", "rotation = [[1.0, 0.0], [0.0, 1.0, 0.0]] # [", "has no numbers in rotation"),
         ("distortions = [0.0, 0.0, 0.0, 0.0]", "distortions = [[0.0], 0.0]", "has no numbers in distortions"),
         ("matrix = [[60.0", "matrix = [[-60.0", "has no camera matrix"),
+        ("[0.0, 60.0,", "[1.0, 60.0,", "has no camera matrix"),
+        ("[0.0, 0.0, 1.0]]", "[1.0, 0.0, 1.0]]", "has no camera matrix"),
         ("fisheye = false", 'fisheye = "false"', "has fisheye = 'false'\n       write true or false"),
         ("fisheye = false", "fisheye = 1", "has fisheye = 1\n"),
         ("fisheye = false", "fish_eye = true", "has a field 'fish_eye', .*\n.* did you mean 'fisheye'"),

@@ -7,6 +7,7 @@ import pytest
 
 from mocapflow.errors import RecordingError
 from mocapflow.io.markers import (
+    _is_cut_off,
     opensim_from_world,
     read_c3d,
     read_mot,
@@ -181,3 +182,20 @@ def test_c3d_without_ezc3d(tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "ezc3d", None)
     with pytest.raises(RecordingError, match="C3D files need ezc3d\n       pip install 'mocapflow"):
         read_c3d(tmp_path / "a.c3d")
+
+
+@pytest.mark.parametrize(
+    ("processor", "order", "one"), [(84, "<", b"\0\0\x80\x3f"), (85, "<", b"\x80\x40\0\0"), (86, ">", b"\x3f\x80\0\0")]
+)
+@pytest.mark.parametrize("floats", [False, True])
+def test_files_of_every_processor_have_their_length(tmp_path, processor, order, one, floats):
+    """Intel, DEC and MIPS: a header of a block, two of parameters, four frames of 300 points."""
+    sign = {84: 3, 85: 1, 86: 0}[processor]
+    scale = bytes(byte | 0x80 * (floats and place == sign) for place, byte in enumerate(one))
+    words = struct.pack(f"{order}5H", 300, 0, 7, 10, 0)
+    header = bytes([2, 0x50]) + words + scale + struct.pack(f"{order}H", 4)
+    parameters = bytes([1, 0x50, 2, processor])
+    whole = header.ljust(512, b"\0") + parameters.ljust(1024, b"\0") + bytes(4 * 300 * 4 * (4 if floats else 2))
+    for content, cut in ((whole, False), (whole[:-1], True)):
+        (tmp_path / "a.c3d").write_bytes(content)
+        assert _is_cut_off(tmp_path / "a.c3d") == cut

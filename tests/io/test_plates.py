@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from mocapflow.errors import RecordingError
 from mocapflow.geometry.camera_rotation import homography, shift_px, warped
-from mocapflow.io.plates import toned
+from mocapflow.io.plates import _laid_over, toned
 from mocapflow.recordings.first_look import examine_first_frame
 from mocapflow.recordings.recording import open_recording
 from mocapflow.records import record
@@ -225,6 +225,17 @@ def test_a_plate_is_laid_over_the_first_frame(nudged):
     assert 0.95 < known.mean() < 0.995
     assert np.percentile(np.abs(room.mean[1] - good.mean[1])[known], 95) < 3.0  # grey levels; 20 if it stays
     assert room.spread[1][known].max() < 1.3 * good.spread[1].max()
+
+
+def test_two_plates_tell_the_same_turn_beside_a_hidden_corner(nudged):
+    folder, shift = nudged
+    recording, plates = open_recording(DEMO), np.stack([cv2.imread(str(folder / "background" / "cam02.png"))] * 2)
+    shown = np.ones(plates.shape[1:3], bool)
+    shown[:40, :40] = False
+    frame = next(iter(recording.frames())).images[1].astype(np.float32)
+    moved, _, turned_px = _laid_over(plates.astype(np.float32), frame, shown, recording.cameras[1])
+    assert turned_px == pytest.approx(shift, abs=0.3)
+    assert moved.shape == plates.shape
 
 
 def test_a_run_says_so(nudged, caplog):

@@ -15,7 +15,7 @@ from mocapflow.errors import RecordingError
 from mocapflow.io.images import name_frames, numbered
 from mocapflow.io.numbering import number_frames, unevenness
 from mocapflow.io.stamps import decode, packets
-from mocapflow.io.video import DAMAGED, TORN, open_video, read_frames
+from mocapflow.io.video import DAMAGED, TORN, count_from_first, open_video, read_frames
 from tests.fixtures.recordings import avi_frames, mp4_frames, number_of, picture, write_reordered, write_video
 
 FRAMES = 20
@@ -377,3 +377,13 @@ def test_what_is_no_video(tmp_path):
 def test_naming_frames():
     assert name_frames([3]) == "frame 3"
     assert name_frames(list(range(2, 9))) == "frames 2, 3, 4, 5, 6 and 2 more"
+
+
+def test_folders_of_images_count_from_the_first_that_any_has(tmp_path):
+    for name, numbers in (("a", (5, 6, 8)), ("b", (6, 7))):
+        (tmp_path / name).mkdir()
+        for number in numbers:
+            cv2.imwrite(str(tmp_path / name / f"{number:03}.png"), picture(number))
+    videos = count_from_first([open_video(tmp_path / name) for name in "ab"])
+    assert [video.numbers.tolist() for video in videos] == [[0, 1, 3], [1, 2]]
+    assert [(video.first, video.declared, video.frames) for video in videos] == [(5, 4, 4), (5, 3, 3)]

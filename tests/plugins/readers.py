@@ -144,6 +144,19 @@ class Gltf:
         world = self._world(row)[node]
         return z_up(local @ world[:3, :3].T + world[:3, 3])
 
+    def attribute(self, name: str, what: str) -> np.ndarray:
+        """Return what the vertices of a mesh have, in its own axes."""
+        return self._values(getattr(self._mesh(name).primitives[0].attributes, what))
+
+    def shapes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return when each shape of the garment is the one that is on (s), and its displacements (S, W, 3) m."""
+        channel = next(c for c in self.file.animations[0].channels if c.target.path == "weights")
+        sampler = self.file.animations[0].samplers[channel.sampler]
+        targets = self._mesh("garment").primitives[0].targets
+        on = self._values(sampler.output).reshape(-1, len(targets))
+        assert (np.argmax(on, axis=1) == np.arange(len(on))).all() and (on.sum(axis=1) == 1).all()
+        return self._values(sampler.input), np.stack([self._values(target.POSITION) for target in targets])
+
     def _mesh(self, name: str) -> Any:
         return next(mesh for mesh in self.file.meshes if mesh.name == name)
 

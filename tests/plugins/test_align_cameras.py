@@ -12,6 +12,7 @@ from mocapflow_fitting.start_from_file import read_pose
 
 from mocapflow.data import Pose
 from mocapflow.geometry import twists
+from mocapflow.geometry.cameras import project
 from mocapflow.recordings.recording import open_recording
 
 
@@ -80,3 +81,19 @@ def test_a_shift_is_that_of_the_picture_about_any_axis(axis):
     assert moved_px(camera, other) == pytest.approx(lever * np.radians(0.5), rel=0.3)
     same = replace(camera, camera_from_world=camera.camera_from_world.copy())
     assert moved_px(camera, same) < 1e-9
+
+
+def test_a_camera_turns_as_far_as_keypoints_are_sure_and_its_mount_is_loose():
+    cameras, knock = open_recording(DEMO).cameras, np.zeros((4, 3))
+    knock[1] = np.radians([0.3, 0.8, 0.2])
+    truth = turn(cameras, knock)
+    points = np.random.default_rng(3).uniform((-0.5, -0.5, 0.2), (0.5, 0.5, 1.7), (25, 3))
+    pixels, seen = np.stack([project(points, camera) for camera in truth]), np.ones((4, 25))
+    pixels[0, :2] += 80.0  # two of them are mistaken, which pulls no harder the farther they are off
+    far = moved_px(cameras[1], truth[1])
+    (sure, unsure, tight) = (
+        AlignCameras(sigma_px=sigma, spread_deg=spread)._turned(cameras, pixels, seen)[1]
+        for sigma, spread in ((1.0, 0.5), (500.0, 0.5), (1.0, 0.001))
+    )
+    assert moved_px(sure, truth[1]) < 0.35 * far
+    assert max(moved_px(each, cameras[1]) for each in (unsure, tight)) < 0.1 * far

@@ -53,6 +53,12 @@ def test_contrast_that_was_cut_off_is_given_back():
     assert np.abs(found[0, :, 0] - levels).max() <= 1
 
 
+def test_a_clean_picture_stays_as_it_is_and_nothing_in_it_is_hidden():
+    image, hidden = Bilateral().restore(scene())
+    np.testing.assert_array_equal(image, scene())
+    assert not hidden.any()
+
+
 def test_what_noise_does_not_reach_is_hidden():
     image = noisy(0.3)
     image[40:88, 60:120] = 77

@@ -180,7 +180,10 @@ def walked(*places):
         ((0, 1, 2, 3, 40, 41, 6, 7, 8), [4, 5]),
         ((0, 1, 2, 3, 40, 41, 42, 7, 8), []),  # longer than a burst may be
         ((0, 1, 2, 3, 40, 80, 81, 82, 83), []),  # it goes on from there: a step that stays
+        ((0, 1, 2, 3, 200, 5, 6, 7, 8, 9, 10, 11, 28, 13, 14, 15, 16), [4, 12]),  # however far the other one jumps
+        ((0, 1, 2, 3, 40, 5, 45, 85, 125, 126, 127, 128), []),  # it begins to move as fast
         ((0, 1, 40, 3, 4, 5, 6), [2]),
+        ((0, 1, 40, 3, 4), [2]),  # the fewest that tell
         ((0, 40, 2, 3, 4, 5, 6), []),  # no step before it tells how fast things move
         ((0, 1, 2, 3, 40, 5, 6), [4]),
         ((0, 1, 2, 3, 4, 40, 6), []),  # nor one after it

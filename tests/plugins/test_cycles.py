@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from mocapflow_evaluation import compare, cycles
 from mocapflow_evaluation.cycles import Cycle, gait_cycles
+from mocapflow_evaluation.evaluate import evaluate
+from mocapflow_evaluation.stick import Stick
+from mocapflow_evaluation.tracked_motion import TrackedMotion
+from mocapflow_export import layout, tables
 from results_scene import DEMO
 
 RATE = 60.0
@@ -37,6 +43,24 @@ def test_heel_strikes_on_a_treadmill_and_over_ground(speed: float, bearing: floa
     np.testing.assert_allclose(np.array(left) / RATE, np.arange(4) + 0.25, atol=0.02)
     np.testing.assert_allclose(np.array(right) / RATE, np.arange(4) + 0.75, atol=0.02)
     assert all(cycle.last - cycle.first == RATE for cycle in found)
+
+
+def test_strikes_of_a_foot_are_half_a_second_apart_or_more() -> None:
+    places = walking(1.3)
+    assert len(gait_cycles(NAMES, places, RATE / 0.6)) == 8  # every stride, if one takes 0.6 s
+    assert min(cycle.last - cycle.first for cycle in gait_cycles(NAMES, places, 3 * RATE)) == 2 * RATE  # not of a third
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_strides_are_told_and_have_their_rows(tmp_path: Path) -> None:
+    places = walking(1.3, seconds=4.5)
+    frame = np.arange(float(len(places)))
+    columns = {"frame": frame, "time": frame / RATE, "knee_flexion_l": 30 * np.sin(frame / 8)}
+    truth = tables.write_columns(tmp_path / "t.csv", columns)
+    own = TrackedMotion(columns=columns, raw=columns, stick=Stick(names=NAMES, places=places))
+    got = evaluate(own, truth, tmp_path)
+    assert got.notes == ("strides, by heel strikes in our own joint centres: 4 left, 3 right",)
+    assert got.rows[0]["cycles"] == len((tmp_path / layout.CYCLES).read_text().splitlines()) - 1 == 4
 
 
 def test_knees_raised_on_the_spot_are_no_strides() -> None:

@@ -45,6 +45,12 @@ def test_most_intact_pixels_are_known_and_random_ones_are_not():
     assert noise_share(kept) == pytest.approx(0.6, abs=0.03)
 
 
+def test_a_clean_picture_stays_as_it_is_and_nothing_in_it_is_hidden():
+    image, hidden = Denoise().restore(scene())
+    np.testing.assert_array_equal(image, scene())
+    assert not hidden.any()
+
+
 def test_what_noise_does_not_reach_is_hidden():
     noisy = disturbances.noisy(scene(), 0.6, "replaced", np.random.default_rng(0))
     noisy[20:44, 30:60] = 77

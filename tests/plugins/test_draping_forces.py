@@ -189,6 +189,14 @@ def test_winds_of_one_drape_are_its_winds_one_by_one(draper):
     assert np.linalg.norm(together - alone, axis=-1).max() < 1e-3
 
 
+def test_a_wind_on_one_pose_does_not_need_one_on_the_pose_before(draper):
+    scene, poses = skirted(), PoseBatch(root=leg_poses().root[[0, 3]], angles=leg_poses().angles[[0, 3]])
+    calm, windy = parameters(scene.garment), parameters(scene.garment, wind_cos_rad=0.2)
+    together = draper.drape(poses, np.concatenate([calm, windy]), Past(), scene)
+    second = PoseBatch(root=poses.root[1:], angles=poses.angles[1:])
+    np.testing.assert_allclose(together[1:], draper.drape(second, windy, Past(), scene), atol=1e-12)
+
+
 def test_the_silhouette_grows_by_the_thickness_on_either_side(draper):
     """T-CL7: so of silhouettes of thin and thick cloth the true thickness alone fits, and others fit the less."""
     scene, amounts = skirted(), np.linspace(0, 0.010, 6)

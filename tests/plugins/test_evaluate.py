@@ -155,7 +155,10 @@ def test_frames_are_matched_by_number(tmp_path: Path) -> None:
     tables.write_columns(tmp_path / "t.csv", {"frame": np.array([5.0, 7.0]), "knee_flexion_l": np.array([50.0, 70.0])})
     ours = {"frame": np.arange(10.0), "time": np.arange(10) / 30, "knee_flexion_l": 10 * np.arange(10.0) + 1}
     got = evaluate(columns_only(ours), tmp_path / "t.csv", tmp_path).rows[0]
-    assert (got["frames"], got["rms_deg"]) == (2, 1.0)
+    assert (got["frames"], got["rms_deg"], got["offset_deg"]) == (2, 1.0, 1.0)
+    errors = read_columns(tmp_path / layout.ERRORS)
+    np.testing.assert_array_equal(errors["frame"], ours["frame"])
+    np.testing.assert_array_equal(errors["knee_flexion_l"], [1.0 if frame in (5, 7) else np.nan for frame in range(10)])
     assert (tmp_path / layout.EVALUATION).read_text().startswith("angle,frames,rms_deg")
 
 
@@ -171,7 +174,8 @@ def test_our_unsmoothed_curve_is_filtered_as_references_are(tmp_path: Path) -> N
         smoothed, raw = clock | {"knee_flexion_l": truth}, clock | {"knee_flexion_l": ours}
         (got,) = evaluate(TrackedMotion(columns=smoothed, raw=raw, stick=nothing), tmp_path / "t.csv", tmp_path).rows
         assert got["rms_lowpassed_deg"] == pytest.approx(wanted, rel=0.02, nan_ok=True)
-        assert got["rms_deg"] < 1e-3 and got["rms_unsmoothed_deg"] > 3
+        assert got["rms_deg"] < 1e-3
+        assert got["rms_unsmoothed_deg"] == pytest.approx(compare.rms(ours - truth), abs=1e-3)
 
 
 @pytest.mark.usefixtures("unrendered")
@@ -200,9 +204,19 @@ def test_the_share_of_frames_in_doubt_is_told_by_a_track_and_by_its_files(tmp_pa
 @pytest.mark.usefixtures("unrendered")
 def test_columns_that_are_no_angles_of_ours_are_named(tmp_path: Path) -> None:
     ours = {"frame": np.arange(10.0), "time": np.arange(10) / 30, "knee_flexion_l": 10 * np.arange(10.0)}
-    tables.write_columns(tmp_path / "t.csv", {**ours, "Knee_L": np.zeros(10), "knee_flexion_l_sd": np.ones(10)})
-    notes = evaluate(columns_only(ours), tmp_path / "t.csv", tmp_path).notes
-    assert "not compared, for the track has no such angles: Knee_L" in notes
+    for count, more in ((10, ""), (12, " and 2 more")):
+        strange = {f"Knee_{number}": np.zeros(10) for number in range(count)}
+        tables.write_columns(tmp_path / "t.csv", {**ours, **strange, "knee_flexion_l_sd": np.ones(10)})
+        notes = evaluate(columns_only(ours), tmp_path / "t.csv", tmp_path).notes
+        assert f"not compared, for the track has no such angles: {', '.join(list(strange)[:10])}{more}" in notes
+
+
+@pytest.mark.usefixtures("unrendered")
+def test_nothing_is_said_of_a_reference_that_agrees(tmp_path: Path) -> None:
+    curves = {"knee_flexion_l": 40 + 20 * np.sin(FRAMES / 5), "knee_flexion_r": 1e-3 * np.sin(FRAMES / 5)}
+    ours = {"frame": FRAMES, "time": FRAMES / 30, **curves}
+    tables.write_columns(tmp_path / "t.csv", ours)
+    assert evaluate(columns_only(ours), tmp_path / "t.csv", tmp_path).notes == ()
 
 
 def run_folder(path: Path) -> RunFolder:
@@ -214,6 +228,7 @@ def test_without_reference_there_is_a_note_and_no_error(tmp_path: Path) -> None:
     recording = SimpleNamespace(folder=tmp_path)
     former = layout.place(tmp_path, layout.ERRORS)
     former.write_text("of another reference")
+    Evaluate().need(recording)
     got = Evaluate().run(track=stepping(scene.body), scene=scene, recording=recording, run_folder=run_folder(tmp_path))
     assert (got.rows, got.reference) == ((), "")
     assert "truth/angles.csv" in got.notes[0]
@@ -261,7 +276,8 @@ def test_a_comparison_forgets_what_another_reference_left_but_the_keypoints(tmp_
     tables.write_columns(tmp_path / "truth.csv", ours)
     for part in (layout.STICK, layout.CYCLES, layout.KEYPOINTS):
         (tmp_path / part).write_text("of another")
-    assert evaluate_run(tmp_path, tmp_path / "truth.csv").rows
+    got = evaluate_run(tmp_path, tmp_path / "truth.csv")
+    assert got.rows and got.notes == ("no lag within 0.5 s fits best; see longest_lag_s of stage evaluate",)
     assert [(tmp_path / part).exists() for part in (layout.STICK, layout.CYCLES, layout.KEYPOINTS)] == [
         False,
         False,
@@ -311,8 +327,10 @@ def test_a_reference_in_radians_or_out_of_order_is_told(tmp_path: Path) -> None:
 
 def test_times_in_milliseconds_are_an_error_not_samples_far_apart(tmp_path: Path) -> None:
     markers.write_mot(tmp_path / "ms.mot", {"knee_angle_r": np.linspace(0, 60, 30)}, np.arange(30) * 33.3)
-    with pytest.raises(RecordingError, match=r"samples are 33\.3 s apart(.|\n)*are these milliseconds"):
-        read_reference(tmp_path / "ms.mot")
+    tables.write_columns(tmp_path / "ms.csv", {"time": np.array([0, 33.3]), "knee_flexion_r": np.array([0.0, 60])})
+    for name in ("ms.mot", "ms.csv"):
+        with pytest.raises(RecordingError, match=r"samples are 33\.3 s apart(.|\n)*are these milliseconds"):
+            read_reference(tmp_path / name)
 
 
 def test_folder_without_angles_is_an_error(tmp_path: Path) -> None:
@@ -349,7 +367,7 @@ def test_times_that_count_from_one_sample_start_at_zero(tmp_path: Path) -> None:
 def test_gait2392_counts_knees_the_other_way_which_is_told_and_not_changed(tmp_path: Path) -> None:
     time = np.arange(50) / 30
     curve = 40 + 20 * np.sin(5 * time)
-    markers.write_mot(tmp_path / "m.mot", {"knee_angle_l": -curve}, time)
+    markers.write_mot(tmp_path / "m.mot", {"knee_angle_l": 3 - curve}, time)
     ours = {"frame": np.arange(50.0), "time": time, "knee_flexion_l": curve}
     got = evaluate(columns_only(ours), tmp_path / "m.mot", tmp_path)
     (row,) = got.rows

@@ -13,7 +13,7 @@ import pytest
 import readers
 from mocapflow_export import formats
 from mocapflow_export.export import Export
-from mocapflow_export.formats import FILES, Result, write
+from mocapflow_export.formats import FILES, Result, gltf, write
 from mocapflow_export.formats.gltf import the_shorter_way
 from results_scene import DEMO, demo_scene, stepping
 from scipy.spatial.transform import Rotation
@@ -147,6 +147,7 @@ def test_c3d_has_the_times_of_the_track(result: Result, tmp_path: Path, first: i
     path = write("c3d", replace(result, track=track), tmp_path)
     names, places, time, _ = markers.read_c3d(path)
     seen = np.isfinite(places).all(axis=(1, 2))
+    assert len(places) == frame[-1] - first + 1
     assert names == result.scene.body.joint_names
     np.testing.assert_allclose(time[seen], track.time, atol=1e-6)  # s; single precision
     np.testing.assert_allclose(places[seen], result.places, atol=NEAR)
@@ -176,7 +177,12 @@ def test_parquet(result: Result, tmp_path: Path) -> None:
 def test_movement_has_the_names_the_toolbox_reads(result: Result, tmp_path: Path) -> None:
     import xarray
 
-    with xarray.open_dataset(write("movement", result, tmp_path), engine="h5netcdf") as dataset:
+    usable = result.track.usable.copy()
+    usable[2, 1] = False  # one of four cameras
+    track = replace(result.track, usable=usable, time=result.track.time + 2.0)
+    with xarray.open_dataset(write("movement", replace(result, track=track), tmp_path), engine="h5netcdf") as dataset:
+        np.testing.assert_allclose(dataset.time, track.time)
+        np.testing.assert_array_equal(dataset.confidence[:, :, 0].T, [[1, 1, 0.75, 1, 1]] * len(dataset.keypoints))
         assert dataset.position.dims == ("time", "space", "keypoints", "individuals")
         assert (dataset.attrs["ds_type"], dataset.attrs["time_unit"]) == ("poses", "seconds")
 
@@ -190,10 +196,49 @@ def test_gltf_opens_and_moves_body_and_garment(result: Result, tmp_path: Path) -
     assert len(viewed.geometry["body"].faces) == len(result.scene.body.faces)
     assert len(viewed.geometry["garment"].faces) == len(result.scene.garment.faces)
     played = readers.Gltf(path)
+    file = played.file
+    assert [file.nodes[node].name for node in file.scenes[file.scene].nodes] == ["world"]
+    for mesh in file.meshes:
+        material = file.materials[mesh.primitives[0].material]
+        assert material.name == mesh.name and material.doubleSided
+    assert [weight for mesh in file.meshes for weight in getattr(mesh, "weights", [])] == [0.0] * 5
     for row in (0, 3):
         np.testing.assert_allclose(played.garment(row), result.track.cloth[row], atol=NEAR)
         off = np.linalg.norm(played.skinned(row) - result.bare(row).vertices, axis=1)
         assert off.max() < 2e-3  # the format has four joints a vertex, ours five
+
+
+@pytest.mark.parametrize("name", ["body", "garment"])
+def test_gltf_is_lit_from_outside(result: Result, tmp_path: Path, name: str) -> None:
+    """Another library weighs the faces about a vertex by their angles there."""
+    import trimesh
+
+    worn = result.scene.body if name == "body" else result.scene.garment
+    assert worn is not None
+    vertices = worn.vertices if name == "body" else result.track.cloth[0]
+    expected = trimesh.Trimesh(vertices, worn.faces, process=False).vertex_normals
+    found = readers.Gltf(write("gltf", result, tmp_path)).attribute(name, "NORMAL")
+    assert np.mean(np.sum(found * expected, axis=1) > 0.95) > 0.95
+    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1, atol=1e-5)
+
+
+def test_gltf_has_no_more_shapes_of_a_garment_than_asked_for(
+    result: Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(gltf, "SHAPES", 3)
+    played = readers.Gltf(write("gltf", result, tmp_path))
+    moments, shapes = played.shapes()
+    np.testing.assert_allclose(moments, result.track.time[[0, 2, 4]])
+    np.testing.assert_allclose(shapes, result.track.cloth[[0, 2, 4]] - result.track.cloth[0], atol=NEAR)
+
+
+@pytest.mark.parametrize("name", ["gltf", "usd"])
+def test_a_garment_that_was_not_tracked_is_left_out(result: Result, tmp_path: Path, name: str) -> None:
+    if name == "usd":
+        pytest.importorskip("pxr")
+    bare = replace(result, track=replace(result.track, cloth=np.zeros((5, 0, 3))))
+    names, places = readers.JOINTS[name](write(name, bare, tmp_path))
+    assert len(names) == places.shape[1]
 
 
 def test_gltf_counts_seconds_from_its_first_frame_and_says_how_far_things_reach(result: Result, tmp_path: Path) -> None:
@@ -207,8 +252,10 @@ def test_gltf_counts_seconds_from_its_first_frame_and_says_how_far_things_reach(
     hanging = [channel.target for channel in file.animations[0].channels if channel.target.path == "weights"]
     assert [names[target.node] for target in hanging] == ["garment"]
     assert file.nodes[names.index("body")].skin == 0 and len(file.skins) == 1
-    places = file.accessors[next(mesh for mesh in file.meshes if mesh.name == "body").primitives[0].attributes.POSITION]
-    vertices = result.scene.body.vertices
+    shown = {mesh.name: mesh.primitives[0] for mesh in file.meshes}
+    places, vertices = file.accessors[shown["body"].attributes.POSITION], result.scene.body.vertices
+    for part in (shown["garment"].attributes, *shown["garment"].targets):
+        assert len(file.accessors[part.POSITION].min) == len(file.accessors[part.POSITION].max) == 3
     assert (places.min, places.max) == (pytest.approx(vertices.min(axis=0)), pytest.approx(vertices.max(axis=0)))
     assert all(0 <= node.mesh < len(file.meshes) for node in file.nodes if getattr(node, "mesh", None) is not None)
 
@@ -231,6 +278,17 @@ def test_usd_opens_and_moves_body_and_garment(result: Result, tmp_path: Path) ->
 
     stage = Usd.Stage.Open(str(write("usd", result, tmp_path)))
     assert (UsdGeom.GetStageUpAxis(stage), UsdGeom.GetStageMetersPerUnit(stage)) == ("Z", 1.0)
+    assert stage.GetDefaultPrim().GetPath() == "/World"
+    assert result.scene.garment is not None
+    for path, worn in (("Person/Body", result.scene.body), ("Garment", result.scene.garment)):
+        mesh = UsdGeom.Mesh(stage.GetPrimAtPath(f"/World/{path}"))
+        assert set(mesh.GetFaceVertexCountsAttr().Get()) == {3}
+        np.testing.assert_array_equal(mesh.GetFaceVertexIndicesAttr().Get(), worn.faces.ravel())
+        assert mesh.GetSubdivisionSchemeAttr().Get() == "none" and mesh.GetDoubleSidedAttr().Get()
+    skeleton = UsdSkel.Skeleton(stage.GetPrimAtPath("/World/Person/Skeleton"))
+    topology = UsdSkel.Topology(skeleton.GetJointsAttr().Get())
+    at_rest = UsdSkel.ConcatJointTransforms(topology, skeleton.GetRestTransformsAttr().Get())
+    np.testing.assert_allclose(at_rest, skeleton.GetBindTransformsAttr().Get(), atol=NEAR)
     for rate in (stage.GetTimeCodesPerSecond(), stage.GetFramesPerSecond()):
         assert rate == pytest.approx(result.track.frame_rate)
     garment = UsdGeom.Mesh(stage.GetPrimAtPath("/World/Garment")).GetPointsAttr()
@@ -244,10 +302,11 @@ def test_usd_plays_every_other_frame_at_the_speed_of_the_recording(result: Resul
     pytest.importorskip("pxr")
     from pxr import Usd
 
-    track = replace(result.track, frame=2 * result.track.frame, time=2 * result.track.time)
+    track = replace(result.track, frame=7 + 2 * result.track.frame, time=2 * result.track.time)
     stage = Usd.Stage.Open(str(write("usd", replace(result, track=track), tmp_path)))
     played = (stage.GetEndTimeCode() - stage.GetStartTimeCode()) / stage.GetTimeCodesPerSecond()
     assert played == pytest.approx(track.time[-1] - track.time[0])
+    assert stage.GetStartTimeCode() == 7
 
 
 @pytest.mark.long

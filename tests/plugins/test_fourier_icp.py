@@ -73,6 +73,7 @@ def test_the_first_turns_are_low_passed_the_later_ones_full():
     for turn, low in ((FIRST, True), (Turn(index=1), True), (CALM, False)):
         image, model = view(FourierIcp(), far, shown, turn)
         assert image.curvature.any() == model.curvature.any() == low
+        assert len(image.pixel) < 1.5 * len(full[0].pixel)  # not every px
         assert (model.contour.pixel.shape == full[1].contour.pixel.shape) or low
         assert (np.diff(image.pixel[:, 1]) >= 0).all() and (np.diff(model.contour.pixel[:, 1]) >= 0).all()
 
@@ -134,6 +135,7 @@ def test_curvature_counts_as_a_distance():
     one = matcher.descriptors(np.zeros((1, 2)), normal, np.array([0.1]))
     other = matcher.descriptors(np.array([[0.0, 1.0], [0.0, 2.0]]), np.repeat(normal, 2, axis=0), np.array([-0.3, 0.1]))
     assert nearest_compatible(one, normal, other, np.repeat(normal, 2, axis=0), 10.0, -1.0)[0] == 1
+    np.testing.assert_allclose(np.linalg.norm(other[:, -1:] - one[:, -1:], axis=1), [4.0, 0.0])  # px
 
 
 @pytest.mark.long

@@ -33,11 +33,25 @@ def test_a_skirt_has_its_measures():
     np.testing.assert_allclose(np.linalg.norm(np.diff(grid, axis=1), axis=2).sum(axis=1), 0.6, atol=1e-12)
     np.testing.assert_allclose(grid[:, 0, 2], 1.08)
     assert abs(around(garment, grid[:, 0]) - 0.92) < 0.005
+    assert abs(around(garment, grid[:, -1]) - 1.7) < 0.01
     lengths = garment.ring_length.reshape(20, 40).sum(axis=1)
     assert abs(lengths[0] - 0.92) < 0.005
     assert abs(lengths[-1] - 1.7) < 1e-9
     assert (np.diff(lengths) >= 0).all()
     assert BODY.joint_names[garment.carried_by[0]] == "pelvis"
+
+
+def test_a_skirt_is_nowhere_tighter_than_the_hips():
+    """On a trunk that widens evenly from the waist down; below, where the legs have parted, it keeps its width."""
+    wider = np.where(BODY.vertices[:, 2:] > 0, 2.08 - BODY.vertices[:, 2:], 1.0)  # by a tenth in ten centimetres
+    body = replace(BODY, vertices=BODY.vertices * np.hstack([wider, wider, np.ones_like(wider)]))
+    sewn = Skirt(**{**SKIRT, "hem_circumference_m": 0.95}, strands=40, rings=61).sew(body)
+    lengths, height = sewn.ring_length.reshape(61, 40).sum(axis=1), 1.08 - np.linspace(0, 0.6, 61)
+    trunk = [max(map(sections.perimeter, sections.outlines(body, sections.level(z)))) for z in height[:13]]
+    np.testing.assert_allclose(lengths[:13] - trunk, 0.92 - trunk[0], atol=1e-3)
+    assert lengths[12] > 1.0 and (np.diff(lengths) >= 0).all() and lengths[-1] < 1.3
+    hem = f"hem_circumference_m 0.950 is tighter than the body; widened to {lengths[-1]:.3f}"
+    assert sewn.repairs == (hem,)
 
 
 def test_faces_look_outwards():
@@ -56,6 +70,12 @@ def test_shorts_have_two_legs_with_their_measures():
     grid = garment.vertices[garment.strands[long]]
     np.testing.assert_allclose(np.linalg.norm(np.diff(grid, axis=1), axis=2).sum(axis=1), 0.52, atol=1e-12)
     assert long.sum() == 48
+    assert abs(around(garment, grid[:, 0]) - 0.92) < 0.005
+    assert (grid[:24, :, 0] > 0).all() and (grid[24:, :, 0] < 0).all()  # each leg's own
+    pairs = np.sort(np.stack([garment.faces, np.roll(garment.faces, -1, axis=1)], axis=-1), axis=-1).reshape(-1, 2)
+    down = np.sort(np.stack([garment.strands[:, :-1][long], garment.strands[:, 1:][long]], axis=-1)).reshape(-1, 2)
+    sides = (pairs[:, None] == down[:, None].swapaxes(0, 1)).all(axis=2).sum(axis=0)
+    assert (sides == 2).all()  # there is cloth on both sides of every link
     inner = garment.strands[~long]
     seam = used[~long].sum(axis=1)
     assert np.ptp(seam) == 0
@@ -66,6 +86,32 @@ def test_shorts_have_two_legs_with_their_measures():
     a, b = garment.rings.T
     openings = np.isin(a, last) & np.isin(b, last)
     assert abs(garment.ring_length[openings].sum() - 2 * 0.65) < 1e-9
+
+
+def test_shorts_lie_outside_of_hips_that_bulge_below_the_waist():
+    wider = 1 + 0.25 * np.exp(-(((BODY.vertices[:, 2:] - 1.0) / 0.04) ** 2))
+    body = replace(BODY, vertices=BODY.vertices * np.hstack([wider, wider, np.ones_like(wider)]))
+    sewn = Shorts(**{**SHORTS, "hip_circumference_m": 1.3}).sew(body)
+    grid = sewn.vertices[sewn.strands[(sewn.strands >= 0).all(axis=1)]]
+    for row in range(1, 5):
+        for x, y, z in grid[:, row]:
+            closed = max(sections.outlines(body, sections.level(z)), key=sections.perimeter)
+            edge = np.roll(closed, -1, axis=0) - closed
+            outward = np.stack([edge[:, 1], -edge[:, 0]], axis=1) / np.linalg.norm(edge, axis=1, keepdims=True)
+            assert np.max(np.sum(outward * ([x, y] - closed), axis=1)) > -0.003  # m; links are made even afterwards
+
+
+def test_a_cylinder_has_its_measures_and_runs_down_its_limb():
+    garment = Cylinder(upper_circumference_m=0.60, lower_circumference_m=0.56, strands=40, rings=20).sew(BODY)
+    grid, lengths = garment.vertices[garment.strands], garment.ring_length.reshape(20, 40).sum(axis=1)
+    assert (lengths[0], lengths[-1]) == (pytest.approx(0.60), pytest.approx(0.56))
+    assert around(garment, grid[:, 0]) == pytest.approx(0.60, abs=0.005)
+    assert around(garment, grid[:, -1]) == pytest.approx(0.56, abs=0.01)
+    np.testing.assert_allclose(np.linalg.norm(np.diff(grid, axis=1), axis=2).sum(axis=1), 0.40, atol=1e-12)
+    hip, knee = (BODY.positions[BODY.joint(name)] for name in ("hip_l", "knee_l"))
+    np.testing.assert_allclose(grid[:, 0].mean(axis=0), hip + 0.3 * (knee - hip), atol=0.01)
+    down = grid[:, -1].mean(axis=0) - grid[:, 0].mean(axis=0)
+    assert down @ (knee - hip) / np.linalg.norm(knee - hip) == pytest.approx(0.40, abs=0.005)
 
 
 def test_a_band_has_its_length_and_faces_outwards():
@@ -80,6 +126,30 @@ def test_a_section_of_two_legs_is_two_outlines():
     assert len(found) == 2
     for points in found:
         assert abs(sections.perimeter(sections.outline(points)) - 2 * np.pi * 0.08) < 2e-3
+
+
+def test_a_section_between_rows_of_vertices_lies_on_the_skin():
+    """Of legs that widen upwards as cones do, cut across, and of straight ones, cut aslant."""
+    cone = replace(
+        BODY, vertices=BODY.vertices * np.stack([BODY.vertices[:, 2]] * 2 + [np.ones(len(BODY.vertices))], 1)
+    )
+    for height in (0.613, 0.7):
+        found = sections.sections(cone, sections.level(height))
+        for points in found:
+            assert abs(sections.perimeter(sections.outline(points)) / height - 2 * np.pi * 0.08) < 2e-3
+    leg = sections.outline(sections.sections(BODY, sections.level(0.6))[0]).mean(axis=0)
+    tilted = np.array([[np.cos(0.3), 0, np.sin(0.3)], [0, 1.0, 0]])
+    plane = sections.Plane(point=np.array([*leg, 0.6]), across=tilted)
+    points = min(sections.sections(BODY, plane), key=lambda points: np.linalg.norm(points.mean(axis=0)))
+    away = np.linalg.norm(plane.lift(points)[:, :2] - leg, axis=1)
+    assert 0.079 < away.min() < away.max() < 0.081
+
+
+def test_a_band_begins_so_many_spacings_from_the_first_axis():
+    diamond = np.array([[0.3, 0.0], [0.0, 0.4], [-0.3, 0.0], [0.0, -0.4]])
+    ring, facing = sections.band(diamond, 0.0, 8, 0.5)
+    np.testing.assert_allclose(np.arctan2(*facing[0][::-1]), 0.5 * 2 * np.pi / 8)
+    np.testing.assert_allclose(ring[0], [0.225, 0.1], atol=1e-3)  # an eighth of a metre from the first corner
 
 
 @pytest.mark.parametrize(("garment", "measures"), [(Skirt, SKIRT), (Shorts, SHORTS)])

@@ -10,7 +10,7 @@ import pytest
 from matching_scenes import FIRST
 from mocapflow_levelset import splits
 from mocapflow_levelset.colours import BINS, bins_of
-from mocapflow_levelset.inner import findable_edges, inner_contours
+from mocapflow_levelset.inner import SIGMA_PX, findable_edges, inner_contours
 from mocapflow_levelset.inner_edges import inner_edges
 from mocapflow_levelset.layers import COLOURS, colour_model, layer_of
 from mocapflow_matching.inner_contours import InnerContours, slipped
@@ -120,6 +120,7 @@ def off(matches, pose):
 
 def test_a_leg_before_the_cloth_is_drawn_to_where_it_is():
     matches = match(dressed, kicked(55.0))
+    assert (matches.weight < 1 / SIGMA_PX**2).all()  # noise adds to it
     assert len(matches.vertex) > 20
     skin = SCENE.layer[matches.vertex] != CLOTH
     before, after = (np.abs(off(matches, kicked(degrees))[skin]) for degrees in (55.0, 60.0))
@@ -188,6 +189,8 @@ def test_a_waistband_that_sits_lower_than_the_tape_says_pulls_at_nothing():
     cloth = SCENE.layer[slid.vertex] == CLOTH
     assert cloth.sum() > 10
     assert abs(np.median(off(slid, pose)[cloth])) < 0.3
+    there = match(dressed, pose, pose)
+    assert np.median(slid.weight[cloth]) > 0.5 * np.median(there.weight[SCENE.layer[there.vertex] == CLOTH])
 
 
 @pytest.mark.parametrize("sigma", [1.0, 1.5])

@@ -115,22 +115,28 @@ def test_the_filter_keeps_what_is_slow_and_has_no_lag() -> None:
     np.testing.assert_allclose(low_pass(slow + fast, 60.0)[middle], slow[middle], atol=0.015)
 
 
-def test_the_filter_halves_its_own_frequency() -> None:
+@pytest.mark.parametrize("frequency", [6.0, 12.0])
+def test_the_filter_halves_its_own_frequency_and_falls_with_the_fourth_power(frequency: float) -> None:
+    """Each pass is of second order: a gain of 1 / sqrt(1 + r^4), and frequencies are warped as the tangent has it."""
     time = np.arange(600) / 60.0
-    wave = np.sin(2 * np.pi * 6.0 * time)
+    wave = np.sin(2 * np.pi * frequency * time)
+    ratio = np.tan(np.pi * frequency / 60) / np.tan(np.pi * 6 / 60)
     middle = slice(100, 500)
-    np.testing.assert_allclose(low_pass(wave, 60.0)[middle], wave[middle] / 2, atol=0.001)  # 1/sqrt(2) a pass
+    np.testing.assert_allclose(low_pass(wave, 60.0)[middle], wave[middle] / (1 + ratio**4), atol=0.001)
 
 
 def test_gaps_stay_and_short_stretches_too() -> None:
-    values = np.linspace(0.0, 1.0, 60)[:, None] * [1.0, 2.0]
-    values[30:33, 1], values[36:, 1] = np.nan, np.nan
+    values = np.linspace(0.0, 1.0, 60)[:, None] * [1.0, 2.0, 0.0]
+    values[30:33, 1:], values[42:, 1] = np.nan, np.nan
+    values[33:, 2] = 5.0
     passed = low_pass(values, 60.0)
     np.testing.assert_allclose(passed[:, 0], values[:, 0], atol=1e-3)  # a line is as slow as can be
     np.testing.assert_array_equal(np.isnan(passed), np.isnan(values))
-    np.testing.assert_array_equal(passed[33:36, 1], values[33:36, 1])
+    np.testing.assert_array_equal(passed[33:42, 1], values[33:42, 1])  # the filter reaches over 9 frames
+    np.testing.assert_allclose(passed[:, 2], values[:, 2], atol=1e-9)  # nothing flows across a gap
 
 
-def test_too_few_frames_a_second_for_a_filter() -> None:
+@pytest.mark.parametrize("rate", [10.0, 12.0])
+def test_too_few_frames_a_second_for_a_filter(rate: float) -> None:
     values = np.random.default_rng(1).normal(size=(40, 3))
-    np.testing.assert_array_equal(low_pass(values, 10.0), values)
+    np.testing.assert_array_equal(low_pass(values, rate), values)

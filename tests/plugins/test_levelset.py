@@ -182,6 +182,9 @@ def test_an_outline_that_slides_along_itself_has_not_moved(scene, pose):
     x, y = np.rint(project(surface.vertices[outline.vertex], camera)).astype(int).T
     moved = moved_outline(surface, shifted(scene, state, 0.02 * across).change, camera, 1.0)[y, x]
     upright, flat = np.abs(outline.normal[:, 0]) > 0.9, np.abs(outline.normal[:, 0]) < 0.3
+    x, y = np.rint(project(surface.vertices[outline.vertex] - 0.02 * across, camera)).astype(int).T
+    shown = moved_outline(surface, shifted(scene, state, 0.02 * across).change, camera, 1.0)
+    assert shown[y, x][upright].all()  # where it was before
     assert upright.sum() > 10 and moved[upright].all() and flat.sum() > 2 and not moved[flat].any()
     assert moved_outline(surface, Change(body=1, cloth=1, angles=1, sigmas=1), camera, 2.0) is None
 

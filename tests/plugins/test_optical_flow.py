@@ -114,7 +114,9 @@ def test_shapes_lead_the_way_in_the_first_turn_only():
     truth = tiny_pose(SCENE)
     surface = SCENE.surface(truth, NO_CLOTH)
     matcher = OpticalFlow()
-    assert len(matcher.match(FRAME, seen(surface, SCENE), surface, Past(), SCENE, FIRST).vertex) > 100
+    matches = matcher.match(FRAME, seen(surface, SCENE), surface, Past(), SCENE, FIRST)
+    assert len(matches.vertex) > 100
+    np.testing.assert_allclose(matches.weight, matcher.first_share)  # each is near: its deviation is a pixel
     assert len(matcher.match(FRAME, seen(surface, SCENE), surface, Past(), SCENE, CALM).vertex) == 0
 
 

@@ -39,6 +39,8 @@ def test_a_first_frame_that_fits_badly():
     assert said.startswith("the first frame fits badly, overlap 0.76 to 0.88: is the first pose right?")
     hidden = np.vstack([[0.61, 0.9, 0.86, 0.93], later])  # something stands before the person in one view
     assert quality_warnings(replace(TRACK, overlap=hidden), NAMES) == []
+    unseen = np.vstack([np.full(4, np.nan), later])
+    assert quality_warnings(replace(TRACK, overlap=unseen), NAMES) == []
 
 
 def test_lost_and_doubted_frames_are_counted():

@@ -5,6 +5,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from mocapflow_evaluation.evaluate import Evaluate
 from mocapflow_evaluation.panels import title
 from mocapflow_export import layout, tables
@@ -62,6 +63,24 @@ def test_the_rms_is_printed_over_each_panel(drawn):
         off = np.sqrt(np.mean((shown["mocapflow"][1] - shown["reference"][1]) ** 2))
         assert off == pytest.approx(row["rms_deg"], abs=0.01)
         assert panel.get_title(loc="left") == f"{title(str(row['angle']))}   RMS {row['rms_deg']:.2f}°"
+
+
+def test_the_band_about_a_curve_is_its_interval_of_ninety_per_cent():
+    panel, frame, value = Figure().subplots(), np.arange(4.0), np.array([10.0, 60.0, 30.0, 20.0])
+    ours = {"frame": frame, "ankle_l": value, "ankle_l_sd": np.array([1.0, 2.0, np.nan, 300.0])}
+    plots._curves(panel, "ankle_l", ours, {"ankle_l": value + 1}, {"ankle_l": value - 1})
+    (band,) = panel.collections
+    at = {(x, round(y, 4)) for x, y in band.get_paths()[0].vertices}
+    for side in (-1.6449, 1.6449):
+        assert at >= {
+            (0, round(10 + side, 4)),
+            (1, round(60 + 2 * side, 4)),
+            (2, 30),
+        }  # of a frame that nobody knows none
+    assert panel.get_ylim() == pytest.approx((9 - 0.12 * 52, 61 + 0.12 * 52))  # however wide the band
+    ours["ankle_l"] = np.array([10.0, 11.0, 10.5, 10.0])
+    plots._curves(panel, "ankle_l", ours, ours, {})
+    assert panel.get_ylim() == pytest.approx((8, 13))
 
 
 def test_the_pictures_read_back(drawn):

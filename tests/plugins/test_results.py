@@ -172,6 +172,19 @@ def test_run_json_says_how_it_was_made_and_how_it_went(scene: Scene, recording: 
     assert got["per_frame"][3]["notes"] == ["cam02 black", "seen by too few cameras; the prediction is kept"]
 
 
+def test_files_count_frames_and_seconds_of_the_video(scene: Scene, recording: Recording, tmp_path: Path) -> None:
+    track, frame = stepping(scene.body, 4), np.array([20, 22, 24, 26], np.int32)
+    seconds, turns = np.array([[0.1, 0.2], [0.1, 0.2], [0.1, 0.2], [1.0, 2.0]]), np.array([3, 3, 0, 3], np.int16)
+    late = replace(track, frame=frame, time=frame / 30, seconds=seconds, iterations=turns)
+    exported(late, scene, replace(recording, indices=range(20, 28, 2)), tmp_path)
+    got = json.loads((tmp_path / layout.RUN).read_text())
+    assert [got["frames"][name] for name in ("count", "first", "last", "lost", "bridged_by")] == [4, 20, 26, [24], None]
+    assert got["cpu_seconds"]["per_frame_median"] == pytest.approx(0.3)
+    assert [each.get("lost") for each in got["per_frame"]] == [None, None, True, None]
+    for time in (markers.read_trc(tmp_path / layout.JOINTS)[2], markers.read_mot(tmp_path / layout.MOTION)[1]):
+        np.testing.assert_allclose(time, late.time, atol=1e-6)
+
+
 def test_plain_makes_json_of_what_a_recipe_may_hold() -> None:
     odd = {"path": Path("a/b"), 1: (np.int32(2), np.nan), "array": np.eye(2), "none": None}
     assert runjson.plain(odd) == {"path": "a/b", "1": [2, None], "array": [[1.0, 0.0], [0.0, 1.0]], "none": None}

@@ -43,5 +43,12 @@ def test_zhang_finds_the_valley_when_everything_is_far() -> None:
     assert zhang_keeps(distance, 2.0).sum() == pytest.approx(300, abs=3)
 
 
+def test_the_valley_is_where_the_histogram_first_rises_again_after_its_main_peak() -> None:
+    counts = np.array([1, 0, 2, 5, 10, 4, 4, 1, 3, 6, *np.full(20, 1)])  # a plateau on the way down is none
+    distance = np.repeat(np.arange(30) + 0.5, counts)
+    distance[0], distance[-1] = 0.0, 30.0  # of thirty bins
+    assert zhang_keeps(distance, 1.0).sum() == counts[:8].sum()
+
+
 def test_of_no_pairs_none_is_kept() -> None:
     assert zhang_keeps(np.empty(0), 2.0).shape == (0,)

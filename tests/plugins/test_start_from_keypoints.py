@@ -1,6 +1,7 @@
 """The first pose from keypoints: layouts, triangulation, choice of the person, inverse kinematics."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from mocapflow_fitting.pose_fit import Solution, velocities
 from mocapflow_fitting.start_from_file import read_pose
 from mocapflow_fitting.start_from_keypoints import StartFromKeypoints
 from mocapflow_fitting.triangulate import triangulate
+from scipy.optimize import least_squares
 
 from mocapflow.data import Pose
 from mocapflow.errors import RecordingError
@@ -208,3 +210,23 @@ def test_a_camera_that_contradicts_the_others_is_trusted_by_cauchys_rule():
     assert np.linalg.norm(found.position - place) < 0.01
     assert found.error[0, 0] > 30
     np.testing.assert_allclose(found.weight, 1 / (1 + (found.error / 8.0) ** 2), rtol=1e-6)
+
+
+def test_points_are_where_they_miss_the_images_least():
+    """Of cameras near and far: an error in metres is worth the fewer pixels the farther the camera is."""
+    cameras, place = list(open_recording(DEMO).cameras), np.array([[0.1, 0.0, 1.0]])
+    for index, metres in ((1, 6.0), (3, 15.0)):
+        back = np.eye(4)
+        back[2, 3] = metres
+        cameras[index] = replace(cameras[index], camera_from_world=back @ cameras[index].camera_from_world)
+    noise = np.random.default_rng(5).normal(scale=3.0, size=(len(cameras), 1, 2))
+    pixels = np.stack([project(place, camera) for camera in cameras]) + noise
+
+    def off(at):
+        return np.concatenate(
+            [project(at[None], camera)[0] - seen[0] for camera, seen in zip(cameras, pixels, strict=True)]
+        )
+
+    found = triangulate(pixels, np.ones((len(cameras), 1)), cameras, scale_px=1e4).position[0]
+    best = least_squares(off, place[0]).x
+    assert np.linalg.norm(found - best) < 2e-4 < 0.1 * np.linalg.norm(best - place[0])

@@ -240,31 +240,6 @@ def test_what_a_stopped_commit_leaves_is_gone_when_the_track_goes_on(tmp_path, p
     assert not list(group.glob(f"{PART}*"))
 
 
-def test_rows_are_plain_zarr(tmp_path):
-    made = Rows.create(tmp_path / "a", (4, 3, 2), "float64", np.nan, ("T", "x", "y"), {"unit": "m"})
-    values = np.random.default_rng(0).normal(size=(3, 2))
-    made.write(2, values)
-    read = zarr.open_array(str(tmp_path / "a"), mode="r")
-    assert np.array_equal(read[2], values)
-    assert np.isnan(read[1]).all()
-    with pytest.raises(Corrupted, match="row 1 of .* is missing"):
-        made.read(1)
-    zarr.open_array(str(tmp_path / "a"), mode="r+")[1] = 2 * values
-    assert np.array_equal(Rows(tmp_path / "a").read(1), 2 * values)
-    made.resize(6)
-    assert zarr.open_array(str(tmp_path / "a"), mode="r").shape == (6, 3, 2)
-
-
-@pytest.mark.parametrize("damage", [lambda data: data[:-3], lambda data: b"", lambda data: data[:9] + b"?" + data[10:]])
-def test_a_damaged_row_is_noticed(tmp_path, damage):
-    made = Rows.create(tmp_path / "a", (2, 500), "float64", np.nan, ("T", "x"), {})
-    made.write(0, np.arange(500.0))
-    file = tmp_path / "a" / "c.0.0"
-    file.write_bytes(damage(file.read_bytes()))
-    with pytest.raises(Corrupted, match="row 0 of .* is damaged"):
-        made.read(0)
-
-
 def test_attributes_are_written_alike_in_every_locale(tmp_path):
     value = {"unit": "px^-2 or px⁻²", "file": "caméra \udcff.png"}  # a name that is no UTF-8 comes so from the system
     rows.write_json(tmp_path / "zarr.json", value)
