@@ -9,7 +9,7 @@ from mocapflow_levelset.masks import counted
 from mocapflow_levelset.plates import BENDING, BLACK, Shadow, density_of, plate_of
 from scipy.stats import norm
 
-SHADOW = Shadow(floor=0.012, share=0.2, darkest=0.5, chroma=0.005)
+SHADOW = Shadow(least_sd=0.012, share=0.2, darkest=0.5, chroma=0.005)
 RAY = np.array([0.8, 0.03, -0.04])  # from black to the plate's colour, in lab channels
 COLOUR = RAY + BLACK
 ACROSS = np.hypot(SHADOW.chroma, BENDING * 0.05)  # standard deviation off the ray: its chroma is 0.05

@@ -64,11 +64,11 @@ def test_the_gradient_is_that_of_the_cost() -> None:
         return Observed(vertices[points] - target, slope, points, precision)
 
     def cost(step: F64) -> float:
-        return _cost([view], Solution(np.empty(0), (moved(pose, step),)), {})
+        return _cost([view], Solution({}, np.empty(0), (moved(pose, step),)))
 
     view, steps = View(tight, look), 1e-6 * np.eye(6 + len(pose.angles))
     numeric = [(cost(step) - cost(-step)) / 2e-6 for step in steps]
-    matrix, gradient = _normal(view, pose, np.empty(0), {})
+    matrix, gradient = _normal(view, pose, Solution({}, np.empty(0), (pose,)))
     np.testing.assert_allclose(gradient, numeric, rtol=1e-4, atol=1e-3)
     assert (np.linalg.eigvalsh(matrix) > 0).all()
 
