@@ -37,7 +37,7 @@ SEARCHES = 4  # from the best pose of as many directions
 REPEATS = 4  # of those that may be right, as far as that helps
 NATURAL = np.radians(20.0)  # a pose so far in each angle from all that were seen counts as twice as far off
 ENOUGH = 0.95  # times the cost before: a search that gains less is the last
-FAR_M = 0.008  # off the silhouettes: right poses were at most 0.006 off, nearly all wrong ones 0.009 and more
+FAR_M = 0.008  # off the silhouettes: right poses were at most 0.006 off, most wrong ones farther than this
 GO_ON = "begin where the person stands freely and in all pictures, or use start_from_file or start_from_keypoints"
 
 
