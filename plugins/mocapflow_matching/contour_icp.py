@@ -19,7 +19,7 @@ from mocapflow.scene import Scene
 from mocapflow.settings import PositiveOrInf
 from mocapflow_matching.camouflage import without_camouflaged
 from mocapflow_matching.robust import Loss, robust_precision
-from mocapflow_matching.uncertainty import contour_sigma
+from mocapflow_matching.uncertainty import HEM_GUARD_PX, contour_sigma
 
 FAR_CALM_MM = 15.0  # stands for `calm_mm`, if less, in a frame that began far off
 
@@ -51,7 +51,7 @@ class ContourIcp(Matcher):
     direction: Literal["both", "forward", "backward"] = "both"  # image to model, model to image, or both
     residual: Literal["normal", "point"] = "normal"  # let points slide along the contour, or not (the chapter)
     spacing_px: PositiveFloat = 4.0  # between the points of a contour
-    hem_guard_px: NonNegativeFloat = 12.0  # skin so near to cloth counts as cloth: a hem is uncertain
+    hem_guard_px: NonNegativeFloat = HEM_GUARD_PX  # skin so near to cloth counts as cloth: a hem is uncertain
     calm_mm: PositiveFloat = 15.0  # change of the body in a turn below which `later_reach_px` and `later_loss` hold
     first_reach_px: PositiveFloat = 40.0  # pairs farther apart are left out at first
     later_reach_px: PositiveFloat = 10.0  # pairs farther apart are left out once the body is calm

@@ -17,7 +17,7 @@ from mocapflow.scene import Scene
 from mocapflow_matching.flow_points import CLOTH_SHARE, distances, flow_points
 from mocapflow_matching.robust import robust_precision
 from mocapflow_matching.shape_flow import register
-from mocapflow_matching.uncertainty import contour_sigma
+from mocapflow_matching.uncertainty import HEM_GUARD_PX, contour_sigma
 
 WORKING_SIDE = 200  # px, at most, of the distance images: they are smooth
 SMOOTHNESS = 3.0  # weight of the flow's smoothness against the difference of the distance images
@@ -26,7 +26,6 @@ LEVELS = 3  # of the pyramid of distance images
 ON_CONTOUR = 1.0  # px from the image contour within which a target has to end
 LATER_SHARE = 0.25  # of points followed, after the turns in which shapes are registered: 0.2 to contour_icp's 0.8
 CONTOUR_SIGMA_PX = 1.0  # standard deviation of a pair of contour points on skin
-HEM_GUARD_PX = 12.0  # as contour_icp has it: skin so near to cloth counts as cloth
 
 
 class OpticalFlow(Matcher):

@@ -10,6 +10,7 @@ from mocapflow.geometry.contours import nearest_compatible
 from mocapflow.records import F64
 from mocapflow.scene import Scene
 
+HEM_GUARD_PX = 12.0  # skin so near to cloth may be behind it
 ANY_DIRECTION = -1.0  # least cosine between normals
 
 
