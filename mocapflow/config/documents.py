@@ -51,7 +51,8 @@ def changed(document: Document, target: str, new: Document) -> Document:
 
     Args:
         document: as it was; it is left alone.
-        target: the path, as `stages.track.draper`, or with its place: `stages.corrupt before background`.
+        target: the path, as `stages.track.draper`, or with its place: `stages.corrupt before background`. What is in a
+            list is named, `stages.track.priors.parzen`, or numbered from 0.
         new: the value, and where it was written.
 
     Raises:
@@ -84,14 +85,27 @@ def _holder_of(values: Any, parts: list[str], where: str) -> tuple[Any, KeyPath]
     for part in parts:
         if steps:
             holder = _opened(holder, steps[-1])
-        key = int(part) if isinstance(holder, list) and part.isdecimal() else part
+        key = _entry(holder, part) if isinstance(holder, list) else part
         if not _may_hold(holder, key, last=len(steps) == len(parts) - 1):
-            places = range(len(holder)) if isinstance(holder, list) else ()
-            known = holder if isinstance(holder, dict) else map(str, places)
+            known = _entries(holder) if isinstance(holder, list) else holder if isinstance(holder, dict) else ()
             message = f"there is no '{dotted((*steps, part))}'"
             raise PipelineError(message, where=where, hint=alternatives(part, known))
         steps = (*steps, key)
     return holder, steps
+
+
+def _entry(entries: list[Any], part: str) -> str | int:
+    """Return the index of the entry that a part of a path means, the part itself if it means none."""
+    if part.isdecimal():
+        return int(part)
+    names = _entries(entries)
+    return names.index(part) if part in names else part
+
+
+def _entries(entries: list[Any]) -> list[str]:
+    """Return how a path may name the entries of a list: components by names that no other has, others by indices."""
+    names = [entry.get("use") if isinstance(entry, dict) else entry for entry in entries]
+    return [name if isinstance(name, str) and names.count(name) == 1 else str(k) for k, name in enumerate(names)]
 
 
 def _moved(holder: Any, key: str | int, successor: str) -> bool:

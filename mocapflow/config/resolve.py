@@ -97,7 +97,8 @@ class Resolver:
             return self.component(base.role, value, steps)
         if not isinstance(value, list):
             return (self.component(base.role, value, steps),)
-        return tuple(self.component(base.role, item, (*steps, index)) for index, item in enumerate(value))
+        wanted = [(index, item) for index, item in enumerate(value) if item is not None]  # `null` leaves one out
+        return tuple(self.component(base.role, item, (*steps, index)) for index, item in wanted)
 
     def _wrong_setting(self, cls: type[BaseModel], error: ValidationError, steps: KeyPath) -> MocapflowError:
         errors = error.errors(include_url=False)

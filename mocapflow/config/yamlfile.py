@@ -13,6 +13,7 @@ import yaml
 from mocapflow.config.documents import Document, KeyPath, Place, changed, dotted
 from mocapflow.errors import PipelineError, alternatives
 
+MOST_VALUES = 100_000  # of a file; aliases of aliases can stand for more than any memory holds
 LEADING_ZERO = re.compile(r"[-+]?0[0-9_]")  # 0x10 and 0b10 say themselves what they are
 
 
@@ -91,6 +92,8 @@ class _Built:
             PipelineError: a name is no text or is written twice, or a value is not what it is tagged as.
         """
         self.places.setdefault(steps, Place(self.where(node.start_mark), self.folder))
+        if len(self.places) > MOST_VALUES:
+            raise PipelineError(f"holds more than {MOST_VALUES:,} values", where=self.where(node.start_mark))
         if isinstance(node, yaml.MappingNode):
             found: dict[str, Any] = {}
             for named, inner in node.value:

@@ -134,6 +134,11 @@ def test_what_starts_parts_is_looked_up_though_there_are_none(folder):
         load("parts.start=nothing")
 
 
+def test_an_entry_of_a_list_is_left_out_by_null(folder):
+    matchers = load("stages.track.matchers=[contour_icp, {use: contour_icp, share: 2}]", "stages.track.matchers.0=null")
+    assert matchers.stages[1].stage.matchers == (small_plugins.Contours(share=2),)
+
+
 def test_a_stage_is_left_out_by_null(folder):
     assert [named.label for named in load("stages.smooth=null").stages] == ["start", "track", "export"]
 

@@ -77,6 +77,32 @@ def test_changes_of_the_command_line_come_last(folder):
     assert read(Path("base.yaml"), ["stages.track.draper="]).values["stages"]["track"]["draper"] is None
 
 
+def test_what_is_in_a_list_has_its_name_or_its_number(folder):
+    def matchers(*changes):
+        return read(Path("base.yaml"), changes).values["stages"]["track"]["matchers"]
+
+    other = ["contour_icp", {"use": "keypoints", "share": 2}]
+    assert matchers("stages.track.matchers.keypoints.share=2") == matchers("stages.track.matchers.1.share=2") == other
+    assert matchers("stages.track.matchers.contour_icp.share=2")[0] == {"use": "contour_icp", "share": 2}
+    assert matchers("stages.track.matchers.contour_icp=null")[0] is None
+    document = read(Path("base.yaml"), ["stages.track.matchers.keypoints.share=2"])
+    assert document.place(("stages", "track", "matchers", 1, "share")).text.startswith("--set")
+
+
+def test_of_two_alike_in_a_list_the_number_tells_which(folder):
+    twice = "stages.track.matchers=[contour_icp, {use: contour_icp, share: 2}, keypoints]"
+    with pytest.raises(PipelineError, match=r"no 'stages.track.matchers.contour_icp'\n +available: 0, 1, keypoints"):
+        read(Path("base.yaml"), [twice, "stages.track.matchers.contour_icp.share=3"])
+    changed = read(Path("base.yaml"), [twice, "stages.track.matchers.1.share=3"]).values["stages"]["track"]["matchers"]
+    assert changed == ["contour_icp", {"use": "contour_icp", "share": 3}, "keypoints"]
+
+
+def test_aliases_of_aliases_do_not_fill_the_memory(folder):
+    lines = ["a0: &a0 [x]", *(f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 10)}]" for k in range(1, 12))]
+    with pytest.raises(PipelineError, match=r"bomb.yaml:\d+:\d+  holds more than 100,000 values"):
+        read(write("bomb.yaml", "\n".join(lines)))
+
+
 def test_what_looks_like_a_date_or_a_time_is_text(folder):
     values = read(write("times.yaml", "recording: 2024-02-30\n2024-02-03: 10:20\npoint: 1:20.5\n")).values
     assert values == {"recording": "2024-02-30", "2024-02-03": "10:20", "point": "1:20.5"}
@@ -143,7 +169,7 @@ def test_what_is_wrong_is_told_with_line_and_column(folder, text, message):
         ("=3", "--set =3  a change is written PATH=VALUE"),
         ("a=[1", "--set a=[1  not YAML: expected ',' or ']', but got '<stream end>' (while parsing a flow sequence)"),
         ("stages.track.matchers.7=x", "--set stages.track.matchers.7=x  there is no 'stages.track.matchers.7'\n"
-         "       available: 0, 1"),
+         "       available: contour_icp, keypoints"),
         ("stages.corrupt before trak=x", "--set stages.corrupt before trak=x  "
          "there is no 'stages.trak' to put 'corrupt' before\n       available: corrupt, track — did you mean 'track'?"),
         ("stages.trak=null", "--set stages.trak=null  there is no 'stages.trak' to leave out\n"
