@@ -9,7 +9,7 @@ import numpy as np
 from mocapflow_levelset import crops
 from mocapflow_levelset.channels import ChannelName, features
 from mocapflow_levelset.colours import bins_of
-from mocapflow_levelset.plates import USUAL, Plate, density_image, plate_in
+from mocapflow_levelset.plates import USUAL, Plate, density_image, plate_in, squared_deviations
 from mocapflow_levelset.shadows import floor_around
 
 from mocapflow.assets import Background, Camera
@@ -112,7 +112,7 @@ def _compared(image: U8, plate: Plate, floor: Bool) -> tuple[Bool, Bool]:
     Where nobody knows the room, it is neither.
     """
     values = features(image, CHANNELS)
-    off = np.sum((values - plate.planes) ** 2, axis=0) / np.maximum(plate.spread, USUAL.least_sd) ** 2
+    off = squared_deviations(values, plate, CHANNELS)
     changed = density_image(values, plate, floor, CHANNELS, USUAL) < 0
     return changed, (off < EMPTY**2) & np.isfinite(plate.spread)
 

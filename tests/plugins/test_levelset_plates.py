@@ -6,7 +6,18 @@ from mocapflow_levelset.channels import features
 from mocapflow_levelset.colours import bin_at, bins_of
 from mocapflow_levelset.evidence import Room, from_image, in_room, smoothed
 from mocapflow_levelset.masks import counted
-from mocapflow_levelset.plates import BENDING, BLACK, Shadow, density_of, plate_of
+from mocapflow_levelset.plates import (
+    BENDING,
+    BLACK,
+    TINT,
+    USUAL,
+    Plate,
+    Shadow,
+    density_image,
+    density_of,
+    plate_of,
+    squared_deviations,
+)
 from scipy.stats import norm
 
 SHADOW = Shadow(least_sd=0.012, share=0.2, darkest=0.5, chroma=0.005)
@@ -27,11 +38,32 @@ def density(colour, floor=True, spread=0.02, shadow=SHADOW, grey=None):
 
 @pytest.mark.parametrize(("spread", "sd"), [(0.02, 0.02), (0.001, 0.012)])
 def test_a_lit_pixel_is_as_likely_as_noise_makes_it(spread, sd):
+    """Tints scatter less than lightness, those of strong colours more."""
+    each = np.array([sd, *[np.hypot(TINT * sd, BENDING * 0.05)] * 2])
     off = np.array([0.6, -1.0, 0.5]) * sd
-    expected = norm.logpdf(off, scale=sd).sum()
+    expected = norm.logpdf(off, scale=each).sum()
     assert density(COLOUR + off, floor=False, spread=spread) == pytest.approx(expected, rel=1e-4)
     both = density(COLOUR + off, floor=False, spread=spread, grey=0.7 * sd)
     assert both == pytest.approx(expected + norm.logpdf(0.7 * sd, scale=sd), rel=1e-4)
+
+
+def test_a_sock_as_light_as_the_floor_is_told_by_its_tint():
+    """Ten of 255 levels: three standard deviations of lightness, five of a tint."""
+    yellow, light = np.array([0, 0, 10 / 255]), np.array([10 / 255, 0, 0])
+    assert density(COLOUR - yellow, floor=False, spread=0.012) < 0 < density(COLOUR - light, floor=False, spread=0.012)
+
+
+@pytest.mark.parametrize("channels", [("lab",), ("grey", "lab"), ("grey",)], ids=str)
+def test_squared_deviations_are_what_the_density_falls_by(channels):
+    rng = np.random.default_rng(4)
+    planes = rng.uniform(0.3, 0.7, ({"lab": 3, "grey": 1}[channels[0]] + 3 * (len(channels) - 1), 5, 6)).astype(
+        np.float32
+    )
+    plate = Plate(planes, np.full((5, 6), 0.03, np.float32))
+    values = (planes + rng.normal(0, 0.02, planes.shape)).astype(np.float32)
+    dark = np.zeros((5, 6), bool)
+    fall = density_image(planes, plate, dark, channels, USUAL) - density_image(values, plate, dark, channels, USUAL)
+    np.testing.assert_allclose(squared_deviations(values, plate, channels) / 2, fall, atol=1e-4)
 
 
 @pytest.mark.parametrize("aside", [0.0, 0.004])
