@@ -8,7 +8,7 @@ import pytest
 from mocapflow.components import Prior, Recovery, Stage
 from mocapflow.data import Pose, Residual, Start, Turn
 from mocapflow.dressing.roles import Garment
-from mocapflow.errors import ShapeError
+from mocapflow.errors import PluginError, ShapeError
 from mocapflow.geometry.meshes import edges
 from mocapflow.testing import (
     GarmentConformance,
@@ -139,6 +139,24 @@ def test_conformance_finds_a_vertex_that_lies_on_no_strand():
     tests.garment = Loose()
     with pytest.raises(AssertionError, match=r"vertex \d+ lies on 0 strands"):
         tests.test_every_vertex_lies_on_one_strand()
+
+
+def test_conformance_finds_a_garment_that_no_draper_can_lay():
+    class Unhung(Garment):
+        """Has one strand that nothing holds."""
+
+        name = "unhung"
+
+        def sew(self, body):
+            mesh = tiny_garment(body)
+            return replace(mesh, pinned=mesh.pinned[1:], pinned_to=mesh.pinned_to[1:])
+
+    tests = GarmentConformance()
+    tests.garment = Unhung()
+    tests.test_every_vertex_lies_on_one_strand()
+    tests.test_pins_lie_on_the_body()
+    with pytest.raises(PluginError, match=r"strand of vertex \d+ hangs from nothing"):
+        tests.test_installed_drapers_lay_it()
 
 
 class TestAtRest(RecoveryConformance):

@@ -42,7 +42,7 @@ def _read_file(path: Path) -> Document:
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
-        here = [p.name for p in path.parent.glob("*.y*ml")]
+        here = [p.name for p in path.parent.glob("[!.]*.y*ml")]
         hint = alternatives(path.name, here) if here else f"{path.parent.absolute()} has no YAML file at all"
         raise PipelineError("there is no such file", where=str(path), hint=hint) from None
     except OSError as error:

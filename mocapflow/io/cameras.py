@@ -66,7 +66,7 @@ def find_calibration(folder: Path) -> Path:
     """
     if (folder / "cameras.toml").exists():
         return folder / "cameras.toml"
-    found = sorted(folder.glob("*.qca.txt")) or [p for p in [folder / "intri.yml"] if p.exists()]
+    found = sorted(folder.glob("[!.]*.qca.txt")) or [p for p in [folder / "intri.yml"] if p.exists()]
     if len(found) == 1:
         return found[0]
     raise RecordingError(

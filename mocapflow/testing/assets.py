@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from pydantic import ValidationError
 
 from mocapflow.assets import Body, GarmentMesh
 from mocapflow.data import NO_CLOTH, Past, Pose, PoseBatch
@@ -12,6 +14,7 @@ from mocapflow.dressing.guards import body_of, drape_of, mesh_of, velocity_of
 from mocapflow.dressing.roles import BodyModel, Draper, Garment
 from mocapflow.geometry import kinematics
 from mocapflow.records import F64
+from mocapflow.registry import load_registry
 from mocapflow.scene import Scene
 from mocapflow.testing import scenes
 from mocapflow.testing.bodies import tiny_body
@@ -62,6 +65,12 @@ class GarmentConformance(Conformance):
         """No parameter is fixed."""
         low, high = self.sewn().parameter_bounds.T
         assert (low < high).all()
+
+    def test_installed_drapers_lay_it(self) -> None:
+        """Every draper of the installed plugins, with its default settings, lays it on the body near rest."""
+        scene = Scene(cameras=(), body=self.make_body(), garment=self.sewn())
+        for draper in _installed():
+            drape_of(draper, *_batch(scene), Past(), scene)
 
 
 class DraperConformance(Conformance):
@@ -138,6 +147,18 @@ class BodyConformance(Conformance):
         """The files exist: their content is part of the cache key."""
         for path in self.body.inputs(self.recording):
             assert path.exists()
+
+
+def _installed() -> Iterator[Draper]:
+    """Yield the drapers of all plugins, but for those that have no defaults or lack a library that they need."""
+    for classes in load_registry().provided("draper").values():
+        for cls in classes:
+            try:
+                draper = cls()
+            except ValidationError:
+                continue
+            assert isinstance(draper, Draper)
+            yield draper
 
 
 def _batch(scene: Scene) -> tuple[PoseBatch, F64]:

@@ -82,7 +82,7 @@ def chosen(recording: Path, wanted: str) -> tuple[Path | None, str]:
     truth = recording / "truth/angles.csv"
     if wanted or truth.is_file():
         return (recording / wanted if wanted else truth), ""
-    files = sorted((recording / "reference").glob("*"))
+    files = sorted((recording / "reference").glob("[!.]*"))
     there = [path for path in files if path.suffix.lower() in SUFFIXES and path.name != COMMON_POINTS]
     if len(there) == 1:
         return there[0], ""

@@ -20,6 +20,7 @@ EASE = 0.002  # m, the least room between waistband and skin
 MEANT = 1.3  # a measure that is further below the body's own is a mistake
 LARGEST_ROOM = 0.08  # m between waistband and skin: more can't hold a garment up
 WHOSE = "is the body this person's? a template is set by body.height_m and body.shape"
+PART = "only a part of the body is used: body.part: full wears what reaches beyond it"
 
 
 def even_links(rows: F64, link: float) -> F64:
@@ -68,7 +69,7 @@ def _torso(garment: str, body: Body, height: float) -> F64:
         raise GarmentError(
             f"{garment}: there is no body at waist_height_m = {height:.2f}",
             hint=f"the height is metres above the floor; the rest body ends at {body.vertices[:, 2].max():.2f} m\n"
-            f"{WHOSE}",
+            f"{PART if body.cut.any() else WHOSE}",
         )
     torso = max(outlines, key=sections.perimeter)
     if not _holds(torso, middle(body)):

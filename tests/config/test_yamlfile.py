@@ -192,5 +192,6 @@ def test_a_file_that_is_no_text(folder):
 
 
 def test_a_folder_without_any_file_is_said_to_have_none(tmp_path):
+    (tmp_path / ".hidden.yaml").touch()
     with pytest.raises(PipelineError, match=rf"there is no such file\n +{tmp_path} has no YAML file at all"):
         read(tmp_path / "skirt.yaml")

@@ -232,6 +232,9 @@ def test_not_a_calibration(tmp_path):
     (tmp_path / "a.qca.txt").write_text("hello")
     with pytest.raises(RecordingError, match="not a Qualisys calibration"):
         read_cameras(tmp_path)
+    (tmp_path / "._a.qca.txt").write_bytes(b"\x00\x05\x16\x07")  # as a Mac leaves them on other disks
+    with pytest.raises(RecordingError, match="not a Qualisys calibration"):
+        read_cameras(tmp_path)
     (tmp_path / "b.qca.txt").write_text(QUALISYS)
     with pytest.raises(RecordingError, match=r"2 calibration files: a\.qca\.txt, b\.qca\.txt"):
         read_cameras(tmp_path)

@@ -176,6 +176,13 @@ def test_a_skirt_that_can_not_be_says_what_to_do(change, said):
         Skirt(**{**SKIRT, **change}).sew(BODY)
 
 
+@pytest.mark.parametrize(("cut", "said"), [(False, "is the body this person's"), (True, "body.part: full")])
+def test_a_waist_above_the_body_may_be_above_the_part_of_it_that_is_used(cut, said):
+    body = replace(BODY, cut=np.full(len(BODY.vertices), cut))
+    with pytest.raises(GarmentError, match=rf"there is no body at(.|\n)*{said}"):
+        Skirt(**{**SKIRT, "waist_height_m": 2.5}).sew(body)
+
+
 def test_a_skirt_does_not_hang_from_the_shoulders():
     body = template_body()
     shoulders = body.positions[body.joint("shoulder_l"), 2]

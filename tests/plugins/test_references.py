@@ -334,6 +334,7 @@ def test_the_file_in_reference_is_found(tmp_path: Path) -> None:
     (tmp_path / "reference").mkdir()
     (tmp_path / "reference/registration.csv").touch()
     (tmp_path / "reference/walk.c3d").touch()
+    (tmp_path / "reference/._walk.c3d").touch()  # as a Mac leaves them on other disks
     assert chosen(tmp_path, "") == (tmp_path / "reference/walk.c3d", "")
     (tmp_path / "reference/walk.trc").touch()
     path, note = chosen(tmp_path, "")
