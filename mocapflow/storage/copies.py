@@ -39,7 +39,7 @@ class Copies:
 
     Raises:
         StoreError: here and in all methods: the URL can't be reached.
-        MocapflowError: there is no such kind of URL.
+        MocapflowError: there is no such kind of URL, or it needs a package that is not installed.
     """
 
     def __init__(self, url: str) -> None:
@@ -116,7 +116,7 @@ class Copies:
             raise
         except ImportError as error:
             hint = "pip install 'mocapflow[remote]', and what fsspec names for this kind of URL"
-            raise StoreError(f"a store at {self.url} needs a package: {error}", hint=hint) from error
+            raise MocapflowError(f"a store at {self.url} needs a package: {error}", hint=hint) from error
         except Exception as error:  # every kind of store has its own
             hint = "without --store the results are kept in a folder beside the run"
             message = f"can't reach the store at {self.url}: {type(error).__name__}: {error}"

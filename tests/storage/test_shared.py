@@ -280,6 +280,16 @@ def test_what_cannot_be_reached_is_told(tmp_path, path):
     assert caught.value.exit_status == 2
 
 
+def test_a_missing_package_is_wrong_input(monkeypatch):
+    def url_to_fs(url, **options):
+        raise ImportError("FarFileSystem requires far")
+
+    monkeypatch.setattr(fsspec.core, "url_to_fs", url_to_fs)
+    with pytest.raises(MocapflowError, match=r"needs a package: FarFileSystem requires far\n +pip install") as caught:
+        Copies("far://lab")
+    assert caught.value.exit_status == 2
+
+
 def test_a_store_is_named_by_folder_or_url(tmp_path):
     assert placed(None, tmp_path) == (str(tmp_path), None)
     assert placed("elsewhere", tmp_path) == ("elsewhere", None)
