@@ -38,10 +38,11 @@ def density(colour, floor=True, spread=0.02, shadow=SHADOW, grey=None):
 
 @pytest.mark.parametrize(("spread", "sd"), [(0.02, 0.02), (0.001, 0.012)])
 def test_a_lit_pixel_is_as_likely_as_noise_makes_it(spread, sd):
-    """Tints scatter less than lightness, those of strong colours more."""
-    each = np.array([sd, *[np.hypot(TINT * sd, BENDING * 0.05)] * 2])
-    off = np.array([0.6, -1.0, 0.5]) * sd
-    expected = norm.logpdf(off, scale=each).sum()
+    """Tints scatter less than lightness, those of strong colours more; one that fits is no likelier for it."""
+    tint = np.hypot(TINT * sd, BENDING * 0.05)
+    off = np.array([0.6, -1.0, 0.5])
+    expected = norm.logpdf([off[0] * sd, *(off[1:] * sd * sd / tint)], scale=sd).sum()
+    off *= sd
     assert density(COLOUR + off, floor=False, spread=spread) == pytest.approx(expected, rel=1e-4)
     both = density(COLOUR + off, floor=False, spread=spread, grey=0.7 * sd)
     assert both == pytest.approx(expected + norm.logpdf(0.7 * sd, scale=sd), rel=1e-4)
