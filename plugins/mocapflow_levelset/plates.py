@@ -25,7 +25,7 @@ from mocapflow_levelset.channels import PLANES, ChannelName, features
 
 BLACK = (-16 / 100, 128 / 255, 128 / 255)  # where the rays start, in lab channels scaled to [0, 1]
 BENDING = 0.05  # how far a colour may be off the plate's, or its ray, as a share of the plate's distance from grey
-TINT = 0.65  # standard deviation of a and b over that of L: 0.2 to 0.55 were found, the most under noise
+TINT = 0.65  # standard deviation of a and b over a plate's spread: 0.1 to 0.6 were found, the most under noise
 STRANGER = np.float32(-6.0)  # log density below which no pixel is called more unlikely
 LOG_ROOT = np.float32(-0.5 * np.log(2 * np.pi))
 
@@ -107,11 +107,12 @@ def first_lab(channels: Sequence[ChannelName]) -> int:
 
 @numba.njit(cache=True, error_model="numpy")
 def _densities(values, plate, spread, may_fall, shadow, lab, out):  # type: ignore[no-untyped-def]
+    least_sd = shadow[0]
     for n in range(out.size):
         if np.isinf(spread[n]):
             out[n] = np.nan
             continue
-        sd = max(spread[n], shadow[0])
+        sd = max(spread[n], least_sd)
         norm, inverse = LOG_ROOT - np.log(sd), np.float32(0.5) / (sd * sd)
         tint_inverse = np.float32(0.5) / _tint_variance(plate, n, lab, sd)
         lit, others = np.float32(0), np.float32(0)
@@ -145,7 +146,7 @@ def _is_tint(c, lab):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, error_model="numpy")
 def _tint_variance(plate, n, lab, sd):  # type: ignore[no-untyped-def]
-    """Return the variance of a and b of pixel n of the lit plate, where `sd` is the standard deviation of L."""
+    """Return the variance of a and b of pixel n of the lit plate, whose spread is `sd`."""
     if lab < 0:
         return sd * sd
     a, b = plate[lab + 1, n] - np.float32(BLACK[1]), plate[lab + 2, n] - np.float32(BLACK[2])

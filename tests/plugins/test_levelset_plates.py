@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from mocapflow_levelset.channels import features
+from mocapflow_levelset.channels import PLANES, features
 from mocapflow_levelset.colours import bin_at, bins_of
 from mocapflow_levelset.evidence import Room, from_image, in_room, smoothed
 from mocapflow_levelset.masks import counted
@@ -57,9 +57,7 @@ def test_a_sock_as_light_as_the_floor_is_told_by_its_tint():
 @pytest.mark.parametrize("channels", [("lab",), ("grey", "lab"), ("grey",)], ids=str)
 def test_squared_deviations_are_what_the_density_falls_by(channels):
     rng = np.random.default_rng(4)
-    planes = rng.uniform(0.3, 0.7, ({"lab": 3, "grey": 1}[channels[0]] + 3 * (len(channels) - 1), 5, 6)).astype(
-        np.float32
-    )
+    planes = rng.uniform(0.3, 0.7, (sum(PLANES[name] for name in channels), 5, 6)).astype(np.float32)
     plate = Plate(planes, np.full((5, 6), 0.03, np.float32))
     values = (planes + rng.normal(0, 0.02, planes.shape)).astype(np.float32)
     dark = np.zeros((5, 6), bool)
