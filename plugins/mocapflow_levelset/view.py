@@ -104,21 +104,21 @@ def find(view: View, resolutions: Sequence[Resolution], method: Method) -> Found
     if crop is None:
         return Found(whole, Costs(0.0, 0.0, 0.0))
     part = view.of(crop)
-    settled, prior = _settled(part, resolutions, method)
-    new = redistance(_refined(settled.level, part, method), BAND_PX)
+    settled = _settled(part, resolutions, method)
+    found = redistance(_refined(settled.level, part, method), BAND_PX)
     # near the rim of a part its statistics lack a side
     kept = crop if view.moved is None else crops.around(view.moved, method.margin_px // 2, multiple)
     assert kept is not None
-    kept.of(whole)[:] = kept.within(crop).of(new)
-    now = _costs(crop.of(whole), settled, prior, method)
+    kept.of(whole)[:] = kept.within(crop).of(found)
+    now = _costs(crop.of(whole), settled, method)
     if view.moved is None:
         return Found(whole, now)
-    before = _costs(part.start, settled, prior, method)
+    before = _costs(part.start, settled, method)
     return Found(whole, Costs(*(new - old for new, old in zip(now, before, strict=True))))
 
 
-def _settled(view: View, resolutions: Sequence[Resolution], method: Method) -> tuple[Settled, F32]:
-    """Return where the descent ended, coarse to fine, and the prior that it kept near."""
+def _settled(view: View, resolutions: Sequence[Resolution], method: Method) -> Settled:
+    """Return where the descent ended, coarse to fine."""
     images = crops.pyramid(view.image, [each.factor for each in resolutions])
     front, factor = view.start, 1
     for resolution in resolutions:
@@ -128,7 +128,7 @@ def _settled(view: View, resolutions: Sequence[Resolution], method: Method) -> t
         begin = without_islands(front, evidence)
         settled = settle(begin, prior, evidence, resolution.window, method.weights, resolution.schedule)
         front, factor = settled.level, resolution.factor
-    return settled, prior
+    return settled
 
 
 def _refined(front: F32, view: View, method: Method) -> F32:
@@ -146,10 +146,10 @@ def _refined(front: F32, view: View, method: Method) -> F32:
     return sharpened(redistance(front, NEAR_PX), view.image, view.matte.room, movable, view.matte.reach_px)
 
 
-def _costs(level: F32, settled: Settled, prior: F32, method: Method) -> Costs:
+def _costs(level: F32, settled: Settled, method: Method) -> Costs:
     """Return what a level set costs by the evidence at hand, where the contour has moved in it."""
     band = np.float32(method.weights.band_px)
-    return costs(settled._replace(level=np.clip(level, -band, band)), prior, method.weights)
+    return costs(settled._replace(level=np.clip(level, -band, band)), method.weights)
 
 
 def _by_chromaticity(front: F32, view: View, contact: Contact, method: Method) -> F32:
