@@ -65,7 +65,7 @@ class TwistGaussNewton(PoseSolver):
         """Return the pose that explains the matches best, its covariance, and what the images told of it."""
         guess = Guess(state.estimate.pose, state.cloth)
         motion = ClothMotion(model, past, self.cloth_unknowns)
-        anchor = Anchor(with_neutral_cloth(guess, model), self._precision(motion, guess))
+        anchor = Anchor(with_neutral_cloth(guess, model), self._anchor_precision(motion, guess))
         surface, damping = model.surface(guess.pose, guess.cloth), self._least_damping(past, turn)
         tried: dict[Pose, Sequence[Residual]] = {}
         found: Quadratic | None = None  # the last quadratic models, for the covariance
@@ -107,8 +107,8 @@ class TwistGaussNewton(PoseSolver):
             return least
         return max(least, self.first_damping * FIRST_DAMPING_PER_TURN**turn.index)
 
-    def _precision(self, motion: ClothMotion, guess: Guess) -> F64:
-        """Return one over the variance of the damping of every unknown."""
+    def _anchor_precision(self, motion: ClothMotion, guess: Guess) -> F64:
+        """Return one over the variance of each unknown (S,) about where the turn of the loop began."""
         turn, bend = np.radians(self.root_sd_deg), np.radians(self.angle_sd_deg)
         pose = np.repeat([turn, self.root_sd_m, bend], [3, 3, len(guess.pose.angles)])
         cloth = self.cloth_sd * np.ptp(motion.bounds, axis=1)
