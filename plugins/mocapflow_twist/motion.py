@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mocapflow.data import Cloth, Past, Pose
-from mocapflow.geometry.sewing import TAKE_UP, THICKNESS
+from mocapflow.geometry.sewing import NO_FORCES
 from mocapflow.model import ClothedModel, moved
 from mocapflow.records import F64, Bool
 from mocapflow_twist.normal_equations import Equations
@@ -74,7 +74,7 @@ class ClothMotion:
     def _slow(self) -> Bool:
         """Which cloth parameters (Q,) follow the recording, not the frame: a cloth fitter moves them."""
         assert self.model.scene.garment is not None
-        return np.array([name in (TAKE_UP, THICKNESS) for name in self.model.scene.garment.parameter_names])
+        return np.array([name in NO_FORCES for name in self.model.scene.garment.parameter_names])
 
     @property
     def bounds(self) -> F64:
