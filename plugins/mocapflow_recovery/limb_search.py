@@ -35,7 +35,6 @@ UNDOUBTED = 2.0  # times as distant may be a fit that is doubted no more: a leg 
 WITHOUT_HINT = 1.1  # the same, without a hint: of a lost foot all other limbs and the cloth tell nothing
 NEAR_M = 0.35  # changes farther than this from the model are somebody else
 START = np.radians(6.0)  # how far off, in each angle, a given first pose may be
-TOLERANCE = 0.03  # share by which the error may grow for parts to stay as they were fitted
 FIRST_REPEATS = 2  # times that each search is repeated in a first frame whose fit is doubted
 UNKNOWN = "too little is known of the room behind the person: limbs that are lost are not looked for"
 FEET_CAMOUFLAGED = "the feet look like the floor: outlines are not compared with them, and ankles are unsure"
@@ -136,7 +135,7 @@ class LimbSearch(TriggeredSearch):
         if not self._due(trigger, mismatch, frame.time, past, body):
             return noted(result, UNSEARCHED, doubted=True) if trigger.doubtful else without_history(result, past)
         scorer = self._scorer(predicted, result, trimaps, past, model)
-        searches = Searches(scorer, self._plan(body), predicted, fitted, self.gain, TOLERANCE)
+        searches = Searches(scorer, self._plan(body), predicted, fitted, self.gain)
         found = self._searched(frame.index, scorer.score(result), searches, trigger, settle)
         return with_search(found, result, mismatch.area, past)
 

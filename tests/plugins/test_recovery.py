@@ -180,7 +180,7 @@ def test_a_skirt_that_flies_where_the_model_hangs_leads_no_limb_astray() -> None
 ])  # fmt: skip
 def test_it_is_searched_as_if_cloth_hung_and_as_if_it_flew(clothed, given, doubtful, near, far) -> None:
     scorer = SimpleNamespace(start=given, model=SimpleNamespace(clothed=clothed))
-    searches = Searches(scorer, PLAN, POSE, POSE, 0.1, 0.03)
+    searches = Searches(scorer, PLAN, POSE, POSE, 0.1)
     ways = LimbSearch()._strategies(searches, Trigger("lost", doubtful, ()))
     weights = [way.keywords["cloth_weight"] for way in ways if "cloth_weight" in way.keywords]
     assert (len(ways) - len(weights), weights) == (near, far)
@@ -193,7 +193,7 @@ def test_a_limb_that_is_odd_is_looked_for_alone() -> None:
     fitted, leg = Pose(root=POSE.root, angles=POSE.angles + 0.3), parts(SCENE.body)[1]
     model, past = SimpleNamespace(scene=SCENE), scenes.tiny_past(SCENE, fitted)
     scorer = SimpleNamespace(start=None, distances=apart_from_truth, model=model, past=past)
-    searches = Searches(scorer, PLAN, fitted, fitted, 0.01, 0.0)
+    searches = Searches(scorer, PLAN, fitted, fitted, 0.01)
     (way,) = LimbSearch()._strategies(searches, Trigger("a joint is bent beyond its limits", False, (leg,)))
     change = np.abs(way(np.random.default_rng(0)).angles - POSE.angles)
     assert change[leg].mean() < 0.25
