@@ -50,11 +50,11 @@ class Trimap(NamedTuple):
 
 
 @memoised
-def small_rooms(background: Background, cameras: tuple[Camera, ...], rows: int = ROWS) -> tuple[SmallRoom, ...]:
-    """Return the empty room in images of about so many rows, by camera; made once, forgotten with the background."""
+def small_rooms(background: Background, cameras: tuple[Camera, ...]) -> tuple[SmallRoom, ...]:
+    """Return the empty room in small images, by camera; made once, forgotten with the background."""
     rooms = []
     for number, camera in enumerate(cameras):
-        factor = max(round(camera.size[1] / rows), 1)
+        factor = max(round(camera.size[1] / ROWS), 1)
         rooms.append(SmallRoom(shrunk(camera, factor), factor, plate_in(background, number, CHANNELS, factor)))
     return tuple(rooms)
 
