@@ -21,6 +21,7 @@ from mocapflow.interrupts import check
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import silent
 from mocapflow.results import Files, RunFolder
+from mocapflow.running import damage
 from mocapflow.running.component_failures import FAILURE_LOG, naming_failures
 from mocapflow.running.progress import Progress
 from mocapflow.running.recipes import Step
@@ -61,6 +62,7 @@ class Execution:
         self, pipeline: Pipeline, store: Store, out: Path, steps: Sequence[Step], *, fresh: bool, report: Report
     ) -> None:
         self._pipeline, self._store, self._out = pipeline, store, out
+        self._repairs = damage.Repairs(store, report)
         self._steps = {step.label: step for step in steps}
         self._fresh, self._report = fresh, report
         self._naming_failures = partial(naming_failures, registry=pipeline.registry, log=out / FAILURE_LOG)
@@ -112,25 +114,15 @@ class Execution:
                 try:
                     return self._read(step, started)
                 except Corrupted as error:
-                    started = self._mended(step, started, error)
+                    started = self._repairs.mended(step, started, error)
             return self._enter_made(step, self._chain(step, started, lock) if step.chain else self._whole(step))
 
     def _started(self, step: Step) -> Artifact | None:
-        for damaged in self._store.damaged(step.key):
-            self._set_aside(step, damaged, Corrupted("its description can't be read"))
-        started = self._store.find(step.key)
+        started = self._repairs.readable(step)
         if started is not None and self._fresh:
             self._store.discard(started)
             return None
         return started
-
-    def _mended(self, step: Step, made: Artifact, error: Corrupted) -> Artifact | None:
-        """Return what is left of a result that can't be read: of a track its frames, to write its arrays from again."""
-        if not step.chain:
-            return self._set_aside(step, made.path, error)
-        self._warn([f"{made.path.name} is damaged and written anew from its frames: {error.message}"])
-        kept = {name: value for name, value in made.attributes.items() if name != "sealed"}
-        return Artifact(made.path, {**kept, "complete": False})
 
     def _whole(self, step: Step) -> Made:
         made = self._run(step)
@@ -147,7 +139,7 @@ class Execution:
         try:
             return self._run(step, self._checkpoint(step, with_versions(started), lock), mixed)
         except Corrupted as error:
-            return self._chain(step, self._set_aside(step, started.path, error), lock)
+            return self._chain(step, self._repairs.set_aside(step, started.path, error), lock)
 
     def _checkpoint(self, step: Step, artifact: Artifact, lock: Lock) -> Checkpoint:
         indices, observers = step.recording.indices, self._pipeline.registry.observers
@@ -267,14 +259,6 @@ class Execution:
                 said.append(f"{what} were made with {how}")
         self._warn(said)
         return said
-
-    def _set_aside(self, step: Step, path: Path, error: Corrupted) -> Artifact | None:
-        """Move a damaged result away and return what takes its place: its copy, where the store is shared."""
-        kept = self._store.set_aside(path).relative_to(path.parent)
-        copy = self._store.find(step.key)
-        what = "made anew" if copy is None else "replaced by its copy"
-        self._warn([f"{path.name} is damaged and {what}: {error.message} (kept as {kept})"])
-        return copy
 
     def _warn(self, warnings: Iterable[str]) -> None:
         for warning in warnings:
