@@ -89,8 +89,8 @@ def settle(level: F32, prior: F32, evidence: Evidence, window: Window, weights: 
             gaussians = local_gaussians(evidence.sparse, weight, sparse, sums, grid, weights.sigma_px / stride, reach)
             runs = near(level, weights, first) if step else runs
             log_ratio(runs, evidence, gaussians, grid.cell_px, weights, ratio)
-            if evidence.prior_ratio is not None:
-                ratio = np.clip(ratio + evidence.prior_ratio, -weights.clip, weights.clip)
+            if evidence.colour_ratio is not None:
+                ratio = np.clip(ratio + evidence.colour_ratio, -weights.clip, weights.clip)
         advance(level, ratio, prior, runs, change, weights)
     return Settled(level, ratio, runs, prior)
 

@@ -193,4 +193,4 @@ def _evidence(small: U8, view: View, resolution: Resolution, method: Method) -> 
         evidence = in_room(evidence, small, method.channels, room)
     if view.colours is None:
         return evidence
-    return evidence._replace(prior_ratio=evidence.weight * view.colours[bins_of(small)])
+    return evidence._replace(colour_ratio=evidence.weight * view.colours[bins_of(small)])
