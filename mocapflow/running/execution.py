@@ -90,15 +90,22 @@ class Execution:
         return self._results[label]
 
     def _find(self, step: Step) -> Artifact | None:
+        """Return what the store holds, if that is all that a stage would make and it may be taken."""
         return None if self._fresh else find_hit(step, self._store)
 
     def _loaded(self, step: Step, found: Artifact) -> Any:
+        """Return a result from the store; one that can't be read is made anew."""
         try:
             return self._read(step, found)
         except Corrupted:  # or somebody is making it anew: who may write it looks again
             return self._made(step)
 
     def _read(self, step: Step, found: Artifact) -> Any:
+        """Return a result from the store.
+
+        Raises:
+            Corrupted: it can't be read back.
+        """
         result = self._store.load(found, step.frames if step.chain else None)
         self._enter_found(step, found)
         if step.named.stage.looks_back:
@@ -106,6 +113,7 @@ class Execution:
         return result
 
     def _made(self, step: Step) -> Any:
+        """Return a result that this run makes, or that another one has made while this one waited to write it."""
         if not step.stored:
             return self._enter_made(step, self._run(step))
         with self._store.writer(step.key, f"{step.label}-{step.key[:6]}", self._report) as lock:
@@ -118,6 +126,7 @@ class Execution:
             return self._enter_made(step, self._chain(step, started, lock) if step.chain else self._whole(step))
 
     def _started(self, step: Step) -> Artifact | None:
+        """Return what there is to go on from, for who may write it; nothing where all is to be made anew."""
         started = self._repairs.readable(step)
         if started is not None and self._fresh:
             self._store.discard(started)
@@ -125,6 +134,7 @@ class Execution:
         return started
 
     def _whole(self, step: Step) -> Made:
+        """Run a stage that makes its result at once, and store that."""
         made = self._run(step)
         begun = self._store.begin(step.label, step.key, step.recipe)
         with self._naming_failures(step.named.stage):
@@ -132,6 +142,7 @@ class Execution:
         return made
 
     def _chain(self, step: Step, started: Artifact | None, lock: Lock) -> Made:
+        """Run a stage that goes on frame by frame, from where it has started; its checkpoint stores what it makes."""
         if started is None or not started.frames:
             return self._run(step, self._checkpoint(step, self._store.begin(step.label, step.key, step.recipe), lock))
         self._report(f"{step.label}: going on after {started.frames} frames")
@@ -142,6 +153,7 @@ class Execution:
             return self._chain(step, self._repairs.set_aside(step, started.path, error), lock)
 
     def _checkpoint(self, step: Step, artifact: Artifact, lock: Lock) -> Checkpoint:
+        """Return where a chain keeps its frames; observers, and who reads of progress, are told of each."""
         indices, observers = step.recording.indices, self._pipeline.registry.observers
         longer = range(indices.start, indices.start + indices.step * max(len(indices), artifact.frames), indices.step)
         names = [camera.name for camera in step.recording.cameras]
@@ -158,6 +170,7 @@ class Execution:
         )  # fmt: skip
 
     def _run(self, step: Step, checkpoint: Checkpoint | None = None, mixed: Sequence[str] = ()) -> Made:
+        """Run a stage; `mixed` has been told of its earlier frames and is kept with the warnings."""
         inputs = {name: self._input(step, source, checkpoint) for name, source in step.sources.items()}
         self._report(f"{step.label}: running {step.named.stage.name}")
         check()
@@ -174,6 +187,7 @@ class Execution:
         return Made(value, [*told, *mixed], time.process_time() - cpu, time.perf_counter() - wall)
 
     def _input(self, step: Step, source: Source, checkpoint: Checkpoint | None) -> Any:
+        """Return what a stage is given for one parameter of its `run`, by where that comes from."""
         quiet = checkpoint is not None or step.passes_frames
         watch = silent if quiet else Progress(step.label, self._report, brief=True).tell
         given: Any = None
