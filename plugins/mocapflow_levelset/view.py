@@ -19,7 +19,9 @@ from mocapflow_levelset.matting import NEAR_PX, sharpened
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.statistics import Window
 
-BAND_PX = 12.0  # half width of the band in which a silhouette's distances are computed
+# half width of the band in which a silhouette's distances are computed; that of `functional`, so that the distance to
+# the model's outline is computed once for both
+BAND_PX = 12.0
 
 
 class Contact(NamedTuple):
