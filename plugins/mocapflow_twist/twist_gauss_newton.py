@@ -102,6 +102,7 @@ class TwistGaussNewton(PoseSolver):
         )
 
     def _least_damping(self, past: Past, turn: Turn) -> float:
+        """Return the damping of a step at least, in a turn of the loop: more in a first frame."""
         least = self.damping * self.damping_per_turn**turn.index
         if past.moments:
             return least
@@ -132,6 +133,7 @@ class TwistGaussNewton(PoseSolver):
         return guess, damping
 
     def _estimate(self, problem: Problem, guess: Guess, found: Quadratic, matches: Matches) -> Estimate:
+        """Return where the solver ended; increments there are about the root, of an estimate about the origin."""
         data, prior = found
         about_root = covariance(data.hessian, prior.hessian, data.energy, problem.data.measurements)
         to_origin = steps.about_origin(problem.centre(guess), problem.unknowns)
