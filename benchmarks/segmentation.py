@@ -89,10 +89,10 @@ def shifted(truth: F32, pixels: int) -> F32:
 
 def levelset(task: Task, start: F32, known: bool = False) -> Bool:
     segmenter = LevelSet(shape_weight=0.0)
-    levels = segmenter._levels(warm=False)
+    resolutions = segmenter._resolutions(warm=False)
     rooms = {factor: Room(plate, np.zeros_like(plate.spread, bool), Shadow()) for factor, plate in task.plates.items()}
     view = View(task.image, start, start, counted(start.shape, BORDER_PX), rooms if known else None)
-    return find(view, levels, segmenter._method()).level > 0
+    return find(view, resolutions, segmenter._method()).level > 0
 
 
 def grabcut(task: Task, start: F32, iterations: int) -> Bool:

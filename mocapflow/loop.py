@@ -50,7 +50,7 @@ def settle(
     for index in range(steady.cap):
         turn = Turn(index=index, change=change, far=far)
         with noting(f"frame {frame.index}, iteration {index + 1}"):
-            state = take_turn(frame, state, past, steps, functional, turn, watch)
+            state = take_turn(frame, state, steps, functional, turn, watch)
             energy[index] = functional.values(state)
         last_cost, cost = cost, functional.total(energy[index])
         change = measure_change(recent[-1], state, model.scene)
@@ -78,14 +78,14 @@ def settle(
 
 
 def take_turn(
-    frame: Frame, state: FrameState, past: Past, steps: Steps, functional: Functional, turn: Turn, watch: Stopwatch
+    frame: Frame, state: FrameState, steps: Steps, functional: Functional, turn: Turn, watch: Stopwatch
 ) -> FrameState:
     """Return the state after one turn: silhouettes, then the pose by the matches, then the cloth."""
-    model = functional.model
+    model, priors, past = functional.model, functional.priors, functional.past
     segmentation = segmentation_of(steps.segmenter, frame, state, past, model.scene, turn)
     watch.lap("segment")
     match = partial(pool_matches, steps.matchers, frame, segmentation, past, model.scene, turn)
-    estimate = estimate_of(steps.pose_solver, match, state, model, steps.priors, past, turn)
+    estimate = estimate_of(steps.pose_solver, match, state, model, priors, past, turn)
     watch.lap("solve")
     fitter = steps.cloth_fitter
     cloth = cloth_of(fitter, frame, segmentation, estimate, model, past, turn) if fitter else NO_CLOTH

@@ -28,7 +28,7 @@ from mocapflow.records import F64, silent
 from mocapflow.results import ImageFlow, Track, ViewChecks
 from mocapflow.scene import Scene
 from mocapflow.steady import Steady
-from mocapflow.storage.checkpoint import Checkpoint
+from mocapflow.storage.checkpoint import Checkpoint, Rest
 from mocapflow.timing import Stopwatch
 
 LOG = logging.getLogger("mocapflow")
@@ -92,7 +92,7 @@ class CoupledLoop(Stage):
         if self.keep == "trace":
             checkpoint.keep_turns(self.steady.cap)
         if self.looks_back:
-            self._refuse(rest for rest in checkpoint.rests() if rest[0] in recording.indices)
+            self._refuse(rest for rest in checkpoint.rests() if rest.frame in recording.indices)
         past, watch = checkpoint.past(), Stopwatch(TIMED)
         for raw in recording.frames(since=checkpoint.next_index):
             with noting(f"frame {raw.index}"):
@@ -127,7 +127,7 @@ class CoupledLoop(Stage):
         Raises:
             ComponentFailed: it has one.
         """
-        self._refuse(zip(made.frame.tolist(), made.iterations.tolist(), made.steady.tolist(), strict=True))
+        self._refuse(map(Rest, made.frame.tolist(), made.iterations.tolist(), made.steady.tolist()))
 
     @property
     def steps(self) -> Steps:
@@ -228,11 +228,11 @@ class CoupledLoop(Stage):
             raise ComponentFailed(f"frame {frame.index} {kind} in {result.iterations} turns: {moved}", hint=GO_ON)
 
     @staticmethod
-    def _refuse(rests: Iterable[tuple[int, int, bool]]) -> None:
-        """Raise for the first saved frame (index, turns, came to rest) that did not come to rest; see `complain`."""
-        for frame, turns, steady in rests:
-            if turns and not steady:
-                raise ComponentFailed(f"frame {frame} did not come to rest in {turns} turns", hint=GO_ON)
+    def _refuse(rests: Iterable[Rest]) -> None:
+        """Raise for the first saved frame that did not come to rest; see `complain`."""
+        for rest in rests:
+            if rest.turns and not rest.steady:
+                raise ComponentFailed(f"frame {rest.frame} did not come to rest in {rest.turns} turns", hint=GO_ON)
 
 
 def prepared(frame: Frame, checks: ViewChecks | None, flow: ImageFlow | None) -> Frame:

@@ -116,14 +116,14 @@ def parts_of(steps: Sequence[Step]) -> list[str]:
 
 def make_parts(labels: Sequence[str], invocation: Invocation, out: Path, workers: int, scheduler: str | None) -> None:
     """Make the parts of a track on workers; a run finds them in the store."""
-    tasks = {label: partial(track, invocation.absolute(), out.absolute(), label) for label in labels}
+    tasks = {label: partial(make_part, invocation.absolute(), out.absolute(), label) for label in labels}
     for number, (label, result) in enumerate(finished(tasks, workers, scheduler), 1):
         result()
         typer.echo(f"{number} of {len(labels)}  {label}", err=True)
 
 
-def track(invocation: Invocation, out: Path, label: str) -> None:
-    """Make one stage and what it needs."""
+def make_part(invocation: Invocation, out: Path, label: str) -> None:
+    """Make one part of a track and what it needs, on a worker."""
     from mocapflow.running import runner
 
     pipeline, store = invocation.load(), Path(invocation.store)

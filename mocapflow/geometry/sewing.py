@@ -17,6 +17,7 @@ HARMONICS: tuple[tuple[str, ...], ...] = (
 )
 THICKNESS = "thickness_m"
 TAKE_UP = "take_up"
+NO_FORCES = (THICKNESS, TAKE_UP)  # these follow the recording, not the frame
 LARGEST_TILT = math.radians(40)
 LARGEST_THICKNESS = 0.010  # m
 LARGEST_TAKE_UP = 0.15  # share of the length of a strand

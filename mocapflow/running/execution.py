@@ -21,6 +21,7 @@ from mocapflow.interrupts import check
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import silent
 from mocapflow.results import Files, RunFolder
+from mocapflow.running import damage
 from mocapflow.running.component_failures import FAILURE_LOG, naming_failures
 from mocapflow.running.progress import Progress
 from mocapflow.running.recipes import Step
@@ -61,6 +62,7 @@ class Execution:
         self, pipeline: Pipeline, store: Store, out: Path, steps: Sequence[Step], *, fresh: bool, report: Report
     ) -> None:
         self._pipeline, self._store, self._out = pipeline, store, out
+        self._repairs = damage.Repairs(store, report)
         self._steps = {step.label: step for step in steps}
         self._fresh, self._report = fresh, report
         self._naming_failures = partial(naming_failures, registry=pipeline.registry, log=out / FAILURE_LOG)
@@ -88,15 +90,22 @@ class Execution:
         return self._results[label]
 
     def _find(self, step: Step) -> Artifact | None:
+        """Return what the store holds, if that is all that a stage would make and it may be taken."""
         return None if self._fresh else find_hit(step, self._store)
 
     def _loaded(self, step: Step, found: Artifact) -> Any:
+        """Return a result from the store; one that can't be read is made anew."""
         try:
             return self._read(step, found)
         except Corrupted:  # or somebody is making it anew: who may write it looks again
             return self._made(step)
 
     def _read(self, step: Step, found: Artifact) -> Any:
+        """Return a result from the store.
+
+        Raises:
+            Corrupted: it can't be read back.
+        """
         result = self._store.load(found, step.frames if step.chain else None)
         self._enter_found(step, found)
         if step.named.stage.looks_back:
@@ -104,6 +113,7 @@ class Execution:
         return result
 
     def _made(self, step: Step) -> Any:
+        """Return a result that this run makes, or that another one has made while this one waited to write it."""
         if not step.stored:
             return self._enter_made(step, self._run(step))
         with self._store.writer(step.key, f"{step.label}-{step.key[:6]}", self._report) as lock:
@@ -112,27 +122,19 @@ class Execution:
                 try:
                     return self._read(step, started)
                 except Corrupted as error:
-                    started = self._mended(step, started, error)
+                    started = self._repairs.mended(step, started, error)
             return self._enter_made(step, self._chain(step, started, lock) if step.chain else self._whole(step))
 
     def _started(self, step: Step) -> Artifact | None:
-        for damaged in self._store.damaged(step.key):
-            self._set_aside(step, damaged, Corrupted("its description can't be read"))
-        started = self._store.find(step.key)
+        """Return what there is to go on from, for who may write it; nothing where all is to be made anew."""
+        started = self._repairs.readable(step)
         if started is not None and self._fresh:
             self._store.discard(started)
             return None
         return started
 
-    def _mended(self, step: Step, made: Artifact, error: Corrupted) -> Artifact | None:
-        """Return what is left of a result that can't be read: of a track its frames, to write its arrays from again."""
-        if not step.chain:
-            return self._set_aside(step, made.path, error)
-        self._warn([f"{made.path.name} is damaged and written anew from its frames: {error.message}"])
-        kept = {name: value for name, value in made.attributes.items() if name != "sealed"}
-        return Artifact(made.path, {**kept, "complete": False})
-
     def _whole(self, step: Step) -> Made:
+        """Run a stage that makes its result at once, and store that."""
         made = self._run(step)
         begun = self._store.begin(step.label, step.key, step.recipe)
         with self._naming_failures(step.named.stage):
@@ -140,6 +142,7 @@ class Execution:
         return made
 
     def _chain(self, step: Step, started: Artifact | None, lock: Lock) -> Made:
+        """Run a stage that goes on frame by frame, from where it has started; its checkpoint stores what it makes."""
         if started is None or not started.frames:
             return self._run(step, self._checkpoint(step, self._store.begin(step.label, step.key, step.recipe), lock))
         self._report(f"{step.label}: going on after {started.frames} frames")
@@ -147,9 +150,10 @@ class Execution:
         try:
             return self._run(step, self._checkpoint(step, with_versions(started), lock), mixed)
         except Corrupted as error:
-            return self._chain(step, self._set_aside(step, started.path, error), lock)
+            return self._chain(step, self._repairs.set_aside(step, started.path, error), lock)
 
     def _checkpoint(self, step: Step, artifact: Artifact, lock: Lock) -> Checkpoint:
+        """Return where a chain keeps its frames; observers, and who reads of progress, are told of each."""
         indices, observers = step.recording.indices, self._pipeline.registry.observers
         longer = range(indices.start, indices.start + indices.step * max(len(indices), artifact.frames), indices.step)
         names = [camera.name for camera in step.recording.cameras]
@@ -166,6 +170,7 @@ class Execution:
         )  # fmt: skip
 
     def _run(self, step: Step, checkpoint: Checkpoint | None = None, mixed: Sequence[str] = ()) -> Made:
+        """Run a stage; `mixed` has been told of its earlier frames and is kept with the warnings."""
         inputs = {name: self._input(step, source, checkpoint) for name, source in step.sources.items()}
         self._report(f"{step.label}: running {step.named.stage.name}")
         check()
@@ -182,6 +187,7 @@ class Execution:
         return Made(value, [*told, *mixed], time.process_time() - cpu, time.perf_counter() - wall)
 
     def _input(self, step: Step, source: Source, checkpoint: Checkpoint | None) -> Any:
+        """Return what a stage is given for one parameter of its `run`, by where that comes from."""
         quiet = checkpoint is not None or step.passes_frames
         watch = silent if quiet else Progress(step.label, self._report, brief=True).tell
         given: Any = None
@@ -267,14 +273,6 @@ class Execution:
                 said.append(f"{what} were made with {how}")
         self._warn(said)
         return said
-
-    def _set_aside(self, step: Step, path: Path, error: Corrupted) -> Artifact | None:
-        """Move a damaged result away and return what takes its place: its copy, where the store is shared."""
-        kept = self._store.set_aside(path).relative_to(path.parent)
-        copy = self._store.find(step.key)
-        what = "made anew" if copy is None else "replaced by its copy"
-        self._warn([f"{path.name} is damaged and {what}: {error.message} (kept as {kept})"])
-        return copy
 
     def _warn(self, warnings: Iterable[str]) -> None:
         for warning in warnings:

@@ -22,7 +22,7 @@ from mocapflow.running.parts import in_parts
 from mocapflow.running.wiring import Source, latest, makes, wire
 
 BEGINNING = 10  # frames of the extent "beginning"
-SEEN = {Start: "first", Background: "all", Rig: "all", Body: "all", Recording: "all"}  # where a stage names no extent
+EXTENTS = {Start: "first", Background: "all", Rig: "all", Body: "all", Recording: "all"}  # by what a stage makes
 
 
 @dataclass(frozen=True)
@@ -80,8 +80,8 @@ def steps_of(pipeline: Pipeline, digests: Digests) -> list[Step]:
         sources, earlier = wiring[named.label], pipeline.stages[:at]
         body, rig = latest(Body, earlier), latest(Rig, earlier)
         chain = "checkpoint" in sources.values()
-        whole = recording if named.part is None else replace(recording, indices=named.part)
-        part = replace(whole, indices=_extent(named, whole))
+        tracked = recording if named.part is None else replace(recording, indices=named.part)
+        seen = replace(tracked, indices=_extent(named, tracked))
         recipe: dict[str, Any] = {
             "format": FORMAT,
             "core": core,
@@ -90,17 +90,18 @@ def steps_of(pipeline: Pipeline, digests: Digests) -> list[Step]:
         }
         changed = [label for label, step in steps.items() if step.passes_frames]
         if {"recording", *changed} & set(sources.values()):
-            recipe["recording"] = _frames(part, pipeline, chain) | _content(part, digests)
+            recipe["recording"] = _frames(seen, pipeline, chain) | _content(seen, digests)
         if "scene" in sources.values():
             recipe["scene"] = _scene(pipeline, recording, steps.get(body or ""), steps.get(rig or ""), digests)
         recipe["files"] = _files(named.stage, recording.folder, digests)
-        steps[named.label] = Step(named, sources, body, rig, part, recipe, key_of(recipe))
+        steps[named.label] = Step(named, sources, body, rig, seen, recipe, key_of(recipe))
     return list(steps.values())
 
 
 def _extent(named: NamedStage, recording: Recording) -> range:
-    kinds = [extent for cls, extent in SEEN.items() if makes(named, cls)]
-    extent = named.stage.extent or (kinds[0] if kinds else "run")
+    """Return the frames that a stage sees, by the extent that it names or that goes with what it makes."""
+    usual = [extent for cls, extent in EXTENTS.items() if makes(named, cls)]
+    extent = named.stage.extent or (usual[0] if usual else "run")
     run = recording.indices
     onward = range(run.start, recording.length, run.step)
     extents = {"first": run[:1], "beginning": onward[:BEGINNING], "run": run, "all": range(recording.length)}
@@ -111,21 +112,23 @@ def _extent(named: NamedStage, recording: Recording) -> range:
 
 
 def _inputs(steps: Mapping[str, Step], source: Source, of_chain: bool) -> Any:
+    """Return what stands in a recipe for one parameter of a stage; None where no stage makes it."""
     if isinstance(source, tuple):
         return [_input(steps[label], of_chain) for label in source]
     return _input(steps[source], of_chain) if source is not None and source in steps else None
 
 
 def _input(step: Step, of_chain: bool = False) -> dict[str, Any]:
+    """Return what stands for a stage in the recipe of another one, which may be a chain."""
     if of_chain and step.named.stage.causal:  # more frames only add to it
         read = {name: value for name, value in step.recipe.get("recording", {}).items() if name != "stop"}
         return {"key": key_of({**step.recipe, "recording": read})}
     return {"key": step.key} | ({"frames": step.frames} if step.chain else {})
 
 
-def _frames(part: Recording, pipeline: Pipeline, chain: bool) -> dict[str, Any]:
+def _frames(seen: Recording, pipeline: Pipeline, chain: bool) -> dict[str, Any]:
     """Return which frames are read; where a chain stops is no matter, it can go on."""
-    indices = part.indices
+    indices = seen.indices
     stop = {} if chain else {"stop": indices[-1] + 1}
     return {
         "start": indices.start,
@@ -135,9 +138,10 @@ def _frames(part: Recording, pipeline: Pipeline, chain: bool) -> dict[str, Any]:
     }
 
 
-def _content(part: Recording, digests: Digests) -> dict[str, Any]:
+def _content(seen: Recording, digests: Digests) -> dict[str, Any]:
+    """Return what the files hold that frames are read from, and the code that reads them."""
     return {
-        "content": {name: digests.file(path, name) for name, path in sorted(part.content.items())},
+        "content": {name: digests.file(path, name) for name, path in sorted(seen.content.items())},
         "reader": digests.package("mocapflow.recordings.recording"),
     }
 
@@ -148,12 +152,12 @@ def _scene(
     garment = pipeline.garment
     return {
         "cameras": _input(rig) if rig else {camera.name: _camera(camera) for camera in recording.cameras},
-        "body": _input(body) if body else _asset(pipeline, digests),
+        "body": _input(body) if body else _body(pipeline, digests),
         "garment": None if garment is None else component_recipe(garment, pipeline.registry, digests),
     }
 
 
-def _asset(pipeline: Pipeline, digests: Digests) -> dict[str, Any]:
+def _body(pipeline: Pipeline, digests: Digests) -> dict[str, Any]:
     files = _files(pipeline.body, pipeline.recording, digests)
     return component_recipe(pipeline.body, pipeline.registry, digests) | {"files": files}
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -37,6 +37,14 @@ from mocapflow.storage.packing import column
 from mocapflow.storage.rows import group_meta, write_json
 from mocapflow.storage.sealing import seal
 from mocapflow.storage.store import Store
+
+
+class Rest(NamedTuple):
+    """How the loop of a frame has ended."""
+
+    frame: int  # its index
+    turns: int
+    steady: bool  # it came to rest
 
 
 class Checkpoint:
@@ -111,12 +119,12 @@ class Checkpoint:
         moments = tuple(self._moment(self._growing.numbers(row, self._columns), self._cloth(row)) for row in rows)
         return Past(moments=moments, appearance=self._appearance(self.done - 1) if rows else {})
 
-    def rests(self) -> Iterator[tuple[int, int, bool]]:
-        """Yield of each frame that is saved its index, its turns, and whether it came to rest."""
+    def rests(self) -> Iterator[Rest]:
+        """Yield how each frame that is saved has ended."""
         for row in range(self.done):
             numbers = self._growing.numbers(row, self._columns)
             turns, steady = (float(column(self._columns, numbers, name)) for name in ("iterations", "steady"))
-            yield self._indices[row], int(turns), bool(steady)
+            yield Rest(self._indices[row], int(turns), bool(steady))
 
     def keep_turns(self, cap: int) -> None:
         """Keep the pose of every turn as `trace`, at most `cap` a frame; frames that are done have none."""

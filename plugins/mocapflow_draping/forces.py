@@ -13,7 +13,7 @@ import numpy as np
 
 from mocapflow.assets import GarmentMesh
 from mocapflow.errors import PluginError, alternatives
-from mocapflow.geometry.sewing import HARMONICS, TAKE_UP, THICKNESS
+from mocapflow.geometry.sewing import HARMONICS, NO_FORCES, TAKE_UP, THICKNESS
 from mocapflow.records import F64
 
 STEEPEST = np.radians(80.0)  # a tail tilted further would rise above its support
@@ -31,7 +31,7 @@ def tilts(garment: GarmentMesh, parameters: F64, azimuth: F64) -> tuple[F64, F64
     out = np.zeros((len(parameters), len(azimuth)))
     aside = np.zeros_like(out)
     for column, name in enumerate(garment.parameter_names):
-        if name in (THICKNESS, TAKE_UP):
+        if name in NO_FORCES:
             continue
         order, part = _meaning(garment, name)
         amount = parameters[:, column, None]
@@ -53,7 +53,7 @@ def _meaning(garment: GarmentMesh, name: str) -> tuple[int, str]:
             return order, "sin" if name.endswith("_sin_rad") else "cos"
     raise PluginError(
         f"garment {garment.name} has a parameter '{name}' that draper kinematic does not know",
-        hint=alternatives(name, [THICKNESS, TAKE_UP, *chain.from_iterable(HARMONICS)]),
+        hint=alternatives(name, [*NO_FORCES, *chain.from_iterable(HARMONICS)]),
     )
 
 

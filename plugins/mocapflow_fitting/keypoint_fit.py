@@ -13,7 +13,7 @@ from mocapflow.geometry.cameras import projections
 from mocapflow.geometry.registration import rigid_motion
 from mocapflow.records import F64, array, record
 from mocapflow_fitting.landmarks import Landmarks, landmarks
-from mocapflow_fitting.pose_fit import Observed, Solution, Spreads, View, descend, projected
+from mocapflow_fitting.pose_fit import Observations, Residuals, Solution, Spreads, descend, projected
 
 DETECTOR_PX = 3.0  # px, of a keypoint against the place the estimator means
 
@@ -44,20 +44,20 @@ def fit(
     marks, spreads = landmarks(body), dict(spreads or {})
     poses = tuple(Pose(root=_first_root(marks, seen), angles=np.zeros(len(body.twists))) for seen in frames)
     solution = Solution(spreads, np.zeros(len(spreads)), poses)
-    for look in (in_space, partial(in_images, cameras=cameras)):
-        views = [View(marks.body, partial(look, seen=seen, spread=marks.spread)) for seen in frames]
-        solution = descend(views, solution)
+    for compare in (in_space, partial(in_images, cameras=cameras)):
+        moments = [Observations(marks.body, partial(compare, seen=seen, spread=marks.spread)) for seen in frames]
+        solution = descend(moments, solution)
     return solution.factors, solution.poses
 
 
-def in_space(points: F64, seen: Seen, spread: F64) -> Observed:
+def in_space(points: F64, seen: Seen, spread: F64) -> Residuals:
     """Compare landmarks (L, 3) with the triangulated points; `spread` (L,) m is their standard deviation."""
     known = np.flatnonzero(np.isfinite(seen.position).all(axis=1)).astype(np.int32)
     slope = np.broadcast_to(np.eye(3), (len(known), 3, 3))
-    return Observed(points[known] - seen.position[known], slope, known, 1 / spread[known])
+    return Residuals(points[known] - seen.position[known], slope, known, 1 / spread[known])
 
 
-def in_images(points: F64, seen: Seen, spread: F64, cameras: Sequence[Camera]) -> Observed:
+def in_images(points: F64, seen: Seen, spread: F64, cameras: Sequence[Camera]) -> Residuals:
     """Compare projected landmarks (L, 3) with the detections; `spread` (L,) m adds to the detector's error."""
     camera, point = np.nonzero(seen.confidence > 0)
     matrices = projections(cameras)[camera]
@@ -66,7 +66,7 @@ def in_images(points: F64, seen: Seen, spread: F64, cameras: Sequence[Camera]) -
     precision = np.sqrt(np.clip(seen.confidence[camera, point], 0.0, 1.0)) / np.hypot(
         DETECTOR_PX, spread[point] * focal / depth
     )
-    return Observed(pixel - seen.pixels[camera, point], slope, point.astype(np.int32), precision)
+    return Residuals(pixel - seen.pixels[camera, point], slope, point.astype(np.int32), precision)
 
 
 def _first_root(marks: Landmarks, seen: Seen) -> F64:

@@ -20,40 +20,47 @@ LIMIT_SPREAD = np.radians(2.0)  # rad, by how much an angle may pass a limit
 CAUCHY = 2.0  # standard deviations at which the weight of an observation has halved
 ENOUGH = 1e-6  # share of the cost below which a gain is none
 NEAREST = 0.1  # m, depth below which a projection is not believed
-STEP = 1e-4  # of a log proportion, for differences
+STEP = 1e-4  # of what is shared, for differences
 
 # What is fitted, with its standard deviation about zero: logarithms of proportions, deviations along modes of a shape.
 Spreads = Mapping[str, float]
 
 
-class Observed(NamedTuple):
-    """Residuals (N, m) of points, their derivatives (N, m, 3), the points they belong to and 1/sd (N,)."""
+class Residuals(NamedTuple):
+    """By how much N points are off what was observed of them, in m components each: px or m."""
 
-    error: F64
-    slope: F64
-    point: I32
-    precision: F64
+    error: F64  # (N, m)
+    slope: F64  # (N, m, 3) their derivatives by the place of the point
+    point: I32  # (N,) which vertex of the body that is
+    precision: F64  # (N,) one over the standard deviation
 
 
-class View(NamedTuple):
-    """What was observed of one moment: a body whose vertices are the points, and how they are compared."""
+class Observations(NamedTuple):
+    """What was observed of one moment."""
 
-    body: Body
-    look: Callable[[F64], Observed]
+    body: Body  # its vertices are the points, before scaling
+    compare: Callable[[F64], Residuals]  # of the points (V, 3) m
 
 
 class Solution(NamedTuple):
-    """Shared log proportions and deviations of the shape (P,), named as their spreads, and the pose of each moment."""
+    """What all moments share, and the pose of each."""
 
-    spreads: Spreads
-    logs: F64
+    spreads: Spreads  # of what is shared, in its order
+    shared: F64  # (P,) logarithms of proportions, deviations along modes of a shape
     poses: tuple[Pose, ...]
 
     @property
     def factors(self) -> Mapping[str, float]:
         """The proportions, and the deviations of the shape, by name."""
-        values = zip(self.spreads, self.logs.tolist(), strict=True)
+        values = zip(self.spreads, self.shared.tolist(), strict=True)
         return {name: value if name.startswith(SHAPE) else math.exp(value) for name, value in values}
+
+
+class NormalEquations(NamedTuple):
+    """Those of one moment over (shared, root, angles), S = P + 6 + D."""
+
+    matrix: F64  # (S, S)
+    gradient: F64  # (S,)
 
 
 def projected(points: F64, matrices: F64) -> tuple[F64, F64, F64]:
@@ -69,14 +76,14 @@ def projected(points: F64, matrices: F64) -> tuple[F64, F64, F64]:
     return pixel, slope, depth
 
 
-def descend(views: Sequence[View], solution: Solution, rounds: int = 80) -> Solution:
+def descend(moments: Sequence[Observations], solution: Solution, rounds: int = 80) -> Solution:
     """Levenberg-Marquardt over all moments at once; the poses are eliminated one by one (Schur complement)."""
-    damping, cost = 1e-3, _cost(views, solution)
+    damping, cost = 1e-3, _cost(moments, solution)
     for _ in range(rounds):
-        blocks = [_normal(view, pose, solution) for view, pose in zip(views, solution.poses, strict=True)]
+        equations = [_normal(moment, pose, solution) for moment, pose in zip(moments, solution.poses, strict=True)]
         while damping < 1e8:
-            trial = _step(blocks, solution, damping)
-            lower = _cost(views, trial)
+            trial = _step(equations, solution, damping)
+            lower = _cost(moments, trial)
             if lower <= cost:
                 break
             damping *= 8
@@ -88,52 +95,53 @@ def descend(views: Sequence[View], solution: Solution, rounds: int = 80) -> Solu
     return solution
 
 
-def _step(blocks: Sequence[tuple[F64, F64]], solution: Solution, damping: float) -> Solution:
-    shared = len(solution.logs)
+def _step(equations: Sequence[NormalEquations], solution: Solution, damping: float) -> Solution:
+    """Return the solution after one damped step: first of what is shared, the poses eliminated, then of each pose."""
+    count = len(solution.shared)
     precision = np.array([1 / sd**2 for sd in solution.spreads.values()])
-    left, right = np.diag(precision * (1 + damping)), -precision * solution.logs
-    solved = []
-    for matrix, vector in blocks:
-        pose = matrix[shared:, shared:] + damping * np.diag(np.diag(matrix[shared:, shared:]))
-        both = np.linalg.solve(pose, np.column_stack([matrix[shared:, :shared], -vector[shared:]]))
-        left = left + matrix[:shared, :shared] - matrix[:shared, shared:] @ both[:, :shared]
-        right = right - vector[:shared] - matrix[:shared, shared:] @ both[:, -1]
-        solved.append(both)
-    logs = np.linalg.solve(left, right) if shared else np.empty(0)
-    steps = [np.asarray(both[:, -1] - both[:, :shared] @ logs, np.float64) for both in solved]
+    left, right = np.diag(precision * (1 + damping)), -precision * solution.shared
+    eliminated = []  # of each moment: how its pose follows what is shared (6 + D, P), and where it goes by itself
+    for matrix, gradient in equations:
+        pose = matrix[count:, count:] + damping * np.diag(np.diag(matrix[count:, count:]))
+        both = np.linalg.solve(pose, np.column_stack([matrix[count:, :count], -gradient[count:]]))
+        left = left + matrix[:count, :count] - matrix[:count, count:] @ both[:, :count]
+        right = right - gradient[:count] - matrix[:count, count:] @ both[:, -1]
+        eliminated.append(both)
+    shared = np.linalg.solve(left, right) if count else np.empty(0)
+    steps = [np.asarray(both[:, -1] - both[:, :count] @ shared, np.float64) for both in eliminated]
     poses = tuple(moved(pose, step) for pose, step in zip(solution.poses, steps, strict=True))
-    return solution._replace(logs=solution.logs + logs, poses=poses)
+    return solution._replace(shared=solution.shared + shared, poses=poses)
 
 
-def _normal(view: View, pose: Pose, solution: Solution) -> tuple[F64, F64]:
-    """Return the normal matrix and gradient of one moment over (log proportions, root, angles)."""
-    points, moves = velocities(view.body, pose, solution)
-    observed = view.look(points)
-    jacobian = np.einsum("nmi,nis->nms", observed.slope, moves[observed.point])
-    weight = observed.precision**2 / (1 + _squared(observed) / CAUCHY**2)
+def _normal(moment: Observations, pose: Pose, solution: Solution) -> NormalEquations:
+    points, moves = velocities(moment.body, pose, solution)
+    residuals = moment.compare(points)
+    jacobian = np.einsum("nmi,nis->nms", residuals.slope, moves[residuals.point])
+    weight = residuals.precision**2 / (1 + _squared(residuals) / CAUCHY**2)
     rows = (np.sqrt(weight)[:, None, None] * jacobian).reshape(-1, moves.shape[2])
-    errors = (np.sqrt(weight)[:, None] * observed.error).ravel()
-    matrix, vector = rows.T @ rows, rows.T @ errors
-    angles = slice(len(solution.logs) + 6, None)
-    error, precision = _prior(view.body, pose.angles)
+    errors = (np.sqrt(weight)[:, None] * residuals.error).ravel()
+    matrix, gradient = rows.T @ rows, rows.T @ errors
+    angles = slice(len(solution.shared) + 6, None)
+    error, precision = _prior(moment.body, pose.angles)
     matrix[angles, angles] += np.diag((precision**2).sum(axis=0))
-    vector[angles] += (precision**2 * error).sum(axis=0)
-    return matrix + 1e-6 * np.eye(len(vector)), vector
+    gradient[angles] += (precision**2 * error).sum(axis=0)
+    return NormalEquations(matrix + 1e-6 * np.eye(len(gradient)), gradient)
 
 
-def _cost(views: Sequence[View], solution: Solution) -> float:
-    cost = 0.5 * sum((log / sd) ** 2 for log, sd in zip(solution.logs, solution.spreads.values(), strict=True))
-    for view, pose in zip(views, solution.poses, strict=True):
-        body = scaled(view.body, solution.factors)
-        observed = view.look(kinematics.skin(body, kinematics.chain(body, pose)[0], pose.angles))
+def _cost(moments: Sequence[Observations], solution: Solution) -> float:
+    cost = 0.5 * sum((value / sd) ** 2 for value, sd in zip(solution.shared, solution.spreads.values(), strict=True))
+    for moment, pose in zip(moments, solution.poses, strict=True):
+        body = scaled(moment.body, solution.factors)
+        residuals = moment.compare(kinematics.skin(body, kinematics.chain(body, pose)[0], pose.angles))
         error, precision = _prior(body, pose.angles)
-        cost += 0.5 * CAUCHY**2 * np.log1p(_squared(observed) / CAUCHY**2).sum()
+        cost += 0.5 * CAUCHY**2 * np.log1p(_squared(residuals) / CAUCHY**2).sum()
         cost += 0.5 * ((precision * error) ** 2).sum()
     return float(cost)
 
 
-def _squared(observed: Observed) -> F64:
-    return np.asarray((observed.error**2).sum(axis=1) * observed.precision**2)
+def _squared(residuals: Residuals) -> F64:
+    """Return the squared residuals (N,) in variances."""
+    return np.asarray((residuals.error**2).sum(axis=1) * residuals.precision**2)
 
 
 def _prior(body: Body, angles: F64) -> tuple[F64, F64]:
@@ -147,11 +155,11 @@ def velocities(body: Body, pose: Pose, solution: Solution) -> tuple[F64, F64]:
     """Return the vertices (V, 3) m of the scaled body and their velocities (V, 3, P + 6 + D)."""
 
     def at(shift: F64) -> tuple[Body, F64, F64, F64]:
-        other = scaled(body, solution._replace(logs=solution.logs + shift).factors)
+        other = scaled(body, solution._replace(shared=solution.shared + shift).factors)
         joints, screws = kinematics.chain(other, pose)
         return other, kinematics.skin(other, joints, pose.angles), joints, screws
 
-    now, points, joints, screws = at(np.zeros(len(solution.logs)))
-    by_logs = [(at(step)[1] - at(-step)[1]) / (2 * STEP) for step in STEP * np.eye(len(solution.logs))]
+    now, points, joints, screws = at(np.zeros(len(solution.shared)))
+    by_shared = [(at(step)[1] - at(-step)[1]) / (2 * STEP) for step in STEP * np.eye(len(solution.shared))]
     by_pose = kinematics.skin_velocities(now, joints, screws, pose.angles)
-    return points, np.concatenate([*(rate[..., None] for rate in by_logs), by_pose], axis=2)
+    return points, np.concatenate([*(rate[..., None] for rate in by_shared), by_pose], axis=2)

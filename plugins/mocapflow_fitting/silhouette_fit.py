@@ -12,7 +12,7 @@ from mocapflow.data import Matches, Pose
 from mocapflow.geometry.cameras import projections
 from mocapflow.geometry.kinematics import part_of
 from mocapflow.records import F64, I32
-from mocapflow_fitting.pose_fit import Observed, Solution, View, descend, projected
+from mocapflow_fitting.pose_fit import Observations, Residuals, Solution, descend, projected
 from mocapflow_fitting.proportions import scaled
 
 STEPS = 4  # Gauss-Newton steps between two matchings
@@ -24,7 +24,7 @@ def refine(
     body: Body, matchers: Sequence[Match], solution: Solution, cameras: Sequence[Camera], independent: float,
     rounds: int,
 ) -> Solution:  # fmt: skip
-    """Return log proportions and poses with which the contours of the body meet those in the images.
+    """Return the solution with which the contours of the body meet those in the images.
 
     Args:
         body: before scaling.
@@ -37,13 +37,13 @@ def refine(
     for _ in range(rounds):
         now = scaled(body, solution.factors)
         pairs = [match(now, pose) for match, pose in zip(matchers, solution.poses, strict=True)]
-        views = [paired(body, found, cameras, independent) for found in pairs]
-        solution = descend(views, solution, STEPS)
+        moments = [paired(body, found, cameras, independent) for found in pairs]
+        solution = descend(moments, solution, STEPS)
     return solution
 
 
-def paired(body: Body, matches: Matches, cameras: Sequence[Camera], independent: float) -> View:
-    """Return matches as a view of the skin vertices that take part; those with the garment are left out."""
+def paired(body: Body, matches: Matches, cameras: Sequence[Camera], independent: float) -> Observations:
+    """Return matches as observations of the skin vertices that take part; those with the garment are left out."""
     own = matches.vertex < len(body.vertices)
     vertices, point = np.unique(matches.vertex[own], return_inverse=True)
     matrices = projections(cameras)[matches.camera[own]]
@@ -51,12 +51,11 @@ def paired(body: Body, matches: Matches, cameras: Sequence[Camera], independent:
     free = np.all(along == 0, axis=1).astype(np.float64)
     onto = along[:, :, None] * along[:, None, :] + free[:, None, None] * np.eye(2)
     precision = np.sqrt(independent * matches.weight[own])
-    return View(
-        part_of(body, vertices), partial(_look, matrices, matches.pixel[own], onto, point.astype(np.int32), precision)
-    )
+    compare = partial(_compare, matrices, matches.pixel[own], onto, point.astype(np.int32), precision)
+    return Observations(part_of(body, vertices), compare)
 
 
-def _look(matrices: F64, pixel: F64, onto: F64, point: I32, precision: F64, points: F64) -> Observed:
+def _compare(matrices: F64, pixel: F64, onto: F64, point: I32, precision: F64, points: F64) -> Residuals:
     at, slope, _ = projected(points[point], matrices)
     error = np.einsum("nab,nb->na", onto, at - pixel)
-    return Observed(error, np.einsum("nab,nbi->nai", onto, slope), point, precision)
+    return Residuals(error, np.einsum("nab,nbi->nai", onto, slope), point, precision)

@@ -21,7 +21,7 @@ from mocapflow_levelset.masks import counted
 from mocapflow_levelset.plates import Plate, Shadow, density_image, plate_in
 from mocapflow_levelset.shadows import ShadowAware, shadowed
 from mocapflow_levelset.statistics import Window
-from mocapflow_levelset.view import BAND_PX, Level, Method, View, find
+from mocapflow_levelset.view import BAND_PX, Method, Resolution, View, find
 
 CHANNELS: tuple[ChannelName, ...] = ("lab",)
 SMOOTH_PX = 1.0  # of the evidence before it is cut
@@ -86,9 +86,8 @@ class BackgroundDifference(ShadowAware):
         plate, shadow = plate_in(background, camera, CHANNELS), self.shadow(image, background, camera)
         start = self._start(image, model, plate, floor, shadow, hidden)
         view = View(image, start, start, counted(start.shape, 0, hidden), {1: Room(plate, floor, shadow, SMOOTH_PX)})
-        against_plate = Level(1, Schedule(REFINE_STEPS, 3, 3), Window(12.0, 8, 0.02))
-        levels = [against_plate, against_plate._replace(use_plate=False)]
-        return find(view, levels, METHOD).level
+        against_plate = Resolution(1, Schedule(REFINE_STEPS, 3, 3), Window(12.0, 8, 0.02))
+        return find(view, [against_plate, against_plate._replace(use_plate=False)], METHOD).level
 
     def _start(self, image: U8, model: F32, plate: Plate, floor: Bool, shadow: Shadow, hidden: Bool | None) -> F32:
         """Return a level set (H, W), not a distance: positive where the image is unlike the plate."""

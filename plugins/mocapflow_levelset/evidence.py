@@ -24,7 +24,7 @@ class Evidence(NamedTuple):
     stride: int
     along: Callable[[I32], F32]  # features (C, N) of the N pixels of some runs
     outside: Callable[[I32, F32], F32] | None = None  # log density (N,) in the empty scene of runs and features, or NaN
-    prior_ratio: F32 | None = None  # (H, W) log ratio of inside and outside that is known besides
+    colour_ratio: F32 | None = None  # (H, W) log ratio of person and room by learned colours, beside the statistics
 
 
 class Room(NamedTuple):

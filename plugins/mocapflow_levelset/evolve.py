@@ -38,11 +38,12 @@ class Schedule(NamedTuple):
 
 
 class Settled(NamedTuple):
-    """Where the descent ended, and the last evidence along the runs it moved in."""
+    """Where the descent ended, the last evidence along the runs it moved in, and the prior that it kept near."""
 
     level: F32  # (H, W) px, near a signed distance within the band
     ratio: F32  # (H, W) log p1 - log p2
     runs: I32  # (N, 3) y, first x, last x + 1
+    prior: F32  # (H, W) px, signed distance to the model's outline
 
 
 class Costs(NamedTuple):
@@ -88,13 +89,13 @@ def settle(level: F32, prior: F32, evidence: Evidence, window: Window, weights: 
             gaussians = local_gaussians(evidence.sparse, weight, sparse, sums, grid, weights.sigma_px / stride, reach)
             runs = near(level, weights, first) if step else runs
             log_ratio(runs, evidence, gaussians, grid.cell_px, weights, ratio)
-            if evidence.prior_ratio is not None:
-                ratio = np.clip(ratio + evidence.prior_ratio, -weights.clip, weights.clip)
+            if evidence.colour_ratio is not None:
+                ratio = np.clip(ratio + evidence.colour_ratio, -weights.clip, weights.clip)
         advance(level, ratio, prior, runs, change, weights)
-    return Settled(level, ratio, runs)
+    return Settled(level, ratio, runs, prior)
 
 
-def costs(settled: Settled, prior: F32, weights: Weights) -> Costs:
+def costs(settled: Settled, weights: Weights) -> Costs:
     """Return the terms of the energy where the descent ended.
 
     The data term of (12.1) is -sum of H log p1 + (1 - H) log p2, over the whole picture. Here it is without -sum of
@@ -102,7 +103,7 @@ def costs(settled: Settled, prior: F32, weights: Weights) -> Costs:
     runs stay the same, and p2 is estimated anew around each contour: `steady.energy_share` sees that change, too.
     """
     table, sigma, band = step_table(), np.float32(weights.sigma_px), np.float32(weights.band_px)
-    data, length, shape = kernels.terms(settled.level, settled.ratio, prior, settled.runs, table, sigma, band)
+    data, length, shape = kernels.terms(settled.level, settled.ratio, settled.prior, settled.runs, table, sigma, band)
     return Costs(float(data), weights.length * float(length), weights.shape * float(shape))
 
 

@@ -24,7 +24,7 @@ from mocapflow_levelset.moved import moved_outline
 from mocapflow_levelset.plates import plate_in
 from mocapflow_levelset.shadows import ShadowAware, shadowed
 from mocapflow_levelset.statistics import Window
-from mocapflow_levelset.view import BAND_PX, Contact, Level, Matte, Method, View, find
+from mocapflow_levelset.view import BAND_PX, Contact, Matte, Method, Resolution, View, find
 
 Share = Annotated[float, Field(ge=0, lt=1)]
 
@@ -86,11 +86,11 @@ class LevelSet(ShadowAware):
             return state.segmentation
         silhouettes, energies = dict(last), dict(state.segmentation.energies) if last else {}
         for c in due:
-            levels = self._levels(warm=c in last)
-            view = self._view(frame, surface, past, scene, c, levels)
+            resolutions = self._resolutions(warm=c in last)
+            view = self._view(frame, surface, past, scene, c, resolutions)
             if c in last:
                 view = view._replace(start=last[c].distance, moved=parts[c])
-            found = find(view, levels, self._method())
+            found = find(view, resolutions, self._method())
             silhouettes[c] = Silhouette(camera=c, layer="person", distance=found.level)
             for term, cost in found.costs._asdict().items():
                 key = f"{scene.cameras[c].name}.{term}"
@@ -98,7 +98,7 @@ class LevelSet(ShadowAware):
         return Segmentation(silhouettes=tuple(silhouettes[c] for c in sorted(silhouettes)), energies=energies)
 
     def _view(
-        self, frame: Frame, surface: Surface, past: Past, scene: Scene, camera: int, levels: Sequence[Level]
+        self, frame: Frame, surface: Surface, past: Past, scene: Scene, camera: int, resolutions: Sequence[Resolution]
     ) -> View:
         """Return what is given of one view, to start from the projected model."""
         lens = scene.cameras[camera]
@@ -109,7 +109,7 @@ class LevelSet(ShadowAware):
             start=model,
             prior=model,
             counted=without_cut(counts, model, scene.body, surface, lens),
-            rooms=self._rooms(frame, surface, scene, camera, levels),
+            rooms=self._rooms(frame, surface, scene, camera, resolutions),
             colours=self._colours(past, camera),
             contact=self._contact(surface, lens),
             matte=self._matte(scene, camera),
@@ -122,7 +122,7 @@ class LevelSet(ShadowAware):
         return moved_outline(surface, turn.change, camera, self.keep_px)
 
     def _rooms(
-        self, frame: Frame, surface: Surface, scene: Scene, camera: int, levels: Sequence[Level]
+        self, frame: Frame, surface: Surface, scene: Scene, camera: int, resolutions: Sequence[Resolution]
     ) -> dict[int, Room] | None:
         background = self._background(scene)
         if background is None:
@@ -130,7 +130,7 @@ class LevelSet(ShadowAware):
         floor, shadow = shadowed(frame, surface, scene, camera), self.shadow(frame.images[camera], background, camera)
         return {
             factor: Room(plate_in(background, camera, self.channels, factor), shrink_mask(floor, factor), shadow)
-            for factor in (level.factor for level in levels if level.use_plate)
+            for factor in (each.factor for each in resolutions if each.use_plate)
         }  # the empty room is compared with small images alone, which are smooth
 
     def _colours(self, past: Past, camera: int) -> F32 | None:
@@ -151,14 +151,14 @@ class LevelSet(ShadowAware):
     def _background(self, scene: Scene) -> Background | None:
         return scene.background if self.use_background else None
 
-    def _levels(self, warm: bool) -> list[Level]:
+    def _resolutions(self, warm: bool) -> list[Resolution]:
         reduced, full = self._window(REDUCED_RHO_PX), self._window(self.rho_px)
-        levels = [
-            Level(COARSE, self._schedule(0 if warm else self.coarse_steps, to_rest=True), reduced),
-            Level(HALF, self._schedule(self.half_steps), reduced),
-            Level(FULL, self._schedule(self.later_steps if warm else self.steps), full, use_plate=False),
+        resolutions = [
+            Resolution(COARSE, self._schedule(0 if warm else self.coarse_steps, to_rest=True), reduced),
+            Resolution(HALF, self._schedule(self.half_steps), reduced),
+            Resolution(FULL, self._schedule(self.later_steps if warm else self.steps), full, use_plate=False),
         ]
-        return [level for level in levels if level.schedule.steps]
+        return [each for each in resolutions if each.schedule.steps]
 
     def _window(self, rho_px: float) -> Window:
         return Window(rho_px, self.cell_px, self.variance_floor)

@@ -24,9 +24,9 @@ SOLID = np.ones((3, 3), np.uint8)  # thinner things are edges, whose pixels mix 
 
 
 def contradicted(views: Sequence[SmallView], floor_m: float) -> list[Bool]:
-    """Return for each view where (h, w) its pixels have another light than others see there.
+    """Return for each view where (h, w) others tell that its pixels do not show the floor.
 
-    These are two views that agree, or one that sees the floor fully lit; and none sees the light that this one sees.
+    Two others agree about the light there, or one sees the floor fully lit; and none sees the light of this view.
 
     Args:
         views: small views of one moment.
@@ -74,18 +74,20 @@ def no_shadows(frame: Frame, background: Background, cameras: tuple[Camera, ...]
     return tuple(_enlarged(mask, view.factor, c) for mask, view, c in zip(masks, views, cameras, strict=True))
 
 
-def _seen(view: SmallView, camera: Camera, places: I32, floor_m: float) -> F32:
-    """Return the least and the greatest light (N, 2) that a view sees near places of the floor.
+def _seen(other: SmallView, camera: Camera, places: I32, floor_m: float) -> F32:
+    """Return the least and the greatest light (N, 2) that another view sees near places of the floor.
+
+    NaN where it shows something else there, or does not see the place.
 
     Args:
-        view: from which they are looked at; NaN where it shows something else there.
-        camera: another one.
-        places: (N, 2) rows and columns of the floor in that.
+        other: the view from which they are looked at.
+        camera: of the view that the places are given in.
+        places: (N, 2) rows and columns in that.
         floor_m: height of the floor.
     """
-    way = _of_floor(view.camera, floor_m) @ np.linalg.inv(_of_floor(camera, floor_m))
+    way = _of_floor(other.camera, floor_m) @ np.linalg.inv(_of_floor(camera, floor_m))
     out = np.full((len(places), 2), np.nan, np.float32)
-    _look(view.light, way, places, out)
+    _look(other.light, way, places, out)
     return out
 
 

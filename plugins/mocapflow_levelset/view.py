@@ -19,7 +19,9 @@ from mocapflow_levelset.matting import NEAR_PX, sharpened
 from mocapflow_levelset.redistance import redistance
 from mocapflow_levelset.statistics import Window
 
-BAND_PX = 12.0  # half width of the band in which a silhouette's distances are computed
+# half width of the band in which a silhouette's distances are computed; that of `functional`, so that the distance to
+# the model's outline is computed once for both
+BAND_PX = 12.0
 
 
 class Contact(NamedTuple):
@@ -64,8 +66,8 @@ class View(NamedTuple):
         )  # fmt: skip
 
 
-class Level(NamedTuple):
-    """One resolution: the image shrunk by a factor, and how long to stay there."""
+class Resolution(NamedTuple):
+    """An image shrunk by a factor, and how long to stay there."""
 
     factor: int
     schedule: Schedule
@@ -90,45 +92,45 @@ class Found(NamedTuple):
     costs: Costs
 
 
-def find(view: View, levels: Sequence[Level], method: Method) -> Found:
+def find(view: View, resolutions: Sequence[Resolution], method: Method) -> Found:
     """Return the silhouette of one view (H, W) and its costs; everything outside without a start contour.
 
     Args:
         view: what is given of it.
-        levels: coarse to fine; the last is of the image as it is.
+        resolutions: coarse to fine; the last is of the image as it is.
         method: the constants.
     """
-    due, multiple = view.start if view.moved is None else view.moved, max(level.factor for level in levels)
+    due, multiple = view.start if view.moved is None else view.moved, max(each.factor for each in resolutions)
     crop = crops.around(due, method.margin_px, multiple)
     whole = np.full(view.start.shape, -BAND_PX, np.float32) if view.moved is None else view.start.copy()
     if crop is None:
         return Found(whole, Costs(0.0, 0.0, 0.0))
     part = view.of(crop)
-    settled, prior = _settled(part, levels, method)
-    new = redistance(_refined(settled.level, part, method), BAND_PX)
+    settled = _settled(part, resolutions, method)
+    found = redistance(_refined(settled.level, part, method), BAND_PX)
     # near the rim of a part its statistics lack a side
     kept = crop if view.moved is None else crops.around(view.moved, method.margin_px // 2, multiple)
     assert kept is not None
-    kept.of(whole)[:] = kept.within(crop).of(new)
-    now = _costs(crop.of(whole), settled, prior, method)
+    kept.of(whole)[:] = kept.within(crop).of(found)
+    now = _costs(crop.of(whole), settled, method)
     if view.moved is None:
         return Found(whole, now)
-    before = _costs(part.start, settled, prior, method)
+    before = _costs(part.start, settled, method)
     return Found(whole, Costs(*(new - old for new, old in zip(now, before, strict=True))))
 
 
-def _settled(view: View, levels: Sequence[Level], method: Method) -> tuple[Settled, F32]:
-    """Return where the descent ended, coarse to fine, and the prior that it kept near."""
-    images = crops.pyramid(view.image, [level.factor for level in levels])
+def _settled(view: View, resolutions: Sequence[Resolution], method: Method) -> Settled:
+    """Return where the descent ended, coarse to fine."""
+    images = crops.pyramid(view.image, [each.factor for each in resolutions])
     front, factor = view.start, 1
-    for level in levels:
-        prior = crops.coarser(view.prior, level.factor)
-        front = _brought(front, factor, level.factor, method.weights.band_px)
-        evidence = _evidence(images[level.factor], view, level, method)
+    for resolution in resolutions:
+        prior = crops.coarser(view.prior, resolution.factor)
+        front = _brought(front, factor, resolution.factor, method.weights.band_px)
+        evidence = _evidence(images[resolution.factor], view, resolution, method)
         begin = without_islands(front, evidence)
-        settled = settle(begin, prior, evidence, level.window, method.weights, level.schedule)
-        front, factor = settled.level, level.factor
-    return settled, prior
+        settled = settle(begin, prior, evidence, resolution.window, method.weights, resolution.schedule)
+        front, factor = settled.level, resolution.factor
+    return settled
 
 
 def _refined(front: F32, view: View, method: Method) -> F32:
@@ -146,10 +148,10 @@ def _refined(front: F32, view: View, method: Method) -> F32:
     return sharpened(redistance(front, NEAR_PX), view.image, view.matte.room, movable, view.matte.reach_px)
 
 
-def _costs(level: F32, settled: Settled, prior: F32, method: Method) -> Costs:
+def _costs(level: F32, settled: Settled, method: Method) -> Costs:
     """Return what a level set costs by the evidence at hand, where the contour has moved in it."""
     band = np.float32(method.weights.band_px)
-    return costs(settled._replace(level=np.clip(level, -band, band)), prior, method.weights)
+    return costs(settled._replace(level=np.clip(level, -band, band)), method.weights)
 
 
 def _by_chromaticity(front: F32, view: View, contact: Contact, method: Method) -> F32:
@@ -182,10 +184,10 @@ def _brought(level: F32, factor: int, wanted: int, band_px: float) -> F32:
     return redistance(crops.coarser(level, wanted // factor), band_px)
 
 
-def _evidence(small: U8, view: View, level: Level, method: Method) -> Evidence:
+def _evidence(small: U8, view: View, resolution: Resolution, method: Method) -> Evidence:
     """Return what the image says at one resolution, to which it is shrunk."""
-    factor = level.factor
-    room = view.rooms[factor] if view.rooms and level.use_plate else None
+    factor = resolution.factor
+    room = view.rooms[factor] if view.rooms and resolution.use_plate else None
     weight = crops.shrink_mask(view.counted, factor).astype(np.float32)
     turned = method.decorrelate and room is None
     evidence = from_image(small, weight, method.channels, max(method.stride // factor, 1), turned)
@@ -193,4 +195,4 @@ def _evidence(small: U8, view: View, level: Level, method: Method) -> Evidence:
         evidence = in_room(evidence, small, method.channels, room)
     if view.colours is None:
         return evidence
-    return evidence._replace(prior_ratio=evidence.weight * view.colours[bins_of(small)])
+    return evidence._replace(colour_ratio=evidence.weight * view.colours[bins_of(small)])

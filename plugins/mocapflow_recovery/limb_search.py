@@ -6,7 +6,6 @@ import logging
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
-from math import inf
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -18,18 +17,16 @@ from mocapflow_priors.parzen import SHIPPED
 from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt
 
 from mocapflow.assets import Body
-from mocapflow.components import Recovery
 from mocapflow.data import Frame, FrameResult, FrameState, Past, Pose, Surface
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow.scene import Scene
-from mocapflow.settings import PositiveOrInf
 from mocapflow_recovery.disagreement import FLYING, HANGING
 from mocapflow_recovery.limb_visibility import camouflaged_feet, warn_of_camouflage, warn_of_occluders
 from mocapflow_recovery.sampling import SHARES, Plan, Spread
 from mocapflow_recovery.scoring import FACES, Fit, Mismatch, Scorer, StartPose, mismatch_of
 from mocapflow_recovery.search_history import history_of, one_frame_of, with_search, without_history
-from mocapflow_recovery.search_triggers import Thresholds, Trigger, search_trigger, stay_overbent
+from mocapflow_recovery.search_triggers import Trigger, TriggeredSearch, stay_overbent
 from mocapflow_recovery.searches import Searches
 from mocapflow_recovery.trimaps import Trimap, small_rooms, trimaps
 
@@ -38,7 +35,6 @@ UNDOUBTED = 2.0  # times as distant may be a fit that is doubted no more: a leg 
 WITHOUT_HINT = 1.1  # the same, without a hint: of a lost foot all other limbs and the cloth tell nothing
 NEAR_M = 0.35  # changes farther than this from the model are somebody else
 START = np.radians(6.0)  # how far off, in each angle, a given first pose may be
-TOLERANCE = 0.03  # share by which the error may grow for parts to stay as they were fitted
 FIRST_REPEATS = 2  # times that each search is repeated in a first frame whose fit is doubted
 UNKNOWN = "too little is known of the room behind the person: limbs that are lost are not looked for"
 FEET_CAMOUFLAGED = "the feet look like the floor: outlines are not compared with them, and ankles are unsure"
@@ -48,7 +44,7 @@ Settle = Callable[[Pose, F64], FrameResult]  # from a pose, with cloth parameter
 Search = Callable[[np.random.Generator], Pose]  # finds a pose by samples
 
 
-class LimbSearch(Recovery):
+class LimbSearch(TriggeredSearch):
     """Compares the fitted model with what the images surely show, which does not depend on the model.
 
     A level set that starts from the model can't find a limb the model has lost, so the two agree in their error.
@@ -84,11 +80,6 @@ class LimbSearch(Recovery):
 
     name: ClassVar[str] = "limb_search"
     needs_background: ClassVar[bool] = True
-    uncovered_cm2: PositiveFloat = 30.0  # area of the person off the model, all views, above which the fit is doubted
-    floating_cm2: PositiveFloat = 30.0  # area of skin in empty space above which the fit is doubted
-    hint_cm2: PositiveOrInf = inf  # area of the person 3 cm off it above which limbs are looked for; noise has some
-    beginnings: bool = True  # look for limbs in the first frame, and in the first one after a gap
-    leap_deg: PositiveOrInf = 20.0  # a limb so far from what was predicted and from all `poses` is looked for
     least_known: Annotated[float, Field(ge=0, le=1)] = 0.4  # of the room behind the model to be known, mean of views
     gain: Annotated[float, Field(ge=0, lt=1)] = 0.1  # share that each part mends, and a fit that cures no doubt
     samples: PositiveInt = 40  # samples of each part in a round
@@ -138,13 +129,13 @@ class LimbSearch(Recovery):
             warn_of_occluders(given, self.trimaps(frame, given, past, scene), scene.body)
         mismatch = mismatch_of(surface, scene, trimaps)
         fitted, predicted, body = result.state.estimate.pose, state.estimate.pose, scene.body
-        trigger = search_trigger(self.thresholds, mismatch, fitted, predicted, past, body, self._density)
+        trigger = self.trigger(mismatch, fitted, predicted, past, body, self._density)
         if trigger is None:
             return without_history(result, past)
         if not self._due(trigger, mismatch, frame.time, past, body):
             return noted(result, UNSEARCHED, doubted=True) if trigger.doubtful else without_history(result, past)
         scorer = self._scorer(predicted, result, trimaps, past, model)
-        searches = Searches(scorer, self._plan(body), predicted, fitted, self.gain, TOLERANCE)
+        searches = Searches(scorer, self._plan(body), predicted, fitted, self.gain)
         found = self._searched(frame.index, scorer.score(result), searches, trigger, settle)
         return with_search(found, result, mismatch.area, past)
 
@@ -163,13 +154,13 @@ class LimbSearch(Recovery):
 
     def _searched(self, index: int, fit: Fit, searches: Searches, trigger: Trigger, settle: Settle) -> FrameResult:
         """Return the result of the best pose that is found, or that of the fit where none is better."""
-        doubtful, scorer, strategies = self.thresholds.doubtful, searches.scorer, self._strategies(searches, trigger)
+        scorer, strategies = searches.scorer, self._strategies(searches, trigger)
 
         def settled(number: int, search: Search) -> Fit:
             return scorer.score(settle(search(np.random.default_rng([index, number])), scorer.parameters))
 
         fits = [settled(number, search) for number, search in enumerate(strategies)]
-        best = self._better(min(fits, key=lambda other: (doubtful(other.mismatch), other.distance)), fit)
+        best = self._better(min(fits, key=lambda other: (self.doubtful(other.mismatch), other.distance)), fit)
         if scorer.start and trigger.doubtful:
             turned = self._better(settled(len(strategies), searches.turned_round), best)
             if turned is not best:
@@ -177,7 +168,7 @@ class LimbSearch(Recovery):
             best = turned
         if best is not fit:
             note = f"{trigger.reason}: found again by search; then {best.mismatch}"
-            return noted(best.result, note, doubtful(best.mismatch))
+            return noted(best.result, note, self.doubtful(best.mismatch))
         if trigger.doubtful:
             return noted(fit.result, f"{trigger.reason}: search found nothing better", doubted=True)
         return fit.result
@@ -196,8 +187,8 @@ class LimbSearch(Recovery):
     def _better(self, other: Fit, fit: Fit) -> Fit:
         """Return another fit if it is clearly nearer to the person, or free of a doubt or hint and not much farther."""
         most = 1 - self.gain
-        if not self.thresholds.doubtful(other.mismatch):
-            if self.thresholds.doubtful(fit.mismatch):
+        if not self.doubtful(other.mismatch):
+            if self.doubtful(fit.mismatch):
                 most = UNDOUBTED
             elif fit.mismatch.hint > self.hint_cm2 >= other.mismatch.hint:
                 most = WITHOUT_HINT
@@ -218,12 +209,6 @@ class LimbSearch(Recovery):
     @cached_property
     def _density(self) -> Density:
         return read(self.poses)
-
-    @property
-    def thresholds(self) -> Thresholds:
-        """What calls for a search."""
-        leap = np.radians(self.leap_deg)
-        return Thresholds(self.uncovered_cm2, self.floating_cm2, self.hint_cm2, self.beginnings, leap)
 
 
 def noted(result: FrameResult, note: str, doubted: bool) -> FrameResult:

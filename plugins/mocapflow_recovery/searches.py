@@ -18,6 +18,8 @@ from mocapflow_recovery.leaps import without_overbent
 from mocapflow_recovery.sampling import Cost, Plan, put_back, search, seen_samples, with_part, without_idle_parts
 from mocapflow_recovery.scoring import Scorer
 
+TOLERANCE = 0.03  # share by which the error may grow for parts to stay as they were
+
 
 class Searches(NamedTuple):
     """Where a search begins, and what it may leave as it was."""
@@ -27,7 +29,6 @@ class Searches(NamedTuple):
     predicted: Pose
     fitted: Pose
     gain: float  # share that each part mends
-    tolerance: float  # by which share a part may be farther that stays as it was
 
     @property
     def body(self) -> Body:
@@ -83,7 +84,7 @@ class Searches(NamedTuple):
     def _restored(self, found: Pose, measure: Cost) -> Pose:
         """Return a found pose in which the parts that need not have moved are as they were."""
         found = without_idle_parts(measure, found, self.fitted, self.body, self.gain)
-        return put_back(self.scorer.distances, found, [self.fitted, self.predicted], self.body, self.tolerance)
+        return put_back(self.scorer.distances, found, [self.fitted, self.predicted], self.body, TOLERANCE)
 
 
 def half_turn(pose: Pose, body: Body) -> Pose:

@@ -106,18 +106,18 @@ class Refitter(NamedTuple):
         result = self.settled(frame, row, past, begin)
         self.tried[row] = True
         same = revised.largest_move(row, result.state.estimate.pose) < OTHER_MM / 1000
-        if not same and self._preferred(result, row, self.mismatches(frame, row, past, result)):
+        if not same and self._preferred(result, row, self.more_mismatch(frame, row, past, result)):
             revised.replace_fit(row, frame, result)
             beside = revised.beside(row)
             self.tried[beside] = [revised.replaced(other) for other in beside]
 
-    def _preferred(self, result: FrameResult, row: int, mismatch: tuple[float, float]) -> bool:
-        """Return whether another fit of a frame is better, by silhouettes, leaps and mismatch (cm², before, now)."""
+    def _preferred(self, result: FrameResult, row: int, more_cm2: float) -> bool:
+        """Return whether another fit of a frame is better, by silhouettes, leaps, and how much more lies apart."""
         pose, revised, first = result.state.estimate.pose, self.revised, self.revised.before
         cost = image_cost(first.energy[row], first.energy_terms)
         dearer = (image_cost(result.energy, result.energy_terms) - cost) / max(abs(cost), 1.0)
         farther = np.log(max(revised.leap_of(row, pose), 1e-9) / revised.leap_of(row, revised.pose(row)))
-        return bool(dearer + LEAP_WEIGHT * farther + MISMATCH_WEIGHT * (mismatch[1] - mismatch[0]) < 0)
+        return bool(dearer + LEAP_WEIGHT * farther + MISMATCH_WEIGHT * more_cm2 < 0)
 
     def settled(self, frame: Frame, row: int, past: Past, begin: Pose) -> FrameResult:
         """Return what the loop makes of a frame from a pose."""
@@ -131,11 +131,11 @@ class Refitter(NamedTuple):
             result = finder.with_camouflaged_feet(frame, result, past, self.model)
         return result.state.segmentation.appearance
 
-    def mismatches(self, frame: Frame, row: int, past: Past, result: FrameResult) -> tuple[float, float]:
-        """Return the mismatch (cm²) of person and model in the fit that stands, and in another one."""
+    def more_mismatch(self, frame: Frame, row: int, past: Past, result: FrameResult) -> float:
+        """Return how much more (cm²) of person and model lies apart in another fit than in the one that stands."""
         finder = self.loop.recovery if isinstance(self.loop.recovery, LimbSearch) else LimbSearch()
         scene = self.model.scene
         surfaces = scene.surface(self.revised.pose(row), self.revised.cloth(row)), scene.surface_of(result.state)
         trimaps = finder.trimaps(frame, surfaces[0], past, scene)
         before, now = (mismatch_of(surface, scene, trimaps) for surface in surfaces)
-        return before.hint + before.floating, now.hint + now.floating
+        return (now.hint + now.floating) - (before.hint + before.floating)

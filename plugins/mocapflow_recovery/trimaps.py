@@ -50,11 +50,11 @@ class Trimap(NamedTuple):
 
 
 @memoised
-def small_rooms(background: Background, cameras: tuple[Camera, ...], rows: int = ROWS) -> tuple[SmallRoom, ...]:
-    """Return the empty room in images of about so many rows, by camera; made once, forgotten with the background."""
+def small_rooms(background: Background, cameras: tuple[Camera, ...]) -> tuple[SmallRoom, ...]:
+    """Return the empty room in small images, by camera; made once, forgotten with the background."""
     rooms = []
     for number, camera in enumerate(cameras):
-        factor = max(round(camera.size[1] / rows), 1)
+        factor = max(round(camera.size[1] / ROWS), 1)
         rooms.append(SmallRoom(shrunk(camera, factor), factor, plate_in(background, number, CHANNELS, factor)))
     return tuple(rooms)
 
@@ -82,7 +82,7 @@ def trimaps(
     found, middle = [], surface.vertices.mean(axis=0)
     for number in np.flatnonzero(frame.usable).tolist():
         camera, factor, plate = rooms[number]
-        model, size = covered(surface, camera), 1 / magnification(camera, middle)
+        model, pixel_m = covered(surface, camera), 1 / magnification(camera, middle)
         image, hidden = frame.images[number], frame.hidden_in(number)
         small = crops.shrink(image, factor)
         floor = floor_around(surface, camera)
@@ -90,13 +90,13 @@ def trimaps(
             floor = floor & ~crops.shrink_mask(no_shadow[number], factor)
         changed, same = _compared(small, plate, floor)
         visible = True if hidden is None else crops.shrink(hidden.astype(np.float32), factor) == 0
-        person = _near(changed & visible, model, near_m / size)
+        person = _near(changed & visible, model, near_m / pixel_m)
         seen, expected = np.count_nonzero(person), np.count_nonzero(model)
         if seen < MOST * expected:
             cloth = np.zeros(person.shape, bool) if garment is None else person & (garment[bins_of(small)] > SURELY)
             known = float(np.isfinite(plate.spread)[model].mean())
             informative, distance = bool(seen > LEAST * expected), _distance(same & visible, person)
-            found.append(Trimap(camera, person, cloth, informative, distance, size, known))
+            found.append(Trimap(camera, person, cloth, informative, distance, pixel_m, known))
     return found
 
 

@@ -87,9 +87,7 @@ def difference_weights(time: F64) -> F64:
     return np.column_stack([first, -(first + last), last])
 
 
-def minimise(
-    covariance: Wide, acceleration: F64, limits: F64, time: F64, wanted: Bool, block: int = BLOCK
-) -> tuple[F64, F64]:
+def minimise(covariance: Wide, acceleration: F64, limits: F64, time: F64, wanted: Bool) -> tuple[F64, F64]:
     """Return the corrections x that minimise sum |x_t|^2 / covariance_t + sum |acceleration + D x|^2 / limits^2.
 
     Args:
@@ -98,7 +96,6 @@ def minimise(
         limits: (R,) standard deviation of the acceleration, per s^2.
         time: (T,) s.
         wanted: (T,) frames whose covariance after smoothing is wanted.
-        block: frames that are solved for at a time, at least two.
 
     Returns:
         The corrections (T, R) and the smoothed covariances (K, R, R) of the wanted frames.
@@ -107,7 +104,7 @@ def minimise(
 
     count, size = covariance.shape[:2]
     system = normal_equations(covariance, acceleration, limits, time)
-    parts = [slice(first, first + block) for first in range(0, count - 1, block)]  # the last has two frames or more
+    parts = [slice(first, first + BLOCK) for first in range(0, count - 1, BLOCK)]  # the last has two frames or more
     parts[-1] = slice(parts[-1].start, count)
     mirrored = [slice(count - part.stop, count - part.start) for part in reversed(parts)]
     before, behind = messages(system, parts), messages(system.backwards(), mirrored)[::-1]

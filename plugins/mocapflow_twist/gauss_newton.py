@@ -24,7 +24,7 @@ from mocapflow.data import (
 )
 from mocapflow.geometry.differences import drape_differences
 from mocapflow.geometry.misfit import bilinear, dressed, misfit, outlines
-from mocapflow.geometry.sewing import TAKE_UP, THICKNESS
+from mocapflow.geometry.sewing import NO_FORCES
 from mocapflow.model import ClothedModel
 from mocapflow.pooling import pool
 from mocapflow.records import F64
@@ -118,7 +118,7 @@ class Task(NamedTuple):
         """Return the cloth after one damped step, its parameters within their bounds."""
         low, high = self.garment.parameter_bounds.T
         parameters, downhill = cloth.parameters, -equations.gradient
-        forces = np.array([name not in (THICKNESS, TAKE_UP) for name in self.garment.parameter_names], bool)
+        forces = np.array([name not in NO_FORCES for name in self.garment.parameter_names], bool)
         free = forces & ~steps.at_bound(parameters, downhill, low, high)
         if not free.any():  # the garment knows no forces, or each stands at a bound
             return cloth

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mocapflow.data import Cloth, Past, Pose
-from mocapflow.geometry.sewing import TAKE_UP, THICKNESS
+from mocapflow.geometry.sewing import NO_FORCES
 from mocapflow.model import ClothedModel, moved
 from mocapflow.records import F64, Bool
 from mocapflow_twist.normal_equations import Equations
@@ -32,7 +32,7 @@ class ClothMotion:
 
     model: ClothedModel
     past: Past
-    unknowns: bool  # the cloth parameters are solved for
+    cloth_unknowns: bool  # the cloth parameters are solved for
     _velocity: F64 | None = None
 
     def velocity(self, guess: Guess) -> F64:
@@ -40,7 +40,7 @@ class ClothMotion:
         if self._velocity is None:
             every = np.arange(len(guess.cloth.vertices), dtype=np.int32)
             velocity = self.model.velocity(guess.pose, guess.cloth, every, self.past)
-            columns = velocity.shape[2] if self.unknowns else 6 + len(guess.pose.angles)
+            columns = velocity.shape[2] if self.cloth_unknowns else 6 + len(guess.pose.angles)
             self._velocity = np.ascontiguousarray(velocity[..., :columns])
         return self._velocity
 
@@ -50,7 +50,7 @@ class ClothMotion:
         if not self.model.clothed:
             return Guess(pose, guess.cloth)
         parameters = guess.cloth.parameters
-        if self.unknowns:
+        if self.cloth_unknowns:
             low, high = self.bounds.T
             parameters = np.clip(parameters + increment[6 + len(pose.angles) :], low, high)
         return Guess(pose, self.model.drape(pose, parameters, self.past))
@@ -74,12 +74,12 @@ class ClothMotion:
     def _slow(self) -> Bool:
         """Which cloth parameters (Q,) follow the recording, not the frame: a cloth fitter moves them."""
         assert self.model.scene.garment is not None
-        return np.array([name in (TAKE_UP, THICKNESS) for name in self.model.scene.garment.parameter_names])
+        return np.array([name in NO_FORCES for name in self.model.scene.garment.parameter_names])
 
     @property
     def bounds(self) -> F64:
         """The bounds (Q, 2) of the cloth parameters that are solved for: of all or of none."""
         garment = self.model.scene.garment
-        if not self.unknowns or self.model.draper is None or garment is None:
+        if not self.cloth_unknowns or self.model.draper is None or garment is None:
             return np.empty((0, 2))
         return garment.parameter_bounds

@@ -1,4 +1,4 @@
-"""The energy of a frame for fixed matches (data, priors, damping) and its quadratic model about the root."""
+"""The energy of a frame for fixed matches (data, priors, anchor) and its quadratic model about the root."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Anchor(NamedTuple):
     precision: F64
 
     def equations(self, guess: Guess, body: Body) -> Equations:
-        """Return the damping's energy; its gradient about the root is exact, its Hessian that of small turns."""
+        """Return its energy; the gradient about the root is exact, the Hessian that of small turns."""
         held, pose = self.guess.pose, guess.pose
         turn = twists.log_rotation(pose.root[:3, :3] @ held.root[:3, :3].T)
         shift = root_position(body, pose.root) - root_position(body, held.root)
@@ -48,7 +48,7 @@ class Anchor(NamedTuple):
 
 
 class Quadratic(NamedTuple):
-    """The quadratic models about the root: of the data, and of priors with damping."""
+    """The quadratic models about the root: of the data, and of priors with the anchor."""
 
     data: Equations
     prior: Equations
@@ -91,7 +91,7 @@ class Problem(NamedTuple):
         if len(worn.vertex):
             error, _ = normal_equations.point_errors(worn, guess.cloth.vertices.take(worn.vertex, axis=0))
             data += 0.5 * float(worn.weight @ error**2)
-        terms = {"data": data, "damping": self.anchor.equations(guess, body).energy}
+        terms = {"data": data, "anchor": self.anchor.equations(guess, body).energy}
         for prior, residual in zip(self.priors, self._residuals(guess), strict=True):
             terms[prior.name] = terms.get(prior.name, 0.0) + prior.weight * residual.energy
         return terms

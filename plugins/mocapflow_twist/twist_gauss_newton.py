@@ -65,7 +65,7 @@ class TwistGaussNewton(PoseSolver):
         """Return the pose that explains the matches best, its covariance, and what the images told of it."""
         guess = Guess(state.estimate.pose, state.cloth)
         motion = ClothMotion(model, past, self.cloth_unknowns)
-        anchor = Anchor(with_neutral_cloth(guess, model), self._precision(motion, guess))
+        anchor = Anchor(with_neutral_cloth(guess, model), self._anchor_precision(motion, guess))
         surface, damping = model.surface(guess.pose, guess.cloth), self._least_damping(past, turn)
         tried: dict[Pose, Sequence[Residual]] = {}
         found: Quadratic | None = None  # the last quadratic models, for the covariance
@@ -102,13 +102,14 @@ class TwistGaussNewton(PoseSolver):
         )
 
     def _least_damping(self, past: Past, turn: Turn) -> float:
+        """Return the damping of a step at least, in a turn of the loop: more in a first frame."""
         least = self.damping * self.damping_per_turn**turn.index
         if past.moments:
             return least
         return max(least, self.first_damping * FIRST_DAMPING_PER_TURN**turn.index)
 
-    def _precision(self, motion: ClothMotion, guess: Guess) -> F64:
-        """Return one over the variance of the damping of every unknown."""
+    def _anchor_precision(self, motion: ClothMotion, guess: Guess) -> F64:
+        """Return one over the variance of each unknown (S,) about where the turn of the loop began."""
         turn, bend = np.radians(self.root_sd_deg), np.radians(self.angle_sd_deg)
         pose = np.repeat([turn, self.root_sd_m, bend], [3, 3, len(guess.pose.angles)])
         cloth = self.cloth_sd * np.ptp(motion.bounds, axis=1)
@@ -132,6 +133,7 @@ class TwistGaussNewton(PoseSolver):
         return guess, damping
 
     def _estimate(self, problem: Problem, guess: Guess, found: Quadratic, matches: Matches) -> Estimate:
+        """Return where the solver ended; increments there are about the root, of an estimate about the origin."""
         data, prior = found
         about_root = covariance(data.hessian, prior.hessian, data.energy, problem.data.measurements)
         to_origin = steps.about_origin(problem.centre(guess), problem.unknowns)

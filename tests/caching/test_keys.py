@@ -107,7 +107,7 @@ def test_stop_is_only_in_the_key_of_what_reads_the_whole_sequence(tmp_path, clip
 
 
 def test_a_stage_that_looks_at_the_beginning_sees_it_however_short_the_run(tmp_path, clip, monkeypatch):
-    monkeypatch.setitem(recipes.SEEN, Start, "beginning")
+    monkeypatch.setitem(recipes.EXTENTS, Start, "beginning")
     path = write_pipeline(tmp_path, clip, frames={"start": 1})
     for change in ("frames.stop=2", "frames.stop=4"):
         (start,) = (step for step in steps_of(load(path, change), SHARED) if step.label == "start")

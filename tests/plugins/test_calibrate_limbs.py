@@ -150,7 +150,7 @@ def test_views_that_were_found_wrong_do_not_count(body, poses):
 
 def test_the_fitted_body_stands_on_the_floor(body, poses, monkeypatch):
     def longer(body, matchers, solution, *_):
-        return solution._replace(logs=np.full_like(solution.logs, 0.05))
+        return solution._replace(shared=np.full_like(solution.shared, 0.05))
 
     monkeypatch.setattr("mocapflow_fitting.calibrate_limbs.refine", longer)
     recording = open_recording(DEMO, stop=1)

@@ -142,19 +142,19 @@ def test_a_part_says_what_it_costs_more_than_the_start():
     segmenter, start = LevelSet(shape_weight=0.0, margin_px=24), redistance(np.roll(exact, 4, axis=1), 12.0)
     moved = np.zeros(start.shape, bool)
     moved[60:100, 44] = True
-    levels, method, view = (
-        segmenter._levels(warm=False),
+    resolutions, method, view = (
+        segmenter._resolutions(warm=False),
         segmenter._method(),
         View(image, start, start, counted(start.shape, 3)),
     )
-    part, whole = (find(each, levels, method) for each in (view._replace(moved=moved), view))
+    part, whole = (find(each, resolutions, method) for each in (view._replace(moved=moved), view))
     left = (slice(60, 100), slice(36, 52))
     np.testing.assert_allclose(part.level[left], whole.level[left], atol=0.3)
     np.testing.assert_array_equal(part.level[:, 80:], start[:, 80:])
     gained = (start[left] > 0) != (part.level[left] > 0)
     assert gained.sum() > 100
     assert part.costs.data < -gained.sum()  # each by a log ratio well above 1
-    nothing = find(view._replace(start=part.level, moved=moved), levels, method)
+    nothing = find(view._replace(start=part.level, moved=moved), resolutions, method)
     assert abs(nothing.costs.data) < 0.1 * abs(part.costs.data)
 
 
@@ -233,7 +233,7 @@ def test_the_contour_is_sub_pixel():
     for known in (rooms, None):
         segmenter = LevelSet(shape_weight=0.0)
         view = View(image, start, start, counted(start.shape, 3), known)
-        found = find(view, segmenter._levels(warm=False), segmenter._method()).level
+        found = find(view, segmenter._resolutions(warm=False), segmenter._method()).level
         at = np.abs(found) < 0.7
         assert abs((found - exact)[at].mean()) < 0.15
         assert np.abs((found - exact)[at]).mean() < 0.35
@@ -280,7 +280,7 @@ def test_the_start_may_touch_the_image_border():
     image = np.random.default_rng(0).integers(0, 256, (160, 160, 3), dtype=np.uint8)
     segmenter = LevelSet()
     view = View(image, start, start, counted(start.shape, 3))
-    found = find(view, segmenter._levels(warm=False), segmenter._method())
+    found = find(view, segmenter._resolutions(warm=False), segmenter._method())
     assert np.isfinite(found.level).all() and found.level.shape == start.shape
 
 

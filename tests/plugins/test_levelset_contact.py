@@ -40,7 +40,7 @@ def sole(steps):
     contact = Contact(zone, Schedule(steps, 4, 4), Window(12.0, 8, 0.03)) if steps else None
     segmenter = LevelSet(use_background=False, shape_weight=0.01)
     view = View(image=image, start=model, prior=model, counted=np.ones(model.shape, bool), contact=contact)
-    level = find(view, segmenter._levels(warm=False), segmenter._method()).level
+    level = find(view, segmenter._resolutions(warm=False), segmenter._method()).level
     return np.mean([EDGE - 20 + np.flatnonzero(level[EDGE - 20 :, x] < 0)[0] for x in range(65, 96)]) - 0.5
 
 

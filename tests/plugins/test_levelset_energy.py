@@ -97,7 +97,7 @@ def test_a_prior_beyond_the_band_pulls_no_harder_than_at_its_edge():
     np.testing.assert_array_equal(*moved)
     assert np.abs(moved[0] - level).max() > 0.5
     everywhere = np.array([[y, 0, 48] for y in range(48)], np.int32)
-    far, near_by = (costs(Settled(level, still, everywhere), np.clip(prior, -b, b), weights) for b in (np.inf, 7.0))
+    far, near_by = (costs(Settled(level, still, everywhere, np.clip(prior, -b, b)), weights) for b in (np.inf, 7.0))
     assert far.shape == near_by.shape > 0
 
 
@@ -107,6 +107,6 @@ def test_the_logged_costs_are_those_of_the_equation_but_for_what_is_outside_alon
     level, prior = (np.clip(circle(r, 48, x, 23), -7, 7).astype(np.float32) for r, x in ((14, 24), (15, 26)))
     ratio = random.uniform(-2, 6, level.shape).astype(np.float32)
     everywhere = np.array([[y, 0, 48] for y in range(48)], np.int32)
-    found = costs(Settled(level, ratio, everywhere), prior, Weights(SIGMA, 0.5, 0.05, 6.0, 1.0, 7.0))
+    found = costs(Settled(level, ratio, everywhere, prior), Weights(SIGMA, 0.5, 0.05, 6.0, 1.0, 7.0))
     wanted = energy(level, ratio, np.zeros_like(ratio), prior, SIGMA, 0.5, 0.05)
     np.testing.assert_allclose(found, wanted, rtol=2e-3)

@@ -32,7 +32,7 @@ def without_feet():
 
 
 def seen(frame):
-    return trimaps(frame, SURFACE, small_rooms(SCENE.background, SCENE.cameras, 120), 0.35)
+    return trimaps(frame, SURFACE, small_rooms(SCENE.background, SCENE.cameras), 0.35)
 
 
 def test_limbs_that_differ_from_the_room_are_not_told():

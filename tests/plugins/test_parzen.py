@@ -128,7 +128,7 @@ def test_an_unseen_leg_leaves_no_direction_free(tmp_path: Path) -> None:
         scale = 1 / np.sqrt(np.maximum(np.diag(found), 1e-12))
         return found * scale * scale[:, None]
 
-    undamped, damped, seen = np.zeros(18), solver._precision(motion, guess), without_the_leg(scene, truth)
+    undamped, damped, seen = np.zeros(18), solver._anchor_precision(motion, guess), without_the_leg(scene, truth)
     ranks = [
         np.linalg.matrix_rank(equations(matches, priors, precision), tol=1e-9)
         for matches, priors, precision in (

@@ -6,7 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mocapflow_fitting.pose_fit import NEAREST, Observed, Solution, View, _cost, _normal, _step, projected
+from mocapflow_fitting.pose_fit import (
+    NEAREST,
+    NormalEquations,
+    Observations,
+    Residuals,
+    Solution,
+    _cost,
+    _normal,
+    _step,
+    projected,
+)
 
 from mocapflow.data import Pose
 from mocapflow.geometry import kinematics, twists
@@ -26,15 +36,15 @@ def test_eliminating_the_poses_solves_the_whole_system(damping: float, names: tu
     blocks = []
     for _ in range(3):
         rows = random.normal(size=(30, shared + unknowns))
-        blocks.append((rows.T @ rows, 1e-3 * random.normal(size=shared + unknowns)))
-    logs = np.array([0.02, -0.01])[:shared]
+        blocks.append(NormalEquations(rows.T @ rows, 1e-3 * random.normal(size=shared + unknowns)))
+    values = np.array([0.02, -0.01])[:shared]
     poses = tuple(Pose(root=twists.exp(random.normal(size=6)), angles=random.normal(size=2)) for _ in blocks)
-    found = _step(blocks, Solution(spreads, logs, poses), damping)
+    found = _step(blocks, Solution(spreads, values, poses), damping)
 
     size = shared + unknowns * len(blocks)
     precision = np.array([sd**-2 for sd in spreads.values()])
     matrix, vector = np.zeros((size, size)), np.zeros(size)
-    matrix[:shared, :shared], vector[:shared] = np.diag(precision * (1 + damping)), precision * logs
+    matrix[:shared, :shared], vector[:shared] = np.diag(precision * (1 + damping)), precision * values
     for k, (block, gradient) in enumerate(blocks):
         own = np.r_[:shared, shared + k * unknowns : shared + (k + 1) * unknowns]
         damped = block.copy()
@@ -42,7 +52,7 @@ def test_eliminating_the_poses_solves_the_whole_system(damping: float, names: tu
         matrix[np.ix_(own, own)] += damped
         vector[own] += gradient
     wanted = np.linalg.solve(matrix, -vector)
-    assert found.logs - logs == pytest.approx(wanted[:shared])
+    assert found.shared - values == pytest.approx(wanted[:shared])
     for k, (pose, before) in enumerate(zip(found.poses, poses, strict=True)):
         step = np.append(twists.log(pose.root @ twists.inverse(before.root)), pose.angles - before.angles)
         assert step == pytest.approx(wanted[shared + k * unknowns :][:unknowns], abs=1e-12)
@@ -60,15 +70,15 @@ def test_the_gradient_is_that_of_the_cost() -> None:
     target += random.normal(scale=0.03, size=target.shape)
     slope, precision = np.broadcast_to(np.eye(3), (len(points), 3, 3)), random.uniform(20, 80, len(points))
 
-    def look(vertices: F64) -> Observed:
-        return Observed(vertices[points] - target, slope, points, precision)
+    def compare(vertices: F64) -> Residuals:
+        return Residuals(vertices[points] - target, slope, points, precision)
 
     def cost(step: F64) -> float:
-        return _cost([view], Solution({}, np.empty(0), (moved(pose, step),)))
+        return _cost([moment], Solution({}, np.empty(0), (moved(pose, step),)))
 
-    view, steps = View(tight, look), 1e-6 * np.eye(6 + len(pose.angles))
+    moment, steps = Observations(tight, compare), 1e-6 * np.eye(6 + len(pose.angles))
     numeric = [(cost(step) - cost(-step)) / 2e-6 for step in steps]
-    matrix, gradient = _normal(view, pose, Solution({}, np.empty(0), (pose,)))
+    matrix, gradient = _normal(moment, pose, Solution({}, np.empty(0), (pose,)))
     np.testing.assert_allclose(gradient, numeric, rtol=1e-4, atol=1e-3)
     assert (np.linalg.eigvalsh(matrix) > 0).all()
 

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from mocapflow_levelset.colours import BINS
+from mocapflow_levelset.plates import plate_in
 from mocapflow_priors.density import Density, write
 from mocapflow_recovery.disagreement import FLYING, HANGING, chamfer_distance, floating_area, uncovered_areas
 from mocapflow_recovery.leaps import leaping, without_overbent
@@ -19,10 +20,10 @@ from mocapflow_recovery.scoring import Fit, Mismatch, StartPose, mismatch_of
 from mocapflow_recovery.search_history import HISTORY
 from mocapflow_recovery.search_triggers import Trigger
 from mocapflow_recovery.searches import Searches, half_turn
-from mocapflow_recovery.trimaps import shrunk, small_rooms, trimaps
+from mocapflow_recovery.trimaps import SmallRoom, small_rooms, trimaps
 
 from mocapflow.data import NO_CLOTH, Frame, Past, Pose
-from mocapflow.geometry.cameras import project
+from mocapflow.geometry.cameras import project, shrunk
 from mocapflow.geometry.silhouettes import covered
 from mocapflow.testing import pictures, recovery, scenes, template_body
 
@@ -30,7 +31,7 @@ SCENE = scenes.tiny_scene()
 settled = partial(recovery.settled, scene=SCENE)
 POSE = scenes.tiny_pose(SCENE, 3, 0.1)
 FRAME = pictures.tiny_frame(SCENE, POSE)
-ROOM = small_rooms(SCENE.background, SCENE.cameras, 120)
+ROOM = small_rooms(SCENE.background, SCENE.cameras)
 SPREAD = Spread(np.radians(25), np.radians(8), 0.06)
 FEW = {"samples": 10, "seen_samples": 0}
 QUICK = LimbSearch(**FEW)  # where what a search finds does not matter, or is found in ten samples
@@ -101,7 +102,7 @@ def test_where_nobody_knows_the_room_it_is_neither() -> None:
     spread = tuple(part.copy() for part in background.spread)
     for part in spread:
         part[:, :160] = np.inf
-    room = small_rooms(replace(background, spread=spread), SCENE.cameras, 120)
+    room = small_rooms(replace(background, spread=spread), SCENE.cameras)
     for view, _ in zip(trimaps(FRAME, surface(POSE), room, 0.35), SCENE.cameras, strict=True):
         assert not view.person[:, :80].any()
         assert not view.distance[:, :80].any()
@@ -110,8 +111,8 @@ def test_where_nobody_knows_the_room_it_is_neither() -> None:
 
 def test_a_room_shrunk_by_more_than_it_is_wide_then_is_compared() -> None:
     """An image 320 wide is 11 wide if shrunk by 27, but 11 goes 29 times into 320."""
-    room = small_rooms(SCENE.background, SCENE.cameras, 9)
-    assert [view.factor for view in room] == [27] * len(SCENE.cameras)
+    plates = [plate_in(SCENE.background, number, ("lab",), 27) for number in range(len(SCENE.cameras))]
+    room = [SmallRoom(shrunk(c, 27), 27, plate) for c, plate in zip(SCENE.cameras, plates, strict=True)]
     for view, _ in zip(trimaps(FRAME, surface(POSE), room, 0.35), SCENE.cameras, strict=True):
         assert view.person.shape == tuple(view.camera.size[::-1])
 
@@ -180,7 +181,7 @@ def test_a_skirt_that_flies_where_the_model_hangs_leads_no_limb_astray() -> None
 ])  # fmt: skip
 def test_it_is_searched_as_if_cloth_hung_and_as_if_it_flew(clothed, given, doubtful, near, far) -> None:
     scorer = SimpleNamespace(start=given, model=SimpleNamespace(clothed=clothed))
-    searches = Searches(scorer, PLAN, POSE, POSE, 0.1, 0.03)
+    searches = Searches(scorer, PLAN, POSE, POSE, 0.1)
     ways = LimbSearch()._strategies(searches, Trigger("lost", doubtful, ()))
     weights = [way.keywords["cloth_weight"] for way in ways if "cloth_weight" in way.keywords]
     assert (len(ways) - len(weights), weights) == (near, far)
@@ -193,7 +194,7 @@ def test_a_limb_that_is_odd_is_looked_for_alone() -> None:
     fitted, leg = Pose(root=POSE.root, angles=POSE.angles + 0.3), parts(SCENE.body)[1]
     model, past = SimpleNamespace(scene=SCENE), scenes.tiny_past(SCENE, fitted)
     scorer = SimpleNamespace(start=None, distances=apart_from_truth, model=model, past=past)
-    searches = Searches(scorer, PLAN, fitted, fitted, 0.01, 0.0)
+    searches = Searches(scorer, PLAN, fitted, fitted, 0.01)
     (way,) = LimbSearch()._strategies(searches, Trigger("a joint is bent beyond its limits", False, (leg,)))
     change = np.abs(way(np.random.default_rng(0)).angles - POSE.angles)
     assert change[leg].mean() < 0.25
@@ -342,8 +343,7 @@ def test_limbs_are_looked_for_where_enough_of_the_room_is_known(columns, looked)
     scene = SCENE.with_background(replace(SCENE.background, spread=spread))
     lost = pictures.tiny_state(SCENE, astray(0.9), POSE)
     shares = [
-        view.known
-        for view in trimaps(FRAME, surface(astray(0.9)), small_rooms(scene.background, SCENE.cameras, 160), 0.35)
+        view.known for view in trimaps(FRAME, surface(astray(0.9)), small_rooms(scene.background, SCENE.cameras), 0.35)
     ]
     assert (np.mean(shares) > QUICK.least_known) == looked
     model = scenes.tiny_model(scene)

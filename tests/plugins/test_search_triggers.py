@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from mocapflow_priors.density import Density
+from mocapflow_recovery.limb_search import LimbSearch
 from mocapflow_recovery.scoring import Mismatch
-from mocapflow_recovery.search_triggers import OVERBENT, Thresholds, search_trigger, stay_overbent
+from mocapflow_recovery.search_triggers import OVERBENT, stay_overbent
 
 from mocapflow.assets import Body
 from mocapflow.data import NO_CLOTH, REMEMBERED, Moment, Past, Pose
 
 CALM = Mismatch(uncovered=0.0, floating=0.0, cloth=0.0, hint=0.0)
-LIMITS = Thresholds(uncovered=100.0, floating=50.0, hint=30.0, beginnings=True, leap=0.5)
+SEARCH = LimbSearch(uncovered_cm2=100.0, floating_cm2=50.0, hint_cm2=30.0, leap_deg=28.0)
 
 
 def standing(body: Body, bent: int | None = None) -> Pose:
@@ -30,7 +31,7 @@ def past_of(*poses: Pose) -> Past:
 def triggered(body: Body, mismatch: Mismatch = CALM, fitted: Pose | None = None, past: Past | None = None):
     nothing_seen = Density(names=body.screw_names, poses=standing(body).angles[None], bandwidth=0.1)
     past = past_of(standing(body)) if past is None else past
-    return search_trigger(LIMITS, mismatch, fitted or standing(body), standing(body), past, body, nothing_seen)
+    return SEARCH.trigger(mismatch, fitted or standing(body), standing(body), past, body, nothing_seen)
 
 
 @pytest.mark.parametrize(

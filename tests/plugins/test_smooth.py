@@ -151,14 +151,16 @@ def test_cloth_goes_with_the_root() -> None:
     assert np.allclose(smoothed.cloth[:, 0], smoothed.root[:, :3, 3], atol=1e-12)
 
 
-def test_solution_is_the_least_squares_minimum_and_its_covariance() -> None:
-    rng = np.random.default_rng(2)
-    count, size = 7, 3
+@pytest.mark.parametrize("count", [3, 7, BLOCK, BLOCK + 1, BLOCK + 2, 2 * BLOCK + 1, 2 * BLOCK + 7])
+def test_solution_is_the_least_squares_minimum_and_its_covariance(count: int) -> None:
+    """Whether it is solved at once or in blocks, of which the last may have two frames."""
+    rng, size = np.random.default_rng(2), 3
     factors = rng.normal(size=(count, size, size))
     covariance = factors @ np.swapaxes(factors, 1, 2) + np.eye(size)
     time = np.cumsum(rng.uniform(0.5, 1.5, count))
     acceleration, limits = rng.normal(size=(count - 2, size)), rng.uniform(0.5, 2, size)
-    got, bridged = minimise(covariance, acceleration, limits, time, np.arange(count) == 3)
+    wanted = rng.random(count) < 0.5
+    got, smoothed = minimise(covariance, acceleration, limits, time, wanted)
     weights = difference_weights(time)
     second = np.zeros((count - 2, count))
     for k in range(3):
@@ -170,29 +172,15 @@ def test_solution_is_the_least_squares_minimum_and_its_covariance() -> None:
         blocks[t * size : (t + 1) * size, t * size : (t + 1) * size] = np.linalg.inv(covariance[t])
     hessian = blocks + operator.T @ precision @ operator
     expected = np.linalg.solve(hessian, -operator.T @ precision @ acceleration.ravel())
-    assert np.allclose(got.ravel(), expected, atol=1e-7)
-    assert np.allclose(bridged[0], np.linalg.inv(hessian)[9:12, 9:12], atol=1e-7)
+    np.testing.assert_allclose(got.ravel(), expected, atol=1e-7)
+    each = np.linalg.inv(hessian).reshape(count, size, count, size)
+    np.testing.assert_allclose(smoothed, each[wanted, :, wanted], atol=1e-7)
 
 
 def test_three_samples_give_the_acceleration_of_a_parabola_however_far_apart() -> None:
     time = np.cumsum(np.random.default_rng(5).uniform(0.5, 2.0, 9))
     three = np.lib.stride_tricks.sliding_window_view(3 * time**2 - 2 * time + 1, 3)
     np.testing.assert_allclose(np.sum(difference_weights(time) * three, axis=1), 6.0)
-
-
-@pytest.mark.parametrize(("count", "block"), [(3, 2), (7, 2), (7, 3), (7, 6), (12, 4), (13, 4)])
-def test_blocks_on_their_own_give_what_the_whole_gives(count: int, block: int) -> None:
-    rng = np.random.default_rng(count + block)
-    factors = rng.normal(size=(count, 3, 3))
-    known = (
-        factors @ np.swapaxes(factors, 1, 2) + 0.1 * np.eye(3),
-        rng.normal(size=(count - 2, 3)),
-        rng.uniform(0.5, 2, 3),
-    )
-    time, wanted = np.cumsum(rng.uniform(0.5, 1.5, count)), rng.random(count) < 0.5
-    whole, parts = (minimise(*known, time, wanted, block=size) for size in (count, block))
-    np.testing.assert_allclose(parts[0], whole[0], atol=1e-11)
-    np.testing.assert_allclose(parts[1], whole[1], atol=1e-11)
 
 
 def test_two_frames_are_returned_as_they_are() -> None:

@@ -45,7 +45,7 @@ def energies_of(
     """What an estimate costs by the matches it was found with, and where the solve began."""
     start = Guess(state.estimate.pose, state.cloth)
     motion = ClothMotion(model, Past(), solver.cloth_unknowns)
-    anchor = Anchor(with_neutral_cloth(start, model), solver._precision(motion, start))
+    anchor = Anchor(with_neutral_cloth(start, model), solver._anchor_precision(motion, start))
     problem = Problem(motion, solver._data(matches, model), priors, anchor, {})
     return problem.energies(Guess(found.pose, model.drape(found.pose, found.parameters, Past())))
 

@@ -31,7 +31,7 @@ def problem_of(solver: TwistGaussNewton, start: Guess, priors: tuple[SmoothMotio
     """The problem of exact matches of the true pose."""
     data = solver._data(exact_matches(SCENE, TRUTH, np.arange(0, 300, 9), directed=False), MODEL)
     motion = ClothMotion(MODEL, past or Past(), False)
-    return Problem(motion, data, priors, Anchor(start, solver._precision(motion, start)), {})
+    return Problem(motion, data, priors, Anchor(start, solver._anchor_precision(motion, start)), {})
 
 
 @pytest.mark.parametrize(("column", "cap"), [(1, 0.1), (4, 0.05), (9, 0.1), (UNKNOWNS - 1, 0.1)])
@@ -96,13 +96,13 @@ def test_priors_on_the_root_pull_about_the_root_as_their_energy_says() -> None:
     assert np.abs(slope[3:6]).max() > 1  # of which the lever would make turns
 
 
-def test_the_damping_pulls_about_the_root_as_its_energy_says() -> None:
+def test_the_anchor_pulls_about_the_root_as_its_energy_says() -> None:
     solver = TwistGaussNewton(root_sd_deg=20.0, root_sd_m=0.05, angle_sd_deg=30.0)
     problem, guess = problem_of(solver, Guess(start_from(TRUTH, 2), NO_CLOTH)), Guess(TRUTH, NO_CLOTH)
     columns = steps.about_origin(problem.centre(guess), UNKNOWNS).T
 
     def energy(step: np.ndarray) -> float:
-        return problem.energies(Guess(moved(TRUTH, step), NO_CLOTH))["damping"]
+        return problem.energies(Guess(moved(TRUTH, step), NO_CLOTH))["anchor"]
 
     slope = [(energy(1e-5 * c) - energy(-1e-5 * c)) / 2e-5 for c in columns]
     prior = problem.quadratic(guess).prior
@@ -111,7 +111,7 @@ def test_the_damping_pulls_about_the_root_as_its_energy_says() -> None:
     assert prior.hessian == pytest.approx(np.diag(sd**-2))
 
 
-def test_cloth_is_held_by_its_damping_alone() -> None:
+def test_cloth_is_held_by_its_anchor_alone() -> None:
     """Priors know nothing of it: theirs are the columns (omega, v, angles), more if they like."""
     start = Guess(start_from(TRUTH, 2), Cloth(vertices=np.empty((0, 3)), parameters=np.array([0.3, -0.2])))
     precision = np.append(np.full(UNKNOWNS, 1e-3), [4.0, 9.0])
