@@ -32,11 +32,17 @@ from mocapflow.storage.checkpoint import Checkpoint
 from mocapflow.storage.locks import Lock
 from mocapflow.storage.rows import Corrupted
 from mocapflow.storage.store import Report, Store
+from mocapflow.storage.traces import untraced
 
 
 def is_hit(step: Step, artifact: Artifact) -> bool:
     """True where an artifact holds all that a stage would make."""
     return artifact.complete and (not step.chain or artifact.frames >= step.frames)
+
+
+def lacking_trace(step: Step, artifact: Artifact) -> str:
+    """Return which frames of the store have no trace, where a stage is to keep one, for people; empty: none."""
+    return untraced(artifact, step.recording.indices) if step.named.stage.keeps_turns else ""
 
 
 def find_hit(step: Step, store: Store) -> Artifact | None:
@@ -143,7 +149,7 @@ class Execution:
         if started is None or not started.frames:
             return self._run(step, self._checkpoint(step, self._store.begin(step.label, step.key, step.recipe), lock))
         self._report(f"{step.label}: going on after {started.frames} frames")
-        mixed = self._warned_of_versions(step, started)
+        mixed = self._warned_of(step, started)
         try:
             return self._run(step, self._checkpoint(step, with_versions(started), lock), mixed)
         except Corrupted as error:
@@ -229,7 +235,7 @@ class Execution:
         if step.label in self.entries:
             return
         self._report(f"{step.label}: from the store")
-        mixed = self._warned_of_versions(step, found)
+        mixed = self._warned_of(step, found)
         self._warn(found.warnings)
         self._enter(step, Made(None, [*found.warnings, *mixed], 0.0, 0.0), cached=True)
 
@@ -257,14 +263,17 @@ class Execution:
             "stages": dict(self.entries),
         }
 
-    def _warned_of_versions(self, step: Step, artifact: Artifact) -> list[str]:
-        """Report, and return, which result or which frames of it were made with other versions."""
+    def _warned_of(self, step: Step, artifact: Artifact) -> list[str]:
+        """Report, and return, what of a result was made with other versions, and which frames lack a trace."""
         indices, said = step.recording.indices, list[str]()
         for first, last, how in made_otherwise(artifact):
             own = indices[first:last]
             if own or not step.chain:
                 what = f"frames {own[0]}–{own[-1]} of {step.label}" if step.chain else step.label
                 said.append(f"{what} were made with {how}")
+        if lack := lacking_trace(step, artifact):
+            how = "tracked without keep: trace; --fresh tracks all anew"
+            said.append(f"{step.label}: frames {lack} have no trace, for they were {how}")
         self._warn(said)
         return said
 

@@ -16,7 +16,7 @@ from mocapflow.config.pipeline import Pipeline
 from mocapflow.errors import MocapflowError, PipelineError, no_run_folder
 from mocapflow.io.paths import for_opencv
 from mocapflow.records import silent
-from mocapflow.running.execution import Execution, find_hit, is_hit
+from mocapflow.running.execution import Execution, find_hit, is_hit, lacking_trace
 from mocapflow.running.recipes import Step, steps_of
 from mocapflow.running.wiring import SUPPLIED, Source
 from mocapflow.storage.shared import open_store
@@ -187,9 +187,11 @@ def _outlook(step: Step, store: Store) -> tuple[str, str]:
     if not step.stored:
         return "run", "writes files or compares: always"
     found = store.find(step.key)
+    lack = "" if found is None else lacking_trace(step, found)
+    without = f"; {lack} without a trace: --fresh" if lack else ""
     if found is not None and is_hit(step, found):
-        return "hit", f"{step.frames} frames" if step.chain else ""
+        return "hit", f"{step.frames} frames{without}" if step.chain else ""
     if found is not None and found.frames:
-        return "resume", f"{min(found.frames, step.frames)} of {step.frames} frames done"
+        return "resume", f"{min(found.frames, step.frames)} of {step.frames} frames done{without}"
     near = store.nearest(step.label, step.recipe, but=step.key)
     return "run", f"new: {explain(near.recipe, step.recipe)}" if near else "new"
