@@ -9,19 +9,16 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from mocapflow.assets import Body, GarmentMesh
 from mocapflow.config.named_parts import whereabouts
 from mocapflow.config.pipeline import Pipeline
 from mocapflow.data import FrameResult
-from mocapflow.dressing.guards import body_of, mesh_of
-from mocapflow.dressing.roles import Garment
-from mocapflow.errors import GarmentError
 from mocapflow.guards.outputs import made_of
 from mocapflow.interrupts import check
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import silent
 from mocapflow.results import Files, RunFolder
 from mocapflow.running.component_failures import FAILURE_LOG, naming_failures
+from mocapflow.running.dressing import body_named, sewn
 from mocapflow.running.progress import Progress
 from mocapflow.running.recipes import Step
 from mocapflow.running.warning_log import warnings_logged
@@ -69,7 +66,8 @@ class Execution:
         self._pipeline, self._store, self._out = pipeline, store, out
         self._steps = {step.label: step for step in steps}
         self._fresh, self._report = fresh, report
-        self._naming_failures = partial(naming_failures, registry=pipeline.registry, log=out / FAILURE_LOG)
+        self._log = out / FAILURE_LOG
+        self._naming_failures = partial(naming_failures, registry=pipeline.registry, log=self._log)
         self._results: dict[str, Any] = {}
         self._scenes: dict[tuple[str | None, str | None], Scene] = {}
         self.entries: dict[str, Mapping[str, Any]] = {}  # per finished stage
@@ -212,24 +210,12 @@ class Execution:
         """Return the cameras and the body that hold at this place in the pipeline, and the garment sewn to it."""
         place = step.body, step.rig
         if place not in self._scenes:
-            body = self._result(step.body) if step.body else self._body()
-            sewn = self._sewn(self._pipeline.garment, body) if self._pipeline.garment else None
+            body = self._result(step.body) if step.body else body_named(self._pipeline, self._log)
+            garment = sewn(self._pipeline, body, self._log)
             cameras = self._result(step.rig).cameras if step.rig else step.recording.cameras
-            scene = self._scenes[place] = Scene(cameras=cameras, body=body, garment=sewn)
+            scene = self._scenes[place] = Scene(cameras=cameras, body=body, garment=garment)
             self._warn(scene.warnings)
         return self._scenes[place]
-
-    def _body(self) -> Body:
-        model = self._pipeline.body
-        with self._naming_failures(model):
-            return body_of(model, self._pipeline.recording)
-
-    def _sewn(self, garment: Garment, body: Body) -> GarmentMesh:
-        try:
-            with self._naming_failures(garment):
-                return mesh_of(garment, body)
-        except GarmentError as error:
-            raise GarmentError(error.message, where=self._pipeline.garment_where, hint=error.hint) from None
 
     def _enter_found(self, step: Step, found: Artifact) -> None:
         if step.label in self.entries:
