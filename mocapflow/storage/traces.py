@@ -16,20 +16,21 @@ def untraced(artifact: Artifact, indices: Sequence[int]) -> str:
         artifact: the track, half done or finished.
         indices: of the wanted frames; each is a row.
     """
-    ends: list[list[int]] = []  # the first and last row of each stretch
-    for row in range(min(artifact.frames, len(indices))):
-        if _traced(artifact, row):
-            continue
-        if ends and ends[-1][1] == row - 1:
-            ends[-1][1] = row
-        else:
-            ends.append([row, row])
-    return ", ".join(f"{indices[a]}" if a == b else f"{indices[a]}–{indices[b]}" for a, b in ends)
-
-
-def _traced(artifact: Artifact, row: int) -> bool:
+    rows = range(min(artifact.frames, len(indices)))
     try:
-        Rows(artifact.path / TRACE).read(row)
+        trace = Rows(artifact.path / TRACE)
+        lacking = {row for row in rows if not _is_there(trace, row)}
+    except Corrupted:
+        lacking = set(rows)
+    firsts = [row for row in sorted(lacking) if row - 1 not in lacking]
+    lasts = [row for row in sorted(lacking) if row + 1 not in lacking]
+    ends = [(indices[a], indices[b]) for a, b in zip(firsts, lasts, strict=True)]
+    return ", ".join(f"{a}" if a == b else f"{a}–{b}" for a, b in ends)
+
+
+def _is_there(trace: Rows, row: int) -> bool:
+    try:
+        trace.read(row)
     except Corrupted:
         return False
     return True
