@@ -176,6 +176,11 @@ class Stage(Component):
         """True where `look_back` has to check a result that comes from the store."""
         return False
 
+    @property
+    def keeps_turns(self) -> bool:
+        """True where the checkpoint is to keep every turn: frames of the store may lack them, and that is told."""
+        return False
+
     def look_back(self, made: Any) -> None:
         """Raise what `run` would have raised about a stored result: settings outside its key may have changed since."""
 

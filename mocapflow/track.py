@@ -89,7 +89,7 @@ class CoupledLoop(Stage):
         for said in check_matcher_inputs(self.matchers, recording):
             LOG.warning(said)
         able, model = self if background else self.without_scene(), self.model_of(scene, background)
-        if self.keep == "trace":
+        if self.keeps_turns:
             checkpoint.keep_turns(self.steady.cap)
         if self.looks_back:
             self._refuse(rest for rest in checkpoint.rests() if rest.frame in recording.indices)
@@ -120,6 +120,11 @@ class CoupledLoop(Stage):
     def looks_back(self) -> bool:
         """True where a stored track is checked, too: an earlier run may have gone on after an unsteady frame."""
         return self.on_unsteady == "stop"
+
+    @property
+    def keeps_turns(self) -> bool:
+        """True where a trace is wanted."""
+        return self.keep == "trace"
 
     def look_back(self, made: Track) -> None:
         """Stop at a track of the store with a frame that did not settle, if that is wanted.

@@ -22,7 +22,7 @@ PIPELINES = shipped("pipelines")
 CLIPS = {name: shipped("examples", "data", f"{name}_steps") for name in ("skirt", "shorts")}
 NO_PICTURES = [part for stage in ("overlay", "virtual", "report") for part in ("--set", f"stages.{stage}=null")]
 FEW = ("--frames", "0:5", *NO_PICTURES)
-OTHERS = ("paper", "bare", "large_motion", "disturbed", "disturbed_added", "corrupted")  # pipelines, on the clips too
+OTHERS = ("paper", "bare", "legs", "large_motion", "disturbed", "disturbed_added", "corrupted")  # on the clips too
 UNSHIPPED = ("balancing", "disturbed_balancing")  # whose recording does not come with mocapflow
 long = pytest.mark.long
 

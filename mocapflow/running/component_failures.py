@@ -33,14 +33,14 @@ FAILURE_LOG = "failed.log"  # in the run folder, the traceback of the last failu
 
 @contextmanager
 def naming_failures(
-    component: Component, registry: Registry, log: Path, checkpoint: Checkpoint | None = None
+    component: Component, registry: Registry, log: Path | None, checkpoint: Checkpoint | None = None
 ) -> Iterator[None]:
     """If a component raises, say who it was, what is saved and how to go on.
 
     Args:
         component: what is running, or what it runs.
         registry: knows which packages are plugins.
-        log: where to write the whole traceback.
+        log: where to write the whole traceback; None: nowhere.
         checkpoint: knows what is saved, and how to go on; None: nothing is.
     """
     try:
@@ -54,18 +54,20 @@ def naming_failures(
             if not isinstance(error, StoreError):
                 error.where = error.where or _named(_culprit(error, registry) or component)
             raise
-        if isinstance(error, OSError) and _nobodys(error, log.parent) and (said := unwritable(error)):
+        if isinstance(error, OSError) and _nobodys(error, log) and (said := unwritable(error)):
             raise said from error
         raise _failure(error, component, registry, checkpoint.kept if checkpoint else "", log) from error
 
 
-def _nobodys(error: OSError, out: Path) -> bool:
+def _nobodys(error: OSError, log: Path | None) -> bool:
     """Return whether it is no component's fault: a drive is full, or the run folder can't be written."""
-    inside = error.filename and Path(str(error.filename)).absolute().is_relative_to(out.absolute())
+    inside = log and error.filename and Path(str(error.filename)).absolute().is_relative_to(log.parent.absolute())
     return error.errno in {*FULL, errno.EROFS} or bool(inside)
 
 
-def _failure(error: BaseException, stage: Component, registry: Registry, saved: str, log: Path) -> ComponentFailed:
+def _failure(
+    error: BaseException, stage: Component, registry: Registry, saved: str, log: Path | None
+) -> ComponentFailed:
     """Return the error for people: the innermost frame of the traceback in a plugin names the culprit."""
     component = error.component if isinstance(error, InvalidOutput) else _culprit(error, registry) or stage
     moment = f" at {when}" if (when := moment_of(error)) else ""
@@ -109,8 +111,10 @@ def _reason(error: BaseException) -> str:
     return raised(error)
 
 
-def _write_traceback(error: BaseException, log: Path) -> str:
+def _write_traceback(error: BaseException, log: Path | None) -> str:
     """Write the traceback and return where it is, for people; "" where it can't be written."""
+    if log is None:
+        return ""
     try:
         log.parent.mkdir(parents=True, exist_ok=True)
         log.write_text("".join(traceback.format_exception(error)), encoding="utf-8")

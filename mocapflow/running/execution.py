@@ -9,13 +9,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from mocapflow.assets import Body, GarmentMesh
 from mocapflow.config.named_parts import whereabouts
 from mocapflow.config.pipeline import Pipeline
 from mocapflow.data import FrameResult
-from mocapflow.dressing.guards import body_of, mesh_of
-from mocapflow.dressing.roles import Garment
-from mocapflow.errors import GarmentError
 from mocapflow.guards.outputs import made_of
 from mocapflow.interrupts import check
 from mocapflow.recordings.recording import Recording
@@ -23,6 +19,7 @@ from mocapflow.records import silent
 from mocapflow.results import Files, RunFolder
 from mocapflow.running import damage
 from mocapflow.running.component_failures import FAILURE_LOG, naming_failures
+from mocapflow.running.dressing import body_named, sewn
 from mocapflow.running.progress import Progress
 from mocapflow.running.recipes import Step
 from mocapflow.running.warning_log import warnings_logged
@@ -33,11 +30,17 @@ from mocapflow.storage.checkpoint import Checkpoint
 from mocapflow.storage.locks import Lock
 from mocapflow.storage.rows import Corrupted
 from mocapflow.storage.store import Report, Store
+from mocapflow.storage.traces import untraced
 
 
 def is_hit(step: Step, artifact: Artifact) -> bool:
     """True where an artifact holds all that a stage would make."""
     return artifact.complete and (not step.chain or artifact.frames >= step.frames)
+
+
+def lacking_trace(step: Step, artifact: Artifact) -> str:
+    """Return which frames of the store have no trace, where a stage is to keep one, for people; empty: none."""
+    return untraced(artifact, step.recording.indices) if step.named.stage.keeps_turns else ""
 
 
 def find_hit(step: Step, store: Store) -> Artifact | None:
@@ -65,7 +68,8 @@ class Execution:
         self._repairs = damage.Repairs(store, report)
         self._steps = {step.label: step for step in steps}
         self._fresh, self._report = fresh, report
-        self._naming_failures = partial(naming_failures, registry=pipeline.registry, log=out / FAILURE_LOG)
+        self._log = out / FAILURE_LOG
+        self._naming_failures = partial(naming_failures, registry=pipeline.registry, log=self._log)
         self._results: dict[str, Any] = {}
         self._scenes: dict[tuple[str | None, str | None], Scene] = {}
         self.entries: dict[str, Mapping[str, Any]] = {}  # per finished stage
@@ -146,7 +150,7 @@ class Execution:
         if started is None or not started.frames:
             return self._run(step, self._checkpoint(step, self._store.begin(step.label, step.key, step.recipe), lock))
         self._report(f"{step.label}: going on after {started.frames} frames")
-        mixed = self._warned_of_versions(step, started)
+        mixed = self._warned_of(step, started)
         try:
             return self._run(step, self._checkpoint(step, with_versions(started), lock), mixed)
         except Corrupted as error:
@@ -212,30 +216,18 @@ class Execution:
         """Return the cameras and the body that hold at this place in the pipeline, and the garment sewn to it."""
         place = step.body, step.rig
         if place not in self._scenes:
-            body = self._result(step.body) if step.body else self._body()
-            sewn = self._sewn(self._pipeline.garment, body) if self._pipeline.garment else None
+            body = self._result(step.body) if step.body else body_named(self._pipeline, self._log)
+            garment = sewn(self._pipeline, body, self._log)
             cameras = self._result(step.rig).cameras if step.rig else step.recording.cameras
-            scene = self._scenes[place] = Scene(cameras=cameras, body=body, garment=sewn)
+            scene = self._scenes[place] = Scene(cameras=cameras, body=body, garment=garment)
             self._warn(scene.warnings)
         return self._scenes[place]
-
-    def _body(self) -> Body:
-        model = self._pipeline.body
-        with self._naming_failures(model):
-            return body_of(model, self._pipeline.recording)
-
-    def _sewn(self, garment: Garment, body: Body) -> GarmentMesh:
-        try:
-            with self._naming_failures(garment):
-                return mesh_of(garment, body)
-        except GarmentError as error:
-            raise GarmentError(error.message, where=self._pipeline.garment_where, hint=error.hint) from None
 
     def _enter_found(self, step: Step, found: Artifact) -> None:
         if step.label in self.entries:
             return
         self._report(f"{step.label}: from the store")
-        mixed = self._warned_of_versions(step, found)
+        mixed = self._warned_of(step, found)
         self._warn(found.warnings)
         self._enter(step, Made(None, [*found.warnings, *mixed], 0.0, 0.0), cached=True)
 
@@ -263,14 +255,17 @@ class Execution:
             "stages": dict(self.entries),
         }
 
-    def _warned_of_versions(self, step: Step, artifact: Artifact) -> list[str]:
-        """Report, and return, which result or which frames of it were made with other versions."""
+    def _warned_of(self, step: Step, artifact: Artifact) -> list[str]:
+        """Report, and return, what of a result was made with other versions, and which frames lack a trace."""
         indices, said = step.recording.indices, list[str]()
         for first, last, how in made_otherwise(artifact):
             own = indices[first:last]
             if own or not step.chain:
                 what = f"frames {own[0]}–{own[-1]} of {step.label}" if step.chain else step.label
                 said.append(f"{what} were made with {how}")
+        if lack := lacking_trace(step, artifact):
+            how = "tracked without keep: trace; --fresh tracks all anew"
+            said.append(f"{step.label}: frames {lack} have no trace, for they were {how}")
         self._warn(said)
         return said
 

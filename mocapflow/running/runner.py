@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +12,12 @@ from threadpoolctl import threadpool_limits
 from mocapflow.caching.keys import explain
 from mocapflow.config.named_parts import FOLDERS, WHOLE
 from mocapflow.config.pipeline import Pipeline
-from mocapflow.errors import MocapflowError, PipelineError, no_run_folder
+from mocapflow.errors import PipelineError, no_run_folder
 from mocapflow.io.paths import for_opencv
 from mocapflow.records import silent
-from mocapflow.running.execution import Execution, find_hit, is_hit
+from mocapflow.running.component_failures import FAILURE_LOG
+from mocapflow.running.dressing import body_named, sewn
+from mocapflow.running.execution import Execution, find_hit, is_hit, lacking_trace
 from mocapflow.running.recipes import Step, steps_of
 from mocapflow.running.wiring import SUPPLIED, Source
 from mocapflow.storage.shared import open_store
@@ -68,18 +69,22 @@ class Prepared:
     steps: Sequence[Step]
 
     def plan(self) -> list[PlanLine]:
-        """Return for each stage whether its result is there, can be continued, or has to be made, and why."""
+        """Return for each stage whether its result is there, can be continued, or has to be made, and why.
+
+        Raises:
+            MocapflowError: a run can't begin; see `check`.
+        """
         self._check_inputs(fresh=False)
         return [PlanLine(step.label, *_outlook(step, self.store), step.key, step.sources) for step in self.steps]
 
     def check(self, out: Path, fresh: bool = False) -> None:
-        """Check that a run can begin: inputs are there, the run folder can be named, the store written or made.
+        """Check that a run can begin: inputs are there, the garment fits, a run folder and a store can be made.
 
         Raises:
             MocapflowError: it can't.
         """
         for_opencv(out)  # of a path that it can't take people hear now, not when videos are drawn
-        self._check_inputs(fresh)
+        self._check_inputs(fresh, out / FAILURE_LOG)
         self.store.create()
         self.store.digests.save()
 
@@ -100,24 +105,18 @@ class Prepared:
             out=out, store=self.store.path, stages=tuple(execution.entries.values()), files=tuple(execution.files)
         )
 
-    def _check_inputs(self, fresh: bool) -> None:
-        """Check that everything is there that has to be read; what comes from the store needs nothing.
+    def _check_inputs(self, fresh: bool, log: Path | None = None) -> None:
+        """Check what the stages will read, and sew the garment; what comes from the store needs nothing.
 
         Raises:
-            MocapflowError: what is missing, as the stage or body would tell it in the midst of a run.
+            MocapflowError: what is missing or can't be worn, as a stage, body or garment would tell it in a run.
         """
-
-        def asked(need: Callable[[], None], readers: Sequence[Step]) -> None:
-            try:
-                need()
-            except MocapflowError:
-                if any(fresh or find_hit(step, self.store) is None for step in readers):
-                    raise
-
-        for step in self.steps:
-            asked(partial(step.named.stage.need, step.recording), [step])
-        dressed = [step for step in self.steps if "scene" in step.sources.values() and step.body is None]
-        asked(partial(self.pipeline.body.need, self.pipeline.recording), dressed)
+        due = [step for step in self.steps if fresh or find_hit(step, self.store) is None]
+        for step in due:
+            step.named.stage.need(step.recording)
+        if any("scene" in step.sources.values() and step.body is None for step in due):
+            self.pipeline.body.need(self.pipeline.recording)
+            sewn(self.pipeline, body_named(self.pipeline, log), log)
 
 
 def prepare(pipeline: Pipeline, *, store: Path | str, url: str | None = None) -> Prepared:
@@ -187,9 +186,11 @@ def _outlook(step: Step, store: Store) -> tuple[str, str]:
     if not step.stored:
         return "run", "writes files or compares: always"
     found = store.find(step.key)
+    lack = "" if found is None else lacking_trace(step, found)
+    without = f"; {lack} without a trace: --fresh" if lack else ""
     if found is not None and is_hit(step, found):
-        return "hit", f"{step.frames} frames" if step.chain else ""
+        return "hit", f"{step.frames} frames{without}" if step.chain else ""
     if found is not None and found.frames:
-        return "resume", f"{min(found.frames, step.frames)} of {step.frames} frames done"
+        return "resume", f"{min(found.frames, step.frames)} of {step.frames} frames done{without}"
     near = store.nearest(step.label, step.recipe, but=step.key)
     return "run", f"new: {explain(near.recipe, step.recipe)}" if near else "new"

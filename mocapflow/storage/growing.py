@@ -24,8 +24,8 @@ from mocapflow.storage import packing
 from mocapflow.storage.packing import Columns, column
 from mocapflow.storage.rows import Corrupted, Rows, flush_all, group_meta, write_json
 
-NUMBERS, CLOTH = "live/rows", "cloth"
-SEEN = ("silhouettes", "matches", "trace")
+NUMBERS, CLOTH, TRACE = "live/rows", "cloth", "trace"
+SEEN = ("silhouettes", "matches", TRACE)
 Shapes = Mapping[str, tuple[int, ...]]
 
 
@@ -104,7 +104,7 @@ class Growing:
         for turn, pose in enumerate(turns):
             poses[turn] = np.concatenate([pose.root.ravel(), pose.angles])
         unit = "root (4, 4) in m, world_from_body, then angles in rad; NaN after the last turn"
-        self._rows_for("trace", poses, np.nan, "turn", "root_and_angles", unit=unit).write(row, poses, durable=False)
+        self._rows_for(TRACE, poses, np.nan, "turn", "root_and_angles", unit=unit).write(row, poses, durable=False)
 
     def flush(self) -> None:
         """Wait until what was not flushed when it was written is on the drive."""

@@ -17,7 +17,7 @@ from mocapflow_bodies.weights import strongest
 
 Part = Literal["full", "legs", "arms"]
 KEPT_JOINTS = {
-    "legs": ("pelvis", "hip", "knee", "ankle", "toe"),
+    "legs": ("pelvis", "spine", "hip", "knee", "ankle", "toe"),  # up to the waist: they may wear something
     "arms": ("pelvis", "spine", "chest", "neck", "head", "clavicle", "shoulder", "elbow", "wrist"),
 }
 

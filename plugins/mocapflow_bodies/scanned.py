@@ -40,7 +40,7 @@ class Scanned(BodyModel):
     """A scan of the person: `subject/body.obj`, `skeleton.json` and, if there, `weights.npz`."""
 
     name: ClassVar[str] = "scanned"
-    part: Part = "full"  # what is used of it; the rest is cut off
+    part: Part = "full"  # what is used of it; the rest is cut off. legs: up to the waist, see pipelines/legs.yaml
     morph: Morph | None = None  # a second shape, for a knee or elbow that bends far
 
     def inputs(self, folder: Path) -> Sequence[Path]:

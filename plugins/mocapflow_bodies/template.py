@@ -26,7 +26,7 @@ class Template(BodyModel):
     name: ClassVar[str] = "template"
     shape: Annotated[float, Field(ge=0, le=1)] = 0.5  # 0 the mean woman, 1 the mean man
     height_m: Annotated[float, Field(gt=0.5, lt=2.6)] | None = None  # null: that of the mean
-    part: Part = "full"  # what is used of it; the rest is cut off
+    part: Part = "full"  # what is used of it; the rest is cut off. legs: up to the waist, see pipelines/legs.yaml
 
     def inputs(self, folder: Path) -> Sequence[Path]:
         """Return the files that are read."""

@@ -49,10 +49,15 @@ def resampled(at: F64, values: F64, wanted: F64, step: float) -> F64:
 
 def at_our_frames(reference: Reference, columns: Mapping[str, F64], lag: float = 0.0) -> dict[str, F64]:
     """Return the curves (T,) of a reference at our frames, or a lag in frames before; NaN where it has nothing."""
+    at, ours = clocks(reference, columns, lag)
+    return {name: resampled(at, curve, ours, reference.step) for name, curve in reference.curves.items()}
+
+
+def clocks(reference: Reference, columns: Mapping[str, F64], lag: float) -> tuple[F64, F64]:
+    """Return the samples (T,) of a reference and our frames (U,), or a lag in frames before, by one clock."""
     clock = columns["frame" if reference.by_frame else "time"]
-    earlier = clock - lag * (float(np.median(np.diff(clock))) if len(clock) > 1 else 0.0)
-    at = reference.moments(clock)
-    return {name: resampled(at, curve, earlier, reference.step) for name, curve in reference.curves.items()}
+    step = float(np.median(np.diff(clock))) if len(clock) > 1 else 0.0
+    return reference.moments(clock), clock - lag * step
 
 
 def align(columns: Mapping[str, F64], reference: Reference, longest_lag_s: float) -> Alignment:

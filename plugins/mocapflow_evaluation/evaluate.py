@@ -40,7 +40,8 @@ class Evaluate(Stage):
     `rms_aligned_deg` alone is without them and without the mean offset. `rms_lowpassed_deg` is by our unsmoothed curve
     without what is faster than 6 Hz, as reference curves are filtered; NaN where a take is too short or too slow.
     Writes results/evaluation.csv and .json and, frame by frame, errors.csv; cycles.csv where somebody walks; and
-    against joint centres or markers joint_distances.csv and the reference's stick model.
+    against joint centres (joints.npz beside the truth's angles, too) or markers joint_distances.csv and the
+    reference's stick model.
     """
 
     name: ClassVar[str] = "evaluate"
@@ -56,7 +57,7 @@ class Evaluate(Stage):
             with_keypoints(recording, path)
             return
         reference, common_points = read_reference(path), path.parent / COMMON_POINTS
-        if reference.joints is not None and common_points.is_file():
+        if reference.joints is not None and not reference.in_our_world and common_points.is_file():
             between_points(common_points)
 
     def run(

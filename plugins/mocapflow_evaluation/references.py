@@ -14,7 +14,7 @@ from mocapflow.geometry import angles
 from mocapflow.io import markers
 from mocapflow.io.columns import read_columns
 from mocapflow.records import F64, array, record
-from mocapflow_evaluation import marker_joints
+from mocapflow_evaluation import marker_joints, true_joints
 from mocapflow_evaluation.marker_names import FILE, landmarks
 from mocapflow_evaluation.tracked_motion import SIGNED
 
@@ -38,6 +38,7 @@ class Reference:
     by_frame: bool  # rows belong to frames; else to times
     joint_names: tuple[str, ...] = ()
     joints: F64 | None = array("T", "J", 3, unit="m, in the axes of its own rig, z up", default=None)
+    in_our_world: bool = False  # its rig is that of the cameras: nothing is registered
     notes: tuple[str, ...] = ()  # how it was read, where that is not plain
     time: F64 | None = array("T", unit="s, where a table has times", default=None)
     counted_from: float = 0.0  # s; some programs begin to count time at one sample
@@ -56,10 +57,11 @@ class Reference:
 def read_reference(path: Path) -> Reference:
     """Return the reference in a file.
 
-    A csv has our columns, degrees, by frame or time. Of a .mot the columns that mean the same are taken, by OpenSim's
-    names; their zeros are the model's own, so that only knees and elbows compare without an offset. A .trc or .c3d
-    holds joint centres, named as ours (hip_l) or as Pose2Sim's (LHip), or markers on bony landmarks (`marker_names`),
-    from which joint centres and knee axes are found (`marker_joints`).
+    A csv has our columns, degrees, by frame or time; beside one by frame may lie its joint centres (`true_joints`). Of
+    a .mot the columns that mean the same are taken, by OpenSim's names; their zeros are the model's own, so that only
+    knees and elbows compare without an offset. A .trc or .c3d holds joint centres, named as ours (hip_l) or as
+    Pose2Sim's (LHip), or markers on bony landmarks (`marker_names`), from which joint centres and knee axes are found
+    (`marker_joints`).
 
     Raises:
         RecordingError: the file is missing, of another kind, has none of our angles, or one that turns more than once
@@ -98,7 +100,9 @@ def _table(path: Path) -> Reference:
     if clock is None:
         raise RecordingError("the reference has neither a column frame nor time", where=str(path))
     curves = {name: columns[name] for name in tables.angle_names(columns)}
-    return Reference(curves=curves, at=columns[clock], by_frame=clock == "frame", time=columns.get("time"))
+    found = Reference(curves=curves, at=columns[clock], by_frame=clock == "frame", time=columns.get("time"))
+    known = true_joints.beside(path, found.at) if found.by_frame else None
+    return found if known is None else replace(found, joint_names=known.names, joints=known.places, in_our_world=True)
 
 
 def _motion(path: Path) -> Reference:

@@ -13,7 +13,7 @@ from mocapflow.geometry.registration import Registration
 from mocapflow.io import markers
 from mocapflow.records import F64, array, record
 from mocapflow_evaluation import compare, comparison_plots, stick
-from mocapflow_evaluation.alignment import resampled
+from mocapflow_evaluation.alignment import clocks, resampled
 from mocapflow_evaluation.references import Reference
 from mocapflow_evaluation.stick import Stick
 from mocapflow_evaluation.tracked_motion import TrackedMotion
@@ -55,7 +55,7 @@ def compare_rigs(own: TrackedMotion, reference: Reference, lag: float, common_po
     """Return the registration of both rigs and the reference's joint centres in our world, at our frames.
 
     It comes from a table of common points where there is one, else from the joint centres themselves, as they are
-    without the lag (frames) between both.
+    without the lag (frames) between both. Joint centres in the world of the cameras are compared as they are.
 
     Raises:
         RecordingError: the table can't be read.
@@ -64,7 +64,9 @@ def compare_rigs(own: TrackedMotion, reference: Reference, lag: float, common_po
     ours, frame = own.stick, own.columns["frame"]
     if reference.joints is None:
         return Rigs(ours=ours, frame=frame)
-    theirs, aligned = (_sampled(reference, own.columns["time"], late / own.frame_rate) for late in (0.0, lag))
+    theirs, aligned = (_sampled(reference, own.columns, late) for late in (0.0, lag))
+    if reference.in_our_world and stick.common(ours, theirs):
+        return Rigs(ours=ours, frame=frame, theirs=theirs, aligned=aligned)
     measured = common_points.is_file()
     found = stick.between_points(common_points) if measured else stick.between_joints(ours, aligned)
     if found is None:
@@ -81,12 +83,12 @@ def compare_rigs(own: TrackedMotion, reference: Reference, lag: float, common_po
     )
 
 
-def _sampled(reference: Reference, ours: F64, lag: float) -> Stick:
-    """Return the joint centres of a reference at our times (T,) s, or a lag (s) before."""
+def _sampled(reference: Reference, columns: Mapping[str, F64], lag: float) -> Stick:
+    """Return the joint centres of a reference at our frames, or a lag in frames before."""
     assert reference.joints is not None
-    columns = reference.joints.reshape(len(reference.at), -1).T
-    at = reference.moments(ours)
-    flat = np.stack([resampled(at, column, ours - lag, reference.step) for column in columns], axis=1)
+    places = reference.joints.reshape(len(reference.at), -1).T
+    at, ours = clocks(reference, columns, lag)
+    flat = np.stack([resampled(at, place, ours, reference.step) for place in places], axis=1)
     return Stick(names=reference.joint_names, places=flat.reshape(len(ours), -1, 3))
 
 

@@ -14,6 +14,7 @@ from mocapflow.data import Frame, Matches, Past, Segmentation, Silhouette, Surfa
 from mocapflow.geometry.contours import at_nearest, nearest_compatible
 from mocapflow.geometry.silhouettes import occluding_contour
 from mocapflow.pooling import pool
+from mocapflow.records import picked_rows
 from mocapflow.scene import Scene
 from mocapflow_matching.camouflage import without_camouflaged
 from mocapflow_matching.robust import robust_precision
@@ -39,7 +40,10 @@ class Containment(Matcher):
     ) -> Matches:
         """Return the pairs of every view; see the class."""
         views = [self.match_view(scene.cameras[s.camera], s, surface) for s in segmentation.of("person")]
-        return without_camouflaged(pool(views), past)
+        matches, cut = without_camouflaged(pool(views), past), scene.body.cut
+        if not cut.any():
+            return matches
+        return picked_rows(matches, ~np.isin(matches.vertex, np.flatnonzero(cut)))  # there the person goes on
 
     def match_view(self, camera: Camera, silhouette: Silhouette, surface: Surface) -> Matches:
         """Return the pairs of one view."""

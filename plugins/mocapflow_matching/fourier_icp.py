@@ -27,7 +27,7 @@ class FourierIcp(ContourIcp):
     view is matched in full.
 
     Alone it does not find more: of 60 poses of the tests' body 20° off (1 sigma), 29 to 2° at both knees, 32 with
-    harmonics 3, 6 and 12, and `contour_icp` 31.
+    harmonics 3, 6 and 12, and `contour_icp` 31, which is chance.
     """
 
     name = "fourier_icp"

@@ -1,5 +1,6 @@
 """The body has to stay inside the silhouette, and is left alone there."""
 
+from dataclasses import replace
 from functools import partial
 
 import matching_scenes
@@ -58,6 +59,17 @@ def test_a_leg_within_the_cloth_is_not_drawn_to_it(truth):
         touched = set(matches.vertex[matches.camera == camera].tolist())
         assert len(inside) > 10
         assert not touched & (set(inside.tolist()) - set(out.tolist()))
+
+
+def test_where_a_partial_body_was_cut_off_nothing_is_matched(truth):
+    """The silhouette may end before the rim, which would then be drawn down with the body."""
+    surface, shown = surface_at(bent(truth, 25)), seen(surface_at(truth), SCENE)
+    usual = match(surface, shown)
+    rim = np.isin(np.arange(len(SCENE.body.vertices)), usual.vertex[::2])
+    part = replace(SCENE, body=replace(SCENE.body, cut=rim))
+    cut = match(surface, shown, part)
+    assert len(cut.vertex) > 5
+    assert sorted(cut.vertex) == sorted(usual.vertex[~rim[usual.vertex]])
 
 
 def test_what_sticks_out_is_drawn_to_the_contour(truth):

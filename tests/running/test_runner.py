@@ -263,14 +263,40 @@ def test_a_stage_of_an_extent_that_is_none(tmp_path, path, monkeypatch):
 
 
 def test_measures_that_can_not_be_sewn_are_told_where_they_are_written(tmp_path, path, monkeypatch):
-    pipeline = load(path)
+    pipeline, store = load(path), tmp_path / "store.zarr"
 
     def sew(self, body):
         raise GarmentError("too short", hint="lengthen it")
 
     monkeypatch.setattr(type(pipeline.garment), "sew", sew)
-    with pytest.raises(GarmentError, match=r"^.*\.yaml:\d+:\d+  too short\n       lengthen it$"):
-        run(pipeline, store=tmp_path / "store.zarr", out=tmp_path / "out")
+    said = r"^.*\.yaml:\d+:\d+  too short\n       lengthen it$"
+    with pytest.raises(GarmentError, match=said):
+        plan(pipeline, store=store)
+    with pytest.raises(GarmentError, match=said):
+        run(pipeline, store=store, out=tmp_path / "out")
+    assert not store.exists() and not (tmp_path / "out").exists()  # told before anything is made
+
+
+def test_a_garment_that_raises_is_told_by_a_plan(tmp_path, path, monkeypatch):
+    pipeline, store = load(path), tmp_path / "store.zarr"
+
+    def sew(self, body):
+        raise ValueError("torn")
+
+    monkeypatch.setattr(type(pipeline.garment), "sew", sew)
+    with pytest.raises(ComponentFailed, match=r"^garment 'tiny_garment' \(.*\) failed: ValueError: torn$"):
+        plan(pipeline, store=store)
+    with pytest.raises(ComponentFailed, match=r"failed: ValueError: torn\n       traceback: .*out.failed\.log$"):
+        run(pipeline, store=store, out=tmp_path / "out")
+
+
+def test_a_garment_is_not_sewn_for_what_is_in_the_store(tmp_path, monkeypatch):
+    stages = {name: STAGES[name] for name in ("start", "track")}
+    path = write_pipeline(tmp_path, write_recording(tmp_path / "clip", frames=2), stages=stages)
+    run_tiny(path, tmp_path)
+    pipeline = load(path)
+    monkeypatch.setattr(type(pipeline.garment), "sew", None)
+    assert {line.action for line in plan(pipeline, store=tmp_path / "store.zarr")} == {"hit"}
 
 
 def test_a_run_folder_that_cannot_be_made(tmp_path, path):
