@@ -37,13 +37,19 @@ class Outline:
         self.columns = np.array([names.index(name) for name in (*angles, *cloth)])
         self.bends = len(angles)
         self.unknowns = len(self.columns)
-        self.low, self.high = np.concatenate([body.limits, garment.parameter_bounds]).T
         self.tracked = np.concatenate([pose.angles, state.cloth.parameters])
-        ranges = (self.high - self.low)[self.columns]
-        self.spread = np.where(np.arange(self.unknowns) < self.bends, ANGLE_SD, CLOTH_SD * ranges)
+        ranges = np.concatenate([np.zeros(len(pose.angles)), np.ptp(garment.parameter_bounds, axis=1)])[self.columns]
+        self.spread = np.where(ranges == 0, ANGLE_SD, CLOTH_SD * ranges)
+        free = np.full((len(pose.angles), 2), [-np.inf, np.inf])  # of angles: the images alone say how a leg bends
+        bounds = np.concatenate([free, garment.parameter_bounds])[self.columns]
+        self.low, self.high = ((bounds - self.tracked[self.columns, None]) / self.spread[:, None]).T
         surface, seen = model.surface(pose, state.cloth), unclipped(state.segmentation)
         self.task = Task(GaussNewton(), seen, state.estimate, model, garment, PAST, surface)
         self.coarse = list(self._coarse())
+
+    def within(self, at: F64) -> F64:
+        """Return the nearest place at which no parameter is beyond its bounds."""
+        return np.clip(at, self.low, self.high)
 
     def error(self, at: F64) -> float:
         """Return the error at a place (N,)."""
@@ -76,10 +82,9 @@ class Outline:
         return Equations(scaled, gradient[chosen] * self.spread, energy)
 
     def _values(self, at: F64) -> tuple[F64, F64]:
-        """Return angles (B, D) and parameters (B, Q) at places (B, N), within their bounds."""
+        """Return angles (B, D) and parameters (B, Q) at places (B, N)."""
         values = np.repeat(self.tracked[None], len(at), axis=0)
-        values[:, self.columns] += self.spread * at
-        values[:, self.columns] = np.clip(values, self.low, self.high)[:, self.columns]
+        values[:, self.columns] += self.spread * self.within(at)
         split = len(self.task.estimate.pose.angles)
         return values[:, :split], values[:, split:]
 

@@ -28,8 +28,11 @@ class Problem(Protocol):
     unknowns: int
     coarse: Sequence[tuple[list[int], F64]]  # columns of a force, and the values (B, columns) to try first
 
+    def within(self, at: F64) -> F64:
+        """Return the nearest place (N,) that is within the bounds."""
+
     def error(self, at: F64) -> float:
-        """Return the error at a place (N,); takes one drape."""
+        """Return the error at a place, or at the nearest within the bounds; takes one drape."""
 
     def equations(self, at: F64, rule: Rule) -> Equations:
         """Return the quadratic model of the error about a place."""
@@ -115,7 +118,7 @@ def gauss_newton(budget: Budget, start: F64, rule: Rule) -> None:
     while True:
         equations = budget.equations(best, rule)
         for _ in range(TRIALS):
-            trial = best + steps.step(equations, np.ones(len(best)), damping)
+            trial = budget.problem.within(best + steps.step(equations, np.ones(len(best)), damping))
             reached = budget.error(trial)
             if reached < least:
                 best, least, damping = trial, reached, steps.LOWERED * damping

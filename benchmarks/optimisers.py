@@ -58,7 +58,7 @@ def main() -> None:
 
 def run(minimiser: Minimiser, problem: Outline, seed: int, drapes: int) -> Run:
     """Minimise from the start of a seed, until the drapes are spent or the minimiser is done."""
-    start = np.random.default_rng(seed).normal(size=problem.unknowns)
+    start = problem.within(np.random.default_rng(seed).normal(size=problem.unknowns))
     budget, begin = Budget(problem, drapes), time.process_time()
     with suppress(Spent):
         minimiser(budget, start, seed)

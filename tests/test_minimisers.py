@@ -21,6 +21,9 @@ class Valley:
     unknowns = 3
     coarse = tuple(([column], np.linspace(-2.0, 2.0, 5)[:, None]) for column in range(3))
 
+    def within(self, at):
+        return np.clip(at, -2.0, 2.0)
+
     def error(self, at):
         return 0.5 * float((at - BOTTOM) @ BEND @ (at - BOTTOM))
 
