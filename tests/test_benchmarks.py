@@ -24,7 +24,7 @@ CLIP = shipped("examples", "data", "skirt_steps")
     "call",
     [
         *(["draping"], ["flow"], ["help_time"], ["pose_solve"], ["segmentation"], ["silhouettes"], ["store_commit"]),
-        *(["frame", CLIP, 4], ["wrong_pictures", CLIP], ["limb_lengths", CLIP, 2, 10]),
+        *(["frame", CLIP, 4], ["wrong_pictures", CLIP], ["limb_lengths", CLIP, 2, 10], ["optimisers", 1, 30, 3]),
     ],
     ids=lambda call: call[0],
 )

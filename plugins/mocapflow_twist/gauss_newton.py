@@ -106,7 +106,7 @@ class Task(NamedTuple):
     def equations(self, cloth: Cloth) -> Equations:
         """Return the quadratic model of the energy about the parameters of a cloth."""
         cameras, first = self.model.scene.cameras, len(self.model.scene.body.vertices)
-        matches = self._matches(dressed(self.surface, cloth.vertices))
+        matches = self.matches(dressed(self.surface, cloth.vertices))
         rows = image_rows(matches, cameras)
         worn = rows.part(rows.vertex >= first, rows.weight, first)
         hessian, gradient, energy = dense_equations(worn, cloth.vertices, self._velocity(cloth))
@@ -142,7 +142,7 @@ class Task(NamedTuple):
         velocity = drape_differences(drape, body, still, bounds, pose, cloth.parameters)
         return velocity[..., 6 + len(pose.angles) :]
 
-    def _matches(self, surface: Surface) -> Matches:
+    def matches(self, surface: Surface) -> Matches:
         """Return the points of the outline, each with where the distance field says the silhouette is."""
         views = outlines(surface, self.segmentation, self.model.scene.cameras, self.fitter.spacing_px)
         return pool([self._matches_in(silhouette, contour) for silhouette, contour in views])
