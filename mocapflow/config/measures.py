@@ -97,6 +97,12 @@ def place_of(value: Any, recording: Path, resolver: Resolver) -> str:
     return str(recording / FILE) if _named(value) == FROM_RECORDING else resolver.place(("garment",))
 
 
+def own_places(value: Any, resolver: Resolver) -> dict[str, str]:
+    """Return where the pipeline itself says measures of its garment, by setting."""
+    said = value if isinstance(value, dict) else {}
+    return {setting: resolver.place(("garment", setting)) for setting in said if setting != "use"}
+
+
 def _named(value: Any) -> Any:
     return value.get("use") if isinstance(value, dict) else value
 

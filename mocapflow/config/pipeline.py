@@ -13,7 +13,7 @@ from pydantic import Field, PositiveInt
 from mocapflow.components import Stage
 from mocapflow.config.documents import Document, KeyPath, Place, changed
 from mocapflow.config.frames import Frames, frames_of
-from mocapflow.config.measures import garment_of, place_of
+from mocapflow.config.measures import garment_of, own_places, place_of
 from mocapflow.config.named_parts import folder_of
 from mocapflow.config.resolve import Resolver
 from mocapflow.config.yamlfile import read
@@ -85,6 +85,7 @@ class Pipeline:
     stages: tuple[NamedStage, ...]
     registry: Registry
     garment_where: str = ""  # its measures are written
+    garment_places: Mapping[str, str] = field(default_factory=dict)  # setting -> where the pipeline itself says it
     start: int = 0
     stop: int | None = None
     step: int = 1
@@ -135,6 +136,7 @@ def load_pipeline(
         body=resolver.component("body", said.body, ("body",)),
         garment=garment_of(said.garment, recording, resolver),
         garment_where=place_of(said.garment, recording, resolver),
+        garment_places=own_places(said.garment, resolver),
         stages=tuple(_stage(label, value, resolver) for label, value in said.stages.items() if value is not None),
         registry=resolver.registry,
         start=part.start,

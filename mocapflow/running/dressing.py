@@ -34,4 +34,6 @@ def sewn(pipeline: Pipeline, body: Body, log: Path | None) -> GarmentMesh | None
         with naming_failures(garment, pipeline.registry, log):
             return mesh_of(garment, body)
     except GarmentError as error:
-        raise GarmentError(error.message, where=pipeline.garment_where, hint=error.hint) from None
+        told = f"{error.message} {error.hint}"  # names the measures that may be wrong
+        own = [place for setting, place in pipeline.garment_places.items() if setting in told]
+        raise GarmentError(error.message, where=own[0] if own else pipeline.garment_where, hint=error.hint) from None

@@ -277,6 +277,18 @@ def test_measures_that_can_not_be_sewn_are_told_where_they_are_written(tmp_path,
     assert not store.exists() and not (tmp_path / "out").exists()  # told before anything is made
 
 
+@pytest.mark.parametrize(("hint", "where"), [("lengthen length_m", "--set garment.length_m=0.1"), ("", ".*.yaml:.*")])
+def test_a_measure_of_the_command_line_is_told_as_such(tmp_path, path, monkeypatch, hint, where):
+    pipeline = load_pipeline(path, changes=["garment.length_m=0.1"])
+
+    def sew(self, body):
+        raise GarmentError("can't be worn", hint=hint)
+
+    monkeypatch.setattr(type(pipeline.garment), "sew", sew)
+    with pytest.raises(GarmentError, match=rf"^{where}  can't be worn"):
+        plan(pipeline, store=tmp_path / "store.zarr")
+
+
 def test_a_garment_that_raises_is_told_by_a_plan(tmp_path, path, monkeypatch):
     pipeline, store = load(path), tmp_path / "store.zarr"
 
