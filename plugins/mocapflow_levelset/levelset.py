@@ -55,7 +55,7 @@ class LevelSet(ShadowAware):
     variance_floor: PositiveFloat = 0.03  # smallest standard deviation inside and outside, share of a channel's range
     sigma_px: PositiveFloat = 1.5  # width of the smooth step
     length_weight: NonNegativeFloat = 0.9  # nu, weight of the contour's length; explicit steps are stable below 0.94
-    shape_weight: NonNegativeFloat = 0.05  # lambda: 0.05 clean, 0.1 with occlusion, 0.1-0.3 in heavy noise, 0 uncoupled
+    shape_weight: NonNegativeFloat = 0.05  # lambda: more gains nothing in noise or behind a stripe; 0 uncoupled
     any_colour: float = -3.0  # least log density of any colour on the person, where the empty scene is known
     coarse_steps: NonNegativeInt = 32  # steps at a quarter of the size on the first turn, at most
     half_steps: NonNegativeInt = 4  # steps at half the size
