@@ -3,8 +3,9 @@
 `OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python benchmarks/optimisers.py [SEEDS [BUDGET [FRAME ...]]]`, for frames of
 the demo clip in a skirt (default 10 200 36 44 52, in which the knee comes down and the skirt swings). Unknown are the
 take-up and the five forces, at the tracked pose; then a hip and a knee, too. The error is that of the cloth fitter
-`gauss_newton`: half the weighted squared distance of the outline to the silhouettes, and of the cloth to calm one. A
-start is off the track by a normal error of each unknown; all optimisers have the same ones.
+`gauss_newton`, but that distances go on beyond their band: half the weighted squared distance of the outline to the
+silhouettes, and of the cloth to calm one. A start is off the track by a normal error of each unknown; all optimisers
+have the same ones.
 
 Everything is counted in drapes: an error takes one; normal equations by differences one an unknown and one more, by
 the strand rule (the draper's own rates) one. Printed is how far the least error is above the least that any run found
