@@ -26,8 +26,8 @@ class FourierIcp(ContourIcp):
     where the holes differ in number; where the components do, or where the contours are near each other already, a
     view is matched in full.
 
-    Alone it does not find more: of 60 poses of the tests' body 20° off (1 sigma), 29 to 2° at both knees, 32 with
-    harmonics 3, 6 and 12, and `contour_icp` 31, which is chance.
+    Alone it hardly finds more: of 400 poses of the tests' body 20° off (1 sigma), 188 to 2° at both knees, 187 with
+    harmonics 3, 6 and 12, and `contour_icp` 178. It finds 22 that `contour_icp` loses and loses 12 that it finds.
     """
 
     name = "fourier_icp"

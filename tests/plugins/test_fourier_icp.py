@@ -140,11 +140,14 @@ def test_curvature_counts_as_a_distance():
 
 @pytest.mark.long
 def test_twenty_degrees_off():
-    """T-ICP3: as many starts are found with the low-pass as without, and not by the same ways."""
+    """T-ICP3: as many starts are found with the low-pass as without, and not by the same ways.
+
+    So many, for of few starts chance decides: of the first 60 it finds 29, without 31.
+    """
     plain, low = (
-        np.array([knee_error_deg(SCENE, [matcher], seed, off_deg=20.0, priors=[JointLimits()]) for seed in range(8)])
+        np.array([knee_error_deg(SCENE, [matcher], seed, off_deg=20.0, priors=[JointLimits()]) for seed in range(400)])
         for matcher in (ContourIcp(), FourierIcp())
     )
-    print(f"knees, degrees: plain {plain.round(1)}, low-passed {low.round(1)}")
+    print(f"found: plain {np.sum(plain < 2)}, low-passed {np.sum(low < 2)} of {len(low)}")
     assert np.sum(low < 2) >= np.sum(plain < 2)
-    assert np.sum(np.abs(low - plain) > 0.1) >= 2
+    assert np.sum((low < 2) != (plain < 2)) >= 10
