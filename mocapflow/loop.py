@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from mocapflow.components import ClothFitter, Matcher, Observe, PoseSolver, Prior, Segmenter
-from mocapflow.data import NO_CLOTH, Frame, FrameResult, FrameState, Past, Turn
+from mocapflow.data import NO_CLOTH, Frame, FrameResult, FrameState, Past, Segmentation, Turn
 from mocapflow.errors import noting
 from mocapflow.functional import Functional, overlaps
 from mocapflow.guards.outputs import cloth_of, estimate_of, segmentation_of
@@ -39,12 +40,15 @@ def settle(
 ) -> FrameResult:
     """Repeat segmentation, pose and cloth until the surface stops moving.
 
+    Contours and model that met on the way from far off may hold each other up. So a later frame that began there rests
+    once more, from new silhouettes.
+
     Source: Rosenhahn 2008, Fig. 12.14
     """
     functional, watch = Functional(model, steps.priors, past), Stopwatch(LAPS)
     far = not past.moments
     steady = steps.steady.beginning if far else steps.steady
-    at_rest, change = 0, None
+    at_rest, change, unproven = 0, None, False
     recent = deque([state], maxlen=3)
     energy, cost = np.full((steady.cap, len(functional.terms)), np.nan), np.nan
     for index in range(steady.cap):
@@ -56,12 +60,14 @@ def settle(
         change = measure_change(recent[-1], state, model.scene)
         recent.append(state)
         if index == 0 and steady.far(change):
-            far, steady = True, steady.beginning
+            far, steady, unproven = True, steady.beginning, bool(past.moments)
         watch.lap("energy")
         observe(frame.index, turn, state)
         at_rest = at_rest + 1 if steady.holds(change, index + 1) and steady.even(last_cost, cost) else 0
-        if at_rest >= steady.turns or index + 1 >= steady.max_turns:
+        if index + 1 >= steady.max_turns or (at_rest >= steady.turns and not unproven):
             break
+        if at_rest >= steady.turns:
+            state, at_rest, unproven = replace(state, segmentation=Segmentation(silhouettes=())), 0, False
     assert change is not None
     swing = measure_change(recent[0], state, model.scene)  # over the last two turns
     return FrameResult(
