@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from mocapflow.components import ClothFitter, Matcher, Observe, PoseSolver, Prior, Segmenter
-from mocapflow.data import NO_CLOTH, Frame, FrameResult, FrameState, Past, Segmentation, Turn
+from mocapflow.data import NO_CLOTH, Frame, FrameResult, FrameState, Past, Turn
 from mocapflow.errors import noting
 from mocapflow.functional import Functional, overlaps
 from mocapflow.guards.outputs import cloth_of, estimate_of, segmentation_of
@@ -67,7 +67,7 @@ def settle(
         if index + 1 >= steady.max_turns or (at_rest >= steady.turns and not unproven):
             break
         if at_rest >= steady.turns:
-            state, at_rest, unproven = replace(state, segmentation=Segmentation(silhouettes=())), 0, False
+            state, at_rest, unproven = without_silhouettes(state), 0, False
     assert change is not None
     swing = measure_change(recent[0], state, model.scene)  # over the last two turns
     return FrameResult(
@@ -81,6 +81,11 @@ def settle(
         energy_terms=functional.terms,
         seconds=watch.seconds,
     )
+
+
+def without_silhouettes(state: FrameState) -> FrameState:
+    """Return a state whose silhouettes are found anew; what the frame has shown of colours stays known."""
+    return replace(state, segmentation=replace(state.segmentation, silhouettes=()))
 
 
 def take_turn(

@@ -135,7 +135,8 @@ def test_a_later_frame_that_began_far_off_rests_once_more_from_new_silhouettes(f
     def noted(self, frame, state, past, scene, turn):
         if not state.segmentation.silhouettes:
             begun.append(turn.index)
-        return segment(self, frame, state, past, scene, turn)
+            assert ("colours" in state.segmentation.appearance) == (turn.index > 0)  # what was learned is kept
+        return replace(segment(self, frame, state, past, scene, turn), appearance={"colours": np.ones(1)})
 
     monkeypatch.setattr(TinySegmenter, "segment", noted)
     known = {3: [0], 4: [0, 3], 6: [0, 3]}[max_turns]
