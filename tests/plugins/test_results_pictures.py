@@ -192,7 +192,7 @@ def test_report_holds_everything(scene: Scene, track: Track, recording: Recordin
     for text in (*said, "segment", "hip flexion, right: held by the priors in 1 frames"):
         assert text in page
     assert page.count("data:image/jpeg;base64") == 3
-    assert page.count("data:image/png;base64") == 3  # angles, overlap, agreement
+    assert page.count("data:image/png;base64") == 4  # angles, overlap, agreement, stick models (truth/joints.npz)
 
 
 class Links(HTMLParser):
