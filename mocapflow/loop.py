@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -40,15 +39,12 @@ def settle(
 ) -> FrameResult:
     """Repeat segmentation, pose and cloth until the surface stops moving.
 
-    Contours and model that met on the way from far off may hold each other up. So a later frame that began there rests
-    once more, from new silhouettes.
-
     Source: Rosenhahn 2008, Fig. 12.14
     """
     functional, watch = Functional(model, steps.priors, past), Stopwatch(LAPS)
     far = not past.moments
     steady = steps.steady.beginning if far else steps.steady
-    at_rest, change, unproven = 0, None, False
+    at_rest, change = 0, None
     recent = deque([state], maxlen=3)
     energy, cost = np.full((steady.cap, len(functional.terms)), np.nan), np.nan
     for index in range(steady.cap):
@@ -60,14 +56,12 @@ def settle(
         change = measure_change(recent[-1], state, model.scene)
         recent.append(state)
         if index == 0 and steady.far(change):
-            far, steady, unproven = True, steady.beginning, bool(past.moments)
+            far, steady = True, steady.beginning
         watch.lap("energy")
         observe(frame.index, turn, state)
         at_rest = at_rest + 1 if steady.holds(change, index + 1) and steady.even(last_cost, cost) else 0
-        if index + 1 >= steady.max_turns or (at_rest >= steady.turns and not unproven):
+        if at_rest >= steady.turns or index + 1 >= steady.max_turns:
             break
-        if at_rest >= steady.turns:
-            state, at_rest, unproven = without_silhouettes(state), 0, False
     assert change is not None
     swing = measure_change(recent[0], state, model.scene)  # over the last two turns
     return FrameResult(
@@ -81,11 +75,6 @@ def settle(
         energy_terms=functional.terms,
         seconds=watch.seconds,
     )
-
-
-def without_silhouettes(state: FrameState) -> FrameState:
-    """Return a state whose silhouettes are found anew; what the frame has shown of colours stays known."""
-    return replace(state, segmentation=replace(state.segmentation, silhouettes=()))
 
 
 def take_turn(

@@ -126,29 +126,6 @@ def test_a_frame_whose_first_turn_moves_the_body_far_is_one_that_began_far_off(f
     assert len(result.energy) == 6
 
 
-@pytest.mark.parametrize("max_turns", [3, 4, 6])
-def test_a_later_frame_that_began_far_off_rests_once_more_from_new_silhouettes(frame, monkeypatch, max_turns):
-    """It is at rest after three turns; a first frame, one that began near, and one without turns left stop there."""
-    before = Past(moments=(Moment(time=0.0, pose=Pose(root=np.eye(4), angles=np.zeros(2)), cloth=NO_CLOTH),))
-    segment, begun = TinySegmenter.segment, list[int]()
-
-    def noted(self, frame, state, past, scene, turn):
-        if not state.segmentation.silhouettes:
-            begun.append(turn.index)
-            assert ("colours" in state.segmentation.appearance) == (turn.index > 0)  # what was learned is kept
-        return replace(segment(self, frame, state, past, scene, turn), appearance={"colours": np.ones(1)})
-
-    monkeypatch.setattr(TinySegmenter, "segment", noted)
-    known = {3: [0], 4: [0, 3], 6: [0, 3]}[max_turns]
-    for past, far_mm, anew in [(before, 1, known), (Past(), 1, [0]), (before, 1000, [0])]:
-        begun.clear()
-        result = go(frame, 1.0, max_turns=max_turns, past=past, steady=dict(far_mm=far_mm))
-        assert begun == anew
-        assert result.iterations == (min(5, max_turns) if len(anew) > 1 else 3)
-        assert result.steady == (result.iterations != 4)
-        assert result.state.segmentation.silhouettes
-
-
 def test_the_only_turn_of_a_frame_is_the_last_however_far_it_moves(frame):
     before = Past(moments=(Moment(time=0.0, pose=Pose(root=np.eye(4), angles=np.zeros(2)), cloth=NO_CLOTH),))
     assert go(frame, 0.5, max_turns=1, past=before, steady=dict(far_mm=1)).iterations == 1
