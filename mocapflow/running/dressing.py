@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from mocapflow.assets import Body, GarmentMesh
@@ -34,6 +35,6 @@ def sewn(pipeline: Pipeline, body: Body, log: Path | None) -> GarmentMesh | None
         with naming_failures(garment, pipeline.registry, log):
             return mesh_of(garment, body)
     except GarmentError as error:
-        told = f"{error.message} {error.hint}"  # names the measures that may be wrong
+        told = re.findall(r"\w+", f"{error.message} {error.hint}")  # among it the measures that may be wrong
         own = [place for setting, place in pipeline.garment_places.items() if setting in told]
         raise GarmentError(error.message, where=own[0] if own else pipeline.garment_where, hint=error.hint) from None

@@ -277,7 +277,10 @@ def test_measures_that_can_not_be_sewn_are_told_where_they_are_written(tmp_path,
     assert not store.exists() and not (tmp_path / "out").exists()  # told before anything is made
 
 
-@pytest.mark.parametrize(("hint", "where"), [("lengthen length_m", "--set garment.length_m=0.1"), ("", ".*.yaml:.*")])
+@pytest.mark.parametrize(
+    ("hint", "where"),
+    [("lengthen length_m", "--set garment.length_m=0.1"), ("", ".*.yaml:.*"), ("shorten arm_length_m", ".*.yaml:.*")],
+)
 def test_a_measure_of_the_command_line_is_told_as_such(tmp_path, path, monkeypatch, hint, where):
     pipeline = load_pipeline(path, changes=["garment.length_m=0.1"])
 
