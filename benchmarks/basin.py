@@ -30,8 +30,8 @@ from mocapflow.components import Matcher, Recovery, Segmenter
 from mocapflow.data import NO_CLOTH, Frame, FrameResult, FrameState, Past, Pose, Segmentation, Silhouette, Turn
 from mocapflow.geometry import silhouettes, twists
 from mocapflow.help.shipped import shipped
-from mocapflow.io.cameras import read_cameras
-from mocapflow.io.first_pose import read_pose
+from mocapflow.io.cameras.calibration import read_cameras
+from mocapflow.io.subject.first_pose import read_pose
 from mocapflow.loop import Steps, settle
 from mocapflow.model import ClothedModel
 from mocapflow.prediction import initial_state

@@ -21,7 +21,7 @@ from mocapflow_export import layout, tables
 from mocapflow_export.uncertainty import OUTLINE_MM, excess, px_per_mm
 
 from mocapflow.commands.invocation import recall
-from mocapflow.io.columns import read_columns
+from mocapflow.io.motion.csv_columns import read_columns
 from mocapflow.recordings.recording import open_recording
 from mocapflow.records import F64
 

@@ -25,7 +25,7 @@ from mocapflow_fitting.keypoint_fit import fit
 from mocapflow_fitting.landmarks import landmarks
 
 from mocapflow.geometry.angles import measure
-from mocapflow.io.columns import read_columns
+from mocapflow.io.motion.csv_columns import read_columns
 from mocapflow.recordings.recording import Recording, open_recording
 from mocapflow.records import F64
 

@@ -38,7 +38,7 @@ from mocapflow.data import (
 from mocapflow.geometry import kinematics, meshes, twists
 from mocapflow.geometry.cameras import project
 from mocapflow.geometry.silhouettes import model_distance
-from mocapflow.io.first_pose import read_pose
+from mocapflow.io.subject.first_pose import read_pose
 from mocapflow.loop import settle
 from mocapflow.model import ClothedModel, moved
 from mocapflow.prediction import initial_state

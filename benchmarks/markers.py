@@ -24,7 +24,7 @@ from scipy.spatial.transform import Rotation
 
 from mocapflow.geometry import angles
 from mocapflow.geometry.registration import register
-from mocapflow.io.columns import read_columns
+from mocapflow.io.motion.csv_columns import read_columns
 from mocapflow.records import F64
 
 NOISE, SKIN, DELAY = 0.001, (0.005, 0.010), 0.05  # m, m, s

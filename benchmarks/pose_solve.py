@@ -23,7 +23,7 @@ from scipy.optimize import least_squares
 from mocapflow.assets import Body
 from mocapflow.data import Matches, Pose
 from mocapflow.geometry import cameras, kinematics, twists
-from mocapflow.io.cameras import read_cameras
+from mocapflow.io.cameras.calibration import read_cameras
 from mocapflow.model import moved
 from mocapflow.records import F64
 

@@ -22,8 +22,8 @@ from mocapflow.geometry import meshes, silhouettes, span_kernels
 from mocapflow.geometry import silhouette_kernels as kernels
 from mocapflow.geometry.cameras import projection
 from mocapflow.help.shipped import shipped
-from mocapflow.io.cameras import read_cameras
-from mocapflow.io.first_pose import read_pose
+from mocapflow.io.cameras.calibration import read_cameras
+from mocapflow.io.subject.first_pose import read_pose
 from mocapflow.scene import Scene
 
 CLIP = shipped("examples", "data", "skirt_steps")

@@ -10,7 +10,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from mocapflow.io.cameras import read_cameras, write_cameras
+from mocapflow.io.cameras.calibration import read_cameras, write_cameras
 
 WHOLE = ("subject", "truth", "init.json")
 BY_CAMERA = {"videos": ".mp4", "background": ".png"}

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from mocapflow_export import layout
 
 from mocapflow.help.shipped import shipped
-from mocapflow.io.columns import read_columns
+from mocapflow.io.motion.csv_columns import read_columns
 from mocapflow.records import F64, U8
 
 HEIGHT = 480  # px

@@ -29,8 +29,8 @@ from mocapflow.commands import cache, pictures, results
 from mocapflow.commands.invocation import FILE, Invocation, remember
 from mocapflow.commands.progress import reporter
 from mocapflow.help.shipped import shipped
-from mocapflow.io import markers
-from mocapflow.io.columns import read_columns
+from mocapflow.io.motion import markers
+from mocapflow.io.motion.csv_columns import read_columns
 from mocapflow.recordings import doctor
 from mocapflow.results import Evaluation
 from mocapflow.running import runner

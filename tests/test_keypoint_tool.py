@@ -14,7 +14,7 @@ from mocapflow_fitting.keypoint_layouts import LAYOUTS
 
 from mocapflow.geometry.cameras import project
 from mocapflow.help.shipped import shipped
-from mocapflow.io.cameras import read_cameras
+from mocapflow.io.cameras.calibration import read_cameras
 
 SCRIPT = Path(__file__).parents[1] / "benchmarks" / "keypoint_tool.py"
 CLIP = shipped("examples", "data", "shorts_steps")

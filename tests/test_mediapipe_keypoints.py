@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from mocapflow_fitting.keypoint_layouts import LAYOUTS
 
-from mocapflow.io.keypoints import keypoint_files, people_at
+from mocapflow.io.recording.keypoints import keypoint_files, people_at
 
 ROOT = Path(__file__).parents[1]
 SKIRT = ROOT / "examples" / "data" / "skirt_steps" / "videos" / "cam01.mp4"

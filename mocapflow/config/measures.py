@@ -12,8 +12,8 @@ from mocapflow.config.resolve import Resolver
 from mocapflow.dressing.guards import body_of
 from mocapflow.dressing.roles import Garment
 from mocapflow.errors import MocapflowError, PluginError, RecordingError, UnknownComponent, guess
-from mocapflow.io.cameras import find_calibration
-from mocapflow.io.typed import place, read_json
+from mocapflow.io.cameras.calibration import find_calibration
+from mocapflow.io.json_toml import place, read_json
 from mocapflow.registry import Registry
 
 FILE = Path("subject") / "garment.json"

@@ -19,8 +19,8 @@ from typing import Any
 from mocapflow.config.documents import KeyPath
 from mocapflow.config.resolve import Resolver
 from mocapflow.errors import PipelineError, RecordingError, alternatives
-from mocapflow.io.cameras import YAML, calibration_files, find_calibration
-from mocapflow.io.lateness import TIMING
+from mocapflow.io.cameras.calibration import YAML, calibration_files, find_calibration
+from mocapflow.io.video.lateness import TIMING
 
 FILES = {"cameras": "cameras.toml", "init": "init.json", "late_frames": TIMING}
 SUBJECT = {"body": "body.obj", "skeleton": "skeleton.json", "weights": "weights.npz", "garment": "garment.json"}

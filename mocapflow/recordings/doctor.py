@@ -11,14 +11,14 @@ from mocapflow.config import measures
 from mocapflow.dressing.guards import mesh_of
 from mocapflow.dressing.roles import Garment
 from mocapflow.errors import MocapflowError, RecordingError, UnknownComponent, raised
-from mocapflow.io import first_pose
-from mocapflow.io.cameras import find_calibration, read_cameras
+from mocapflow.io.cameras.calibration import find_calibration, read_cameras
+from mocapflow.io.cameras.rigs import examine_size, examine_view
 from mocapflow.io.findings import Finding, attempt, error, has_errors, note, warning
-from mocapflow.io.lateness import TIMING, late_frames, timing_text, write_late_frames
-from mocapflow.io.rigs import examine_size, examine_view
-from mocapflow.io.subjects import examine_subject
+from mocapflow.io.subject import first_pose
+from mocapflow.io.video.lateness import TIMING, late_frames, timing_text, write_late_frames
 from mocapflow.recordings.first_look import examine_first_frame
 from mocapflow.recordings.recording import open_recording
+from mocapflow.recordings.subject import examine_subject
 from mocapflow.recordings.synchrony import Lateness, measure
 from mocapflow.recordings.trial import copies, examine_trial
 from mocapflow.registry import Registry, load_registry

@@ -10,8 +10,8 @@ from mocapflow.data import NO_CLOTH
 from mocapflow.dressing.guards import body_of
 from mocapflow.errors import MocapflowError
 from mocapflow.geometry.silhouettes import covered
-from mocapflow.io import first_pose
 from mocapflow.io.findings import Finding, warning
+from mocapflow.io.subject import first_pose
 from mocapflow.recordings.paired_views import foreground
 from mocapflow.recordings.recording import Recording, open_recording
 from mocapflow.records import Bool

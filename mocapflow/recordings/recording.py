@@ -11,17 +11,18 @@ from typing import Protocol
 from mocapflow.assets import Background, Camera
 from mocapflow.data import Frame
 from mocapflow.errors import RecordingError
-from mocapflow.io import agreement, folders
-from mocapflow.io.cameras import calibration_files, find_calibration, read_cameras
-from mocapflow.io.decoding import decoded
-from mocapflow.io.keypoints import first_numbers, keypoint_files, people_at
-from mocapflow.io.lateness import TIMING, late_frames
-from mocapflow.io.lenses import View
-from mocapflow.io.occluders import occluder
-from mocapflow.io.plates import background
-from mocapflow.io.rates import common_rate
-from mocapflow.io.rigs import examine_rig
-from mocapflow.io.video import Video, count_from_first, open_video
+from mocapflow.io.cameras.calibration import calibration_files, find_calibration, read_cameras
+from mocapflow.io.cameras.rigs import examine_rig
+from mocapflow.io.cameras.views import View
+from mocapflow.io.recording import layout
+from mocapflow.io.recording.keypoints import first_numbers, keypoint_files, people_at
+from mocapflow.io.recording.occluders import occluder
+from mocapflow.io.recording.plates import background
+from mocapflow.io.video import consistency
+from mocapflow.io.video.frame_rate import common_rate
+from mocapflow.io.video.frames import decoded
+from mocapflow.io.video.lateness import TIMING, late_frames
+from mocapflow.io.video.reading import Video, count_from_first, open_video
 from mocapflow.records import F64, Watch, record, silent
 
 LEAST_PX = 8  # from side to side; nobody is seen in fewer
@@ -126,8 +127,8 @@ class Recording:
         paths = [*calibration_files(self.calibration), *(video.path for video in self.videos)]
         paths += [path for path in (self.folder / TIMING,) if path.exists()]
         paths += [folder for folder in self.keypoint_folders if folder is not None]
-        paths += [plate for view in self.views for plate in folders.plates(self.folder, view.lens.name)]
-        paths += folders.occluders(self.folder, self.lenses)
+        paths += [plate for view in self.views for plate in layout.plates(self.folder, view.lens.name)]
+        paths += layout.occluders(self.folder, self.lenses)
         return {
             path.relative_to(self.folder).as_posix() if path.is_relative_to(self.folder) else path.name: path
             for path in paths
@@ -174,31 +175,31 @@ def open_recording(
         calibration = find_calibration(folder)
     cameras = read_cameras(calibration)
     videos = _videos(folder, cameras, calibration)
-    lenses, cut = agreement.fit_sizes(cameras, videos, calibration)
-    length, broken = agreement.agree_on_length(cameras, videos, folder)
-    agreement.check_lateness(cameras, videos, length, folder)
+    lenses, cut = consistency.fit_sizes(cameras, videos, calibration)
+    length, broken = consistency.agree_on_length(cameras, videos, folder)
+    consistency.check_lateness(cameras, videos, length, folder)
     rate, assumed = common_rate(cameras, videos, calibration)
-    gaps = [*agreement.first_warnings(videos), *agreement.gap_warnings(cameras, videos)]
+    gaps = [*consistency.first_warnings(videos), *consistency.gap_warnings(cameras, videos)]
     rig = [f"{found.message}: {found.hint}" for found in examine_rig(lenses) if found.severity != "note"]
-    odd = folders.keypoint_warnings(folder, cameras, length, videos[0].first)
+    odd = layout.keypoint_warnings(folder, cameras, length, videos[0].first)
     _check_scale(scale, lenses)
     return Recording(
         folder=folder,
         views=tuple(View(lens=lens, scale=scale, occluder=occluder(folder, lens)) for lens in lenses),
         videos=videos,
-        keypoint_folders=folders.keypoint_folders(folder / folders.KEYPOINTS, cameras),
+        keypoint_folders=layout.keypoint_folders(folder / layout.KEYPOINTS, cameras),
         calibration=calibration,
         frame_rate=rate,
         indices=_indices(start, stop, step, length, folder),
         length=length,
-        warnings=(*cut, *rig, *broken, *gaps, *assumed, *odd, *folders.unused_pictures(folder, cameras)),
+        warnings=(*cut, *rig, *broken, *gaps, *assumed, *odd, *layout.unused_pictures(folder, cameras)),
     )
 
 
 def _videos(folder: Path, cameras: Sequence[Camera], calibration: Path) -> tuple[Video, ...]:
     """Return the video of each camera, with how late it is."""
     names = [camera.name for camera in cameras]
-    paths, late = folders.match_videos(folder, names, calibration), late_frames(folder, names)
+    paths, late = layout.match_videos(folder, names, calibration), late_frames(folder, names)
     opened = count_from_first([open_video(path) for path in paths])
     return tuple(replace(video, late=frames) for video, frames in zip(opened, late, strict=True))
 

@@ -10,7 +10,7 @@ from itertools import combinations
 import numpy as np
 
 from mocapflow.errors import RecordingError
-from mocapflow.io.lenses import View
+from mocapflow.io.cameras.views import View
 from mocapflow.recordings.paired_views import Signals, keypoint_signals, outline_signals
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64, record

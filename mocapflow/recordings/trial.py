@@ -12,18 +12,19 @@ from pathlib import Path
 import numpy as np
 
 from mocapflow.assets import Camera
-from mocapflow.io import agreement, folders
-from mocapflow.io.cameras import read_cameras
-from mocapflow.io.decoding import decoded
+from mocapflow.io.cameras.calibration import read_cameras
+from mocapflow.io.cameras.rigs import examine_rig
+from mocapflow.io.cameras.views import View
 from mocapflow.io.findings import Finding, attempt, note, warning
-from mocapflow.io.images import name_frames
-from mocapflow.io.lateness import late_frames
-from mocapflow.io.lenses import View
-from mocapflow.io.occluders import occluder
-from mocapflow.io.plates import background
-from mocapflow.io.rates import common_rate
-from mocapflow.io.rigs import examine_rig
-from mocapflow.io.video import Video, count_from_first, open_video, read_frames
+from mocapflow.io.recording import layout
+from mocapflow.io.recording.occluders import occluder
+from mocapflow.io.recording.plates import background
+from mocapflow.io.video import consistency
+from mocapflow.io.video.frame_rate import common_rate
+from mocapflow.io.video.frames import decoded
+from mocapflow.io.video.images import name_frames
+from mocapflow.io.video.lateness import late_frames
+from mocapflow.io.video.reading import Video, count_from_first, open_video, read_frames
 from mocapflow.recordings.freezing import difference, frozen_from
 from mocapflow.records import F64
 
@@ -49,9 +50,9 @@ def examine_trial(folder: Path, calibration: Path, rig: bool = True) -> list[Fin
     findings += [*copies(cameras, videos), *_looked_through(cameras, videos, length)]
     if late is not None:
         delayed = [replace(video, late=frames) for video, frames in zip(videos, late, strict=True)]
-        attempt(lambda: agreement.check_lateness(cameras, delayed, length, folder), findings)
+        attempt(lambda: consistency.check_lateness(cameras, delayed, length, folder), findings)
     _examine_keypoints(folder, cameras, length, videos[0].first, findings)
-    unused = attempt(lambda: folders.unused_pictures(folder, cameras), findings)
+    unused = attempt(lambda: layout.unused_pictures(folder, cameras), findings)
     if unused is not None:
         findings += [warning(text, where=folder) for text in unused]
         if lenses is not None:
@@ -68,7 +69,7 @@ def _opened(
     folder: Path, cameras: Sequence[Camera], calibration: Path, findings: list[Finding]
 ) -> tuple[Video, ...] | None:
     """Return the video of each camera; None where one is missing or can't be opened."""
-    paths = attempt(lambda: folders.match_videos(folder, [c.name for c in cameras], calibration), findings)
+    paths = attempt(lambda: layout.match_videos(folder, [c.name for c in cameras], calibration), findings)
     tried = [attempt(partial(open_video, path), findings) for path in paths or ()]
     videos = [video for video in tried if video is not None]
     return count_from_first(videos) if len(videos) == len(cameras) else None
@@ -78,11 +79,11 @@ def _agreed(
     folder: Path, cameras: Sequence[Camera], videos: Sequence[Video], calibration: Path, findings: list[Finding]
 ) -> tuple[Sequence[Camera] | None, int]:
     """Return the cameras with the size of their videos, None where that is another, and how many frames all have."""
-    fitted = attempt(lambda: agreement.fit_sizes(cameras, videos, calibration), findings)
-    agreed = attempt(lambda: agreement.agree_on_length(cameras, videos, folder), findings)
+    fitted = attempt(lambda: consistency.fit_sizes(cameras, videos, calibration), findings)
+    agreed = attempt(lambda: consistency.agree_on_length(cameras, videos, folder), findings)
     rate = attempt(lambda: common_rate(cameras, videos, calibration), findings)
     findings += [warning(text, where=folder) for part in (fitted, agreed, rate) if part is not None for text in part[1]]
-    findings += [note(text, where=folder) for text in agreement.first_warnings(videos)]
+    findings += [note(text, where=folder) for text in consistency.first_warnings(videos)]
     length = min(video.frames for video in videos) if agreed is None else agreed[0]
     return None if fitted is None else fitted[0], length
 
@@ -91,10 +92,10 @@ def _examine_keypoints(
     folder: Path, cameras: Sequence[Camera], length: int, image: int, findings: list[Finding]
 ) -> None:
     """Add what is odd about keypoints, for images from a number on."""
-    odd = attempt(lambda: folders.keypoint_warnings(folder, cameras, length, image), findings)
+    odd = attempt(lambda: layout.keypoint_warnings(folder, cameras, length, image), findings)
     if odd is not None:
         findings += [warning(text, where=folder) for text in odd]
-        findings += [note(text, where=folder) for text in folders.keypoint_numbers(folder, cameras, length, image)]
+        findings += [note(text, where=folder) for text in layout.keypoint_numbers(folder, cameras, length, image)]
 
 
 def _examine_pictures(folder: Path, lenses: Sequence[Camera], videos: Sequence[Video], findings: list[Finding]) -> None:

@@ -12,9 +12,9 @@ from pydantic import model_validator
 from mocapflow.assets import Body
 from mocapflow.dressing.roles import BodyModel
 from mocapflow.errors import RecordingError
-from mocapflow.io.meshes import check_winding, read_mesh
-from mocapflow.io.scans import check_size, need_scan, read_skeleton
-from mocapflow.io.weights import read_weights
+from mocapflow.io.subject.meshes import check_winding, read_mesh
+from mocapflow.io.subject.skeleton import check_size, need_scan, read_skeleton
+from mocapflow.io.subject.weights import read_weights
 from mocapflow.records import F64
 from mocapflow.settings import Settings
 from mocapflow_bodies.assemble import Part, SecondShape, assemble

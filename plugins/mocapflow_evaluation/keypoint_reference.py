@@ -13,7 +13,8 @@ from mocapflow_fitting.detections import names_of, persons
 
 from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
-from mocapflow.io import folders, markers
+from mocapflow.io.motion import markers
+from mocapflow.io.recording.layout import keypoint_folders
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
 from mocapflow.results import ViewChecks
@@ -30,7 +31,7 @@ def with_keypoints(recording: Recording, place: Path) -> Recording:
     Raises:
         RecordingError: there are none of two cameras.
     """
-    found = folders.keypoint_folders(place, recording.cameras)
+    found = keypoint_folders(place, recording.cameras)
     if len(found) - found.count(None) < 2:
         hint = f"expected {place.name}/{recording.cameras[0].name}_json/*.json as OpenPose writes them"
         raise RecordingError("there are no 2D keypoints of two cameras or more", where=str(place), hint=hint)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from mocapflow.errors import RecordingError, alternatives
-from mocapflow.io.typed import place, read_toml
+from mocapflow.io.json_toml import place, read_toml
 
 # Landmark: its marker in Plug-in Gait and CGM2, CAST (van Sint Jan), OpenSim's gait models, OpenCap; s is the side.
 KNOWN: Mapping[str, tuple[str, ...]] = {

@@ -11,8 +11,8 @@ from mocapflow_export import tables
 
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import angles
-from mocapflow.io import markers
-from mocapflow.io.columns import read_columns
+from mocapflow.io.motion import markers
+from mocapflow.io.motion.csv_columns import read_columns
 from mocapflow.records import F64, array, record
 from mocapflow_evaluation import marker_joints, true_joints
 from mocapflow_evaluation.marker_names import FILE, landmarks

@@ -10,7 +10,7 @@ import numpy as np
 from mocapflow_export import layout, tables
 
 from mocapflow.geometry.registration import Registration
-from mocapflow.io import markers
+from mocapflow.io.motion import markers
 from mocapflow.records import F64, array, record
 from mocapflow_evaluation import compare, comparison_plots, stick
 from mocapflow_evaluation.alignment import clocks, resampled

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from mocapflow_export import layout
 
-from mocapflow.io.columns import read_columns
+from mocapflow.io.motion.csv_columns import read_columns
 from mocapflow.records import F64
 
 

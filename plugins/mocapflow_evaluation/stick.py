@@ -10,7 +10,7 @@ import numpy as np
 from mocapflow.errors import MocapflowError, RecordingError
 from mocapflow.geometry.registration import Registration, register
 from mocapflow.geometry.skeleton import SEGMENTS
-from mocapflow.io.columns import read_columns
+from mocapflow.io.motion.csv_columns import read_columns
 from mocapflow.records import F64, array, record
 
 BONES = tuple(

@@ -12,8 +12,8 @@ from mocapflow_export.uncertainty import measured
 
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import kinematics
-from mocapflow.io import markers, opensim
-from mocapflow.io.columns import read_columns
+from mocapflow.io.motion import markers, opensim
+from mocapflow.io.motion.csv_columns import read_columns
 from mocapflow.records import F64, record
 from mocapflow.results import Track, frame_rate_of
 from mocapflow.scene import Scene

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import ClassVar, Literal
 
 from mocapflow.components import Stage
-from mocapflow.io import markers, opensim
+from mocapflow.io.motion import markers, opensim
 from mocapflow.recordings.recording import Recording
 from mocapflow.results import Files, RunFolder, Track, ViewChecks
 from mocapflow.scene import Scene

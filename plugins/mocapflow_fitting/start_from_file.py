@@ -14,8 +14,8 @@ from mocapflow.components import Stage
 from mocapflow.data import NO_CLOTH, Pose, Start
 from mocapflow.errors import RecordingError
 from mocapflow.geometry.cameras import project
-from mocapflow.io.first_pose import FILE, read_first_pose, read_pose
-from mocapflow.io.rigs import PLACE
+from mocapflow.io.cameras.rigs import PLACE
+from mocapflow.io.subject.first_pose import FILE, read_first_pose, read_pose
 from mocapflow.recordings.recording import Recording
 from mocapflow.scene import Scene
 

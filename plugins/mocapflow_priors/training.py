@@ -12,8 +12,8 @@ from mocapflow.errors import MocapflowError, PipelineError, RecordingError, alte
 from mocapflow.geometry import angles
 from mocapflow.geometry.joints import angles_from_rotations
 from mocapflow.geometry.skeleton import unsided
-from mocapflow.io import markers
-from mocapflow.io.columns import read_columns
+from mocapflow.io.motion import markers
+from mocapflow.io.motion.csv_columns import read_columns
 from mocapflow.records import F64
 from mocapflow_priors import training_bvh
 from mocapflow_priors.density import Density, bandwidth
@@ -29,7 +29,7 @@ COLUMNS = {  # of angles.csv: the screw that makes nearly all of each
     "ankle": "ankle.dorsiflexion",
     "elbow": "elbow.flexion",
 }
-COORDINATES = {  # of OpenSim, as `mocapflow.io.opensim` names them
+COORDINATES = {  # of OpenSim, as `mocapflow.io.motion.opensim` names them
     "hip_flexion": "hip.flexion",
     "knee_angle": "knee.flexion",
     "ankle_angle": "ankle.dorsiflexion",
@@ -182,7 +182,7 @@ def bent_forwards(degrees: Mapping[str, F64], path: Path) -> Mapping[str, F64]:
 
 def opensim_at_rest(body: Body) -> Mapping[str, float]:
     """Return what OpenSim calls the angles of the rest pose, in degrees."""
-    from mocapflow.io.opensim import coordinates
+    from mocapflow.io.motion.opensim import coordinates
 
     found = coordinates(body, np.eye(4)[None], np.zeros((1, len(body.twists))))
     return {name: float(value[0]) for name, value in found.items()}

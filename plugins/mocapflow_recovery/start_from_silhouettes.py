@@ -15,7 +15,7 @@ from mocapflow.components import Stage
 from mocapflow.data import NO_CLOTH, Past, Pose, Start
 from mocapflow.dressing.roles import Draper
 from mocapflow.errors import RecordingError
-from mocapflow.io.plates import plate_files
+from mocapflow.io.recording.plates import plate_files
 from mocapflow.model import ClothedModel
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64

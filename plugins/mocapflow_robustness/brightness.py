@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mocapflow.data import Frame
-from mocapflow.io.lenses import with_levels
-from mocapflow.io.plates import blocks
+from mocapflow.io.cameras.views import with_levels
+from mocapflow.io.recording.plates import blocks
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64, U8, Bool
 

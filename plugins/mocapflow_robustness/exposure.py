@@ -12,7 +12,7 @@ from pydantic import Field
 
 from mocapflow.components import Stage
 from mocapflow.errors import PipelineError
-from mocapflow.io.lenses import View, with_levels
+from mocapflow.io.cameras.views import View, with_levels
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64, U8
 from mocapflow_robustness.brightness import NormalisedBrightness, block_means, multiplied

@@ -15,7 +15,7 @@ from mocapflow.assets import Background
 from mocapflow.components import Stage
 from mocapflow.data import NO_CLOTH, Start
 from mocapflow.errors import RecordingError
-from mocapflow.io.plates import plate_files
+from mocapflow.io.recording.plates import plate_files
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import U8
 from mocapflow.scene import Scene

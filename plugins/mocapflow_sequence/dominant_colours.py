@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from mocapflow.io.plates import LEAST_SPREAD, NORMAL
+from mocapflow.io.recording.plates import LEAST_SPREAD, NORMAL
 from mocapflow.records import F32, U8
 from mocapflow_sequence.colours import Colours
 

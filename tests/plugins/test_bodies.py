@@ -14,7 +14,7 @@ from mocapflow.errors import PipelineError, RecordingError
 from mocapflow.geometry import kinematics, twists
 from mocapflow.geometry.joints import angles_from_rotations
 from mocapflow.geometry.skeleton import Skeleton, unsided
-from mocapflow.io.scans import read_skeleton
+from mocapflow.io.subject.skeleton import read_skeleton
 
 RECORDINGS = Path(__file__).parents[2] / "examples" / "data"
 

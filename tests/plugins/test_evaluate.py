@@ -19,8 +19,8 @@ from scipy.signal import lfilter
 
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import angles
-from mocapflow.io import markers
-from mocapflow.io.columns import read_columns
+from mocapflow.io.motion import markers
+from mocapflow.io.motion.csv_columns import read_columns
 from mocapflow.recordings.recording import open_recording
 from mocapflow.results import RunFolder
 

@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 
 from mocapflow.errors import PipelineError
 from mocapflow.geometry import angles, silhouettes, twists
-from mocapflow.io import markers
+from mocapflow.io.motion import markers
 from mocapflow.knocks import Knocks
 from mocapflow.recordings.recording import open_recording
 from mocapflow.results import ViewChecks

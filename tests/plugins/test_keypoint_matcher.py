@@ -16,7 +16,7 @@ from mocapflow.data import NO_CLOTH, Frame, Past, Segmentation, Turn
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import kinematics
 from mocapflow.geometry.cameras import centre, project
-from mocapflow.io.cameras import read_cameras
+from mocapflow.io.cameras.calibration import read_cameras
 from mocapflow.model import ClothedModel, moved
 from mocapflow.prediction import initial_state
 from mocapflow.scene import Scene

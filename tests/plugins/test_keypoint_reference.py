@@ -16,7 +16,7 @@ from results_scene import make_track, stepping
 
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import kinematics
-from mocapflow.io import markers
+from mocapflow.io.motion import markers
 from mocapflow.knocks import Knocks
 from mocapflow.recordings.recording import Recording, open_recording
 from mocapflow.results import Evaluation, RunFolder, Track, ViewChecks

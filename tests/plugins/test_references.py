@@ -23,7 +23,7 @@ from scipy.spatial.transform import Rotation
 
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import angles
-from mocapflow.io import markers
+from mocapflow.io.motion import markers
 from mocapflow.recordings.recording import open_recording
 
 SCENE = demo_scene()

@@ -15,7 +15,7 @@ from mocapflow_report.report import Report
 from mocapflow_sequence.smooth import Smooth
 from results_scene import DEMO, demo_scene, stepping
 
-from mocapflow.io.columns import read_columns
+from mocapflow.io.motion.csv_columns import read_columns
 from mocapflow.recordings.recording import open_recording
 from mocapflow.results import RunFolder
 

@@ -11,8 +11,8 @@ from results_scene import DEMO, ball_body, cameras, demo_scene, stepping
 
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import kinematics
-from mocapflow.io import markers
-from mocapflow.io.columns import read_columns
+from mocapflow.io.motion import markers
+from mocapflow.io.motion.csv_columns import read_columns
 from mocapflow.recordings.recording import Recording, open_recording
 from mocapflow.results import Files, RunFolder, Track
 from mocapflow.scene import Scene

@@ -6,7 +6,7 @@ from results_scene import ball_body, start_pose, stepping
 
 from mocapflow.assets import Body
 from mocapflow.geometry import angles, twists
-from mocapflow.io import opensim
+from mocapflow.io.motion import opensim
 
 
 def turned(body: Body, **turns_deg: float) -> dict[str, np.ndarray]:

@@ -18,7 +18,7 @@ from results_scene import DEMO, demo_scene, stepping
 
 from mocapflow.errors import StoreError
 from mocapflow.geometry import cameras
-from mocapflow.io.columns import read_columns
+from mocapflow.io.motion.csv_columns import read_columns
 from mocapflow.knocks import Knocks
 from mocapflow.recordings.recording import Recording, open_recording
 from mocapflow.results import Evaluation, RunFolder, Track, ViewChecks

@@ -19,7 +19,7 @@ from mocapflow.assets import Body
 from mocapflow.cli import app
 from mocapflow.errors import PipelineError, RecordingError
 from mocapflow.geometry import angles
-from mocapflow.io import markers, opensim
+from mocapflow.io.motion import markers, opensim
 from mocapflow.recordings.recording import open_recording
 from tests.fixtures.turns import rotations_from_angles
 

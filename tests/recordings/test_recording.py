@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 
 from mocapflow.errors import RecordingError
-from mocapflow.io import rates
-from mocapflow.io.cameras import read_cameras, write_cameras
-from mocapflow.io.video import VIDEOS
+from mocapflow.io.cameras.calibration import read_cameras, write_cameras
+from mocapflow.io.video import frame_rate
+from mocapflow.io.video.reading import VIDEOS
 from mocapflow.recordings.doctor import examine
 from mocapflow.recordings.recording import open_recording
 from tests.fixtures.recordings import NAMES, avi_frames, number_of, picture, ring, write_recording, write_video
-from tests.io.test_calibrations import write_easymocap
+from tests.io.cameras.test_calibration import write_easymocap
 
 DEMO = Path(__file__).parents[2] / "examples" / "data" / "skirt_steps"
 
@@ -419,7 +419,7 @@ def test_a_stated_frame_rate_does_not_hide_that_the_videos_differ(tmp_path):
 @pytest.mark.parametrize("stated", ["", "[metadata]\nframe_rate = 25\n"])
 @pytest.mark.parametrize(("rate", "apart"), [(25.1, ()), (25.2, ("0.3",))])
 def test_rates_that_are_nearly_one(tmp_path, monkeypatch, rate, apart, stated):
-    monkeypatch.setattr(rates, "OFF", 0.3)
+    monkeypatch.setattr(frame_rate, "OFF", 0.3)
     write_recording(tmp_path, frames=40)
     with (tmp_path / "cameras.toml").open("a") as file:
         file.write(stated)

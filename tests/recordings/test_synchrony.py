@@ -10,8 +10,8 @@ import pytest
 from mocapflow.errors import RecordingError
 from mocapflow.geometry.cameras import centre, project
 from mocapflow.geometry.epipolar import pencil_axes, plane_angles
-from mocapflow.io.cameras import write_cameras
-from mocapflow.io.lateness import late_frames, write_late_frames
+from mocapflow.io.cameras.calibration import write_cameras
+from mocapflow.io.video.lateness import late_frames, write_late_frames
 from mocapflow.recordings import doctor, paired_views, synchrony
 from mocapflow.recordings.doctor import examine_timing
 from mocapflow.recordings.recording import open_recording

@@ -1,0 +1,155 @@
+"""Calibration files: Pose2Sim/anipose TOML, Qualisys .qca.txt, OpenCV/EasyMocap intri.yml and extri.yml."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mocapflow.assets import Camera
+from mocapflow.errors import RecordingError, guess
+from mocapflow.geometry import twists
+from mocapflow.geometry.cameras import bends
+from mocapflow.io.atomic import atomic_write
+from mocapflow.io.cameras import opencv, qualisys
+from mocapflow.io.cameras.from_numbers import bad, make_camera
+from mocapflow.io.json_toml import place, read_toml
+
+FARTHEST = 100.0  # m; a camera further from the origin is one calibrated in centimetres
+MILLIMETRES = 1000.0  # m; beyond, in millimetres
+SKEW = 0.1  # px; a camera matrix with more does not go with a distorted lens: OpenCV's model of one has none
+YAML = (".yml", ".yaml")
+FIELDS = ("size", "matrix", "distortions", "rotation", "translation")
+OPTIONAL = ("name", "fisheye")
+
+
+def read_cameras(path: Path) -> tuple[Camera, ...]:
+    """Read the cameras of a calibration file of any known format, in the order of the file.
+
+    Args:
+        path: a `.toml`, a Qualisys `.qca.txt`, an `intri.yml` with `extri.yml` beside it, or a recording folder.
+
+    Returns:
+        The cameras with their lens distortion. A size of 0 x 0 means that the file does not say.
+
+    Raises:
+        RecordingError: the file is missing, incomplete, not a calibration, not in metres, or has its
+            frame rate where nobody looks for it.
+    """
+    path = find_calibration(path) if path.is_dir() else path
+    if not path.is_file():
+        raise RecordingError("no such calibration file", where=str(path))
+    if path.suffix == ".toml":
+        cameras = _from_toml(path)
+    elif path.suffix in YAML:
+        cameras = opencv.cameras(path.parent)
+    else:
+        cameras = qualisys.cameras(path)
+    if not cameras:
+        raise RecordingError("the file holds no camera", where=str(path))
+    names = [camera.name for camera in cameras]
+    for camera in cameras:
+        _check(camera, path)
+        if names.count(camera.name) > 1:
+            raise bad(camera.name, path, "is there more than once")
+    return cameras
+
+
+def find_calibration(folder: Path) -> Path:
+    """Return the calibration file of a recording folder.
+
+    Raises:
+        RecordingError: there is none, or more than one Qualisys file.
+    """
+    if (folder / "cameras.toml").exists():
+        return folder / "cameras.toml"
+    found = sorted(folder.glob("[!.]*.qca.txt")) or [p for p in [folder / "intri.yml"] if p.exists()]
+    if len(found) == 1:
+        return found[0]
+    raise RecordingError(
+        "no calibration file" if not found else f"{len(found)} calibration files: {', '.join(p.name for p in found)}",
+        where=str(folder),
+        hint="put the calibration there as cameras.toml (Pose2Sim or anipose),\n"
+        "as one Qualisys *.qca.txt, or as intri.yml and extri.yml (EasyMocap)",
+    )
+
+
+def calibration_files(path: Path) -> tuple[Path, ...]:
+    """Return the files that `read_cameras` reads for a path: EasyMocap calibrations are a pair."""
+    return (path.with_name("intri.yml"), path.with_name("extri.yml")) if path.suffix in YAML else (path,)
+
+
+def write_cameras(path: Path, cameras: Sequence[Camera]) -> None:
+    """Write cameras as Pose2Sim TOML, one table each; reading it again gives the same numbers."""
+    text = "\n".join(_table(camera) for camera in cameras)
+    with atomic_write(path) as part:
+        part.write_text(text, encoding="utf-8")
+
+
+def metadata(path: Path) -> Mapping[str, Any]:
+    """Return the `[metadata]` table of a TOML calibration; empty where there is none."""
+    if path.suffix != ".toml":
+        return {}
+    found = read_toml(path).get("metadata", {})
+    return found if isinstance(found, dict) else {}
+
+
+def _from_toml(path: Path) -> tuple[Camera, ...]:
+    content = read_toml(path)
+    tables = {key: table for key, table in content.items() if isinstance(table, dict) and key != "metadata"}
+    if any("frame_rate" in table for table in (content, *tables.values())):
+        hint = "in TOML what follows a [table] belongs to it: write it right below a line [metadata]"
+        raise RecordingError("frame_rate is not under [metadata]", where=place(path, "frame_rate"), hint=hint)
+    own = set(FIELDS) - {"size"}  # which a calibration board of another program has, too
+    cameras = {key: table for key, table in tables.items() if own & set(table)}
+    return tuple(_from_table(key, table, path) for key, table in cameras.items())
+
+
+def _from_table(key: str, table: Mapping[str, Any], path: Path) -> Camera:
+    name = str(table.get("name", key))
+    missing = [field for field in FIELDS if field not in table]
+    if missing:
+        hint = f"each camera needs {', '.join(FIELDS)}"
+        raise bad(name, path, f"lacks {', '.join(missing)}", hint)
+    size, matrix, distortion, rotation, translation = (table[field] for field in FIELDS)
+    for field in set(table) - {*FIELDS, *OPTIONAL}:  # other programs add fields of their own
+        if meant := guess(field, (*FIELDS, *OPTIONAL)):
+            raise bad(name, path, f"has a field '{field}', which nobody reads", meant)
+    fisheye = table.get("fisheye", False)
+    if not isinstance(fisheye, bool):
+        raise bad(name, path, f"has fisheye = {fisheye!r}", "write true or false, without quotes")
+    return make_camera(name, size, matrix, distortion, rotation, translation, where=path, fisheye=fisheye)
+
+
+def _check(camera: Camera, path: Path) -> None:
+    k, rotation = camera.intrinsics, camera.camera_from_world[:3, :3]
+    if (camera.size < 0).any():
+        raise bad(camera.name, path, f"has the size {camera.size[0]} x {camera.size[1]}")
+    if not (k[0, 0] > 0 and k[1, 1] > 0 and k[2, 2] == 1) or k[1, 0] or k[2, 0] or k[2, 1]:
+        raise bad(camera.name, path, "has no camera matrix", "expected [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] in pixels")
+    if abs(k[0, 1]) > SKEW and bends(camera):
+        hint = "lens distortion is corrected without skew: calibrate with a skew of 0, as OpenCV always does"
+        raise bad(camera.name, path, f"has a skew of {k[0, 1]:g} px", hint)
+    if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-3 or np.linalg.det(rotation) < 0:
+        hint = "its rows must be orthonormal, with determinant +1"
+        raise bad(camera.name, path, "has a matrix that is not a rotation", hint)
+    distance = float(np.linalg.norm(camera.camera_from_world[:3, 3]))
+    if distance > FARTHEST:
+        unit, factor = ("mm", 1000) if distance > MILLIMETRES else ("cm", 100)
+        hint = f"lengths are in metres: divide every translation by {factor}"
+        raise bad(camera.name, path, f"stands {distance:.0f} m from the origin: the calibration is in {unit}", hint)
+
+
+def _table(camera: Camera) -> str:
+    rows = ", ".join(str([float(x) for x in row]) for row in camera.intrinsics)
+    coefficients = camera.distortion[: 4 if camera.fisheye or not camera.distortion[4] else 5]
+    rotation = twists.log_rotation(camera.camera_from_world[:3, :3])
+    name = json.dumps(camera.name, ensure_ascii=False)  # as TOML quotes it
+    return (
+        f"[{name}]\nname = {name}\nsize = {camera.size.tolist()}\nmatrix = [{rows}]\n"
+        f"distortions = {coefficients.tolist()}\nrotation = {rotation.tolist()}\n"
+        f"translation = {camera.camera_from_world[:3, 3].tolist()}\nfisheye = {str(camera.fisheye).lower()}\n"
+    )

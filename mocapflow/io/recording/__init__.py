@@ -1,0 +1,1 @@
+"""The folder of a recording: where its parts lie, keypoints, clean plates and occluders."""

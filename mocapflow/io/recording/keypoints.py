@@ -1,0 +1,121 @@
+"""OpenPose-format 2D keypoints: one JSON file per camera and frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from mocapflow.errors import RecordingError
+from mocapflow.io.json_toml import read_json
+from mocapflow.io.video.images import name_frames, numbered
+from mocapflow.records import F64
+
+FORM = 'expected OpenPose\'s format: {"people": [{"pose_keypoints_2d": [x, y, confidence, ...]}]}'
+
+
+def keypoint_files(folder: Path, first: int = 0) -> dict[int, Path]:
+    """Return the files of one camera's folder by frame number.
+
+    Args:
+        folder: of one camera.
+        first: number of frame 0's file, see `first_numbers`.
+
+    Raises:
+        RecordingError: two files have one number.
+    """
+    return {number - first: path for number, path in numbered(folder, (".json",)).items()}
+
+
+def first_numbers(folders: Sequence[Path | None], image: int, length: int) -> list[int]:
+    """Return the number of frame 0's file in each folder: that of its image, which it may be named after, or 0.
+
+    A number below that of the first image, or beyond the last frame, tells. For a camera without one the others tell;
+    where they don't, or contradict each other, files that end with the last frame count from 0.
+
+    Args:
+        folders: of all cameras; None: one without keypoints.
+        image: number of frame 0's image.
+        length: frames of the videos.
+
+    Raises:
+        RecordingError: two files of a camera have one number.
+    """
+    if not image:
+        return [0] * len(folders)
+    files = [[] if folder is None else list(numbered(folder, (".json",))) for folder in folders]
+    told = [_own_first_number(numbers, image, length) for numbers in files]
+    known = {number for number in told if number is not None}
+    ends = {max(numbers) for numbers, number in zip(files, told, strict=True) if numbers and number is None}
+    others = known.pop() if len(known) == 1 else 0 if length - 1 in ends else image
+    return [others if number is None else number for number in told]
+
+
+def _own_first_number(numbers: Sequence[int], image: int, length: int) -> int | None:
+    """Return what a camera's own numbers tell of frame 0's, None where they may count from either."""
+    if not numbers or image <= min(numbers) <= max(numbers) < length:
+        return None
+    return 0 if min(numbers) < image else image
+
+
+def read_keypoints(path: Path) -> F64:
+    """Return the keypoints (N people, K, 3) of a file: px, px, confidence, as the file has them.
+
+    Nobody in the picture gives (0, 0, 3).
+
+    Raises:
+        RecordingError: the file is not in OpenPose's format.
+    """
+    content = read_json(path, FORM)
+    try:
+        rows = [np.array(person["pose_keypoints_2d"], np.float64).reshape(-1, 3) for person in content["people"]]
+        return np.stack(rows) if rows else np.empty((0, 0, 3))
+    except (ValueError, TypeError, KeyError, OverflowError) as error:
+        raise RecordingError(f"not a file of keypoints: {error}", where=str(path), hint=FORM) from error
+
+
+def people_at(files: Mapping[int, Path] | None, index: int) -> F64:
+    """Return the people (N, K, 3) of a frame; nobody where its file is missing or can't be read (see `odd_keypoints`).
+
+    A point with a number missing is at (0, 0) with confidence 0.
+    """
+    if files is None or index not in files:
+        return np.empty((0, 0, 3))
+    try:
+        people = read_keypoints(files[index])
+    except RecordingError:
+        return np.empty((0, 0, 3))
+    lost = ~np.isfinite(people).all(axis=-1, keepdims=True)
+    return np.where(lost, 0.0, people)
+
+
+def odd_keypoints(camera: str, folder: Path, length: int, first: int = 0) -> list[str]:
+    """Say what is odd about the keypoints of a camera with `length` frames; every file is read (60 us each).
+
+    `first` is the number of frame 0's file.
+    """
+    files = keypoint_files(folder, first)
+    broken, gaps, counts, farthest = [], [], set(), 0.0
+    for index, path in files.items():
+        try:
+            people = read_keypoints(path)
+        except RecordingError:
+            broken.append(index)
+            continue
+        counts |= {people.shape[1]} if len(people) else set()
+        gaps += [index] if not np.isfinite(people).all() else []
+        farthest = max(farthest, float(np.nanmax(np.abs(people[..., :2]), initial=0.0)))
+    beyond, missing = [i for i in files if i >= length], [i for i in range(length) if i not in files]
+    faults = (
+        (broken, "can't be read: nobody is seen there"),
+        (gaps, "are not all numbers (NaN): these points count as not seen"),
+        (beyond, f"lie after the last frame, {length - 1}: they are left out"),
+        (missing, "are missing: nobody is seen there"),
+    )
+    odd = [f"{camera}: keypoints of {name_frames(indices)} {what}" for indices, what in faults if indices]
+    if len(counts) > 1:
+        odd.append(f"{camera}: people with {' and with '.join(map(str, sorted(counts)))} keypoints in one folder")
+    if 0 < farthest <= 1:
+        odd.append(f"{camera}: all keypoints lie within one pixel: are they shares of the picture? expected pixels")
+    return odd
