@@ -29,8 +29,8 @@ from mocapflow.commands import cache, pictures, results
 from mocapflow.commands.invocation import FILE, Invocation, remember
 from mocapflow.commands.progress import reporter
 from mocapflow.help.shipped import shipped
-from mocapflow.io.motion import markers
 from mocapflow.io.motion.csv_columns import read_columns
+from mocapflow.io.motion.trc import write_trc
 from mocapflow.recordings import doctor
 from mocapflow.results import Evaluation
 from mocapflow.running import runner
@@ -474,7 +474,7 @@ def test_what_the_pipeline_compares_with_is_compared_with_again(call, tmp_path):
     lost = call("evaluate", str(tmp_path), "--truth", "nowhere.csv")
     assert (lost.exit_code, lost.stderr) == (2, "error: nowhere.csv  no such reference\n")
     joints = np.random.default_rng(0).uniform(size=(9, 3, 3))
-    markers.write_trc(tmp_path / layout.KEYPOINTS, ["hip_l", "knee_l", "ankle_l"], joints, 30.0)
+    write_trc(tmp_path / layout.KEYPOINTS, ["hip_l", "knee_l", "ankle_l"], joints, 30.0)
     again = call("evaluate", str(tmp_path))
     assert again.stdout.startswith(f"compared with {tmp_path / layout.KEYPOINTS}\n"), again.output
 

@@ -13,7 +13,8 @@ from mocapflow_fitting.detections import names_of, persons
 
 from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
-from mocapflow.io.motion import markers
+from mocapflow.io.motion.opensim_axes import opensim_from_world
+from mocapflow.io.motion.trc import write_trc
 from mocapflow.io.recording.layout import keypoint_folders
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64
@@ -66,7 +67,7 @@ def write_triangulated(
     path = layout.place(run_folder, layout.KEYPOINTS)
     ours = [name.replace("big_toe", "toe") for name in names]
     smooth = low_pass(places, recording.frame_rate)
-    markers.write_trc(path, ours, markers.opensim_from_world(smooth), recording.frame_rate)
+    write_trc(path, ours, opensim_from_world(smooth), recording.frame_rate)
     return path
 
 

@@ -11,8 +11,11 @@ from mocapflow_export import tables
 
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import angles
-from mocapflow.io.motion import markers
+from mocapflow.io.motion.c3d import read_c3d
 from mocapflow.io.motion.csv_columns import read_columns
+from mocapflow.io.motion.mot import read_mot
+from mocapflow.io.motion.opensim_axes import world_from_opensim
+from mocapflow.io.motion.trc import read_trc
 from mocapflow.records import F64, array, record
 from mocapflow_evaluation import marker_joints, true_joints
 from mocapflow_evaluation.marker_names import FILE, landmarks
@@ -106,7 +109,7 @@ def _table(path: Path) -> Reference:
 
 
 def _motion(path: Path) -> Reference:
-    columns, time = markers.read_mot(path)
+    columns, time = read_mot(path)
     named = {f"{theirs}_{side}": f"{ours}_{side}" for theirs, ours in MOTION.items() for side in ("l", "r")}
     curves = {ours: columns[theirs] for theirs, ours in named.items() if theirs in columns}
     curves |= {name: columns[name] for name in SIGNED if name in columns}
@@ -117,14 +120,14 @@ def _motion(path: Path) -> Reference:
 
 
 def _trc(path: Path) -> Reference:
-    names, positions, time, _ = markers.read_trc(path)
+    names, positions, time, _ = read_trc(path)
     start, notes = counted_from(time)
-    reference = _positions(path, names, markers.world_from_opensim(positions), time)
+    reference = _positions(path, names, world_from_opensim(positions), time)
     return replace(reference, notes=(*notes, *reference.notes), counted_from=start)
 
 
 def _c3d(path: Path) -> Reference:
-    names, positions, time, _ = markers.read_c3d(path)
+    names, positions, time, _ = read_c3d(path)
     return _positions(path, names, positions, time)
 
 

@@ -10,7 +10,8 @@ import numpy as np
 from mocapflow_export import layout, tables
 
 from mocapflow.geometry.registration import Registration
-from mocapflow.io.motion import markers
+from mocapflow.io.motion.opensim_axes import opensim_from_world
+from mocapflow.io.motion.trc import write_trc
 from mocapflow.records import F64, array, record
 from mocapflow_evaluation import compare, comparison_plots, stick
 from mocapflow_evaluation.alignment import clocks, resampled
@@ -46,8 +47,8 @@ class Rigs:
         rows = stick.distances(self.ours, self.theirs, self.aligned)
         tables.write_rows(layout.place(folder, layout.DISTANCES), rows)
         laid = stick.constant(self.theirs)
-        places = markers.opensim_from_world(laid.places)
-        markers.write_trc(layout.place(folder, layout.STICK), laid.names, places, frame_rate, start=start)
+        places = opensim_from_world(laid.places)
+        write_trc(layout.place(folder, layout.STICK), laid.names, places, frame_rate, start=start)
         return [comparison_plots.draw_sticks(layout.place(folder, layout.STICK_PLOT), self.ours, laid, self.frame)]
 
 

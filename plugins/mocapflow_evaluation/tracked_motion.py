@@ -12,8 +12,11 @@ from mocapflow_export.uncertainty import measured
 
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import kinematics
-from mocapflow.io.motion import markers, opensim
+from mocapflow.io.motion import opensim
 from mocapflow.io.motion.csv_columns import read_columns
+from mocapflow.io.motion.mot import read_mot
+from mocapflow.io.motion.opensim_axes import world_from_opensim
+from mocapflow.io.motion.trc import read_trc
 from mocapflow.records import F64, record
 from mocapflow.results import Track, frame_rate_of
 from mocapflow.scene import Scene
@@ -58,7 +61,7 @@ def of_folder(folder: Path) -> TrackedMotion:
         raise RecordingError("there are no angles to compare", where=str(path), hint=hint)
     columns = read_columns(path)
     raw = folder / layout.RAW_ANGLES
-    motion = markers.read_mot(folder / layout.MOTION)[0] if (folder / layout.MOTION).is_file() else {}
+    motion = read_mot(folder / layout.MOTION)[0] if (folder / layout.MOTION).is_file() else {}
     return TrackedMotion(
         columns=columns | {name: motion[name] for name in SIGNED if name in motion},
         raw=read_columns(raw) if raw.is_file() else columns,
@@ -86,5 +89,5 @@ def _columns(track: Track, scene: Scene) -> dict[str, F64]:
 def _stick(path: Path, frames: int) -> Stick:
     if not path.is_file():
         return Stick(names=(), places=np.empty((frames, 0, 3)))
-    names, places, _, _ = markers.read_trc(path)
-    return Stick(names=names, places=markers.world_from_opensim(places))
+    names, places, _, _ = read_trc(path)
+    return Stick(names=names, places=world_from_opensim(places))

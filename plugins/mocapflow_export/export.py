@@ -7,7 +7,10 @@ from pathlib import Path
 from typing import ClassVar, Literal
 
 from mocapflow.components import Stage
-from mocapflow.io.motion import markers, opensim
+from mocapflow.io.motion import opensim
+from mocapflow.io.motion.mot import write_mot
+from mocapflow.io.motion.opensim_axes import opensim_from_world
+from mocapflow.io.motion.trc import write_trc
 from mocapflow.recordings.recording import Recording
 from mocapflow.results import Files, RunFolder, Track, ViewChecks
 from mocapflow.scene import Scene
@@ -91,13 +94,13 @@ def write_angles(result: Result, folder: Path) -> list[Path]:
 def write_motion(result: Result, folder: Path) -> list[Path]:
     """Write angles.mot into a run folder."""
     path, track = layout.place(folder, layout.MOTION), result.track
-    markers.write_mot(path, opensim.coordinates(result.scene.body, track.root, track.angles), track.time)
+    write_mot(path, opensim.coordinates(result.scene.body, track.root, track.angles), track.time)
     return [path]
 
 
 def write_joints(result: Result, folder: Path) -> list[Path]:
     """Write joints.trc into a run folder."""
     path, track = layout.place(folder, layout.JOINTS), result.track
-    places, rate = markers.opensim_from_world(result.places), result.recording.run_rate
-    markers.write_trc(path, result.scene.body.joint_names, places, rate, start=float(track.time[0]))
+    places, rate = opensim_from_world(result.places), result.recording.run_rate
+    write_trc(path, result.scene.body.joint_names, places, rate, start=float(track.time[0]))
     return [path]

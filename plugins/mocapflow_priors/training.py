@@ -12,8 +12,8 @@ from mocapflow.errors import MocapflowError, PipelineError, RecordingError, alte
 from mocapflow.geometry import angles
 from mocapflow.geometry.joints import angles_from_rotations
 from mocapflow.geometry.skeleton import unsided
-from mocapflow.io.motion import markers
 from mocapflow.io.motion.csv_columns import read_columns
+from mocapflow.io.motion.mot import read_mot
 from mocapflow.records import F64
 from mocapflow_priors import training_bvh
 from mocapflow_priors.density import Density, bandwidth
@@ -159,7 +159,7 @@ def from_columns(degrees: Mapping[str, F64], body: Body) -> Angles:
 
 def from_opensim(path: Path, body: Body) -> Angles:
     """Read an OpenSim motion: degrees from the straight limb."""
-    columns, _ = markers.read_mot(path)
+    columns, _ = read_mot(path)
     rest = opensim_at_rest(body)
     angles_only = {name: values for name, values in columns.items() if name[:-2] in COORDINATES and name in rest}
     degrees = bent_forwards(possible(angles_only, path), path)

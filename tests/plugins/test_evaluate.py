@@ -19,8 +19,10 @@ from scipy.signal import lfilter
 
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import angles
-from mocapflow.io.motion import markers
 from mocapflow.io.motion.csv_columns import read_columns
+from mocapflow.io.motion.mot import write_mot
+from mocapflow.io.motion.opensim_axes import opensim_from_world
+from mocapflow.io.motion.trc import write_trc
 from mocapflow.recordings.recording import open_recording
 from mocapflow.results import RunFolder
 
@@ -326,7 +328,7 @@ def test_a_reference_in_radians_or_out_of_order_is_told(tmp_path: Path) -> None:
 
 
 def test_times_in_milliseconds_are_an_error_not_samples_far_apart(tmp_path: Path) -> None:
-    markers.write_mot(tmp_path / "ms.mot", {"knee_angle_r": np.linspace(0, 60, 30)}, np.arange(30) * 33.3)
+    write_mot(tmp_path / "ms.mot", {"knee_angle_r": np.linspace(0, 60, 30)}, np.arange(30) * 33.3)
     tables.write_columns(tmp_path / "ms.csv", {"time": np.array([0, 33.3]), "knee_flexion_r": np.array([0.0, 60])})
     for name in ("ms.mot", "ms.csv"):
         with pytest.raises(RecordingError, match=r"samples are 33\.3 s apart(.|\n)*are these milliseconds"):
@@ -344,7 +346,7 @@ def test_folder_without_angles_is_an_error(tmp_path: Path) -> None:
 def test_motion_file_in_time_is_interpolated(tmp_path: Path) -> None:
     time = np.arange(0, 2, 0.01)
     columns = {"knee_angle_r": 30 + 20 * np.sin(5 * time), "pelvis_ty": np.ones_like(time)}
-    markers.write_mot(tmp_path / "m.mot", columns, time)
+    write_mot(tmp_path / "m.mot", columns, time)
     frames = np.arange(80.0)
     ours = {"frame": frames, "time": frames / 30, "knee_flexion_r": 30 + 20 * np.sin(5 * frames / 30)}
     got = evaluate(columns_only(ours), tmp_path / "m.mot", tmp_path).rows
@@ -357,7 +359,7 @@ def test_motion_file_in_time_is_interpolated(tmp_path: Path) -> None:
 def test_times_that_count_from_one_sample_start_at_zero(tmp_path: Path) -> None:
     time = np.arange(1, 51) / 60
     curve = 30 + 20 * np.sin(np.arange(50) / 5)
-    markers.write_mot(tmp_path / "m.mot", {"knee_angle_r": curve}, time)
+    write_mot(tmp_path / "m.mot", {"knee_angle_r": curve}, time)
     ours = {"frame": np.arange(50.0), "time": np.arange(50) / 60, "knee_flexion_r": curve}
     got = evaluate(columns_only(ours), tmp_path / "m.mot", tmp_path).rows[0]
     assert (got["frames"], round(float(got["rms_deg"]), 3)) == (50, 0)
@@ -367,7 +369,7 @@ def test_times_that_count_from_one_sample_start_at_zero(tmp_path: Path) -> None:
 def test_gait2392_counts_knees_the_other_way_which_is_told_and_not_changed(tmp_path: Path) -> None:
     time = np.arange(50) / 30
     curve = 40 + 20 * np.sin(5 * time)
-    markers.write_mot(tmp_path / "m.mot", {"knee_angle_l": 3 - curve}, time)
+    write_mot(tmp_path / "m.mot", {"knee_angle_l": 3 - curve}, time)
     ours = {"frame": np.arange(50.0), "time": time, "knee_flexion_l": curve}
     got = evaluate(columns_only(ours), tmp_path / "m.mot", tmp_path)
     (row,) = got.rows
@@ -383,7 +385,7 @@ def test_joint_centres_give_three_point_angles(tmp_path: Path, style: str) -> No
     names, places = [str(n) for n in found["names"]], found["positions"].astype(np.float64)
     theirs = {"hip_l": "LHip", "knee_l": "LKnee", "ankle_l": "LAnkle"}
     shown = names if style == "ours" else [theirs.get(n, n) for n in names]
-    markers.write_trc(tmp_path / "j.trc", shown, markers.opensim_from_world(places), 30.0)
+    write_trc(tmp_path / "j.trc", shown, opensim_from_world(places), 30.0)
     truth = read_columns(DEMO / "truth" / "angles.csv")
     assert np.abs(read_reference(tmp_path / "j.trc").curves["knee_flexion_l"] - truth["knee_flexion_l"]).max() < 0.01
 

@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 
 from mocapflow.errors import PipelineError
 from mocapflow.geometry import angles, silhouettes, twists
-from mocapflow.io.motion import markers
+from mocapflow.io.motion.c3d import read_c3d
 from mocapflow.knocks import Knocks
 from mocapflow.recordings.recording import open_recording
 from mocapflow.results import ViewChecks
@@ -145,7 +145,7 @@ def test_c3d_has_the_times_of_the_track(result: Result, tmp_path: Path, first: i
     frame = first + step * result.track.frame
     track = replace(result.track, frame=frame, time=frame / result.recording.frame_rate)
     path = write("c3d", replace(result, track=track), tmp_path)
-    names, places, time, _ = markers.read_c3d(path)
+    names, places, time, _ = read_c3d(path)
     seen = np.isfinite(places).all(axis=(1, 2))
     assert len(places) == frame[-1] - first + 1
     assert names == result.scene.body.joint_names

@@ -16,7 +16,8 @@ from results_scene import make_track, stepping
 
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import kinematics
-from mocapflow.io.motion import markers
+from mocapflow.io.motion.opensim_axes import world_from_opensim
+from mocapflow.io.motion.trc import read_trc
 from mocapflow.knocks import Knocks
 from mocapflow.recordings.recording import Recording, open_recording
 from mocapflow.results import Evaluation, RunFolder, Track, ViewChecks
@@ -54,13 +55,13 @@ def evaluated(track: Track, recording: Recording, cameras, out: Path, checks: Vi
 
 def apart(evaluation: Evaluation, track: Track) -> float:
     """Return how far (m) the reference is at most from where the estimator's marks truly were."""
-    names, places, time, _ = markers.read_trc(Path(evaluation.reference))
+    names, places, time, _ = read_trc(Path(evaluation.reference))
     np.testing.assert_allclose(time[:FRAMES], track.time, atol=1e-6)
     marks = landmarks(BODY)
     poses = [track.pose(t) for t in range(FRAMES)]
     known = np.stack([kinematics.skin(marks.body, kinematics.chain(marks.body, p)[0], p.angles) for p in poses])
     columns = [names.index(name.replace("big_toe", "toe")) for name in marks.names]
-    return float(np.abs(markers.world_from_opensim(places)[:FRAMES, columns] - known).max())
+    return float(np.abs(world_from_opensim(places)[:FRAMES, columns] - known).max())
 
 
 def test_a_folder_without_keypoints_of_two_cameras_is_told_before_the_run(recording: Recording, tmp_path: Path) -> None:

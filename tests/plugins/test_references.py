@@ -23,7 +23,9 @@ from scipy.spatial.transform import Rotation
 
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import angles
-from mocapflow.io.motion import markers
+from mocapflow.io.motion.mot import write_mot
+from mocapflow.io.motion.opensim_axes import opensim_from_world, world_from_opensim
+from mocapflow.io.motion.trc import read_trc, write_trc
 from mocapflow.recordings.recording import open_recording
 
 SCENE = demo_scene()
@@ -108,21 +110,21 @@ def test_names_can_be_told(tmp_path: Path) -> None:
 
 
 def test_markers_that_tell_nothing_say_what_to_do(tmp_path: Path) -> None:
-    markers.write_trc(tmp_path / "m.trc", ["A", "B"], np.zeros((3, 2, 3)), 100.0)
+    write_trc(tmp_path / "m.trc", ["A", "B"], np.zeros((3, 2, 3)), 100.0)
     with pytest.raises(RecordingError, match=r"neither joint centres nor markers(.|\n)*markers\.toml(.|\n)*A, B"):
         read_reference(tmp_path / "m.trc")
 
 
 def test_a_knee_without_its_inner_marker_is_left_out(tmp_path: Path) -> None:
     kept = [k for k, label in enumerate(LABELS) if not label.endswith("LKNM")]
-    markers.write_trc(tmp_path / "m.trc", [LABELS[k] for k in kept], markers.opensim_from_world(PLACES[:, kept]), RATE)
+    write_trc(tmp_path / "m.trc", [LABELS[k] for k in kept], opensim_from_world(PLACES[:, kept]), RATE)
     assert {"knee_flexion_r", "knee_angle_r"} <= set(read_reference(tmp_path / "m.trc").curves)
     assert "knee_flexion_l" not in read_reference(tmp_path / "m.trc").curves
 
 
 def test_a_leg_without_markers_of_the_pelvis_has_the_angle_of_its_ankle_alone(tmp_path: Path) -> None:
     kept = [k for k, label in enumerate(LABELS) if not label.endswith(("ASI", "PSI"))]
-    markers.write_trc(tmp_path / "m.trc", [LABELS[k] for k in kept], markers.opensim_from_world(PLACES[:, kept]), RATE)
+    write_trc(tmp_path / "m.trc", [LABELS[k] for k in kept], opensim_from_world(PLACES[:, kept]), RATE)
     assert {"ankle_l", "ankle_r"} == {name for name in read_reference(tmp_path / "m.trc").curves if "elbow" not in name}
 
 
@@ -153,7 +155,7 @@ def test_rigs_whose_metres_differ_by_more_than_a_fifth_of_a_percent_are_told(
 
 
 def test_common_points_that_can_not_be_read_are_told_before_anything_runs(tmp_path: Path) -> None:
-    markers.write_trc(tmp_path / "m.trc", LABELS, markers.opensim_from_world(PLACES), RATE)
+    write_trc(tmp_path / "m.trc", LABELS, opensim_from_world(PLACES), RATE)
     recording, stage = open_recording(DEMO), Evaluate(reference=str(tmp_path / "m.trc"))
     stage.need(recording)
     (tmp_path / "registration.csv").write_text("x,y,z\n0,0,0\n")
@@ -187,8 +189,8 @@ def test_without_common_points_joint_centres_do(own: TrackedMotion, tmp_path: Pa
     got = evaluate(own, tmp_path / "markers.c3d", tmp_path)
     assert any("registered by joint centres of both systems" in note for note in got.notes)
     assert {path.name for path in got.pictures} == {"agreement.png", "stick_model.png"}
-    names, places, _, _ = markers.read_trc(tmp_path / layout.STICK)
-    knee = markers.world_from_opensim(places)[:, names.index("knee_l")]
+    names, places, _, _ = read_trc(tmp_path / layout.STICK)
+    knee = world_from_opensim(places)[:, names.index("knee_l")]
     assert np.linalg.norm(knee - own.stick.places[:, own.stick.names.index("knee_l")], axis=1).max() < 0.03
 
 
@@ -227,7 +229,7 @@ def test_the_stick_model_has_the_times_of_the_track(own: TrackedMotion, tmp_path
     columns, raw = ({name: values[10:] for name, values in part.items()} for part in (own.columns, own.raw))
     late = TrackedMotion(columns=columns, raw=raw, stick=replace(own.stick, places=own.stick.places[10:]))
     evaluate(late, tmp_path / "markers.c3d", tmp_path)
-    np.testing.assert_allclose(markers.read_trc(tmp_path / layout.STICK)[2], columns["time"], atol=1e-6)
+    np.testing.assert_allclose(read_trc(tmp_path / layout.STICK)[2], columns["time"], atol=1e-6)
 
 
 @pytest.mark.usefixtures("undrawn")
@@ -236,7 +238,7 @@ def test_the_stick_model_keeps_its_lengths(own: TrackedMotion, tmp_path: Path) -
     loose = PLACES + np.random.default_rng(0).normal(scale=0.005, size=PLACES.shape)
     read(tmp_path, loose)
     evaluate(own, tmp_path / "markers.c3d", tmp_path)
-    names, places, _, _ = markers.read_trc(tmp_path / layout.STICK)
+    names, places, _, _ = read_trc(tmp_path / layout.STICK)
     at = {name: places[:, k] for k, name in enumerate(names)}
     for a, b in (("hip_l", "knee_l"), ("knee_r", "ankle_r")):
         length = np.linalg.norm(at[b] - at[a], axis=1)
@@ -275,10 +277,10 @@ def test_a_run_against_its_own_files_is_off_by_nothing(tmp_path: Path, name: str
     if name == "joints.c3d":
         write("c3d", Result(track=track, scene=SCENE, recording=open_recording(DEMO)), tmp_path)
     elif name == "joints.trc":
-        places = markers.opensim_from_world(own.stick.places)
-        markers.write_trc(tmp_path / name, own.stick.names, places, track.frame_rate, start=track.time[0])
+        places = opensim_from_world(own.stick.places)
+        write_trc(tmp_path / name, own.stick.names, places, track.frame_rate, start=track.time[0])
     else:
-        markers.write_mot(tmp_path / name, {"hip_flexion_l": own.columns["hip_flexion_l"]}, track.time)
+        write_mot(tmp_path / name, {"hip_flexion_l": own.columns["hip_flexion_l"]}, track.time)
     rows = evaluate(own, tmp_path / name, tmp_path).rows
     assert {row["frames"] for row in rows} == {len(track.frame)}
     for row in rows:
@@ -288,7 +290,7 @@ def test_a_run_against_its_own_files_is_off_by_nothing(tmp_path: Path, name: str
 @pytest.mark.parametrize("decimals", [8, 3])
 def test_times_that_begin_at_one_sample_are_told(tmp_path: Path, decimals: int) -> None:
     curve = 30 + np.arange(50.0)
-    markers.write_mot(tmp_path / "m.mot", {"knee_angle_r": curve}, np.round(np.arange(1, 51) / 60, decimals))
+    write_mot(tmp_path / "m.mot", {"knee_angle_r": curve}, np.round(np.arange(1, 51) / 60, decimals))
     reference = read_reference(tmp_path / "m.mot")
     assert "one sample: taken as 0, unless our first frame is there" in reference.notes[0]
     for first in (0, 1):
@@ -299,13 +301,13 @@ def test_times_that_begin_at_one_sample_are_told(tmp_path: Path, decimals: int) 
 
 def test_times_that_begin_otherwise_are_as_they_are(tmp_path: Path) -> None:
     curve = 30 + np.arange(50.0)
-    markers.write_mot(tmp_path / "m.mot", {"knee_angle_r": curve}, np.arange(50) / 60)
+    write_mot(tmp_path / "m.mot", {"knee_angle_r": curve}, np.arange(50) / 60)
     found = at_our_frames(read_reference(tmp_path / "m.mot"), {"time": np.arange(10, 50) / 60})["knee_angle_r"]
     np.testing.assert_allclose(found, curve[10:], atol=0.01)
 
 
 def test_a_reference_without_rows_shares_nothing(own: TrackedMotion, tmp_path: Path) -> None:
-    markers.write_mot(tmp_path / "m.mot", {"knee_angle_r": np.empty(0)}, np.empty(0))
+    write_mot(tmp_path / "m.mot", {"knee_angle_r": np.empty(0)}, np.empty(0))
     assert "shares no angle with the track" in evaluate(own, tmp_path / "m.mot", tmp_path).notes[-1]
 
 
@@ -350,12 +352,8 @@ def tables_of_words(path: Path) -> list[dict[str, str]]:
 def test_our_side_from_files_is_that_from_the_track(own: TrackedMotion, tmp_path: Path) -> None:
     angles_only = {n: v for n, v in own.columns.items() if n not in tracked_motion.SIGNED}
     tables.write_columns(layout.place(tmp_path, layout.ANGLES), angles_only)
-    markers.write_trc(
-        layout.place(tmp_path, layout.JOINTS), own.stick.names, markers.opensim_from_world(own.stick.places), RATE
-    )
-    markers.write_mot(
-        layout.place(tmp_path, layout.MOTION), {n: own.columns[n] for n in tracked_motion.SIGNED}, TRACK.time
-    )
+    write_trc(layout.place(tmp_path, layout.JOINTS), own.stick.names, opensim_from_world(own.stick.places), RATE)
+    write_mot(layout.place(tmp_path, layout.MOTION), {n: own.columns[n] for n in tracked_motion.SIGNED}, TRACK.time)
     assert tracked_motion.of_folder(tmp_path).raw.keys() == angles_only.keys()
     clock = {name: own.columns[name] for name in ("frame", "time")}
     tables.write_columns(layout.place(tmp_path, layout.RAW_ANGLES), clock)
@@ -375,9 +373,9 @@ def test_another_run_is_a_reference_by_its_angles_alone(tmp_path: Path) -> None:
 
 def test_a_knee_of_opensim_is_compared_as_signed_too(tmp_path: Path) -> None:
     bend = np.array([-4.0, 0.0, 30.0])
-    markers.write_mot(tmp_path / "m.mot", {"knee_angle_l": bend, "ankle_angle_l": bend}, np.arange(3) / 30)
+    write_mot(tmp_path / "m.mot", {"knee_angle_l": bend, "ankle_angle_l": bend}, np.arange(3) / 30)
     assert read_reference(tmp_path / "m.mot").notes[-1].endswith("may be off by a constant: ankle_l")
-    markers.write_mot(tmp_path / "m.mot", {"knee_angle_l": bend}, np.arange(3) / 30)
+    write_mot(tmp_path / "m.mot", {"knee_angle_l": bend}, np.arange(3) / 30)
     curves = read_reference(tmp_path / "m.mot").curves
     assert not any("constant" in note for note in read_reference(tmp_path / "m.mot").notes)
     np.testing.assert_allclose(curves["knee_angle_l"], bend)

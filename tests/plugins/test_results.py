@@ -11,8 +11,10 @@ from results_scene import DEMO, ball_body, cameras, demo_scene, stepping
 
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import kinematics
-from mocapflow.io.motion import markers
 from mocapflow.io.motion.csv_columns import read_columns
+from mocapflow.io.motion.mot import read_mot
+from mocapflow.io.motion.opensim_axes import world_from_opensim
+from mocapflow.io.motion.trc import read_trc
 from mocapflow.recordings.recording import Recording, open_recording
 from mocapflow.results import Files, RunFolder, Track
 from mocapflow.scene import Scene
@@ -104,7 +106,7 @@ def test_without_smoothing_both_tables_are_the_same(scene: Scene, recording: Rec
 
 
 def test_motion_file_reads_back_with_opensim_names(folder: Path) -> None:
-    columns, time = markers.read_mot(folder / layout.MOTION)
+    columns, time = read_mot(folder / layout.MOTION)
     wanted = {
         "pelvis_tilt",
         "pelvis_ty",
@@ -123,11 +125,11 @@ def test_motion_file_reads_back_with_opensim_names(folder: Path) -> None:
 def test_joint_centres_read_back_in_the_world(scene: Scene, recording: Recording, tmp_path: Path) -> None:
     track = stepping(scene.body, 5)
     exported(track, scene, recording, tmp_path)
-    names, places, _, rate = markers.read_trc(tmp_path / layout.JOINTS)
+    names, places, _, rate = read_trc(tmp_path / layout.JOINTS)
     joints, _ = kinematics.chain(scene.body, track.pose(3))
     assert names == scene.body.joint_names
     assert rate == pytest.approx(30)
-    here = markers.world_from_opensim(places[3])
+    here = world_from_opensim(places[3])
     assert np.abs(here - kinematics.joint_positions(scene.body, joints)).max() < 1e-6
 
 
@@ -181,7 +183,7 @@ def test_files_count_frames_and_seconds_of_the_video(scene: Scene, recording: Re
     assert [got["frames"][name] for name in ("count", "first", "last", "lost", "bridged_by")] == [4, 20, 26, [24], None]
     assert got["cpu_seconds"]["per_frame_median"] == pytest.approx(0.3)
     assert [each.get("lost") for each in got["per_frame"]] == [None, None, True, None]
-    for time in (markers.read_trc(tmp_path / layout.JOINTS)[2], markers.read_mot(tmp_path / layout.MOTION)[1]):
+    for time in (read_trc(tmp_path / layout.JOINTS)[2], read_mot(tmp_path / layout.MOTION)[1]):
         np.testing.assert_allclose(time, late.time, atol=1e-6)
 
 

@@ -19,7 +19,8 @@ from mocapflow.assets import Body
 from mocapflow.cli import app
 from mocapflow.errors import PipelineError, RecordingError
 from mocapflow.geometry import angles
-from mocapflow.io.motion import markers, opensim
+from mocapflow.io.motion import opensim
+from mocapflow.io.motion.mot import write_mot
 from mocapflow.recordings.recording import open_recording
 from tests.fixtures.turns import rotations_from_angles
 
@@ -135,26 +136,26 @@ def test_a_table_that_can_be_misread_is_refused(tmp_path, body, text, message):
 def test_an_angle_that_no_joint_has(body: Body, tmp_path: Path, file: str, value: float) -> None:
     bend = np.array([10.0, np.nan, value, 40.0])
     tables.write_columns(tmp_path / "angles.csv", {"knee_flexion_l": bend})
-    markers.write_mot(tmp_path / "angles.mot", {"knee_angle_l": bend}, np.arange(4) / 30)
+    write_mot(tmp_path / "angles.mot", {"knee_angle_l": bend}, np.arange(4) / 30)
     with pytest.raises(RecordingError, match=rf"{file}  knee_(flexion|angle)_l is {value:g} in row 3\n"):
         training.read_angles(tmp_path / file, body)
 
 
 def test_an_opensim_motion(body: Body, motion: np.ndarray, tmp_path: Path) -> None:
     columns = opensim.coordinates(body, np.tile(np.eye(4), (12, 1, 1)), motion)
-    markers.write_mot(tmp_path / "angles.mot", columns, np.arange(12) / 30)
+    write_mot(tmp_path / "angles.mot", columns, np.arange(12) / 30)
     assert_same(training.read_angles(tmp_path / "angles.mot", body), motion, body, atol_deg=2.5)
 
 
 def test_an_opensim_motion_of_a_model_that_counts_knees_the_other_way(body: Body, tmp_path: Path) -> None:
     """As gait2392 does; a knee that is stretched too far now and then is none."""
     bend = np.linspace(-2, 60, 12)
-    markers.write_mot(tmp_path / "ours.mot", {"knee_angle_r": bend, "knee_angle_l": bend - 10}, np.arange(12) / 30)
+    write_mot(tmp_path / "ours.mot", {"knee_angle_r": bend, "knee_angle_l": bend - 10}, np.arange(12) / 30)
     assert set(training.read_angles(tmp_path / "ours.mot", body)) == {"knee_r.flexion", "knee_l.flexion"}
     unseen = np.where(np.arange(12) < 9, np.nan, -bend)
     for name, values in (("other", -bend), ("gaps", unseen)):
         columns = {"knee_angle_r": bend, "knee_angle_l": values}
-        markers.write_mot(tmp_path / f"{name}.mot", columns, np.arange(12) / 30)
+        write_mot(tmp_path / f"{name}.mot", columns, np.arange(12) / 30)
         with pytest.raises(RecordingError, match=rf"{name}\.mot  knee_angle_l bends backwards: its model counts"):
             training.read_angles(tmp_path / f"{name}.mot", body)
 
@@ -225,7 +226,7 @@ def test_files_of_another_kind(body: Body, tmp_path: Path) -> None:
 
 def test_the_command(body: Body, motion: np.ndarray, tmp_path: Path) -> None:
     columns = opensim.coordinates(body, np.tile(np.eye(4), (12, 1, 1)), motion)
-    markers.write_mot(tmp_path / "take.mot", columns, np.arange(12) / 30)
+    write_mot(tmp_path / "take.mot", columns, np.arange(12) / 30)
     out = tmp_path / "poses.npz"
     command = ["prior", "fit", str(tmp_path / "take.mot"), "--out", str(out), "--angle", "knee.flexion"]
     said = CliRunner().invoke(app, command)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from mocapflow.errors import RecordingError
+from mocapflow.io.motion.rows import row_of_numbers
 from mocapflow.records import F64
 
 DIVIDERS = {";": "semicolons", "\t": "tabs"}  # that spreadsheets write in place of commas
@@ -41,21 +41,3 @@ def read_columns(path: Path) -> dict[str, F64]:
         raise RecordingError(f"two columns are called '{twice}'", where=f"{path}:1", hint="which one is meant?")
     values = np.array([row_of_numbers(row, len(header), f"{path}:{number}") for number, row in lines[1:]])
     return {name: values[:, column].copy() for column, name in enumerate(header)}
-
-
-def row_of_numbers(cells: Sequence[str], width: int, where: str) -> list[float]:
-    """Return the numbers in the cells of a row; an empty cell is NaN.
-
-    Raises:
-        RecordingError: there are more or fewer cells than columns, or one holds no number; `where` is the row's place.
-    """
-    if len(cells) != width:
-        raise RecordingError(f"{len(cells)} columns; expected {width}", where=where)
-    return [_number(cell, f"{where}:{column}") if cell.strip() else np.nan for column, cell in enumerate(cells, 1)]
-
-
-def _number(cell: str, where: str) -> float:
-    try:
-        return float(cell)
-    except ValueError:
-        raise RecordingError(f"'{cell.strip()}' is no number", where=where) from None

@@ -2,7 +2,7 @@
 
 gait2392 has the same names without arms, and counts knees the other way.
 
-Ground: x = world y, y = world z (up), z = world x (`markers`); pelvis_tilt and pelvis_list are turns
+Ground: x = world y, y = world z (up), z = world x (`opensim_axes`); pelvis_tilt and pelvis_list are turns
 about the ground's own z and x, so they read as such for a person who faces the ground's x. Segments: x forward,
 y up, z right. At rest the segment of a limb has y along the limb and z across the body (at an arm that is bent at
 rest, along its hinge), so 0 is a straight, hanging limb. Every joint is the sequence z, x, y; signs are mirrored
@@ -28,10 +28,10 @@ import numpy as np
 from mocapflow.assets import Body
 from mocapflow.data import PoseBatch
 from mocapflow.geometry import angles, kinematics
-from mocapflow.io.motion import markers
+from mocapflow.io.motion.opensim_axes import opensim_from_world
 from mocapflow.records import F64
 
-OPENSIM_FROM_WORLD = markers.opensim_from_world(np.eye(3)).T
+OPENSIM_FROM_WORLD = opensim_from_world(np.eye(3)).T
 LEG, ARM = ("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist")
 BENT = np.radians(5.0)  # rad; an arm bent at least this much at rest shows the axis of its hinge
 
@@ -45,7 +45,7 @@ def coordinates(body: Body, root: F64, poses: F64) -> dict[str, F64]:
         poses: (T, D) rad, its angles.
     """
     joints = kinematics.chain_batch(body, PoseBatch(root=root, angles=poses))
-    places = markers.opensim_from_world(kinematics.joint_positions(body, joints))
+    places = opensim_from_world(kinematics.joint_positions(body, joints))
     frames = {
         name: OPENSIM_FROM_WORLD @ joints[:, body.joint(name), :3, :3] @ rest
         for name, rest in rest_frames(body).items()
