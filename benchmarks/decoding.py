@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 
 from mocapflow.assets import Camera
-from mocapflow.io.cameras.calibration import write_cameras
+from mocapflow.io.cameras.pose2sim import write_cameras
 from mocapflow.recordings.recording import open_recording
 
 SIZES = {"640 x 800": (640, 800), "1088 x 1920": (1088, 1920)}

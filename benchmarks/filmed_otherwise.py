@@ -19,7 +19,8 @@ import numpy as np
 
 from mocapflow.assets import Camera
 from mocapflow.geometry.cameras import undistort
-from mocapflow.io.cameras.calibration import read_cameras, write_cameras
+from mocapflow.io.cameras.calibration import read_cameras
+from mocapflow.io.cameras.pose2sim import write_cameras
 from mocapflow.recordings.recording import open_recording
 from mocapflow.records import F64, U8
 

@@ -10,7 +10,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from mocapflow.io.cameras.calibration import read_cameras, write_cameras
+from mocapflow.io.cameras.calibration import read_cameras
+from mocapflow.io.cameras.pose2sim import write_cameras
 
 WHOLE = ("subject", "truth", "init.json")
 BY_CAMERA = {"videos": ".mp4", "background": ".png"}

@@ -13,7 +13,7 @@ from mocapflow_garments.shorts import Shorts
 from mocapflow.geometry import twists
 from mocapflow.geometry.cameras import magnification
 from mocapflow.io.cameras import rigs
-from mocapflow.io.cameras.calibration import write_cameras
+from mocapflow.io.cameras.pose2sim import write_cameras
 from mocapflow.recordings.doctor import examine, examine_timing
 from tests.fixtures.recordings import avi_frames, look_at, ring, write_recording, write_video
 

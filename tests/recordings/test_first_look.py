@@ -10,7 +10,8 @@ import pytest
 from mocapflow_bodies.scanned import Scanned
 
 from mocapflow.help.shipped import shipped
-from mocapflow.io.cameras.calibration import read_cameras, write_cameras
+from mocapflow.io.cameras.calibration import read_cameras
+from mocapflow.io.cameras.pose2sim import write_cameras
 from mocapflow.recordings.first_look import examine_first_frame
 from mocapflow.registry import load_registry
 

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from mocapflow.errors import RecordingError
-from mocapflow.io.cameras.calibration import read_cameras, write_cameras
+from mocapflow.io.cameras.calibration import read_cameras
+from mocapflow.io.cameras.pose2sim import write_cameras
 from mocapflow.io.video import frame_rate
 from mocapflow.io.video.reading import VIDEOS
 from mocapflow.recordings.doctor import examine

@@ -10,7 +10,7 @@ import pytest
 from mocapflow.errors import RecordingError
 from mocapflow.geometry.cameras import centre, project
 from mocapflow.geometry.epipolar import pencil_axes, plane_angles
-from mocapflow.io.cameras.calibration import write_cameras
+from mocapflow.io.cameras.pose2sim import write_cameras
 from mocapflow.io.video.lateness import late_frames, write_late_frames
 from mocapflow.recordings import doctor, paired_views, synchrony
 from mocapflow.recordings.doctor import examine_timing

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
-from mocapflow.io.cameras.calibration import metadata
+from mocapflow.io.cameras.pose2sim import metadata
 from mocapflow.io.json_toml import place
 from mocapflow.io.video.reading import Video
 

@@ -1,36 +1,28 @@
-"""The one video decoder: frames exactly in order, a placeholder with a reason where one is lost.
+"""The one reader of videos: frames exactly in order, a placeholder with a reason where one is lost.
 
 The number of a frame comes from its time stamp, so a frame that the file lacks, or that can't be decoded, leaves
-a gap and does not shift the rest. What is made from a frame that can't be decoded, or over whose damage the decoder
-painted, is lost, too; those of H.264 and MPEG-4 tell that they do. All stamps are read once, without decoding, when a
-video is opened. Decoding always starts at the first frame: seeking lands on the wrong picture in some files, and
-a resumed run must see the same pixels.
+a gap and does not shift the rest. All stamps are read once, without decoding, when a video is opened. Decoding always
+starts at the first frame: seeking lands on the wrong picture in some files, and a resumed run must see the same pixels.
 """
 
 from __future__ import annotations
 
 import os
 import sys
-from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import chain, islice
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mocapflow.errors import RecordingError
 from mocapflow.io.paths import led_nowhere
+from mocapflow.io.video.decoding import judged
 from mocapflow.io.video.images import IMAGES, check_depth, check_numbers, numbered, read_image
-from mocapflow.io.video.packets import HIDDEN, decode, open_stream, packets, picture, read_stamps
-from mocapflow.records import I32, U8, Bool, array, record
-
-if TYPE_CHECKING:
-    from av import VideoFrame, VideoStream
+from mocapflow.io.video.packets import open_stream, picture, read_stamps
+from mocapflow.records import I32, U8, array, record
 
 NO_MORE = (sys.maxsize, None, "")  # what comes after all frames
-DAMAGED, TORN = "the frame is damaged", "the frame is decoded from damaged ones"
 VIDEOS = (".mp4", ".avi", ".mov", ".mkv", ".m4v", ".webm", ".mpg", ".mpeg", ".mts", ".m2ts", ".ts", ".wmv", ".3gp")
 
 
@@ -102,11 +94,11 @@ def read_frames(video: Video, indices: range) -> Iterator[tuple[U8 | None, str]]
 
 def _file_pictures(video: Video, indices: range) -> Iterator[tuple[U8 | None, str]]:
     with open_stream(video.path) as stream:
-        judged = _judged(stream, video)
-        current, frame, flaw = next(judged, NO_MORE)
+        decoded = judged(stream, video.numbers, video.starts)
+        current, frame, flaw = next(decoded, NO_MORE)
         for index in indices:
             while current < index:
-                current, frame, flaw = next(judged, NO_MORE)
+                current, frame, flaw = next(decoded, NO_MORE)
             if frame is None or current > index:
                 yield None, _why_lost(video, index)
             else:
@@ -122,55 +114,6 @@ def _why_lost(video: Video, index: int) -> str:
     if index not in video.numbers:
         return "the frame is missing in the video: its time stamps jump"
     return "the frame can't be decoded"
-
-
-def _judged(stream: VideoStream, video: Video) -> Iterator[tuple[int, VideoFrame, str]]:
-    """Yield the number of each frame, its picture, and what is wrong with it.
-
-    A decoder goes on after a damaged frame with the differences from it, up to the next key frame. That it painted
-    over damage it tells with the picture, so a frame waits for those, shown later, that it may be made from.
-    """
-    damaged = np.zeros(len(video.numbers) + 1, bool)
-    latest = np.maximum.accumulate(video.numbers)
-    waiting: deque[tuple[int, int, VideoFrame]] = deque()
-    for decoded in chain(_numbered(stream, video.numbers, damaged), [None]):
-        while waiting and (decoded is None or latest[waiting[0][1]] <= decoded[0]):
-            number, place, frame = waiting.popleft()
-            since = slice(video.starts[place], place)
-            used = video.starts[since] >= since.start  # what is shown before a key frame is not used after it
-            torn = damaged[since][used].any()
-            yield number, frame, DAMAGED if damaged[place] else TORN if torn else ""
-        if decoded is not None:
-            waiting.append(decoded)
-
-
-def _numbered(stream: VideoStream, numbers: I32, damaged: Bool) -> Iterator[tuple[int, int, VideoFrame]]:
-    """Yield number, packet and picture of each frame as it is decoded, in the order of display; marks damaged packets.
-
-    Some files keep no times of display: their frames, if reordered, are numbered in the order in which they come.
-    """
-    from av.video.frame import PictureType
-
-    timeless, reordered = bool((np.diff(numbers[numbers != HIDDEN]) > 0).all()), False
-    due: list[int] = []  # packets whose pictures are to come
-    for place, packet in enumerate(islice(packets(stream), len(damaged))):
-        if packet is not None:
-            packet.pts = place  # its picture gets it, too
-        frames, whole = decode(packet)
-        damaged[place] |= not whole
-        if whole and place < len(numbers) and numbers[place] != HIDDEN:
-            due.append(place)
-        for frame in frames:
-            own = int(frame.pts or 0)
-            damaged[own] |= frame.is_corrupt
-            reordered |= timeless and frame.pict_type == PictureType.B
-            turn = own
-            if reordered:  # times are those of decoding: each picture takes the first that is due
-                turn = min((each for each in due if each >= own or not frame.key_frame), default=own)
-            number = int(numbers[turn])
-            damaged[[each for each in due if numbers[each] < number]] = True  # passed over without a word
-            due = [each for each in due if numbers[each] > number]
-            yield number, own, frame
 
 
 def _open_folder(path: Path) -> Video:

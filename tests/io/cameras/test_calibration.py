@@ -11,7 +11,8 @@ import pytest
 
 from mocapflow.errors import RecordingError
 from mocapflow.geometry.cameras import centre
-from mocapflow.io.cameras.calibration import calibration_files, find_calibration, metadata, read_cameras, write_cameras
+from mocapflow.io.cameras.calibration import calibration_files, find_calibration, read_cameras
+from mocapflow.io.cameras.pose2sim import metadata, write_cameras
 from tests.fixtures.recordings import ring
 
 ARRAYS = ("size", "intrinsics", "distortion", "camera_from_world")

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from mocapflow.geometry.cameras import distort, project
-from mocapflow.io.cameras.calibration import read_cameras, write_cameras
+from mocapflow.io.cameras.calibration import read_cameras
+from mocapflow.io.cameras.pose2sim import write_cameras
 from tests.fixtures.recordings import ring
 from tests.io.cameras.test_calibration import write_easymocap
 

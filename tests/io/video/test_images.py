@@ -1,10 +1,10 @@
-"""Images as they are read from files, whole and damaged."""
+"""Images as they are read from files, whole and damaged, and numbered by frame."""
 
 import cv2
 import numpy as np
 import pytest
 
-from mocapflow.io.video.images import read_image
+from mocapflow.io.video.images import name_frames, numbered, read_image
 
 PICTURE = np.random.default_rng(1).integers(0, 255, (48, 64, 3), np.uint8)
 
@@ -34,3 +34,14 @@ def test_a_jpeg_may_hold_a_thumbnail_and_go_on_behind_its_end(tmp_path):
 
 def test_no_image_is_none(tmp_path):
     assert read_image(tmp_path / "0.png") is None
+
+
+def test_hidden_files_are_no_images(tmp_path):
+    cv2.imwrite(str(tmp_path / "000001.png"), PICTURE)
+    (tmp_path / "._000001.png").write_bytes(b"what another system keeps beside the file")
+    assert numbered(tmp_path, (".png",)) == {1: tmp_path / "000001.png"}
+
+
+def test_naming_frames():
+    assert name_frames([3]) == "frame 3"
+    assert name_frames(list(range(2, 9))) == "frames 2, 3, 4, 5, 6 and 2 more"

@@ -4,7 +4,6 @@ import os
 import wave
 from dataclasses import replace
 from fractions import Fraction
-from types import SimpleNamespace
 
 import av
 import cv2
@@ -12,11 +11,9 @@ import numpy as np
 import pytest
 
 from mocapflow.errors import RecordingError
-from mocapflow.io.video.frame_numbers import number_frames, unevenness
-from mocapflow.io.video.images import name_frames, numbered
-from mocapflow.io.video.packets import decode, packets
-from mocapflow.io.video.reading import DAMAGED, TORN, count_from_first, open_video, read_frames
-from tests.fixtures.recordings import avi_frames, mp4_frames, number_of, picture, write_reordered, write_video
+from mocapflow.io.video.decoding import DAMAGED
+from mocapflow.io.video.reading import count_from_first, open_video, read_frames
+from tests.fixtures.recordings import avi_frames, number_of, picture, write_reordered, write_video
 
 FRAMES = 20
 
@@ -42,104 +39,6 @@ def test_reading_a_part_gives_the_same_pixels(tmp_path, indices):
     assert len(part) == len(indices)
     for index, image in zip(indices, part, strict=True):
         np.testing.assert_array_equal(image, whole[index])
-
-
-def test_a_damaged_frame_leaves_a_gap(tmp_path):
-    path = write_video(tmp_path / "a.avi", FRAMES, codec="MJPG")
-    content = bytearray(path.read_bytes())
-    offset, length = avi_frames(content)[8]
-    content[offset : offset + length] = bytes(length)
-    path.write_bytes(content)
-    video = open_video(path)
-    rows = list(read_frames(video, range(FRAMES)))
-    assert [i for i, (image, _) in enumerate(rows) if image is None] == [8]
-    assert rows[8] == (None, "the frame can't be decoded")
-    assert [number_of(image) for image, _ in rows if image is not None] == [i for i in range(FRAMES) if i != 8]
-
-
-@pytest.mark.parametrize(("ending", "bad", "key"), [("avi", 18, 28), ("avi", 12, 16), ("mp4", 18, 28), ("mp4", 12, 16)])
-def test_what_is_decoded_from_a_damaged_frame_is_lost_up_to_the_next_key_frame(tmp_path, ending, bad, key):
-    """Key frames are 0, 12, 16 and 28."""
-    path = write_video(tmp_path / f"a.{ending}", 30, codec="XVID" if ending == "avi" else "mp4v")
-    content = bytearray(path.read_bytes())
-    offset, length = (avi_frames if ending == "avi" else mp4_frames)(content)[bad]
-    content[offset : offset + length] = bytes(length)
-    path.write_bytes(content)
-    rows = list(read_frames(open_video(path), range(30)))
-    assert [i for i, (image, _) in enumerate(rows) if image is None] == list(range(bad, key))
-    assert {why for image, why in rows[bad + 1 : key]} == {"the frame is decoded from damaged ones"}
-    assert [number_of(image) for image, _ in rows[key:]] == list(range(key, 30))
-
-
-@pytest.mark.parametrize(
-    ("codec", "bad", "frame", "lost"),
-    [("libx264", 13, 15, range(13, 24)), ("mpeg4", 4, 6, range(4, 12)), ("mpeg4", 11, 10, range(10, 12))],
-)
-def test_what_is_made_from_a_frame_painted_over_is_lost(tmp_path, capfd, codec, bad, frame, lost):
-    """Key frames are 0, 12 and 24. The files have 15 before 13 and 14, and that of MPEG-4 has 12 before 10 and 11.
-
-    A decoder tells that it has painted over 15 when it has shown 13 and 14.
-    """
-    path = write_reordered(tmp_path / "a.mp4", 30, codec)
-    content = bytearray(path.read_bytes())
-    offset, length = mp4_frames(content)[bad]
-    content[offset + 8 : offset + length] = np.random.default_rng(0).bytes(length - 8)
-    path.write_bytes(content)
-    rows = list(read_frames(open_video(path), range(30)))
-    assert [i for i, (image, _) in enumerate(rows) if image is None] == list(lost)
-    assert (rows[frame][1], rows[lost[-1]][1]) == (DAMAGED, TORN)
-    assert all(number_of(image) == i for i, (image, _) in enumerate(rows) if image is not None)
-    assert capfd.readouterr().err == ""  # ffmpeg would tell, too
-
-
-def test_frames_that_the_decoder_passes_over_damage_others(tmp_path):
-    """The file lacks 15, so nothing comes of 13 and 14."""
-    video = open_video(write_reordered(tmp_path / "a.mp4", 30, without=[13]))
-    assert numbers(video) == [*range(13), *[None] * 11, *range(24, 30)]
-    assert video.frame_rate == pytest.approx(25)
-
-
-def test_what_a_decoder_swallows_of_an_avi_shifts_frames_up_to_the_next_key_frame(tmp_path, monkeypatch):
-    """It keeps no times of display, so reordered frames are counted; key frames are 0, 12 and 24."""
-
-    def swallow(packet):
-        frames, whole = decode(packet)
-        return [frame for frame in frames if frame.pts != 3], whole
-
-    video = open_video(write_reordered(tmp_path / "a.avi", 30, "libx264"))
-    monkeypatch.setattr("mocapflow.io.video.reading.decode", swallow)
-    assert numbers(video)[12:] == list(range(12, 30))
-
-
-def test_a_part_that_can_not_be_read_damages_what_follows(tmp_path, monkeypatch):
-    """Key frames are 0 and 12."""
-    path = write_video(tmp_path / "a.mp4", FRAMES)
-
-    def with_hole(stream):
-        for place, packet in enumerate(packets(stream)):
-            yield from (None, packet) if place == 5 else (packet,)
-
-    monkeypatch.setattr("mocapflow.io.video.packets.packets", with_hole)
-    monkeypatch.setattr("mocapflow.io.video.reading.packets", with_hole)
-    assert numbers(open_video(path)) == [*range(5), *[None] * 7, *range(12, FRAMES)]
-
-
-def test_a_frame_that_a_camera_left_out_damages_no_others(tmp_path):
-    video = open_video(write_video(tmp_path / "a.mp4", FRAMES))
-    later = np.arange(FRAMES) + (np.arange(FRAMES) >= 5)
-    video = replace(video, numbers=later.astype(np.int32))
-    assert [index for index, (image, _) in enumerate(read_frames(video, range(FRAMES + 1))) if image is None] == [5]
-
-
-def test_reading_goes_on_after_an_error():
-    def demux(_):
-        yield from parts.pop(0)
-        if parts:
-            raise av.error.OSError(5, "Input/output error")
-
-    parts = [[SimpleNamespace(size=1)], [], [SimpleNamespace(size=2)]]
-    read = packets(SimpleNamespace(container=SimpleNamespace(demux=demux)))
-    assert [packet and packet.size for packet in read] == [1, None, None, 2]
 
 
 def test_packets_with_one_time_are_one_frame(tmp_path):
@@ -282,32 +181,6 @@ def test_a_video_that_may_not_be_read(tmp_path, monkeypatch):
         open_video(path)
 
 
-def test_gaps_in_the_time_stamps_are_lost_frames():
-    period = 1000 / 30
-    stamps = np.delete(np.arange(30) * period, [10, 11, 20])
-    assert number_frames(stamps).tolist() == np.delete(np.arange(30), [10, 11, 20]).tolist()
-    jitter = np.random.default_rng(0).uniform(-0.2, 0.2, 30) * period
-    assert number_frames(np.arange(30) * period + jitter).tolist() == list(range(30))
-    assert number_frames(np.round(np.arange(3000) * period)).tolist() == list(range(3000))  # times in whole ms
-    kept = np.delete(np.arange(300), [40, 41, 90, 200])
-    for rate in (150, 180):  # whole milliseconds, at which the median is far from the period
-        assert number_frames(np.round(kept * 1000 / rate)).tolist() == kept.tolist()
-    late = np.array([0, 1, 2.6, 3, 4.7, 5, 6, 9, 10, 12.6, 13, 14])  # 7, 8 and 11 are lost
-    assert number_frames(late).tolist() == [0, 1, 2, 3, 4, 5, 6, 9, 10, 12, 13, 14]
-    assert number_frames(np.zeros(4)).tolist() == [0, 1, 2, 3]
-    assert number_frames(np.zeros(1)).tolist() == [0]
-    assert number_frames(np.array([0.0, 1, 4])).tolist() == [0, 1, 4]
-    assert number_frames(np.array([0.0, 3, 1, 1, 2])).tolist() == [0, 3, 1, 1, 2]
-
-
-def test_how_uneven_frames_come():
-    times = np.delete(np.arange(60) * 3003, [20, 21])
-    assert unevenness(times, number_frames(times)) < 1e-6
-    slower = np.append(np.arange(40), 40 + 1.25 * np.arange(20))  # as of a phone in the dark
-    assert unevenness(slower, number_frames(slower)) == pytest.approx(2, abs=0.5)
-    assert unevenness(np.zeros(1), np.zeros(1, np.int32)) == unevenness(np.zeros(5), np.zeros(5, np.int32)) == 0
-
-
 def test_frames_of_another_size_are_lost(tmp_path):
     for number in range(4):
         size = (64, 48) if number != 2 else (32, 24)
@@ -355,12 +228,6 @@ def test_twelve_bits_in_sixteen(tmp_path):
     assert numbers(open_video(tmp_path)) == [1]
 
 
-def test_hidden_files_are_no_images(tmp_path):
-    cv2.imwrite(str(tmp_path / "000001.png"), picture(1))
-    (tmp_path / "._000001.png").write_bytes(b"what another system keeps beside the file")
-    assert numbered(tmp_path, (".png",)) == {1: tmp_path / "000001.png"}
-
-
 def test_what_is_no_video(tmp_path):
     (tmp_path / "a.mp4").write_text("hello")
     with wave.open(str(tmp_path / "b.mp4"), "wb") as sound:
@@ -372,11 +239,6 @@ def test_what_is_no_video(tmp_path):
     (tmp_path / "cam01").mkdir()
     with pytest.raises(RecordingError, match=r"no image in this folder can be read\n.*000000\.png"):
         open_video(tmp_path / "cam01")
-
-
-def test_naming_frames():
-    assert name_frames([3]) == "frame 3"
-    assert name_frames(list(range(2, 9))) == "frames 2, 3, 4, 5, 6 and 2 more"
 
 
 def test_folders_of_images_count_from_the_first_that_any_has(tmp_path):
