@@ -110,6 +110,17 @@ def test_no_circle_of_imports():
     TopologicalSorter(uses).prepare()  # raises the circle
 
 
+def test_no_circle_between_the_folders_of_io():
+    uses = {}
+    for path in sources(ROOT / "io"):
+        own = path.relative_to(ROOT / "io").parts[0].removesuffix(".py")
+        names = imported(ast.parse(path.read_text()), types=True)
+        found = {name.split(".")[2] for name in names if name.startswith("mocapflow.io.")}
+        uses.setdefault(own, set()).update(found - {own})
+    assert "reading" not in uses and uses["video"] >= {"cameras", "paths"}
+    TopologicalSorter(uses).prepare()  # raises the circle
+
+
 def test_public_names():
     static = {
         alias.asname: node.module

@@ -8,11 +8,13 @@ import re
 import shutil
 import sys
 from enum import Enum
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from mocapflow import io
 from mocapflow.caching import digests, sources
 from mocapflow.caching.digests import Digests
 from mocapflow.caching.keys import _plain, all_changes, explain, key_of
@@ -255,7 +257,7 @@ def test_code_by_meaning(tmp_path, monkeypatch, old, new, same):
 def test_code_that_a_plugin_imports_counts(tmp_path, monkeypatch):
     def made(value):
         for name, text in {
-            "mocapflow_upper": "from mocapflow_lower import f\nfrom mocapflow.io import cameras",
+            "mocapflow_upper": "from mocapflow_lower import f\nfrom mocapflow.io.cameras import opencv",
             "mocapflow_lower": f"def f():\n    return {value}",
         }.items():
             (tmp_path / name).mkdir(exist_ok=True)
@@ -268,6 +270,15 @@ def test_code_that_a_plugin_imports_counts(tmp_path, monkeypatch):
     monkeypatch.setattr(digests, "LOADED", {})
     monkeypatch.setattr(digests.sources, "meaning", lambda tree: "")  # all else is alike: mocapflow.io counted too
     assert made(1) != before
+
+
+def test_all_of_io_counts_where_a_plugin_imports_one_file_of_it(tmp_path, monkeypatch):
+    (tmp_path / "mocapflow_reader.py").write_text("from mocapflow.io.cameras import opencv")
+    monkeypatch.syspath_prepend(tmp_path)
+    read, source = [], Digests._source
+    monkeypatch.setattr(Digests, "_source", lambda self, path: (read.append(path), source(self, path))[1])
+    Digests().package("mocapflow_reader")
+    assert {*Path(io.__path__[0]).rglob("*.py"), tmp_path / "mocapflow_reader.py"} == set(read)
 
 
 def test_code_that_changes_after_it_was_loaded_makes_no_results(tmp_path, monkeypatch):
