@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
 import sys
 from pathlib import Path
@@ -10,31 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mocapflow_export import layout
-from mocapflow_fitting.keypoint_layouts import LAYOUTS
 
-from mocapflow.geometry.cameras import project
 from mocapflow.help.shipped import shipped
-from mocapflow.io.cameras.calibration import read_cameras
+from tests.fixtures.true_keypoints import write_true_keypoints
 
 SCRIPT = Path(__file__).parents[1] / "benchmarks" / "keypoint_tool.py"
 CLIP = shipped("examples", "data", "shorts_steps")
-CALLED = {"big_toe_l": "toe_l", "big_toe_r": "toe_r", "hip_mid": "pelvis"}  # joints of the truth that have other names
-
-
-def write_true_keypoints(folder: Path) -> None:
-    """Write the true joints of the clip as a detector would that makes no mistakes."""
-    with np.load(CLIP / "truth" / "joints.npz") as truth:
-        places = dict(zip(truth["names"].tolist(), np.moveaxis(truth["positions"].astype(float), 1, 0), strict=True))
-    names = LAYOUTS["halpe_26"]
-    for camera in read_cameras(CLIP):
-        (folder / f"{camera.name}_json").mkdir(parents=True)
-        pixels = {
-            name: project(where, camera) for name in names if (where := places.get(CALLED.get(name, name))) is not None
-        }
-        for frame in range(len(places["hip_l"])):
-            points = [(*pixels[name][frame], 1.0) if name in pixels else (0.0, 0.0, 0.0) for name in names]
-            person = {"pose_keypoints_2d": np.ravel(points).tolist()}
-            (folder / f"{camera.name}_json" / f"{frame:06d}.json").write_text(json.dumps({"people": [person]}))
 
 
 @pytest.mark.long
@@ -43,7 +23,7 @@ def test_true_keypoints_give_the_true_angles(tmp_path: Path) -> None:
 
     Beside them stands a run of a part of the recording, which is compared where it has frames.
     """
-    write_true_keypoints(tmp_path)
+    write_true_keypoints(CLIP, tmp_path)
     header, *rows = (CLIP / "truth" / "angles.csv").read_text().splitlines()
     (tmp_path / "run" / "results").mkdir(parents=True)
     (tmp_path / "run" / layout.ANGLES).write_text("\n".join([header, *rows[20:]]))
