@@ -6,11 +6,13 @@ import os
 import re
 import shutil
 import socket
+import subprocess
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -666,17 +668,88 @@ def test_a_lock_is_as_old_as_the_drive_says_whatever_the_time_is_here(tmp_path, 
     path, lines = tmp_path / "x.lock", []
     path.write_text(json.dumps({"pid": 1, "host": "elsewhere"}))
     monkeypatch.setattr(locks.time, "time", lambda: path.stat().st_mtime + 3600)
-    monkeypatch.setattr(locks.time, "sleep", lambda _: path.unlink())
+    looks = iter((path.exists, path.unlink))
+    monkeypatch.setattr(locks.time, "sleep", lambda _: next(looks)())
     locks.acquire(path, "track-12", lines.append).release()
     assert lines == ["track-12: waiting for process 1 on elsewhere, which is making it"]
+
+
+def test_the_drive_s_time_is_that_of_now_not_of_when_the_locks_were_last_looked_at(tmp_path):
+    path, lines = tmp_path / "x.lock", []
+    path.write_text(json.dumps({"pid": 1, "host": "elsewhere"}))
+    (tmp_path / locks.GUARD).touch()
+    for file in (path, tmp_path / locks.GUARD):
+        os.utime(file, (1, 1))
+    locks.acquire(path, "track-12", lines.append).release()
+    assert lines == ["track-12: taking over from process 1 on elsewhere, which ended without finishing"]
+
+
+def test_a_lock_that_is_taken_over_is_another_file(tmp_path):
+    """That of somebody else may be removed by all who may write to the folder, but not be written."""
+    path = tmp_path / "x.lock"
+    path.write_text(json.dumps({"pid": 2**22 + 1, "host": socket.gethostname()}))
+    os.link(path, tmp_path / "theirs")
+    before = path.read_text()
+    locks.acquire(path, "track-12", print).release()
+    assert (tmp_path / "theirs").read_text() == before
+
+
+def test_of_two_locks_of_one_process_each_knows_its_own(tmp_path):
+    first = locks.acquire(tmp_path / "x.lock", "track-12", print)
+    (tmp_path / "x.lock").unlink()
+    second = locks.acquire(tmp_path / "x.lock", "track-12", print)
+    with pytest.raises(StoreError, match="another run took over track-12"):
+        first.check()
+    first.release()
+    second.check()
+    second.release()
+
+
+def test_a_lock_says_whose_it_is(tmp_path, monkeypatch):
+    lock = locks.acquire(tmp_path / "x.lock", "track-12", print)
+    holder = json.loads((tmp_path / "x.lock").read_text())
+    lock.release()
+    assert locks.gone(holder) is False
+    assert locks.gone(holder | {"pid": "1"}) is None
+    monkeypatch.setattr(locks, "_space", lambda: "pid:[1]")  # this process is in a container, its number another's
+    assert locks.gone(holder) is None
+
+
+def test_a_process_is_told_by_its_start_from_others_of_its_number(monkeypatch):
+    times = " ".join(map(str, range(4, 53)))  # in the place of each value its number in proc(5)
+    monkeypatch.setattr(Path, "read_text", lambda self: f"7 (a) b) S {times}")
+    assert locks._born(7) == "22"
+
+
+def test_who_has_ended_but_is_remembered_by_its_parent_is_gone():
+    with subprocess.Popen(["cat"], stdin=subprocess.PIPE) as child:
+        there = {**locks.myself(), "pid": child.pid, "born": locks._born(child.pid)}
+        assert locks.gone(there) is False
+        child.stdin.close()
+        os.waitid(os.P_PID, child.pid, os.WEXITED | os.WNOWAIT)  # it stays, as a zombie
+        assert locks.gone(there) is True
+
+
+def test_a_process_of_somebody_else_is_alive(monkeypatch):
+    """Of which some machines don't tell either when it has started."""
+
+    def refuse(*_, **__):
+        raise PermissionError
+
+    holder = locks.myself()
+    monkeypatch.setattr(os, "kill", refuse)
+    assert locks.gone(holder) is False
+    monkeypatch.setattr(Path, "read_text", refuse)
+    assert locks.gone(holder) is False
 
 
 def test_a_lock_that_was_taken_over_is_noticed_before_the_next_write(tmp_path):
     lock = locks.acquire(tmp_path / "x.lock", "track-12", print)
     lock.check()
-    (tmp_path / "x.lock").write_text("another")
-    with pytest.raises(StoreError, match="another run took over track-12"):
-        lock.check()
+    for change in ((tmp_path / "x.lock").unlink, lambda: (tmp_path / "x.lock").write_text("another")):
+        change()
+        with pytest.raises(StoreError, match="another run took over track-12"):
+            lock.check()
     lock.release()
     assert (tmp_path / "x.lock").exists()  # it is not ours
 
@@ -697,6 +770,32 @@ def test_the_heartbeat_keeps_a_lock_fresh(tmp_path, monkeypatch):
     assert (tmp_path / "x.lock").stat().st_mtime > 2
     lock.release()
     assert not (tmp_path / "x.lock").exists()
+    assert not [thread for thread in threading.enumerate() if "x.lock" in thread.name]
+
+
+def beat(lock):
+    """Let the heart of a lock that is released beat once."""
+    waits = iter((False, True))
+    lock._done = SimpleNamespace(wait=lambda _: next(waits))
+    lock._beat()
+
+
+def test_the_heart_of_who_has_lost_a_lock_does_not_beat_for_who_has_it(tmp_path, monkeypatch):
+    path = tmp_path / "x.lock"
+    lock = locks.acquire(path, "track-12", print)
+    said = path.read_text()
+    lock.release()
+    for text, beats in (("another", False), (said, True)):
+        path.write_text(text)
+        os.utime(path, (1, 1))
+        beat(lock)
+        assert (path.stat().st_mtime > 1) is beats
+
+    def gone(path):
+        raise FileNotFoundError
+
+    monkeypatch.setattr(os, "utime", gone)
+    beat(lock)  # its thread does not end: `check` tells
 
 
 def test_a_failed_run_gives_its_lock_back(tmp_path, path, monkeypatch):
