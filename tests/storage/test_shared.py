@@ -13,10 +13,12 @@ from mocapflow.commands.invocation import placed
 from mocapflow.errors import ComponentFailed, MocapflowError, StoreError
 from mocapflow.running.runner import plan, run
 from mocapflow.storage.copies import Copies
+from mocapflow.storage.rows import group_meta, write_json
 from mocapflow.storage.shared import open_store
 from mocapflow.storage.store import Store
 from tests.fixtures.stores import actions, load, run_tiny, same, the_track, write_pipeline, write_recording
 
+KEY = "0123456789abcdef"
 MADE = {"background": "hit", "start": "hit", "track": "hit", "smooth": "hit", "export": "run"}
 
 
@@ -164,7 +166,7 @@ def test_a_copy_that_breaks_off_leaves_what_is_here(tmp_path, path, url, monkeyp
 
 
 def test_what_a_run_had_fetched_when_it_was_killed_can_be_pruned(tmp_path, url, monkeypatch):
-    key = "0123456789abcdef"
+    key = KEY
     there, here = Store(tmp_path / "one"), open_store(tmp_path / "two", url)
     for store in (there, here):
         store.create()
@@ -205,6 +207,73 @@ def test_a_copy_that_is_dropped_meanwhile_leaves_what_is_here(tmp_path, path, ur
         _, lines = shared(path, tmp_path / "two", url)
     assert "track: going on after 5 frames" in lines
     assert same(the_track(tmp_path / "one"), the_track(tmp_path / "two"))
+
+
+def begun(folder, frames=0, complete=True):
+    """The only artifact of a store: of so many frames, as far as its attributes tell."""
+    store = Store(folder)
+    store.create()
+    made = store.begin("track", KEY, {})
+    (made.path / "angles").mkdir()
+    (made.path / "angles" / "c.0").write_bytes(b"some")
+    write_json(made.path / "zarr.json", group_meta({**made.attributes, "frames_done": frames, "complete": complete}))
+    return store.find(KEY)
+
+
+@everywhere
+def test_a_copy_that_is_dropped_while_it_is_fetched_is_not_whole(tmp_path, url, monkeypatch):
+    copies, files = Copies(url), type(fsspec.core.url_to_fs(url)[0])
+    copies.send(begun(tmp_path / "one").path)
+    copy, get = copies.find(KEY), files.get
+
+    def late(self, *args, **options):
+        copies.remove(KEY)
+        get(self, *args, **options)
+
+    monkeypatch.setattr(files, "get", late)
+    copies.fetch(copy, tmp_path / "part")
+    assert not (tmp_path / "part" / "zarr.json").exists()
+
+
+@everywhere
+def test_what_is_half_removed_is_no_copy(tmp_path, url, monkeypatch):
+    copies, files = Copies(url), type(fsspec.core.url_to_fs(url)[0])
+    copies.send(begun(tmp_path / "one").path)
+    rm = files.rm
+
+    def cut(self, path, recursive=False, **options):
+        if recursive:
+            raise OSError("the line is cut")
+        rm(self, path, **options)
+
+    monkeypatch.setattr(files, "rm", cut)
+    with pytest.raises(StoreError, match="the line is cut"):
+        copies.remove(KEY)
+    assert copies.find(KEY) is None
+
+
+@everywhere
+def test_what_is_half_sent_is_no_copy(tmp_path, url, monkeypatch):
+    copies, files = Copies(url), type(fsspec.core.url_to_fs(url)[0])
+    put = files.put
+
+    def cut(self, *args, **options):
+        put(self, *args, **options)
+        raise OSError("the line is cut")
+
+    monkeypatch.setattr(files, "put", cut)
+    with pytest.raises(StoreError, match="the line is cut"):
+        copies.send(begun(tmp_path / "one").path)
+    assert copies.find(KEY) is None
+
+
+def test_of_what_is_here_and_there_the_further_counts(tmp_path, url):
+    here, there = open_store(tmp_path / "two" / "store.zarr", url), begun(tmp_path / "one", frames=8)
+    begun(here.path, frames=5)
+    Copies(url).send(there.path)
+    assert here.find(KEY).frames == 8
+    begun(here.path, frames=9, complete=False)
+    assert here.find(KEY).frames == 9
 
 
 @pytest.mark.long
