@@ -369,6 +369,16 @@ def test_damaged_arrays_of_a_track_are_written_anew_from_its_frames(tmp_path, ra
     assert same(whole, the_track(tmp_path))
 
 
+def test_a_track_whose_arrays_are_damaged_goes_on_from_its_frames(tmp_path, path, whole):
+    run_tiny(path, tmp_path, frames=5)
+    (group,) = (tmp_path / "store.zarr").glob("track-*")
+    damage_array_json(group)
+    _, lines = run_tiny(path, tmp_path)
+    assert any(line.startswith(f"warning: {group.name} is damaged and written anew from its frames") for line in lines)
+    assert [line for line in lines if "going on after" in line][-1] == "track: going on after 12 frames"
+    assert same(the_track(whole), the_track(tmp_path))
+
+
 @pytest.mark.parametrize("name", ["angles", "doubted"])  # doubted: zeros, which zarr by itself does not write
 def test_a_chunk_that_is_missing_is_no_zeros(tmp_path, ran, name):
     made = json.loads((tmp_path / "out" / "results.json").read_text())["angles"]
