@@ -478,10 +478,39 @@ def test_files_in_linked_folders_count(tmp_path):
     assert Digests().file(trial) != first
 
 
+def test_names_of_files_in_a_folder_count(tmp_path):
+    folder = tmp_path / "clip"
+    folder.mkdir()
+    (folder / "000000.png").write_text("one")
+    first = Digests().file(folder)
+    (folder / "000000.png").rename(folder / "000001.png")
+    assert Digests().file(folder) != first
+
+
+def test_what_was_read_must_not_change(tmp_path):
+    file, folder, kept = tmp_path / "a.txt", tmp_path / "clip", Digests()
+    folder.mkdir()
+    for path in (file, folder / "000000.png"):
+        path.write_text("one")
+    kept.file(file), kept.file(folder)
+    os.utime(file, ns=(1, 1))
+    os.utime(folder, ns=(1, 1))
+    kept.check_inputs()
+    (folder / "000001.png").write_text("one")
+    with pytest.raises(RecordingError, match="clip  this has changed since the run began"):
+        kept.check_inputs()
+    file.write_text("two")
+    with pytest.raises(RecordingError, match="a.txt  this has changed since the run began"):
+        kept.check_inputs()
+
+
 def test_arrays_count_by_dtype_shape_and_content():
     values = np.arange(6.0)
     assert digests.digest_array(values) == digests.digest_array(values.copy())
     assert len({digests.digest_array(v) for v in (values, values.reshape(2, 3), values.astype("f4"), values + 1)}) == 4
+    assert digests.digest_array(np.zeros(2)) != digests.digest_array(np.zeros(2, int))  # the same bytes
+    table = values.reshape(2, 3)
+    assert digests.digest_array(np.asfortranarray(table)) == digests.digest_array(table)  # however it lies in memory
 
 
 def test_code_that_has_not_changed_is_read_once(tmp_path, monkeypatch):
@@ -493,6 +522,28 @@ def test_code_that_has_not_changed_is_read_once(tmp_path, monkeypatch):
     first.save()
     monkeypatch.setattr(digests.sources, "meaning", lambda tree: pytest.fail("read again"))
     assert Digests(tmp_path / "memory.json").package("mocapflow_upper") == code
+    (tmp_path / "sources.py").write_text("")
+    for change in ((digests, "PYTHON", " 3.99"), (digests.sources, "__file__", str(tmp_path / "sources.py"))):
+        with monkeypatch.context() as patch, pytest.raises(pytest.fail.Exception, match="read again"):
+            patch.setattr(*change)  # who read it then may have found something else
+            Digests(tmp_path / "memory.json").package("mocapflow_upper")
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "3"])
+def test_a_damaged_memory_is_forgotten(tmp_path, text):
+    (tmp_path / "memory.json").write_text(text)
+    (tmp_path / "a.txt").write_text("one")
+    kept = Digests(tmp_path / "memory.json")
+    assert kept.file(tmp_path / "a.txt") == Digests().file(tmp_path / "a.txt")
+    kept.save()
+    assert json.loads((tmp_path / "memory.json").read_text())
+
+
+def test_digests_that_can_not_be_kept_are_computed_again(tmp_path):
+    (tmp_path / "a.txt").write_text("one")
+    kept = Digests(tmp_path / "a.txt" / "memory.json")
+    kept.file(tmp_path / "a.txt")
+    kept.save()
 
 
 def test_a_causal_input_of_a_track_need_not_read_the_recording():

@@ -25,7 +25,7 @@ from mocapflow.errors import ComponentFailed, MocapflowError, ShapeError, StoreE
 from mocapflow.io.atomic import PART
 from mocapflow.records import F64, record
 from mocapflow.running.execution import Execution
-from mocapflow.series import Series
+from mocapflow.series import BLOCK, Series, Wide
 from mocapflow.storage import locks, rows
 from mocapflow.storage.artifacts import remove
 from mocapflow.storage.growing import SEEN
@@ -84,6 +84,14 @@ class Curve:
     """A record with a field called as the store calls the array of a group."""
 
     values: "F64" = records.array("T", unit="rad")
+
+
+@record
+class Long:
+    """A record of more rows than a chunk has: `few` are read at once, `many` when they are asked for."""
+
+    few: "F64" = records.array("T", unit="rad")
+    many: "Wide" = records.array("T", 2, unit="rad")
 
 
 @dataclass
@@ -288,6 +296,17 @@ def test_an_unfinished_result_is_none(store):
     assert len(store.artifacts()) == 1
 
 
+def test_what_is_compared_with_is_the_newest_of_the_same_stage(store):
+    for digit, label, created in (("1", "some", "3"), ("2", "some", "1"), ("3", "other", "4"), ("4", "some", "5")):
+        made = put(store, VALUES["start"], key=digit * 32).path
+        meta = rows.read_json(made / "zarr.json")
+        rows.write_json(made / "zarr.json", meta | {"attributes": meta["attributes"] | {"created": created}})
+        made.rename(made.with_name(f"{label}-{digit * 12}"))
+    assert store.nearest("some", RECIPE, but="4" * 32).key == "1" * 32
+    assert store.nearest("gone", RECIPE, but="4" * 32).key == "3" * 32
+    assert store.nearest("some", {"component": {"name": "another"}}, but="") is None
+
+
 def test_a_folder_with_other_things_becomes_no_store(tmp_path):
     empty, papers = tmp_path / "empty", tmp_path / "papers"
     for folder, name in ((empty, ".hidden"), (papers, "letter.txt")):
@@ -425,6 +444,57 @@ def test_what_is_wide_stays_in_the_store_and_is_missed_when_it_is_removed(tmp_pa
     remove(found.path)
     with pytest.raises(Corrupted, match="cloth of .* can't be read back"):
         other.cloth[0]
+
+
+@pytest.fixture
+def long_record(store):
+    few = np.arange(2.5 * BLOCK)
+    many = np.outer(few, [1, -1])
+    return put(store, Long(few=few, many=Series(many.shape, lambda numbers: many[numbers])))
+
+
+@pytest.mark.parametrize("wanted", [None, 3, BLOCK, BLOCK + 1])
+def test_what_is_longer_than_a_chunk_comes_back_block_by_block(store, long_record, wanted):
+    made, few = store.load(long_record, wanted), np.arange(2.5 * BLOCK)[:wanted]
+    np.testing.assert_array_equal(made.few, few)
+    np.testing.assert_array_equal(made.many[:], np.outer(few, [1, -1]))
+    mixed = np.arange(len(few))[::-2]
+    np.testing.assert_array_equal(made.many[mixed], np.outer(few[mixed], [1, -1]))
+
+
+@pytest.mark.parametrize("name", ["few/c/2", "many/c/2/0"])
+def test_a_chunk_that_is_missing_at_the_end_is_damage_for_who_reads_so_far(store, long_record, name):
+    (long_record.path / name).unlink()
+    assert len(store.load(long_record, 2 * BLOCK).few) == 2 * BLOCK
+    for wanted in (2 * BLOCK + 1, None):
+        with pytest.raises(Corrupted, match=f"chunk 2 of {name.partition('/')[0]} is missing"):
+            store.load(long_record, wanted)
+
+
+@pytest.mark.parametrize("name", ["few", "many"])
+def test_a_chunk_that_is_removed_while_it_is_read_is_no_zeros(store, long_record, monkeypatch, name):
+    read = zarr.Array.__getitem__
+
+    def removed(self, which):
+        shutil.rmtree(long_record.path / name / "c")
+        monkeypatch.setattr(zarr.Array, "__getitem__", read)
+        return read(self, which)
+
+    def when_it_is_its_turn(self, which):
+        return removed(self, which) if self.path == name else read(self, which)
+
+    monkeypatch.setattr(zarr.Array, "__getitem__", when_it_is_its_turn)
+    with pytest.raises(Corrupted, match=f"chunk 0 of {name} is missing"):
+        store.load(long_record)
+
+
+def test_fewer_rows_than_there_should_be_are_damage(store, long_record):
+    with pytest.raises(Corrupted, match="few has 160 rows of 161"):
+        store.load(long_record, 161)
+    many = long_record.path / "many" / "zarr.json"
+    rows.write_json(many, rows.read_json(many) | {"shape": [159, 2]})
+    with pytest.raises(Corrupted, match="many has 159 rows of 160"):
+        store.load(long_record, 160)
 
 
 def cut_back(group, frames):
