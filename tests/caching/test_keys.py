@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import sys
+from dataclasses import fields, replace
 from enum import Enum
 from types import SimpleNamespace
 
@@ -18,6 +19,7 @@ from mocapflow.caching.digests import Digests
 from mocapflow.caching.keys import _plain, all_changes, explain, key_of
 from mocapflow.data import Start
 from mocapflow.errors import PluginError, RecordingError
+from mocapflow.recordings.recording import open_recording
 from mocapflow.running import recipes
 from mocapflow.running.recipes import steps_of
 from tests.fixtures.stores import PLUGIN, STAGES, load, write_pipeline, write_recording
@@ -183,6 +185,33 @@ def test_content_of_files(tmp_path, clip, name, expected):
     assert bool(after) == bool(expected)
 
 
+def test_all_of_a_camera_counts(clip):
+    camera = open_recording(clip).cameras[0]
+    changes = {
+        "size": camera.size + 1, "intrinsics": 2 * camera.intrinsics, "distortion": camera.distortion + 0.1,
+        "camera_from_world": np.diag([1.0, -1.0, -1.0, 1.0]) @ camera.camera_from_world, "fisheye": True,
+    }  # fmt: skip
+    cameras = [camera, *(replace(camera, **{name: value}) for name, value in changes.items())]
+    assert len({key_of({"camera": recipes._camera(each)}) for each in cameras}) == len(cameras)
+    assert {field.name for field in fields(camera)} == {"name", *changes}
+
+
+def test_all_files_of_a_component_count_by_where_they_lie_in_the_recording(tmp_path, clip):
+    paths = [clip / "a" / "x.json", clip / "b" / "x.json", tmp_path / "c" / "x.json", tmp_path / "d" / "x.json"]
+    for path in paths:
+        path.parent.mkdir()
+        path.write_text(path.parent.name)
+    component = SimpleNamespace(inputs=lambda folder: [*paths, clip / "none.json"])
+    found = recipes._files(component, clip, SHARED)
+    assert {name: len(digests) for name, digests in found.items()} == {"a/x.json": 1, "b/x.json": 1, "x.json": 2}
+
+
+def test_a_join_depends_on_all_its_parts(tmp_path, clip):
+    starts = (f"parts.start={{use: tiny_start, angle_rad: {angle}}}" for angle in (0.0, 0.5))
+    before, after = (keys(tmp_path, clip, "parts.count=2", "parts.overlap=1", start) for start in starts)
+    assert changed(before, after) == {"start_2", "track_2", "track", "smooth", "export"}
+
+
 @pytest.mark.parametrize("trial", ["auto", "static", "recording"])
 def test_the_standing_trial_counts_for_who_looks_at_it(tmp_path, clip, trial):
     stages = STAGES | {"late": {"use": "fit_subject", "trial": trial}}
@@ -286,6 +315,9 @@ def test_code_that_changes_after_it_was_loaded_makes_no_results(tmp_path, monkey
     importlib.invalidate_caches()
     assert importlib.reload(module).f(1) == 3
     assert Digests().package("mocapflow_edited") != before
+    file.write_text(CODE.replace("x + 1", "x + 3"))
+    with pytest.raises(PluginError, match="this code has changed since it was loaded"):
+        Digests().package("mocapflow_edited")
     for name in ("mocapflow_edited.inner", "mocapflow_edited"):
         del sys.modules[name]
 
@@ -301,6 +333,17 @@ def test_modules_of_an_author_count_however_they_are_called(tmp_path, monkeypatc
         found.append(Digests().package("mocapflow_upper"))
     assert found[0] == found[1] != found[2]
     assert not sources.counts("numpy.linalg") and not sources.counts("json")
+
+
+def test_a_module_counts_whose_name_begins_that_of_another(tmp_path, monkeypatch):
+    for name, text in {"mocapflow_upper": "import my_helpers", "my_helpers": "import my_help"}.items():
+        (tmp_path / f"{name}.py").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    found = []
+    for value in (1, 2):
+        (tmp_path / "my_help.py").write_text(f"X = {value}")
+        found.append(Digests().package("mocapflow_upper"))
+    assert found[0] != found[1]
 
 
 @pytest.mark.parametrize(
