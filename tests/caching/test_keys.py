@@ -9,6 +9,7 @@ import shutil
 import sys
 from dataclasses import fields, replace
 from enum import Enum
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -333,6 +334,28 @@ def test_modules_of_an_author_count_however_they_are_called(tmp_path, monkeypatc
         found.append(Digests().package("mocapflow_upper"))
     assert found[0] == found[1] != found[2]
     assert not sources.counts("numpy.linalg") and not sources.counts("json")
+
+
+def test_of_what_is_installed_plugins_count(tmp_path, monkeypatch):
+    for place, name in [
+        ("site-packages", "mocapflow_installed"), ("site-packages", "installed"), ("site-packages", "open"),
+        ("mine", "open"),
+    ]:  # fmt: skip
+        (tmp_path / place / name).mkdir(parents=True)
+        (tmp_path / place / name / "flat.py").write_text("")
+        monkeypatch.syspath_prepend(tmp_path / place)
+    assert [sources.counts(name) for name in ("mocapflow_installed", "installed", "open")] == [True, False, True]
+    assert sources.counts("mocapflow.io.images") and not sources.counts("mocapflow.iodine")
+
+
+def test_files_of_a_folder_count_in_one_order_without_what_file_browsers_leave(tmp_path, monkeypatch):
+    for name in ("a.png", "b.png", "c.png"):
+        (tmp_path / name).write_text(name)
+    first, real = Digests().file(tmp_path), Path.iterdir
+    (tmp_path / "Thumbs.db").write_text("")
+    for turned in (sorted, lambda paths: sorted(paths, reverse=True)):
+        monkeypatch.setattr(Path, "iterdir", lambda self, turned=turned: iter(turned(real(self))))
+        assert Digests().file(tmp_path) == first
 
 
 def test_a_module_counts_whose_name_begins_that_of_another(tmp_path, monkeypatch):
