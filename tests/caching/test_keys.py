@@ -502,12 +502,21 @@ def test_explanations_name_the_change():
     assert explain(before, after) == "; ".join(told[:4]) + " and 6 more"
 
 
-def test_what_a_stage_is_made_of_does_not_hang_on_code(tmp_path, clip, monkeypatch):
-    pipeline = load(write_pipeline(tmp_path, clip))
+@pytest.mark.parametrize("of", ["format", "core", "components", "reader"])
+def test_all_code_is_in_a_key_and_none_in_what_a_stage_is_made_of(tmp_path, clip, monkeypatch, of):
+    pipeline, package = load(write_pipeline(tmp_path, clip)), Digests.package
     before = steps_of(pipeline, SHARED)
-    monkeypatch.setattr(recipes, "FORMAT", 99)
-    monkeypatch.setattr(Digests, "core", lambda self: f"{digests.MARK}1 code")
-    monkeypatch.setattr(Digests, "package", lambda self, module: f"{digests.MARK}2 code")
+    if of == "format":
+        monkeypatch.setattr(recipes, "FORMAT", 99)
+    elif of == "core":
+        monkeypatch.setattr(Digests, "core", lambda self: f"{digests.MARK}1 code")
+    else:
+
+        def other(self, module):
+            edited = (module == "mocapflow.recordings.recording") == (of == "reader")
+            return f"{digests.MARK}2 code" if edited else package(self, module)
+
+        monkeypatch.setattr(Digests, "package", other)
     after = steps_of(pipeline, SHARED)
     assert [step.content for step in after] == [step.content for step in before]
     assert not {step.key for step in after} & {step.key for step in before}
