@@ -130,6 +130,14 @@ def test_start_and_step_are_in_the_key(tmp_path, clip):
         assert changed(before, after) == expected
 
 
+def test_frames_that_a_stage_changes_as_they_are_read_count_as_frames_do(tmp_path, clip):
+    path = write_pipeline(tmp_path, clip, stages={"corrupt": {"use": "corrupt", "noise": 0.5}, **STAGES}, frames={})
+    before, after = (
+        {step.label: step.key for step in steps_of(load(path, *change), SHARED)} for change in ((), ("frames.start=1",))
+    )
+    assert changed(before, after) == {"start", "track", "smooth", "export"}
+
+
 def test_names_and_order_of_stages_and_files_do_not_count(tmp_path, clip):
     before = keys(tmp_path, clip)
     renamed = {"room": "tiny_background", "first": "tiny_start", "loop": STAGES["track"], "smooth": "tiny_smooth"}
