@@ -530,6 +530,13 @@ def test_all_code_is_in_a_key_and_none_in_what_a_stage_is_made_of(tmp_path, clip
     assert not {step.key for step in after} & {step.key for step in before}
 
 
+def test_what_a_stage_reads_is_part_of_what_it_is_made_of(tmp_path, clip):
+    one, other = ({"use": "tiny_start", "angle_rad": angle} for angle in (0.0, 0.5))
+    path = write_pipeline(tmp_path, clip, stages={"one": one, "other": other, "track": STAGES["track"]})
+    tracks = [steps_of(load(path, f"stages.track.from={{start: {name}}}"), SHARED)[-1] for name in ("one", "other")]
+    assert tracks[0].content != tracks[1].content
+
+
 def test_names_in_digests_are_for_people_only():
     assert key_of({"file": "blake2b:12 body.obj"}) == key_of({"file": "blake2b:12 other.obj"})
     assert key_of({"file": "blake2b:12 body.obj"}) != key_of({"file": "blake2b:13 body.obj"})

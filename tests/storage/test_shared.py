@@ -1,6 +1,7 @@
 """A store shared at a URL: fetched when somebody else has made it, sent when it is done, whole or not at all."""
 
 import json
+import os
 from pathlib import Path
 
 import fsspec
@@ -274,6 +275,74 @@ def test_of_what_is_here_and_there_the_further_counts(tmp_path, url):
     assert here.find(KEY).frames == 8
     begun(here.path, frames=9, complete=False)
     assert here.find(KEY).frames == 9
+
+
+def test_what_is_done_is_sent_whatever_ends_the_run(tmp_path, url, monkeypatch):
+    here, lines = open_store(tmp_path / "one", url), []
+
+    def stopped(frames):
+        with pytest.raises(KeyboardInterrupt), here.writer(KEY, "track", lines.append):
+            begun(here.path, frames=frames, complete=False)
+            raise KeyboardInterrupt
+
+    def broken(self, path):
+        raise StoreError("the line is cut")
+
+    here.create()
+    stopped(frames=0)
+    assert Copies(url).find(KEY) is None
+    stopped(frames=3)
+    assert Copies(url).find(KEY).attributes["frames_done"] == 3
+    monkeypatch.setattr(Copies, "send", broken)
+    stopped(frames=4)
+    assert lines == ["warning: the line is cut"]
+
+
+def test_what_is_fetched_is_on_the_drive_and_nothing_beside_it(tmp_path, url, monkeypatch):
+    synced, here = set(), open_store(tmp_path / "two", url)
+    Copies(url).send(begun(tmp_path / "one", frames=3).path)
+    here.create()
+    left = here.state / f"damaged-track-{KEY[:12]}"  # by a run that was killed
+    left.mkdir()
+    (left / "older").write_text("")
+    monkeypatch.setattr(os, "fsync", lambda number: synced.add(os.fstat(number).st_ino))
+    with here.writer(KEY, "track", print):
+        made = here.find(KEY).path
+    files = {file.relative_to(made).as_posix(): file.stat().st_ino for file in made.rglob("*") if file.is_file()}
+    assert set(files) == {"zarr.json", "angles/c.0"} and set(files.values()) <= synced
+
+
+def test_what_others_send_or_remove_meanwhile_is_no_error(tmp_path, url, monkeypatch):
+    copies, made, (files, root) = Copies(url), begun(tmp_path / "one"), fsspec.core.url_to_fs(url)
+    listed, ls = {}, type(files).ls
+    monkeypatch.setattr(type(files), "ls", lambda self, path, **how: listed.setdefault(path, ls(self, path, **how)))
+    monkeypatch.setattr(type(files), "invalidate_cache", lambda self, path=None: listed.clear())
+    copies.send(made.path)
+    name = copies.find(KEY).name
+    for text in (b"{", b"{}", b"[]"):
+        files.pipe_file(f"{root}/{name}/zarr.json", text)
+        assert copies.find(KEY) is None
+    copies.send(made.path)
+    gone = copies.find(KEY)
+    copies.remove(KEY)
+    copies._drop(gone)
+
+
+def test_of_equal_copies_all_keep_the_same(tmp_path, url, monkeypatch):
+    made = begun(tmp_path / "one")
+    with monkeypatch.context() as patch:
+        patch.setattr(Copies, "_drop", lambda self, copy: None)  # the other has not looked yet
+        Copies(url).send(made.path)
+        Copies(url).send(made.path)
+    assert len(copies(url)) == 2
+    files = type(fsspec.core.url_to_fs(url)[0])
+    ls, found = files.ls, []
+    for reverse in (False, True):
+        monkeypatch.setattr(
+            files, "ls", lambda *args, reverse=reverse, **how: sorted(ls(*args, **how), reverse=reverse)
+        )
+        found.append(Copies(url).find(KEY).name)
+    assert found[0] == found[1]
 
 
 @pytest.mark.long
