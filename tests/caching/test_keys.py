@@ -150,7 +150,7 @@ def test_names_and_order_of_stages_and_files_do_not_count(tmp_path, clip):
 
 def test_an_added_stage_changes_what_reads_it(tmp_path, clip):
     before = keys(tmp_path, clip)
-    stages = {"start": "tiny_start", "grow": "tiny_grow", "track": STAGES["track"], "background": "tiny_background"}
+    stages = {"background": "tiny_background", "start": "tiny_start", "grow": "tiny_grow", "track": STAGES["track"]}
     after = keys(tmp_path, clip, stages=stages)
     assert after["start"] == before["start"]  # it comes before the other body
     assert after["track"] != before["track"]
@@ -160,7 +160,7 @@ def test_an_added_stage_changes_what_reads_it(tmp_path, clip):
 
 def test_cameras_made_by_a_stage_change_what_comes_after_it(tmp_path, clip):
     before = keys(tmp_path, clip)
-    stages = {"start": "tiny_start", "align": "tiny_align", "track": STAGES["track"], "background": "tiny_background"}
+    stages = {"background": "tiny_background", "start": "tiny_start", "align": "tiny_align", "track": STAGES["track"]}
     after = keys(tmp_path, clip, stages=stages)
     assert after["start"] == before["start"]  # it comes before the other cameras
     assert after["track"] != before["track"]
