@@ -207,6 +207,12 @@ def test_all_of_a_camera_counts(clip):
     assert {field.name for field in fields(camera)} == {"name", *changes}
 
 
+def test_cameras_count_for_who_looks_at_no_frame(tmp_path, clip):
+    before = keys(tmp_path, clip, stages={"grow": "tiny_grow"})
+    (clip / "cameras.toml").write_text((clip / "cameras.toml").read_text().replace("20.0", "21.0"))
+    assert changed(before, keys(tmp_path, clip, stages={"grow": "tiny_grow"})) == {"grow"}
+
+
 def test_all_files_of_a_component_count_by_where_they_lie_in_the_recording(tmp_path, clip):
     paths = [clip / "a" / "x.json", clip / "b" / "x.json", tmp_path / "c" / "x.json", tmp_path / "d" / "x.json"]
     for path in paths:
