@@ -130,6 +130,16 @@ def test_start_and_step_are_in_the_key(tmp_path, clip):
         assert changed(before, after) == expected
 
 
+def test_which_frames_are_read_is_in_a_recipe():
+    def read(*frames, chain=False, scale=1.0):
+        return recipes._frames(SimpleNamespace(indices=range(*frames)), SimpleNamespace(scale=scale), chain)
+
+    assert all(read(0, 9) != other for other in (read(1, 9), read(0, 8), read(0, 9, 2), read(0, 9, scale=0.5)))
+    assert read(0, 1) == read(0, 1, 2)
+    chain = read(0, 9, chain=True)
+    assert chain == read(0, 8, chain=True) and chain not in (read(1, 9, chain=True), read(0, 9, 2, chain=True))
+
+
 def test_frames_that_a_stage_changes_as_they_are_read_count_as_frames_do(tmp_path, clip):
     path = write_pipeline(tmp_path, clip, stages={"corrupt": {"use": "corrupt", "noise": 0.5}, **STAGES}, frames={})
     before, after = (
