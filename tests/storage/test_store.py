@@ -578,7 +578,7 @@ def test_a_frame_is_on_the_drive_before_it_counts(tmp_path, path, monkeypatch, u
         return replace(self, target)
 
     monkeypatch.setattr(Path, "replace", counted)
-    run_tiny(path, tmp_path)
+    run_tiny(path, tmp_path, "stages.track.keep=trace")
     assert left == [0] * 14  # begun, twelve frames, sealed
     assert (seen[0], seen[-1]) == (0, 0) and seen[1] > 0
 
