@@ -328,6 +328,14 @@ def test_what_others_send_or_remove_meanwhile_is_no_error(tmp_path, url, monkeyp
     copies._drop(gone)
 
 
+@pytest.mark.parametrize("frames", [(8, 5), (5, 8)])
+def test_the_furthest_copy_stays_whoever_sends_last(tmp_path, url, frames):
+    for number in frames:
+        Copies(url).send(begun(tmp_path / str(number), frames=number).path)
+    assert Copies(url).find(KEY).attributes["frames_done"] == 8
+    assert len(copies(url)) == 1
+
+
 def test_of_equal_copies_all_keep_the_same(tmp_path, url, monkeypatch):
     made = begun(tmp_path / "one")
     with monkeypatch.context() as patch:
