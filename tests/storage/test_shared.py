@@ -222,16 +222,18 @@ def begun(folder, frames=0, complete=True):
 
 
 @everywhere
-def test_a_copy_that_is_dropped_while_it_is_fetched_is_not_whole(tmp_path, url, monkeypatch):
+@pytest.mark.parametrize("removed_first", [True, False])
+def test_a_copy_that_is_dropped_while_it_is_fetched_is_not_whole(tmp_path, url, monkeypatch, removed_first):
     copies, files = Copies(url), type(fsspec.core.url_to_fs(url)[0])
     copies.send(begun(tmp_path / "one").path)
     copy, get = copies.find(KEY), files.get
 
-    def late(self, *args, **options):
-        copies.remove(KEY)
-        get(self, *args, **options)
+    def meanwhile(self, *args, **options):
+        steps = [lambda: copies.remove(KEY), lambda: get(self, *args, **options)]
+        for step in steps if removed_first else reversed(steps):
+            step()
 
-    monkeypatch.setattr(files, "get", late)
+    monkeypatch.setattr(files, "get", meanwhile)
     copies.fetch(copy, tmp_path / "part")
     assert not (tmp_path / "part" / "zarr.json").exists()
 
