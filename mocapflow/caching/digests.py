@@ -13,7 +13,6 @@ from importlib.machinery import ModuleSpec
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
 from mocapflow.caching import sources
@@ -58,7 +57,7 @@ def digest(data: bytes | memoryview, name: str = "") -> str:
 def digest_array(values: npt.NDArray[Any]) -> str:
     """Return the digest of an array: dtype, shape and content."""
     head = f"{values.dtype.str}{values.shape}".encode()
-    return digest(head + np.ascontiguousarray(values).tobytes())
+    return digest(head + values.tobytes())
 
 
 class Digests:

@@ -154,7 +154,9 @@ class Execution:
         try:
             return self._run(step, self._checkpoint(step, with_versions(started), lock), mixed)
         except Corrupted as error:
-            return self._chain(step, self._repairs.set_aside(step, started.path, error), lock)
+            if "sealed" not in started.attributes:  # it is the frames themselves
+                return self._chain(step, self._repairs.set_aside(step, started.path, error), lock)
+            return self._chain(step, self._repairs.mended(step, self._store.find(step.key) or started, error), lock)
 
     def _checkpoint(self, step: Step, artifact: Artifact, lock: Lock) -> Checkpoint:
         """Return where a chain keeps its frames; observers, and who reads of progress, are told of each."""

@@ -61,14 +61,15 @@ class Copies:
             return max(self._copies_of(key), key=_rank, default=None)
 
     def fetch(self, copy: Copy, path: Path) -> None:
-        """Bring a copy to a folder that is not there yet; if that fails, a part of it may be there."""
+        """Bring a copy to a folder that is not there yet; without `zarr.json` a part of it, for others may drop it."""
         source = f"{self._root}/{copy.name}/"
-        with self._reaching():
-            found = self._files.find(source)
+        with self._reaching(), suppress(FileNotFoundError):  # dropped meanwhile
+            found = [file for file in self._files.find(source) if file != source + META]
             targets = [path / file.removeprefix(source) for file in found]
-            for folder in {target.parent for target in targets}:
+            for folder in {path, *(target.parent for target in targets)}:
                 folder.mkdir(parents=True, exist_ok=True)
             self._files.get(found, [str(target) for target in targets])
+            self._files.get_file(source + META, str(path / META))  # last, for `_drop` removes it first
 
     def send(self, path: Path) -> None:
         """Make a copy of a group; of all there are, the furthest stays."""
@@ -106,6 +107,7 @@ class Copies:
 
     def _drop(self, copy: Copy) -> None:
         with suppress(FileNotFoundError):  # somebody else was quicker
+            self._files.rm(f"{self._root}/{copy.name}/{META}")  # first, so that what is half removed never looks whole
             self._files.rm(f"{self._root}/{copy.name}", recursive=True)
 
     @contextmanager

@@ -144,17 +144,16 @@ def gone(process: Mapping[str, Any]) -> bool | None:
     pid, here = process.get("pid"), (socket.gethostname(), _space())
     if (process.get("host"), process.get("space", _space())) != here or not isinstance(pid, int):
         return None
-    return not _alive(pid) or _born(pid) != process.get("born")
+    return not _alive(pid) or _born(pid) not in {"", process.get("born")}
 
 
 def _alive(pid: int) -> bool:
     try:
-        os.kill(pid, 0)
+        with suppress(PermissionError):  # it is somebody else's
+            os.kill(pid, 0)
     except ProcessLookupError:
         return False
-    except PermissionError:
-        return True
-    return not _born(pid).startswith("Z")
+    return True
 
 
 def _space() -> str:

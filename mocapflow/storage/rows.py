@@ -98,16 +98,16 @@ class Rows:
         Raises:
             Corrupted: it was never written, or can't be read back.
         """
-        values = np.empty(self.shape[1:], self._dtype)
-        if not values.size:
-            return values
+        shape = self.shape[1:]
+        if 0 in shape:
+            return np.empty(shape, self._dtype)
         try:
-            self._zstd.decode(self._file(row).read_bytes(), out=values)
+            values = np.frombuffer(self._zstd.decode(self._file(row).read_bytes()), self._dtype)
+            return values.reshape(shape).copy()  # never shorter than the row, as decoding into one leaves it unnoticed
         except FileNotFoundError as error:
             raise Corrupted(f"row {row} of {self._path} is missing") from error
         except (RuntimeError, ValueError) as error:
             raise Corrupted(f"row {row} of {self._path} is damaged: {error}") from error
-        return values
 
     def _file(self, row: int) -> Path:
         return self._path / f"c.{row}{self._inner}"

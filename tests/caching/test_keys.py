@@ -7,7 +7,8 @@ import os
 import re
 import shutil
 import sys
-from enum import Enum
+from dataclasses import fields, replace
+from enum import Enum, IntEnum
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -20,6 +21,7 @@ from mocapflow.caching.digests import Digests
 from mocapflow.caching.keys import _plain, all_changes, explain, key_of
 from mocapflow.data import Start
 from mocapflow.errors import PluginError, RecordingError
+from mocapflow.recordings.recording import open_recording
 from mocapflow.running import recipes
 from mocapflow.running.recipes import steps_of
 from tests.fixtures.stores import PLUGIN, STAGES, load, write_pipeline, write_recording
@@ -65,6 +67,8 @@ def test_every_kind_of_setting_is_in_a_key_by_what_it_says(tmp_path):
     assert plain(np.arange(3)) == digests.digest_array(np.arange(3)) != plain(np.arange(4))
     assert plain({1: (0.5, side)}) == {"1": [0.5, "RIGHT"]}
     assert plain({"b", "a"}) == plain(frozenset("ab")) == ['"a"', '"b"']
+    assert plain({0, 8}) == plain({8, 0})  # equal sets, whose elements come in different order
+    assert plain(IntEnum("Level", ["LOW"]).LOW) == "LOW"
     with pytest.raises(PluginError, match=r"setting Stage\.setting is a object, which has no place in a cache key"):
         plain(object())
 
@@ -127,6 +131,24 @@ def test_start_and_step_are_in_the_key(tmp_path, clip):
         assert changed(before, after) == expected
 
 
+def test_which_frames_are_read_is_in_a_recipe():
+    def read(*frames, chain=False, scale=1.0):
+        return recipes._frames(SimpleNamespace(indices=range(*frames)), SimpleNamespace(scale=scale), chain)
+
+    assert all(read(0, 9) != other for other in (read(1, 9), read(0, 8), read(0, 9, 2), read(0, 9, scale=0.5)))
+    assert read(0, 1) == read(0, 1, 2)
+    chain = read(0, 9, chain=True)
+    assert chain == read(0, 8, chain=True) and chain not in (read(1, 9, chain=True), read(0, 9, 2, chain=True))
+
+
+def test_frames_that_a_stage_changes_as_they_are_read_count_as_frames_do(tmp_path, clip):
+    path = write_pipeline(tmp_path, clip, stages={"corrupt": {"use": "corrupt", "noise": 0.5}, **STAGES}, frames={})
+    before, after = (
+        {step.label: step.key for step in steps_of(load(path, *change), SHARED)} for change in ((), ("frames.start=1",))
+    )
+    assert changed(before, after) == {"start", "track", "smooth", "export"}
+
+
 def test_names_and_order_of_stages_and_files_do_not_count(tmp_path, clip):
     before = keys(tmp_path, clip)
     renamed = {"room": "tiny_background", "first": "tiny_start", "loop": STAGES["track"], "smooth": "tiny_smooth"}
@@ -139,7 +161,7 @@ def test_names_and_order_of_stages_and_files_do_not_count(tmp_path, clip):
 
 def test_an_added_stage_changes_what_reads_it(tmp_path, clip):
     before = keys(tmp_path, clip)
-    stages = {"start": "tiny_start", "grow": "tiny_grow", "track": STAGES["track"], "background": "tiny_background"}
+    stages = {"background": "tiny_background", "start": "tiny_start", "grow": "tiny_grow", "track": STAGES["track"]}
     after = keys(tmp_path, clip, stages=stages)
     assert after["start"] == before["start"]  # it comes before the other body
     assert after["track"] != before["track"]
@@ -149,7 +171,7 @@ def test_an_added_stage_changes_what_reads_it(tmp_path, clip):
 
 def test_cameras_made_by_a_stage_change_what_comes_after_it(tmp_path, clip):
     before = keys(tmp_path, clip)
-    stages = {"start": "tiny_start", "align": "tiny_align", "track": STAGES["track"], "background": "tiny_background"}
+    stages = {"background": "tiny_background", "start": "tiny_start", "align": "tiny_align", "track": STAGES["track"]}
     after = keys(tmp_path, clip, stages=stages)
     assert after["start"] == before["start"]  # it comes before the other cameras
     assert after["track"] != before["track"]
@@ -183,6 +205,39 @@ def test_content_of_files(tmp_path, clip, name, expected):
     after = changed(before, keys(tmp_path, clip))
     assert after >= expected
     assert bool(after) == bool(expected)
+
+
+def test_all_of_a_camera_counts(clip):
+    camera = open_recording(clip).cameras[0]
+    changes = {
+        "size": camera.size + 1, "intrinsics": 2 * camera.intrinsics, "distortion": camera.distortion + 0.1,
+        "camera_from_world": np.diag([1.0, -1.0, -1.0, 1.0]) @ camera.camera_from_world, "fisheye": True,
+    }  # fmt: skip
+    cameras = [camera, *(replace(camera, **{name: value}) for name, value in changes.items())]
+    assert len({key_of({"camera": recipes._camera(each)}) for each in cameras}) == len(cameras)
+    assert {field.name for field in fields(camera)} == {"name", *changes}
+
+
+def test_cameras_count_for_who_looks_at_no_frame(tmp_path, clip):
+    before = keys(tmp_path, clip, stages={"grow": "tiny_grow"})
+    (clip / "cameras.toml").write_text((clip / "cameras.toml").read_text().replace("20.0", "21.0"))
+    assert changed(before, keys(tmp_path, clip, stages={"grow": "tiny_grow"})) == {"grow"}
+
+
+def test_all_files_of_a_component_count_by_where_they_lie_in_the_recording(tmp_path, clip):
+    paths = [clip / "a" / "x.json", clip / "b" / "x.json", tmp_path / "c" / "x.json", tmp_path / "d" / "x.json"]
+    for path in paths:
+        path.parent.mkdir()
+        path.write_text(path.parent.name)
+    component = SimpleNamespace(inputs=lambda folder: [*paths, clip / "none.json"])
+    found = recipes._files(component, clip, SHARED)
+    assert {name: len(digests) for name, digests in found.items()} == {"a/x.json": 1, "b/x.json": 1, "x.json": 2}
+
+
+def test_a_join_depends_on_all_its_parts(tmp_path, clip):
+    starts = (f"parts.start={{use: tiny_start, angle_rad: {angle}}}" for angle in (0.0, 0.5))
+    before, after = (keys(tmp_path, clip, "parts.count=2", "parts.overlap=1", start) for start in starts)
+    assert changed(before, after) == {"start_2", "track_2", "track", "smooth", "export"}
 
 
 @pytest.mark.parametrize("trial", ["auto", "static", "recording"])
@@ -297,6 +352,9 @@ def test_code_that_changes_after_it_was_loaded_makes_no_results(tmp_path, monkey
     importlib.invalidate_caches()
     assert importlib.reload(module).f(1) == 3
     assert Digests().package("mocapflow_edited") != before
+    file.write_text(CODE.replace("x + 1", "x + 3"))
+    with pytest.raises(PluginError, match="this code has changed since it was loaded"):
+        Digests().package("mocapflow_edited")
     for name in ("mocapflow_edited.inner", "mocapflow_edited"):
         del sys.modules[name]
 
@@ -312,6 +370,39 @@ def test_modules_of_an_author_count_however_they_are_called(tmp_path, monkeypatc
         found.append(Digests().package("mocapflow_upper"))
     assert found[0] == found[1] != found[2]
     assert not sources.counts("numpy.linalg") and not sources.counts("json")
+
+
+def test_of_what_is_installed_plugins_count(tmp_path, monkeypatch):
+    for place, name in [
+        ("site-packages", "mocapflow_installed"), ("site-packages", "installed"), ("site-packages", "open"),
+        ("mine", "open"),
+    ]:  # fmt: skip
+        (tmp_path / place / name).mkdir(parents=True)
+        (tmp_path / place / name / "flat.py").write_text("")
+        monkeypatch.syspath_prepend(tmp_path / place)
+    assert [sources.counts(name) for name in ("mocapflow_installed", "installed", "open")] == [True, False, True]
+    assert sources.counts("mocapflow.io.images") and not sources.counts("mocapflow.iodine")
+
+
+def test_files_of_a_folder_count_in_one_order_without_what_file_browsers_leave(tmp_path, monkeypatch):
+    for name in ("a.png", "b.png", "c.png"):
+        (tmp_path / name).write_text(name)
+    first, real = Digests().file(tmp_path), Path.iterdir
+    (tmp_path / "Thumbs.db").write_text("")
+    for turned in (sorted, lambda paths: sorted(paths, reverse=True)):
+        monkeypatch.setattr(Path, "iterdir", lambda self, turned=turned: iter(turned(real(self))))
+        assert Digests().file(tmp_path) == first
+
+
+def test_a_module_counts_whose_name_begins_that_of_another(tmp_path, monkeypatch):
+    for name, text in {"mocapflow_upper": "import my_helpers", "my_helpers": "import my_help"}.items():
+        (tmp_path / f"{name}.py").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    found = []
+    for value in (1, 2):
+        (tmp_path / "my_help.py").write_text(f"X = {value}")
+        found.append(Digests().package("mocapflow_upper"))
+    assert found[0] != found[1]
 
 
 @pytest.mark.parametrize(
@@ -445,6 +536,33 @@ def test_explanations_name_the_change():
     assert explain(before, after) == "; ".join(told[:4]) + " and 6 more"
 
 
+@pytest.mark.parametrize("of", ["format", "core", "components", "reader"])
+def test_all_code_is_in_a_key_and_none_in_what_a_stage_is_made_of(tmp_path, clip, monkeypatch, of):
+    pipeline, package = load(write_pipeline(tmp_path, clip)), Digests.package
+    before = steps_of(pipeline, SHARED)
+    if of == "format":
+        monkeypatch.setattr(recipes, "FORMAT", 99)
+    elif of == "core":
+        monkeypatch.setattr(Digests, "core", lambda self: f"{digests.MARK}1 code")
+    else:
+
+        def other(self, module):
+            edited = (module == "mocapflow.recordings.recording") == (of == "reader")
+            return f"{digests.MARK}2 code" if edited else package(self, module)
+
+        monkeypatch.setattr(Digests, "package", other)
+    after = steps_of(pipeline, SHARED)
+    assert [step.content for step in after] == [step.content for step in before]
+    assert not {step.key for step in after} & {step.key for step in before}
+
+
+def test_what_a_stage_reads_is_part_of_what_it_is_made_of(tmp_path, clip):
+    one, other = ({"use": "tiny_start", "angle_rad": angle} for angle in (0.0, 0.5))
+    path = write_pipeline(tmp_path, clip, stages={"one": one, "other": other, "track": STAGES["track"]})
+    tracks = [steps_of(load(path, f"stages.track.from={{start: {name}}}"), SHARED)[-1] for name in ("one", "other")]
+    assert tracks[0].content != tracks[1].content
+
+
 def test_names_in_digests_are_for_people_only():
     assert key_of({"file": "blake2b:12 body.obj"}) == key_of({"file": "blake2b:12 other.obj"})
     assert key_of({"file": "blake2b:12 body.obj"}) != key_of({"file": "blake2b:13 body.obj"})
@@ -484,15 +602,45 @@ def test_files_in_linked_folders_count(tmp_path):
     (elsewhere / "000000.png").write_text("one")
     (trial / "videos" / "cam01").symlink_to(elsewhere)
     (trial / "videos" / "back").symlink_to(trial)
+    assert list(sources.visible(trial)) == [trial / "videos" / "cam01" / "000000.png"]
     first = Digests().file(trial)
     (elsewhere / "000000.png").write_text("two")
     assert Digests().file(trial) != first
+
+
+def test_names_of_files_in_a_folder_count(tmp_path):
+    folder = tmp_path / "clip"
+    folder.mkdir()
+    (folder / "000000.png").write_text("one")
+    first = Digests().file(folder)
+    (folder / "000000.png").rename(folder / "000001.png")
+    assert Digests().file(folder) != first
+
+
+def test_what_was_read_must_not_change(tmp_path):
+    file, folder, kept = tmp_path / "a.txt", tmp_path / "clip", Digests()
+    folder.mkdir()
+    for path in (file, folder / "000000.png"):
+        path.write_text("one")
+    kept.file(file), kept.file(folder)
+    os.utime(file, ns=(1, 1))
+    os.utime(folder, ns=(1, 1))
+    kept.check_inputs()
+    (folder / "000001.png").write_text("one")
+    with pytest.raises(RecordingError, match="clip  this has changed since the run began"):
+        kept.check_inputs()
+    file.write_text("two")
+    with pytest.raises(RecordingError, match="a.txt  this has changed since the run began"):
+        kept.check_inputs()
 
 
 def test_arrays_count_by_dtype_shape_and_content():
     values = np.arange(6.0)
     assert digests.digest_array(values) == digests.digest_array(values.copy())
     assert len({digests.digest_array(v) for v in (values, values.reshape(2, 3), values.astype("f4"), values + 1)}) == 4
+    assert digests.digest_array(np.zeros(2)) != digests.digest_array(np.zeros(2, int))  # the same bytes
+    table = values.reshape(2, 3)
+    assert digests.digest_array(np.asfortranarray(table)) == digests.digest_array(table)  # however it lies in memory
 
 
 def test_code_that_has_not_changed_is_read_once(tmp_path, monkeypatch):
@@ -504,6 +652,28 @@ def test_code_that_has_not_changed_is_read_once(tmp_path, monkeypatch):
     first.save()
     monkeypatch.setattr(digests.sources, "meaning", lambda tree: pytest.fail("read again"))
     assert Digests(tmp_path / "memory.json").package("mocapflow_upper") == code
+    (tmp_path / "sources.py").write_text("")
+    for change in ((digests, "PYTHON", " 3.99"), (digests.sources, "__file__", str(tmp_path / "sources.py"))):
+        with monkeypatch.context() as patch, pytest.raises(pytest.fail.Exception, match="read again"):
+            patch.setattr(*change)  # who read it then may have found something else
+            Digests(tmp_path / "memory.json").package("mocapflow_upper")
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "3"])
+def test_a_damaged_memory_is_forgotten(tmp_path, text):
+    (tmp_path / "memory.json").write_text(text)
+    (tmp_path / "a.txt").write_text("one")
+    kept = Digests(tmp_path / "memory.json")
+    assert kept.file(tmp_path / "a.txt") == Digests().file(tmp_path / "a.txt")
+    kept.save()
+    assert json.loads((tmp_path / "memory.json").read_text())
+
+
+def test_digests_that_can_not_be_kept_are_computed_again(tmp_path):
+    (tmp_path / "a.txt").write_text("one")
+    kept = Digests(tmp_path / "a.txt" / "memory.json")
+    kept.file(tmp_path / "a.txt")
+    kept.save()
 
 
 def test_a_causal_input_of_a_track_need_not_read_the_recording():
@@ -517,6 +687,8 @@ def test_a_causal_input_of_a_track_need_not_read_the_recording():
         }.items()
     }
     assert keys["short"] == keys["long"] and set(keys["none"]) == {"key"}
+    whole = SimpleNamespace(named=causal, recipe={}, key="k", chain=False)
+    assert recipes._input(whole, of_chain=False) == {"key": "k"}  # who reads it to its end depends on where that is
 
 
 def test_a_file_that_is_not_there_is_named_once(tmp_path):

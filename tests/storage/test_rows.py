@@ -46,6 +46,17 @@ def test_a_damaged_row_is_noticed(tmp_path, damage):
         made.read(2)
 
 
+@pytest.mark.parametrize("width", [49, 51])
+def test_a_row_of_another_length_is_damage(tmp_path, width):
+    for name, length in (("a", 50), ("b", width)):
+        Rows.create(tmp_path / name, (6, length), "float64", np.nan, ("T", "x"), {}).write(2, np.ones(length))
+    (tmp_path / "b" / "c.2.0").replace(tmp_path / "a" / "c.2.0")
+    with pytest.raises(Corrupted, match="row 2 of .* is damaged"):
+        Rows(tmp_path / "a").read(2)
+    with pytest.raises(AssertionError):
+        Rows(tmp_path / "a").write(3, np.ones(width))
+
+
 @pytest.mark.parametrize(("dtype", "fill"), [("float64", np.nan), ("int16", -1), ("bool", 0), ("uint8", 7)])
 def test_zarr_reads_blocks_and_the_rest_as_fill(tmp_path, dtype, fill):
     values = (10 * VALUES).astype(dtype)
@@ -60,10 +71,19 @@ def test_zarr_reads_blocks_and_the_rest_as_fill(tmp_path, dtype, fill):
     assert Rows(tmp_path / "a").shape == (11, 50)
 
 
-def test_what_is_no_array_is_said(tmp_path):
-    (tmp_path / "zarr.json").write_text('{"shape": [3]}')
-    with pytest.raises(Corrupted, match="is no array of frames"):
-        Rows(tmp_path)
-    (tmp_path / "zarr.json").write_text("{")
-    with pytest.raises(Corrupted, match=r"zarr\.json is damaged"):
+def test_a_new_array_has_no_rows_of_an_older_one_in_its_place(tmp_path):
+    for values in (VALUES, VALUES[:3]):
+        made = Rows.create(tmp_path / "a", values.shape, "float64", np.nan, ("T", "x"), {})
+        with pytest.raises(Corrupted, match="row 2 of .* is missing"):
+            made.read(2)
+        made.write(2, values[2])
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [('{"shape": [3]}', "is no array of frames"), ("{", r"zarr\.json is damaged"), ("[]", r"zarr\.json is damaged")],
+)
+def test_what_is_no_array_is_said(tmp_path, text, told):
+    (tmp_path / "zarr.json").write_text(text)
+    with pytest.raises(Corrupted, match=told):
         Rows(tmp_path)

@@ -1,6 +1,7 @@
 """A store shared at a URL: fetched when somebody else has made it, sent when it is done, whole or not at all."""
 
 import json
+import os
 from pathlib import Path
 
 import fsspec
@@ -13,10 +14,12 @@ from mocapflow.commands.invocation import placed
 from mocapflow.errors import ComponentFailed, MocapflowError, StoreError
 from mocapflow.running.runner import plan, run
 from mocapflow.storage.copies import Copies
+from mocapflow.storage.rows import group_meta, write_json
 from mocapflow.storage.shared import open_store
 from mocapflow.storage.store import Store
 from tests.fixtures.stores import actions, load, run_tiny, same, the_track, write_pipeline, write_recording
 
+KEY = "0123456789abcdef"
 MADE = {"background": "hit", "start": "hit", "track": "hit", "smooth": "hit", "export": "run"}
 
 
@@ -164,7 +167,7 @@ def test_a_copy_that_breaks_off_leaves_what_is_here(tmp_path, path, url, monkeyp
 
 
 def test_what_a_run_had_fetched_when_it_was_killed_can_be_pruned(tmp_path, url, monkeypatch):
-    key = "0123456789abcdef"
+    key = KEY
     there, here = Store(tmp_path / "one"), open_store(tmp_path / "two", url)
     for store in (there, here):
         store.create()
@@ -205,6 +208,151 @@ def test_a_copy_that_is_dropped_meanwhile_leaves_what_is_here(tmp_path, path, ur
         _, lines = shared(path, tmp_path / "two", url)
     assert "track: going on after 5 frames" in lines
     assert same(the_track(tmp_path / "one"), the_track(tmp_path / "two"))
+
+
+def begun(folder, frames=0, complete=True):
+    """The only artifact of a store: of so many frames, as far as its attributes tell."""
+    store = Store(folder)
+    store.create()
+    made = store.begin("track", KEY, {})
+    (made.path / "angles").mkdir()
+    (made.path / "angles" / "c.0").write_bytes(b"some")
+    write_json(made.path / "zarr.json", group_meta({**made.attributes, "frames_done": frames, "complete": complete}))
+    return store.find(KEY)
+
+
+@everywhere
+@pytest.mark.parametrize("removed_first", [True, False])
+def test_a_copy_that_is_dropped_while_it_is_fetched_is_not_whole(tmp_path, url, monkeypatch, removed_first):
+    copies, files = Copies(url), type(fsspec.core.url_to_fs(url)[0])
+    copies.send(begun(tmp_path / "one").path)
+    copy, get = copies.find(KEY), files.get
+
+    def meanwhile(self, *args, **options):
+        steps = [lambda: copies.remove(KEY), lambda: get(self, *args, **options)]
+        for step in steps if removed_first else reversed(steps):
+            step()
+
+    monkeypatch.setattr(files, "get", meanwhile)
+    copies.fetch(copy, tmp_path / "part")
+    assert not (tmp_path / "part" / "zarr.json").exists()
+
+
+@everywhere
+def test_what_is_half_removed_is_no_copy(tmp_path, url, monkeypatch):
+    copies, files = Copies(url), type(fsspec.core.url_to_fs(url)[0])
+    copies.send(begun(tmp_path / "one").path)
+    rm = files.rm
+
+    def cut(self, path, recursive=False, **options):
+        if recursive:
+            raise OSError("the line is cut")
+        rm(self, path, **options)
+
+    monkeypatch.setattr(files, "rm", cut)
+    with pytest.raises(StoreError, match="the line is cut"):
+        copies.remove(KEY)
+    assert copies.find(KEY) is None
+
+
+@everywhere
+def test_what_is_half_sent_is_no_copy(tmp_path, url, monkeypatch):
+    copies, files = Copies(url), type(fsspec.core.url_to_fs(url)[0])
+    put = files.put
+
+    def cut(self, *args, **options):
+        put(self, *args, **options)
+        raise OSError("the line is cut")
+
+    monkeypatch.setattr(files, "put", cut)
+    with pytest.raises(StoreError, match="the line is cut"):
+        copies.send(begun(tmp_path / "one").path)
+    assert copies.find(KEY) is None
+
+
+def test_of_what_is_here_and_there_the_further_counts(tmp_path, url):
+    here, there = open_store(tmp_path / "two" / "store.zarr", url), begun(tmp_path / "one", frames=8)
+    begun(here.path, frames=5)
+    Copies(url).send(there.path)
+    assert here.find(KEY).frames == 8
+    begun(here.path, frames=9, complete=False)
+    assert here.find(KEY).frames == 9
+
+
+def test_what_is_done_is_sent_whatever_ends_the_run(tmp_path, url, monkeypatch):
+    here, lines = open_store(tmp_path / "one", url), []
+
+    def stopped(frames):
+        with pytest.raises(KeyboardInterrupt), here.writer(KEY, "track", lines.append):
+            begun(here.path, frames=frames, complete=False)
+            raise KeyboardInterrupt
+
+    def broken(self, path):
+        raise StoreError("the line is cut")
+
+    here.create()
+    stopped(frames=0)
+    assert Copies(url).find(KEY) is None
+    stopped(frames=3)
+    assert Copies(url).find(KEY).attributes["frames_done"] == 3
+    monkeypatch.setattr(Copies, "send", broken)
+    stopped(frames=4)
+    assert lines == ["warning: the line is cut"]
+
+
+def test_what_is_fetched_is_on_the_drive_and_nothing_beside_it(tmp_path, url, monkeypatch):
+    synced, here = set(), open_store(tmp_path / "two", url)
+    Copies(url).send(begun(tmp_path / "one", frames=3).path)
+    here.create()
+    left = here.state / f"damaged-track-{KEY[:12]}"  # by a run that was killed
+    left.mkdir()
+    (left / "older").write_text("")
+    monkeypatch.setattr(os, "fsync", lambda number: synced.add(os.fstat(number).st_ino))
+    with here.writer(KEY, "track", print):
+        made = here.find(KEY).path
+    files = {file.relative_to(made).as_posix(): file.stat().st_ino for file in made.rglob("*") if file.is_file()}
+    assert set(files) == {"zarr.json", "angles/c.0"} and set(files.values()) <= synced
+
+
+def test_what_others_send_or_remove_meanwhile_is_no_error(tmp_path, url, monkeypatch):
+    copies, made, (files, root) = Copies(url), begun(tmp_path / "one"), fsspec.core.url_to_fs(url)
+    listed, ls = {}, type(files).ls
+    monkeypatch.setattr(type(files), "ls", lambda self, path, **how: listed.setdefault(path, ls(self, path, **how)))
+    monkeypatch.setattr(type(files), "invalidate_cache", lambda self, path=None: listed.clear())
+    copies.send(made.path)
+    name = copies.find(KEY).name
+    for text in (b"{", b"{}", b"[]"):
+        files.pipe_file(f"{root}/{name}/zarr.json", text)
+        assert copies.find(KEY) is None
+    copies.send(made.path)
+    gone = copies.find(KEY)
+    copies.remove(KEY)
+    copies._drop(gone)
+
+
+@pytest.mark.parametrize("frames", [(8, 5), (5, 8)])
+def test_the_furthest_copy_stays_whoever_sends_last(tmp_path, url, frames):
+    for number in frames:
+        Copies(url).send(begun(tmp_path / str(number), frames=number).path)
+    assert Copies(url).find(KEY).attributes["frames_done"] == 8
+    assert len(copies(url)) == 1
+
+
+def test_of_equal_copies_all_keep_the_same(tmp_path, url, monkeypatch):
+    made = begun(tmp_path / "one")
+    with monkeypatch.context() as patch:
+        patch.setattr(Copies, "_drop", lambda self, copy: None)  # the other has not looked yet
+        Copies(url).send(made.path)
+        Copies(url).send(made.path)
+    assert len(copies(url)) == 2
+    files = type(fsspec.core.url_to_fs(url)[0])
+    ls, found = files.ls, []
+    for reverse in (False, True):
+        monkeypatch.setattr(
+            files, "ls", lambda *args, reverse=reverse, **how: sorted(ls(*args, **how), reverse=reverse)
+        )
+        found.append(Copies(url).find(KEY).name)
+    assert found[0] == found[1]
 
 
 @pytest.mark.long

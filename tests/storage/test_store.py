@@ -6,11 +6,13 @@ import os
 import re
 import shutil
 import socket
+import subprocess
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -23,7 +25,7 @@ from mocapflow.errors import ComponentFailed, MocapflowError, ShapeError, StoreE
 from mocapflow.io.atomic import PART
 from mocapflow.records import F64, record
 from mocapflow.running.execution import Execution
-from mocapflow.series import Series
+from mocapflow.series import BLOCK, Series, Wide
 from mocapflow.storage import locks, rows
 from mocapflow.storage.artifacts import remove
 from mocapflow.storage.growing import SEEN
@@ -82,6 +84,14 @@ class Curve:
     """A record with a field called as the store calls the array of a group."""
 
     values: "F64" = records.array("T", unit="rad")
+
+
+@record
+class Long:
+    """A record of more rows than a chunk has: `few` are read at once, `many` when they are asked for."""
+
+    few: "F64" = records.array("T", unit="rad")
+    many: "Wide" = records.array("T", 2, unit="rad")
 
 
 @dataclass
@@ -286,6 +296,17 @@ def test_an_unfinished_result_is_none(store):
     assert len(store.artifacts()) == 1
 
 
+def test_what_is_compared_with_is_the_newest_of_the_same_stage(store):
+    for digit, label, created in (("1", "some", "3"), ("2", "some", "1"), ("3", "other", "4"), ("4", "some", "5")):
+        made = put(store, VALUES["start"], key=digit * 32).path
+        meta = rows.read_json(made / "zarr.json")
+        rows.write_json(made / "zarr.json", meta | {"attributes": meta["attributes"] | {"created": created}})
+        made.rename(made.with_name(f"{label}-{digit * 12}"))
+    assert store.nearest("some", RECIPE, but="4" * 32).key == "1" * 32
+    assert store.nearest("gone", RECIPE, but="4" * 32).key == "3" * 32
+    assert store.nearest("some", {"component": {"name": "another"}}, but="") is None
+
+
 def test_a_folder_with_other_things_becomes_no_store(tmp_path):
     empty, papers = tmp_path / "empty", tmp_path / "papers"
     for folder, name in ((empty, ".hidden"), (papers, "letter.txt")):
@@ -367,6 +388,16 @@ def test_damaged_arrays_of_a_track_are_written_anew_from_its_frames(tmp_path, ra
     assert same(whole, the_track(tmp_path))
 
 
+def test_a_track_whose_arrays_are_damaged_goes_on_from_its_frames(tmp_path, path, whole):
+    run_tiny(path, tmp_path, frames=5)
+    (group,) = (tmp_path / "store.zarr").glob("track-*")
+    damage_array_json(group)
+    _, lines = run_tiny(path, tmp_path)
+    assert any(line.startswith(f"warning: {group.name} is damaged and written anew from its frames") for line in lines)
+    assert [line for line in lines if "going on after" in line][-1] == "track: going on after 12 frames"
+    assert same(the_track(whole), the_track(tmp_path))
+
+
 @pytest.mark.parametrize("name", ["angles", "doubted"])  # doubted: zeros, which zarr by itself does not write
 def test_a_chunk_that_is_missing_is_no_zeros(tmp_path, ran, name):
     made = json.loads((tmp_path / "out" / "results.json").read_text())["angles"]
@@ -413,6 +444,57 @@ def test_what_is_wide_stays_in_the_store_and_is_missed_when_it_is_removed(tmp_pa
     remove(found.path)
     with pytest.raises(Corrupted, match="cloth of .* can't be read back"):
         other.cloth[0]
+
+
+@pytest.fixture
+def long_record(store):
+    few = np.arange(2.5 * BLOCK)
+    many = np.outer(few, [1, -1])
+    return put(store, Long(few=few, many=Series(many.shape, lambda numbers: many[numbers])))
+
+
+@pytest.mark.parametrize("wanted", [None, 3, BLOCK, BLOCK + 1])
+def test_what_is_longer_than_a_chunk_comes_back_block_by_block(store, long_record, wanted):
+    made, few = store.load(long_record, wanted), np.arange(2.5 * BLOCK)[:wanted]
+    np.testing.assert_array_equal(made.few, few)
+    np.testing.assert_array_equal(made.many[:], np.outer(few, [1, -1]))
+    mixed = np.arange(len(few))[::-2]
+    np.testing.assert_array_equal(made.many[mixed], np.outer(few[mixed], [1, -1]))
+
+
+@pytest.mark.parametrize("name", ["few/c/2", "many/c/2/0"])
+def test_a_chunk_that_is_missing_at_the_end_is_damage_for_who_reads_so_far(store, long_record, name):
+    (long_record.path / name).unlink()
+    assert len(store.load(long_record, 2 * BLOCK).few) == 2 * BLOCK
+    for wanted in (2 * BLOCK + 1, None):
+        with pytest.raises(Corrupted, match=f"chunk 2 of {name.partition('/')[0]} is missing"):
+            store.load(long_record, wanted)
+
+
+@pytest.mark.parametrize("name", ["few", "many"])
+def test_a_chunk_that_is_removed_while_it_is_read_is_no_zeros(store, long_record, monkeypatch, name):
+    read = zarr.Array.__getitem__
+
+    def removed(self, which):
+        shutil.rmtree(long_record.path / name / "c")
+        monkeypatch.setattr(zarr.Array, "__getitem__", read)
+        return read(self, which)
+
+    def when_it_is_its_turn(self, which):
+        return removed(self, which) if self.path == name else read(self, which)
+
+    monkeypatch.setattr(zarr.Array, "__getitem__", when_it_is_its_turn)
+    with pytest.raises(Corrupted, match=f"chunk 0 of {name} is missing"):
+        store.load(long_record)
+
+
+def test_fewer_rows_than_there_should_be_are_damage(store, long_record):
+    with pytest.raises(Corrupted, match="few has 160 rows of 161"):
+        store.load(long_record, 161)
+    many = long_record.path / "many" / "zarr.json"
+    rows.write_json(many, rows.read_json(many) | {"shape": [159, 2]})
+    with pytest.raises(Corrupted, match="many has 159 rows of 160"):
+        store.load(long_record, 160)
 
 
 def cut_back(group, frames):
@@ -496,7 +578,7 @@ def test_a_frame_is_on_the_drive_before_it_counts(tmp_path, path, monkeypatch, u
         return replace(self, target)
 
     monkeypatch.setattr(Path, "replace", counted)
-    run_tiny(path, tmp_path)
+    run_tiny(path, tmp_path, "stages.track.keep=trace")
     assert left == [0] * 14  # begun, twelve frames, sealed
     assert (seen[0], seen[-1]) == (0, 0) and seen[1] > 0
 
@@ -666,17 +748,89 @@ def test_a_lock_is_as_old_as_the_drive_says_whatever_the_time_is_here(tmp_path, 
     path, lines = tmp_path / "x.lock", []
     path.write_text(json.dumps({"pid": 1, "host": "elsewhere"}))
     monkeypatch.setattr(locks.time, "time", lambda: path.stat().st_mtime + 3600)
-    monkeypatch.setattr(locks.time, "sleep", lambda _: path.unlink())
+    looks = iter((path.exists, path.unlink))
+    monkeypatch.setattr(locks.time, "sleep", lambda _: next(looks)())
     locks.acquire(path, "track-12", lines.append).release()
     assert lines == ["track-12: waiting for process 1 on elsewhere, which is making it"]
+
+
+def test_the_drive_s_time_is_that_of_now_not_of_when_the_locks_were_last_looked_at(tmp_path, monkeypatch):
+    path, lines = tmp_path / "x.lock", []
+    monkeypatch.setattr(locks.time, "sleep", lambda _: path.unlink())  # who waits would wait for ever
+    path.write_text(json.dumps({"pid": 1, "host": "elsewhere"}))
+    (tmp_path / locks.GUARD).touch()
+    for file in (path, tmp_path / locks.GUARD):
+        os.utime(file, (1, 1))
+    locks.acquire(path, "track-12", lines.append).release()
+    assert lines == ["track-12: taking over from process 1 on elsewhere, which ended without finishing"]
+
+
+def test_a_lock_that_is_taken_over_is_another_file(tmp_path):
+    """That of somebody else may be removed by all who may write to the folder, but not be written."""
+    path = tmp_path / "x.lock"
+    path.write_text(json.dumps({"pid": 2**22 + 1, "host": socket.gethostname()}))
+    os.link(path, tmp_path / "theirs")
+    before = path.read_text()
+    locks.acquire(path, "track-12", print).release()
+    assert (tmp_path / "theirs").read_text() == before
+
+
+def test_of_two_locks_of_one_process_each_knows_its_own(tmp_path):
+    first = locks.acquire(tmp_path / "x.lock", "track-12", print)
+    (tmp_path / "x.lock").unlink()
+    second = locks.acquire(tmp_path / "x.lock", "track-12", print)
+    with pytest.raises(StoreError, match="another run took over track-12"):
+        first.check()
+    first.release()
+    second.check()
+    second.release()
+
+
+def test_a_lock_says_whose_it_is(tmp_path, monkeypatch):
+    lock = locks.acquire(tmp_path / "x.lock", "track-12", print)
+    holder = json.loads((tmp_path / "x.lock").read_text())
+    lock.release()
+    assert locks.gone(holder) is False
+    assert locks.gone(holder | {"pid": "1"}) is None
+    monkeypatch.setattr(locks, "_space", lambda: "pid:[1]")  # this process is in a container, its number another's
+    assert locks.gone(holder) is None
+
+
+def test_a_process_is_told_by_its_start_from_others_of_its_number(monkeypatch):
+    times = " ".join(map(str, range(4, 53)))  # in the place of each value its number in proc(5)
+    monkeypatch.setattr(Path, "read_text", lambda self: f"7 (a) b) S {times}")
+    assert locks._born(7) == "22"
+
+
+def test_who_has_ended_but_is_remembered_by_its_parent_is_gone():
+    with subprocess.Popen(["cat"], stdin=subprocess.PIPE) as child:
+        there = {**locks.myself(), "pid": child.pid, "born": locks._born(child.pid)}
+        assert locks.gone(there) is False
+        child.stdin.close()
+        os.waitid(os.P_PID, child.pid, os.WEXITED | os.WNOWAIT)  # it stays, as a zombie
+        assert locks.gone(there) is True
+
+
+def test_a_process_of_somebody_else_is_alive(monkeypatch):
+    """Of which some machines don't tell either when it has started."""
+
+    def refuse(*_, **__):
+        raise PermissionError
+
+    holder = locks.myself()
+    monkeypatch.setattr(os, "kill", refuse)
+    assert locks.gone(holder) is False
+    monkeypatch.setattr(Path, "read_text", refuse)
+    assert locks.gone(holder) is False
 
 
 def test_a_lock_that_was_taken_over_is_noticed_before_the_next_write(tmp_path):
     lock = locks.acquire(tmp_path / "x.lock", "track-12", print)
     lock.check()
-    (tmp_path / "x.lock").write_text("another")
-    with pytest.raises(StoreError, match="another run took over track-12"):
-        lock.check()
+    for change in ((tmp_path / "x.lock").unlink, lambda: (tmp_path / "x.lock").write_text("another")):
+        change()
+        with pytest.raises(StoreError, match="another run took over track-12"):
+            lock.check()
     lock.release()
     assert (tmp_path / "x.lock").exists()  # it is not ours
 
@@ -697,6 +851,32 @@ def test_the_heartbeat_keeps_a_lock_fresh(tmp_path, monkeypatch):
     assert (tmp_path / "x.lock").stat().st_mtime > 2
     lock.release()
     assert not (tmp_path / "x.lock").exists()
+    assert not [thread for thread in threading.enumerate() if "x.lock" in thread.name]
+
+
+def beat(lock):
+    """Let the heart of a lock that is released beat once."""
+    waits = iter((False, True))
+    lock._done = SimpleNamespace(wait=lambda _: next(waits))
+    lock._beat()
+
+
+def test_the_heart_of_who_has_lost_a_lock_does_not_beat_for_who_has_it(tmp_path, monkeypatch):
+    path = tmp_path / "x.lock"
+    lock = locks.acquire(path, "track-12", print)
+    said = path.read_text()
+    lock.release()
+    for text, beats in (("another", False), (said, True)):
+        path.write_text(text)
+        os.utime(path, (1, 1))
+        beat(lock)
+        assert (path.stat().st_mtime > 1) is beats
+
+    def gone(path):
+        raise FileNotFoundError
+
+    monkeypatch.setattr(os, "utime", gone)
+    beat(lock)  # its thread does not end: `check` tells
 
 
 def test_a_failed_run_gives_its_lock_back(tmp_path, path, monkeypatch):
