@@ -13,7 +13,7 @@ from mocapflow.data import Pose
 from mocapflow.geometry import kinematics
 from mocapflow.model import moved
 from mocapflow.records import F64, I32
-from mocapflow_fitting.proportions import SHAPE, scaled
+from mocapflow_fitting.proportions import PROPORTIONS, scaled
 
 FREE_SPREAD = np.radians(60.0)  # rad, of angles the body leaves free: unseen joints stay near rest
 LIMIT_SPREAD = np.radians(2.0)  # rad, by how much an angle may pass a limit
@@ -22,7 +22,8 @@ ENOUGH = 1e-6  # share of the cost below which a gain is none
 NEAREST = 0.1  # m, depth below which a projection is not believed
 STEP = 1e-4  # of what is shared, for differences
 
-# What is fitted, with its standard deviation about zero: logarithms of proportions, deviations along modes of a shape.
+# What is fitted, with its standard deviation about zero: logarithms of proportions, m by which joints turn elsewhere,
+# deviations along modes of a shape.
 Spreads = Mapping[str, float]
 
 
@@ -46,14 +47,14 @@ class Solution(NamedTuple):
     """What all moments share, and the pose of each."""
 
     spreads: Spreads  # of what is shared, in its order
-    shared: F64  # (P,) logarithms of proportions, deviations along modes of a shape
+    shared: F64  # (P,) values of these
     poses: tuple[Pose, ...]
 
     @property
     def factors(self) -> Mapping[str, float]:
-        """The proportions, and the deviations of the shape, by name."""
+        """The proportions, where joints turn, and the deviations of the shape, by name."""
         values = zip(self.spreads, self.shared.tolist(), strict=True)
-        return {name: value if name.startswith(SHAPE) else math.exp(value) for name, value in values}
+        return {name: math.exp(value) if name in PROPORTIONS else value for name, value in values}
 
 
 class NormalEquations(NamedTuple):

@@ -1,4 +1,4 @@
-"""Bodies of other shapes and proportions: as people differ, and segments stretched, the mesh with them."""
+"""Bodies of other shapes and proportions: as people differ, segments stretched, and joints that turn elsewhere."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ Proportion = Literal[
 ]  # fmt: skip
 PROPORTIONS: tuple[str, ...] = get_args(Proportion)
 LIMBS = {start: segment for segment, (start, _) in SEGMENTS.items()}
+CENTRES = ("hip_forward_m", "knee_up_m")  # m, how far joints turn from where the body has them
 SHAPE = "shape_"  # begins the name of what a body is changed by along one of its modes
 WHOLE = {"neck": "head", "head": "head", "ankle": "foot", "toe": "foot", "wrist": "forearm"}
 
@@ -31,15 +32,15 @@ def scaled(body: Body, factors: Mapping[str, float]) -> Body:
 
     Args:
         body: at rest.
-        factors: by the names in PROPORTIONS, 1 where left out, left and right alike; and shape_0 and so on, how many
-            standard deviations to go along each of the body's modes.
+        factors: by the names in PROPORTIONS, 1 where left out, left and right alike; by those in CENTRES, 0 where left
+            out; and shape_0 and so on, how many standard deviations to go along each of the body's modes.
 
-    The shape changes first. Then joint j stretches what it carries by A_j about itself, so child joints move by
-    A_parent, and a vertex moves to sum_j w_j (p'_j + A_j (v - p_j)): smooth where the weights are. Axes keep their
-    directions.
+    The shape changes first, then where joints turn in it. Then joint j stretches what it carries by A_j about itself,
+    so child joints move by A_parent, and a vertex moves to sum_j w_j (p'_j + A_j (v - p_j)): smooth where the weights
+    are. Axes keep their directions.
     """
-    body = _shaped(body, factors)
-    stretch = _stretches(body, {name: factor for name, factor in factors.items() if not name.startswith(SHAPE)})
+    body = _recentred(_shaped(body, factors), *(factors.get(name, 0.0) for name in CENTRES))
+    stretch = _stretches(body, factors)
     positions = body.positions.copy()
     for joint in range(len(positions)):
         parent = int(body.parents[joint])
@@ -81,6 +82,14 @@ def _shaped(body: Body, factors: Mapping[str, float]) -> Body:
     return _moved(plain, body.vertices + vertices, body.positions + positions)
 
 
+def _recentred(body: Body, hip_forward_m: float, knee_up_m: float) -> Body:
+    """Return a body whose hips and knees turn elsewhere in it; its skin stays."""
+    forward, _, up = body_directions(skeleton_of(body))
+    away = {"hip": hip_forward_m * forward, "knee": knee_up_m * up}
+    shifts = [away.get(unsided(name), np.zeros(3)) for name in body.joint_names]
+    return _moved(body, body.vertices, body.positions + np.array(shifts))
+
+
 def _moved(body: Body, vertices: F64, positions: F64) -> Body:
     """Return a body with its vertices and joints elsewhere; the axes of the joints keep their directions."""
     screws = twists.screw(body.twists[:, :3], positions[body.screw_joint])
@@ -89,7 +98,7 @@ def _moved(body: Body, vertices: F64, positions: F64) -> Body:
 
 def _stretches(body: Body, factors: Mapping[str, float]) -> F64:
     """Return the stretch (J, 3, 3) of what each joint carries."""
-    unknown = set(factors) - set(PROPORTIONS)
+    unknown = [name for name in factors if name not in (*PROPORTIONS, *CENTRES) and not name.startswith(SHAPE)]
     if unknown:
         raise ValueError(f"unknown proportions {sorted(unknown)}; there are {PROPORTIONS}")
     by = {name: factors.get(name, 1.0) for name in PROPORTIONS}

@@ -106,6 +106,23 @@ def test_girth_leaves_the_bones(body):
     assert 0.75 < widths[1] / widths[0] < 0.9
 
 
+def test_where_joints_turn_leaves_the_skin(body):
+    """The template looks to -y; longer thighs carry the knees on from where the hips turn."""
+    factors = {"hip_forward_m": 0.03, "knee_up_m": -0.02}
+    other = scaled(body, factors)
+    np.testing.assert_allclose(other.vertices, body.vertices, atol=1e-12)
+    away = dict(zip(body.joint_names, other.positions - body.positions, strict=True))
+    for side in "lr":
+        np.testing.assert_allclose(away.pop(f"hip_{side}"), [0, -0.03, 0], atol=1e-12)
+        np.testing.assert_allclose(away.pop(f"knee_{side}"), [0, 0, -0.02], atol=1e-12)
+    np.testing.assert_allclose(list(away.values()), 0, atol=1e-12)
+    of_hip = body.screw_joint == body.joint("hip_l")
+    axes, points = other.twists[of_hip, :3], other.positions[body.joint("hip_l")]
+    np.testing.assert_allclose(other.twists[of_hip, 3:], -np.cross(axes, points), atol=1e-12)
+    longer = scaled(body, {**factors, "thigh": 1.1})
+    assert length(longer, "hip_l", "knee_l") == pytest.approx(1.1 * length(other, "hip_l", "knee_l"), rel=1e-9)
+
+
 def test_longer_legs_do_not_reach_below_the_floor(body):
     factors = {"thigh": 1.1, "shank": 1.05, "girth": 0.9}
     loose, stood = scaled(body, factors), fitted(body, factors)
