@@ -175,6 +175,28 @@ def test_cameras_made_by_a_stage_replace_those_of_later_ones(tmp_path):
         assert cameras and all(name.startswith("aligned ") for name in cameras)
 
 
+def test_of_a_recording_that_a_stage_changes_each_stage_gets_its_frames(tmp_path):
+    """The start takes the first frame only, and says so."""
+    stages = {"corrupt": "corrupt", "start": "tiny_start", "track": STAGES["track"]}
+    path = write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=stages)
+    run_tiny(path, tmp_path, frames=3)
+    assert len(the_track(tmp_path).frame) == 3
+
+
+def test_a_run_that_is_to_stop_begins_no_other_stage(tmp_path, path, monkeypatch):
+    """Also where compiled code of the stage before has swallowed the signal."""
+    asked = iter([None])
+
+    def check():
+        if next(asked, "stop"):
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("mocapflow.running.execution.check", check)
+    with pytest.raises(KeyboardInterrupt):
+        run_tiny(path, tmp_path)
+    assert [found.path.name.partition("-")[0] for found in Store(tmp_path / "store.zarr").artifacts()] == ["background"]
+
+
 def test_evaluations_always_run_and_are_not_stored(tmp_path):
     stages = {k: STAGES[k] for k in ("start", "track")} | {"evaluate": "tiny_evaluate"}
     path = write_pipeline(tmp_path, write_recording(tmp_path / "clip", frames=3), stages=stages)
