@@ -5,6 +5,8 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
+from functools import wraps
 from pathlib import Path
 
 import numpy as np
@@ -88,8 +90,9 @@ def test_variants_share_what_comes_before(tmp_path, path):
 
 
 def test_fresh_makes_everything_anew(tmp_path, ran):
-    again, _ = run_tiny(ran, tmp_path, fresh=True)
+    again, lines = run_tiny(ran, tmp_path, fresh=True)
     assert set(actions(again).values()) == {"run"}
+    assert sum(": running " in line for line in lines) == len(STAGES)  # each once, whoever needs it
     assert len([p for p in (tmp_path / "store.zarr").iterdir() if p.name.startswith("track")]) == 1
 
 
@@ -197,6 +200,11 @@ def test_a_run_that_is_to_stop_begins_no_other_stage(tmp_path, path, monkeypatch
     assert [found.path.name.partition("-")[0] for found in Store(tmp_path / "store.zarr").artifacts()] == ["background"]
 
 
+def test_what_a_single_stage_needs_is_told_with_it(tmp_path, ran):
+    summary = run(load(ran), store=tmp_path / "store.zarr", out=tmp_path / "out", only="export")
+    assert actions(summary) == {"smooth": "hit", "export": "run"}
+
+
 def test_evaluations_always_run_and_are_not_stored(tmp_path):
     stages = {k: STAGES[k] for k in ("start", "track")} | {"evaluate": "tiny_evaluate"}
     path = write_pipeline(tmp_path, write_recording(tmp_path / "clip", frames=3), stages=stages)
@@ -267,6 +275,22 @@ def test_a_result_that_can_not_be_kept_is_not_told_as_done(tmp_path, path, monke
     with pytest.raises(StoreError, match="No space left"):
         run(pipeline, store=tmp_path / "store.zarr", out=tmp_path / "out")
     assert told == []
+
+
+def test_a_result_that_is_no_number_is_not_kept(tmp_path, path, monkeypatch):
+    pipeline = load(path)
+    stage = type(pipeline.stages[1].stage)
+
+    @wraps(stage.run)
+    def lost(self, *given, **named):
+        made = real(self, *given, **named)
+        return replace(made, pose=replace(made.pose, angles=np.full(2, np.nan)))
+
+    real = stage.run
+    monkeypatch.setattr(stage, "run", lost)
+    with pytest.raises(ComponentFailed, match=r"^stage 'tiny_start' .* failed: it returned a pose that is not finite"):
+        run(pipeline, store=tmp_path / "store.zarr", out=tmp_path / "out")
+    assert [found.path.name.partition("-")[0] for found in Store(tmp_path / "store.zarr").artifacts()] == ["background"]
 
 
 @pytest.mark.parametrize("inputs", ["subject.txt", ["subject.txt"], None, iter([Path("subject.txt")])])
