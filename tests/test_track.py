@@ -17,17 +17,20 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mocapflow.components import Segmenter
+from mocapflow.components import Recovery, Segmenter
 from mocapflow.config.pipeline import load_pipeline
+from mocapflow.data import Frame, Pose
 from mocapflow.errors import ComponentFailed, PipelineError
 from mocapflow.loop import settle
 from mocapflow.model import ClothedModel
+from mocapflow.output_checks import InvalidOutput
 from mocapflow.prediction import initial_state
 from mocapflow.recordings.recording import Recording
+from mocapflow.results import ImageFlow, ViewChecks
 from mocapflow.running.runner import run
 from mocapflow.scene import Scene
 from mocapflow.storage.store import Store
-from mocapflow.track import CoupledLoop
+from mocapflow.track import CoupledLoop, prepared
 from tests.fixtures.stores import STAGES, actions, load, run_tiny, same, the_track, write_pipeline, write_recording
 
 SHORT = {name: STAGES[name] for name in ("start", "track")}
@@ -239,19 +242,21 @@ def test_the_first_segmenter_settles_frames_before_which_no_velocity_is_known(tm
 
 @pytest.mark.parametrize(("cost", "helps"), [(0.0, True), (1.0, False), (2.0, False)])
 def test_what_the_first_segmenter_finds_is_kept_where_images_fit_better_from_there(tmp_path, monkeypatch, cost, helps):
-    begins, costs = [], iter([1.0, cost])
+    begins, turns, costs = [], [], iter([1.0, cost])
 
-    def spy(frame, state, *rest):
+    def spy(frame, state, past, steps, *rest):
         begins.append(state)
-        return settle(frame, state, *rest)
+        turns.append((steps.segmenter.sigma_px, steps.steady.max_turns))
+        return settle(frame, state, past, steps, *rest)
 
     monkeypatch.setattr("mocapflow.track.settle", spy)
     monkeypatch.setattr("mocapflow.track.image_cost", lambda *energy: next(costs))
-    stages = SHORT | {"track": SHORT["track"] | {"first_segmenter": "tiny_segmenter"}}
+    stages = SHORT | {"track": SHORT["track"] | {"first_segmenter": {"use": "tiny_segmenter", "sigma_px": 3}}}
     run_tiny(write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=stages), tmp_path, frames=1)
     given, stayed, approached, kept = begins
     assert stayed is given
     assert kept is (approached if helps else given)
+    assert turns == [(3, 4), (2, 1), (2, 1), (2, 4)]  # where the images fit better is seen in one turn
 
 
 @pytest.mark.parametrize("costs", [(1.0, 3.0, 2.0), (3.0, 2.0, 1.0)])
@@ -354,6 +359,54 @@ def test_a_recovery_gets_the_prediction_and_only_what_is_trusted(tmp_path, monke
     assert given == [(2, begins[2], 0)]
 
 
+def test_what_a_recovery_tries_knows_what_was_before(tmp_path, monkeypatch):
+    known = []
+
+    def spy(frame, state, past, *rest):
+        known.append(len(past.moments))
+        return settle(frame, state, past, *rest)
+
+    def recovered(self, frame, state, result, past, model):
+        return self.settled(frame, past, model, state.estimate.pose, state.cloth.parameters)
+
+    monkeypatch.setattr("mocapflow.track.settle", spy)
+    monkeypatch.setattr(CoupledLoop, "recovered", recovered)
+    run_tiny(write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=SHORT), tmp_path, frames=3)
+    assert known == [0, 0, 1, 1, 2, 2]
+
+
+def test_a_predictor_that_returns_no_pose_is_named(tmp_path, path, monkeypatch):
+    pipeline = load(path)
+    (loop,) = (named.stage for named in pipeline.stages if named.label == "track")
+    monkeypatch.setattr(type(loop.predictor), "predict", lambda *_: Pose(root=np.eye(4), angles=np.full(2, np.nan)))
+    with pytest.raises(ComponentFailed, match=r"^predictor 'tiny_predictor' .* failed at frame 1: it returned "):
+        run(pipeline, store=tmp_path / "store.zarr", out=tmp_path / "out")
+
+
+def test_a_recovery_that_returns_no_result_is_named():
+    class Nothing(Recovery):
+        name = "nothing"
+
+        def recover(self, *_):
+            return None
+
+    loop = SimpleNamespace(recovery=Nothing(), settled=print)
+    with pytest.raises(InvalidOutput):
+        CoupledLoop.recovered(loop, *[None] * 4, SimpleNamespace(scene=None))
+
+
+def test_a_frame_is_tracked_without_wrong_views_and_with_the_flow_into_it():
+    image, index = np.zeros((4, 6, 3), np.uint8), np.array([7], np.int32)
+    frame = Frame(index=7, time=0.2, images=(image, image), usable=np.array([True, True]))
+    checks = ViewChecks(frame=index, camera=np.array([1], np.int16), reasons=("torn",))
+    moved = np.ones((1, 2), np.float32)
+    flow = ImageFlow(frame=index, camera=np.array([0], np.int16), pixel=moved, displacement=moved, cameras=2)
+    seen = prepared(frame, checks, flow)
+    assert seen.usable.tolist() == [True, False]
+    assert [len(view.pixel) for view in seen.flow] == [1, 0]
+    assert prepared(frame, None, None) is frame
+
+
 def test_a_frame_begins_with_the_cloth_of_the_last_and_keeps_its_notes(tmp_path, monkeypatch):
     begun = []
 
@@ -429,6 +482,16 @@ def test_on_unsteady_stop_leaves_frames_alone_that_are_not_asked_for(tmp_path, p
     with pytest.raises(ComponentFailed, match="frame 2 did not come to rest"):
         run_tiny(path, tmp_path, turns, "stages.track.on_unsteady=stop", frames=3)
     run_tiny(path, tmp_path, turns, "stages.track.on_unsteady=stop", frames=2)
+
+
+def test_on_unsteady_stop_does_not_stop_at_a_lost_frame(tmp_path):
+    clip = write_recording(tmp_path / "clip", frames=4)
+    (clip / "videos" / "cam01" / "000001.png").write_bytes(b"")
+    path = write_pipeline(tmp_path, clip, stages=SHORT)
+    for action in ("run", "hit"):
+        summary, _ = run_tiny(path, tmp_path, "stages.track.steady.max_turns=20", "stages.track.on_unsteady=stop")
+        assert actions(summary)["track"] == action
+    assert the_track(tmp_path).steady.tolist() == [True, False, True, True]
 
 
 @pytest.mark.parametrize("frames", [5, None])
