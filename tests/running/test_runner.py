@@ -36,12 +36,14 @@ def outlook(path, folder, *changes, frames=None):
     return {line.label: (line.action, line.why) for line in lines}
 
 
-@pytest.mark.parametrize("out", ["clip", "clip/videos", "elsewhere/../clip/background/run"])
+@pytest.mark.parametrize("out", ["clip", "clip/videos", "elsewhere/../clip/background/run", "clip/static/run"])
 def test_a_run_folder_among_the_files_of_its_recording_is_refused(tmp_path, path, out):
     (tmp_path / "elsewhere").mkdir()
     before = sorted((tmp_path / "clip").rglob("*"))
     with pytest.raises(PipelineError, match="among the files of the recording"):
         run(load(path), store=tmp_path / "store.zarr", out=tmp_path / out)
+    with pytest.raises(PipelineError, match="the stored results would lie among the files of the recording"):
+        run(load(path), store=tmp_path / out, out=tmp_path / "out")
     assert sorted((tmp_path / "clip").rglob("*")) == before
     run(load(path, frames=2), store=tmp_path / "store.zarr", out=tmp_path / "clip" / "runs" / "mine")
 
@@ -62,9 +64,18 @@ def test_a_plan_says_what_a_run_does(tmp_path, path):
         "smooth": ("run", "new: track grew from 5 to 12 frames"),
         "export": always,
     }
+    assert outlook(path, tmp_path, frames=3)["track"] == ("hit", "3 frames")
     changed = outlook(path, tmp_path, "stages.track.draper=other_draper", frames=5)
     assert changed["track"] == ("run", "new: draper tiny_draper → other_draper")
     assert changed["smooth"] == ("run", "new: track was made anew")
+
+
+def test_a_plan_says_what_is_left_of_a_run_that_failed(tmp_path, path, monkeypatch):
+    monkeypatch.setenv("TINY_RAISE_AT", "7")
+    with pytest.raises(ComponentFailed):
+        run_tiny(path, tmp_path)
+    assert outlook(path, tmp_path)["track"] == ("resume", "7 of 12 frames done")
+    assert outlook(path, tmp_path, frames=5)["track"] == ("resume", "5 of 5 frames done")
 
 
 def test_a_plan_line_for_people(tmp_path, path):
@@ -154,7 +165,7 @@ def test_what_a_track_warned_of_is_kept_with_its_frames(tmp_path, path, monkeypa
 def test_what_is_odd_about_a_recording_is_told_when_it_is_run(tmp_path, path):
     _, lines = run_tiny(path, tmp_path, frames=2)
     said = "\n".join(lines)
-    assert "warning: nothing says the frame rate: 30 frames per second assumed" in said
+    assert said.count("warning: nothing says the frame rate: 30 frames per second assumed") == 1
     assert "warning: the images' up is the y axis of the world" in said
 
 
@@ -358,6 +369,31 @@ def test_a_garment_is_not_sewn_for_what_is_in_the_store(tmp_path, monkeypatch):
     pipeline = load(path)
     monkeypatch.setattr(type(pipeline.garment), "sew", None)
     assert {line.action for line in plan(pipeline, store=tmp_path / "store.zarr")} == {"hit"}
+
+
+def test_what_a_body_lacks_is_told_by_a_plan(tmp_path, path, monkeypatch):
+    def need(self, recording):
+        raise RecordingError("there is no scan")
+
+    pipeline = load(path)
+    monkeypatch.setattr(type(pipeline.body), "need", need)
+    with pytest.raises(RecordingError, match="there is no scan"):
+        plan(pipeline, store=tmp_path / "store.zarr")
+
+
+def test_a_fresh_run_that_can_not_begin_leaves_the_store_as_it_is(tmp_path, monkeypatch):
+    def sew(self, body):
+        raise GarmentError("too short", hint="lengthen it")
+
+    stages = {name: STAGES[name] for name in ("start", "track")}
+    path = write_pipeline(tmp_path, write_recording(tmp_path / "clip", frames=2), stages=stages)
+    run_tiny(path, tmp_path)
+    pipeline, store = load(path), Store(tmp_path / "store.zarr")
+    before = store.artifacts()
+    monkeypatch.setattr(type(pipeline.garment), "sew", sew)
+    with pytest.raises(GarmentError, match="too short"):
+        run(pipeline, store=store.path, out=tmp_path / "out", fresh=True)
+    assert store.artifacts() == before
 
 
 def test_a_run_folder_that_cannot_be_made(tmp_path, path):
