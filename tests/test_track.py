@@ -422,6 +422,20 @@ def test_a_frame_begins_with_the_cloth_of_the_last_and_keeps_its_notes(tmp_path,
     assert track.notes == ("frame 2: odd",)
 
 
+def test_what_frames_have_shown_is_known_after_a_lost_one(tmp_path, monkeypatch):
+    known = {}
+
+    def spy(frame, state, past, *rest):
+        known[frame.index] = set(past.appearance)
+        return settle(frame, state, past, *rest)
+
+    monkeypatch.setattr("mocapflow.track.settle", spy)
+    clip = write_recording(tmp_path / "clip", frames=3)
+    (clip / "videos" / "cam01" / "000001.png").write_bytes(b"")
+    run_tiny(write_pipeline(tmp_path, clip, stages=SHORT), tmp_path)
+    assert known == {0: set(), 2: {"grey", "count"}}
+
+
 def test_a_frame_that_shows_nobody_says_so(tmp_path, monkeypatch):
     def empty(frame, *rest):
         result = settle(frame, *rest)
@@ -476,8 +490,8 @@ def test_on_unsteady_stop(tmp_path, path):
 
 def test_on_unsteady_stop_leaves_frames_alone_that_are_not_asked_for(tmp_path, path, monkeypatch):
     turns = "stages.track.steady.max_turns=5"  # frame 2 is the first that does not come to rest in them
-    monkeypatch.setenv("TINY_RAISE_AT", "4")
-    with pytest.raises(ComponentFailed, match="frames 0–3 are saved"):
+    monkeypatch.setenv("TINY_RAISE_AT", "3")
+    with pytest.raises(ComponentFailed, match="frames 0–2 are saved"):
         run_tiny(path, tmp_path, turns)
     with pytest.raises(ComponentFailed, match="frame 2 did not come to rest"):
         run_tiny(path, tmp_path, turns, "stages.track.on_unsteady=stop", frames=3)
