@@ -1,5 +1,7 @@
 """What is said of a frame without a look at it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -46,3 +48,18 @@ def test_a_lost_frame_keeps_what_was_believed_and_says_which_views_were_missing(
     assert notes_on(frame(True, False), scene, Past(), result) == [
         "cam02 not usable: no image", "lost, fewer than 2 views; the prediction is kept",
     ]  # fmt: skip
+
+
+def test_which_view_is_missing_is_said_also_of_a_frame_that_was_seen():
+    scene = tiny_scene(cameras=3)
+    begun = initial_state(tiny_pose(scene), np.zeros(0), Cloth(vertices=np.zeros((0, 3)), parameters=np.zeros(0)))
+    steps = Steps(segmenter=None, matchers=(), pose_solver=None, cloth_fitter=None, priors=(), steady=Steady())
+    unseen = lost(frame(True, True, True), begun, steps, ClothedModel(scene=scene))
+    observed = np.ones(len(begun.estimate.observed))
+    shown = replace(unseen, state=replace(begun, estimate=replace(begun.estimate, observed=observed)))
+    torn = replace(frame(True, False, True), reasons=("", "torn", ""))
+    missing = "cam02 not usable: torn"
+    assert notes_on(torn, scene, Past(), shown) == [missing]
+    assert notes_on(torn, scene, Past(), unseen) == [missing, "no view shows the person; the prediction is kept"]
+    anew = "begun anew, like a first frame: the frames before do not show the person"
+    assert notes_on(torn, scene, Past(after_gap=True), shown) == [missing, anew]

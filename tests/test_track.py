@@ -1,6 +1,7 @@
 """The track, saved frame by frame: resumed it is bitwise what it is uninterrupted."""
 
 import gc
+import itertools
 import json
 import os
 import random
@@ -11,17 +12,25 @@ import time
 import tracemalloc
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from mocapflow.components import Segmenter
+from mocapflow.components import Recovery, Segmenter
+from mocapflow.config.pipeline import load_pipeline
+from mocapflow.data import Frame, Pose
 from mocapflow.errors import ComponentFailed, PipelineError
 from mocapflow.loop import settle
+from mocapflow.model import ClothedModel
+from mocapflow.output_checks import InvalidOutput
 from mocapflow.prediction import initial_state
 from mocapflow.recordings.recording import Recording
+from mocapflow.results import ImageFlow, ViewChecks
 from mocapflow.running.runner import run
+from mocapflow.scene import Scene
 from mocapflow.storage.store import Store
+from mocapflow.track import CoupledLoop, prepared
 from tests.fixtures.stores import STAGES, actions, load, run_tiny, same, the_track, write_pipeline, write_recording
 
 SHORT = {name: STAGES[name] for name in ("start", "track")}
@@ -93,6 +102,13 @@ def test_growing_stop_continues(tmp_path, path, whole):
     assert same(the_track(whole), the_track(tmp_path / "grown"))
 
 
+def test_a_run_of_every_third_frame_goes_on_with_every_third(tmp_path, path):
+    for stop in (6, 12):
+        pipeline = load_pipeline(path, frames=slice(0, stop, 3))
+        run(pipeline, store=tmp_path / "store.zarr", out=tmp_path / "out")
+    assert the_track(tmp_path).frame.tolist() == [0, 3, 6, 9]
+
+
 def test_a_smaller_stop_reads_the_first_frames(tmp_path, ran):
     summary, _ = run_tiny(ran, tmp_path, frames=5)
     assert next(s for s in summary.stages if s["label"] == "track")["cached"]
@@ -138,6 +154,16 @@ def test_a_component_that_raises_is_named_and_the_run_goes_on_there(tmp_path, pa
     monkeypatch.delenv("TINY_RAISE_AT")
     _, lines = run_tiny(path, tmp_path)
     assert "track: going on after 7 frames" in lines
+    assert same(the_track(whole), the_track(tmp_path))
+
+
+def test_a_track_whose_first_frame_failed_is_begun_again(tmp_path, path, monkeypatch, whole):
+    monkeypatch.setenv("TINY_RAISE_AT", "0")
+    with pytest.raises(ComponentFailed, match="no frame is saved yet; run the same command to start again"):
+        run_tiny(path, tmp_path)
+    monkeypatch.delenv("TINY_RAISE_AT")
+    _, lines = run_tiny(path, tmp_path)
+    assert not any("going on after" in line for line in lines)
     assert same(the_track(whole), the_track(tmp_path))
 
 
@@ -216,19 +242,21 @@ def test_the_first_segmenter_settles_frames_before_which_no_velocity_is_known(tm
 
 @pytest.mark.parametrize(("cost", "helps"), [(0.0, True), (1.0, False), (2.0, False)])
 def test_what_the_first_segmenter_finds_is_kept_where_images_fit_better_from_there(tmp_path, monkeypatch, cost, helps):
-    begins, costs = [], iter([1.0, cost])
+    begins, turns, costs = [], [], iter([1.0, cost])
 
-    def spy(frame, state, *rest):
+    def spy(frame, state, past, steps, *rest):
         begins.append(state)
-        return settle(frame, state, *rest)
+        turns.append((steps.segmenter.sigma_px, steps.steady.max_turns))
+        return settle(frame, state, past, steps, *rest)
 
     monkeypatch.setattr("mocapflow.track.settle", spy)
     monkeypatch.setattr("mocapflow.track.image_cost", lambda *energy: next(costs))
-    stages = SHORT | {"track": SHORT["track"] | {"first_segmenter": "tiny_segmenter"}}
+    stages = SHORT | {"track": SHORT["track"] | {"first_segmenter": {"use": "tiny_segmenter", "sigma_px": 3}}}
     run_tiny(write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=stages), tmp_path, frames=1)
     given, stayed, approached, kept = begins
     assert stayed is given
     assert kept is (approached if helps else given)
+    assert turns == [(3, 4), (2, 1), (2, 1), (2, 4)]  # where the images fit better is seen in one turn
 
 
 @pytest.mark.parametrize("costs", [(1.0, 3.0, 2.0), (3.0, 2.0, 1.0)])
@@ -243,6 +271,37 @@ def test_of_the_poses_that_a_start_leaves_open_the_one_that_fits_best_begins(tmp
     run_tiny(write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=stages), tmp_path, frames=2)
     assert begun == [(0, 0)] * 4 + [(1, 1)]
     assert begins[3] is begins[int(np.argmin(costs))]
+
+
+def test_of_the_poses_that_a_start_leaves_open_one_that_is_doubted_comes_last(tmp_path, monkeypatch):
+    costs, begins = iter([1.0, 3.0, 2.0]), []
+
+    def doubting(frame, state, *rest):
+        begins.append(state.estimate.pose)
+        return replace(settle(frame, state, *rest), doubted=len(begins) == 1)
+
+    monkeypatch.setattr("mocapflow.track.image_cost", lambda *energy: next(costs))
+    monkeypatch.setattr("mocapflow.track.settle", doubting)
+    stages = SHORT | {"start": {"use": "tiny_start", "others": 2}}
+    run_tiny(write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=stages), tmp_path, frames=1)
+    assert begins[3] is begins[2]
+
+
+def test_the_cloth_of_a_prediction_is_laid_by_all_that_is_known_of_it(tmp_path, monkeypatch):
+    laid, begun, real = [], [], ClothedModel.drape
+
+    def drape(self, pose, parameters, past):
+        laid.append(len(past.moments))
+        return real(self, pose, parameters, past)
+
+    def spy(*given):
+        begun.append(laid[-1])
+        return settle(*given)
+
+    monkeypatch.setattr(ClothedModel, "drape", drape)
+    monkeypatch.setattr("mocapflow.track.settle", spy)
+    run_tiny(write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=SHORT), tmp_path, frames=5)
+    assert begun == [0, 1, 2, 3, 3]
 
 
 @pytest.mark.parametrize("without", [True, False])
@@ -275,6 +334,106 @@ def test_the_first_frame_that_shows_the_person_begins_like_a_first(tmp_path, beg
     assert [note for note in the_track(tmp_path).notes if "anew" in note] == [
         f"frame {index}: begun anew, like a first frame: the frames before do not show the person" for index in (2, 6)
     ]
+
+
+def test_a_recovery_gets_the_prediction_and_only_what_is_trusted(tmp_path, monkeypatch):
+    begins, given, costs = [], [], itertools.cycle([1.0, 0.0])  # the first segmenter always helps
+
+    def begin(*state):
+        begins.append(initial_state(*state))
+        return begins[-1]
+
+    def recovered(self, frame, state, result, past, model):
+        given.append((frame.index, state, len(past.moments)))
+        return result
+
+    monkeypatch.setattr("mocapflow.track.initial_state", begin)
+    monkeypatch.setattr("mocapflow.track.image_cost", lambda *energy: next(costs))
+    monkeypatch.setattr(CoupledLoop, "recovered", recovered)
+    clip = write_recording(tmp_path / "clip", frames=3)
+    for index in (0, 1):
+        (clip / "videos" / "cam01" / f"{index:06}.png").write_bytes(b"")
+    stages = SHORT | {"track": SHORT["track"] | {"first_segmenter": "tiny_segmenter"}}
+    run_tiny(write_pipeline(tmp_path, clip, stages=stages), tmp_path)
+    assert len(begins) == 4  # one more near the person, at frame 2
+    assert given == [(2, begins[2], 0)]
+
+
+def test_what_a_recovery_tries_knows_what_was_before(tmp_path, monkeypatch):
+    known = []
+
+    def spy(frame, state, past, *rest):
+        known.append(len(past.moments))
+        return settle(frame, state, past, *rest)
+
+    def recovered(self, frame, state, result, past, model):
+        return self.settled(frame, past, model, state.estimate.pose, state.cloth.parameters)
+
+    monkeypatch.setattr("mocapflow.track.settle", spy)
+    monkeypatch.setattr(CoupledLoop, "recovered", recovered)
+    run_tiny(write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=SHORT), tmp_path, frames=3)
+    assert known == [0, 0, 1, 1, 2, 2]
+
+
+def test_a_predictor_that_returns_no_pose_is_named(tmp_path, path, monkeypatch):
+    pipeline = load(path)
+    (loop,) = (named.stage for named in pipeline.stages if named.label == "track")
+    monkeypatch.setattr(type(loop.predictor), "predict", lambda *_: Pose(root=np.eye(4), angles=np.full(2, np.nan)))
+    with pytest.raises(ComponentFailed, match=r"^predictor 'tiny_predictor' .* failed at frame 1: it returned "):
+        run(pipeline, store=tmp_path / "store.zarr", out=tmp_path / "out")
+
+
+def test_a_recovery_that_returns_no_result_is_named():
+    class Nothing(Recovery):
+        name = "nothing"
+
+        def recover(self, *_):
+            return None
+
+    loop = SimpleNamespace(recovery=Nothing(), settled=print)
+    with pytest.raises(InvalidOutput):
+        CoupledLoop.recovered(loop, *[None] * 4, SimpleNamespace(scene=None))
+
+
+def test_a_frame_is_tracked_without_wrong_views_and_with_the_flow_into_it():
+    image, index = np.zeros((4, 6, 3), np.uint8), np.array([7], np.int32)
+    frame = Frame(index=7, time=0.2, images=(image, image), usable=np.array([True, True]))
+    checks = ViewChecks(frame=index, camera=np.array([1], np.int16), reasons=("torn",))
+    moved = np.ones((1, 2), np.float32)
+    flow = ImageFlow(frame=index, camera=np.array([0], np.int16), pixel=moved, displacement=moved, cameras=2)
+    seen = prepared(frame, checks, flow)
+    assert seen.usable.tolist() == [True, False]
+    assert [len(view.pixel) for view in seen.flow] == [1, 0]
+    assert prepared(frame, None, None) is frame
+
+
+def test_a_frame_begins_with_the_cloth_of_the_last_and_keeps_its_notes(tmp_path, monkeypatch):
+    begun = []
+
+    def noted(frame, state, *rest):
+        begun.append(state.estimate.parameters)
+        return replace(settle(frame, state, *rest), notes=("odd",) if frame.index == 2 else ())
+
+    monkeypatch.setattr("mocapflow.track.settle", noted)
+    run_tiny(write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=SHORT), tmp_path, frames=5)
+    track = the_track(tmp_path)
+    np.testing.assert_array_equal(begun[1:], track.cloth_parameters[:-1])
+    assert len(np.unique(track.cloth_parameters)) == 5
+    assert track.notes == ("frame 2: odd",)
+
+
+def test_what_frames_have_shown_is_known_after_a_lost_one(tmp_path, monkeypatch):
+    known = {}
+
+    def spy(frame, state, past, *rest):
+        known[frame.index] = set(past.appearance)
+        return settle(frame, state, past, *rest)
+
+    monkeypatch.setattr("mocapflow.track.settle", spy)
+    clip = write_recording(tmp_path / "clip", frames=3)
+    (clip / "videos" / "cam01" / "000001.png").write_bytes(b"")
+    run_tiny(write_pipeline(tmp_path, clip, stages=SHORT), tmp_path)
+    assert known == {0: set(), 2: {"grey", "count"}}
 
 
 def test_a_frame_that_shows_nobody_says_so(tmp_path, monkeypatch):
@@ -322,10 +481,31 @@ def test_a_garment_that_nothing_drapes_is_refused(tmp_path):
 
 
 def test_on_unsteady_stop(tmp_path, path):
-    with pytest.raises(
-        ComponentFailed, match=r"frame \d+ did not come to rest in 2 turns: .* mm and .*° in the last turn"
-    ):
+    said = r"frame 0 did not come to rest in 2 turns: .* mm and .*° in the last turn\n *the frame is saved; "
+    with pytest.raises(ComponentFailed, match=said):
         run_tiny(path, tmp_path, "stages.track.on_unsteady=stop", "stages.track.steady.max_turns=2")
+    _, lines = run_tiny(path, tmp_path, "stages.track.steady.max_turns=2")
+    assert "track: going on after 1 frames" in lines
+
+
+def test_on_unsteady_stop_leaves_frames_alone_that_are_not_asked_for(tmp_path, path, monkeypatch):
+    turns = "stages.track.steady.max_turns=5"  # frame 2 is the first that does not come to rest in them
+    monkeypatch.setenv("TINY_RAISE_AT", "3")
+    with pytest.raises(ComponentFailed, match="frames 0–2 are saved"):
+        run_tiny(path, tmp_path, turns)
+    with pytest.raises(ComponentFailed, match="frame 2 did not come to rest"):
+        run_tiny(path, tmp_path, turns, "stages.track.on_unsteady=stop", frames=3)
+    run_tiny(path, tmp_path, turns, "stages.track.on_unsteady=stop", frames=2)
+
+
+def test_on_unsteady_stop_does_not_stop_at_a_lost_frame(tmp_path):
+    clip = write_recording(tmp_path / "clip", frames=4)
+    (clip / "videos" / "cam01" / "000001.png").write_bytes(b"")
+    path = write_pipeline(tmp_path, clip, stages=SHORT)
+    for action in ("run", "hit"):
+        summary, _ = run_tiny(path, tmp_path, "stages.track.steady.max_turns=20", "stages.track.on_unsteady=stop")
+        assert actions(summary)["track"] == action
+    assert the_track(tmp_path).steady.tolist() == [True, False, True, True]
 
 
 @pytest.mark.parametrize("frames", [5, None])
@@ -339,6 +519,22 @@ def test_on_unsteady_stop_also_holds_for_frames_of_the_store(tmp_path, path, fra
     assert len(the_track(tmp_path).frame) == 5
     summary, _ = run_tiny(path, tmp_path, stop[0], frames=5)
     assert actions(summary)["track"] == "hit"
+
+
+def test_each_frame_has_its_own_seconds(tmp_path, monkeypatch):
+    ticks = itertools.count()
+    monkeypatch.setattr("mocapflow.timing.time", SimpleNamespace(process_time=lambda: next(ticks)))
+    run_tiny(write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=SHORT), tmp_path, frames=3)
+    track = the_track(tmp_path)
+    assert (track.seconds[:, :3] == [1, 2, 1]).all()  # decode; predict, also to come near; drape
+    assert (track.seconds[:, 3] == track.iterations).all()
+
+
+def test_a_body_of_more_faces_is_tracked_with_as_many_as_wanted(tmp_path, path, monkeypatch):
+    wanted = []
+    monkeypatch.setattr(Scene, "simplified", lambda self, faces: wanted.append(faces) or self)
+    run_tiny(path, tmp_path, "stages.track.body_faces=2345", frames=1)
+    assert wanted == [2345]
 
 
 def test_keep_trace_keeps_every_turn(tmp_path, path, whole):

@@ -172,7 +172,8 @@ def check_apart(out: Path, store: Path, recording: Path) -> None:
         PipelineError: the run folder or the store is the recording folder, or lies in one of its folders.
     """
     folder = recording.resolve()
-    inside = [(folder / name).resolve() for name in (*FOLDERS, WHOLE)]  # links, where a pipeline names each part
+    parts = [folder / name for name in (*FOLDERS, WHOLE)]
+    inside = [place.resolve() for part in parts for place in (part, *part.glob("*"))]  # links, where each is named
     for what, path, option in (("results", out, "--out"), ("stored results", store, "--store")):
         if path.resolve() == folder or any(path.resolve().is_relative_to(place) for place in inside):
             hint = f"give {what} a folder of their own: {option} {Path('runs') / folder.name}"

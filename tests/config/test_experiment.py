@@ -45,6 +45,18 @@ def test_every_combination_on_every_recording(tmp_path: Path) -> None:
     )
 
 
+def test_frames_that_are_given_count_and_paths_start_at_the_folder_of_the_experiment(tmp_path: Path) -> None:
+    path = written(tmp_path, GRID.replace("other.yaml", "elsewhere/other.yaml"))
+    last = load_experiment(path, frames="0:5")[-1]
+    assert (last.pipeline, last.folder, last.frames) == (tmp_path / "elsewhere" / "other.yaml", tmp_path, "0:5")
+
+
+def test_a_step_of_no_frame_is_refused_however_it_is_written(tmp_path: Path) -> None:
+    for said in ("0:20:0", "{step: 0}"):
+        with pytest.raises(PipelineError, match="input should be greater than 0, not 0"):
+            load_experiment(written(tmp_path, GRID.replace("frames: 0:20", f"frames: {said}")))
+
+
 def test_each_change_knows_where_it_is_said(tmp_path: Path) -> None:
     last = load_experiment(written(tmp_path, GRID))[-1]
     assert [place.removeprefix(f"{tmp_path}/") for place in last.places] == [

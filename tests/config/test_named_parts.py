@@ -144,8 +144,9 @@ def test_what_is_wrong_is_told_by_its_line(tmp_path, spread):
         folder_of({"cameras": "lab/rig.toml"}, "few", Resolver(read(tmp_path / "few.yaml"), Registry()))
 
 
-def test_a_run_among_the_named_parts_is_refused(tmp_path, spread):
-    pipeline = load_pipeline(spread, changes=["recording.videos=clip/videos"], folder=tmp_path)
+@pytest.mark.parametrize("named", ["clip/videos", "{cam01: clip/videos, cam02: b.mp4}"])
+def test_a_run_among_the_named_parts_is_refused(tmp_path, spread, named):
+    pipeline = load_pipeline(spread, changes=[f"recording.videos={named}"], folder=tmp_path)
     with pytest.raises(PipelineError, match="among the files of the recording"):
         run(pipeline, store=tmp_path / "store.zarr", out=tmp_path / "clip/videos/out")
 

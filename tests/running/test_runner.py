@@ -5,6 +5,8 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
+from functools import wraps
 from pathlib import Path
 
 import numpy as np
@@ -34,12 +36,14 @@ def outlook(path, folder, *changes, frames=None):
     return {line.label: (line.action, line.why) for line in lines}
 
 
-@pytest.mark.parametrize("out", ["clip", "clip/videos", "elsewhere/../clip/background/run"])
+@pytest.mark.parametrize("out", ["clip", "clip/videos", "elsewhere/../clip/background/run", "clip/static/run"])
 def test_a_run_folder_among_the_files_of_its_recording_is_refused(tmp_path, path, out):
     (tmp_path / "elsewhere").mkdir()
     before = sorted((tmp_path / "clip").rglob("*"))
     with pytest.raises(PipelineError, match="among the files of the recording"):
         run(load(path), store=tmp_path / "store.zarr", out=tmp_path / out)
+    with pytest.raises(PipelineError, match="the stored results would lie among the files of the recording"):
+        run(load(path), store=tmp_path / out, out=tmp_path / "out")
     assert sorted((tmp_path / "clip").rglob("*")) == before
     run(load(path, frames=2), store=tmp_path / "store.zarr", out=tmp_path / "clip" / "runs" / "mine")
 
@@ -60,9 +64,18 @@ def test_a_plan_says_what_a_run_does(tmp_path, path):
         "smooth": ("run", "new: track grew from 5 to 12 frames"),
         "export": always,
     }
+    assert outlook(path, tmp_path, frames=3)["track"] == ("hit", "3 frames")
     changed = outlook(path, tmp_path, "stages.track.draper=other_draper", frames=5)
     assert changed["track"] == ("run", "new: draper tiny_draper → other_draper")
     assert changed["smooth"] == ("run", "new: track was made anew")
+
+
+def test_a_plan_says_what_is_left_of_a_run_that_failed(tmp_path, path, monkeypatch):
+    monkeypatch.setenv("TINY_RAISE_AT", "7")
+    with pytest.raises(ComponentFailed):
+        run_tiny(path, tmp_path)
+    assert outlook(path, tmp_path)["track"] == ("resume", "7 of 12 frames done")
+    assert outlook(path, tmp_path, frames=5)["track"] == ("resume", "5 of 5 frames done")
 
 
 def test_a_plan_line_for_people(tmp_path, path):
@@ -88,8 +101,9 @@ def test_variants_share_what_comes_before(tmp_path, path):
 
 
 def test_fresh_makes_everything_anew(tmp_path, ran):
-    again, _ = run_tiny(ran, tmp_path, fresh=True)
+    again, lines = run_tiny(ran, tmp_path, fresh=True)
     assert set(actions(again).values()) == {"run"}
+    assert sum(": running " in line for line in lines) == len(STAGES)  # each once, whoever needs it
     assert len([p for p in (tmp_path / "store.zarr").iterdir() if p.name.startswith("track")]) == 1
 
 
@@ -151,7 +165,7 @@ def test_what_a_track_warned_of_is_kept_with_its_frames(tmp_path, path, monkeypa
 def test_what_is_odd_about_a_recording_is_told_when_it_is_run(tmp_path, path):
     _, lines = run_tiny(path, tmp_path, frames=2)
     said = "\n".join(lines)
-    assert "warning: nothing says the frame rate: 30 frames per second assumed" in said
+    assert said.count("warning: nothing says the frame rate: 30 frames per second assumed") == 1
     assert "warning: the images' up is the y axis of the world" in said
 
 
@@ -173,6 +187,33 @@ def test_cameras_made_by_a_stage_replace_those_of_later_ones(tmp_path):
         assert actions(run_tiny(path, tmp_path)[0])["align"] == action
         cameras = json.loads((tmp_path / "out" / "results.json").read_text())["cameras"]
         assert cameras and all(name.startswith("aligned ") for name in cameras)
+
+
+def test_of_a_recording_that_a_stage_changes_each_stage_gets_its_frames(tmp_path):
+    """The start takes the first frame only, and says so."""
+    stages = {"corrupt": "corrupt", "start": "tiny_start", "track": STAGES["track"]}
+    path = write_pipeline(tmp_path, write_recording(tmp_path / "clip"), stages=stages)
+    run_tiny(path, tmp_path, frames=3)
+    assert len(the_track(tmp_path).frame) == 3
+
+
+def test_a_run_that_is_to_stop_begins_no_other_stage(tmp_path, path, monkeypatch):
+    """Also where compiled code of the stage before has swallowed the signal."""
+    asked = iter([None])
+
+    def check():
+        if next(asked, "stop"):
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("mocapflow.running.execution.check", check)
+    with pytest.raises(KeyboardInterrupt):
+        run_tiny(path, tmp_path)
+    assert [found.path.name.partition("-")[0] for found in Store(tmp_path / "store.zarr").artifacts()] == ["background"]
+
+
+def test_what_a_single_stage_needs_is_told_with_it(tmp_path, ran):
+    summary = run(load(ran), store=tmp_path / "store.zarr", out=tmp_path / "out", only="export")
+    assert actions(summary) == {"smooth": "hit", "export": "run"}
 
 
 def test_evaluations_always_run_and_are_not_stored(tmp_path):
@@ -247,6 +288,22 @@ def test_a_result_that_can_not_be_kept_is_not_told_as_done(tmp_path, path, monke
     assert told == []
 
 
+def test_a_result_that_is_no_number_is_not_kept(tmp_path, path, monkeypatch):
+    pipeline = load(path)
+    stage = type(pipeline.stages[1].stage)
+
+    @wraps(stage.run)
+    def lost(self, *given, **named):
+        made = real(self, *given, **named)
+        return replace(made, pose=replace(made.pose, angles=np.full(2, np.nan)))
+
+    real = stage.run
+    monkeypatch.setattr(stage, "run", lost)
+    with pytest.raises(ComponentFailed, match=r"^stage 'tiny_start' .* failed: it returned a pose that is not finite"):
+        run(pipeline, store=tmp_path / "store.zarr", out=tmp_path / "out")
+    assert [found.path.name.partition("-")[0] for found in Store(tmp_path / "store.zarr").artifacts()] == ["background"]
+
+
 @pytest.mark.parametrize("inputs", ["subject.txt", ["subject.txt"], None, iter([Path("subject.txt")])])
 def test_inputs_that_are_no_paths_name_the_body(tmp_path, path, monkeypatch, inputs):
     pipeline = load(path)
@@ -312,6 +369,31 @@ def test_a_garment_is_not_sewn_for_what_is_in_the_store(tmp_path, monkeypatch):
     pipeline = load(path)
     monkeypatch.setattr(type(pipeline.garment), "sew", None)
     assert {line.action for line in plan(pipeline, store=tmp_path / "store.zarr")} == {"hit"}
+
+
+def test_what_a_body_lacks_is_told_by_a_plan(tmp_path, path, monkeypatch):
+    def need(self, recording):
+        raise RecordingError("there is no scan")
+
+    pipeline = load(path)
+    monkeypatch.setattr(type(pipeline.body), "need", need)
+    with pytest.raises(RecordingError, match="there is no scan"):
+        plan(pipeline, store=tmp_path / "store.zarr")
+
+
+def test_a_fresh_run_that_can_not_begin_leaves_the_store_as_it_is(tmp_path, monkeypatch):
+    def sew(self, body):
+        raise GarmentError("too short", hint="lengthen it")
+
+    stages = {name: STAGES[name] for name in ("start", "track")}
+    path = write_pipeline(tmp_path, write_recording(tmp_path / "clip", frames=2), stages=stages)
+    run_tiny(path, tmp_path)
+    pipeline, store = load(path), Store(tmp_path / "store.zarr")
+    before = store.artifacts()
+    monkeypatch.setattr(type(pipeline.garment), "sew", sew)
+    with pytest.raises(GarmentError, match="too short"):
+        run(pipeline, store=store.path, out=tmp_path / "out", fresh=True)
+    assert store.artifacts() == before
 
 
 def test_a_run_folder_that_cannot_be_made(tmp_path, path):

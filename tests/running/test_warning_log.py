@@ -12,7 +12,8 @@ from mocapflow.running.warning_log import warnings_logged
 from tests.fixtures.stores import PLUGIN, run_tiny, write_pipeline, write_recording
 
 
-def test_warnings_are_kept_but_for_those_of_onlookers():
+def test_warnings_are_kept_but_for_those_of_onlookers(caplog):
+    caplog.set_level(logging.INFO)
     logger = logging.getLogger("mocapflow")
     with warnings_logged() as said:
         logger.warning("frame %d is dark", 3)
@@ -40,6 +41,15 @@ def test_warnings_of_a_plugin_are_kept_whatever_its_logger_is_called(name):
     with warnings_logged(["another"]) as nothing:
         logging.getLogger(name).warning("a guess")
     assert (said, nothing) == (["a guess"], [])
+
+
+def test_warnings_of_any_module_of_a_plugin_are_kept(monkeypatch):
+    module = ModuleType("dresses.lace")
+    module.__file__ = __file__
+    monkeypatch.setitem(sys.modules, "dresses.lace", module)
+    with warnings_logged(["dresses"]) as said:
+        logging.getLogger("lace").warning("a guess")
+    assert said == ["a guess"]
 
 
 def test_what_a_plugin_file_warns_of_is_kept_with_what_it_made(tmp_path):

@@ -9,6 +9,7 @@ import pytest
 from mocapflow.errors import ComponentFailed, StoreError
 from mocapflow.running.runner import run
 from mocapflow.storage import checkpoint, packing
+from mocapflow.storage.rows import read_json
 from tests.fixtures.stores import load, run_tiny, same, the_track
 
 
@@ -56,6 +57,30 @@ def test_a_frame_whose_count_could_not_be_written_is_not_said_to_be_saved(tmp_pa
         patch.setattr(checkpoint, "write_json", write)
         run_tiny(path, tmp_path)
     assert frames_saved(tmp_path) == "track: going on after 3 frames"
+
+
+def test_a_run_that_ends_after_its_last_frame_has_only_to_write_its_arrays(tmp_path, path, monkeypatch, whole):
+    def seal(*_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(checkpoint, "seal", seal)
+        run_tiny(path, tmp_path)
+    assert frames_saved(tmp_path) == "track: going on after 12 frames"
+    assert same(the_track(whole), the_track(tmp_path))
+
+
+def test_what_was_warned_of_before_a_run_failed_is_kept_and_its_arrays_are_as_long_as_its_frames(
+    tmp_path, path, monkeypatch
+):
+    monkeypatch.setenv("TINY_WARN_AT", "3")
+    monkeypatch.setenv("TINY_RAISE_AT", "7")
+    with pytest.raises(ComponentFailed):
+        run_tiny(path, tmp_path)
+    run_tiny(path, tmp_path, frames=5)
+    (group,) = (tmp_path / "store.zarr").glob("track-*")
+    assert read_json(group / "zarr.json")["attributes"]["warnings"] == ["frame 3 is dark"]
+    assert {read_json(group / name / "zarr.json")["shape"][0] for name in ("angles", "cloth")} == {7}
 
 
 def test_a_frame_with_more_numbers_than_those_before_is_refused(tmp_path, path, monkeypatch):

@@ -332,6 +332,11 @@ def damage_zarr_json(group):
     (group / "zarr.json").write_text('{"attributes": {"key": ')
 
 
+def lose_attributes(group):
+    meta = rows.read_json(group / "zarr.json")
+    rows.write_json(group / "zarr.json", meta | {"attributes": {}})
+
+
 def damage_array_json(group):
     (group / "angles" / "zarr.json").write_text("{")
 
@@ -363,7 +368,7 @@ def remove_rows(group):
     (group / "live" / "rows" / "c.3.0").unlink()
 
 
-@pytest.mark.parametrize("damage", [damage_zarr_json, remove_rows])
+@pytest.mark.parametrize("damage", [damage_zarr_json, lose_attributes, remove_rows])
 def test_a_damaged_group_is_set_aside_and_made_anew(tmp_path, ran, damage):
     whole, group = the_track(tmp_path), without_smooth(tmp_path)
     damage(group)
