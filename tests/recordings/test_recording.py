@@ -246,8 +246,9 @@ def changed(tmp_path, matrix=None, distortion=None, fisheye=False):
     return write_recording(tmp_path, frames=2, cameras=cameras)
 
 
-def test_a_focal_length_in_millimetres(tmp_path):
-    folder = changed(tmp_path, [[4.2, 0, 31.5], [0, 4.2, 23.5], [0, 0, 1]])
+@pytest.mark.parametrize(("fx", "fy"), [(4.2, 4.2), (4.2, 60), (60, 4.2)])
+def test_a_focal_length_in_millimetres(tmp_path, fx, fy):
+    folder = changed(tmp_path, [[fx, 0, 31.5], [0, fy, 23.5], [0, 0, 1]])
     assert refused(folder).startswith(
         f"{tmp_path / 'cameras.toml'}:10:3  camera 'cam02' has a focal length of 4.2 px in pictures of 64\n"
         "       matrix is in pixels: "
@@ -271,7 +272,11 @@ def test_cameras_whose_size_no_file_tells_are_no_rig_that_is_wrong(tmp_path):
             None,
             "principal point (63, 23.5) is not in its pictures",
         ),
+        ([[60, 0, 31.5], [0, 60, 50], [0, 0, 1]], None, "principal point (31.5, 50) is not in its pictures"),
         (None, [-0.1, 0.1, 0.05, 0.001, 0], "tangential distortion moves pixels by "),
+        (None, [-0.1, 0.1, 0.001, 0.05, 0], "tangential distortion moves pixels by "),
+        (None, [-1.2, 0, 0, 0, 0], "distortion folds 20% of the undistorted picture, as no lens does"),
+        (None, [3, 0, 0, 0, 0], "distortion folds 20% of the undistorted picture, as no lens does"),
         (None, [-3, 0, 0, 0, 0], "distortion folds 62% of the undistorted picture, as no lens does"),
         (None, [-0.3, 0.1, 0.002, 0.001, 0], ""),
         # of a GoPro: it folds what lies beyond the undistorted picture
