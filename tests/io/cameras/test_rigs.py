@@ -1,0 +1,28 @@
+"""Whether cameras make sense together, by their numbers alone; what the doctor makes of it is tested there."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from mocapflow.io.cameras.rigs import examine_rig
+from tests.fixtures.recordings import ring
+
+
+def moved(camera, turn_deg=0.0, aside_m=0.0):
+    """Return a camera that is rolled about its viewing direction where it stands, and then put aside."""
+    motion = np.eye(4)
+    motion[:3, :3] = Rotation.from_euler("z", turn_deg, degrees=True).as_matrix()
+    motion[0, 3] = aside_m
+    return replace(camera, name="another", camera_from_world=motion @ camera.camera_from_world)
+
+
+@pytest.mark.parametrize(
+    ("turn_deg", "aside_m", "told"),
+    [(0.0, 0.0, True), (0.9, 0.0, True), (1.1, 0.0, False), (0.0, 0.019, True), (0.0, -0.021, False)],
+)
+def test_two_cameras_are_one_within_two_centimetres_and_a_degree(turn_deg, aside_m, told):
+    cameras = ring()
+    said = [finding.message for finding in examine_rig([*cameras, moved(cameras[0], turn_deg, aside_m)])]
+    assert said == ["cam01 and another stand in one place and look the same way"] * told
