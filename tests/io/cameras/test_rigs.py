@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mocapflow.io.cameras.rigs import examine_rig
+from mocapflow.geometry.cameras import centre, directions
+from mocapflow.io.cameras.rigs import examine_rig, examine_view
 from tests.fixtures.recordings import ring
 
 
@@ -26,3 +27,14 @@ def test_two_cameras_are_one_within_two_centimetres_and_a_degree(turn_deg, aside
     cameras = ring()
     said = [finding.message for finding in examine_rig([*cameras, moved(cameras[0], turn_deg, aside_m)])]
     assert said == ["cam01 and another stand in one place and look the same way"] * told
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "seen"),
+    [(63.4, 20, True), (63.6, 20, False), (-0.4, 20, True), (-0.6, 20, False), (30, 47.4, True), (30, 47.6, False)],
+)
+def test_a_point_is_seen_where_it_lies_in_the_picture(x, y, seen):
+    camera = ring()[0]  # 64 x 48 px
+    point = centre(camera) + 4 * directions(np.array([x, y]), camera)
+    told = [finding.message for finding in examine_view([camera], point, "the root")]
+    assert told == ["no camera sees the root"] * (not seen)

@@ -86,6 +86,16 @@ def test_everything_odd_is_said(tmp_path):
     assert odd_keypoints("cam02", tmp_path, 3) == []
 
 
+@pytest.mark.parametrize("points", [person() * [1, 1, 0] + [0, 0, 87], person(24)[:, :2] + 3])  # pairs fill 16 rows
+def test_confidences_that_are_none(tmp_path, points):
+    write(tmp_path / "c.0.json", person() * [1, 1, 0] + [0, 0, 1.1])
+    assert odd_keypoints("cam02", tmp_path, 1) == []
+    write(tmp_path / "c.0.json", points)
+    assert odd_keypoints("cam02", tmp_path, 1) == [
+        "cam02: keypoints of frame 0 have confidences far beyond 1: are they percents, or is there none behind x and y?"
+    ]
+
+
 def test_shares_of_the_picture_are_no_pixels(tmp_path):
     write(tmp_path / "c.0.json", person() / [64, 48, 1])
     assert odd_keypoints("cam02", tmp_path, 1) == [
