@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from mocapflow.geometry.cameras import centre, directions
 from mocapflow.io.cameras.rigs import examine_rig, examine_view
-from tests.fixtures.recordings import ring
+from tests.fixtures.recordings import look_at, ring
 
 
 def moved(camera, turn_deg=0.0, aside_m=0.0):
@@ -38,3 +38,9 @@ def test_a_point_is_seen_where_it_lies_in_the_picture(x, y, seen):
     point = centre(camera) + 4 * directions(np.array([x, y]), camera)
     told = [finding.message for finding in examine_view([camera], point, "the root")]
     assert told == ["no camera sees the root"] * (not seen)
+
+
+def test_a_single_camera_may_stand_below_the_floor():
+    low = look_at("low", np.array([0.5, -4.0, -0.2]))
+    for cameras, told in (([*ring(), low], False), ([low, replace(low, name="twin")], True)):
+        assert any("below the floor" in finding.message for finding in examine_rig(cameras)) == told
