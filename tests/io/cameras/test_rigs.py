@@ -44,3 +44,8 @@ def test_a_single_camera_may_stand_below_the_floor():
     low = look_at("low", np.array([0.5, -4.0, -0.2]))
     for cameras, told in (([*ring(), low], False), ([low, replace(low, name="twin")], True)):
         assert any("below the floor" in finding.message for finding in examine_rig(cameras)) == told
+
+
+def test_cameras_on_their_sides_all_around_agree_on_no_up():
+    said = [finding.message for finding in examine_rig([moved(camera, 90) for camera in ring()])]
+    assert not any("up is" in message for message in said)
