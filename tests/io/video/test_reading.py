@@ -171,6 +171,8 @@ def test_a_link_that_leads_nowhere(tmp_path):
     (tmp_path / "a.mp4").symlink_to(tmp_path / "gone.mp4")
     with pytest.raises(RecordingError, match=r"no such video\n       it is a link to .*gone\.mp4, where nothing is"):
         open_video(tmp_path / "a.mp4")
+    write_video(tmp_path / "gone.mp4", 3)
+    assert open_video(tmp_path / "a.mp4").frames == 3
 
 
 def test_a_video_that_may_not_be_read(tmp_path, monkeypatch):
