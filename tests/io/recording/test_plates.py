@@ -75,6 +75,14 @@ def test_several_plates_give_the_spread_of_each_pixel(tmp_path):
     assert scene.spread[1].min() >= 0.9 * 5  # no pixel is trusted more than the usual one
 
 
+def test_nothing_is_trusted_to_less_than_a_grey_level(tmp_path):
+    write_recording(tmp_path, frames=2)
+    for name in NAMES:
+        for take in range(2):
+            plate(tmp_path / "background" / name / f"{take}.png")
+    assert all((spread == 1).all() for spread in open_recording(tmp_path).background().spread)
+
+
 def room(noise=0.0, seed=0):
     """A room of 60 x 80 px, dark to the left and light to the right."""
     grey = np.linspace(40, 200, 80)[None, :, None] + np.array([-10.0, 0.0, 20.0])
