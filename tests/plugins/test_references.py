@@ -125,6 +125,11 @@ def test_of_two_markers_of_one_name_the_first_is_taken(tmp_path: Path) -> None:
     assert landmarks(["LKNE", "L.KNE"], tmp_path) == {"knee_lateral_l": 0}
 
 
+def test_joint_centres_of_a_trc_are_taken_to_our_axes(own: TrackedMotion, tmp_path: Path) -> None:
+    write_trc(tmp_path / "m.trc", own.stick.names, opensim_from_world(own.stick.places), RATE)
+    np.testing.assert_allclose(read_reference(tmp_path / "m.trc").joints, own.stick.places, atol=1e-7)
+
+
 def test_markers_that_tell_nothing_say_what_to_do(tmp_path: Path) -> None:
     write_trc(tmp_path / "m.trc", ["A", "B"], np.zeros((3, 2, 3)), 100.0)
     with pytest.raises(RecordingError, match=r"neither joint centres nor markers(.|\n)*markers\.toml(.|\n)*A, B"):

@@ -488,8 +488,11 @@ def test_frames_that_are_not_there(tmp_path, part):
 def test_wrong_arguments(tmp_path):
     assert refused(tmp_path / "nowhere").endswith("nowhere  no such recording folder")
     write_recording(tmp_path)
-    assert refused(tmp_path, scale=2).startswith("the scale is 2; expected")
-    assert refused(tmp_path, scale=0.01).startswith("the scale 0.01 leaves images of less than 8 pixels")
+    for scale in (2, 0, -0.5):
+        assert refused(tmp_path, scale=scale).startswith(f"the scale is {scale}; expected")
+    open_recording(tmp_path, scale=0.17)  # 8.16 of 48 px
+    for scale in (0.16, 0.01):
+        assert refused(tmp_path, scale=scale).startswith(f"the scale {scale} leaves images of less than 8 pixels")
     with pytest.raises(RecordingError, match="no frame 10: the videos have frames 0 to 9"):
         open_recording(tmp_path).frame(10)
 
@@ -504,3 +507,11 @@ def test_memory_does_not_grow_with_the_number_of_frames(tmp_path):
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[1] < peaks[0] + 2e5  # ten times the frames: 270 x 3 views x 9 kB would be 7 MB
+
+
+def test_keypoints_of_a_late_camera_are_those_of_its_later_pictures(tmp_path):
+    write_keypoints(write_recording(tmp_path, frames=8), 8)
+    (tmp_path / "recording.json").write_text('{"late_frames": {"cam02": 2}}')
+    recording = open_recording(tmp_path)
+    assert [people[0, 0, 0] for people in recording.people(3)] == [13, 15, 13]  # as `write_keypoints` has them
+    assert [len(people) for people in recording.people(7)] == [1, 0, 1]
