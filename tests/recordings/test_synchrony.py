@@ -237,3 +237,15 @@ def test_the_standard_deviation_of_a_lag_is_that_of_repeated_noise():
 )
 def test_a_camera_is_late_beyond_half_a_frame_and_three_standard_deviations(frames, sd, sure):
     assert synchrony.Lateness(camera="cam01", frames=frames, sd=sd).sure == sure
+
+
+def test_a_camera_that_shares_nothing_with_the_others_is_not_called_punctual():
+    moving = np.sin(np.arange(60.0) / 5)[:, None]
+
+    def signals(one, other):
+        noisy = moving + np.random.default_rng(other).normal(0, 0.01, moving.shape)
+        return moving, noisy if other < 3 else np.full_like(moving, np.nan)
+
+    assert len(synchrony.lateness(["a", "b", "c"], signals, 5)) == 3
+    with pytest.raises(RecordingError, match="too little of the same person"):
+        synchrony.lateness(["a", "b", "c", "d"], signals, 5)

@@ -96,6 +96,12 @@ def test_confidences_that_are_none(tmp_path, points):
     ]
 
 
+def test_nobody_is_no_share_of_a_picture(tmp_path):
+    write(tmp_path / "c.0.json", np.zeros((25, 3)))
+    write(tmp_path / "c.1.json")
+    assert odd_keypoints("cam02", tmp_path, 2) == []
+
+
 def test_shares_of_the_picture_are_no_pixels(tmp_path):
     write(tmp_path / "c.0.json", person() / [64, 48, 0.8])  # OpenPose's confidence may be a little beyond 1
     assert odd_keypoints("cam02", tmp_path, 1) == [
