@@ -299,11 +299,12 @@ def test_a_run_is_told_of_a_world_that_is_not_z_up(tmp_path):
     assert said[0].startswith("the images' up is the y axis of the world: the world has to be z up: turn ")
 
 
-def test_a_camera_later_than_the_recording_is_long(tmp_path):
+@pytest.mark.parametrize("late", [-40, -2, 2])
+def test_a_camera_later_than_the_recording_is_long(tmp_path, late):
     write_recording(tmp_path, frames=2)
-    (tmp_path / "recording.json").write_text('{"late_frames": {"cam02": -40}}')
+    (tmp_path / "recording.json").write_text(json.dumps({"late_frames": {"cam02": late}}))
     assert refused(tmp_path) == (
-        f"{tmp_path / 'recording.json'}:1:19  camera 'cam02' is -40 frames late in a recording of 2\n"
+        f"{tmp_path / 'recording.json'}:1:19  camera 'cam02' is {late} frames late in a recording of 2\n"
         "       late_frames counts frames, not milliseconds; `mocapflow doctor DIR --sync` measures it"
     )
 
@@ -411,6 +412,16 @@ def test_different_frame_rates(tmp_path):
     shutil.move(tmp_path / "videos", tmp_path / "static" / "videos")
     calibration = tmp_path / "cameras.toml"
     assert f"{tmp_path}/static/videos  {said}" in refused(tmp_path / "static", calibration=calibration)
+
+
+@pytest.mark.parametrize(("rate", "apart"), [(25.2, False), (25.3, True)])
+def test_frame_rates_that_differ_by_more_than_a_hundredth(tmp_path, rate, apart):
+    write_recording(tmp_path, frames=4)
+    write_video(tmp_path / "videos" / "cam02.mp4", 4, rate=rate)
+    if apart:
+        assert "the videos differ in frame rate" in refused(tmp_path)
+    else:
+        assert open_recording(tmp_path).frame_rate == 25
 
 
 def test_a_stated_frame_rate_does_not_hide_that_the_videos_differ(tmp_path):
