@@ -33,8 +33,8 @@ def landmarks(labels: Sequence[str], folder: Path) -> dict[str, int]:
     """Return which marker shows which landmark: by markers.toml in the folder, else by the names that are known.
 
     Raises:
-        RecordingError: markers.toml can't be read, or names a landmark or a marker that is not there; without one, known
-            names are there of more than one subject.
+        RecordingError: markers.toml can't be read, or names a landmark or a marker that is not there; without one,
+            there are known names of more than one subject.
     """
     told = _told(labels, folder / FILE)
     plain = {_plain(label): index for index, label in reversed(list(enumerate(labels)))}
@@ -48,7 +48,7 @@ def landmarks(labels: Sequence[str], folder: Path) -> dict[str, int]:
                 found[f"{name}_{side}"] = index
     if len(subjects) > 1 and not told:
         what = f"there are markers of {len(subjects)} subjects: {', '.join(sorted(subjects))}"
-        hint = "export one of them, or name the markers of one in this file: knee_lateral_l = \"…\""
+        hint = 'export one of them, or name the markers of one in this file: knee_lateral_l = "…"'
         raise RecordingError(what, where=str(folder / FILE), hint=hint)
     return told if len(subjects) > 1 else found | told
 

@@ -111,7 +111,7 @@ def test_names_can_be_told(tmp_path: Path) -> None:
 
 def test_markers_of_two_people_are_not_mixed(tmp_path: Path) -> None:
     labels = ["Anna:LKNE", "Bert:LKNE", "Bert:LKNM", "Ball:top"]
-    with pytest.raises(RecordingError, match=r"markers\.toml  there are markers of 2 subjects: Anna, Bert\n.*export one"):
+    with pytest.raises(RecordingError, match=r"\.toml  there are markers of 2 subjects: Anna, Bert\n.*export one"):
         landmarks(labels, tmp_path)
     assert landmarks([label for label in labels if "Anna" not in label], tmp_path) == {
         "knee_lateral_l": 0,

@@ -20,7 +20,7 @@ def test_who_differs_in_one_colour_alone_is_seen(change):
     assert not foreground(image, room).any()
 
 
-FRONT, ABOVE, BESIDE = (look_at("a", np.array(place)) for place in ([4, 0, 1.5], [1, 0, 5.0], [0, 4, 1.5]))  # 64 x 48 px
+FRONT, ABOVE, BESIDE = (look_at("a", np.array(place)) for place in ([4, 0, 1.5], [1, 0, 5.0], [0, 4, 1.5]))
 
 
 @pytest.mark.parametrize(
