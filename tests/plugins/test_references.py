@@ -130,6 +130,12 @@ def test_joint_centres_of_a_trc_are_taken_to_our_axes(own: TrackedMotion, tmp_pa
     np.testing.assert_allclose(read_reference(tmp_path / "m.trc").joints, own.stick.places, atol=1e-7)
 
 
+@pytest.mark.parametrize("start", [0, 1])
+def test_a_trc_may_begin_at_one_sample_too(own: TrackedMotion, tmp_path: Path, start: int) -> None:
+    write_trc(tmp_path / "m.trc", own.stick.names, opensim_from_world(own.stick.places), RATE, start=start / RATE)
+    assert read_reference(tmp_path / "m.trc").counted_from == pytest.approx(start / RATE, abs=1e-6)
+
+
 def test_markers_that_tell_nothing_say_what_to_do(tmp_path: Path) -> None:
     write_trc(tmp_path / "m.trc", ["A", "B"], np.zeros((3, 2, 3)), 100.0)
     with pytest.raises(RecordingError, match=r"neither joint centres nor markers(.|\n)*markers\.toml(.|\n)*A, B"):
