@@ -87,6 +87,7 @@ def test_qualisys_units_and_axes(tmp_path):
     np.testing.assert_allclose(camera.distortion, [-0.05, 0.14, 0.001, 0.002, 0.01])
     np.testing.assert_allclose(centre(camera), [2.5, 0.1, 1.2])
     np.testing.assert_allclose(camera.camera_from_world[:3, :3], [[0, 1, 0], [0, 0, -1], [-1, 0, 0]])  # y down, z ahead
+    assert metadata(path) == {}
 
 
 def write_easymocap(folder, cameras, sizes=True, vectors=True):
