@@ -28,7 +28,6 @@ POSE2SIM = {
 }  # fmt: skip
 SLACK = 0.03  # of a sample: times in files are rounded
 SPARSE = 1.0  # s between samples; between such that are farther apart a curve would be made up
-BACKWARDS = -30.0  # deg; beyond, no knee bends to the front: models such as gait2392 count flexion as negative
 AROUND = 360.0  # deg; no angle between two bones is larger
 SUFFIXES = (".csv", ".mot", ".sto", ".trc", ".c3d")
 
@@ -111,15 +110,10 @@ def _table(path: Path) -> Reference:
 
 def _motion(path: Path) -> Reference:
     columns, time = read_mot(path)
-    knees = [name for name in SIGNED if name in columns]
-    turned = any(np.nanmin(columns[name], initial=0.0) < BACKWARDS for name in knees)
-    columns |= {name: -columns[name] for name in knees if turned}
     named = {f"{theirs}_{side}": f"{ours}_{side}" for theirs, ours in MOTION.items() for side in ("l", "r")}
     curves = {ours: columns[theirs] for theirs, ours in named.items() if theirs in columns}
-    curves |= {name: columns[name] for name in knees}
+    curves |= {name: columns[name] for name in SIGNED if name in columns}
     start, notes = counted_from(time)
-    if turned:
-        notes = (*notes, f"{', '.join(knees)}: flexion is negative there, as in gait2392; taken with the other sign")
     if offset := [name for name in curves if not name.startswith(("knee", "elbow"))]:
         notes = (*notes, f"OpenSim has zeros of its own, so these may be off by a constant: {', '.join(offset)}")
     return Reference(curves=curves, at=time, by_frame=False, notes=notes, counted_from=start)

@@ -407,13 +407,3 @@ def test_a_knee_of_opensim_is_compared_as_signed_too(tmp_path: Path) -> None:
     assert not any("constant" in note for note in read_reference(tmp_path / "m.mot").notes)
     np.testing.assert_allclose(curves["knee_angle_l"], bend)
     assert set(curves) == {"knee_angle_l", "knee_flexion_l"}
-
-
-def test_knees_that_count_flexion_as_negative_are_turned(tmp_path: Path) -> None:
-    bend = {"knee_angle_l": np.array([4.0, -20.0, -60.0]), "knee_angle_r": np.array([2.0, -5.0, np.nan])}
-    write_mot(tmp_path / "m.mot", bend, np.arange(3) / 30)
-    reference = read_reference(tmp_path / "m.mot")
-    for side in ("l", "r"):
-        for name in (f"knee_angle_{side}", f"knee_flexion_{side}"):
-            np.testing.assert_allclose(reference.curves[name], -bend[f"knee_angle_{side}"])
-    assert reference.notes[-1].startswith("knee_angle_l, knee_angle_r: flexion is negative there, as in gait2392")

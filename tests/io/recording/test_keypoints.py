@@ -84,6 +84,8 @@ def test_everything_odd_is_said(tmp_path):
     for frame in range(3):
         write(tmp_path / f"c.{frame}.json", person())
     assert odd_keypoints("cam02", tmp_path, 3) == []
+    (tmp_path / "c.0.json").unlink()
+    assert odd_keypoints("cam02", tmp_path, 3) == ["cam02: keypoints of frame 0 are missing: nobody is seen there"]
 
 
 @pytest.mark.parametrize("points", [person() * [1, 1, 0] + [0, 0, 87], person(24)[:, :2] + 3])  # pairs fill 16 rows
