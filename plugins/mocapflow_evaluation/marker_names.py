@@ -33,17 +33,24 @@ def landmarks(labels: Sequence[str], folder: Path) -> dict[str, int]:
     """Return which marker shows which landmark: by markers.toml in the folder, else by the names that are known.
 
     Raises:
-        RecordingError: markers.toml can't be read, or names a landmark or a marker that is not there.
+        RecordingError: markers.toml can't be read, or names a landmark or a marker that is not there; without one,
+            there are known names of more than one subject.
     """
+    told = _told(labels, folder / FILE)
     plain = {_plain(label): index for index, label in reversed(list(enumerate(labels)))}
-    found = {}
+    found, subjects = {}, set()
     for name, patterns in KNOWN.items():
         for side in ("l", "r"):
-            spelled = (_plain(re.sub("^s", side, pattern)) for pattern in patterns)
+            spelled = [_plain(re.sub("^s", side, pattern)) for pattern in patterns]
+            subjects |= {_subject(label) for label in labels if _plain(label) in spelled}
             index = next((plain[each] for each in spelled if each in plain), None)
             if index is not None:
                 found[f"{name}_{side}"] = index
-    return found | _told(labels, folder / FILE)
+    if len(subjects) > 1 and not told:
+        what = f"there are markers of {len(subjects)} subjects: {', '.join(sorted(subjects))}"
+        hint = 'export one of them, or name the markers of one in this file: knee_lateral_l = "…"'
+        raise RecordingError(what, where=str(folder / FILE), hint=hint)
+    return told if len(subjects) > 1 else found | told
 
 
 def _told(labels: Sequence[str], path: Path) -> dict[str, int]:
@@ -60,6 +67,10 @@ def _told(labels: Sequence[str], path: Path) -> dict[str, int]:
                 f"no marker '{label}'", where=place(path, landmark), hint=alternatives(str(label), labels)
             )
     return {landmark: list(labels).index(label) for landmark, label in told.items()}
+
+
+def _subject(label: str) -> str:
+    return label.rpartition(":")[0]
 
 
 def _plain(label: str) -> str:

@@ -109,6 +109,33 @@ def test_names_can_be_told(tmp_path: Path) -> None:
         landmarks(["Inner"], tmp_path)
 
 
+def test_markers_of_two_people_are_not_mixed(tmp_path: Path) -> None:
+    labels = ["Anna:LKNE", "Bert:LKNE", "Bert:LKNM", "Ball:top"]
+    with pytest.raises(RecordingError, match=r"\.toml  there are markers of 2 subjects: Anna, Bert\n.*export one"):
+        landmarks(labels, tmp_path)
+    assert landmarks([label for label in labels if "Anna" not in label], tmp_path) == {
+        "knee_lateral_l": 0,
+        "knee_medial_l": 1,
+    }
+    (tmp_path / "markers.toml").write_text('knee_lateral_l = "Bert:LKNE"\n')
+    assert landmarks(labels, tmp_path) == {"knee_lateral_l": 1}
+
+
+def test_of_two_markers_of_one_name_the_first_is_taken(tmp_path: Path) -> None:
+    assert landmarks(["LKNE", "L.KNE"], tmp_path) == {"knee_lateral_l": 0}
+
+
+def test_joint_centres_of_a_trc_are_taken_to_our_axes(own: TrackedMotion, tmp_path: Path) -> None:
+    write_trc(tmp_path / "m.trc", own.stick.names, opensim_from_world(own.stick.places), RATE)
+    np.testing.assert_allclose(read_reference(tmp_path / "m.trc").joints, own.stick.places, atol=1e-7)
+
+
+@pytest.mark.parametrize("start", [0, 1])
+def test_a_trc_may_begin_at_one_sample_too(own: TrackedMotion, tmp_path: Path, start: int) -> None:
+    write_trc(tmp_path / "m.trc", own.stick.names, opensim_from_world(own.stick.places), RATE, start=start / RATE)
+    assert read_reference(tmp_path / "m.trc").counted_from == pytest.approx(start / RATE, abs=1e-6)
+
+
 def test_markers_that_tell_nothing_say_what_to_do(tmp_path: Path) -> None:
     write_trc(tmp_path / "m.trc", ["A", "B"], np.zeros((3, 2, 3)), 100.0)
     with pytest.raises(RecordingError, match=r"neither joint centres nor markers(.|\n)*markers\.toml(.|\n)*A, B"):

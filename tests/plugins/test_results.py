@@ -223,3 +223,10 @@ def test_table_with_a_missing_cell_says_where(tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text(f"frame,knee_flexion_l\n0,{'1' * 200_000}\n")
     with pytest.raises(RecordingError, match=r"t\.csv:2  is no table: field larger than"):
         read_columns(tmp_path / "t.csv")
+
+
+def test_a_note_stands_with_the_frame_of_its_number():
+    track = replace(stepping(demo_scene().body, 9), notes=("frame 8: odd",))
+    later = replace(track, frame=track.frame + 7)
+    assert runjson._frame(later, 1, False, runjson.by_frame(later.notes))["notes"] == ["odd"]
+    assert "notes" not in runjson._frame(later, 8, False, runjson.by_frame(later.notes))

@@ -129,3 +129,9 @@ def test_legs_alone_have_no_arms() -> None:
     found = opensim.coordinates(body, np.eye(4)[None], np.zeros((1, len(body.twists))))
     assert not any("arm" in n or "elbow" in n or "lumbar" in n for n in found)
     assert {"hip_flexion_l", "knee_angle_r", "ankle_angle_l"} <= set(found)
+
+
+def test_axes_of_segments_at_rest_are_rotations_though_limbs_lie_askew():
+    for name, axes in opensim.rest_frames(ball_body()).items():
+        np.testing.assert_allclose(axes.T @ axes, np.eye(3), atol=1e-12, err_msg=name)
+        assert np.linalg.det(axes) > 0

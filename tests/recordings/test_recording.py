@@ -246,8 +246,9 @@ def changed(tmp_path, matrix=None, distortion=None, fisheye=False):
     return write_recording(tmp_path, frames=2, cameras=cameras)
 
 
-def test_a_focal_length_in_millimetres(tmp_path):
-    folder = changed(tmp_path, [[4.2, 0, 31.5], [0, 4.2, 23.5], [0, 0, 1]])
+@pytest.mark.parametrize(("fx", "fy"), [(4.2, 4.2), (4.2, 60), (60, 4.2)])
+def test_a_focal_length_in_millimetres(tmp_path, fx, fy):
+    folder = changed(tmp_path, [[fx, 0, 31.5], [0, fy, 23.5], [0, 0, 1]])
     assert refused(folder).startswith(
         f"{tmp_path / 'cameras.toml'}:10:3  camera 'cam02' has a focal length of 4.2 px in pictures of 64\n"
         "       matrix is in pixels: "
@@ -271,7 +272,11 @@ def test_cameras_whose_size_no_file_tells_are_no_rig_that_is_wrong(tmp_path):
             None,
             "principal point (63, 23.5) is not in its pictures",
         ),
+        ([[60, 0, 31.5], [0, 60, 50], [0, 0, 1]], None, "principal point (31.5, 50) is not in its pictures"),
         (None, [-0.1, 0.1, 0.05, 0.001, 0], "tangential distortion moves pixels by "),
+        (None, [-0.1, 0.1, 0.001, 0.05, 0], "tangential distortion moves pixels by "),
+        (None, [-1.2, 0, 0, 0, 0], "distortion folds 20% of the undistorted picture, as no lens does"),
+        (None, [3, 0, 0, 0, 0], "distortion folds 20% of the undistorted picture, as no lens does"),
         (None, [-3, 0, 0, 0, 0], "distortion folds 62% of the undistorted picture, as no lens does"),
         (None, [-0.3, 0.1, 0.002, 0.001, 0], ""),
         # of a GoPro: it folds what lies beyond the undistorted picture
@@ -294,11 +299,12 @@ def test_a_run_is_told_of_a_world_that_is_not_z_up(tmp_path):
     assert said[0].startswith("the images' up is the y axis of the world: the world has to be z up: turn ")
 
 
-def test_a_camera_later_than_the_recording_is_long(tmp_path):
+@pytest.mark.parametrize("late", [-40, -2, 2])
+def test_a_camera_later_than_the_recording_is_long(tmp_path, late):
     write_recording(tmp_path, frames=2)
-    (tmp_path / "recording.json").write_text('{"late_frames": {"cam02": -40}}')
+    (tmp_path / "recording.json").write_text(json.dumps({"late_frames": {"cam02": late}}))
     assert refused(tmp_path) == (
-        f"{tmp_path / 'recording.json'}:1:19  camera 'cam02' is -40 frames late in a recording of 2\n"
+        f"{tmp_path / 'recording.json'}:1:19  camera 'cam02' is {late} frames late in a recording of 2\n"
         "       late_frames counts frames, not milliseconds; `mocapflow doctor DIR --sync` measures it"
     )
 
@@ -408,6 +414,16 @@ def test_different_frame_rates(tmp_path):
     assert f"{tmp_path}/static/videos  {said}" in refused(tmp_path / "static", calibration=calibration)
 
 
+@pytest.mark.parametrize(("rate", "apart"), [(25.2, False), (25.3, True)])
+def test_frame_rates_that_differ_by_more_than_a_hundredth(tmp_path, rate, apart):
+    write_recording(tmp_path, frames=4)
+    write_video(tmp_path / "videos" / "cam02.mp4", 4, rate=rate)
+    if apart:
+        assert "the videos differ in frame rate" in refused(tmp_path)
+    else:
+        assert open_recording(tmp_path).frame_rate == 25
+
+
 def test_a_stated_frame_rate_does_not_hide_that_the_videos_differ(tmp_path):
     write_recording(tmp_path, frames=4)
     write_video(tmp_path / "videos" / "cam02.mp4", 4, rate=50.0)
@@ -483,8 +499,11 @@ def test_frames_that_are_not_there(tmp_path, part):
 def test_wrong_arguments(tmp_path):
     assert refused(tmp_path / "nowhere").endswith("nowhere  no such recording folder")
     write_recording(tmp_path)
-    assert refused(tmp_path, scale=2).startswith("the scale is 2; expected")
-    assert refused(tmp_path, scale=0.01).startswith("the scale 0.01 leaves images of less than 8 pixels")
+    for scale in (2, 0, -0.5):
+        assert refused(tmp_path, scale=scale).startswith(f"the scale is {scale}; expected")
+    open_recording(tmp_path, scale=0.17)  # 8.16 of 48 px
+    for scale in (0.16, 0.01):
+        assert refused(tmp_path, scale=scale).startswith(f"the scale {scale} leaves images of less than 8 pixels")
     with pytest.raises(RecordingError, match="no frame 10: the videos have frames 0 to 9"):
         open_recording(tmp_path).frame(10)
 
@@ -499,3 +518,11 @@ def test_memory_does_not_grow_with_the_number_of_frames(tmp_path):
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[1] < peaks[0] + 2e5  # ten times the frames: 270 x 3 views x 9 kB would be 7 MB
+
+
+def test_keypoints_of_a_late_camera_are_those_of_its_later_pictures(tmp_path):
+    write_keypoints(write_recording(tmp_path, frames=8), 8)
+    (tmp_path / "recording.json").write_text('{"late_frames": {"cam02": 2}}')
+    recording = open_recording(tmp_path)
+    assert [people[0, 0, 0] for people in recording.people(3)] == [13, 15, 13]  # as `write_keypoints` has them
+    assert [len(people) for people in recording.people(7)] == [1, 0, 1]

@@ -230,3 +230,22 @@ def test_the_standard_deviation_of_a_lag_is_that_of_repeated_noise():
     stated = np.mean(told) ** -0.5
     assert abs(np.mean(lags)) < 4 * stated / np.sqrt(len(lags))
     assert 0.6 < np.std(lags) / stated < 1.6
+
+
+@pytest.mark.parametrize(
+    ("frames", "sd", "sure"), [(0.6, 0.1, True), (0.4, 0.01, False), (-2.0, 0.6, True), (-2.0, 0.7, False)]
+)
+def test_a_camera_is_late_beyond_half_a_frame_and_three_standard_deviations(frames, sd, sure):
+    assert synchrony.Lateness(camera="cam01", frames=frames, sd=sd).sure == sure
+
+
+def test_a_camera_that_shares_nothing_with_the_others_is_not_called_punctual():
+    moving = np.sin(np.arange(60.0) / 5)[:, None]
+
+    def signals(one, other):
+        noisy = moving + np.random.default_rng(other).normal(0, 0.01, moving.shape)
+        return moving, noisy if other < 3 else np.full_like(moving, np.nan)
+
+    assert len(synchrony.lateness(["a", "b", "c"], signals, 5)) == 3
+    with pytest.raises(RecordingError, match="too little of the same person"):
+        synchrony.lateness(["a", "b", "c", "d"], signals, 5)

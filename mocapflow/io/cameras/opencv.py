@@ -39,7 +39,7 @@ def _camera(name: str, inner: Any, outer: Any, folder: Path) -> Camera:
     rotation = _matrix(turn, f"R_{name} and Rot_{name}", name, extri)
     translation = _matrix(outer.getNode(f"T_{name}"), f"T_{name}", name, extri)
     matrix = _matrix(inner.getNode(f"K_{name}"), f"K_{name}", name, intri)
-    distortion = _matrix(inner.getNode(f"dist_{name}"), f"dist_{name}", name, intri).ravel()
+    distortion = _matrix(inner.getNode(f"dist_{name}"), f"dist_{name}", name, intri)
     size = [inner.getNode(f"{axis}_{name}").real() for axis in "WH"]
     return make_camera(name, size, matrix, distortion, rotation, translation, where=intri)
 
@@ -60,7 +60,7 @@ def _open(path: Path) -> Any:
 
 
 def _matrix(node: Any, key: str, name: str, path: Path) -> F64:
-    """Return the numbers of a matrix; `node.mat()` would write beyond its memory where `cols` is missing."""
+    """Return the numbers (N,) of a matrix; `node.mat()` would write beyond its memory where `cols` is missing."""
     if node.empty():
         raise RecordingError(f"camera '{name}' lacks {key}", where=str(path))
     found = _numbers(node) if node.isMap() else None
@@ -71,13 +71,11 @@ def _matrix(node: Any, key: str, name: str, path: Path) -> F64:
 
 
 def _numbers(node: Any) -> F64 | None:
-    """Return what a mapping with rows, cols, dt and data holds, None where these do not go together."""
+    """Return the numbers (N,) of a mapping with rows, cols, dt and data, None where these do not go together."""
     rows, columns, kind, data = (node.getNode(part) for part in ("rows", "cols", "dt", "data"))
     if not (rows.isInt() and columns.isInt() and data.isSeq() and kind.isString() and kind.string() in KINDS):
         return None
-    shape = int(rows.real()), int(columns.real())
+    count = int(rows.real()) * int(columns.real())
     values = [data.at(k) for k in range(data.size())]
     numbers = [value.real() for value in values if value.isReal() or value.isInt()]
-    if min(shape) < 1 or not shape[0] * shape[1] == len(numbers) == len(values):
-        return None
-    return np.array(numbers).reshape(shape)
+    return np.array(numbers) if count == len(numbers) == len(values) else None

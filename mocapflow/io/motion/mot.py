@@ -56,6 +56,6 @@ def read_mot(path: Path) -> tuple[dict[str, F64], F64]:
     ]
     table = dict(zip(names, np.array(rows).reshape(-1, len(names)).T.copy(), strict=True))
     time = table.pop("time")
-    if any(line.replace(" ", "").lower() == "indegrees=no" for line in lines[:end]):
+    if any("".join(line.split()).lower() == "indegrees=no" for line in lines[:end]):
         table = {name: column if name.endswith(SHIFTS) else np.degrees(column) for name, column in table.items()}
     return table, time

@@ -69,7 +69,7 @@ def read_trc(path: Path) -> tuple[tuple[str, ...], F64, F64, float]:
         raise RecordingError("no DataRate above zero", where=f"{path}:3", hint="it is in rows per second")
     width = 2 + 3 * len(names)
     rows = [
-        row_of_numbers(_fitted(line.split("\t"), width), width, f"{path}:{number}")
+        row_of_numbers(_cells(line, width), width, f"{path}:{number}")
         for number, line in enumerate(lines[5:], 6)
         if line.strip()
     ]
@@ -83,9 +83,7 @@ def seen(positions: F64) -> F64:
     return np.where((positions == 0).all(axis=-1, keepdims=True), np.nan, positions)
 
 
-def _fitted(cells: Sequence[str], width: int) -> Sequence[str]:
+def _cells(line: str, width: int) -> Sequence[str]:
     """Return the cells of a row of which trailing empty ones may be too many or left out."""
-    kept = len(cells)
-    while kept > width and not cells[kept - 1].strip():
-        kept -= 1
-    return [*cells[:kept], *[""] * (width - kept)]
+    cells = line.rstrip().split("\t")
+    return [*cells, *[""] * (width - len(cells))]

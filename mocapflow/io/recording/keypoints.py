@@ -12,6 +12,7 @@ from mocapflow.io.json_toml import read_json
 from mocapflow.io.video.images import name_frames, numbered
 from mocapflow.records import F64
 
+SUREST = 2.0  # confidence; OpenPose's go a little beyond 1, per cent and pixels far
 FORM = 'expected OpenPose\'s format: {"people": [{"pose_keypoints_2d": [x, y, confidence, ...]}]}'
 
 
@@ -96,7 +97,7 @@ def odd_keypoints(camera: str, folder: Path, length: int, first: int = 0) -> lis
     `first` is the number of frame 0's file.
     """
     files = keypoint_files(folder, first)
-    broken, gaps, counts, farthest = [], [], set(), 0.0
+    broken, gaps, unsure, counts, farthest = [], [], [], set(), 0.0
     for index, path in files.items():
         try:
             people = read_keypoints(path)
@@ -105,11 +106,13 @@ def odd_keypoints(camera: str, folder: Path, length: int, first: int = 0) -> lis
             continue
         counts |= {people.shape[1]} if len(people) else set()
         gaps += [index] if not np.isfinite(people).all() else []
+        unsure += [index] if (people[..., 2] > SUREST).any() else []
         farthest = max(farthest, float(np.nanmax(np.abs(people[..., :2]), initial=0.0)))
     beyond, missing = [i for i in files if i >= length], [i for i in range(length) if i not in files]
     faults = (
         (broken, "can't be read: nobody is seen there"),
         (gaps, "are not all numbers (NaN): these points count as not seen"),
+        (unsure, "have confidences far beyond 1: are they percents, or is there none behind x and y?"),
         (beyond, f"lie after the last frame, {length - 1}: they are left out"),
         (missing, "are missing: nobody is seen there"),
     )

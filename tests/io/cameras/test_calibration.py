@@ -87,6 +87,7 @@ def test_qualisys_units_and_axes(tmp_path):
     np.testing.assert_allclose(camera.distortion, [-0.05, 0.14, 0.001, 0.002, 0.01])
     np.testing.assert_allclose(centre(camera), [2.5, 0.1, 1.2])
     np.testing.assert_allclose(camera.camera_from_world[:3, :3], [[0, 1, 0], [0, 0, -1], [-1, 0, 0]])  # y down, z ahead
+    assert metadata(path) == {}
 
 
 def write_easymocap(folder, cameras, sizes=True, vectors=True):
@@ -148,11 +149,12 @@ def test_missing_field(tmp_path):
         read_cameras(path)
 
 
-def test_rotation_in_degrees(tmp_path):
+@pytest.mark.parametrize(("rotation", "turn"), [("[69.0, 81.6, -72.7]", "129.2"), ("[0.0, 0.0, 6.5]", "6.5")])
+def test_rotation_in_degrees(tmp_path, rotation, turn):
     path = tmp_path / "cameras.toml"
     write_cameras(path, ring())
-    path.write_text(re.sub(r"rotation = \[.*?\]", "rotation = [69.0, 81.6, -72.7]", path.read_text(), count=1))
-    with pytest.raises(RecordingError, match=r"'cam01' turns by 129.\d rad, .*: it looks like degrees"):
+    path.write_text(re.sub(r"rotation = \[.*?\]", f"rotation = {rotation}", path.read_text(), count=1))
+    with pytest.raises(RecordingError, match=rf"'cam01' turns by {turn} rad, .*: it looks like degrees"):
         read_cameras(path)
 
 
@@ -186,11 +188,15 @@ def test_nan(tmp_path):
         ("distortions = [0.0, 0.0, 0.0, 0.0]", "distortions = [[0.0], 0.0]", "has no numbers in distortions"),
         ("matrix = [[60.0", "matrix = [[-60.0", "has no camera matrix"),
         ("[0.0, 60.0,", "[1.0, 60.0,", "has no camera matrix"),
+        ("[0.0, 60.0,", "[0.0, -60.0,", "has no camera matrix"),
         ("[0.0, 0.0, 1.0]]", "[1.0, 0.0, 1.0]]", "has no camera matrix"),
+        ("[0.0, 0.0, 1.0]]", "[0.0, 1.0, 1.0]]", "has no camera matrix"),
+        ("[0.0, 0.0, 1.0]]", "[0.0, 0.0, 2.0]]", "has no camera matrix"),
         ("fisheye = false", 'fisheye = "false"', "has fisheye = 'false'\n       write true or false"),
         ("fisheye = false", "fisheye = 1", "has fisheye = 1\n"),
         ("fisheye = false", "fish_eye = true", "has a field 'fish_eye', .*\n.* did you mean 'fisheye'"),
         ("rotation = [", "rotation = [[2, 0, 0], [0, 1, 0], [0, 0, 1]] # [", "has a matrix that is not a rotation"),
+        ("rotation = [", "rotation = [[-1, 0, 0], [0, 1, 0], [0, 0, 1]] # [", "has a matrix that is not a rotation"),
         ("distortions = [0.0, 0.0, 0.0, 0.0]", "distortions = [0, 0, 0, 0, 0, 0.1]", "has 6 distortion coefficients"),
         ("distortions = [0.0, 0.0, 0.0, 0.0]", "distortions = [0.1, 0, 0.1]", "has 3 distortion .*\n.* k1 k2 p1 p2 k3"),
     ],
@@ -215,8 +221,8 @@ def test_skew_goes_with_a_lens_without_distortion_alone(tmp_path):
     with pytest.raises(RecordingError, match="camera 'cam01' has a skew of 3 px\n.*without skew"):
         read_cameras(path)
     qualisys = tmp_path / "trial.qca.txt"
-    qualisys.write_text(QUALISYS.replace('skew="0"', 'skew="128"'))
-    with pytest.raises(RecordingError, match="camera '26578' has a skew of 2 px"):
+    qualisys.write_text(QUALISYS.replace('skew="0"', 'skew="-128"'))
+    with pytest.raises(RecordingError, match="camera '26578' has a skew of -2 px"):
         read_cameras(qualisys)
 
 

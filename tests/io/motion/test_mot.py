@@ -21,11 +21,12 @@ def test_mot_there_and_back(tmp_path):
     ]  # fmt: skip
 
 
-def test_mot_in_radians_is_read_in_degrees(tmp_path):
+@pytest.mark.parametrize("line", ["inDegrees=no", "InDegrees = No", "inDegrees=no\t\t"])  # a spreadsheet adds tabs
+def test_mot_in_radians_is_read_in_degrees(tmp_path, line):
     columns = {"knee_angle_l": np.full(3, np.pi / 2), "pelvis_ty": np.full(3, 0.9)}
     write_mot(tmp_path / "a.sto", columns, np.arange(3) / 10)
     said = (tmp_path / "a.sto").read_text()
-    (tmp_path / "a.sto").write_text(said.replace("inDegrees=yes", "inDegrees=no"))
+    (tmp_path / "a.sto").write_text(said.replace("inDegrees=yes", line))
     read, time = read_mot(tmp_path / "a.sto")
     np.testing.assert_allclose(read["knee_angle_l"], 90, atol=1e-6)
     np.testing.assert_allclose(read["pelvis_ty"], 0.9)

@@ -84,10 +84,28 @@ def test_everything_odd_is_said(tmp_path):
     for frame in range(3):
         write(tmp_path / f"c.{frame}.json", person())
     assert odd_keypoints("cam02", tmp_path, 3) == []
+    (tmp_path / "c.0.json").unlink()
+    assert odd_keypoints("cam02", tmp_path, 3) == ["cam02: keypoints of frame 0 are missing: nobody is seen there"]
+
+
+@pytest.mark.parametrize("points", [person() * [1, 1, 0] + [0, 0, 87], person(24)[:, :2] + 3])  # pairs fill 16 rows
+def test_confidences_that_are_none(tmp_path, points):
+    write(tmp_path / "c.0.json", person() * [1, 1, 0] + [0, 0, 1.1])
+    assert odd_keypoints("cam02", tmp_path, 1) == []
+    write(tmp_path / "c.0.json", points)
+    assert odd_keypoints("cam02", tmp_path, 1) == [
+        "cam02: keypoints of frame 0 have confidences far beyond 1: are they percents, or is there none behind x and y?"
+    ]
+
+
+def test_nobody_is_no_share_of_a_picture(tmp_path):
+    write(tmp_path / "c.0.json", np.zeros((25, 3)))
+    write(tmp_path / "c.1.json")
+    assert odd_keypoints("cam02", tmp_path, 2) == []
 
 
 def test_shares_of_the_picture_are_no_pixels(tmp_path):
-    write(tmp_path / "c.0.json", person() / [64, 48, 1])
+    write(tmp_path / "c.0.json", person() / [64, 48, 0.8])  # OpenPose's confidence may be a little beyond 1
     assert odd_keypoints("cam02", tmp_path, 1) == [
         "cam02: all keypoints lie within one pixel: are they shares of the picture? expected pixels"
     ]

@@ -75,6 +75,16 @@ def test_several_plates_give_the_spread_of_each_pixel(tmp_path):
     assert scene.spread[1].min() >= 0.9 * 5  # no pixel is trusted more than the usual one
 
 
+@pytest.mark.parametrize(("levels", "spread"), [((30, 30), 1.0), ((28, 32), 8**0.5)])
+def test_two_plates_tell_the_spread_but_none_below_a_grey_level(tmp_path, levels, spread):
+    write_recording(tmp_path, frames=2)
+    for name in NAMES:
+        for take, level in enumerate(levels):
+            plate(tmp_path / "background" / name / f"{take}.png", level)
+    for found in open_recording(tmp_path).background().spread:
+        np.testing.assert_allclose(found, spread, rtol=1e-5)
+
+
 def room(noise=0.0, seed=0):
     """A room of 60 x 80 px, dark to the left and light to the right."""
     grey = np.linspace(40, 200, 80)[None, :, None] + np.array([-10.0, 0.0, 20.0])

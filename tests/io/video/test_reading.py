@@ -171,6 +171,8 @@ def test_a_link_that_leads_nowhere(tmp_path):
     (tmp_path / "a.mp4").symlink_to(tmp_path / "gone.mp4")
     with pytest.raises(RecordingError, match=r"no such video\n       it is a link to .*gone\.mp4, where nothing is"):
         open_video(tmp_path / "a.mp4")
+    write_video(tmp_path / "gone.mp4", 3)
+    assert open_video(tmp_path / "a.mp4").frames == 3
 
 
 def test_a_video_that_may_not_be_read(tmp_path, monkeypatch):
@@ -181,12 +183,13 @@ def test_a_video_that_may_not_be_read(tmp_path, monkeypatch):
         open_video(path)
 
 
-def test_frames_of_another_size_are_lost(tmp_path):
+@pytest.mark.parametrize(("width", "height"), [(32, 24), (32, 48), (64, 24)])
+def test_frames_of_another_size_are_lost(tmp_path, width, height):
     for number in range(4):
-        size = (64, 48) if number != 2 else (32, 24)
+        size = (64, 48) if number != 2 else (width, height)
         cv2.imwrite(str(tmp_path / f"{number:06d}.png"), picture(number, size))
     rows = list(read_frames(open_video(tmp_path), range(4)))
-    assert rows[2] == (None, "the frame is 32 x 24, the others 64 x 48")
+    assert rows[2] == (None, f"the frame is {width} x {height}, the others 64 x 48")
     assert [number_of(rows[i][0]) for i in (0, 1, 3)] == [0, 1, 3]
 
 
