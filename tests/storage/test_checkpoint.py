@@ -17,6 +17,14 @@ def frames_saved(folder):
     return next(line for line in run_tiny(folder / "tiny.yaml", folder)[1] if "going on after" in line)
 
 
+def saved_when_stopped_in(folder, monkeypatch, name, function):
+    """What the next run says of the frames that a run had saved which was stopped in a function of checkpoint."""
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(checkpoint, name, function)
+        run_tiny(folder / "tiny.yaml", folder)
+    return frames_saved(folder)
+
+
 def test_a_run_whose_track_another_has_taken_over_writes_no_more_of_it(tmp_path, path, monkeypatch):
     def report(line):
         if line.startswith("track: 3 of"):
@@ -38,10 +46,8 @@ def test_a_run_that_is_to_stop_does_so_before_the_next_commit(tmp_path, path, mo
         if next(asked, "stop"):
             raise KeyboardInterrupt
 
-    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        patch.setattr(checkpoint, "check", check)
-        run_tiny(path, tmp_path)
-    assert frames_saved(tmp_path) == "track: going on after 2 frames"
+    saved = saved_when_stopped_in(tmp_path, monkeypatch, "check", check)
+    assert saved == "track: going on after 2 frames"
     assert same(the_track(whole), the_track(tmp_path))
 
 
@@ -63,10 +69,8 @@ def test_a_run_that_ends_after_its_last_frame_has_only_to_write_its_arrays(tmp_p
     def seal(*_):
         raise KeyboardInterrupt
 
-    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        patch.setattr(checkpoint, "seal", seal)
-        run_tiny(path, tmp_path)
-    assert frames_saved(tmp_path) == "track: going on after 12 frames"
+    saved = saved_when_stopped_in(tmp_path, monkeypatch, "seal", seal)
+    assert saved == "track: going on after 12 frames"
     assert same(the_track(whole), the_track(tmp_path))
 
 
