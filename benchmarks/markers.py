@@ -3,7 +3,8 @@
 python benchmarks/markers.py RECORDING RUN: markers are put on the true joints of a rendered recording, with 1 mm of
 noise and 5 to 10 mm that skin and flesh slide with the bend of the nearest joint, low-passed at 6 Hz, 100 per second,
 in a rig of their own that lies elsewhere and starts 50 ms late. They are written as a C3D file and a table of common
-points into RUN/markers, and compared with the run as any such file is.
+points into RUN/markers, and compared with the run as any such file is. Once more without the inner markers, and with a
+standing trial that has them, into RUN/markers_without_inner.
 """
 
 from __future__ import annotations
@@ -35,8 +36,10 @@ BESIDE = {"knee": ("hip", "knee", "ankle"), "elbow": ("shoulder", "elbow", "wris
 CGM2 = {
     "asis": "ASI", "psis": "PSI", "knee_lateral": "KNE", "knee_medial": "KNM", "ankle_lateral": "ANK",
     "ankle_medial": "MED", "toe": "TOE", "acromion": "SHO", "elbow_lateral": "ELB", "elbow_medial": "ELBM",
-    "wrist_lateral": "WRA", "wrist_medial": "WRB",
+    "wrist_lateral": "WRA", "wrist_medial": "WRB", "thigh": "THI", "shank": "TIB", "upper_arm": "UPA", "forearm": "FRM",
 }  # fmt: skip
+ON_SEGMENT = {"knee": "thigh", "ankle": "shank", "elbow": "upper_arm", "wrist": "forearm"}  # by the joint at its end
+ASIDE = 0.07  # m, of the marker on a segment
 
 
 def main() -> None:
@@ -45,13 +48,16 @@ def main() -> None:
     archive = np.load(recording / "truth/joints.npz")
     at = {str(name): archive["positions"][:, k].astype(float) for k, name in enumerate(archive["names"])}
     time = np.arange(len(truth["frame"])) / 30.0
-    folder = run / "markers"
-    folder.mkdir(exist_ok=True)
-    path = write(folder, time, measured(landmarks(at, pelvis(recording, at)), at, time))
+    seen = measured(landmarks(at, pelvis(recording, at)), at, time)
+    path = write(run / "markers", seen)
+    outer = {name: places for name, places in seen.items() if "medial" not in name}
+    without_inner = write(run / "markers_without_inner", outer)
+    write_c3d(without_inner.with_name("static.c3d"), standing(recording))
     known = {**truth, "time": time}
-    nothing = Stick(names=(), places=np.empty((len(time), 0, 3)))
+    true_motion = TrackedMotion(columns=known, raw=known, stick=Stick(names=(), places=np.empty((len(time), 0, 3))))
     columns = {
-        "markers, truth": evaluate(TrackedMotion(columns=known, raw=known, stick=nothing), path, folder / "truth").rows,
+        "markers, truth": evaluate(true_motion, path, path.parent / "truth").rows,
+        "without inner": evaluate(true_motion, without_inner, without_inner.parent / "truth").rows,
         "ours, markers": evaluate_run(run, path).rows,
         "ours, truth": evaluate_run(run, recording / "truth/angles.csv").rows,
     }
@@ -64,11 +70,23 @@ def main() -> None:
     print((run / layout.FINDINGS).read_text())
 
 
+def at_rest(recording: Path) -> dict[str, F64]:
+    """Return where the joints are at rest, (1, 3) m."""
+    joints = json.loads((recording / "subject/skeleton.json").read_text())["joints"]
+    return {entry["name"]: np.array([entry["position"]], float) for entry in joints}
+
+
+def standing(recording: Path) -> dict[str, F64]:
+    """Return the markers of a standing trial of ten frames, with the noise of the system."""
+    still, random = landmarks(at_rest(recording), np.eye(3)[None]), np.random.default_rng(3)
+    return {name: place + random.normal(scale=NOISE, size=(10, 3)) for name, place in still.items()}
+
+
 def pelvis(recording: Path, at: dict[str, F64]) -> F64:
     """Return how the pelvis is turned from its rest in every frame (T, 3, 3); at rest it looks along -y."""
-    rest = {e["name"]: e["position"] for e in json.loads((recording / "subject/skeleton.json").read_text())["joints"]}
+    rest = at_rest(recording)
     corners = ("hip_l", "hip_r", "spine")
-    still, moving = np.array([rest[name] for name in corners]), np.stack([at[name] for name in corners], axis=1)
+    still, moving = np.concatenate([rest[name] for name in corners]), np.stack([at[name] for name in corners], axis=1)
     return np.stack([register(still, places).rotation for places in moving])
 
 
@@ -91,6 +109,8 @@ def landmarks(at: dict[str, F64], turned: F64) -> dict[str, F64]:
             aside = sign * unit(right - np.sum(right * along, axis=1, keepdims=True) * along)
             found[f"{joint}_lateral_{side}"] = at[f"{joint}_{side}"] + ACROSS[joint] * aside
             found[f"{joint}_medial_{side}"] = at[f"{joint}_{side}"] - ACROSS[joint] * aside
+            middle = (at[f"{joint}_{side}"] + at[f"{above}_{side}"]) / 2
+            found[f"{ON_SEGMENT[joint]}_{side}"] = middle + ASIDE * aside
     return found
 
 
@@ -112,24 +132,31 @@ def measured(marks: dict[str, F64], at: dict[str, F64], time: F64) -> dict[str, 
     return seen
 
 
-def write(folder: Path, time: F64, marks: dict[str, F64]) -> Path:
-    """Write markers.c3d and the points that both rigs have measured."""
-    import ezc3d
-
+def write(folder: Path, marks: dict[str, F64]) -> Path:
+    """Write markers.c3d, which starts late, and the points that both rigs have measured."""
     turn, shift = Rotation.from_euler("zyx", [130, 3, -2], degrees=True), np.array([2.0, -0.5, 0.1])
-    file, late = ezc3d.c3d(), round(DELAY * RATE)
-    points = np.ones((4, len(marks), len(next(iter(marks.values()))) - late))
-    points[:3] = 1000 * np.stack([turn.apply(places[late:]) + shift for places in marks.values()]).transpose(2, 0, 1)
-    point = file["parameters"]["POINT"]
-    point["LABELS"]["value"] = [f"{name[-1].upper()}{CGM2[name[:-2]]}" for name in marks]
-    point["RATE"]["value"], point["UNITS"]["value"] = [RATE], ["mm"]
-    file["data"]["points"] = points
-    file.write(str(folder / "markers.c3d"))
+    folder.mkdir(exist_ok=True)
+    late = round(DELAY * RATE)
+    write_c3d(folder / "markers.c3d", {name: turn.apply(places[late:]) + shift for name, places in marks.items()})
     wand = np.random.default_rng(1).uniform([-1, -1, 0], [1, 1, 2], (12, 3))
     other = turn.apply(wand) + shift + np.random.default_rng(2).normal(scale=NOISE, size=wand.shape)
     header = "x,y,z,marker_x,marker_y,marker_z"
     np.savetxt(folder / COMMON_POINTS, np.hstack([wand, other]), delimiter=",", header=header, comments="")
     return folder / "markers.c3d"
+
+
+def write_c3d(path: Path, marks: dict[str, F64]) -> None:
+    """Write markers (T, 3) m as a C3D file, by the names of CGM2."""
+    import ezc3d
+
+    file = ezc3d.c3d()
+    points = np.ones((4, len(marks), len(next(iter(marks.values())))))
+    points[:3] = 1000 * np.stack(list(marks.values())).transpose(2, 0, 1)
+    point = file["parameters"]["POINT"]
+    point["LABELS"]["value"] = [f"{name[-1].upper()}{CGM2[name[:-2]]}" for name in marks]
+    point["RATE"]["value"], point["UNITS"]["value"] = [RATE], ["mm"]
+    file["data"]["points"] = points
+    file.write(str(path))
 
 
 def unit(vectors: F64) -> F64:

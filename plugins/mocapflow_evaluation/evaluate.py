@@ -19,8 +19,10 @@ from mocapflow_evaluation import compare, comparison_plots, cycles, findings, tr
 from mocapflow_evaluation.alignment import align, at_our_frames
 from mocapflow_evaluation.cycles import Cycle
 from mocapflow_evaluation.keypoint_reference import low_pass, with_keypoints, write_triangulated
+from mocapflow_evaluation.measured_points import SUFFIXES as POINTS
 from mocapflow_evaluation.references import SUFFIXES, read_reference
 from mocapflow_evaluation.rigs import COMMON_POINTS, compare_rigs
+from mocapflow_evaluation.static_trial import STEM
 from mocapflow_evaluation.stick import between_points
 from mocapflow_evaluation.tracked_motion import TrackedMotion
 
@@ -32,9 +34,9 @@ class Evaluate(Stage):
     """Compares with truth/angles.csv of the recording, with the one file in its reference/, or with another file.
 
     `reference` is a .csv with our columns, an OpenSim .mot, or a .trc or .c3d of joint centres or of markers on bony
-    landmarks (relative to the recording), or a folder of 2D keypoints like keypoints/, which are triangulated with the
-    cameras of the run (`keypoint_reference`). Rows with frame numbers are matched by them, others interpolated at our
-    times.
+    landmarks (relative to the recording; a standing trial beside it is used, see `static_trial`), or a folder of 2D
+    keypoints like keypoints/, which are triangulated with the cameras of the run (`keypoint_reference`). Rows with
+    frame numbers are matched by them, others interpolated at our times.
     Failures are not left out: evaluation.json tells the share of the frames that are lost, doubted or not at rest.
     A lag up to `longest_lag_s` that all angles share, and curves that count the other way, are reported;
     `rms_aligned_deg` alone is without them and without the mean offset. `rms_lowpassed_deg` is by our unsmoothed curve
@@ -84,7 +86,8 @@ def chosen(recording: Path, wanted: str) -> tuple[Path | None, str]:
     if wanted or truth.is_file():
         return (recording / wanted if wanted else truth), ""
     files = sorted((recording / "reference").glob("[!.]*"))
-    there = [path for path in files if path.suffix.lower() in SUFFIXES and path.name != COMMON_POINTS]
+    beside = COMMON_POINTS, *(f"{STEM}{suffix}" for suffix in POINTS)
+    there = [path for path in files if path.suffix.lower() in SUFFIXES and path.name not in beside]
     if len(there) == 1:
         return there[0], ""
     if not there:

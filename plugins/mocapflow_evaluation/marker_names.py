@@ -29,14 +29,19 @@ LANDMARKS = tuple(f"{name}_{side}" for name in KNOWN for side in ("l", "r"))
 FILE = "markers.toml"  # beside the reference: landmark = "name of the marker"
 
 
-def landmarks(labels: Sequence[str], folder: Path) -> dict[str, int]:
+def landmarks(labels: Sequence[str], folder: Path, others: Sequence[str] = ()) -> dict[str, int]:
     """Return which marker shows which landmark: by markers.toml in the folder, else by the names that are known.
+
+    Args:
+        labels: of the markers in a file.
+        folder: where it lies.
+        others: of those in another file there, which markers.toml may name too.
 
     Raises:
         RecordingError: markers.toml can't be read, or names a landmark or a marker that is not there; without one,
             there are known names of more than one subject.
     """
-    told = _told(labels, folder / FILE)
+    told = _told(labels, folder / FILE, others)
     plain = {_plain(label): index for index, label in reversed(list(enumerate(labels)))}
     found, subjects = {}, set()
     for name, patterns in KNOWN.items():
@@ -53,7 +58,7 @@ def landmarks(labels: Sequence[str], folder: Path) -> dict[str, int]:
     return told if len(subjects) > 1 else found | told
 
 
-def _told(labels: Sequence[str], path: Path) -> dict[str, int]:
+def _told(labels: Sequence[str], path: Path, others: Sequence[str]) -> dict[str, int]:
     if not path.is_file():
         return {}
     told = read_toml(path, 'expected lines as knee_medial_l = "LMK"')
@@ -62,11 +67,11 @@ def _told(labels: Sequence[str], path: Path) -> dict[str, int]:
             raise RecordingError(
                 f"unknown landmark '{landmark}'", where=place(path, landmark), hint=alternatives(landmark, LANDMARKS)
             )
-        if label not in labels:
+        if label not in labels and label not in others:
             raise RecordingError(
                 f"no marker '{label}'", where=place(path, landmark), hint=alternatives(str(label), labels)
             )
-    return {landmark: list(labels).index(label) for landmark, label in told.items()}
+    return {landmark: list(labels).index(label) for landmark, label in told.items() if label in labels}
 
 
 def _subject(label: str) -> str:

@@ -10,26 +10,19 @@ import numpy as np
 from mocapflow_export import tables
 
 from mocapflow.errors import RecordingError
-from mocapflow.geometry import angles
-from mocapflow.io.motion.c3d import read_c3d
 from mocapflow.io.motion.csv_columns import read_columns
 from mocapflow.io.motion.mot import read_mot
-from mocapflow.io.motion.opensim_axes import world_from_opensim
-from mocapflow.io.motion.trc import read_trc
 from mocapflow.records import F64, array, record
-from mocapflow_evaluation import marker_joints, true_joints
-from mocapflow_evaluation.marker_names import FILE, landmarks
+from mocapflow_evaluation import true_joints
+from mocapflow_evaluation.measured_points import SUFFIXES as POINTS
+from mocapflow_evaluation.measured_points import measured_centres
 from mocapflow_evaluation.tracked_motion import SIGNED
 
 MOTION = {"knee_angle": "knee_flexion", "hip_flexion": "hip_flexion", "ankle_angle": "ankle", "elbow_flex": "elbow"}
-POSE2SIM = {
-    "Hip": "hip", "Knee": "knee", "Ankle": "ankle", "BigToe": "toe", "Heel": "heel",
-    "Shoulder": "shoulder", "Elbow": "elbow", "Wrist": "wrist",
-}  # fmt: skip
 SLACK = 0.03  # of a sample: times in files are rounded
 SPARSE = 1.0  # s between samples; between such that are farther apart a curve would be made up
 AROUND = 360.0  # deg; no angle between two bones is larger
-SUFFIXES = (".csv", ".mot", ".sto", ".trc", ".c3d")
+SUFFIXES = (".csv", ".mot", ".sto", *POINTS)
 
 
 @record
@@ -64,13 +57,13 @@ def read_reference(path: Path) -> Reference:
     a .mot the columns that mean the same are taken, by OpenSim's names; their zeros are the model's own, so that only
     knees and elbows compare without an offset. A .trc or .c3d holds joint centres, named as ours (hip_l) or as
     Pose2Sim's (LHip), or markers on bony landmarks (`marker_names`), from which joint centres and knee axes are found
-    (`marker_joints`).
+    (`marker_joints`). Inner markers that it lacks may be in a standing trial beside it (`static_trial`).
 
     Raises:
         RecordingError: the file is missing, of another kind, has none of our angles, or one that turns more than once
             around, goes back in time, or has its samples far apart.
     """
-    readers = {".csv": _table, ".mot": _motion, ".sto": _motion, ".trc": _trc, ".c3d": _c3d}
+    readers = {".csv": _table, ".mot": _motion, ".sto": _motion, ".trc": _trc, ".c3d": _points}
     if not path.is_file():
         raise RecordingError("no such reference", where=str(path))
     if path.suffix.lower() not in readers:
@@ -120,48 +113,21 @@ def _motion(path: Path) -> Reference:
 
 
 def _trc(path: Path) -> Reference:
-    names, positions, time, _ = read_trc(path)
-    start, notes = counted_from(time)
-    reference = _positions(path, names, world_from_opensim(positions), time)
+    reference = _points(path)
+    start, notes = counted_from(reference.at)
     return replace(reference, notes=(*notes, *reference.notes), counted_from=start)
 
 
-def _c3d(path: Path) -> Reference:
-    names, positions, time, _ = read_c3d(path)
-    return _positions(path, names, positions, time)
-
-
-def _positions(path: Path, labels: tuple[str, ...], positions: F64, time: F64) -> Reference:
-    """Return the angles between joint centres that a file has, or that its markers tell."""
-    known = {f"{s.upper()}{name}": f"{ours}_{s}" for name, ours in POSE2SIM.items() for s in ("l", "r")}
-    names = tuple(known.get(label, label) for label in labels)
-    curves = angles.between_centres(dict(zip(names, np.moveaxis(positions, 1, 0), strict=True)))
-    notes: tuple[str, ...] = ()
-    if not curves:
-        marks = {name: positions[:, index] for name, index in landmarks(labels, path.parent).items()}
-        centres = marker_joints.joint_centres(marks)
-        names = tuple(centres)
-        if not names:
-            said, known_by = "these are neither joint centres nor markers that are known", path.parent / FILE
-            hint = f'name the landmarks in {known_by}: knee_lateral_l = "…"; the markers are {", ".join(labels)}'
-            raise RecordingError(said, where=str(path), hint=hint)
-        positions = np.stack(list(centres.values()), axis=1)
-        curves = angles.between_centres(centres) | _about_axes(marks, centres)
-        notes = (f"joint centres and knee axes from {len(marks)} markers on bony landmarks",)
-    return Reference(curves=curves, at=time, by_frame=False, joint_names=names, joints=positions, notes=notes)
-
-
-def _about_axes(marks: Mapping[str, F64], centres: Mapping[str, F64]) -> dict[str, F64]:
-    """Return the angles that need more than joint centres: hip flexion, and the knee's turn about its own axis."""
-    found = {}
-    for side in ("l", "r"):
-        hip, knee, ankle = (centres.get(f"{joint}_{side}") for joint in ("hip", "knee", "ankle"))
-        if hip is not None and knee is not None:
-            found[f"hip_flexion_{side}"] = angles.hip_flexion(knee - hip, marker_joints.pelvis_axes(marks)[:, :2])
-            if ankle is not None:
-                axis = marker_joints.knee_axis(marks, side)
-                found[f"knee_angle_{side}"] = marker_joints.signed_flexion(hip, knee, ankle, axis)
-    return found
+def _points(path: Path) -> Reference:
+    found = measured_centres(path)
+    return Reference(
+        curves=found.curves,
+        at=found.time,
+        by_frame=False,
+        joint_names=tuple(found.centres),
+        joints=np.stack(list(found.centres.values()), axis=1),
+        notes=found.notes,
+    )
 
 
 def counted_from(time: F64) -> tuple[float, tuple[str, ...]]:
