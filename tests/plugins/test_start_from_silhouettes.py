@@ -68,15 +68,17 @@ def test_without_plates_it_says_what_else_there_is(tmp_path):
         StartFromSilhouettes().need(open_recording(tmp_path))
 
 
-def test_an_empty_room_is_an_error(tmp_path):
-    """The clean plates themselves as pictures."""
+@pytest.mark.parametrize("start", [0, 1], ids=["empty", "missing"])
+def test_an_empty_room_is_an_error(tmp_path, start):
+    """The clean plates themselves as pictures; of frame 1 there are none."""
     for plate in (SKIRT / "background").glob("*.png"):
         folder = tmp_path / "videos" / plate.stem
         folder.mkdir(parents=True)
-        (folder / "000000.png").symlink_to(plate)
+        for number in (0, 2):
+            (folder / f"{number:06}.png").symlink_to(plate)
     (tmp_path / "background").symlink_to(SKIRT / "background")
     (tmp_path / "cameras.toml").symlink_to(SKIRT / "cameras.toml")
-    recording = open_recording(tmp_path)
+    recording = open_recording(tmp_path, start=start)
     scene = Scene(cameras=recording.cameras, body=Template(shape=0.0).load(SKIRT))
     with pytest.raises(RecordingError, match="0 cameras show a person"):
         StartFromSilhouettes().run(recording, scene)
