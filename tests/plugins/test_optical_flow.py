@@ -8,7 +8,7 @@ import pytest
 from matching_scenes import CALM, FIRST, FRAME, knee_error_deg, seen
 from mocapflow_matching.contour_icp import ContourIcp
 from mocapflow_matching.flow_points import flow_points
-from mocapflow_matching.optical_flow import OpticalFlow
+from mocapflow_matching.optical_flow import LATER_SHARE, OpticalFlow, _snapped
 from mocapflow_matching.shape_flow import _relax, register
 from mocapflow_priors.constant_velocity import ConstantVelocity
 from mocapflow_priors.image_flow import ImageFlowPredictor
@@ -110,6 +110,15 @@ def test_targets_are_brought_onto_the_contour_of_the_picture_itself():
     assert np.percentile(away, 90) < 0.6  # what is left is the spacing of the contour's points, a pixel
 
 
+def test_a_step_down_a_distance_is_not_long_where_that_is_nearly_flat():
+    """Half-way between two outlines, where it has a ridge."""
+    away = np.abs(np.arange(40, dtype=np.float32) - 20)[None] * np.ones((40, 1), np.float32) - 10
+    beside = np.array([[20.1, 20.0], [25.0, 20.0]])
+    moved_to = _snapped(beside, away)
+    assert np.abs(moved_to - beside)[0].max() < 10
+    np.testing.assert_allclose(moved_to[1], [30.0, 20.0], atol=1e-4)
+
+
 def test_shapes_lead_the_way_in_the_first_turn_only():
     truth = tiny_pose(SCENE)
     surface = SCENE.surface(truth, NO_CLOTH)
@@ -120,11 +129,12 @@ def test_shapes_lead_the_way_in_the_first_turn_only():
     assert len(matcher.match(FRAME, seen(surface, SCENE), surface, Past(), SCENE, CALM).vertex) == 0
 
 
-def test_a_model_that_has_left_the_views_has_no_pairs():
+def test_a_model_or_a_person_that_has_left_the_views_has_no_pairs():
     truth = tiny_pose(SCENE)
     away = SCENE.surface(moved(truth, np.r_[0, 0, 0, 0, 0, 50.0, np.zeros(len(truth.angles))]), NO_CLOTH)
-    shown = seen(SCENE.surface(truth, NO_CLOTH), SCENE)
-    assert len(OpticalFlow(between="shapes").match(FRAME, shown, away, Past(), SCENE, FIRST).vertex) == 0
+    here, matcher = SCENE.surface(truth, NO_CLOTH), OpticalFlow(between="shapes")
+    assert len(matcher.match(FRAME, seen(here, SCENE), away, Past(), SCENE, FIRST).vertex) == 0
+    assert len(matcher.match(FRAME, seen(away, SCENE), here, Past(), SCENE, FIRST).vertex) == 0
 
 
 def test_hanging_cloth_counts_less():
@@ -211,6 +221,7 @@ def test_a_pose_that_nobody_saw_carries_nothing():
     past = tiny_past(SCENE, before)
     unseen = replace(past.moments[-1], observed=np.zeros(len(before.angles)))
     assert not len(flow_points(textured(SCENE, before, before), Past(moments=(unseen,)), SCENE).camera)
+    assert not len(flow_points(textured(SCENE, before, before), Past(), SCENE).camera)  # nor does a first frame
 
 
 def test_points_on_cloth_count_less():
@@ -222,6 +233,8 @@ def test_points_on_cloth_count_less():
     assert cloth.sum() > 20
     np.testing.assert_allclose(np.median(matches.weight[cloth]), 0.2)
     np.testing.assert_allclose(np.median(matches.weight[~cloth]), 1.0)
+    later = OpticalFlow(image_sigma_px=1, first_share=1).match(frame, NOTHING, surface, past, DRESSED, CALM)
+    np.testing.assert_allclose(later.weight, LATER_SHARE * matches.weight)
 
 
 def test_points_on_cloth_stand_for_the_skin_that_it_touches():
@@ -263,3 +276,10 @@ def test_flow_of_a_wrong_picture_is_not_followed():
     wrong = Frame(index=5, time=1 / 6, images=frame.images, usable=frame.usable, flow=wild)
     guess = ImageFlowPredictor().predict(wrong, tiny_past(SCENE, before), SCENE)
     assert guess is before
+
+
+def test_a_few_points_are_not_trusted():
+    before = tiny_pose(SCENE)
+    frame = textured(SCENE, before, moved(before, step(1, 0.1)))
+    few = tuple(Flow(pixel=view.pixel[:7], displacement=view.displacement[:7]) for view in frame.flow)
+    assert ImageFlowPredictor().predict(replace(frame, flow=few), tiny_past(SCENE, before), SCENE) is before

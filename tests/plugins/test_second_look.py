@@ -12,6 +12,7 @@ from mocapflow_matching.camouflage import FEET
 from mocapflow_recovery.limb_search import LimbSearch
 from mocapflow_recovery.refit_windows import LEAD_IN, WINDOW, pictured, windows
 from mocapflow_recovery.revised_track import RevisedTrack
+from mocapflow_recovery.scoring import mismatch_of
 from mocapflow_recovery.second_look import Refitter, SecondLook
 from results_scene import DEMO, demo_scene, stepping
 
@@ -20,8 +21,9 @@ from mocapflow.data import NO_CLOTH, Change, Cloth, FrameResult, Past, Pose
 from mocapflow.help.shipped import shipped
 from mocapflow.prediction import initial_state
 from mocapflow.recordings.recording import open_recording
-from mocapflow.results import Track
+from mocapflow.results import ImageFlow, Track, ViewChecks
 from mocapflow.series import Series
+from mocapflow.testing import pictures, recovery, scenes
 from mocapflow.track import CoupledLoop
 
 SCENE = demo_scene()
@@ -31,6 +33,7 @@ ROW = 12
 RECORDING = open_recording(DEMO, stop=len(TRUE.frame))
 STAGES = load_pipeline(shipped("pipelines", "bare.yaml"), recording=DEMO).stages
 LOOP = next(named.stage for named in STAGES if isinstance(named.stage, CoupledLoop))
+MORE_MISMATCH = Refitter.more_mismatch
 
 
 def astray(*rows: int, by: float = 0.8) -> Track:
@@ -206,6 +209,44 @@ def test_the_mismatch_has_its_say(monkeypatch, mismatch, areas, kept):
     monkeypatch.setattr(CoupledLoop, "settled", lambda *given: fitted(TRUE.pose(given[1].index), cost))
     mismatch[:] = areas
     assert (second_look(track) is track) is kept
+
+
+def test_what_lies_apart_more_is_the_person_off_the_model_and_skin_in_empty_space():
+    scene = scenes.tiny_scene()
+    pose = scenes.tiny_pose(scene, 3, 0.1)
+    astray = Pose(root=pose.root, angles=pose.angles + 0.8 * (np.arange(len(pose.angles)) == 1))  # a leg
+    frame, past = pictures.tiny_frame(scene, pose), Past()
+    trimaps = LimbSearch().trimaps(frame, scene.surface(pose, NO_CLOTH), past, scene)
+    right, wrong = (mismatch_of(scene.surface(each, NO_CLOTH), scene, trimaps) for each in (pose, astray))
+    standing = SimpleNamespace(pose=lambda row: pose, cloth=lambda row: NO_CLOTH)
+    loop, model = SimpleNamespace(recovery=None), scenes.tiny_model(scene)
+    other = recovery.settled(pictures.tiny_state(scene, astray, pose), scene)
+    more = MORE_MISMATCH(Refitter(loop, model, standing, 0.04, np.zeros(1, bool)), frame, 0, past, other)
+    assert min(wrong.hint, wrong.floating) > 100  # cm²
+    assert more == pytest.approx(wrong.hint + wrong.floating - right.hint - right.floating)
+
+
+def test_a_track_that_nothing_recovers_is_looked_at_too(looked):
+    loop = LOOP.model_copy(update={"recovery": None})
+    again = SecondLook().run(astray(ROW), loop, RECORDING, SCENE, RECORDING.background())
+    np.testing.assert_array_equal(again.angles, TRUE.angles)
+
+
+def test_pictures_are_those_that_were_tracked(monkeypatch):
+    """Without wrong views, with the flow into them."""
+    shown = []
+    monkeypatch.setattr(
+        CoupledLoop, "settled", lambda *given: shown.append(given[1]) or fitted(TRUE.pose(given[1].index), cost=0.49)
+    )
+    checks = ViewChecks(frame=np.array([ROW], np.int32), camera=np.array([1], np.int16), reasons=("torn",))
+    flow = ImageFlow(
+        frame=np.full(1, ROW, np.int32), camera=np.full(1, 2, np.int16), pixel=np.ones((1, 2), np.float32),
+        displacement=np.ones((1, 2), np.float32), cameras=4,
+    )  # fmt: skip
+    SecondLook().run(astray(ROW), LOOP, RECORDING, SCENE, RECORDING.background(), flow, checks)
+    last = shown[-1]
+    assert last.usable.tolist() == [True, False, True, True]
+    assert [len(view.pixel) for view in last.flow] == [0, 0, 1, 0]
 
 
 def test_without_the_empty_scene_no_frame_is_looked_at(looked, caplog):
