@@ -101,6 +101,10 @@ def test_a_frozen_view_is_found_beside_missing_pictures(clip):
     assert set(told) == {(index, 1) for index in (25, 26, 27)}
 
 
+def test_most_of_a_view_may_be_missing(clip):
+    assert found(clip, dict(what="dropped", first=10, count=45, views=["cam02"])) == {}
+
+
 def test_a_view_that_shows_one_picture_from_first_to_last(clip):
     """Its first picture may be true."""
     told = found(clip, dict(what="frozen", first=0, views=["cam02"]))
