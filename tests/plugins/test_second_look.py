@@ -79,9 +79,10 @@ def second_look(track: Track, **settings: float) -> Track:
 
 
 def test_a_frame_that_leaps_is_fitted_again_from_between_its_neighbours(looked):
-    again = second_look(astray(ROW))
+    again = second_look(replace(astray(ROW), doubted=TRUE.frame == ROW))
     np.testing.assert_array_equal(again.angles, TRUE.angles)
     np.testing.assert_array_equal(again.root, TRUE.root)
+    assert np.flatnonzero(again.doubted).tolist() == [ROW]  # the room behind is what it was
     colours, same, (index, past, start) = looked  # the frame after that wrong one leaps, too
     assert (colours[0], same[0], index) == (ROW + 2, ROW + 1, ROW)
     assert abs(start.angles[KNEE] - TRUE.angles[[ROW - 1, ROW + 1], KNEE].mean()) < 1e-12
