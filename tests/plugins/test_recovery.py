@@ -20,7 +20,7 @@ from mocapflow_recovery.scoring import Fit, Mismatch, StartPose, mismatch_of
 from mocapflow_recovery.search_history import HISTORY
 from mocapflow_recovery.search_triggers import Trigger
 from mocapflow_recovery.searches import Searches, half_turn
-from mocapflow_recovery.trimaps import SmallRoom, small_rooms, trimaps
+from mocapflow_recovery.trimaps import SmallRoom, _distance, small_rooms, trimaps
 
 from mocapflow.data import NO_CLOTH, Frame, Past, Pose
 from mocapflow.geometry.cameras import project, shrunk
@@ -95,6 +95,10 @@ def test_a_shadow_is_neither() -> None:
     for before, after, _ in zip(lit, dim, SCENE.cameras, strict=True):
         assert np.mean(after.person[part]) < 0.05  # not the person
         assert np.mean(after.distance[part] == 0) > np.mean(before.distance[part] == 0) + 0.5  # nor surely the room
+    nowhere = [np.ones(spot.shape, bool)] * len(shadowed)  # may there be a shadow, as other views tell
+    frame = replace(FRAME, images=shadowed)
+    for near, far in zip(dim, trimaps(frame, surface(POSE), ROOM, 9.0, None, nowhere), strict=True):
+        assert np.mean(far.person[part]) > 0.8 > np.mean(near.person[part])
 
 
 def test_where_nobody_knows_the_room_it_is_neither() -> None:
@@ -117,13 +121,22 @@ def test_a_room_shrunk_by_more_than_it_is_wide_then_is_compared() -> None:
         assert view.person.shape == tuple(view.camera.size[::-1])
 
 
-def test_what_hides_the_person_is_neither() -> None:
+@pytest.mark.parametrize("room", [False, True], ids=["black", "like the room"])
+def test_what_hides_the_person_is_neither(room) -> None:
     bar = np.zeros(FRAME.images[0].shape[:2], bool)
-    bar[100:130] = True
-    images = tuple(np.where(bar[..., None], np.uint8(0), image) for image in FRAME.images)
+    bar[100:129] = True  # of the last two rows, which are one in a small view, the first
+    shown = [mean.astype(np.uint8) if room else np.zeros_like(FRAME.images[0]) for mean in SCENE.background.mean]
+    images = tuple(np.where(bar[..., None], *pair) for pair in zip(shown, FRAME.images, strict=True))
     for view, _ in zip(seen(replace(FRAME, images=images, hidden=(bar,) * len(images))), SCENE.cameras, strict=True):
         assert not view.person[50:65].any()
         assert not view.distance[50:65].any()
+
+
+def test_a_gap_in_the_person_that_looks_like_the_room_is_the_person_s() -> None:
+    person = np.ones((20, 30), bool)
+    person[:, 10:13] = person[:, 20:] = False
+    distance = _distance(~person, person)
+    assert not distance[:, :20].any() and distance[10, 25] == pytest.approx(6, abs=0.5)
 
 
 def test_somebody_far_away_is_not_the_person() -> None:

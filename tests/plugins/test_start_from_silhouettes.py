@@ -130,14 +130,26 @@ def test_a_pose_that_fits_badly_is_warned_of(monkeypatch, caplog):
     for name, value in {
         "DIRECTIONS": 4,
         "CANDIDATES": 1,
-        "SEARCHES": 1,
+        "SEARCHES": 2,
         "search": lambda cost, begin, *_: begin,
+        "likely_headings": lambda poses, off: list(range(len(poses))),
     }.items():
         monkeypatch.setattr(start_from_silhouettes, name, value)
     recording = open_recording(SKIRT)
     scene = Scene(cameras=recording.cameras, body=Template(shape=0.0).load(SKIRT))
-    StartFromSilhouettes(draper=None).run(recording, scene)
+    start = StartFromSilhouettes(draper=None).run(recording, scene)
+    assert len(start.others) == 1 and heading_between(start.pose, start.others[0]) > 1
     assert re.search(r"first pose: \d+\.\d mm off the silhouettes .* may be wrong; .* start_from_file", caplog.text)
+
+
+@pytest.mark.parametrize("dressed", [True, False])
+def test_without_a_draper_clothes_are_left_out(dressed):
+    pipeline, recording = load_pipeline(shipped("pipelines", "skirt.yaml"), recording=SKIRT), open_recording(SKIRT)
+    body = pipeline.body.load(SKIRT)
+    scene = Scene(cameras=recording.cameras, body=body, garment=pipeline.garment.sew(body))
+    stage = StartFromSilhouettes() if dressed else StartFromSilhouettes(draper=None)
+    scorer = stage._target(recording, scene).scorer
+    assert scorer.model.clothed == (scorer.coarse.garment is not None) == dressed
 
 
 def test_a_search_is_repeated_as_long_as_that_helps(monkeypatch):
