@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from mocapflow_levelset.colours import BINS, bins_of
 from mocapflow_levelset.layered import Layered
-from mocapflow_levelset.layers import COLOURS, colour_model, garment_log_ratio, layer_histograms, layer_of
+from mocapflow_levelset.layers import COLOURS, _drawn, colour_model, garment_log_ratio, layer_histograms, layer_of
+from mocapflow_levelset.room_colours import ROOM
 
 from mocapflow.data import BODY, CLOTH, Frame, Past, Turn
 from mocapflow.geometry.visibility import front_vertices
@@ -57,6 +58,24 @@ def test_a_layer_has_the_colours_that_it_is_drawn_on():
     assert counts[:-1, skin].sum() == counts[:-1].sum() > 100
 
 
+def test_the_rim_of_a_silhouette_is_not_learned():
+    """Its pixels mix person and room."""
+    frame, rim = painted(dressed, noise=0.0), (250, 5, 250)
+    for image, silhouette in zip(frame.images, tiny_segmentation(SCENE, POSE).silhouettes, strict=True):
+        image[(silhouette.distance > 0) & (silhouette.distance <= 3)] = rim
+    counts = learned(frame)
+    assert counts.sum() > 100 and not counts[:, int(bins_of(np.array(rim, np.uint8)))].any()
+
+
+def test_pixels_beside_another_layer_are_not_learned():
+    surface, layers, camera = SCENE.surface(POSE, tiny_cloth(SCENE, POSE)), layer_of(SCENE), SCENE.cameras[0]
+    inside = tiny_segmentation(SCENE, POSE).silhouettes[0].distance[::3, ::3] > 3
+    pixel, layer = _drawn(surface, camera, layers, inside, 3)
+    assert len(np.unique(layer)) > 3
+    for step in ([3, 0], [-3, 0], [0, 3], [0, -3]):
+        np.testing.assert_array_equal(layers[front_vertices(surface, camera, pixel + np.array(step, float))[0]], layer)
+
+
 def test_what_is_apart_is_told_and_what_is_alike_is_not():
     layers = layer_of(SCENE)
     knee = layers[np.linalg.norm(SCENE.body.vertices - [0.1, 0, 0.3], axis=1).argmin()]
@@ -78,6 +97,7 @@ def test_the_garment_is_told_from_every_part_outside_of_it_or_not_at_all():
     told = garment_log_ratio(Past(appearance={COLOURS: learned(alike)}), SCENE)
     assert told[cloth] < 0.5
     assert garment_log_ratio(Past(), SCENE) is None
+    assert garment_log_ratio(Past(appearance={COLOURS: learned(alike)}), SCENE.undressed) is None
 
 
 def test_a_garment_that_leaves_no_part_outside_is_not_told(monkeypatch):
@@ -104,7 +124,7 @@ def test_the_segmenter_hands_them_on():
     past, turn = tiny_past(SCENE, POSE), Turn(index=1)
     frame, state = tiny_frame(SCENE, POSE), tiny_state(SCENE, POSE)
     found = Layered().segment(frame, state, past, SCENE, turn)
-    assert found.inner is None
+    assert found.inner is None and ROOM not in found.appearance
     then = Layered().segment(frame, state, replace(past, appearance=found.appearance), SCENE, Turn(index=0))
     assert then.inner is not None
     assert then.appearance == found.appearance

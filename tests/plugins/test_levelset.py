@@ -5,15 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from levelset_scenes import ellipse
+from mocapflow_levelset.background import BackgroundDifference
+from mocapflow_levelset.colours import BINS
+from mocapflow_levelset.crops import shrink, shrink_mask
 from mocapflow_levelset.evidence import Room
+from mocapflow_levelset.evolve import Schedule
 from mocapflow_levelset.grabcut import GrabCut
 from mocapflow_levelset.layered import Layered
+from mocapflow_levelset.layers import COLOURS
 from mocapflow_levelset.levelset import LevelSet
 from mocapflow_levelset.masks import counted, without_cut
 from mocapflow_levelset.moved import moved_outline
 from mocapflow_levelset.plates import Shadow, plate_of
 from mocapflow_levelset.redistance import redistance
-from mocapflow_levelset.view import View, find
+from mocapflow_levelset.view import Contact, Matte, View, _evidence, _refined, find
 
 from mocapflow.data import Change, Moment, Past, Turn
 from mocapflow.geometry.cameras import project
@@ -63,13 +68,22 @@ def test_where_nobody_knows_the_room_local_colours_tell(scene, pose):
     background = scene.background
     unknown = replace(background, spread=tuple(np.full_like(part, np.inf) for part in background.spread))
     segmenter = LevelSet(decorrelate=False, matte_px=0)
-    found, without, with_room = (
-        segmenter.segment(frame, state, Past(), scene.with_background(room), FIRST).of("person")
-        for room in (unknown, None, background)
+    unused = segmenter.model_copy(update={"use_background": False})
+    found, without, left_out, with_room = (
+        each.segment(frame, state, Past(), scene.with_background(room), FIRST).of("person")
+        for each, room in ((segmenter, unknown), (segmenter, None), (unused, background), (segmenter, background))
     )
-    for one, other, known in zip(found, without, with_room, strict=True):
-        np.testing.assert_array_equal(one.distance, other.distance)
+    for one, *others, known in zip(found, without, left_out, with_room, strict=True):
+        assert all((one.distance == other.distance).all() for other in others)
         assert (one.distance != known.distance).any()
+
+
+def test_an_image_is_looked_at_only_in_sizes_in_which_the_contour_moves():
+    factors = [
+        [each.factor for each in segmenter._resolutions(warm)]
+        for segmenter, warm in ((LevelSet(), False), (LevelSet(), True), (LevelSet(half_steps=0), True))
+    ]
+    assert factors == [[4, 2, 1], [2, 1], [1]]
 
 
 def test_the_matte_moves_nothing_where_nobody_knows_the_room(scene, pose):
@@ -131,6 +145,25 @@ def test_the_contour_is_found_anew_only_where_the_model_has_moved(scene, pose):
     assert due[: rows[0]].any() and not changed[: rows[0]].any()
     anew = np.abs(new - all_new)[rows[0] + 10 :][np.abs(all_new)[rows[0] + 10 :] < 1]
     assert anew.max() < 0.3
+
+
+def test_a_view_in_which_no_outline_has_moved_keeps_its_silhouette_and_energies(scene, pose):
+    """One that the person walks away from."""
+    frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, pose)
+    state = replace(state, segmentation=LevelSet().segment(frame, state, Past(), scene, FIRST))
+    away = 0.02 * scene.cameras[0].camera_from_world[2, :3]
+    found = LevelSet().segment(frame, state, Past(), scene, shifted(scene, state, away))
+    assert found.silhouettes[0] is state.segmentation.silhouettes[0]
+    assert found.silhouettes[1] is not state.segmentation.silhouettes[1]
+    assert found.energies["cam01.data"] == state.segmentation.energies["cam01.data"]
+    assert found.energies["cam02.data"] != state.segmentation.energies["cam02.data"]
+
+
+def test_a_view_without_a_picture_has_no_silhouette(scene, pose):
+    frame = pictures.without_view(pictures.tiny_frame(scene, pose), 1)
+    for segmenter in (LevelSet(), GrabCut(), BackgroundDifference()):
+        found = segmenter.segment(frame, pictures.tiny_state(scene, pose), Past(), scene, FIRST)
+        assert [silhouette.camera for silhouette in found.silhouettes] == [0, 2, 3]
 
 
 def test_a_part_says_what_it_costs_more_than_the_start():
@@ -239,6 +272,74 @@ def test_the_contour_is_sub_pixel():
         assert np.abs((found - exact)[at]).mean() < 0.35
 
 
+def disc(x, y, radius, width):
+    rows, columns = np.mgrid[:160, :width]
+    return (radius - np.hypot(columns - x, rows - y)).astype(np.float32)
+
+
+def disc_in_a_room(width=160):
+    """A picture of a disc, where it is, and the empty room by how much it is shrunk."""
+    rng, exact, empty = np.random.default_rng(0), disc(70.4, 79.7, 40.3, width), np.ones((160, width, 3), np.float32)
+    empty *= (140, 130, 120)
+    alpha = np.clip(exact / 1.6 + 0.5, 0, 1)[..., None]
+    image = alpha * [60, 90, 150] + (1 - alpha) * empty + rng.normal(0, 3, empty.shape)
+    plates = {factor: plate_of(empty, np.full_like(empty, 3), ("lab",), factor) for factor in (1, 2, 4)}
+    rooms = {factor: Room(plate, np.ones(plate.spread.shape, bool), Shadow()) for factor, plate in plates.items()}
+    return np.clip(image, 0, 255).astype(np.uint8), exact, empty, rooms
+
+
+def test_an_arm_of_the_model_that_lies_in_the_empty_room_is_given_up():
+    """Far from the person: both sides of its contour show the room."""
+    image, exact, _, rooms = disc_in_a_room(400)
+    stray, segmenter = disc(340, 80, 12.0, 400), LevelSet()
+    model = redistance(np.maximum(exact, stray), 12.0)
+    view = View(image, model, model, counted(model.shape, 3), rooms)
+    found = find(view, segmenter._resolutions(warm=True), segmenter._method()).level
+    assert not (found[stray > 0] > 0).any()
+    assert (found[exact > 3] > 0).all()
+
+
+@pytest.mark.parametrize("kept", ["contact", "hidden", "unknown"])
+def test_a_matte_moves_nothing_where_it_may_not(kept):
+    """A contour that has ended 1 px too far out, at the right of it."""
+    image, exact, empty, _ = disc_in_a_room()
+    right = np.arange(160)[None] * np.ones((160, 1)) > 70
+    segmenter, zone = LevelSet(), np.zeros(exact.shape, bool)
+    still = Schedule(0, 4, 4)
+    contact = Contact(right if kept == "contact" else zone, still, segmenter._window(12.0))
+    view = View(
+        image, exact + 1, exact + 1, counted(exact.shape, 3, right if kept == "hidden" else None), contact=contact,
+        matte=Matte(empty, ~right if kept == "unknown" else ~zone, 2),
+    )  # fmt: skip
+    level = _refined(redistance(exact + np.float32(1), 7.0), view, segmenter._method())
+    off = (level - exact)[np.abs(exact) < 0.5], right[np.abs(exact) < 0.5]
+    assert np.median(np.abs(off[0][off[1]] - 1)) < 0.2 and np.median(np.abs(off[0][~off[1]])) < 0.2
+
+
+def test_a_person_whose_feet_are_out_of_sight_has_no_contact(scene, pose):
+    image, exact, _, rooms = disc_in_a_room()
+    segmenter, start = LevelSet(), redistance(exact, 12.0)
+    plain = View(image, start, start, counted(start.shape, 3), rooms)
+    contact = Contact(np.zeros(start.shape, bool), Schedule(4, 4, 4), segmenter._window(12.0))
+    one, other = (
+        find(view, segmenter._resolutions(warm=False), segmenter._method()).level
+        for view in (plain, plain._replace(contact=contact))
+    )
+    np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize(("factor", "stride", "every"), [(1, 4, 4), (2, 4, 2), (4, 2, 1)])
+def test_learned_colours_tell_of_pixels_that_count_and_statistics_take_as_many(factor, stride, every):
+    image, exact, _, _ = disc_in_a_room()
+    hidden = exact > 0
+    view = View(image, exact, exact, counted(exact.shape, 0, hidden), colours=np.full(BINS, 2, np.float32))
+    segmenter = LevelSet(stride_px=stride)
+    small = shrink(image, factor)
+    found = _evidence(small, view, segmenter._resolutions(warm=False)[-1]._replace(factor=factor), segmenter._method())
+    np.testing.assert_array_equal(found.colour_ratio, np.where(shrink_mask(hidden, factor), 0, 2))
+    assert found.stride == every
+
+
 def test_the_literal_chapter_runs(scene, pose):
     frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, believed(pose))
     literal = LevelSet(
@@ -262,6 +363,8 @@ def test_beyond_a_cut_nothing_counts(scene, pose):
     assert weight[max(first_row - 6, 3), column] == 0
     below = np.flatnonzero((model > 0).any(axis=1))[-1]
     assert weight[(first_row + below) // 2].sum() > 0.9 * (weight.shape[1] - 6)
+    view = LevelSet()._view(pictures.tiny_frame(scene, pose), surface, Past(), replace(scene, body=partial), 0, [])
+    np.testing.assert_array_equal(view.counted, weight)
     assert (without_cut(counted(model.shape, 3), model, scene.body, surface, camera) > 0).sum() == 234 * 314
     behind = replace(camera, camera_from_world=camera.camera_from_world - 20 * np.outer(np.eye(4)[2], np.eye(4)[3]))
     assert (without_cut(counted(model.shape, 3), model, partial, surface, behind) > 0).sum() == 234 * 314
@@ -291,6 +394,10 @@ def test_inner_contours_stay_only_while_the_body_rests(scene, pose):
     state = replace(state, segmentation=Layered().segment(frame, state, past, scene, FIRST))
     turn = shifted(scene, state, 0.0, index=2)
     calm = replace(turn, change=replace(turn.change, body=0.004))
+    learned = Layered().segment(frame, state, past, scene, replace(calm, index=1))  # the turn in which colours are
+    assert COLOURS in learned.appearance
+    state = replace(state, segmentation=learned)
     assert Layered().segment(frame, state, past, scene, calm) is state.segmentation
     renewed = Layered().segment(frame, state, past, scene, turn)
     assert renewed is not state.segmentation and renewed.silhouettes == state.segmentation.silhouettes
+    assert renewed.appearance == learned.appearance

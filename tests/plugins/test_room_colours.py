@@ -84,6 +84,16 @@ def test_a_view_that_has_shown_no_room_tells_nothing():
     assert person_log_ratio(Past(appearance=appearance), 1).any()
 
 
+def test_before_a_frame_has_shown_the_room_nothing_is_told_and_then_it_is_learned():
+    frame, state, segmenter = pictures(POSE), tiny_state(SCENE, POSE), Layered(use_background=False, colour_weight=1.0)
+    found = segmenter.segment(frame, state, Past(), SCENE, Turn(index=0))
+    plain = Layered(use_background=False).segment(frame, state, Past(), SCENE, Turn(index=0))
+    for one, other in zip(found.silhouettes, plain.silhouettes, strict=True):
+        np.testing.assert_array_equal(one.distance, other.distance)
+    assert ROOM not in found.appearance
+    assert ROOM in segmenter.segment(frame, state, Past(), SCENE, Turn(index=1)).appearance
+
+
 def test_a_limb_that_came_back_elsewhere_is_found_by_its_colours():
     """The shank is believed 80° from where it is, before the wall: local statistics call the wall the person there."""
     frame, believed = pictures(POSE), strayed(80)
