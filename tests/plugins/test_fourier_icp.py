@@ -105,16 +105,6 @@ def test_other_numbers_of_components_fall_back():
     assert not view(FourierIcp(least_px=1e4), far, shown, FIRST)[0].curvature.any()  # nothing is as long
 
 
-@pytest.mark.parametrize(("seen_holes", "own_holes"), [(1, 1), (0, 1), (1, 0), (0, 0)])
-def test_holes_are_low_passed_where_both_have_as_many(seen_holes, own_holes):
-    y, x = np.mgrid[:100, :120]
-    away = np.hypot(x - 60, y - 50)
-    disc, ring = away < 40, (away < 40) & (away > 20)
-    curves = FourierIcp()._comparable(*((ring if holes else disc) for holes in (seen_holes, own_holes)), 3)
-    around = 2 * np.pi * (40 + 20 * min(seen_holes, own_holes))
-    assert [len(curve.raw) for curve in curves] == pytest.approx([around] * 2, rel=0.1)
-
-
 def test_low_passed_pairs_ask_for_the_shift():
     """15 cm aside: in the mean over all contours, the pairs of each view ask for most of what the view sees of it."""
     truth = tiny_pose(SCENE)

@@ -49,12 +49,3 @@ def test_a_body_without_feet_has_no_rows() -> None:
     scene = make_scene()
     bare = replace(scene, body=replace(scene.body, joint_names=tuple(f"other{k}" for k in range(8))))
     assert floor(1e3).residual(make_pose(0), Past(), bare).error.shape == (0,)
-
-
-def test_a_part_that_carries_no_skin_has_no_row() -> None:
-    scene, body = make_scene(), make_scene().body
-    carried = np.where(body.skin_joint == body.joint("joint3"), np.int32(0), body.skin_joint)
-    bare = replace(scene, body=replace(body, skin_joint=carried))
-    pose = make_pose(0)
-    (error,) = floor(max(lowest(pose)) + 0.1).residual(pose, Past(), bare).error
-    assert error > 0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mocapflow_levelset.colours import BINS, bins_of
 from mocapflow_levelset.layered import Layered
-from mocapflow_levelset.layers import COLOURS, _drawn, colour_model, garment_log_ratio, layer_histograms, layer_of
+from mocapflow_levelset.layers import COLOURS, colour_model, garment_log_ratio, layer_histograms, layer_of
 from mocapflow_levelset.room_colours import ROOM
 
 from mocapflow.data import BODY, CLOTH, Frame, Past, Turn
@@ -65,15 +65,6 @@ def test_the_rim_of_a_silhouette_is_not_learned():
         image[(silhouette.distance > 0) & (silhouette.distance <= 3)] = rim
     counts = learned(frame)
     assert counts.sum() > 100 and not counts[:, int(bins_of(np.array(rim, np.uint8)))].any()
-
-
-def test_pixels_beside_another_layer_are_not_learned():
-    surface, layers, camera = SCENE.surface(POSE, tiny_cloth(SCENE, POSE)), layer_of(SCENE), SCENE.cameras[0]
-    inside = tiny_segmentation(SCENE, POSE).silhouettes[0].distance[::3, ::3] > 3
-    pixel, layer = _drawn(surface, camera, layers, inside, 3)
-    assert len(np.unique(layer)) > 3
-    for step in ([3, 0], [-3, 0], [0, 3], [0, -3]):
-        np.testing.assert_array_equal(layers[front_vertices(surface, camera, pixel + np.array(step, float))[0]], layer)
 
 
 def test_what_is_apart_is_told_and_what_is_alike_is_not():

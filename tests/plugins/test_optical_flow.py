@@ -8,7 +8,7 @@ import pytest
 from matching_scenes import CALM, FIRST, FRAME, knee_error_deg, seen
 from mocapflow_matching.contour_icp import ContourIcp
 from mocapflow_matching.flow_points import flow_points
-from mocapflow_matching.optical_flow import LATER_SHARE, OpticalFlow, _snapped
+from mocapflow_matching.optical_flow import LATER_SHARE, OpticalFlow
 from mocapflow_matching.shape_flow import _relax, register
 from mocapflow_priors.constant_velocity import ConstantVelocity
 from mocapflow_priors.image_flow import ImageFlowPredictor
@@ -108,15 +108,6 @@ def test_targets_are_brought_onto_the_contour_of_the_picture_itself():
                 away.append(np.linalg.norm(silhouette.zero_level[0] - target, axis=1).min())
     assert len(away) > 50
     assert np.percentile(away, 90) < 0.6  # what is left is the spacing of the contour's points, a pixel
-
-
-def test_a_step_down_a_distance_is_not_long_where_that_is_nearly_flat():
-    """Half-way between two outlines, where it has a ridge."""
-    away = np.abs(np.arange(40, dtype=np.float32) - 20)[None] * np.ones((40, 1), np.float32) - 10
-    beside = np.array([[20.1, 20.0], [25.0, 20.0]])
-    moved_to = _snapped(beside, away)
-    assert np.abs(moved_to - beside)[0].max() < 10
-    np.testing.assert_allclose(moved_to[1], [30.0, 20.0], atol=1e-4)
 
 
 def test_shapes_lead_the_way_in_the_first_turn_only():

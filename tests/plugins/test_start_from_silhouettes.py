@@ -19,7 +19,6 @@ from mocapflow_recovery.trimaps import small_rooms
 from mocapflow.config.pipeline import load_pipeline
 from mocapflow.data import NO_CLOTH, Pose
 from mocapflow.errors import RecordingError
-from mocapflow.geometry import twists
 from mocapflow.geometry.angles import measure
 from mocapflow.geometry.silhouettes import covered
 from mocapflow.help.shipped import shipped
@@ -81,16 +80,6 @@ def test_the_largest_change_of_each_usable_view_is_the_person():
     assert [camera.name for camera in cameras] == ["cam01", "cam02", "cam03"]
     assert masks[0].sum() > 500 and not masks[1].any()
     assert masks[2].sum() > 500 and not masks[2][:12, :12].any()
-
-
-@pytest.mark.parametrize("lean", [0.0, 1.0])
-def test_two_who_look_the_same_way_have_one_heading(lean):
-    def facing(turn):
-        return Pose(root=twists.exp(np.r_[0, 0, turn, np.zeros(3)]) @ twists.exp(np.r_[lean, np.zeros(5)]), angles=still)
-
-    still = np.zeros(1)
-    assert max(heading_between(facing(turn), facing(turn)) for turn in np.linspace(0, 6, 40)) < 1e-7
-    assert heading_between(facing(0.3), facing(1.3)) == pytest.approx(1.0)
 
 
 def test_without_plates_it_says_what_else_there_is(tmp_path):
