@@ -210,6 +210,8 @@ def test_an_outline_that_slides_along_itself_has_not_moved(scene, pose):
     assert shown[y, x][upright].all()  # where it was before
     assert upright.sum() > 10 and moved[upright].all() and flat.sum() > 2 and not moved[flat].any()
     assert moved_outline(surface, Change(body=1, cloth=1, angles=1, sigmas=1), camera, 2.0) is None
+    entered = moved_outline(surface, shifted(scene, state, 1.5 * across).change, camera, 1.0)
+    assert entered.any() and not entered[:, 240:].any()  # it was beyond the left border
 
 
 def test_energies_are_named_by_view_and_term(scene, pose):
@@ -297,18 +299,6 @@ def test_a_matte_moves_nothing_where_it_may_not(kept):
     level = _refined(redistance(exact + np.float32(1), 7.0), view, segmenter._method())
     off = (level - exact)[np.abs(exact) < 0.5], right[np.abs(exact) < 0.5]
     assert np.median(np.abs(off[0][off[1]] - 1)) < 0.2 and np.median(np.abs(off[0][~off[1]])) < 0.2
-
-
-def test_a_person_whose_feet_are_out_of_sight_has_no_contact(scene, pose):
-    image, exact, _, rooms = disc_in_a_room()
-    segmenter, start = LevelSet(), redistance(exact, 12.0)
-    plain = View(image, start, start, counted(start.shape, 3), rooms)
-    contact = Contact(np.zeros(start.shape, bool), Schedule(4, 4, 4), segmenter._window(12.0))
-    one, other = (
-        find(view, segmenter._resolutions(warm=False), segmenter._method()).level
-        for view in (plain, plain._replace(contact=contact))
-    )
-    np.testing.assert_array_equal(one, other)
 
 
 def test_the_literal_chapter_runs(scene, pose):

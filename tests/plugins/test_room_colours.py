@@ -78,8 +78,11 @@ def test_colours_tell_person_from_room_and_nothing_of_what_was_never_seen():
 
 def test_a_view_that_has_shown_no_room_tells_nothing():
     frame = pictures(POSE)
-    usable = [s for s in tiny_segmentation(SCENE, POSE).silhouettes if s.camera != 2]
-    appearance = past_of(frame).appearance | {ROOM: room_histograms(frame, usable, Past(), 0.9, GRID, REACH)}
+    first, second, third, _ = tiny_segmentation(SCENE, POSE).silhouettes
+    nobody = replace(third, distance=np.full_like(third.distance, -12))
+    shown = room_histograms(frame, [first, second, nobody], Past(), 0.9, GRID, REACH)
+    appearance = past_of(frame).appearance | {ROOM: shown}
+    assert not person_log_ratio(Past(appearance=appearance), 3).any()
     assert not person_log_ratio(Past(appearance=appearance), 2).any()
     assert person_log_ratio(Past(appearance=appearance), 1).any()
 

@@ -113,16 +113,6 @@ def test_what_a_frame_knows_of_those_before_it_is_their_better_fit():
     assert gap.after_gap and not gap.moments
 
 
-def test_colours_are_shown_by_the_fit_that_stands():
-    fits, frame, asked = RevisedTrack(astray(ROW), SCENE.body), next(RECORDING.frames(since=ROW)), []
-    better, hung = fitted(TRUE.pose(ROW)), Cloth(vertices=np.ones((4, 3)), parameters=np.array([0.1, 0.2]))
-    fits.replace_fit(ROW, frame, replace(better, state=replace(better.state, cloth=hung)))
-    loop = SimpleNamespace(recovery=None, settled=lambda *given: asked.append(given) or better)
-    Refitter(loop, LOOP.model_of(SCENE, None), fits, 0.04, np.zeros(len(TRUE.frame), bool)).appearance(frame, ROW)
-    ((*_, begin, parameters),) = asked
-    assert begin.angles[KNEE] == TRUE.angles[ROW, KNEE] and parameters.tolist() == [0.1, 0.2]
-
-
 @pytest.mark.parametrize("row", [ROW, len(TRUE.frame) - 1])
 def test_feet_that_look_like_the_floor_stay_unmatched(looked, monkeypatch, row):
     def told(finder, frame, result, past, model):

@@ -131,16 +131,6 @@ def test_a_pose_that_fits_badly_is_warned_of(monkeypatch, caplog):
     assert re.search(r"first pose: \d+\.\d mm off the silhouettes .* may be wrong; .* start_from_file", caplog.text)
 
 
-@pytest.mark.parametrize("dressed", [True, False])
-def test_without_a_draper_clothes_are_left_out(dressed):
-    pipeline, recording = load_pipeline(shipped("pipelines", "skirt.yaml"), recording=SKIRT), open_recording(SKIRT)
-    body = pipeline.body.load(SKIRT)
-    scene = Scene(cameras=recording.cameras, body=body, garment=pipeline.garment.sew(body))
-    stage = StartFromSilhouettes() if dressed else StartFromSilhouettes(draper=None)
-    scorer = stage._target(recording, scene).scorer
-    assert scorer.model.clothed == (scorer.coarse.garment is not None) == dressed
-
-
 def test_a_search_is_repeated_as_long_as_that_helps(monkeypatch):
     """Poses are what they cost here."""
     ends, seeds = iter([8.0, 5.0, 4.9, 1.0]), []
