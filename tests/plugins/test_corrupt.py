@@ -78,6 +78,8 @@ def test_noise_lies_under_a_stripe_or_over_it(clip):
 
 
 def test_rectangles_are_as_many_and_as_large_as_asked():
+    with pytest.raises(ValueError, match="at least, at most"):
+        Corrupt(rectangles=(3, 1))
     white, rng = np.full((100, 200, 3), 255, np.uint8), np.random.default_rng(3)
     sides = []
     for _ in range(60):
@@ -128,9 +130,17 @@ def test_a_picture_that_is_spoiled_or_missing(clip):
     assert frames[4].hidden[0][half:].all() and not frames[4].hidden[0][:half].any() and not frames[4].hidden[1].any()
     assert frames[2].hidden == ()
     assert frames[6].usable.tolist() == [False, True]
-    assert frames[6].reasons == ("dropped", "")
+    assert not frames[6].images[0].any()
+    again = Corrupt(noise=0.5).run(found).frame(6)
+    assert frames[6].reasons == again.reasons == ("dropped", "") and not again.images[0].any()
     assert frames[8].usable.all()
     assert all(equal(frames[k].images[1:], plain[k][1:]) for k in frames)
+
+
+def test_of_a_picture_that_is_another_there_are_no_keypoints(clip):
+    (change,) = disturbed(clip, dict(what="late", views=GOOD)).changes
+    frame = replace(open_recording(clip).frame(5), keypoints=(np.ones((2, 25, 3)),) * 2)
+    assert [len(view) for view in change._disturbed(frame, ["cam01", "cam02"], {}).keypoints] == [0, 2]
 
 
 def test_a_covered_picture_stays_hidden_where_it_was(clip):
