@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from mocapflow_robustness import disturbances
-from mocapflow_robustness.corrupt import Corrupt
+from mocapflow_robustness.corrupt import Corrupt, fitted
 from mocapflow_robustness.events import Event
 from mocapflow_robustness.occlusion import union
 
@@ -97,6 +97,8 @@ def test_rectangles_are_as_many_and_as_large_as_asked():
     [
         (dict(what="frozen", first=5), (0, 4)),
         (dict(what="late", by=3), (0, 3)),
+        (dict(what="late", by=9), (0, 0)),
+        (dict(what="frozen"), (0, 0)),
         (dict(what="other_time", first=5, count=2, by=4), (0, 10)),
         (dict(what="other_time", first=5, count=6, by=4), (0, 2)),
         (dict(what="other_time", by=6), (0, 0)),  # to the end, which 6 + 6 is beyond
@@ -108,6 +110,16 @@ def test_a_picture_from_elsewhere(clip, event, source):
     camera, index = source
     assert (found.frame(6).images[0] == plain[index][camera]).all()
     assert (found.frame(6).images[1] == plain[6][1]).all()
+
+
+def test_of_two_events_that_meet_the_later_one_in_the_list_counts(clip):
+    late, black = dict(what="late"), dict(what="black", first=4, count=1)
+    shown = [disturbed(clip, *events).frame(4).images[0].any() for events in ((late, black), (black, late))]
+    assert shown == [False, True]
+
+
+def test_a_picture_of_another_camera_has_the_size_of_this_one():
+    assert fitted(np.zeros((4, 6, 3), np.uint8), np.zeros((8, 5, 3), np.uint8)).shape == (8, 5, 3)
 
 
 def test_one_camera_has_no_other(clip):
