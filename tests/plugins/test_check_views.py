@@ -193,6 +193,7 @@ def walked(*places):
         ((0, 40, 2, 3, 4, 5, 6), []),  # no step before it tells how fast things move
         ((0, 1, 2, 3, 40, 5, 6), [4]),
         ((0, 1, 2, 3, 4, 40, 6), []),  # nor one after it
+        ((0,), []),
     ],
 )
 def test_what_jumps_away_and_comes_back_is_a_burst(places, wrong):
