@@ -8,6 +8,7 @@ from mocapflow_robustness import disturbances
 from mocapflow_robustness.corrupt import Corrupt, fitted
 from mocapflow_robustness.events import Event
 from mocapflow_robustness.occlusion import union
+from mocapflow_robustness.sequential_reader import SequentialReader
 
 from mocapflow.errors import RecordingError
 from mocapflow.recordings.recording import open_recording
@@ -120,6 +121,11 @@ def test_of_two_events_that_meet_the_later_one_in_the_list_counts(clip):
 
 def test_a_picture_of_another_camera_has_the_size_of_this_one():
     assert fitted(np.zeros((4, 6, 3), np.uint8), np.zeros((8, 5, 3), np.uint8)).shape == (8, 5, 3)
+
+
+def test_a_reader_goes_back_too(clip):
+    reader = SequentialReader(open_recording(clip))
+    assert [reader.at(index).index for index in (5, 7, 2, 2, 3)] == [5, 7, 2, 2, 3]
 
 
 def test_one_camera_has_no_other(clip):
