@@ -582,8 +582,8 @@ def test_a_view_in_which_something_stands_before_the_person_leads_nobody_astray(
 
 def test_where_no_picture_tells_person_from_room_a_fit_is_doubted() -> None:
     noise = np.random.default_rng(0).integers(0, 255, FRAME.images[0].shape, np.uint8)
-    right, model = pictures.tiny_state(SCENE, POSE, POSE), scenes.tiny_model(SCENE)
-    frame = replace(FRAME, images=(noise,) * len(FRAME.images))
+    right, room = pictures.tiny_state(SCENE, POSE, POSE), replace(SCENE.background, floor_m=0.0)
+    model, frame = scenes.tiny_model(SCENE.with_background(room)), replace(FRAME, images=(noise,) * len(FRAME.images))
     found = LimbSearch().recover(frame, right, settled(right), Past(), model, lambda *_: settled(right))
     assert found.doubted and "no picture tells" in found.notes[0]
 
