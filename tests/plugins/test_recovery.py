@@ -372,7 +372,7 @@ def test_limbs_are_looked_for_where_enough_of_the_room_is_known(columns, looked)
     ids=["doubted", "not doubted", "a later frame"],
 )
 @pytest.mark.long
-def test_a_first_frame_that_is_doubted_is_searched_twice_and_turned_round(past, end, times) -> None:
+def test_a_first_frame_that_is_doubted_is_searched_twice_and_turned_round(past, end, times, caplog) -> None:
     begun, lost = [], pictures.tiny_state(SCENE, astray(end), POSE)
 
     def settle(pose, parameters):
@@ -380,7 +380,7 @@ def test_a_first_frame_that_is_doubted_is_searched_twice_and_turned_round(past, 
         return settled(lost)  # nothing helps
 
     QUICK.recover(FRAME, lost, settled(lost), past, scenes.tiny_model(SCENE), settle)
-    assert len(begun) == times
+    assert len(begun) == times and "looks the other way" not in caplog.text
 
 
 @pytest.mark.long
@@ -474,6 +474,24 @@ def test_a_hint_that_is_cleared_may_cost_a_little_distance(left, floating, apart
     fit = Fit(result, Mismatch(0.0, 0.0, 0.0, 25.0), 1.0)
     other = Fit(result, Mismatch(0.0, floating, 0.0, left), apart)
     assert (LimbSearch(hint_cm2=15)._better(other, fit) is other) == taken
+
+
+def test_of_what_searches_find_a_fit_that_is_not_doubted_comes_first() -> None:
+    result = settled(pictures.tiny_state(SCENE, POSE, POSE))
+    sizes = (100.0, 1.0), (90.0, 0.5), (0.0, 0.8)
+    fit, near, sound = (Fit(result, Mismatch(area, 0.0, 0.0, 0.0), apart) for area, apart in sizes)
+    found = iter([near, sound])
+    scorer = SimpleNamespace(
+        start=None, model=SimpleNamespace(clothed=True), parameters=None, score=lambda _: next(found)
+    )
+    searches = SimpleNamespace(scorer=scorer, wide=lambda *_, **__: POSE)
+    assert not QUICK._searched(0, fit, searches, Trigger("lost", True, ()), lambda *_: result).doubted
+
+
+@pytest.mark.parametrize(("past", "weight"), [(Past(), HANGING), (Past(after_gap=True), FLYING)])
+def test_cloth_may_fly_once_its_colours_are_known(past, weight) -> None:
+    result = settled(pictures.tiny_state(SCENE, POSE, POSE))
+    assert QUICK._scorer(POSE, result, seen(), past, scenes.tiny_model(SCENE)).cloth_weight == weight
 
 
 def test_of_two_fits_alike_the_one_nearer_to_the_start_is_taken() -> None:
