@@ -477,7 +477,7 @@ def test_a_hint_that_is_cleared_may_cost_a_little_distance(left, floating, apart
 
 
 def test_of_what_searches_find_a_fit_that_is_not_doubted_comes_first() -> None:
-    result = settled(pictures.tiny_state(SCENE, POSE, POSE))
+    result = replace(settled(pictures.tiny_state(SCENE, POSE, POSE)), notes=("before",))
     sizes = (100.0, 1.0), (90.0, 0.5), (0.0, 0.8)
     fit, near, sound = (Fit(result, Mismatch(area, 0.0, 0.0, 0.0), apart) for area, apart in sizes)
     found = iter([near, sound])
@@ -485,7 +485,8 @@ def test_of_what_searches_find_a_fit_that_is_not_doubted_comes_first() -> None:
         start=None, model=SimpleNamespace(clothed=True), parameters=None, score=lambda _: next(found)
     )
     searches = SimpleNamespace(scorer=scorer, wide=lambda *_, **__: POSE)
-    assert not QUICK._searched(0, fit, searches, Trigger("lost", True, ()), lambda *_: result).doubted
+    best = QUICK._searched(0, fit, searches, Trigger("lost", True, ()), lambda *_: result)
+    assert not best.doubted and best.notes[0] == "before" and len(best.notes) == 2
 
 
 @pytest.mark.parametrize(("past", "weight"), [(Past(), HANGING), (Past(after_gap=True), FLYING)])
