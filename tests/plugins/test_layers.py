@@ -58,15 +58,6 @@ def test_a_layer_has_the_colours_that_it_is_drawn_on():
     assert counts[:-1, skin].sum() == counts[:-1].sum() > 100
 
 
-def test_the_rim_of_a_silhouette_is_not_learned():
-    """Its pixels mix person and room."""
-    frame, rim = painted(dressed, noise=0.0), (250, 5, 250)
-    for image, silhouette in zip(frame.images, tiny_segmentation(SCENE, POSE).silhouettes, strict=True):
-        image[(silhouette.distance > 0) & (silhouette.distance <= 3)] = rim
-    counts = learned(frame)
-    assert counts.sum() > 100 and not counts[:, int(bins_of(np.array(rim, np.uint8)))].any()
-
-
 def test_what_is_apart_is_told_and_what_is_alike_is_not():
     layers = layer_of(SCENE)
     knee = layers[np.linalg.norm(SCENE.body.vertices - [0.1, 0, 0.3], axis=1).argmin()]
