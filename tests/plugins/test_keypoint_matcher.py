@@ -103,10 +103,10 @@ def test_a_bystander_is_not_meant():
 
 
 def test_a_landmark_behind_the_camera_says_nothing_of_the_others():
-    points = np.array([[10.0, 20, 1], [30, 40, 1], [50, 60, 1], [0, 0, 0]])  # the last was not seen
-    projected = np.array([[13.0, 24], [np.nan, np.nan], [50, 65], [40, 80]])
+    points = np.array([[10.0, 20, 1], [30, 40, 1], [50, 60, 1], [0, 0, 0], [0, 0, 0]])  # two were not seen
+    projected = np.array([[13.0, 24], [np.nan, np.nan], [50, 65], [40, 80], [90, 9]])
     assert _median_error(points, projected) == 5.0
-    assert _median_error(points, np.full((4, 2), np.nan)) == np.inf
+    assert _median_error(points, np.full((5, 2), np.nan)) == np.inf
 
 
 def test_somebody_far_away_is_not_taken():
