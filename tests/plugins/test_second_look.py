@@ -220,18 +220,20 @@ def test_the_mismatch_has_its_say(monkeypatch, mismatch, areas, kept):
 
 
 def test_what_lies_apart_more_is_the_person_off_the_model_and_skin_in_empty_space():
+    """Of a leg that is spread by too much in both fits."""
     scene = scenes.tiny_scene()
     pose = scenes.tiny_pose(scene, 3, 0.1)
-    astray = Pose(root=pose.root, angles=pose.angles + 0.8 * (np.arange(len(pose.angles)) == 1))  # a leg
+    leg = np.arange(len(pose.angles)) == 1
+    stands, other = (Pose(root=pose.root, angles=pose.angles + by * leg) for by in (0.4, 0.8))
     frame, past = pictures.tiny_frame(scene, pose), Past()
-    trimaps = LimbSearch().trimaps(frame, scene.surface(pose, NO_CLOTH), past, scene)
-    right, wrong = (mismatch_of(scene.surface(each, NO_CLOTH), scene, trimaps) for each in (pose, astray))
-    standing = SimpleNamespace(pose=lambda row: pose, cloth=lambda row: NO_CLOTH)
-    loop, model = SimpleNamespace(recovery=None), scenes.tiny_model(scene)
-    other = recovery.settled(pictures.tiny_state(scene, astray, pose), scene)
-    more = MORE_MISMATCH(Refitter(loop, model, standing, 0.04, np.zeros(1, bool)), frame, 0, past, other)
-    assert min(wrong.hint, wrong.floating) > 100  # cm²
-    assert more == pytest.approx(wrong.hint + wrong.floating - right.hint - right.floating)
+    trimaps = LimbSearch().trimaps(frame, scene.surface(stands, NO_CLOTH), past, scene)
+    before, now = (mismatch_of(scene.surface(each, NO_CLOTH), scene, trimaps) for each in (stands, other))
+    standing = SimpleNamespace(pose=lambda row: stands, cloth=lambda row: NO_CLOTH)
+    refitter = Refitter(SimpleNamespace(recovery=None), scenes.tiny_model(scene), standing, 0.04, np.zeros(1, bool))
+    result = recovery.settled(pictures.tiny_state(scene, other, pose), scene)
+    assert min(before.hint, before.floating, now.hint, now.floating) > 100  # cm²
+    more = now.hint + now.floating - before.hint - before.floating
+    assert MORE_MISMATCH(refitter, frame, 0, past, result) == pytest.approx(more)
 
 
 def test_a_track_that_nothing_recovers_is_looked_at_too(looked):
