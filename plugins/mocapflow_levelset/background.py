@@ -119,6 +119,5 @@ class BackgroundDifference(ShadowAware):
         whole = stats[:, cv2.CC_STAT_AREA]
         within = np.bincount(label.ravel(), weights=(model > 0).ravel(), minlength=count)
         small = (whole <= HOLE_PX2) | (within > 0.8 * whole)  # the model says where the body has no hole
-        small[0] = False
         kept: Bool = person | small[label]
         return kept

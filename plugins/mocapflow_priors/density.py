@@ -101,7 +101,7 @@ def read(path: Path) -> Density:
         raise PipelineError("there is no such file of training poses", where=str(path), hint=hint) from None
     except Exception:  # of numpy, zipfile, zlib and tokenize, which say nothing that would help
         raise PipelineError("this is no file of training poses", where=str(path), hint=hint) from None
-    usable = poses.ndim == 2 and poses.shape[1] == len(names) and poses.size and np.abs(poses).max() <= LARGEST
+    usable = poses.shape[1] == len(names) and poses.size and np.abs(poses).max() <= LARGEST
     if not (usable and 0 < density.bandwidth < np.inf):  # NaN is neither
         what = "these poses are no finite angles in radians, a column for each name, with a bandwidth above zero"
         raise PipelineError(what, where=str(path), hint=hint)

@@ -36,6 +36,8 @@ def centred(pose: Pose, bare: Scene, middle: F64, cameras: Sequence[Camera]) -> 
 
 def mask_centre(masks: Sequence[Bool], cameras: Sequence[Camera]) -> F64:
     """Return where (3) m the rays through the middles of masks (h, w) meet best; NaN where fewer than two show any."""
+    if len(masks) < 2:
+        return np.full(3, np.nan)
     middles = [np.argwhere(mask).mean(axis=0)[::-1] if mask.any() else np.full(2, np.nan) for mask in masks]
     position: F64 = triangulate(np.array(middles)[:, None], np.ones((len(masks), 1)), cameras).position[0]
     return position

@@ -144,7 +144,7 @@ class StartFromSilhouettes(Stage):
         found = [trimap for trimap in every if trimap.informative]
         if len(found) < 2:
             raise RecordingError(
-                f"frame {frame.index}: {len(found)} cameras show a person who is not in their clean plates",
+                f"frame {frame.index}: fewer than two cameras show a person who is not in their clean plates",
                 where=str(recording.folder),
                 hint="begin where two cameras see all of the person; do plates and videos show the same room?",
             )

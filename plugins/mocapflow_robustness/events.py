@@ -49,4 +49,4 @@ class Event(Settings):
             "late": index - self.by,
             "other_time": index + self.by if stop + self.by <= length else index - self.by,
         }.get(self.what, index)
-        return min(max(wanted, 0), length - 1)
+        return max(wanted, 0)

@@ -13,6 +13,8 @@ from mocapflow.geometry.camera_rotation import LEAST_PX, shift_px, turn_between
 from mocapflow.knocks import Knocks
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64, U8, Bool
+from mocapflow_robustness.picture_checks import LEAST_CONTRAST, contrast
+from mocapflow_robustness.thumbnails import thumbnail
 
 LOG = logging.getLogger("mocapflow")
 EVERY_S = 2.0  # between the frames that are compared with the first one; where two differ, all between them are
@@ -31,15 +33,15 @@ class KnockDetector:
     def look(self, frame: Frame) -> None:
         """Note how pictures lie to what their cameras show in the beginning, every few seconds and in the last frame.
 
-        Of a camera whose empty room is not known that is its first picture.
+        Of a camera whose empty room is not known that is its first picture that shows anything.
         """
         every = max(round(EVERY_S * self.recording.frame_rate), 1)
         wanted = frame.index % every == 0 or frame.index == self.recording.length - 1
         for camera in np.flatnonzero(frame.usable).tolist():
             image, hidden = frame.images[camera], frame.hidden_in(camera)
-            if camera not in self.room:
+            if camera not in self.room and contrast(thumbnail(image)) >= LEAST_CONTRAST:
                 self.room[camera] = image, np.ones(image.shape[:2], bool) if hidden is None else ~hidden
-            if wanted and (turn := self._turn(image, camera)) is not None:
+            if wanted and camera in self.room and (turn := self._turn(image, camera)) is not None:
                 self.turns.setdefault(camera, []).append((frame.index, turn))
 
     def knocks(self) -> Knocks | None:

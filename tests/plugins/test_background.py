@@ -103,6 +103,17 @@ def test_someone_far_from_the_model_is_left_out():
     assert BackgroundDifference(reach_px=0).find(image, model(), FLOOR, known(), 0)[40, 215] > 0
 
 
+def test_small_parts_holes_and_slits_are_noise_and_large_ones_where_the_model_has_none():
+    changed, nowhere = person() > 0, np.full(SHAPE, -12, np.float32)
+    small, large, slit, speck = np.s_[50:59, 90:99], np.s_[90:110, 90:110], np.s_[130:133], np.s_[10:15, 200:205]
+    changed[small] = changed[large] = changed[slit] = False
+    changed[speck] = True
+    for given, filled in ((nowhere, False), (model(), True)):
+        kept = BackgroundDifference(reach_px=0)._person(changed, given)
+        assert kept[small].all() and kept[131, 85:115].all() and not kept[speck].any()
+        assert kept[large].all() if filled else not kept[93:107, 93:107].any()
+
+
 def test_where_nobody_knows_the_room_the_model_tells():
     """Half of the person, and much beside it, is before what nobody knows: there the model's outline is taken."""
     background = known()

@@ -108,6 +108,9 @@ def test_a_frame_that_began_far_off_is_calm_later(truth):
     assert len(near.vertex) < len(far.vertex)
     still = match(icp, surface, segmentation, replace(CALM, far=True))
     assert len(still.vertex) == len(near.vertex)
+    strict, slow = ContourIcp(calm_mm=5), replace(moved, change=replace(CALM.change, body=0.01))
+    for turn in (slow, replace(slow, far=True)):  # it never makes a turn calmer
+        assert len(match(strict, surface, segmentation, turn).vertex) == len(far.vertex)
 
 
 @pytest.mark.parametrize("sigma", [1.0, 2.5])

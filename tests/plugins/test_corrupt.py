@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from mocapflow_robustness import disturbances
-from mocapflow_robustness.corrupt import Corrupt
+from mocapflow_robustness.corrupt import Corrupt, fitted
 from mocapflow_robustness.events import Event
 from mocapflow_robustness.occlusion import union
+from mocapflow_robustness.sequential_reader import SequentialReader
 
 from mocapflow.errors import RecordingError
 from mocapflow.recordings.recording import open_recording
@@ -78,6 +79,8 @@ def test_noise_lies_under_a_stripe_or_over_it(clip):
 
 
 def test_rectangles_are_as_many_and_as_large_as_asked():
+    with pytest.raises(ValueError, match="at least, at most"):
+        Corrupt(rectangles=(3, 1))
     white, rng = np.full((100, 200, 3), 255, np.uint8), np.random.default_rng(3)
     sides = []
     for _ in range(60):
@@ -95,6 +98,8 @@ def test_rectangles_are_as_many_and_as_large_as_asked():
     [
         (dict(what="frozen", first=5), (0, 4)),
         (dict(what="late", by=3), (0, 3)),
+        (dict(what="late", by=9), (0, 0)),
+        (dict(what="frozen"), (0, 0)),
         (dict(what="other_time", first=5, count=2, by=4), (0, 10)),
         (dict(what="other_time", first=5, count=6, by=4), (0, 2)),
         (dict(what="other_time", by=6), (0, 0)),  # to the end, which 6 + 6 is beyond
@@ -106,6 +111,21 @@ def test_a_picture_from_elsewhere(clip, event, source):
     camera, index = source
     assert (found.frame(6).images[0] == plain[index][camera]).all()
     assert (found.frame(6).images[1] == plain[6][1]).all()
+
+
+def test_of_two_events_that_meet_the_later_one_in_the_list_counts(clip):
+    late, black = dict(what="late"), dict(what="black", first=4, count=1)
+    shown = [disturbed(clip, *events).frame(4).images[0].any() for events in ((late, black), (black, late))]
+    assert shown == [False, True]
+
+
+def test_a_picture_of_another_camera_has_the_size_of_this_one():
+    assert fitted(np.zeros((4, 6, 3), np.uint8), np.zeros((8, 5, 3), np.uint8)).shape == (8, 5, 3)
+
+
+def test_a_reader_goes_back_too(clip):
+    reader = SequentialReader(open_recording(clip))
+    assert [reader.at(index).index for index in (5, 7, 2, 2, 3)] == [5, 7, 2, 2, 3]
 
 
 def test_one_camera_has_no_other(clip):
@@ -128,9 +148,17 @@ def test_a_picture_that_is_spoiled_or_missing(clip):
     assert frames[4].hidden[0][half:].all() and not frames[4].hidden[0][:half].any() and not frames[4].hidden[1].any()
     assert frames[2].hidden == ()
     assert frames[6].usable.tolist() == [False, True]
-    assert frames[6].reasons == ("dropped", "")
+    assert not frames[6].images[0].any()
+    again = Corrupt(noise=0.5).run(found).frame(6)
+    assert frames[6].reasons == again.reasons == ("dropped", "") and not again.images[0].any()
     assert frames[8].usable.all()
     assert all(equal(frames[k].images[1:], plain[k][1:]) for k in frames)
+
+
+def test_of_a_picture_that_is_another_there_are_no_keypoints(clip):
+    (change,) = disturbed(clip, dict(what="late", views=GOOD)).changes
+    frame = replace(open_recording(clip).frame(5), keypoints=(np.ones((2, 25, 3)),) * 2)
+    assert [len(view) for view in change._disturbed(frame, ["cam01", "cam02"], {}).keypoints] == [0, 2]
 
 
 def test_a_covered_picture_stays_hidden_where_it_was(clip):

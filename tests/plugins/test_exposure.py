@@ -5,7 +5,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from mocapflow_robustness.brightness import block_means, relative_gain
+from mocapflow_robustness.brightness import NormalisedBrightness, block_means, relative_gain
 from mocapflow_robustness.corrupt import Corrupt
 from mocapflow_robustness.exposure import STEP, Exposure
 
@@ -179,6 +179,24 @@ def test_how_much_brighter_nobody_can_tell_of_another_room_or_a_black_one():
     assert relative_gain(room[::-1], room) is None
     assert relative_gain(times(room, 0.1), room) is None
     assert relative_gain(room * np.uint8(0), room * np.uint8(0)) is None
+
+
+def test_blocks_that_are_too_bright_to_tell_say_nothing_and_a_few_are_too_few():
+    light, white, few = SHADE.copy(), slice(None, 30), slice(None, 2)
+    light[white] = 400  # more than a camera shows
+    np.testing.assert_allclose(relative_gain(times(light, 0.5), times(light, 1)), 0.5, atol=0.02)
+    dark = np.full(SHADE.shape, 10.0)
+    dark[few] = SHADE[few]
+    assert relative_gain(times(dark, 0.8), times(dark, 1)) is None
+
+
+@pytest.mark.parametrize(("factor", "stays"), [(0.985, True), (0.95, False)])
+def test_a_frame_that_is_nearly_as_bright_stays_as_it_is(factor, stays):
+    room = times(SHADE.repeat(8, axis=0).repeat(8, axis=1), 1)
+    dimmer = times(room, factor)
+    shown = NormalisedBrightness(0.02, {}).image(dimmer, block_means(room))
+    assert (shown is dimmer) == stays
+    assert block_means(room[:, :20]).shape == (400, 20, 3)  # of so narrow a picture each pixel is a block
 
 
 @pytest.mark.parametrize(

@@ -102,6 +102,7 @@ def test_other_numbers_of_components_fall_back():
     object.__setattr__(silhouette, "distance", distance)
     assert not view(FourierIcp(), far, shown, FIRST)[0].curvature.any()
     assert view(FourierIcp(least_px=100), far, shown, FIRST)[0].curvature.any()
+    assert not view(FourierIcp(least_px=1e4), far, shown, FIRST)[0].curvature.any()  # nothing is as long
 
 
 def test_low_passed_pairs_ask_for_the_shift():

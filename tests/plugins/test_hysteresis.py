@@ -41,7 +41,7 @@ def test_where_nobody_knows_the_empty_scene_pictures_stay():
     image = np.full(MEAN.shape, 100, np.uint8)
     spread = SPREAD.copy()
     spread[:, :20] = np.inf
-    result = cleared(image, MEAN - 2, spread * 10)
+    result = cleared(image, MEAN - np.float32(2.3), spread * 10)
     assert (result[:, :20] == 100).all()
     assert (result[:, 20:] == MEAN[0, 0] - 2).all()
 

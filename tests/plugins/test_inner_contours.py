@@ -13,6 +13,7 @@ from mocapflow_levelset.colours import BINS, bins_of
 from mocapflow_levelset.inner import SIGMA_PX, findable_edges, inner_contours
 from mocapflow_levelset.inner_edges import inner_edges
 from mocapflow_levelset.layers import COLOURS, colour_model, layer_of
+from mocapflow_matching.contour_icp import ContourIcp
 from mocapflow_matching.inner_contours import InnerContours, slipped
 from mocapflow_matching.layered_icp import LayeredIcp, of_another_layer
 from test_layers import CLOTHS, SCENE, SKIN, dressed, learned, painted
@@ -241,6 +242,13 @@ def test_contours_of_another_part_s_colours_make_no_pair():
     assert (right.weight > 0).mean() > 0.95
     assert (wrong.weight > 0).mean() < 0.2
     assert of_another_layer(right, swapped, colour_model(past), layer_of(SCENE), 2.0).mean() > 0.8
+
+
+def test_before_colours_are_known_all_pairs_count():
+    pose = kicked(60.0)
+    given = painted(dressed, pose), tiny_segmentation(SCENE, pose), surface_at(pose), Past(), SCENE, FIRST
+    found, plain = (matcher.match(*given) for matcher in (LayeredIcp(), ContourIcp()))
+    np.testing.assert_array_equal(found.weight, plain.weight)
 
 
 def test_whose_colours_they_are_needs_the_direction_of_a_contour():

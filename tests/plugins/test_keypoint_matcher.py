@@ -103,10 +103,10 @@ def test_a_bystander_is_not_meant():
 
 
 def test_a_landmark_behind_the_camera_says_nothing_of_the_others():
-    points = np.array([[10.0, 20, 1], [30, 40, 1], [50, 60, 1]])
-    projected = np.array([[13.0, 24], [np.nan, np.nan], [50, 65]])
+    points = np.array([[10.0, 20, 1], [30, 40, 1], [50, 60, 1], [0, 0, 0], [0, 0, 0]])  # two were not seen
+    projected = np.array([[13.0, 24], [np.nan, np.nan], [50, 65], [40, 80], [90, 9]])
     assert _median_error(points, projected) == 5.0
-    assert _median_error(points, np.full((3, 2), np.nan)) == np.inf
+    assert _median_error(points, np.full((5, 2), np.nan)) == np.inf
 
 
 def test_somebody_far_away_is_not_taken():
@@ -134,6 +134,23 @@ def test_a_landmark_pulls_once_however_many_vertices_stand_for_it():
     for index, camera in enumerate(SCENE.cameras):
         spread = camera.intrinsics[0, 0] * marks.spread / np.linalg.norm(places - centre(camera), axis=1)
         assert matches.weight[matches.camera == index].sum() == pytest.approx((1 / (1 + spread**2)).sum())
+
+
+def test_two_views_do_not_tell_how_good_keypoints_are():
+    """Then they are as good as is set."""
+    frame = replace(frame_of(POSE), usable=np.array([True, True, False, False]))
+    one, other = (match(frame, matcher=Keypoints(sigma_px=sigma, scale=1e6)).weight for sigma in (50.0, 100.0))
+    np.testing.assert_allclose(one, 4 * other, rtol=0.1)  # the landmarks' own spread adds to it
+
+
+def test_no_confidence_is_above_one_or_below_zero():
+    def weights(confidence):
+        views = frame_of(POSE).keypoints
+        told = [np.where(view[..., 2:] > 0, [1, 1, confidence], 1.0) * view for view in views]
+        return match(replace(frame_of(POSE), keypoints=tuple(told))).weight
+
+    np.testing.assert_array_equal(weights(3.0), weights(1.0))
+    assert len(weights(-1.0)) == 0
 
 
 def test_points_astray_pull_little():

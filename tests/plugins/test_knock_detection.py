@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from mocapflow_robustness import knock_detection
@@ -10,7 +11,9 @@ from mocapflow_robustness.corrupt import Corrupt
 from mocapflow_robustness.events import Event
 
 from mocapflow.geometry.camera_rotation import shift_px
+from mocapflow.io.cameras.pose2sim import write_cameras
 from mocapflow.recordings.recording import open_recording
+from mocapflow.testing import scenes
 
 DEMO = Path(__file__).parents[2] / "examples" / "data" / "skirt_steps"
 
@@ -85,3 +88,23 @@ def test_the_track_is_passed_what_the_camera_would_have_seen(demo):
     off = np.abs(seen.images[1].astype(int) - true.images[1])[known]
     assert np.mean(off) < 2.0  # grey levels: resampled twice
     assert np.abs(source.frame(30).images[1].astype(int) - true.images[1]).mean() > 5
+
+
+@pytest.fixture(scope="module")
+def bare(tmp_path_factory):
+    """A camera in a room full of corners, of which there is no clean plate."""
+    folder = tmp_path_factory.mktemp("bare")
+    (camera,) = scenes.tiny_scene(cameras=1).cameras
+    write_cameras(folder / "cameras.toml", [camera])
+    (folder / "videos" / camera.name).mkdir(parents=True)
+    blocks = np.random.default_rng(0).integers(40, 220, (*camera.size[::-1] // 10, 3), np.uint8)
+    for index in range(6):
+        cv2.imwrite(str(folder / f"videos/{camera.name}/{index:06}.png"), blocks.repeat(10, axis=0).repeat(10, axis=1))
+    return open_recording(folder)
+
+
+@pytest.mark.parametrize("black", [0, 2], ids=["none", "two"])
+def test_without_a_clean_plate_the_first_picture_that_shows_anything_is_the_room(bare, black):
+    events = [Event(what="knocked", first=4, turn_deg=1.0), *([Event(what="black", count=black)] if black else [])]
+    knocks = CheckViews().run(Corrupt(events=tuple(events)).run(bare)).knocks
+    assert knocks.frame.tolist() == [4]

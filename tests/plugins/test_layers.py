@@ -7,6 +7,7 @@ import pytest
 from mocapflow_levelset.colours import BINS, bins_of
 from mocapflow_levelset.layered import Layered
 from mocapflow_levelset.layers import COLOURS, colour_model, garment_log_ratio, layer_histograms, layer_of
+from mocapflow_levelset.room_colours import ROOM
 
 from mocapflow.data import BODY, CLOTH, Frame, Past, Turn
 from mocapflow.geometry.visibility import front_vertices
@@ -78,6 +79,7 @@ def test_the_garment_is_told_from_every_part_outside_of_it_or_not_at_all():
     told = garment_log_ratio(Past(appearance={COLOURS: learned(alike)}), SCENE)
     assert told[cloth] < 0.5
     assert garment_log_ratio(Past(), SCENE) is None
+    assert garment_log_ratio(Past(appearance={COLOURS: learned(alike)}), SCENE.undressed) is None
 
 
 def test_a_garment_that_leaves_no_part_outside_is_not_told(monkeypatch):
@@ -104,7 +106,7 @@ def test_the_segmenter_hands_them_on():
     past, turn = tiny_past(SCENE, POSE), Turn(index=1)
     frame, state = tiny_frame(SCENE, POSE), tiny_state(SCENE, POSE)
     found = Layered().segment(frame, state, past, SCENE, turn)
-    assert found.inner is None
+    assert found.inner is None and ROOM not in found.appearance
     then = Layered().segment(frame, state, replace(past, appearance=found.appearance), SCENE, Turn(index=0))
     assert then.inner is not None
     assert then.appearance == found.appearance

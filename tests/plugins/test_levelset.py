@@ -5,15 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from levelset_scenes import ellipse
+from mocapflow_levelset.background import BackgroundDifference
 from mocapflow_levelset.evidence import Room
+from mocapflow_levelset.evolve import Schedule
 from mocapflow_levelset.grabcut import GrabCut
 from mocapflow_levelset.layered import Layered
+from mocapflow_levelset.layers import COLOURS
 from mocapflow_levelset.levelset import LevelSet
 from mocapflow_levelset.masks import counted, without_cut
 from mocapflow_levelset.moved import moved_outline
 from mocapflow_levelset.plates import Shadow, plate_of
 from mocapflow_levelset.redistance import redistance
-from mocapflow_levelset.view import View, find
+from mocapflow_levelset.view import Contact, Matte, View, _refined, find
 
 from mocapflow.data import Change, Moment, Past, Turn
 from mocapflow.geometry.cameras import project
@@ -63,12 +66,13 @@ def test_where_nobody_knows_the_room_local_colours_tell(scene, pose):
     background = scene.background
     unknown = replace(background, spread=tuple(np.full_like(part, np.inf) for part in background.spread))
     segmenter = LevelSet(decorrelate=False, matte_px=0)
-    found, without, with_room = (
-        segmenter.segment(frame, state, Past(), scene.with_background(room), FIRST).of("person")
-        for room in (unknown, None, background)
+    unused = segmenter.model_copy(update={"use_background": False})
+    found, without, left_out, with_room = (
+        each.segment(frame, state, Past(), scene.with_background(room), FIRST).of("person")
+        for each, room in ((segmenter, unknown), (segmenter, None), (unused, background), (segmenter, background))
     )
-    for one, other, known in zip(found, without, with_room, strict=True):
-        np.testing.assert_array_equal(one.distance, other.distance)
+    for one, *others, known in zip(found, without, left_out, with_room, strict=True):
+        assert all((one.distance == other.distance).all() for other in others)
         assert (one.distance != known.distance).any()
 
 
@@ -133,6 +137,25 @@ def test_the_contour_is_found_anew_only_where_the_model_has_moved(scene, pose):
     assert anew.max() < 0.3
 
 
+def test_a_view_in_which_no_outline_has_moved_keeps_its_silhouette_and_energies(scene, pose):
+    """One that the person walks away from."""
+    frame, state = pictures.tiny_frame(scene, pose), pictures.tiny_state(scene, pose)
+    state = replace(state, segmentation=LevelSet().segment(frame, state, Past(), scene, FIRST))
+    away = 0.02 * scene.cameras[0].camera_from_world[2, :3]
+    found = LevelSet().segment(frame, state, Past(), scene, shifted(scene, state, away))
+    assert found.silhouettes[0] is state.segmentation.silhouettes[0]
+    assert found.silhouettes[1] is not state.segmentation.silhouettes[1]
+    assert found.energies["cam01.data"] == state.segmentation.energies["cam01.data"]
+    assert found.energies["cam02.data"] != state.segmentation.energies["cam02.data"]
+
+
+def test_a_view_without_a_picture_has_no_silhouette(scene, pose):
+    frame = pictures.without_view(pictures.tiny_frame(scene, pose), 1)
+    for segmenter in (LevelSet(), GrabCut(), BackgroundDifference()):
+        found = segmenter.segment(frame, pictures.tiny_state(scene, pose), Past(), scene, FIRST)
+        assert [silhouette.camera for silhouette in found.silhouettes] == [0, 2, 3]
+
+
 def test_a_part_says_what_it_costs_more_than_the_start():
     """Of a disc that begins 4 px too far right the left half is found anew: that alone costs less than before."""
     rows, columns = np.mgrid[:160, :160]
@@ -187,6 +210,8 @@ def test_an_outline_that_slides_along_itself_has_not_moved(scene, pose):
     assert shown[y, x][upright].all()  # where it was before
     assert upright.sum() > 10 and moved[upright].all() and flat.sum() > 2 and not moved[flat].any()
     assert moved_outline(surface, Change(body=1, cloth=1, angles=1, sigmas=1), camera, 2.0) is None
+    entered = moved_outline(surface, shifted(scene, state, 1.5 * across).change, camera, 1.0)
+    assert entered.any() and not entered[:, 240:].any()  # it was beyond the left border
 
 
 def test_energies_are_named_by_view_and_term(scene, pose):
@@ -204,6 +229,7 @@ def test_a_person_outside_a_view_gives_an_empty_silhouette(scene, pose):
         found = segmenter.segment(frame, state, Past(), scene, FIRST)
         assert len(found.silhouettes) == len(scene.cameras)
         assert all((s.distance == -12).all() for s in found.silhouettes)
+    assert (GrabCut().find(frame.images[0], np.full((240, 320), 12, np.float32)) > 0).all()  # and one who fills it
 
 
 def test_a_view_in_which_nobody_was_begins_anew_from_the_model(scene, pose):
@@ -219,17 +245,26 @@ def test_a_view_in_which_nobody_was_begins_anew_from_the_model(scene, pose):
     )
 
 
-def test_the_contour_is_sub_pixel():
-    """A disc drawn with soft edges at a place between pixels is found to 0.15 px in the mean."""
-    rows, columns = np.mgrid[:160, :160]
-    exact = (40.3 - np.hypot(columns - 80.4, rows - 79.7)).astype(np.float32)
+def disc(x, y, radius, width):
+    rows, columns = np.mgrid[:160, :width]
+    return (radius - np.hypot(columns - x, rows - y)).astype(np.float32)
+
+
+def disc_in_a_room(width=160):
+    """A picture of a disc, where it is, and the empty room by how much it is shrunk."""
+    rng, exact, empty = np.random.default_rng(0), disc(80.4, 79.7, 40.3, width), np.ones((160, width, 3), np.float32)
+    empty *= (140, 130, 120)
     alpha = np.clip(exact / 1.6 + 0.5, 0, 1)[..., None]
-    noise = np.random.default_rng(0).normal(0, 3, (160, 160, 3))
-    image = np.clip(alpha * [60, 90, 150] + (1 - alpha) * [140, 130, 120] + noise, 0, 255).astype(np.uint8)
-    empty = np.full((160, 160, 3), (140, 130, 120), np.float32)
-    start = redistance(np.roll(exact, 4, axis=1), 12.0)
+    image = alpha * [60, 90, 150] + (1 - alpha) * empty + rng.normal(0, 3, empty.shape)
     plates = {factor: plate_of(empty, np.full_like(empty, 3), ("lab",), factor) for factor in (1, 2, 4)}
     rooms = {factor: Room(plate, np.ones(plate.spread.shape, bool), Shadow()) for factor, plate in plates.items()}
+    return np.clip(image, 0, 255).astype(np.uint8), exact, empty, rooms
+
+
+def test_the_contour_is_sub_pixel():
+    """A disc drawn with soft edges at a place between pixels is found to 0.15 px in the mean."""
+    image, exact, _, rooms = disc_in_a_room()
+    start = redistance(np.roll(exact, 4, axis=1), 12.0)
     for known in (rooms, None):
         segmenter = LevelSet(shape_weight=0.0)
         view = View(image, start, start, counted(start.shape, 3), known)
@@ -237,6 +272,34 @@ def test_the_contour_is_sub_pixel():
         at = np.abs(found) < 0.7
         assert abs((found - exact)[at].mean()) < 0.15
         assert np.abs((found - exact)[at]).mean() < 0.35
+
+
+def test_an_arm_of_the_model_that_lies_in_the_empty_room_is_given_up():
+    """Far from the person: both sides of its contour show the room."""
+    image, exact, _, rooms = disc_in_a_room(400)
+    stray, segmenter = disc(340, 80, 12.0, 400), LevelSet()
+    model = redistance(np.maximum(exact, stray), 12.0)
+    view = View(image, model, model, counted(model.shape, 3), rooms)
+    found = find(view, segmenter._resolutions(warm=True), segmenter._method()).level
+    assert not (found[stray > 0] > 0).any()
+    assert (found[exact > 3] > 0).all()
+
+
+@pytest.mark.parametrize("kept", ["contact", "hidden", "unknown"])
+def test_a_matte_moves_nothing_where_it_may_not(kept):
+    """A contour that has ended 1 px too far out, at the right of it."""
+    image, exact, empty, _ = disc_in_a_room()
+    right = np.arange(160)[None] * np.ones((160, 1)) > 80
+    segmenter, zone = LevelSet(), np.zeros(exact.shape, bool)
+    still = Schedule(0, 4, 4)
+    contact = Contact(right if kept == "contact" else zone, still, segmenter._window(12.0))
+    view = View(
+        image, exact + 1, exact + 1, counted(exact.shape, 3, right if kept == "hidden" else None), contact=contact,
+        matte=Matte(empty, ~right if kept == "unknown" else ~zone, 2),
+    )  # fmt: skip
+    level = _refined(redistance(exact + np.float32(1), 7.0), view, segmenter._method())
+    off = (level - exact)[np.abs(exact) < 0.5], right[np.abs(exact) < 0.5]
+    assert np.median(np.abs(off[0][off[1]] - 1)) < 0.2 and np.median(np.abs(off[0][~off[1]])) < 0.2
 
 
 def test_the_literal_chapter_runs(scene, pose):
@@ -259,9 +322,11 @@ def test_beyond_a_cut_nothing_counts(scene, pose):
     weight = without_cut(counted(model.shape, 3), model, partial, surface, camera)
     first_row = np.flatnonzero((model > 0).any(axis=1))[0]
     column = int(np.median(np.flatnonzero(model[first_row] > 0)))
-    assert weight[max(first_row - 6, 3), column] == 0
+    assert first_row > 30 and not weight[[first_row - 6, first_row - 25], column].any()  # farther than the band, too
     below = np.flatnonzero((model > 0).any(axis=1))[-1]
     assert weight[(first_row + below) // 2].sum() > 0.9 * (weight.shape[1] - 6)
+    view = LevelSet()._view(pictures.tiny_frame(scene, pose), surface, Past(), replace(scene, body=partial), 0, [])
+    np.testing.assert_array_equal(view.counted, weight)
     assert (without_cut(counted(model.shape, 3), model, scene.body, surface, camera) > 0).sum() == 234 * 314
     behind = replace(camera, camera_from_world=camera.camera_from_world - 20 * np.outer(np.eye(4)[2], np.eye(4)[3]))
     assert (without_cut(counted(model.shape, 3), model, partial, surface, behind) > 0).sum() == 234 * 314
@@ -291,6 +356,10 @@ def test_inner_contours_stay_only_while_the_body_rests(scene, pose):
     state = replace(state, segmentation=Layered().segment(frame, state, past, scene, FIRST))
     turn = shifted(scene, state, 0.0, index=2)
     calm = replace(turn, change=replace(turn.change, body=0.004))
+    learned = Layered().segment(frame, state, past, scene, replace(calm, index=1))  # the turn in which colours are
+    assert COLOURS in learned.appearance
+    state = replace(state, segmentation=learned)
     assert Layered().segment(frame, state, past, scene, calm) is state.segmentation
     renewed = Layered().segment(frame, state, past, scene, turn)
     assert renewed is not state.segmentation and renewed.silhouettes == state.segmentation.silhouettes
+    assert renewed.appearance == learned.appearance

@@ -1,5 +1,7 @@
 """Where the body meets the floor, both sides of its contour are dark."""
 
+from dataclasses import replace
+
 import numpy as np
 from mocapflow_levelset.channels import features
 from mocapflow_levelset.contact import NEAR_M, contact_zone
@@ -72,4 +74,6 @@ def test_the_zone_lies_below_what_is_lowest():
     assert len(row)
     distance = np.linalg.norm(np.stack([column, row], axis=1)[:, None] - low[None], axis=2).min(axis=1)
     assert distance.max() < 6 + 4  # the outline may lie between vertices
+    jumping = replace(surface, vertices=surface.vertices + [0, 0, 0.3])
+    assert contact_zone(jumping, camera).any()
     assert not contact_zone(surface, camera)[: int(project(surface.vertices, camera)[:, 1].min())].any()

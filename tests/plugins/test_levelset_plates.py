@@ -138,6 +138,7 @@ def test_what_is_hidden_and_the_border_do_not_count():
 @pytest.mark.parametrize("smooth_px", [0.0, 1.5])
 def test_a_room_is_compared_with_the_smoothed_image(smooth_px):
     room, floor = picture(), np.arange(12) % 2 == 0
+    assert (smoothed(room, 0.0) == room).all() and (smoothed(room, 1.0) != room).any()
     plate = plate_of(room.astype(np.float32), np.full(room.shape, 5, np.float32), ("lab",))
     image = (0.8 * smoothed(room, 1.0)).astype(np.uint8)
     floor = np.broadcast_to(floor, image.shape[:2]).copy()

@@ -8,7 +8,7 @@ import pytest
 from matching_scenes import CALM, FIRST, FRAME, knee_error_deg, seen
 from mocapflow_matching.contour_icp import ContourIcp
 from mocapflow_matching.flow_points import flow_points
-from mocapflow_matching.optical_flow import OpticalFlow
+from mocapflow_matching.optical_flow import LATER_SHARE, OpticalFlow
 from mocapflow_matching.shape_flow import _relax, register
 from mocapflow_priors.constant_velocity import ConstantVelocity
 from mocapflow_priors.image_flow import ImageFlowPredictor
@@ -211,6 +211,7 @@ def test_a_pose_that_nobody_saw_carries_nothing():
     past = tiny_past(SCENE, before)
     unseen = replace(past.moments[-1], observed=np.zeros(len(before.angles)))
     assert not len(flow_points(textured(SCENE, before, before), Past(moments=(unseen,)), SCENE).camera)
+    assert not len(flow_points(textured(SCENE, before, before), Past(), SCENE).camera)  # nor does a first frame
 
 
 def test_points_on_cloth_count_less():
@@ -222,6 +223,8 @@ def test_points_on_cloth_count_less():
     assert cloth.sum() > 20
     np.testing.assert_allclose(np.median(matches.weight[cloth]), 0.2)
     np.testing.assert_allclose(np.median(matches.weight[~cloth]), 1.0)
+    later = OpticalFlow(image_sigma_px=1, first_share=1).match(frame, NOTHING, surface, past, DRESSED, CALM)
+    np.testing.assert_allclose(later.weight, LATER_SHARE * matches.weight)
 
 
 def test_points_on_cloth_stand_for_the_skin_that_it_touches():
@@ -263,3 +266,10 @@ def test_flow_of_a_wrong_picture_is_not_followed():
     wrong = Frame(index=5, time=1 / 6, images=frame.images, usable=frame.usable, flow=wild)
     guess = ImageFlowPredictor().predict(wrong, tiny_past(SCENE, before), SCENE)
     assert guess is before
+
+
+def test_a_few_points_are_not_trusted():
+    before = tiny_pose(SCENE)
+    frame = textured(SCENE, before, moved(before, step(1, 0.1)))
+    few = tuple(Flow(pixel=view.pixel[:7], displacement=view.displacement[:7]) for view in frame.flow)
+    assert ImageFlowPredictor().predict(replace(frame, flow=few), tiny_past(SCENE, before), SCENE) is before

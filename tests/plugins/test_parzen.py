@@ -196,14 +196,15 @@ def test_a_file_of_something_else(tmp_path: Path) -> None:
     with pytest.raises(PipelineError, match=r"there is no such file of training poses"):
         read(tmp_path / "none.npz")
     density = read(SHIPPED)
-    for wrong in (np.nan, 1000.0):
-        poses = density.poses.copy()
-        poses[3, 4] = wrong
+    odd = [density.poses.copy() for _ in range(2)]
+    odd[0][3, 4], odd[1][3, 4] = np.nan, 1000.0
+    for poses in (*odd, density.poses[:0], density.poses[:, 1:]):  # none, and none of the first name
         write(tmp_path / "poses.npz", replace(density, poses=poses))
-        with pytest.raises(PipelineError, match=r"no finite angles in radians"):
+        with pytest.raises(PipelineError, match=r"no finite angles in radians, a column for each name"):
             read(tmp_path / "poses.npz")
-    write(tmp_path / "poses.npz", replace(density, bandwidth=-0.1))
-    with pytest.raises(PipelineError, match=r"with a bandwidth above zero"):
-        read(tmp_path / "poses.npz")
+    for wide in (-0.1, 0.0, np.nan, np.inf):
+        write(tmp_path / "poses.npz", replace(density, bandwidth=wide))
+        with pytest.raises(PipelineError, match=r"with a bandwidth above zero"):
+            read(tmp_path / "poses.npz")
     with pytest.raises(ValidationError, match=r"none\.npz: there is no such file .*`mocapflow prior fit"):
         Parzen(poses=tmp_path / "none.npz")

@@ -115,3 +115,10 @@ def test_the_spine_bends_like_the_chest() -> None:
     assert residual.error == pytest.approx((pose.angles[0] - pose.angles[1]) / np.radians(4))
     assert np.flatnonzero(residual.jacobian[0]).tolist() == [6, 7]
     assert not len(SpineCoupling().residual(pose, Past(), scene).error)
+
+
+@pytest.mark.parametrize("names", [("spine.flexion", "chest.twist"), ("spine2.flexion", "chest.flexion")])
+def test_angles_of_other_names_or_joints_are_not_held_together(names: tuple[str, str]) -> None:
+    scene = make_scene()
+    body = replace(scene.body, screw_names=(*names, *scene.body.screw_names[2:]))
+    assert not len(SpineCoupling().residual(make_pose(0), Past(), replace(scene, body=body)).error)

@@ -20,7 +20,7 @@ from mocapflow_recovery.scoring import Fit, Mismatch, StartPose, mismatch_of
 from mocapflow_recovery.search_history import HISTORY
 from mocapflow_recovery.search_triggers import Trigger
 from mocapflow_recovery.searches import Searches, half_turn
-from mocapflow_recovery.trimaps import SmallRoom, small_rooms, trimaps
+from mocapflow_recovery.trimaps import SmallRoom, _distance, small_rooms, trimaps
 
 from mocapflow.data import NO_CLOTH, Frame, Past, Pose
 from mocapflow.geometry.cameras import project, shrunk
@@ -95,6 +95,10 @@ def test_a_shadow_is_neither() -> None:
     for before, after, _ in zip(lit, dim, SCENE.cameras, strict=True):
         assert np.mean(after.person[part]) < 0.05  # not the person
         assert np.mean(after.distance[part] == 0) > np.mean(before.distance[part] == 0) + 0.5  # nor surely the room
+    nowhere = [np.ones(spot.shape, bool)] * len(shadowed)  # may there be a shadow, as other views tell
+    frame = replace(FRAME, images=shadowed)
+    for near, far in zip(dim, trimaps(frame, surface(POSE), ROOM, 9.0, None, nowhere), strict=True):
+        assert np.mean(far.person[part]) > 0.8 > np.mean(near.person[part])
 
 
 def test_where_nobody_knows_the_room_it_is_neither() -> None:
@@ -117,13 +121,22 @@ def test_a_room_shrunk_by_more_than_it_is_wide_then_is_compared() -> None:
         assert view.person.shape == tuple(view.camera.size[::-1])
 
 
-def test_what_hides_the_person_is_neither() -> None:
+@pytest.mark.parametrize("room", [False, True], ids=["black", "like the room"])
+def test_what_hides_the_person_is_neither(room) -> None:
     bar = np.zeros(FRAME.images[0].shape[:2], bool)
-    bar[100:130] = True
-    images = tuple(np.where(bar[..., None], np.uint8(0), image) for image in FRAME.images)
+    bar[100:129] = True  # of the last two rows, which are one in a small view, the first
+    shown = [mean.astype(np.uint8) if room else np.zeros_like(FRAME.images[0]) for mean in SCENE.background.mean]
+    images = tuple(np.where(bar[..., None], *pair) for pair in zip(shown, FRAME.images, strict=True))
     for view, _ in zip(seen(replace(FRAME, images=images, hidden=(bar,) * len(images))), SCENE.cameras, strict=True):
         assert not view.person[50:65].any()
         assert not view.distance[50:65].any()
+
+
+def test_a_gap_in_the_person_that_looks_like_the_room_is_the_person_s() -> None:
+    person = np.ones((20, 30), bool)
+    person[:, 10:13] = person[:, 20:] = False
+    distance = _distance(~person, person)
+    assert not distance[:, :20].any() and distance[10, 25] == pytest.approx(6, abs=0.5)
 
 
 def test_somebody_far_away_is_not_the_person() -> None:
@@ -359,7 +372,7 @@ def test_limbs_are_looked_for_where_enough_of_the_room_is_known(columns, looked)
     ids=["doubted", "not doubted", "a later frame"],
 )
 @pytest.mark.long
-def test_a_first_frame_that_is_doubted_is_searched_twice_and_turned_round(past, end, times) -> None:
+def test_a_first_frame_that_is_doubted_is_searched_twice_and_turned_round(past, end, times, caplog) -> None:
     begun, lost = [], pictures.tiny_state(SCENE, astray(end), POSE)
 
     def settle(pose, parameters):
@@ -367,7 +380,7 @@ def test_a_first_frame_that_is_doubted_is_searched_twice_and_turned_round(past, 
         return settled(lost)  # nothing helps
 
     QUICK.recover(FRAME, lost, settled(lost), past, scenes.tiny_model(SCENE), settle)
-    assert len(begun) == times
+    assert len(begun) == times and "looks the other way" not in caplog.text
 
 
 @pytest.mark.long
@@ -461,6 +474,25 @@ def test_a_hint_that_is_cleared_may_cost_a_little_distance(left, floating, apart
     fit = Fit(result, Mismatch(0.0, 0.0, 0.0, 25.0), 1.0)
     other = Fit(result, Mismatch(0.0, floating, 0.0, left), apart)
     assert (LimbSearch(hint_cm2=15)._better(other, fit) is other) == taken
+
+
+def test_of_what_searches_find_a_fit_that_is_not_doubted_comes_first() -> None:
+    result = replace(settled(pictures.tiny_state(SCENE, POSE, POSE)), notes=("before",))
+    sizes = (100.0, 1.0), (90.0, 0.5), (0.0, 0.8)
+    fit, near, sound = (Fit(result, Mismatch(area, 0.0, 0.0, 0.0), apart) for area, apart in sizes)
+    found = iter([near, sound])
+    scorer = SimpleNamespace(
+        start=None, model=SimpleNamespace(clothed=True), parameters=None, score=lambda _: next(found)
+    )
+    searches = SimpleNamespace(scorer=scorer, wide=lambda *_, **__: POSE)
+    best = QUICK._searched(0, fit, searches, Trigger("lost", True, ()), lambda *_: result)
+    assert not best.doubted and best.notes[0] == "before" and len(best.notes) == 2
+
+
+@pytest.mark.parametrize(("past", "weight"), [(Past(), HANGING), (Past(after_gap=True), FLYING)])
+def test_cloth_may_fly_once_its_colours_are_known(past, weight) -> None:
+    result = settled(pictures.tiny_state(SCENE, POSE, POSE))
+    assert QUICK._scorer(POSE, result, seen(), past, scenes.tiny_model(SCENE)).cloth_weight == weight
 
 
 def test_of_two_fits_alike_the_one_nearer_to_the_start_is_taken() -> None:
@@ -569,8 +601,8 @@ def test_a_view_in_which_something_stands_before_the_person_leads_nobody_astray(
 
 def test_where_no_picture_tells_person_from_room_a_fit_is_doubted() -> None:
     noise = np.random.default_rng(0).integers(0, 255, FRAME.images[0].shape, np.uint8)
-    right, model = pictures.tiny_state(SCENE, POSE, POSE), scenes.tiny_model(SCENE)
-    frame = replace(FRAME, images=(noise,) * len(FRAME.images))
+    right, room = pictures.tiny_state(SCENE, POSE, POSE), replace(SCENE.background, floor_m=0.0)
+    model, frame = scenes.tiny_model(SCENE.with_background(room)), replace(FRAME, images=(noise,) * len(FRAME.images))
     found = LimbSearch().recover(frame, right, settled(right), Past(), model, lambda *_: settled(right))
     assert found.doubted and "no picture tells" in found.notes[0]
 

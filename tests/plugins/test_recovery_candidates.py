@@ -16,6 +16,7 @@ def test_directions_that_are_searched_lie_apart():
     off = np.array([3.0, 1.0, 2.0, 9.0, 9.0, 4.0, 9.0, 1.5])
     assert separate_minima(off, 3) == [1, 7, 5]  # 2 and 0 lie beside better ones
     assert separate_minima(off, 9) == [1, 7, 5, 3]
+    assert separate_minima(np.array([1.0, 9.0, 3.0, 9.0, 2.0]), 2) == [0, 2]  # 4 lies beside 0
 
 
 def test_one_pose_for_each_way_that_a_person_may_look():

@@ -78,10 +78,23 @@ def test_colours_tell_person_from_room_and_nothing_of_what_was_never_seen():
 
 def test_a_view_that_has_shown_no_room_tells_nothing():
     frame = pictures(POSE)
-    usable = [s for s in tiny_segmentation(SCENE, POSE).silhouettes if s.camera != 2]
-    appearance = past_of(frame).appearance | {ROOM: room_histograms(frame, usable, Past(), 0.9, GRID, REACH)}
+    first, second, third, _ = tiny_segmentation(SCENE, POSE).silhouettes
+    nobody = replace(third, distance=np.full_like(third.distance, -12))
+    shown = room_histograms(frame, [first, second, nobody], Past(), 0.9, GRID, REACH)
+    appearance = past_of(frame).appearance | {ROOM: shown}
+    assert not person_log_ratio(Past(appearance=appearance), 3).any()
     assert not person_log_ratio(Past(appearance=appearance), 2).any()
     assert person_log_ratio(Past(appearance=appearance), 1).any()
+
+
+def test_before_a_frame_has_shown_the_room_nothing_is_told_and_then_it_is_learned():
+    frame, state, segmenter = pictures(POSE), tiny_state(SCENE, POSE), Layered(use_background=False, colour_weight=1.0)
+    found = segmenter.segment(frame, state, Past(), SCENE, Turn(index=0))
+    plain = Layered(use_background=False).segment(frame, state, Past(), SCENE, Turn(index=0))
+    for one, other in zip(found.silhouettes, plain.silhouettes, strict=True):
+        np.testing.assert_array_equal(one.distance, other.distance)
+    assert ROOM not in found.appearance
+    assert ROOM in segmenter.segment(frame, state, Past(), SCENE, Turn(index=1)).appearance
 
 
 def test_a_limb_that_came_back_elsewhere_is_found_by_its_colours():

@@ -12,6 +12,7 @@ from mocapflow_matching.camouflage import FEET
 from mocapflow_recovery.limb_search import LimbSearch
 from mocapflow_recovery.refit_windows import LEAD_IN, WINDOW, pictured, windows
 from mocapflow_recovery.revised_track import RevisedTrack
+from mocapflow_recovery.scoring import mismatch_of
 from mocapflow_recovery.second_look import Refitter, SecondLook
 from results_scene import DEMO, demo_scene, stepping
 
@@ -20,8 +21,9 @@ from mocapflow.data import NO_CLOTH, Change, Cloth, FrameResult, Past, Pose
 from mocapflow.help.shipped import shipped
 from mocapflow.prediction import initial_state
 from mocapflow.recordings.recording import open_recording
-from mocapflow.results import Track
+from mocapflow.results import ImageFlow, Track, ViewChecks
 from mocapflow.series import Series
+from mocapflow.testing import pictures, recovery, scenes
 from mocapflow.track import CoupledLoop
 
 SCENE = demo_scene()
@@ -31,6 +33,7 @@ ROW = 12
 RECORDING = open_recording(DEMO, stop=len(TRUE.frame))
 STAGES = load_pipeline(shipped("pipelines", "bare.yaml"), recording=DEMO).stages
 LOOP = next(named.stage for named in STAGES if isinstance(named.stage, CoupledLoop))
+MORE_MISMATCH = Refitter.more_mismatch
 
 
 def astray(*rows: int, by: float = 0.8) -> Track:
@@ -76,9 +79,10 @@ def second_look(track: Track, **settings: float) -> Track:
 
 
 def test_a_frame_that_leaps_is_fitted_again_from_between_its_neighbours(looked):
-    again = second_look(astray(ROW))
+    again = second_look(replace(astray(ROW), doubted=TRUE.frame == ROW))
     np.testing.assert_array_equal(again.angles, TRUE.angles)
     np.testing.assert_array_equal(again.root, TRUE.root)
+    assert np.flatnonzero(again.doubted).tolist() == [ROW]  # the room behind is what it was
     colours, same, (index, past, start) = looked  # the frame after that wrong one leaps, too
     assert (colours[0], same[0], index) == (ROW + 2, ROW + 1, ROW)
     assert abs(start.angles[KNEE] - TRUE.angles[[ROW - 1, ROW + 1], KNEE].mean()) < 1e-12
@@ -102,6 +106,11 @@ def test_what_a_frame_knows_of_those_before_it_is_their_better_fit():
     assert latest.cloth.parameters.tolist() == [0.1, 0.2] and (latest.observed == 0.75).all()
     assert latest.pose.angles[KNEE] == TRUE.angles[ROW, KNEE] and latest.time == TRUE.time[ROW]
     assert fits.past(ROW + 2, {}).moments[-1].pose.angles[KNEE] == TRUE.angles[ROW + 1, KNEE]
+    windy = RevisedTrack(replace(TRUE, cloth_parameters=np.arange(80.0).reshape(40, 2)), SCENE.body)
+    assert windy.cloth(ROW).parameters.tolist() == [2 * ROW, 2 * ROW + 1]
+    seen = TRUE.observed * ~np.isin(TRUE.frame, [ROW - 2, ROW - 1])[:, None]
+    gap = RevisedTrack(replace(TRUE, observed=seen), SCENE.body).past(ROW, {})
+    assert gap.after_gap and not gap.moments
 
 
 @pytest.mark.parametrize("row", [ROW, len(TRUE.frame) - 1])
@@ -170,7 +179,9 @@ def test_an_end_is_fitted_again_if_the_frame_beside_it_leaps(looked, end):
     again = second_look(astray(end))
     np.testing.assert_array_equal(again.angles, TRUE.angles)
     assert f"frame {end}: fitted again, for the frame beside it leaps" in again.notes
-    *_, (past, start) = ((past, pose) for index, past, pose in looked if index == end)  # one may have shown colours
+    indices = [index for index, *_ in looked]  # what shows the colours, and is fitted again by them, in turn
+    assert indices == ([end, end - 1, end - 1, end] if end else [2, 1, 0])
+    _, past, start = looked[-1]
     near, next_to_near = TRUE.angles[[1, 2], KNEE]
     frame = next(RECORDING.frames(since=end))
     lead = LOOP.predictor.predict(frame, past, SCENE).angles[KNEE] if end else 2 * near - next_to_near
@@ -191,7 +202,7 @@ def test_a_smooth_track_stays_as_it_is_and_no_picture_is_read(looked, monkeypatc
 
 @pytest.mark.parametrize(
     ("cost", "kept"),
-    [(0.5, False), (0.4, False), (0.52, False), (1.5, True)],  # of the fit that leaps less, beside 0.5
+    [(0.5, False), (0.4, False), (0.8, False), (1.0, True)],  # of the fit that leaps less, beside 0.5
 )
 def test_the_pictures_have_their_say(monkeypatch, cost, kept):
     monkeypatch.setattr(CoupledLoop, "settled", lambda *given: fitted(TRUE.pose(given[1].index), cost))
@@ -206,6 +217,42 @@ def test_the_mismatch_has_its_say(monkeypatch, mismatch, areas, kept):
     monkeypatch.setattr(CoupledLoop, "settled", lambda *given: fitted(TRUE.pose(given[1].index), cost))
     mismatch[:] = areas
     assert (second_look(track) is track) is kept
+
+
+def test_what_lies_apart_more_is_the_person_off_the_model_and_skin_in_empty_space():
+    """Of a leg that is spread by too much in both fits."""
+    scene = scenes.tiny_scene()
+    pose = scenes.tiny_pose(scene, 3, 0.1)
+    leg = np.arange(len(pose.angles)) == 1
+    stands, other = (Pose(root=pose.root, angles=pose.angles + by * leg) for by in (0.4, 0.8))
+    frame, past = pictures.tiny_frame(scene, pose), Past()
+    trimaps = LimbSearch().trimaps(frame, scene.surface(stands, NO_CLOTH), past, scene)
+    before, now = (mismatch_of(scene.surface(each, NO_CLOTH), scene, trimaps) for each in (stands, other))
+    standing = SimpleNamespace(pose=lambda row: stands, cloth=lambda row: NO_CLOTH)
+    refitter = Refitter(SimpleNamespace(recovery=None), scenes.tiny_model(scene), standing, 0.04, np.zeros(1, bool))
+    result = recovery.settled(pictures.tiny_state(scene, other, pose), scene)
+    assert min(before.hint, before.floating, now.hint, now.floating) > 100  # cm²
+    more = now.hint + now.floating - before.hint - before.floating
+    assert MORE_MISMATCH(refitter, frame, 0, past, result) == pytest.approx(more)
+
+
+def test_a_track_that_nothing_recovers_is_looked_at_too(looked):
+    loop = LOOP.model_copy(update={"recovery": None})
+    again = SecondLook().run(astray(ROW), loop, RECORDING, SCENE, RECORDING.background())
+    np.testing.assert_array_equal(again.angles, TRUE.angles)
+
+
+def test_pictures_are_those_that_were_tracked(monkeypatch):
+    """Without wrong views, with the flow into them."""
+    shown = []
+    monkeypatch.setattr(Refitter, "refit", lambda again, rows, frames: again.tried.fill(True) or shown.extend(frames))
+    checks = ViewChecks(frame=np.array([ROW], np.int32), camera=np.array([1], np.int16), reasons=("torn",))
+    one = {"pixel": np.ones((1, 2), np.float32), "displacement": np.ones((1, 2), np.float32)}
+    flow = ImageFlow(frame=np.full(1, ROW, np.int32), camera=np.full(1, 2, np.int16), cameras=4, **one)
+    SecondLook().run(astray(ROW), LOOP, RECORDING, SCENE, RECORDING.background(), flow, checks)
+    (frame,) = (frame for frame in shown if frame.index == ROW)
+    assert frame.usable.tolist() == [True, False, True, True]
+    assert [len(view.pixel) for view in frame.flow] == [0, 0, 1, 0]
 
 
 def test_without_the_empty_scene_no_frame_is_looked_at(looked, caplog):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mocapflow_levelset.floor_height import floor_height, grey_floor
 from mocapflow_levelset.floor_light import small_views
-from mocapflow_levelset.shadow_consistency import contradicted, no_shadows
+from mocapflow_levelset.shadow_consistency import _enlarged, contradicted, no_shadows
 from mocapflow_levelset.shadows import floor_around, shadowed
 from mocapflow_sequence.background import EmptyScene
 
@@ -82,6 +82,11 @@ def test_without_a_shadow_nothing_tells_it():
 def test_only_a_floor_without_colours_needs_the_others():
     assert grey_floor(pictures()[1], CAMERAS, BODY)
     assert not grey_floor(pictures(colour=(90, 140, 180))[1], CAMERAS, BODY)
+    room = pictures()[1]
+    for number, (mean, spread) in enumerate(zip(room.mean, room.spread, strict=True)):
+        unknown = np.s_[:, : 220 if number else None]  # of one view all
+        mean[unknown], spread[unknown] = (90, 140, 180), np.inf
+    assert grey_floor(room, CAMERAS, BODY)
 
 
 @pytest.mark.parametrize(("colour", "found"), [(GREY, FLOOR_M), ((90, 140, 180), None)])
@@ -110,6 +115,12 @@ def test_two_views_are_too_few():
     assert no_shadows(some, background, CAMERAS) is None
     three = no_shadows(replace(frame, usable=np.array([True, True, True, False])), background, CAMERAS)
     assert three is not None and three[0][SOCK].mean() > 0.7
+
+
+def test_what_was_left_over_when_a_view_was_shrunk_is_its_lower_right_rim():
+    small = np.array([[True, False, True], [False, True, False]])
+    large = _enlarged(small, 2, replace(CAMERAS[0], size=np.array([7, 5], np.int32)))
+    np.testing.assert_array_equal(large, np.pad(small.repeat(2, axis=0).repeat(2, axis=1), ((0, 1), (0, 1))))
 
 
 def test_what_is_hidden_tells_nothing():

@@ -1,15 +1,20 @@
 """The first pose from silhouettes alone."""
 
 import re
+import shutil
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
+import cv2
 import numpy as np
 import pytest
 from mocapflow_bodies.template import Template
 from mocapflow_fitting.start_from_file import read_pose
 from mocapflow_recovery import start_from_silhouettes
-from mocapflow_recovery.placing import centred, heading_between, mask_centre, placed
-from mocapflow_recovery.start_from_silhouettes import StartFromSilhouettes
+from mocapflow_recovery.placing import centred, heading_between, largest_changes, mask_centre, placed
+from mocapflow_recovery.start_from_silhouettes import NATURAL, StartFromSilhouettes, Target
+from mocapflow_recovery.trimaps import small_rooms
 
 from mocapflow.config.pipeline import load_pipeline
 from mocapflow.data import NO_CLOTH, Pose
@@ -19,6 +24,7 @@ from mocapflow.geometry.silhouettes import covered
 from mocapflow.help.shipped import shipped
 from mocapflow.recordings.recording import open_recording
 from mocapflow.scene import Scene
+from mocapflow.testing import pictures, scenes
 
 DATA = Path(__file__).parents[2] / "examples" / "data"
 SKIRT = DATA / "skirt_steps"
@@ -61,6 +67,21 @@ def test_a_pose_out_of_sight_stays_where_it_is(bare):
     )
 
 
+def test_the_largest_change_of_each_usable_view_is_the_person():
+    """In the second view there is nobody, but a speck; in the third something small is left besides."""
+    scene = scenes.tiny_scene()
+    frame = pictures.tiny_frame(scene, scenes.tiny_pose(scene))
+    empty, crowded = scene.background.mean[1].astype(np.uint8), frame.images[2].copy()
+    empty[100:102, 100:102] = crowded[4:24, 4:24] = 240
+    frame = replace(
+        frame, images=(frame.images[0], empty, crowded, frame.images[3]), usable=np.array([True, True, True, False])
+    )
+    masks, cameras = largest_changes(frame, small_rooms(scene.background, scene.cameras))
+    assert [camera.name for camera in cameras] == ["cam01", "cam02", "cam03"]
+    assert masks[0].sum() > 500 and not masks[1].any()
+    assert masks[2].sum() > 500 and not masks[2][:12, :12].any()
+
+
 def test_without_plates_it_says_what_else_there_is(tmp_path):
     (tmp_path / "videos").symlink_to(SKIRT / "videos")
     (tmp_path / "cameras.toml").symlink_to(SKIRT / "cameras.toml")
@@ -68,18 +89,29 @@ def test_without_plates_it_says_what_else_there_is(tmp_path):
         StartFromSilhouettes().need(open_recording(tmp_path))
 
 
-def test_an_empty_room_is_an_error(tmp_path):
-    """The clean plates themselves as pictures."""
+@pytest.mark.parametrize("start", [0, 1, 2], ids=["empty", "missing", "a person in one view"])
+def test_an_empty_room_is_an_error(tmp_path, start):
+    """The clean plates themselves as pictures; of frame 1 there are none, and one of frame 2 shows the person."""
     for plate in (SKIRT / "background").glob("*.png"):
         folder = tmp_path / "videos" / plate.stem
         folder.mkdir(parents=True)
-        (folder / "000000.png").symlink_to(plate)
+        for number in (0, 2):
+            shutil.copy(plate, folder / f"{number:06}.png")
+    cv2.imwrite(str(tmp_path / "videos/cam01/000002.png"), open_recording(SKIRT).frame(0).images[0])
     (tmp_path / "background").symlink_to(SKIRT / "background")
     (tmp_path / "cameras.toml").symlink_to(SKIRT / "cameras.toml")
-    recording = open_recording(tmp_path)
+    recording = open_recording(tmp_path, start=start)
     scene = Scene(cameras=recording.cameras, body=Template(shape=0.0).load(SKIRT))
-    with pytest.raises(RecordingError, match="0 cameras show a person"):
+    with pytest.raises(RecordingError, match=f"frame {start}: fewer than two cameras show a person"):
         StartFromSilhouettes().run(recording, scene)
+
+
+def test_a_pose_counts_as_farther_the_farther_it_is_from_all_that_were_seen():
+    scorer = SimpleNamespace(distances=lambda poses: np.full(len(poses), 0.01))
+    target = Target(scorer, None, np.array([[0.5, np.nan], [0.0, 2.0]]))
+    off = [0, 0], [0.5, 0], [0, 2], [0.5 + NATURAL, -NATURAL]
+    costs = target.costs([Pose(root=np.eye(4), angles=np.array(angles, float)) for angles in off])
+    assert costs == pytest.approx([0.01, 0.01, 0.01, 0.02])  # standing upright is known without a file
 
 
 def test_a_pose_that_fits_badly_is_warned_of(monkeypatch, caplog):
@@ -87,14 +119,25 @@ def test_a_pose_that_fits_badly_is_warned_of(monkeypatch, caplog):
     for name, value in {
         "DIRECTIONS": 4,
         "CANDIDATES": 1,
-        "SEARCHES": 1,
+        "SEARCHES": 2,
         "search": lambda cost, begin, *_: begin,
+        "likely_headings": lambda poses, off: list(range(len(poses))),
     }.items():
         monkeypatch.setattr(start_from_silhouettes, name, value)
     recording = open_recording(SKIRT)
     scene = Scene(cameras=recording.cameras, body=Template(shape=0.0).load(SKIRT))
-    StartFromSilhouettes(draper=None).run(recording, scene)
+    start = StartFromSilhouettes(draper=None).run(recording, scene)
+    assert len(start.others) == 1 and heading_between(start.pose, start.others[0]) > 1
     assert re.search(r"first pose: \d+\.\d mm off the silhouettes .* may be wrong; .* start_from_file", caplog.text)
+
+
+def test_a_search_is_repeated_as_long_as_that_helps(monkeypatch):
+    """Poses are what they cost here."""
+    ends, seeds = iter([8.0, 5.0, 4.9, 1.0]), []
+    monkeypatch.setattr(Target, "costs", lambda target, poses: np.array(poses))
+    monkeypatch.setattr(Target, "searched", lambda target, pose, seed: seeds.append(seed) or next(ends))
+    assert Target(None, None, None).searched_again(10.0, 7) == 4.9
+    assert seeds == [7, 8, 9]
 
 
 @pytest.mark.long

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -94,10 +95,12 @@ def assert_same(found: training.Angles, motion: np.ndarray, body: Body, atol_deg
 
 def test_joint_rotations(body: Body, motion: np.ndarray, tmp_path: Path) -> None:
     turns = [rotations_from_angles(body, pose) for pose in motion]
-    names = list(turns[0])
-    vectors = np.array([[turn[name] for name in names] for turn in turns])
-    np.savez(tmp_path / "take.npz", rotation_vectors=vectors, joint_names=np.array(names))
-    assert_same(training.read_angles(tmp_path / "take.npz", body), motion, body)
+    names = [name for name in turns[0] if name != "elbow_r"]  # the body's, but for one, and one that it lacks
+    vectors = np.array([[*(turn[name] for name in names), [0.1, 0.2, 0.3]] for turn in turns])
+    np.savez(tmp_path / "take.npz", rotation_vectors=vectors, joint_names=np.array([*names, "tail"]))
+    found = training.read_angles(tmp_path / "take.npz", body)
+    assert_same(found, motion, body)
+    assert {name.partition(".")[0] for name in found} == set(names) & {n.partition(".")[0] for n in body.screw_names}
 
 
 def test_a_table_of_angles(body: Body, motion: np.ndarray, tmp_path: Path) -> None:
@@ -112,7 +115,7 @@ def test_a_table_of_angles(body: Body, motion: np.ndarray, tmp_path: Path) -> No
 
 def test_a_table_in_radians(body: Body, tmp_path: Path) -> None:
     tables.write_columns(tmp_path / "angles.csv", {"knee_flexion_l": np.radians(np.linspace(5, 90, 9))})
-    with pytest.raises(RecordingError, match=r"angles\.csv  no angle in it is above 3\.14: .* in radians"):
+    with pytest.raises(RecordingError, match=r"^\S+angles\.csv  no angle in it is above 3\.14: .* in radians"):
         training.read_angles(tmp_path / "angles.csv", body)
 
 
@@ -145,6 +148,9 @@ def test_an_opensim_motion(body: Body, motion: np.ndarray, tmp_path: Path) -> No
     columns = opensim.coordinates(body, np.tile(np.eye(4), (12, 1, 1)), motion)
     write_mot(tmp_path / "angles.mot", columns, np.arange(12) / 30)
     assert_same(training.read_angles(tmp_path / "angles.mot", body), motion, body, atol_deg=2.5)
+    joints, screws = (tuple(n.replace("elbow", "x") for n in names) for names in (body.joint_names, body.screw_names))
+    legs = training.read_angles(tmp_path / "angles.mot", replace(body, joint_names=joints, screw_names=screws))
+    assert "knee_l.flexion" in legs and not any(name.startswith("elbow") for name in legs)
 
 
 def test_an_opensim_motion_of_a_model_that_counts_knees_the_other_way(body: Body, tmp_path: Path) -> None:
@@ -183,6 +189,20 @@ def test_a_bvh_motion(tmp_path: Path) -> None:
     expected = {"hip_flexion_l": 30, "knee_flexion_l": 70, "ankle_l": 15, "hip_flexion_r": 0, "knee_flexion_r": 0}
     for name, degrees in expected.items():
         assert found[name] == pytest.approx([degrees], abs=1e-3), name
+    (tmp_path / "legs.bvh").write_text(BVH.format(legs=legs, values=values).replace("Spine", "Tail"))
+    legs_only = training_bvh.columns(tmp_path / "legs.bvh")
+    assert "knee_flexion_l" in legs_only and "hip_flexion_l" not in legs_only  # nothing tells how the pelvis stands
+
+
+def test_joints_of_other_files_are_known_by_their_names() -> None:
+    names = ["mixamorig:LeftUpLeg", "Right Up_Leg", "rtibia", "LTibia", "Hips", "toe_r"]
+    assert training_bvh.our_names(names) == {"hip_l": 0, "hip_r": 1, "knee_r": 2, "knee_l": 3, "toe_r": 5}
+
+
+def test_without_the_reader_of_bvh_files_it_says_what_to_install(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "bvhio", None)
+    with pytest.raises(RecordingError, match=r"take\.bvh  BVH files need the package bvhio\n.*mocapflow\[bvh\]"):
+        training_bvh.columns(tmp_path / "take.bvh")
 
 
 def test_our_own_bvh(tmp_path: Path) -> None:
@@ -247,6 +267,22 @@ def test_what_is_learned_is_not_written_over_a_recording(tmp_path: Path, out: st
 def test_an_angle_of_one_side(body: Body, tmp_path: Path, wanted: str) -> None:
     (tmp_path / "knees.csv").write_text("frame,knee_flexion_l,knee_flexion_r\n0,10,9\n1,20,8\n")
     assert training.fit([tmp_path / "knees.csv"], body, [wanted]).names == ("knee_l.flexion",)
+
+
+def test_what_is_learned_is_what_all_files_have_in_frames_that_are_known(body: Body, tmp_path: Path) -> None:
+    (tmp_path / "legs.csv").write_text("knee_flexion_l,ankle_l\n10,1\nnan,2\n30,3\n")
+    (tmp_path / "knee.csv").write_text("knee_flexion_l\n60\n20\n")
+    found, closer = (
+        training.fit([tmp_path / "legs.csv", tmp_path / "knee.csv"], body, percentile=share) for share in (100, 0)
+    )
+    assert found.names == ("knee_l.flexion",) and 0 < closer.bandwidth < 0.5 * found.bandwidth
+    np.testing.assert_allclose(np.degrees(found.poses[:, 0]), [10, 20, 30, 60], atol=3)
+
+
+def test_one_pose_is_no_density(body: Body, tmp_path: Path) -> None:
+    (tmp_path / "still.csv").write_text("knee_flexion_l\n10\n10\nnan\n")
+    with pytest.raises(RecordingError, match=r"still\.csv  a density needs two different poses"):
+        training.fit([tmp_path / "still.csv"], body)
 
 
 @pytest.mark.long
