@@ -121,6 +121,12 @@ def test_markers_of_two_people_are_not_mixed(tmp_path: Path) -> None:
     assert landmarks(labels, tmp_path) == {"knee_lateral_l": 1}
 
 
+def test_markers_that_name_no_subject_are_those_of_who_is_named_unless_both_have_one(tmp_path: Path) -> None:
+    assert landmarks(["Anna:LKNE", "LKNM"], tmp_path) == {"knee_lateral_l": 0, "knee_medial_l": 1}
+    with pytest.raises(RecordingError, match="markers of 2 subjects: Anna, one without a name"):
+        landmarks(["Anna:LKNE", "LKNE"], tmp_path)
+
+
 def test_of_two_markers_of_one_name_the_first_is_taken(tmp_path: Path) -> None:
     assert landmarks(["LKNE", "L.KNE"], tmp_path) == {"knee_lateral_l": 0}
 
