@@ -90,6 +90,15 @@ def test_a_lag_between_signals_is_found_between_frames(lag):
     assert synchrony.best_lag(np.ones((80, 1)), np.ones((80, 1)), 10)[1] == 0  # nothing moves
 
 
+def test_signals_without_noise_are_surely_not_late_and_leave_the_others_as_they_are():
+    signal = np.sin(np.arange(80)[:, None] / [7, 11])
+    noisy = signal + 0.02 * np.random.default_rng(0).normal(size=signal.shape)
+    seen = [signal, signal, noisy]
+    found = synchrony.lateness(NAMES, lambda one, other: (seen[one], seen[other]), 10)
+    assert [each.frames for each in found] == pytest.approx([0, 0, 0], abs=0.1)
+    assert 0 < found[0].sd < found[2].sd < 0.1
+
+
 def test_one_wild_error_does_not_move_the_lag():
     moments = np.arange(80)[:, None]
     one, other = np.sin(moments / [7, 11]), np.sin(moments / [7, 11]) + 0.01 * np.cos(moments)
