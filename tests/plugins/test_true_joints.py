@@ -76,6 +76,8 @@ def test_centres_that_can_not_be_read_are_told(own: TrackedMotion, tmp_path: Pat
     np.savez(tmp_path / "joints.npz", places=own.stick.places)
     with pytest.raises(RecordingError, match=r"can't be read: .*names(.|\n)*positions \(T, J, 3\) m, names"):
         evaluate(own, path, tmp_path)
-    (tmp_path / "joints.npz").write_text("no archive")
-    with pytest.raises(RecordingError, match=r"joints\.npz  can't be read"):
-        evaluate(own, path, tmp_path)
+    whole = (tmp_path / "joints.npz").read_bytes()
+    for content in (b"no archive", b"", whole[:-9], whole.replace(b"NUMPY", b"numpy", 1)):
+        (tmp_path / "joints.npz").write_bytes(content)
+        with pytest.raises(RecordingError, match=r"joints\.npz  can't be read"):
+            evaluate(own, path, tmp_path)
