@@ -142,6 +142,7 @@ def test_cmc_by_the_formula_written_out() -> None:
 
 def test_limits_of_agreement_hold_95_per_cent() -> None:
     error = np.random.default_rng(0).normal(1.0, 2.0, 5000)
+    assert compare.agreement(np.array([0.0, 2.0]))["agreement_high_deg"] == pytest.approx(1 + 1.96 * np.sqrt(2))
     low, high = compare.agreement(error).values()
     assert (low, high) == (pytest.approx(1 - 3.92, abs=0.15), pytest.approx(1 + 3.92, abs=0.15))
     assert np.mean((error > low) & (error < high)) == pytest.approx(0.95, abs=0.01)
