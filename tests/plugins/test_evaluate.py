@@ -338,7 +338,7 @@ def test_a_reference_in_radians_or_out_of_order_is_told(tmp_path: Path) -> None:
     turned = tables.write_columns(tmp_path / "turned.csv", clock | {n: np.radians(v) for n, v in columns.items()})
     assert any(note.endswith("is it in radians?") for note in evaluate_run(tmp_path, turned).notes)
     assert not any("radians" in note for note in evaluate_run(tmp_path, DEMO / "truth" / "angles.csv").notes)
-    tables.write_columns(turned, clock | columns | {"knee_flexion_l": 10 * columns["knee_flexion_l"]})
+    tables.write_columns(turned, clock | columns | {"knee_flexion_l": -10 * columns["knee_flexion_l"]})
     with pytest.raises(RecordingError, match=r"turned\.csv  knee_flexion_l reaches \d+°, more than once around\n"):
         evaluate_run(tmp_path, turned)
     clock["frame"][5] = 4

@@ -155,6 +155,13 @@ def test_a_knee_without_its_inner_marker_is_left_out(tmp_path: Path) -> None:
     assert "knee_flexion_l" not in read_reference(tmp_path / "m.trc").curves
 
 
+def test_a_leg_without_markers_of_its_ankle_has_the_angle_of_its_hip_alone(tmp_path: Path) -> None:
+    kept = [k for k, label in enumerate(LABELS) if not label.endswith(("LANK", "LMED"))]
+    write_trc(tmp_path / "m.trc", [LABELS[k] for k in kept], opensim_from_world(PLACES[:, kept]), RATE)
+    found = read_reference(tmp_path / "m.trc").curves
+    assert "hip_flexion_l" in found and {"knee_angle_l", "knee_flexion_l", "ankle_l"}.isdisjoint(found)
+
+
 def test_a_leg_without_markers_of_the_pelvis_has_the_angle_of_its_ankle_alone(tmp_path: Path) -> None:
     kept = [k for k, label in enumerate(LABELS) if not label.endswith(("ASI", "PSI"))]
     write_trc(tmp_path / "m.trc", [LABELS[k] for k in kept], opensim_from_world(PLACES[:, kept]), RATE)
@@ -406,8 +413,9 @@ def test_another_run_is_a_reference_by_its_angles_alone(tmp_path: Path) -> None:
 
 def test_a_knee_of_opensim_is_compared_as_signed_too(tmp_path: Path) -> None:
     bend = np.array([-4.0, 0.0, 30.0])
-    write_mot(tmp_path / "m.mot", {"knee_angle_l": bend, "ankle_angle_l": bend}, np.arange(3) / 30)
-    assert read_reference(tmp_path / "m.mot").notes[-1].endswith("may be off by a constant: ankle_l")
+    several = {"knee_angle_l": bend, "elbow_flex_l": bend, "ankle_angle_l": bend}
+    write_mot(tmp_path / "m.sto", several, np.arange(3) / 30)
+    assert read_reference(tmp_path / "m.sto").notes[-1].endswith("may be off by a constant: ankle_l")
     write_mot(tmp_path / "m.mot", {"knee_angle_l": bend}, np.arange(3) / 30)
     curves = read_reference(tmp_path / "m.mot").curves
     assert not any("constant" in note for note in read_reference(tmp_path / "m.mot").notes)
