@@ -428,9 +428,11 @@ def test_a_stated_frame_rate_does_not_hide_that_the_videos_differ(tmp_path):
     write_recording(tmp_path, frames=4)
     write_video(tmp_path / "videos" / "cam02.mp4", 4, rate=50.0)
     with (tmp_path / "cameras.toml").open("a") as file:
-        file.write("[metadata]\nframe_rate = 25\n")
-    (said,) = open_recording(tmp_path).warnings
+        file.write("[metadata]\nframe_rate = 1\n")  # as slow as it may be
+    found = open_recording(tmp_path)
+    (said,) = found.warnings
     assert said.startswith("the videos differ in frame rate (cam01: 25 per second, cam02: 50 per second, cam03: 25")
+    assert said.endswith("1 is taken for all") and found.frame_rate == 1
 
 
 @pytest.mark.parametrize("stated", ["", "[metadata]\nframe_rate = 25\n"])
@@ -462,7 +464,9 @@ def test_a_frame_rate_that_varies(tmp_path):
         file.mux(stream.encode(None))
     with (tmp_path / "cameras.toml").open("a") as file:
         file.write("[metadata]\nframe_rate = 250\n")  # slow motion
-    said = open_recording(tmp_path).warnings
+    found = open_recording(tmp_path)
+    said = found.warnings
+    assert found.frame_rate == 250
     assert said[0].startswith("cam02: its frame rate varies, which puts frames up to ")
     assert "ffmpeg -i IN -vf fps=25 " in said[0]
     assert said[0] in [finding.message for finding in examine(tmp_path)]

@@ -58,6 +58,7 @@ def test_players_do_not_show_what_is_cut_off_without_encoding_again(tmp_path):
     video = open_video(write_reordered(tmp_path / "a.mp4", 30, hidden=5))
     assert (video.frames, video.declared, video.frame_rate) == (25, 25, 25.0)
     assert numbers(video) == list(range(5, 30))
+    assert count_from_first([video])[0].first == 0
 
 
 @pytest.mark.parametrize(("matrix", "turns"), [((0, 1, -1, 0), 1), ((-1, 0, 0, -1), 2), ((0, -1, 1, 0), 3)])
@@ -115,6 +116,8 @@ def test_a_late_video_ends_earlier_and_is_not_broken(tmp_path):
     video = replace(open_video(write_video(tmp_path / "a.avi", FRAMES)), late=3)
     rows = list(read_frames(video, range(FRAMES)))
     assert [reason for image, reason in rows if image is None] == ["the video ends earlier"] * 3
+    early = list(read_frames(replace(video, late=-2), range(4)))
+    assert [reason for _, reason in early] == ["the video starts later"] * 2 + [""] * 2
 
 
 @pytest.mark.parametrize("count", [1, 2])
