@@ -59,9 +59,14 @@ def test_players_do_not_show_what_is_cut_off_without_encoding_again(tmp_path):
     assert (video.frames, video.declared, video.frame_rate) == (25, 25, 25.0)
     assert numbers(video) == list(range(5, 30))
     assert count_from_first([video])[0].first == 0
+    with pytest.raises(RecordingError, match="this video can't be decoded"):
+        open_video(write_reordered(tmp_path / "b.mp4", 12, hidden=12))
 
 
-@pytest.mark.parametrize(("matrix", "turns"), [((0, 1, -1, 0), 1), ((-1, 0, 0, -1), 2), ((0, -1, 1, 0), 3)])
+@pytest.mark.parametrize(
+    ("matrix", "turns"),
+    [((0, 1, -1, 0), 1), ((-1, 0, 0, -1), 2), ((0, -1, 1, 0), 3), ((-1, 1, -1, -1), 0), ((-1, -1, 1, -1), 0)],
+)
 def test_pictures_are_turned_as_players_do(tmp_path, matrix, turns):
     upright = write_video(tmp_path / "a.mp4", 6)
     content = bytearray(upright.read_bytes())
@@ -126,6 +131,10 @@ def test_a_video_of_hardly_any_pictures(tmp_path, count, ending):
     video = open_video(write_video(tmp_path / f"a.{ending}", count))
     assert (video.frames, video.declared, video.frame_rate, video.uneven) == (count, count, 25.0, 0.0)
     assert [number_of(image) for image, _ in read_frames(video, range(count))] == list(range(count))
+
+
+def test_a_frame_rate_that_no_camera_has_says_nothing(tmp_path):
+    assert open_video(write_video(tmp_path / "a.mov", 3, rate=2e5, codec="MJPG")).frame_rate == 0
 
 
 def test_frames_that_come_unevenly_are_told_from_a_file(tmp_path):
@@ -201,6 +210,7 @@ def test_a_folder_of_images(tmp_path):
         cv2.imwrite(str(tmp_path / f"{number:06d}.png"), picture(number))
     (tmp_path / "000004.png").write_bytes(b"no image")
     (tmp_path / "notes.txt").write_text("12")
+    (tmp_path / "cover.png").touch()
     video = open_video(tmp_path)
     assert (video.frames, video.frame_rate) == (5, 0.0)
     assert numbers(video) == [0, 1, None, 3, None]
@@ -230,8 +240,9 @@ def test_twelve_bits_in_sixteen(tmp_path):
     cv2.imwrite(str(tmp_path / "000000.png"), picture(1).astype(np.uint16) * 16)
     with pytest.raises(RecordingError, match=r"000000\.png  a picture of 16 bits .* reaches 3520 of 65535.*\n.*8 bits"):
         open_video(tmp_path)
-    cv2.imwrite(str(tmp_path / "000000.png"), picture(1).astype(np.uint16) * 257)
-    assert numbers(open_video(tmp_path)) == [1]
+    for number in (1, 0):
+        cv2.imwrite(str(tmp_path / "000000.png"), (picture(number) * (number > 0)).astype(np.uint16) * 257)
+        assert numbers(open_video(tmp_path)) == [number]  # also of a room in the dark
 
 
 def test_what_is_no_video(tmp_path):
