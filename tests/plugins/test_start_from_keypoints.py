@@ -65,7 +65,9 @@ def test_body_25_and_25b_are_told_apart(body, pose, cameras):
         layout_of([b[:18]])
     assert layout_of([np.zeros((25, 3))], "body_25b") == "body_25b"
     with pytest.raises(RecordingError, match="a person has 25 keypoints, in the layout coco_17 17"):
-        layout_of([b], "coco_17")
+        layout_of([b[:17], b], "coco_17")
+    with pytest.raises(RecordingError, match="no detections: the layout of the keypoints is not known"):
+        layout_of([])
 
 
 def test_triangulation_is_exact_and_outvotes_a_camera(cameras):

@@ -226,6 +226,11 @@ def test_two_images_of_one_frame_are_told_apart_by_nobody(tmp_path):
         open_video(tmp_path)
 
 
+def test_a_single_image_may_be_of_a_late_frame(tmp_path):
+    cv2.imwrite(str(tmp_path / "005999.png"), picture(1))
+    assert open_video(tmp_path).frames == 6000
+
+
 @pytest.mark.parametrize("first", [20260131, 1700000000000])
 def test_images_named_by_date_or_time(tmp_path, first):
     for name in (first, first + 33):
