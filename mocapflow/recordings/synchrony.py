@@ -96,8 +96,6 @@ def best_lag(one: F64, other: F64, reach: int) -> tuple[float, float]:
     most = max(np.isfinite(error).sum() for error in errors)
     enough = np.array([np.isfinite(error).sum() >= max(SHARED * most, 2) for error in errors])
     raw = np.array([np.nanmedian(np.abs(e)) if ok else np.inf for e, ok in zip(errors, enough, strict=True)])
-    if not np.isfinite(raw).any():
-        return 0.0, 0.0
     scale = max(1.4826 * float(raw.min()), 1e-9)
     clipped = [np.minimum((e / scale) ** 2, CLIP**2) for e in errors]
     cost = np.array([np.nanmean(c) if ok else np.inf for c, ok in zip(clipped, enough, strict=True)])

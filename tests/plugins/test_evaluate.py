@@ -111,7 +111,8 @@ def test_a_gap_in_the_reference_makes_no_lag() -> None:
 
 
 @pytest.mark.parametrize(
-    ("ours", "truth"), [(np.ones(60), np.sin(FRAMES[:60])), (np.sin(FRAMES[:60]), np.ones(60)), (FRAMES[:3], FRAMES[:3])]
+    ("ours", "truth"),
+    [(np.ones(60), np.sin(FRAMES[:60])), (np.sin(FRAMES[:60]), np.ones(60)), (FRAMES[:3], FRAMES[:3])],
 )
 def test_lag_of_a_curve_that_does_not_move_or_is_too_short_is_unknown(ours: np.ndarray, truth: np.ndarray) -> None:
     assert np.isnan(compare.lag(ours, truth, 30.0))

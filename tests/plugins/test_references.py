@@ -95,7 +95,9 @@ def test_knee_axes_of_both_sides_point_to_the_left(own: TrackedMotion) -> None:
 
 
 def test_names_of_other_laboratories_are_known(tmp_path: Path) -> None:
-    found = landmarks(["L_IAS", "R.Knee.Lat", "L_mknee_study", "r.ASIS_study", "*23", "Lab:Anna:L-KNE", "SACR"], tmp_path)
+    found = landmarks(
+        ["L_IAS", "R.Knee.Lat", "L_mknee_study", "r.ASIS_study", "*23", "Lab:Anna:L-KNE", "SACR"], tmp_path
+    )
     assert found == {"asis_l": 0, "asis_r": 3, "knee_lateral_r": 1, "knee_lateral_l": 5, "knee_medial_l": 2}
 
 

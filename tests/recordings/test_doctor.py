@@ -15,6 +15,7 @@ from mocapflow.geometry.cameras import magnification
 from mocapflow.io.cameras import rigs
 from mocapflow.io.cameras.pose2sim import write_cameras
 from mocapflow.recordings.doctor import examine, examine_timing
+from mocapflow.recordings.recording import open_recording
 from tests.fixtures.recordings import avi_frames, look_at, ring, write_recording, write_video
 
 DEMO = Path(__file__).parents[2] / "examples" / "data"
@@ -200,6 +201,7 @@ def test_cameras_that_face_each_other(tmp_path):
     pair = [look_at(n, np.array([x, 0.1, 1.5]), target=(0, 0, 1.5)) for n, x in (("cam01", 4.0), ("cam02", -4.0))]
     write_recording(tmp_path, frames=2, cameras=pair)
     assert any(m.startswith("cam01 and cam02 face each other (17") for m in messages(tmp_path, "note"))
+    assert open_recording(tmp_path).warnings == ()
 
 
 def test_missing_camera_and_unequal_lengths_and_sizes(tmp_path):

@@ -62,6 +62,7 @@ def test_a_part_and_going_on_in_it(tmp_path):
     assert [frame.index for frame in recording.frames(since=9)] == [11, 14, 17]
     assert [frame.index for frame in recording.frames(since=0)] == [2, 5, 8, 11, 14, 17]
     assert list(recording.frames(since=18)) == []
+    assert [list(recording.until(last).indices) for last in (7, 8, 99)] == [[2, 5], [2, 5, 8], [2, 5, 8, 11, 14, 17]]
     assert number_of(recording.frame(7).images[1]) == 7
     whole = {frame.index: frame.images for frame in recording.frames()}
     for frame in recording.frames(since=11):  # resumed: the same pixels
@@ -127,6 +128,9 @@ def test_static_trial_shares_the_calibration(tmp_path):
     static = open_recording(tmp_path, scale=0.5).static()
     assert static.length == 2
     assert [camera.size.tolist() for camera in static.cameras] == [[32, 24]] * 3
+    assert static.content["cameras.toml"] == tmp_path / "cameras.toml"
+    (tmp_path / "static" / "cameras.toml").write_bytes((tmp_path / "cameras.toml").read_bytes())
+    assert open_recording(tmp_path).static().calibration == tmp_path / "static" / "cameras.toml"  # it has its own
 
 
 def test_missing_camera(tmp_path):
