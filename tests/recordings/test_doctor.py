@@ -518,3 +518,5 @@ def test_the_static_trial_is_examined_too(tmp_path):
     write_recording(tmp_path, frames=3)
     write_recording(tmp_path / "static", frames=3, lengths={"cam02": 2})
     assert errors(tmp_path) == ["static trial: the videos differ in length"]
+    (tmp_path / "static" / "cameras.toml").write_text("")  # its own comes before that of the recording
+    assert errors(tmp_path) == ["static trial: the file holds no camera"]

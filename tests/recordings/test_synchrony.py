@@ -208,6 +208,7 @@ def test_what_is_found_comes_on_top_of_what_is_known(tmp_path, monkeypatch, befo
         synchrony.Lateness(camera=name, frames=frames, sd=0.5) for name, frames in zip(NAMES, found, strict=True)
     ]
     monkeypatch.setattr(doctor, "_measured", lambda folder: measured)
+    assert examine_timing(folder)[-1].message == f"cam02 is 4.0 frames {'late' if found[1] > 0 else 'early'}"
     assert examine_timing(folder, write=True)[-1].message.startswith("written")
     assert json.loads((folder / "recording.json").read_text())["late_frames"] == after
     open_recording(folder)  # and every run takes it
