@@ -142,6 +142,8 @@ def test_standard_deviation_of_a_straight_limb_is_finite() -> None:
     size = 6 + len(body.twists)
     series = angles.measure(body, np.eye(4)[None], np.zeros((1, size - 6)), 1e-4 * np.eye(size)[None])
     assert series.value[0, 0] < 1e-5
+    rounded = angles.measure(body, np.eye(4)[None], np.zeros((1, size - 6)), -1e-18 * np.eye(size)[None])
+    assert rounded.sd[0, 0] == 0  # a variance that rounding left below zero
     assert 0.5 < series.sd[0, 0] < 2.0  # 0.01 rad about the axes of the knee, and what hip and root add
 
 
