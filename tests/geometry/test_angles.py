@@ -8,6 +8,7 @@ import pytest
 from mocapflow.assets import Body
 from mocapflow.data import Pose
 from mocapflow.geometry import angles, kinematics, twists
+from mocapflow.geometry.skeleton import Skeleton, body_directions
 from mocapflow.model import moved
 from mocapflow.scene import Scene
 
@@ -167,6 +168,11 @@ def test_nothing_is_known_of_an_angle_that_no_screw_changes() -> None:
     )
     assert np.isnan([series.sd[0, 0], series.observed[0, 0]]).all()
     assert np.isfinite(series.sd[0, 1:]).all()
+
+
+def test_left_is_level_whatever_the_hips_are() -> None:
+    hips = Skeleton(("hip_l", "hip_r"), np.array([-1, 0], np.int32), np.array([[0.1, 0, 1.0], [-0.1, 0, 0.9]]))
+    np.testing.assert_allclose(body_directions(hips), [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-12)
 
 
 def test_legs_only_body_has_no_elbows() -> None:

@@ -2,19 +2,20 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from keypoint_recording import DEMO, NAMES, bystander_of, copy_demo, keypoints, write
 from mocapflow_bodies.template import Template
-from mocapflow_fitting.detections import frames_seen, person_at
+from mocapflow_fitting.detections import frames_seen, names_of, person_at, seen
 from mocapflow_fitting.keypoint_layouts import LAYOUTS, layout_of
 from mocapflow_fitting.landmarks import landmarks
-from mocapflow_fitting.person import find_person
+from mocapflow_fitting.person import Person, find_person
 from mocapflow_fitting.pose_fit import Solution, velocities
 from mocapflow_fitting.start_from_file import read_pose
 from mocapflow_fitting.start_from_keypoints import StartFromKeypoints
-from mocapflow_fitting.triangulate import triangulate
+from mocapflow_fitting.triangulate import Points, triangulate
 from scipy.optimize import least_squares
 
 from mocapflow.data import Pose
@@ -109,6 +110,24 @@ def test_a_frame_needs_eight_keypoints_that_two_cameras_see(body, pose, cameras,
         path.parent.mkdir(parents=True)
         path.write_text(json.dumps({"people": [person]}))
     assert (person_at(open_recording(folder), 0, cameras) is not None) == usable
+
+
+def test_keypoints_of_one_camera_or_of_a_layout_that_nothing_tells_are_refused(body, pose, cameras, tmp_path):
+    folder = copy_demo(tmp_path / "recording")
+    write(folder, body, [pose], cameras[:1], bystander=())
+    with pytest.raises(RecordingError, match="there are no 2D keypoints of two cameras or more"):
+        StartFromKeypoints().need(open_recording(folder))
+    hardly = SimpleNamespace(folder=folder, people=lambda index: (np.zeros((1, 25, 3)),))
+    with pytest.raises(RecordingError, match="25 keypoints may be BODY_25 or BODY_25B(.|\n)*setting `layout`"):
+        names_of(hardly, [0], None)
+
+
+def test_landmarks_that_a_layout_lacks_are_not_seen():
+    points = Points(position=np.ones((1, 3)), error=np.zeros((2, 1)), weight=np.ones((2, 1)))
+    person = Person(pixels=np.ones((2, 1, 2)), confidence=np.ones((2, 1)), points=points, support=2.0)
+    found = seen(person, ("hip_l",), ("knee_l", "hip_l"))
+    np.testing.assert_array_equal(found.position, [[np.nan] * 3, [1, 1, 1]])
+    assert found.confidence.tolist() == [[0, 1], [0, 1]]
 
 
 def test_landmarks_lie_where_their_names_say(body):
