@@ -161,6 +161,8 @@ def test_which_trials_count_and_what_they_need(body, cameras, tmp_path, monkeypa
     scene = Scene(cameras=cameras, body=body)
     for trial in ("recording", "auto", "static"):
         FitSubject(trial=trial).run(open_recording(folder, stop=1), scene)
+    with pytest.raises(RecordingError, match="in the layout coco_17 17"):
+        FitSubject(layout="coco_17").run(open_recording(folder, stop=1), scene)
     shutil.rmtree(static / "keypoints")
     FitSubject().run(open_recording(folder, stop=1), scene)
     assert taken == [1, 2, 1, 1]

@@ -130,6 +130,20 @@ def test_landmarks_that_a_layout_lacks_are_not_seen():
     assert found.confidence.tolist() == [[0, 1], [0, 1]]
 
 
+@pytest.mark.parametrize("lacking", ["hip_l", "neck", "head", "ankle_l"])
+def test_a_body_has_the_landmarks_that_its_joints_and_its_skin_tell(body, lacking):
+    other = replace(body, joint_names=tuple("x" if name == lacking else name for name in body.joint_names))
+    found = landmarks(other)
+    assert lacking not in found.names and ("nose" in found.names) == (lacking != "head")
+    shoulder = found.body.vertices[found.names.index("shoulder_l")]
+    raised = shoulder[2] - body.positions[body.joint("shoulder_l"), 2]
+    assert (raised == 0) == (lacking in ("hip_l", "neck"))  # which say by how much
+    few = landmarks(kinematics.part_of(other, np.arange(9))).names
+    assert {"shoulder_l", "elbow_l"} <= set(few) and {"nose", "heel_r"}.isdisjoint(few)
+    strange = tuple(f"joint {number}" for number in range(len(body.joint_names)))
+    assert landmarks(replace(body, joint_names=strange)).names == ()
+
+
 def test_landmarks_lie_where_their_names_say(body):
     marks = landmarks(body)
     at = dict(zip(marks.names, marks.body.vertices, strict=True))
