@@ -185,6 +185,11 @@ def test_start_finds_the_pose(body, pose, recording):
     assert (start.pose.angles > body.limits[:, 0] - 0.02).all() and (start.pose.angles < body.limits[:, 1] + 0.02).all()
 
 
+def test_a_layout_that_is_asked_for_is_taken(body, recording):
+    with pytest.raises(RecordingError, match="in the layout coco_17 17"):
+        StartFromKeypoints(layout="coco_17").run(recording, Scene(cameras=recording.cameras, body=body))
+
+
 def test_a_turned_person_is_found_too(body, pose, cameras, tmp_path):
     turned = twists.exp(np.array([0, 0, 2.5, 0, 0, 0])) @ pose.root
     folder = copy_demo(tmp_path / "recording")
