@@ -21,7 +21,7 @@ from scipy.optimize import least_squares
 from mocapflow.data import Pose
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import kinematics, twists
-from mocapflow.geometry.cameras import project
+from mocapflow.geometry.cameras import project, projections
 from mocapflow.model import moved
 from mocapflow.recordings.recording import open_recording
 from mocapflow.scene import Scene
@@ -81,6 +81,19 @@ def test_triangulation_is_exact_and_outvotes_a_camera(cameras):
     assert np.median(found.error[2]) > 50
     seen[1:, 3] = 0.0
     assert np.isnan(triangulate(pixels, seen, cameras).position[3]).all()
+    pixels[0, 5] = np.nan
+    np.testing.assert_allclose(
+        triangulate(pixels[[0, 1, 3]], seen[[0, 1, 3]], cameras[:2] + cameras[3:]).position[5], points[5]
+    )
+
+
+def test_what_two_cameras_can_not_place_is_nowhere(cameras):
+    one, turned = cameras[0], np.diag([-1.0, 1, -1, 1]) @ cameras[1].camera_from_world  # it looks away
+    away = replace(cameras[1], camera_from_world=turned)
+    homogeneous = projections([one, away]) @ [0.1, 0.0, 1.0, 1.0]
+    pixels = (homogeneous[:, :2] / homogeneous[:, 2:])[:, None]
+    assert np.isnan(triangulate(pixels, np.ones((2, 1)), [one, away]).position).all()
+    assert np.isnan(triangulate(pixels[[0, 0]], np.ones((2, 1)), [one, one]).position).all()
 
 
 def test_the_person_is_who_reprojects_best(body, pose, cameras):
@@ -211,6 +224,10 @@ def test_frames_without_people_are_passed_over_with_a_warning(body, pose, record
     refused = "in frames 0 to 0 no two cameras see enough of the same person\n *they do in frame 1: .* --frames 1:\n"
     with pytest.raises(RecordingError, match=refused):
         StartFromKeypoints().run(open_recording(folder, stop=1), scene)
+    for path in folder.glob("keypoints/*/*.0001.json"):
+        path.write_text(json.dumps({"people": []}))
+    with pytest.raises(RecordingError, match=r"the same person\n *check that"):  # there is no frame to begin at
+        StartFromKeypoints().run(open_recording(folder, stop=2), scene)
 
 
 @pytest.mark.long
