@@ -417,6 +417,9 @@ def test_unreadable_references_say_so(tmp_path: Path) -> None:
     (tmp_path / "a.xlsx").touch()
     with pytest.raises(RecordingError, match=r"can't compare with a \.xlsx"):
         read_reference(tmp_path / "a.xlsx")
+    (tmp_path / "a").touch()
+    with pytest.raises(RecordingError, match="can't compare with a file without ending"):
+        read_reference(tmp_path / "a")
     (tmp_path / "a.csv").write_text("frame,knee_flexion_l\n0,1\n1,x\n")
     with pytest.raises(RecordingError, match=r"a\.csv:3"):
         read_reference(tmp_path / "a.csv")
