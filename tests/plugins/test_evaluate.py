@@ -119,7 +119,7 @@ def test_lag_of_a_curve_that_does_not_move_or_is_too_short_is_unknown(ours: np.n
 
 
 def test_a_lag_needs_a_third_of_what_both_have_at_every_shift() -> None:
-    assert compare.lag(np.sin(FRAMES[:10] - 2), np.sin(FRAMES[:10]), 30.0) == pytest.approx(2, abs=0.1)
+    assert compare.lag(np.sin(FRAMES[:10] - 3), np.sin(FRAMES[:10]), 30.0) == pytest.approx(3, abs=0.1)
     ours = np.where(FRAMES % 20 < 16, np.sin((FRAMES - 2) / 5), np.nan)  # of 16 frames 4
     assert np.isnan(compare.lag(ours, np.sin(FRAMES / 5), 30.0))
 
@@ -423,9 +423,9 @@ def test_unreadable_references_say_so(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("frame,knee_flexion_l\n0,1\n1,x\n")
     with pytest.raises(RecordingError, match=r"a\.csv:3"):
         read_reference(tmp_path / "a.csv")
-    (tmp_path / "b.csv").write_text("knee_flexion_l\n0\n1\n")
+    (tmp_path / "b.CSV").write_text("knee_flexion_l\n0\n1\n")
     with pytest.raises(RecordingError, match="neither a column frame nor time"):
-        read_reference(tmp_path / "b.csv")
+        read_reference(tmp_path / "b.CSV")
 
 
 def test_a_reference_that_can_not_be_read_is_told_before_anything_runs(tmp_path: Path) -> None:
