@@ -150,7 +150,7 @@ def _start(folder: Path, calibration: Path) -> list[Finding]:
         root = first_pose.read_first_pose(pose, ()).position if pose.exists() else None
     except MocapflowError:
         return []
-    if root is None:
+    if root is None or not cameras:
         return []
     found = list(examine_view(cameras, root, "the root joint of the first pose"))
     return [replace(finding, where=str(pose)) for finding in found] or list(examine_size(cameras, root))

@@ -22,6 +22,7 @@ LEAST = 0.5  # frames; less than that can't be mended by taking another frame
 SURE = 3.0  # standard deviations
 SHARED = 0.5  # share of the frames that two cameras must both have at a lag
 CLIP = 3.0  # standard deviations at the best lag, beyond which an error counts no more
+EXACT = 1e-6  # variances that are left at the best lag at least: signals without noise are not infinitely sure
 ALIKE = 5  # frames in a row whose errors are alike: they count as one
 
 
@@ -95,8 +96,6 @@ def best_lag(one: F64, other: F64, reach: int) -> tuple[float, float]:
     most = max(np.isfinite(error).sum() for error in errors)
     enough = np.array([np.isfinite(error).sum() >= max(SHARED * most, 2) for error in errors])
     raw = np.array([np.nanmedian(np.abs(e)) if ok else np.inf for e, ok in zip(errors, enough, strict=True)])
-    if not np.isfinite(raw).any():
-        return 0.0, 0.0
     scale = max(1.4826 * float(raw.min()), 1e-9)
     clipped = [np.minimum((e / scale) ** 2, CLIP**2) for e in errors]
     cost = np.array([np.nanmean(c) if ok else np.inf for c, ok in zip(clipped, enough, strict=True)])
@@ -106,7 +105,8 @@ def best_lag(one: F64, other: F64, reach: int) -> tuple[float, float]:
     before, least, after = cost[at - 1 : at + 2]
     bend = before - 2 * least + after
     independent = np.isfinite(errors[at]).any(axis=1).sum() / ALIKE
-    return float(lags[at] + (before - after) / (2 * bend)), float(bend / (2 * least) * independent)
+    information = bend / (2 * max(least, EXACT)) * independent
+    return float(lags[at] + (before - after) / (2 * bend)), float(information)
 
 
 def _overlapping(one: F64, other: F64, lag: int) -> tuple[F64, F64]:

@@ -111,7 +111,7 @@ def _examine_pictures(folder: Path, lenses: Sequence[Camera], videos: Sequence[V
 def copies(cameras: Sequence[Camera], videos: Sequence[Video]) -> Iterator[Finding]:
     """Yield which cameras have one and the same file."""
     for (a, one), (b, other) in combinations(zip([c.name for c in cameras], videos, strict=True), 2):
-        if one.path.is_file() and other.path.is_file() and cmp(one.path, other.path, shallow=False):
+        if cmp(one.path, other.path, shallow=False):  # folders of images are never alike to it
             hint = "one of them is a copy by mistake: copy it again from its own camera"
             yield warning(f"{a} and {b} have the same video", hint, other.path)
 

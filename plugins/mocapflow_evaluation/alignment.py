@@ -76,7 +76,7 @@ def align(columns: Mapping[str, F64], reference: Reference, longest_lag_s: float
     table = table.reshape(len(shifts), len(names), 3)
     together, ours, theirs = np.moveaxis(table, 2, 0)
     most = np.sqrt(ours * theirs)
-    flipped = (together < TURNED * most) & (most > 0)
+    flipped = together < TURNED * most
     total = np.where(flipped, -together - FLIP * most, together).sum(axis=1)
     size = ours.sum(axis=1) * theirs.sum(axis=1)
     score = np.where(size > 0, total / np.sqrt(np.where(size > 0, size, 1.0)), -np.inf)

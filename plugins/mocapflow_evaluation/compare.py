@@ -121,7 +121,7 @@ def lag(ours: F64, truth: F64, rate: float) -> float:
     and places the minimum by a parabola through the best shift and its neighbours.
     """
     known = np.flatnonzero(np.isfinite(ours) & np.isfinite(truth))
-    if not len(known) or np.ptp(truth[known]) == 0 or np.ptp(ours[known]) == 0:
+    if not len(known) or np.ptp(truth[known]) == 0:
         return np.nan
     ours, truth = (curve[known[0] : known[-1] + 1] for curve in (ours, truth))
     reach = min(round(ANGLE_LAG_S * rate), (len(ours) - 1) // 3)

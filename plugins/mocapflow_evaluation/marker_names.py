@@ -26,6 +26,7 @@ KNOWN: Mapping[str, tuple[str, ...]] = {
     "wrist_medial": ("sWRB", "s_USP", "s.Wrist.Med", "s_mwrist_study"),
 }
 LANDMARKS = tuple(f"{name}_{side}" for name in KNOWN for side in ("l", "r"))
+NOBODY = ""  # subject of a marker that says none
 FILE = "markers.toml"  # beside the reference: landmark = "name of the marker"
 
 
@@ -47,12 +48,14 @@ def landmarks(labels: Sequence[str], folder: Path, others: Sequence[str] = ()) -
     for name, patterns in KNOWN.items():
         for side in ("l", "r"):
             spelled = [_plain(re.sub("^s", side, pattern)) for pattern in patterns]
-            subjects |= {_subject(label) for label in labels if _plain(label) in spelled}
+            whose = {_subject(label) for label in labels if _plain(label) in spelled}
+            subjects |= whose if len(whose) > 1 else whose - {NOBODY}  # it may be anybody's, if nobody else has it
             index = next((plain[each] for each in spelled if each in plain), None)
             if index is not None:
                 found[f"{name}_{side}"] = index
     if len(subjects) > 1 and not told:
-        what = f"there are markers of {len(subjects)} subjects: {', '.join(sorted(subjects))}"
+        named = ", ".join(sorted(name or "one without a name" for name in subjects))
+        what = f"there are markers of {len(subjects)} subjects: {named}"
         hint = 'export one of them, or name the markers of one in this file: knee_lateral_l = "…"'
         raise RecordingError(what, where=str(folder / FILE), hint=hint)
     return told if len(subjects) > 1 else found | told

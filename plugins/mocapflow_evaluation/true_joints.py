@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 
@@ -24,9 +23,9 @@ def beside(table: Path, frames: F64) -> Stick | None:
     if not path.is_file():
         return None
     try:
-        with np.load(path) as content:
+        with path.open("rb") as stream, np.load(stream) as content:
             names, positions = tuple(map(str, content["names"])), np.asarray(content["positions"], np.float64)
-    except (OSError, ValueError, KeyError, BadZipFile) as error:
+    except Exception as error:  # of numpy, zipfile and zlib: what is cut off or no archive may raise any
         raise RecordingError(f"can't be read: {error}", where=str(path), hint="positions (T, J, 3) m, names") from error
     if positions.shape[1:] != (len(names), 3):
         what = f"positions have shape {positions.shape}, expected (T, {len(names)}, 3): there are {len(names)} names"

@@ -8,6 +8,7 @@ import pytest
 from mocapflow.assets import Body
 from mocapflow.data import Pose
 from mocapflow.geometry import angles, kinematics, twists
+from mocapflow.geometry.skeleton import Skeleton, body_directions
 from mocapflow.model import moved
 from mocapflow.scene import Scene
 
@@ -142,6 +143,8 @@ def test_standard_deviation_of_a_straight_limb_is_finite() -> None:
     size = 6 + len(body.twists)
     series = angles.measure(body, np.eye(4)[None], np.zeros((1, size - 6)), 1e-4 * np.eye(size)[None])
     assert series.value[0, 0] < 1e-5
+    rounded = angles.measure(body, np.eye(4)[None], np.zeros((1, size - 6)), -1e-18 * np.eye(size)[None])
+    assert rounded.sd[0, 0] == 0  # a variance that rounding left below zero
     assert 0.5 < series.sd[0, 0] < 2.0  # 0.01 rad about the axes of the knee, and what hip and root add
 
 
@@ -165,6 +168,11 @@ def test_nothing_is_known_of_an_angle_that_no_screw_changes() -> None:
     )
     assert np.isnan([series.sd[0, 0], series.observed[0, 0]]).all()
     assert np.isfinite(series.sd[0, 1:]).all()
+
+
+def test_left_is_level_whatever_the_hips_are() -> None:
+    hips = Skeleton(("hip_l", "hip_r"), np.array([-1, 0], np.int32), np.array([[0.1, 0, 1.0], [-0.1, 0, 0.9]]))
+    np.testing.assert_allclose(body_directions(hips), [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-12)
 
 
 def test_legs_only_body_has_no_elbows() -> None:

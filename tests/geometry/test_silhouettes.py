@@ -73,6 +73,7 @@ def test_every_edge_of_a_closed_mesh_has_two_faces() -> None:
     edges = meshes.edges(faces)
     assert len(edges) == 3 * len(faces) / 2
     assert (edges[:, 2:] >= 0).all()
+    assert meshes.edges(faces[:0]).shape == (0, 4)
 
 
 def test_normals_of_a_sphere_point_outward() -> None:

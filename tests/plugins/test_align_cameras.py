@@ -63,6 +63,15 @@ def test_what_only_two_cameras_see_tells_nothing(body, tmp_path, caplog):
     assert "no keypoint is seen by three cameras" in caplog.text
 
 
+def test_of_two_cameras_both_have_to_see_it(body, tmp_path, caplog):
+    folder = copy_demo(tmp_path / "recording")
+    write(folder, body, walking(body, 1), open_recording(folder).cameras, noise_px=0.7, bystander=())
+    whole = open_recording(folder, stop=1)
+    pair = {name: getattr(whole, name)[:2] for name in ("views", "videos", "keypoint_folders")}
+    assert len(AlignCameras().run(replace(whole, **pair)).cameras) == 2
+    assert "seen by three" not in caplog.text
+
+
 def test_the_first_frame_alone_can_do(body, tmp_path):
     folder = copy_demo(tmp_path / "recording")
     cameras = open_recording(folder).cameras

@@ -33,6 +33,10 @@ def test_a_common_lag_is_found_to_a_tenth_of_a_frame(lag: float, noise: float) -
     assert set(found.signs.values()) == {1}
 
 
+def test_a_lag_is_looked_for_by_a_frame_at_least() -> None:
+    assert aligned(motion(TIME), motion(TIME + 0.3 / 30), TIME, longest=0.001).lag == pytest.approx(0.3, abs=0.1)
+
+
 def test_what_counts_the_other_way_is_found_beside_a_lag() -> None:
     theirs = motion(TIME + 3 / 30)
     theirs["knee_flexion_r"] = -theirs["knee_flexion_r"]

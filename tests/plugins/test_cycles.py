@@ -49,6 +49,7 @@ def test_strikes_of_a_foot_are_half_a_second_apart_or_more() -> None:
     places = walking(1.3)
     assert len(gait_cycles(NAMES, places, RATE / 0.6)) == 8  # every stride, if one takes 0.6 s
     assert min(cycle.last - cycle.first for cycle in gait_cycles(NAMES, places, 3 * RATE)) == 2 * RATE  # not of a third
+    assert gait_cycles(NAMES, places, RATE / 2.6) == []  # nobody walks so slowly
 
 
 @pytest.mark.usefixtures("undrawn")
@@ -93,7 +94,7 @@ def test_every_stride_of_its_own_side_has_a_row() -> None:
     curve = 30 * np.sin(frame / 8)
     known = {"knee_flexion_l": np.where(frame < 90, curve - 2, np.nan), "knee_flexion_r": curve}
     own = {"frame": frame + 7, "knee_flexion_l": curve, "knee_flexion_r": curve}
-    strides = [Cycle("l", 0, 50), Cycle("r", 25, 75), Cycle("l", 50, 99), Cycle("l", 92, 99)]  # none known of the last
+    strides = [Cycle("l", 0, 50), Cycle("r", 25, 75), Cycle("l", 50, 99), Cycle("l", 89, 99)]  # one frame of the last
     rows = cycles.rows(strides, own, known)
     assert [(row["angle"], row["cycle"], row["first_frame"], row["frames"]) for row in rows] == [
         ("knee_flexion_l", 1, 7, 51), ("knee_flexion_l", 2, 57, 40), ("knee_flexion_r", 1, 32, 51),
@@ -142,6 +143,7 @@ def test_cmc_by_the_formula_written_out() -> None:
 
 def test_limits_of_agreement_hold_95_per_cent() -> None:
     error = np.random.default_rng(0).normal(1.0, 2.0, 5000)
+    assert compare.agreement(np.array([0.0, 2.0]))["agreement_high_deg"] == pytest.approx(1 + 1.96 * np.sqrt(2))
     low, high = compare.agreement(error).values()
     assert (low, high) == (pytest.approx(1 - 3.92, abs=0.15), pytest.approx(1 + 3.92, abs=0.15))
     assert np.mean((error > low) & (error < high)) == pytest.approx(0.95, abs=0.01)

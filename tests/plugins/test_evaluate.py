@@ -76,6 +76,15 @@ def test_figures_of_errors_from_none_to_a_hundred() -> None:
     got = row(np.arange(101.0), np.zeros(101))
     names = ("mae_deg", "offset_deg", "p95_deg", "max_deg", "worst_frame", "rom_deg", "rom_reference_deg")
     assert [got[name] for name in names] == pytest.approx([50, 50, 95, 100, 100, 100, 0])
+    assert row(-np.arange(101.0), np.zeros(101))["worst_frame"] == 100
+
+
+def test_what_one_frame_and_curves_that_do_not_move_tell() -> None:
+    got = row(np.array([3.0]), np.array([1.0]))
+    assert got["rms_deg"] == 2 and np.isnan([got["agreement_low_deg"], got["lag_frames"]]).all()
+    assert np.isnan(compare.cmc(np.ones((1, 2, 5))))
+    assert np.isnan(compare.rms_interval(np.ones(3), 0.2)[0])
+    assert compare.rms_interval(np.ones(9), 0.2) == (1, 1)  # a frame in five seconds
 
 
 @pytest.mark.parametrize("delay", [-3.4, -0.5, 0.0, 0.3, 2.75])
@@ -101,8 +110,18 @@ def test_a_gap_in_the_reference_makes_no_lag() -> None:
     assert np.isnan(row(late, truth)["lag_frames"])  # no frame has both at every shift
 
 
-def test_lag_of_a_curve_that_does_not_move_is_unknown() -> None:
-    assert np.isnan(compare.lag(np.ones(60), np.arange(60.0), 30.0))
+@pytest.mark.parametrize(
+    ("ours", "truth"),
+    [(np.ones(60), np.sin(FRAMES[:60])), (np.sin(FRAMES[:60]), np.ones(60)), (FRAMES[:3], FRAMES[:3])],
+)
+def test_lag_of_a_curve_that_does_not_move_or_is_too_short_is_unknown(ours: np.ndarray, truth: np.ndarray) -> None:
+    assert np.isnan(compare.lag(ours, truth, 30.0))
+
+
+def test_a_lag_needs_a_third_of_what_both_have_at_every_shift() -> None:
+    assert compare.lag(np.sin(FRAMES[:10] - 3), np.sin(FRAMES[:10]), 30.0) == pytest.approx(3, abs=0.1)
+    ours = np.where(FRAMES % 20 < 16, np.sin((FRAMES - 2) / 5), np.nan)  # of 16 frames 4
+    assert np.isnan(compare.lag(ours, np.sin(FRAMES / 5), 30.0))
 
 
 def test_a_lag_is_looked_for_in_seconds() -> None:
@@ -143,6 +162,8 @@ def test_coverage_counts_our_own_intervals() -> None:
     error = np.array([NormalDist().inv_cdf((k + 0.5) / 120) for k in range(120)])
     assert row(error, truth)["coverage_90"] == pytest.approx(0.9)
     assert row(3 * error, truth)["coverage_90"] < 0.6
+    unknown = compare.figures(error, truth, np.full(120, np.nan), FRAMES, 30.0)
+    assert np.isnan(unknown["coverage_90"])
 
 
 def columns_only(columns: dict[str, np.ndarray]) -> TrackedMotion:
@@ -318,7 +339,7 @@ def test_a_reference_in_radians_or_out_of_order_is_told(tmp_path: Path) -> None:
     turned = tables.write_columns(tmp_path / "turned.csv", clock | {n: np.radians(v) for n, v in columns.items()})
     assert any(note.endswith("is it in radians?") for note in evaluate_run(tmp_path, turned).notes)
     assert not any("radians" in note for note in evaluate_run(tmp_path, DEMO / "truth" / "angles.csv").notes)
-    tables.write_columns(turned, clock | columns | {"knee_flexion_l": 10 * columns["knee_flexion_l"]})
+    tables.write_columns(turned, clock | columns | {"knee_flexion_l": -10 * columns["knee_flexion_l"]})
     with pytest.raises(RecordingError, match=r"turned\.csv  knee_flexion_l reaches \d+°, more than once around\n"):
         evaluate_run(tmp_path, turned)
     clock["frame"][5] = 4
@@ -396,12 +417,15 @@ def test_unreadable_references_say_so(tmp_path: Path) -> None:
     (tmp_path / "a.xlsx").touch()
     with pytest.raises(RecordingError, match=r"can't compare with a \.xlsx"):
         read_reference(tmp_path / "a.xlsx")
+    (tmp_path / "a").touch()
+    with pytest.raises(RecordingError, match="can't compare with a file without ending"):
+        read_reference(tmp_path / "a")
     (tmp_path / "a.csv").write_text("frame,knee_flexion_l\n0,1\n1,x\n")
     with pytest.raises(RecordingError, match=r"a\.csv:3"):
         read_reference(tmp_path / "a.csv")
-    (tmp_path / "b.csv").write_text("knee_flexion_l\n0\n1\n")
+    (tmp_path / "b.CSV").write_text("knee_flexion_l\n0\n1\n")
     with pytest.raises(RecordingError, match="neither a column frame nor time"):
-        read_reference(tmp_path / "b.csv")
+        read_reference(tmp_path / "b.CSV")
 
 
 def test_a_reference_that_can_not_be_read_is_told_before_anything_runs(tmp_path: Path) -> None:

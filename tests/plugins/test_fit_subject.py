@@ -1,6 +1,7 @@
 """Scaling a body: what each proportion does, and that keypoints give the proportions back."""
 
 import logging
+import shutil
 
 import numpy as np
 import pytest
@@ -8,10 +9,12 @@ from keypoint_recording import DEMO, copy_demo, length, write
 from mocapflow_bodies.template import Template
 from mocapflow_fitting import fit_subject
 from mocapflow_fitting.fit_subject import FitSubject
+from mocapflow_fitting.keypoint_fit import Seen
 from mocapflow_fitting.proportions import PROPORTIONS, fitted, modes_of, scaled
 from mocapflow_fitting.start_from_file import read_pose
 
 from mocapflow.data import Pose
+from mocapflow.errors import RecordingError
 from mocapflow.geometry import angles
 from mocapflow.geometry.kinematics import chain, part_of, skin
 from mocapflow.recordings.recording import open_recording
@@ -142,6 +145,39 @@ def test_the_fitted_body_stands_on_the_floor(body, monkeypatch):
     found = FitSubject().run(open_recording(DEMO), Scene(cameras=(), body=body))
     assert np.ptp(found.vertices[:, 2]) == pytest.approx(1.1 * np.ptp(body.vertices[:, 2]))
     assert found.vertices[:, 2].min() == pytest.approx(body.vertices[:, 2].min(), abs=1e-12)
+
+
+def test_which_trials_count_and_what_they_need(body, cameras, tmp_path, monkeypatch):
+    folder, taken = copy_demo(tmp_path / "recording"), []
+    static = copy_demo(folder / "static")
+    with pytest.raises(RecordingError, match="static/keypoints  there are no 2D keypoints"):
+        FitSubject(trial="static").need(open_recording(folder))
+    write(static, body, poses(body, 1), cameras, bystander=())
+    FitSubject(trial="static").need(open_recording(folder))  # those of the recording do not matter
+    for trial, inputs in (("recording", []), ("auto", [static]), ("static", [static])):
+        assert list(FitSubject(trial=trial).inputs(folder)) == inputs
+    write(folder, body, poses(body, 1), cameras, bystander=())
+    monkeypatch.setattr(fit_subject, "fit", lambda body, frames, *_: (taken.append(len(frames)), ({}, ()))[1])
+    scene = Scene(cameras=cameras, body=body)
+    for trial in ("recording", "auto", "static"):
+        FitSubject(trial=trial).run(open_recording(folder, stop=1), scene)
+    with pytest.raises(RecordingError, match="in the layout coco_17 17"):
+        FitSubject(layout="coco_17").run(open_recording(folder, stop=1), scene)
+    shutil.rmtree(static / "keypoints")
+    FitSubject().run(open_recording(folder, stop=1), scene)
+    assert taken == [1, 2, 1, 1]
+
+
+def test_people_differ_by_the_limbs_that_both_trials_show():
+    names, hip, knee, ankle = ("hip_l", "knee_l", "ankle_l"), [0.0, 0, 1], [0.0, 0, 0.5], [0.0, 0, 0.1]
+    low, nowhere = [0.0, 0, 0.4], [np.nan] * 3
+
+    def frame(*position):
+        return Seen(position=np.array(position), pixels=np.zeros((1, 3, 2)), confidence=np.zeros((1, 3)))
+
+    thigh, longer, shank = frame(hip, knee, nowhere), frame(hip, low, nowhere), frame(nowhere, knee, ankle)
+    assert fit_subject.unlike([thigh], [longer], names) == pytest.approx(np.log(0.6 / 0.5))
+    assert fit_subject.unlike([thigh], [shank], names) == 0
 
 
 def test_unknown_proportions(body):

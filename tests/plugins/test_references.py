@@ -95,7 +95,9 @@ def test_knee_axes_of_both_sides_point_to_the_left(own: TrackedMotion) -> None:
 
 
 def test_names_of_other_laboratories_are_known(tmp_path: Path) -> None:
-    found = landmarks(["L_IAS", "R.Knee.Lat", "L_mknee_study", "r.ASIS_study", "*23", "LKNE", "SACR"], tmp_path)
+    found = landmarks(
+        ["L_IAS", "R.Knee.Lat", "L_mknee_study", "r.ASIS_study", "*23", "Lab:Anna:L-KNE", "SACR"], tmp_path
+    )
     assert found == {"asis_l": 0, "asis_r": 3, "knee_lateral_r": 1, "knee_lateral_l": 5, "knee_medial_l": 2}
 
 
@@ -119,6 +121,12 @@ def test_markers_of_two_people_are_not_mixed(tmp_path: Path) -> None:
     }
     (tmp_path / "markers.toml").write_text('knee_lateral_l = "Bert:LKNE"\n')
     assert landmarks(labels, tmp_path) == {"knee_lateral_l": 1}
+
+
+def test_markers_that_name_no_subject_are_those_of_who_is_named_unless_both_have_one(tmp_path: Path) -> None:
+    assert landmarks(["Anna:LKNE", "LKNM"], tmp_path) == {"knee_lateral_l": 0, "knee_medial_l": 1}
+    with pytest.raises(RecordingError, match="markers of 2 subjects: Anna, one without a name"):
+        landmarks(["Anna:LKNE", "LKNE"], tmp_path)
 
 
 def test_of_two_markers_of_one_name_the_first_is_taken(tmp_path: Path) -> None:
@@ -147,6 +155,13 @@ def test_a_knee_without_its_inner_marker_is_left_out(tmp_path: Path) -> None:
     write_trc(tmp_path / "m.trc", [LABELS[k] for k in kept], opensim_from_world(PLACES[:, kept]), RATE)
     assert {"knee_flexion_r", "knee_angle_r"} <= set(read_reference(tmp_path / "m.trc").curves)
     assert "knee_flexion_l" not in read_reference(tmp_path / "m.trc").curves
+
+
+def test_a_leg_without_markers_of_its_ankle_has_the_angle_of_its_hip_alone(tmp_path: Path) -> None:
+    kept = [k for k, label in enumerate(LABELS) if not label.endswith(("LANK", "LMED"))]
+    write_trc(tmp_path / "m.trc", [LABELS[k] for k in kept], opensim_from_world(PLACES[:, kept]), RATE)
+    found = read_reference(tmp_path / "m.trc").curves
+    assert "hip_flexion_l" in found and {"knee_angle_l", "knee_flexion_l", "ankle_l"}.isdisjoint(found)
 
 
 def test_a_leg_without_markers_of_the_pelvis_has_the_angle_of_its_ankle_alone(tmp_path: Path) -> None:
@@ -400,8 +415,9 @@ def test_another_run_is_a_reference_by_its_angles_alone(tmp_path: Path) -> None:
 
 def test_a_knee_of_opensim_is_compared_as_signed_too(tmp_path: Path) -> None:
     bend = np.array([-4.0, 0.0, 30.0])
-    write_mot(tmp_path / "m.mot", {"knee_angle_l": bend, "ankle_angle_l": bend}, np.arange(3) / 30)
-    assert read_reference(tmp_path / "m.mot").notes[-1].endswith("may be off by a constant: ankle_l")
+    several = {"knee_angle_l": bend, "elbow_flex_l": bend, "ankle_angle_l": bend}
+    write_mot(tmp_path / "m.sto", several, np.arange(3) / 30)
+    assert read_reference(tmp_path / "m.sto").notes[-1].endswith("may be off by a constant: ankle_l")
     write_mot(tmp_path / "m.mot", {"knee_angle_l": bend}, np.arange(3) / 30)
     curves = read_reference(tmp_path / "m.mot").curves
     assert not any("constant" in note for note in read_reference(tmp_path / "m.mot").notes)

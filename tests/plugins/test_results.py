@@ -188,13 +188,18 @@ def test_files_count_frames_and_seconds_of_the_video(scene: Scene, recording: Re
 
 
 def test_plain_makes_json_of_what_a_recipe_may_hold() -> None:
-    odd = {"path": Path("a/b"), 1: (np.int32(2), np.nan), "array": np.eye(2), "none": None}
-    assert runjson.plain(odd) == {"path": "a/b", "1": [2, None], "array": [[1.0, 0.0], [0.0, 1.0]], "none": None}
+    odd = {"path": Path("a/b"), 1: (np.int32(2), np.nan), "set": {2}, "array": np.eye(2), "none": None}
+    array = [[1.0, 0.0], [0.0, 1.0]]
+    assert runjson.plain(odd) == {"path": "a/b", "1": [2, None], "set": [2], "array": array, "none": None}
 
 
 def test_legs_alone_export(recording: Recording, tmp_path: Path) -> None:
     body = ball_body(("pelvis", "hip_l", "knee_l", "ankle_l", "toe_l", "hip_r", "knee_r", "ankle_r", "toe_r"))
-    exported(stepping(body, 4), Scene(cameras=cameras(), body=body), recording, tmp_path)
+    body = replace(body, cut=np.arange(len(body.vertices)) == 0)  # where the trunk was
+    odd = replace(recording, warnings=("odd",))
+    exported(stepping(body, 4), Scene(cameras=cameras(), body=body), odd, tmp_path)
+    told = json.loads((tmp_path / layout.RUN).read_text())
+    assert "height" not in told["body_m"] and "odd" in told["warnings"]
     assert tables.angle_names(read_columns(tmp_path / layout.ANGLES)) == COLUMNS[:6]
 
 

@@ -107,17 +107,20 @@ def test_bad_files(recording, scene, change, message):
 
 
 def test_a_knee_that_bends_the_wrong_way_is_told(recording, scene, caplog):
-    StartFromFile().run(open_recording(recording), scene)
-    assert not caplog.messages
     content = json.loads((recording / "init.json").read_text())
-    content["joint_rotations"]["knee_l"] = [-1.0, 0, 0]
-    (recording / "init.json").write_text(json.dumps(content))
-    StartFromFile().run(open_recording(recording), scene)
+    for bend in (-0.35, -1.0):  # the former is a little beyond what knees can, as by eye
+        assert not caplog.messages
+        content["joint_rotations"]["knee_l"] = [bend, 0, 0]
+        (recording / "init.json").write_text(json.dumps(content))
+        StartFromFile().run(open_recording(recording), scene)
     (message,) = caplog.messages
     assert re.search(r"init.json bends joints as nobody can: knee_l.flexion -5\d° of -\d+° to 1\d\d°; are its", message)
 
 
 def test_missing_file(recording, scene):
+    (recording / "init.json").write_text("{")
+    with pytest.raises(RecordingError, match="not JSON"):
+        StartFromFile().need(open_recording(recording))  # before a run
     (recording / "init.json").unlink()
     with pytest.raises(RecordingError, match="the recording has: .*cameras.toml(.|\n)*start_from_keypoints"):
         StartFromFile().run(open_recording(recording), scene)

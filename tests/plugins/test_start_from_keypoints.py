@@ -2,25 +2,26 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from keypoint_recording import DEMO, NAMES, bystander_of, copy_demo, keypoints, write
 from mocapflow_bodies.template import Template
-from mocapflow_fitting.detections import frames_seen, person_at
+from mocapflow_fitting.detections import frames_seen, names_of, person_at, seen
 from mocapflow_fitting.keypoint_layouts import LAYOUTS, layout_of
 from mocapflow_fitting.landmarks import landmarks
-from mocapflow_fitting.person import find_person
+from mocapflow_fitting.person import Person, find_person
 from mocapflow_fitting.pose_fit import Solution, velocities
 from mocapflow_fitting.start_from_file import read_pose
 from mocapflow_fitting.start_from_keypoints import StartFromKeypoints
-from mocapflow_fitting.triangulate import triangulate
+from mocapflow_fitting.triangulate import Points, triangulate
 from scipy.optimize import least_squares
 
 from mocapflow.data import Pose
 from mocapflow.errors import RecordingError
 from mocapflow.geometry import kinematics, twists
-from mocapflow.geometry.cameras import project
+from mocapflow.geometry.cameras import project, projections
 from mocapflow.model import moved
 from mocapflow.recordings.recording import open_recording
 from mocapflow.scene import Scene
@@ -65,7 +66,9 @@ def test_body_25_and_25b_are_told_apart(body, pose, cameras):
         layout_of([b[:18]])
     assert layout_of([np.zeros((25, 3))], "body_25b") == "body_25b"
     with pytest.raises(RecordingError, match="a person has 25 keypoints, in the layout coco_17 17"):
-        layout_of([b], "coco_17")
+        layout_of([b[:17], b], "coco_17")
+    with pytest.raises(RecordingError, match="no detections: the layout of the keypoints is not known"):
+        layout_of([])
 
 
 def test_triangulation_is_exact_and_outvotes_a_camera(cameras):
@@ -78,6 +81,19 @@ def test_triangulation_is_exact_and_outvotes_a_camera(cameras):
     assert np.median(found.error[2]) > 50
     seen[1:, 3] = 0.0
     assert np.isnan(triangulate(pixels, seen, cameras).position[3]).all()
+    pixels[0, 5] = np.nan
+    np.testing.assert_allclose(
+        triangulate(pixels[[0, 1, 3]], seen[[0, 1, 3]], cameras[:2] + cameras[3:]).position[5], points[5]
+    )
+
+
+def test_what_two_cameras_can_not_place_is_nowhere(cameras):
+    one, turned = cameras[0], np.diag([-1.0, 1, -1, 1]) @ cameras[1].camera_from_world  # it looks away
+    away = replace(cameras[1], camera_from_world=turned)
+    homogeneous = projections([one, away]) @ [0.1, 0.0, 1.0, 1.0]
+    pixels = (homogeneous[:, :2] / homogeneous[:, 2:])[:, None]
+    assert np.isnan(triangulate(pixels, np.ones((2, 1)), [one, away]).position).all()
+    assert np.isnan(triangulate(pixels[[0, 0]], np.ones((2, 1)), [one, one]).position).all()
 
 
 def test_the_person_is_who_reprojects_best(body, pose, cameras):
@@ -107,6 +123,38 @@ def test_a_frame_needs_eight_keypoints_that_two_cameras_see(body, pose, cameras,
         path.parent.mkdir(parents=True)
         path.write_text(json.dumps({"people": [person]}))
     assert (person_at(open_recording(folder), 0, cameras) is not None) == usable
+
+
+def test_keypoints_of_one_camera_or_of_a_layout_that_nothing_tells_are_refused(body, pose, cameras, tmp_path):
+    folder = copy_demo(tmp_path / "recording")
+    write(folder, body, [pose], cameras[:1], bystander=())
+    with pytest.raises(RecordingError, match="there are no 2D keypoints of two cameras or more"):
+        StartFromKeypoints().need(open_recording(folder))
+    hardly = SimpleNamespace(folder=folder, people=lambda index: (np.zeros((1, 25, 3)),))
+    with pytest.raises(RecordingError, match="25 keypoints may be BODY_25 or BODY_25B(.|\n)*setting `layout`"):
+        names_of(hardly, [0], None)
+
+
+def test_landmarks_that_a_layout_lacks_are_not_seen():
+    points = Points(position=np.ones((1, 3)), error=np.zeros((2, 1)), weight=np.ones((2, 1)))
+    person = Person(pixels=np.ones((2, 1, 2)), confidence=np.ones((2, 1)), points=points, support=2.0)
+    found = seen(person, ("hip_l",), ("knee_l", "hip_l"))
+    np.testing.assert_array_equal(found.position, [[np.nan] * 3, [1, 1, 1]])
+    assert found.confidence.tolist() == [[0, 1], [0, 1]]
+
+
+@pytest.mark.parametrize("lacking", ["hip_l", "neck", "head", "ankle_l"])
+def test_a_body_has_the_landmarks_that_its_joints_and_its_skin_tell(body, lacking):
+    other = replace(body, joint_names=tuple("x" if name == lacking else name for name in body.joint_names))
+    found = landmarks(other)
+    assert lacking not in found.names and ("nose" in found.names) == (lacking != "head")
+    shoulder = found.body.vertices[found.names.index("shoulder_l")]
+    raised = shoulder[2] - body.positions[body.joint("shoulder_l"), 2]
+    assert (raised == 0) == (lacking in ("hip_l", "neck"))  # which say by how much
+    few = landmarks(kinematics.part_of(other, np.arange(9))).names
+    assert {"shoulder_l", "elbow_l"} <= set(few) and {"nose", "heel_r"}.isdisjoint(few)
+    strange = tuple(f"joint {number}" for number in range(len(body.joint_names)))
+    assert landmarks(replace(body, joint_names=strange)).names == ()
 
 
 def test_landmarks_lie_where_their_names_say(body):
@@ -150,6 +198,11 @@ def test_start_finds_the_pose(body, pose, recording):
     assert (start.pose.angles > body.limits[:, 0] - 0.02).all() and (start.pose.angles < body.limits[:, 1] + 0.02).all()
 
 
+def test_a_layout_that_is_asked_for_is_taken(body, recording):
+    with pytest.raises(RecordingError, match="in the layout coco_17 17"):
+        StartFromKeypoints(layout="coco_17").run(recording, Scene(cameras=recording.cameras, body=body))
+
+
 def test_a_turned_person_is_found_too(body, pose, cameras, tmp_path):
     turned = twists.exp(np.array([0, 0, 2.5, 0, 0, 0])) @ pose.root
     folder = copy_demo(tmp_path / "recording")
@@ -171,6 +224,10 @@ def test_frames_without_people_are_passed_over_with_a_warning(body, pose, record
     refused = "in frames 0 to 0 no two cameras see enough of the same person\n *they do in frame 1: .* --frames 1:\n"
     with pytest.raises(RecordingError, match=refused):
         StartFromKeypoints().run(open_recording(folder, stop=1), scene)
+    for path in folder.glob("keypoints/*/*.0001.json"):
+        path.write_text(json.dumps({"people": []}))
+    with pytest.raises(RecordingError, match=r"the same person\n *check that"):  # there is no frame to begin at
+        StartFromKeypoints().run(open_recording(folder, stop=2), scene)
 
 
 @pytest.mark.long

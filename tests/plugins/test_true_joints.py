@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mocapflow_evaluation import tracked_motion
+from mocapflow_evaluation import tracked_motion, true_joints
 from mocapflow_evaluation.evaluate import evaluate
+from mocapflow_evaluation.references import read_reference
 from mocapflow_evaluation.tracked_motion import TrackedMotion
 from mocapflow_export import layout, tables
 from results_scene import demo_scene, stepping
@@ -59,6 +60,12 @@ def test_rows_are_those_of_the_frames(own: TrackedMotion, tmp_path: Path) -> Non
     assert max(distances(tmp_path / "run").values()) < 0.01
 
 
+def test_a_table_by_time_has_no_centres(own: TrackedMotion, tmp_path: Path) -> None:
+    path = write_truth(tmp_path, own, own.stick.places)
+    path.write_text("time,knee_flexion_l\n0,1\n0.04,2\n")
+    assert read_reference(path).joints is None
+
+
 @pytest.mark.usefixtures("undrawn")
 def test_centres_of_other_names_are_told(own: TrackedMotion, tmp_path: Path) -> None:
     names = tuple(f"joint {number}" for number in range(len(own.stick.names)))
@@ -68,14 +75,22 @@ def test_centres_of_other_names_are_told(own: TrackedMotion, tmp_path: Path) -> 
 
 def test_centres_that_can_not_be_read_are_told(own: TrackedMotion, tmp_path: Path) -> None:
     path = write_truth(tmp_path, own, own.stick.places[:20])
+    for frame in (-1.0, 0.5):
+        with pytest.raises(RecordingError, match=rf"frame {frame:g} is not among its 20 rows"):
+            true_joints.beside(path, np.array([frame]))
     with pytest.raises(RecordingError, match=r"joints\.npz  frame 20 is not among its 20 rows(.|\n)*row i is frame i"):
         evaluate(own, path, tmp_path)
     write_truth(tmp_path, own, own.stick.places[:, :3])
     with pytest.raises(RecordingError, match=r"shape \(30, 3, 3\), expected \(T, 19, 3\)"):
         evaluate(own, path, tmp_path)
+    write_truth(tmp_path, own, own.stick.places[..., :2])
+    with pytest.raises(RecordingError, match=r"shape \(30, 19, 2\), expected"):
+        evaluate(own, path, tmp_path)
     np.savez(tmp_path / "joints.npz", places=own.stick.places)
     with pytest.raises(RecordingError, match=r"can't be read: .*names(.|\n)*positions \(T, J, 3\) m, names"):
         evaluate(own, path, tmp_path)
-    (tmp_path / "joints.npz").write_text("no archive")
-    with pytest.raises(RecordingError, match=r"joints\.npz  can't be read"):
-        evaluate(own, path, tmp_path)
+    whole = (tmp_path / "joints.npz").read_bytes()
+    for content in (b"no archive", b"", whole[:-9], whole.replace(b"NUMPY", b"numpy", 1)):
+        (tmp_path / "joints.npz").write_bytes(content)
+        with pytest.raises(RecordingError, match=r"joints\.npz  can't be read"):
+            evaluate(own, path, tmp_path)

@@ -1,6 +1,7 @@
 """The doctor finds each fault, says what to do, and finds nothing on a good recording."""
 
 import json
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +16,9 @@ from mocapflow.geometry.cameras import magnification
 from mocapflow.io.cameras import rigs
 from mocapflow.io.cameras.pose2sim import write_cameras
 from mocapflow.recordings.doctor import examine, examine_timing
+from mocapflow.recordings.recording import open_recording
 from tests.fixtures.recordings import avi_frames, look_at, ring, write_recording, write_video
+from tests.io.cameras.test_calibration import write_easymocap
 
 DEMO = Path(__file__).parents[2] / "examples" / "data"
 
@@ -200,6 +203,7 @@ def test_cameras_that_face_each_other(tmp_path):
     pair = [look_at(n, np.array([x, 0.1, 1.5]), target=(0, 0, 1.5)) for n, x in (("cam01", 4.0), ("cam02", -4.0))]
     write_recording(tmp_path, frames=2, cameras=pair)
     assert any(m.startswith("cam01 and cam02 face each other (17") for m in messages(tmp_path, "note"))
+    assert open_recording(tmp_path).warnings == ()
 
 
 def test_missing_camera_and_unequal_lengths_and_sizes(tmp_path):
@@ -354,13 +358,16 @@ def test_a_garment_without_a_scan_is_tried_on_the_template(good):
     assert "body.height_m" in finding.hint
 
 
-def test_a_garment_that_raises_what_nobody_expects(good, monkeypatch):
+@pytest.mark.parametrize(
+    ("problem", "said"), [(ZeroDivisionError("no strands"), "Zero.*: no strands"), (SystemExit(3), ".* status 3")]
+)
+def test_a_garment_that_raises_what_nobody_expects(good, monkeypatch, problem, said):
     def broken(self, body):
-        raise ZeroDivisionError("no strands")
+        raise problem
 
     monkeypatch.setattr(Shorts, "sew", broken)
     (finding,) = examine(good)
-    assert (finding.severity, finding.message) == ("error", "shorts can't be sewn: ZeroDivisionError: no strands")
+    assert finding.severity == "error" and re.fullmatch(f"shorts can't be sewn: {said}", finding.message)
 
 
 def test_a_garment_that_a_run_would_refuse(good, monkeypatch):
@@ -464,6 +471,14 @@ def test_a_first_pose_that_cameras_do_not_see(good):
     assert "cam02 does not see the root joint of the first pose" in messages(good, "warning")
 
 
+def test_cameras_whose_size_is_not_known_are_not_said_to_see_nothing(good):
+    (good / "cameras.toml").unlink()
+    write_easymocap(good, ring(), sizes=False)
+    assert examine(good) == []  # the videos tell it
+    (good / "videos" / "cam02.mp4").unlink()
+    assert not messages(good, "warning") and len(errors(good)) == 1
+
+
 def test_a_person_larger_in_the_images_than_is_of_use(good, monkeypatch):
     assert messages(good, "note") == []
     shown = [magnification(camera, np.array([0, 0, 1.0])) for camera in ring()]
@@ -516,3 +531,6 @@ def test_the_static_trial_is_examined_too(tmp_path):
     write_recording(tmp_path, frames=3)
     write_recording(tmp_path / "static", frames=3, lengths={"cam02": 2})
     assert errors(tmp_path) == ["static trial: the videos differ in length"]
+    assert not any("static trial" in said for said in messages(tmp_path, "note"))  # that there is none
+    (tmp_path / "static" / "cameras.toml").write_text("")  # its own comes before that of the recording
+    assert errors(tmp_path) == ["static trial: the file holds no camera"]

@@ -27,6 +27,8 @@ def said(folder):
 
 def test_a_good_recording_has_nothing_odd_nor_one_without_plates_or_pose(clip):
     assert said(clip) == []
+    (clip / "recording.json").write_text('{"late_frames": {"cam02": -1}}')  # it has no first frame
+    assert said(clip) == []
     (clip / "init.json").unlink()
     assert said(clip) == []
     shutil.rmtree(clip / "background")

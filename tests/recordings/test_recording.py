@@ -62,6 +62,7 @@ def test_a_part_and_going_on_in_it(tmp_path):
     assert [frame.index for frame in recording.frames(since=9)] == [11, 14, 17]
     assert [frame.index for frame in recording.frames(since=0)] == [2, 5, 8, 11, 14, 17]
     assert list(recording.frames(since=18)) == []
+    assert [list(recording.until(last).indices) for last in (7, 8, 99)] == [[2, 5], [2, 5, 8], [2, 5, 8, 11, 14, 17]]
     assert number_of(recording.frame(7).images[1]) == 7
     whole = {frame.index: frame.images for frame in recording.frames()}
     for frame in recording.frames(since=11):  # resumed: the same pixels
@@ -127,6 +128,9 @@ def test_static_trial_shares_the_calibration(tmp_path):
     static = open_recording(tmp_path, scale=0.5).static()
     assert static.length == 2
     assert [camera.size.tolist() for camera in static.cameras] == [[32, 24]] * 3
+    assert static.content["cameras.toml"] == tmp_path / "cameras.toml"
+    (tmp_path / "static" / "cameras.toml").write_bytes((tmp_path / "cameras.toml").read_bytes())
+    assert open_recording(tmp_path).static().calibration == tmp_path / "static" / "cameras.toml"  # it has its own
 
 
 def test_missing_camera(tmp_path):
@@ -428,9 +432,11 @@ def test_a_stated_frame_rate_does_not_hide_that_the_videos_differ(tmp_path):
     write_recording(tmp_path, frames=4)
     write_video(tmp_path / "videos" / "cam02.mp4", 4, rate=50.0)
     with (tmp_path / "cameras.toml").open("a") as file:
-        file.write("[metadata]\nframe_rate = 25\n")
-    (said,) = open_recording(tmp_path).warnings
+        file.write("[metadata]\nframe_rate = 1\n")  # as slow as it may be
+    found = open_recording(tmp_path)
+    (said,) = found.warnings
     assert said.startswith("the videos differ in frame rate (cam01: 25 per second, cam02: 50 per second, cam03: 25")
+    assert said.endswith("1 is taken for all") and found.frame_rate == 1
 
 
 @pytest.mark.parametrize("stated", ["", "[metadata]\nframe_rate = 25\n"])
@@ -462,7 +468,9 @@ def test_a_frame_rate_that_varies(tmp_path):
         file.mux(stream.encode(None))
     with (tmp_path / "cameras.toml").open("a") as file:
         file.write("[metadata]\nframe_rate = 250\n")  # slow motion
-    said = open_recording(tmp_path).warnings
+    found = open_recording(tmp_path)
+    said = found.warnings
+    assert found.frame_rate == 250
     assert said[0].startswith("cam02: its frame rate varies, which puts frames up to ")
     assert "ffmpeg -i IN -vf fps=25 " in said[0]
     assert said[0] in [finding.message for finding in examine(tmp_path)]

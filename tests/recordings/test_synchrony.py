@@ -90,6 +90,31 @@ def test_a_lag_between_signals_is_found_between_frames(lag):
     assert synchrony.best_lag(np.ones((80, 1)), np.ones((80, 1)), 10)[1] == 0  # nothing moves
 
 
+def test_a_lag_is_unknown_where_too_little_is_seen_of_it_by_both():
+    signal = np.sin(np.arange(76)[:, None] / [7, 11]) + 0.02 * np.random.default_rng(0).normal(size=(76, 2))
+    one, other = signal.copy(), signal.copy()
+    one[40:], other[:36] = np.nan, np.nan  # 4 frames of the same moments; as if 10 late 14
+    assert synchrony.best_lag(one, other, 10) == (0, 0)
+    assert synchrony.best_lag(one, np.full_like(other, np.nan), 10) == (0, 0)
+
+
+@pytest.mark.parametrize(("late", "frames"), [([0, 3], [0, 3]), ([3, 0], [3, 0]), ([0, 0, 3, 3], [0, 0, 3, 3])])
+def test_of_two_halves_the_earlier_one_is_punctual(late, frames):
+    moments, random = np.arange(80)[:, None], np.random.default_rng(0)
+    seen = [np.sin((moments - by) / [7, 11]) + 0.01 * random.normal(size=(80, 2)) for by in late]
+    found = synchrony.lateness([str(k) for k in range(len(late))], lambda a, b: (seen[a], seen[b]), 10)
+    assert [each.frames for each in found] == pytest.approx(frames, abs=0.1)
+
+
+def test_signals_without_noise_are_surely_not_late_and_leave_the_others_as_they_are():
+    signal = np.sin(np.arange(80)[:, None] / [7, 11])
+    noisy = signal + 0.02 * np.random.default_rng(0).normal(size=signal.shape)
+    seen = [signal, signal, noisy]
+    found = synchrony.lateness(NAMES, lambda one, other: (seen[one], seen[other]), 10)
+    assert [each.frames for each in found] == pytest.approx([0, 0, 0], abs=0.1)
+    assert 0 < found[0].sd < found[2].sd < 0.1
+
+
 def test_one_wild_error_does_not_move_the_lag():
     moments = np.arange(80)[:, None]
     one, other = np.sin(moments / [7, 11]), np.sin(moments / [7, 11]) + 0.01 * np.cos(moments)
@@ -153,6 +178,8 @@ def test_keypoints_tell_too(tmp_path):
     assert signals(0, 1)[0].shape == (FRAMES, 3)
     late = {m.camera: m.frames for m in synchrony.measure(open_recording(folder))}
     assert late == pytest.approx({"cam01": 0, "cam02": 0, "cam03": 3}, abs=0.1)
+    part = {m.camera: m.frames for m in synchrony.measure(open_recording(folder, stop=14))}  # less than half a second
+    assert part == pytest.approx(late, abs=0.1)
 
 
 def test_outlines_tell_where_keypoints_are_sparse(tmp_path):
@@ -181,6 +208,7 @@ def test_what_is_found_comes_on_top_of_what_is_known(tmp_path, monkeypatch, befo
         synchrony.Lateness(camera=name, frames=frames, sd=0.5) for name, frames in zip(NAMES, found, strict=True)
     ]
     monkeypatch.setattr(doctor, "_measured", lambda folder: measured)
+    assert examine_timing(folder)[-1].message == f"cam02 is 4.0 frames {'late' if found[1] > 0 else 'early'}"
     assert examine_timing(folder, write=True)[-1].message.startswith("written")
     assert json.loads((folder / "recording.json").read_text())["late_frames"] == after
     open_recording(folder)  # and every run takes it
@@ -191,6 +219,8 @@ def test_frames_are_late_by_whole_ones_and_written_to_a_hundredth(tmp_path):
     said = json.loads((tmp_path / "recording.json").read_text())
     assert said == {"late_frames": {"cam01": 2.84, "cam02": -3.46, "cam03": 0.44}}
     assert late_frames(tmp_path, [*NAMES, "cam04"]) == (3, -3, 0, 0)
+    with pytest.raises(RecordingError, match=r"nowhere/recording\.json  can't be written"):
+        write_late_frames(tmp_path / "nowhere", {"cam01": 3})
 
 
 @pytest.mark.parametrize(
@@ -200,6 +230,7 @@ def test_frames_are_late_by_whole_ones_and_written_to_a_hundredth(tmp_path):
         ("{}", "does not say how late the cameras are: KeyError"),
         ('{"late": {}}', "recording.json:1:3  unknown setting 'late'"),
         ('{"late_frames": {"cam01": "much"}}', "does not say how late the cameras are: ValueError"),
+        ('{"late_frames": {"cam01": 1e999}}', "does not say how late the cameras are: OverflowError"),
         ('{"late_frames": {"cam01": true}}', "does not say how late the cameras are: TypeError"),
         ('{"late_frames": {"cam1": 3}}', "there is no camera 'cam1'"),
         ('{"late_frames": {}, "late_frame": {"cam01": 3}}', "unknown setting 'late_frame'"),
@@ -249,3 +280,5 @@ def test_a_camera_that_shares_nothing_with_the_others_is_not_called_punctual():
     assert len(synchrony.lateness(["a", "b", "c"], signals, 5)) == 3
     with pytest.raises(RecordingError, match="too little of the same person"):
         synchrony.lateness(["a", "b", "c", "d"], signals, 5)
+    with pytest.raises(RecordingError, match="too little of the same person"):
+        synchrony.lateness(["a", "b"], lambda *_: (moving, np.full_like(moving, np.nan)), 5)

@@ -76,8 +76,6 @@ def calibration_files(path: Path) -> tuple[Path, ...]:
 
 def _check(camera: Camera, path: Path) -> None:
     k, rotation = camera.intrinsics, camera.camera_from_world[:3, :3]
-    if (camera.size < 0).any():
-        raise bad(camera.name, path, f"has the size {camera.size[0]} x {camera.size[1]}")
     if not (k[0, 0] > 0 and k[1, 1] > 0 and k[2, 2] == 1) or k[1, 0] or k[2, 0] or k[2, 1]:
         raise bad(camera.name, path, "has no camera matrix", "expected [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] in pixels")
     if abs(k[0, 1]) > SKEW and bends(camera):

@@ -34,8 +34,11 @@ def make_camera(
     """Return a camera from the numbers of a file; `rotation` is a Rodrigues vector or a 3 x 3 matrix.
 
     Raises:
-        RecordingError: an array has the wrong length, or the rotation is none, or in degrees.
+        RecordingError: an array has the wrong length, the size is none, or the rotation is none, or in degrees.
     """
+    pixels = _numbers(size, (2,), "size", name, where)
+    if not ((pixels >= 0) & (pixels < np.iinfo(np.int32).max)).all():
+        raise bad(name, where, f"has the size {pixels[0]:g} x {pixels[1]:g}")
     motion = np.eye(4)
     motion[:3, 3] = _numbers(translation, (3,), "translation", name, where)
     if _count(rotation) == 9:
@@ -49,7 +52,7 @@ def make_camera(
     coefficients = _coefficients(distortion, fisheye, name, where)
     return Camera(
         name=composed(name),
-        size=_numbers(size, (2,), "size", name, where).astype(np.int32),
+        size=pixels.astype(np.int32),
         intrinsics=_numbers(intrinsics, (3, 3), "matrix", name, where),
         distortion=np.pad(coefficients, (0, 5 - len(coefficients))),
         camera_from_world=motion,

@@ -40,7 +40,7 @@ def _camera(name: str, inner: Any, outer: Any, folder: Path) -> Camera:
     translation = _matrix(outer.getNode(f"T_{name}"), f"T_{name}", name, extri)
     matrix = _matrix(inner.getNode(f"K_{name}"), f"K_{name}", name, intri)
     distortion = _matrix(inner.getNode(f"dist_{name}"), f"dist_{name}", name, intri)
-    size = [inner.getNode(f"{axis}_{name}").real() for axis in "WH"]
+    size = [_pixels(inner.getNode(f"{axis}_{name}"), f"{axis}_{name}", name, intri) for axis in "WH"]
     return make_camera(name, size, matrix, distortion, rotation, translation, where=intri)
 
 
@@ -57,6 +57,13 @@ def _open(path: Path) -> Any:
     if not storage.isOpened() or not storage.root().isMap():
         raise RecordingError("not an OpenCV YAML file", where=str(path))
     return storage
+
+
+def _pixels(node: Any, key: str, name: str, path: Path) -> float:
+    """Return how many pixels a size has; 0 where it is not there. OpenCV would read a text as the largest number."""
+    if not (node.empty() or node.isInt() or node.isReal()):
+        raise RecordingError(f"camera '{name}' has no number in {key}", where=place(path, key), hint="it is in pixels")
+    return float(node.real())
 
 
 def _matrix(node: Any, key: str, name: str, path: Path) -> F64:

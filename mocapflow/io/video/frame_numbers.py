@@ -40,7 +40,7 @@ def _undelayed(times: F64, period: float) -> F64:
 
 def unevenness(times: F64, numbers: I32) -> float:
     """Return by how many frames a picture at its time (N,) is off an even rhythm of the numbers (N,), at most."""
-    if len(times) < 3 or np.ptp(numbers) == 0 or np.ptp(times) == 0:
+    if len(times) < 3 or np.ptp(times) == 0:
         return 0.0
     period, start = np.polyfit(numbers, times, 1)
     return float(np.abs((times - start) / period - numbers).max())

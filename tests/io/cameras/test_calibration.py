@@ -126,6 +126,15 @@ def test_easymocap_without_sizes(tmp_path):
     assert not read_cameras(tmp_path)[0].size.any()
 
 
+@pytest.mark.parametrize("width", ['"64"', "[ 64, 48 ]"])
+def test_easymocap_whose_size_is_no_number(tmp_path, width):
+    write_easymocap(tmp_path, ring())
+    path = tmp_path / "intri.yml"
+    path.write_text(path.read_text().replace("W_cam01: 64", f"W_cam01: {width}"))
+    with pytest.raises(RecordingError, match=r"intri\.yml:\d+:1  camera 'cam01' has no number in W_cam01"):
+        read_cameras(tmp_path)
+
+
 def test_easymocap_needs_both_files(tmp_path):
     write_easymocap(tmp_path, ring())
     (tmp_path / "extri.yml").unlink()
@@ -183,6 +192,7 @@ def test_nan(tmp_path):
         ("size = [64, 48]", "size = [64]", "has 1 numbers in size; expected 2"),
         ("size = [64, 48]", f"size = [1{'0' * 400}, 48]", "has no numbers in size"),
         ("size = [64, 48]", "size = [-64, 48]", "has the size -64 x 48"),
+        ("size = [64, 48]", "size = [64, 1e30]", r"has the size 64 x 1e\+30"),
         ("size = [64, 48]", 'size = ["big", 48]', r"has no numbers in size: \['big', 48\]"),
         ("rotation = [", "rotation = [[1.0, 0.0], [0.0, 1.0, 0.0]] # [", "has no numbers in rotation"),
         ("distortions = [0.0, 0.0, 0.0, 0.0]", "distortions = [[0.0], 0.0]", "has no numbers in distortions"),

@@ -18,6 +18,9 @@ def test_gaps_in_the_time_stamps_are_lost_frames():
         assert number_frames(np.round(kept * 1000 / rate)).tolist() == kept.tolist()
     late = np.array([0, 1, 2.6, 3, 4.7, 5, 6, 9, 10, 12.6, 13, 14])  # 7, 8 and 11 are lost
     assert number_frames(late).tolist() == [0, 1, 2, 3, 4, 5, 6, 9, 10, 12, 13, 14]
+    held = np.arange(30.0)
+    held[3:8] = [7.5, 7.6, 7.7, 7.8, 7.9]  # five that come at once, before the next is due
+    assert number_frames(held).tolist() == list(range(30))
     assert number_frames(np.zeros(4)).tolist() == [0, 1, 2, 3]
     assert number_frames(np.zeros(1)).tolist() == [0]
     assert number_frames(np.array([0.0, 1, 4])).tolist() == [0, 1, 4]
@@ -29,4 +32,4 @@ def test_how_uneven_frames_come():
     assert unevenness(times, number_frames(times)) < 1e-6
     slower = np.append(np.arange(40), 40 + 1.25 * np.arange(20))  # as of a phone in the dark
     assert unevenness(slower, number_frames(slower)) == pytest.approx(2, abs=0.5)
-    assert unevenness(np.zeros(1), np.zeros(1, np.int32)) == unevenness(np.zeros(5), np.zeros(5, np.int32)) == 0
+    assert unevenness(np.zeros(1), np.zeros(1, np.int32)) == unevenness(np.zeros(5), number_frames(np.zeros(5))) == 0

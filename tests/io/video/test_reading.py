@@ -58,9 +58,15 @@ def test_players_do_not_show_what_is_cut_off_without_encoding_again(tmp_path):
     video = open_video(write_reordered(tmp_path / "a.mp4", 30, hidden=5))
     assert (video.frames, video.declared, video.frame_rate) == (25, 25, 25.0)
     assert numbers(video) == list(range(5, 30))
+    assert count_from_first([video])[0].first == 0
+    with pytest.raises(RecordingError, match="this video can't be decoded"):
+        open_video(write_reordered(tmp_path / "b.mp4", 12, hidden=12))
 
 
-@pytest.mark.parametrize(("matrix", "turns"), [((0, 1, -1, 0), 1), ((-1, 0, 0, -1), 2), ((0, -1, 1, 0), 3)])
+@pytest.mark.parametrize(
+    ("matrix", "turns"),
+    [((0, 1, -1, 0), 1), ((-1, 0, 0, -1), 2), ((0, -1, 1, 0), 3), ((-1, 1, -1, -1), 0), ((-1, -1, 1, -1), 0)],
+)
 def test_pictures_are_turned_as_players_do(tmp_path, matrix, turns):
     upright = write_video(tmp_path / "a.mp4", 6)
     content = bytearray(upright.read_bytes())
@@ -115,6 +121,8 @@ def test_a_late_video_ends_earlier_and_is_not_broken(tmp_path):
     video = replace(open_video(write_video(tmp_path / "a.avi", FRAMES)), late=3)
     rows = list(read_frames(video, range(FRAMES)))
     assert [reason for image, reason in rows if image is None] == ["the video ends earlier"] * 3
+    early = list(read_frames(replace(video, late=-2), range(4)))
+    assert [reason for _, reason in early] == ["the video starts later"] * 2 + [""] * 2
 
 
 @pytest.mark.parametrize("count", [1, 2])
@@ -123,6 +131,10 @@ def test_a_video_of_hardly_any_pictures(tmp_path, count, ending):
     video = open_video(write_video(tmp_path / f"a.{ending}", count))
     assert (video.frames, video.declared, video.frame_rate, video.uneven) == (count, count, 25.0, 0.0)
     assert [number_of(image) for image, _ in read_frames(video, range(count))] == list(range(count))
+
+
+def test_a_frame_rate_that_no_camera_has_says_nothing(tmp_path):
+    assert open_video(write_video(tmp_path / "a.mov", 3, rate=2e5, codec="MJPG")).frame_rate == 0
 
 
 def test_frames_that_come_unevenly_are_told_from_a_file(tmp_path):
@@ -198,6 +210,7 @@ def test_a_folder_of_images(tmp_path):
         cv2.imwrite(str(tmp_path / f"{number:06d}.png"), picture(number))
     (tmp_path / "000004.png").write_bytes(b"no image")
     (tmp_path / "notes.txt").write_text("12")
+    (tmp_path / "cover.png").touch()
     video = open_video(tmp_path)
     assert (video.frames, video.frame_rate) == (5, 0.0)
     assert numbers(video) == [0, 1, None, 3, None]
@@ -211,6 +224,11 @@ def test_two_images_of_one_frame_are_told_apart_by_nobody(tmp_path):
         cv2.imwrite(str(tmp_path / f"frame_{number:06d}_cam1.png"), picture(number))
     with pytest.raises(RecordingError, match="two files for frame 1: frame_000000_cam1.png, frame_000001_cam1.png\n"):
         open_video(tmp_path)
+
+
+def test_a_single_image_may_be_of_a_late_frame(tmp_path):
+    cv2.imwrite(str(tmp_path / "005999.png"), picture(1))
+    assert open_video(tmp_path).frames == 6000
 
 
 @pytest.mark.parametrize("first", [20260131, 1700000000000])
@@ -227,8 +245,9 @@ def test_twelve_bits_in_sixteen(tmp_path):
     cv2.imwrite(str(tmp_path / "000000.png"), picture(1).astype(np.uint16) * 16)
     with pytest.raises(RecordingError, match=r"000000\.png  a picture of 16 bits .* reaches 3520 of 65535.*\n.*8 bits"):
         open_video(tmp_path)
-    cv2.imwrite(str(tmp_path / "000000.png"), picture(1).astype(np.uint16) * 257)
-    assert numbers(open_video(tmp_path)) == [1]
+    for number in (1, 0):
+        cv2.imwrite(str(tmp_path / "000000.png"), (picture(number) * (number > 0)).astype(np.uint16) * 257)
+        assert numbers(open_video(tmp_path)) == [number]  # also of a room in the dark
 
 
 def test_what_is_no_video(tmp_path):
