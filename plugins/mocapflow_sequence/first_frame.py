@@ -53,8 +53,8 @@ class Evidence(NamedTuple):
 def empty_scene(pictures: U8, first: U8, body: Surface, camera: Camera) -> Learnt:
     """Return one view of the empty scene: of the dominant colours of each pixel the first that is the room's.
 
-    Away from the body in its start pose, the first frame shows the room. Near it a colour is the room's if it is more
-    common beside the body than on it.
+    Away from the body in its start pose, the first frame shows the room, but where a limb was that the pose has
+    elsewhere. Near it a colour is the room's if it is more common beside the body than on it.
 
     Args:
         pictures: (N, H, W, 3) BGR, from all over the recording.
@@ -70,6 +70,8 @@ def empty_scene(pictures: U8, first: U8, body: Surface, camera: Camera) -> Learn
     beside = far & (away_m < AROUND_M)
     for _ in range(ROUNDS):
         rooms, persons = more_common(now[beside], now[person]), more_common(now[person], now[beside])
+        far = far & ~_left_behind(colours[0], shown, rooms)
+        beside = beside & far
         evidence = Evidence(shown.mean, far, rooms, persons)
         learnt = chosen((*colours, shown), evidence)
         person = ~far & learnt.known & ~alike(shown, learnt.mean) & ~shaded(shown.mean, learnt.mean)
@@ -97,6 +99,11 @@ def lit(learnt: Learnt, pictures: U8, evidence: Evidence, usual: F32, floor: Boo
         _take(found, colour, brighter & shaded(colour.mean, dim.mean, DEEP) & there.of_room(colour))
     learnt.mean[floor], learnt.spread[floor] = found.mean[:, 0], found.spread[:, 0]
     return learnt
+
+
+def _left_behind(dominant: Colours, first: Colours, rooms: Bool) -> Bool:
+    """Return where (H, W) most pictures show a colour of the room, and the first frame another one that is not."""
+    return rooms[lab_bins(dominant.mean)] & ~rooms[lab_bins(first.mean)] & ~alike(dominant, first.mean)
 
 
 def _shown(picture: U8, usual: F32) -> Colours:

@@ -12,7 +12,7 @@ from mocapflow_levelset.shadows import colourless, floor_around
 from mocapflow_sequence.background import EmptyScene
 from mocapflow_sequence.colours import more_common
 from mocapflow_sequence.dominant_colours import LEAST_SAME, dominant_colours
-from mocapflow_sequence.first_frame import empty_scene
+from mocapflow_sequence.first_frame import REACH_M, _about, empty_scene
 
 from mocapflow.assets import Background
 from mocapflow.caching.digests import Digests
@@ -245,6 +245,17 @@ def test_who_comes_to_stand_elsewhere_is_not_the_room_there():
     there = np.roll(mask, 80, axis=1)
     assert known[there].mean() > 0.97
     assert (off[known & there] < 15).mean() > 0.97
+
+
+def test_a_limb_that_the_start_pose_has_elsewhere_is_not_the_room():
+    """It is far from the body in that pose, and a few pictures later it is gone."""
+    shown, empty, mask, body, camera = taken([0] * 20)
+    limb = np.s_[130:190, 260:272]
+    shown[:3][:, *limb] = STRIPES[limb]
+    assert (_about(body, camera)[1][limb] > REACH_M).all()
+    scene = empty_scene(shown, shown[0], body, camera)
+    assert scene.known[limb].mean() > 0.97
+    assert (np.abs(scene.mean - empty)[limb].max(axis=2) < 15).mean() > 0.97
 
 
 @pytest.mark.parametrize("shade", [0.75, 0.42])
