@@ -110,6 +110,7 @@ class GarmentMesh:
     parameter_names: tuple[str, ...]
     parameter_bounds: F64 = array("Q", 2, unit="unit of the parameter")
     repairs: tuple[str, ...] = ()  # tape measures that were changed so that it could be sewn; also in run.json
+    pieces: tuple[GarmentMesh, ...] = ()  # where several garments are worn as one: each of them, in this order
 
     def __post_init__(self) -> None:
         """Refuse what no draper could lay.
@@ -132,6 +133,10 @@ class GarmentMesh:
             raise GarmentError(f"{self.name}: strand {short[0, 0]} has a link of zero length", hint=hint)
         if not (self.ring_length > 0).all():
             raise GarmentError(f"{self.name}: ring link {int((self.ring_length > 0).argmin())} has no length")
+
+    def columns(self, *meanings: str) -> list[int]:
+        """Return which parameters (of Q) have one of these meanings; that of `skirt.take_up` is `take_up`."""
+        return [k for k, name in enumerate(self.parameter_names) if name.rpartition(".")[2] in meanings]
 
 
 @record

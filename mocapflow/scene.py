@@ -9,7 +9,7 @@ import numpy as np
 
 from mocapflow.assets import Background, Body, Camera, GarmentMesh
 from mocapflow.data import BODY, CLOTH, Cloth, FrameState, Pose, Surface
-from mocapflow.geometry import kinematics, meshes, sewing, simplify
+from mocapflow.geometry import kinematics, meshes, outfits, simplify
 from mocapflow.geometry.angles import unmeasured
 from mocapflow.memo import memoised
 from mocapflow.records import F64, I32, U8, Bool, record
@@ -44,9 +44,14 @@ class Scene:
             return self
         body, garment = simplify.simplified(self.body, faces), self.garment
         if garment is not None:
-            pinned_to = sewing.nearest_skin(body, self.body.vertices[garment.pinned_to])
-            garment = replace(garment, pinned_to=pinned_to)
+            garment = outfits.pinned_anew(garment, self.body, body)
         return replace(self, body=body, garment=garment)
+
+    @cached_property
+    def pieces(self) -> tuple[Scene, ...]:
+        """The person in each of the garments alone: of several that are worn as one each is draped by itself."""
+        worn = () if self.garment is None else self.garment.pieces
+        return tuple(replace(self, garment=piece) for piece in worn) or (self,)
 
     @cached_property
     def faces(self) -> I32:

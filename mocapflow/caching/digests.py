@@ -27,6 +27,7 @@ CORE = (
     "components",
     "data",
     "dressing.guards",
+    "dressing.pieces",
     "dressing.roles",
     "functional",
     "geometry",

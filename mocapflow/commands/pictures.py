@@ -73,13 +73,12 @@ def poster(scene: Scene, garment: Garment, draper: Draper) -> U8:
         "at rest, from behind": portrait.portrait(scene, standing, scene.garment.vertices, bearing_deg=145),
         "draped": portrait.portrait(scene, standing, _draped(draper, scene, standing)),
         "draped, knee raised": portrait.portrait(scene, raised, _draped(draper, scene, raised), opacity=0.8),
-        "pattern": portrait.pattern(scene.garment),
-    }
+    } | {f"pattern of {piece.name}": portrait.pattern(piece) for piece in scene.garment.pieces or (scene.garment,)}
     for title, panel in panels.items():
         drawing.label(panel, title)
     image = np.hstack(list(panels.values()))
     measures = [f"{key} {value:g}" for key, value in garment.model_dump().items() if key.endswith("_m")]
-    drawing.note(image, f"{garment.name}: {', '.join(measures)}", (8, image.shape[0] - 8))
+    drawing.note(image, f"{garment.name}: {', '.join(measures)}" if measures else garment.name, (8, image.shape[0] - 8))
     return image
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,30 +11,37 @@ from mocapflow.config.documents import Document, Place
 from mocapflow.config.resolve import Resolver
 from mocapflow.dressing.guards import body_of
 from mocapflow.dressing.roles import Garment
-from mocapflow.errors import MocapflowError, PluginError, RecordingError, UnknownComponent, guess
+from mocapflow.errors import MocapflowError, PluginError, RecordingError, UnknownComponent
 from mocapflow.io.cameras.calibration import find_calibration
 from mocapflow.io.json_toml import place, read_json
 from mocapflow.registry import Registry
 
 FILE = Path("subject") / "garment.json"
 FROM_RECORDING = "from_recording"
+OUTFIT = "outfit"  # the garment that several make which are worn at once
 
 
 class RecordedGarment(NamedTuple):
-    """The garment that a recording describes, with its tape measures."""
+    """A garment that a recording describes, with its tape measures."""
 
     file: Path
-    kind: str | None  # None: there is no such file
-    written: Mapping[str, tuple[str, Any]]  # by setting: its key and value in the file
+    entry: int = 0  # of the list that the file may hold
+    kind: str | None = None  # None: there is no such file
+    settings: Collection[str] = ()  # that such a garment has
+    written: Mapping[str, tuple[str, Any]] = {}  # by setting: its key and value in the file
 
     @property
     def measures(self) -> dict[str, Any]:
         """The measures by setting."""
         return {setting: value for setting, (_, value) in self.written.items()}
 
+    def place(self, name: str) -> str:
+        """Return where the file says something of this garment."""
+        return place(self.file, name, self.entry)
+
 
 def garment_of(value: Any, recording: Path, resolver: Resolver) -> Garment | None:
-    """Return the garment that a pipeline names, None without one.
+    """Return the garment that a pipeline names, None without one; several that are worn at once are an outfit.
 
     Args:
         value: what the file says: a name, `from_recording`, or {use: name, setting: value}.
@@ -46,21 +53,39 @@ def garment_of(value: Any, recording: Path, resolver: Resolver) -> Garment | Non
     """
     if value is None:
         return None
-    recorded = _read_recorded(recording / FILE)
-    named = _named(value)
-    by_file_alone = named == FROM_RECORDING and not (isinstance(value, dict) and len(value) > 1)
-    if named == FROM_RECORDING:
-        if recorded.kind is None:
-            find_calibration(recording)  # without one it is no recording: that comes first
-            raise _no_garment(recorded.file)
-        named, value = recorded.kind, {**value, "use": recorded.kind} if isinstance(value, dict) else recorded.kind
-    if named != recorded.kind:
-        recorded = recorded._replace(written={})  # measures of another garment
+    file = recording / FILE
+    recorded = _read_recorded(file, resolver.registry)
+    if _named(value) != FROM_RECORDING and value != OUTFIT:
+        described = next((one for one in recorded if one.kind == _named(value)), None)
+        other = recorded[0]._replace(written={}) if recorded else RecordedGarment(file)
+        return _garment(value, described or other, resolver)
+    if not recorded:
+        find_calibration(recording)  # without one it is no recording: that comes first
+        raise _no_garment(file)
+    settings = {key: given for key, given in value.items() if key != "use"} if isinstance(value, dict) else {}
+    garments = [
+        _garment({"use": one.kind, **_meant(settings, one, recorded)}, one, resolver, by_file_alone=not settings)
+        for one in recorded
+    ]
+    if len(garments) == 1:
+        return garments[0]
+    outfit: Any = resolver.registry.get("garment", OUTFIT)
+    return outfit(garments=tuple(garments))  # type: ignore[no-any-return]
+
+
+def _meant(settings: dict[str, Any], one: RecordedGarment, worn: list[RecordedGarment]) -> dict[str, Any]:
+    """Return the settings that are meant for one of the garments worn: those it has, and those that none has."""
+    known = set().union(*(each.settings for each in worn))
+    return {key: given for key, given in settings.items() if key in one.settings or key not in known}
+
+
+def _garment(value: Any, recorded: RecordedGarment, resolver: Resolver, by_file_alone: bool = False) -> Garment:
+    """Return a garment by what a pipeline says of it, and by its measures."""
     try:
         garment: Garment = resolver.component("garment", value, ("garment",), recorded.measures)
         return garment
     except UnknownComponent as error:
-        where = place(recorded.file, str(recorded.kind)) if named == recorded.kind else error.where
+        where = recorded.place(str(recorded.kind)) if _named(value) == recorded.kind else error.where
         raise UnknownComponent(error.message, where=where, hint=error.hint) from None
     except PluginError:  # two garments have its name, which no measure mends
         raise
@@ -121,32 +146,38 @@ def _wrong_measure(error: MocapflowError, recorded: RecordedGarment, by_file_alo
     source = f"describes a {recorded.kind}" if recorded.kind else "does not exist"
     note = f"measures, in metres, come from {recorded.file}, which {source}; a value in the pipeline overrides them"
     setting = next((name for name in recorded.written if error.message.startswith(f"garment.{name}: ")), "")
-    message, where, hint = error.message, str(recorded.file) if by_file_alone else error.where, error.hint
+    message, where = error.message, str(recorded.file) if by_file_alone else error.where
     if setting:
         key, _ = recorded.written[setting]
-        message, where = message.replace(setting, key, 1), place(recorded.file, key)
-        if hint == guess(key, [key]):  # a setting of that name, but no measure
-            hint = f"no measure: write it in the pipeline, garment: {{use: {FROM_RECORDING}, {key}: …}}"
-    return type(error)(message, where=where, hint="\n".join(filter(None, [hint, note])))
+        message, where = message.replace(setting, key, 1), recorded.place(key)
+    return type(error)(message, where=where, hint="\n".join(filter(None, [error.hint, note])))
 
 
-def _read_recorded(path: Path) -> RecordedGarment:
-    """Return what a recording says of its garment.
+def _read_recorded(path: Path, registry: Registry) -> list[RecordedGarment]:
+    """Return what a recording says of each garment that is worn.
 
     There the unit may be written, as in a pipeline, or left out: `length_m` is `length`.
     """
     if not path.exists():
-        return RecordedGarment(path, None, {})
-    hint = 'write {"type": "skirt", "waist_height": 1.05, ...}, in metres'
+        return []
+    hint = 'write {"type": "skirt", "waist_height": 1.05, ...}, in metres; several garments as a list of them'
     said = read_json(path, hint)
-    if not isinstance(said, dict) or "type" not in said:
+    entries = said if isinstance(said, list) else [said]
+    if not entries or not all(isinstance(entry, dict) and "type" in entry for entry in entries):
         raise RecordingError("it does not say its type", where=str(path), hint=hint)
+    return [_described(RecordedGarment(path, number), entry, registry) for number, entry in enumerate(entries)]
+
+
+def _described(empty: RecordedGarment, said: dict[str, Any], registry: Registry) -> RecordedGarment:
+    """Return a garment with its kind and measures."""
+    kind = str(said["type"])
+    known = {setting for cls in registry.provided("garment").get(kind, []) for setting in cls.model_fields}
     written: dict[str, tuple[str, Any]] = {}
     for key, value in said.items():
-        setting = f"{key.removesuffix('_m')}_m"
+        setting = key if key in known else f"{key.removesuffix('_m')}_m"
         if setting in written:
             message = f"'{written[setting][0]}' and '{key}' are one measure"
-            raise RecordingError(message, where=place(path, key), hint="leave one of them out")
+            raise RecordingError(message, where=empty.place(key), hint="leave one of them out")
         if key != "type":
             written[setting] = key, value
-    return RecordedGarment(path, str(said["type"]), written)
+    return empty._replace(kind=kind, settings=known, written=written)

@@ -8,6 +8,7 @@ import numpy as np
 
 from mocapflow.assets import Body, GarmentMesh
 from mocapflow.data import Past, Pose, PoseBatch
+from mocapflow.dressing.pieces import pieces_of
 from mocapflow.dressing.roles import BodyModel, Draper, Garment
 from mocapflow.output_checks import UNIT, InvalidOutput, array_of, of_kind
 from mocapflow.records import F64, I32, out_of_range
@@ -68,6 +69,14 @@ def drape_of(draper: Draper, poses: PoseBatch, parameters: F64, past: Past, scen
     Raises:
         InvalidOutput: they are of another shape, not finite, or far away from the body.
     """
+    laid = []
+    for piece in pieces_of(scene):
+        own = parameters[:, piece.parameters]
+        laid.append(_laid(draper, poses, own, piece.past(past), piece.scene))
+    return laid[0] if len(laid) == 1 else np.concatenate(laid, axis=1)
+
+
+def _laid(draper: Draper, poses: PoseBatch, parameters: F64, past: Past, scene: Scene) -> F64:
     assert scene.garment is not None
     laid = of_kind(draper, draper.drape(poses, parameters, past, scene), np.ndarray)
     array_of(draper, laid, (len(parameters), *scene.garment.vertices.shape), "cloth")
@@ -93,5 +102,20 @@ def velocity_of(draper: Draper, pose: Pose, parameters: F64, vertices: I32, past
     Raises:
         InvalidOutput: they are of another shape, or not finite.
     """
+    if len(scene.pieces) == 1:
+        return _told(draper, pose, parameters, vertices, past, scene)
+    unknowns = np.arange(6 + len(pose.angles) + len(parameters))
+    pose_columns, cloth_columns = np.split(unknowns, [6 + len(pose.angles)])
+    velocity = np.zeros((len(vertices), 3, len(unknowns)))
+    for piece in pieces_of(scene):
+        first, stop = piece.vertices.start, piece.vertices.stop
+        rows = np.flatnonzero((vertices >= first) & (vertices < stop))
+        told = _told(draper, pose, parameters[piece.parameters], vertices[rows] - first, piece.past(past), piece.scene)
+        columns = np.concatenate([pose_columns, cloth_columns[piece.parameters]])
+        velocity[np.ix_(rows, np.arange(3), columns)] = told
+    return velocity
+
+
+def _told(draper: Draper, pose: Pose, parameters: F64, vertices: I32, past: Past, scene: Scene) -> F64:
     told = of_kind(draper, draper.velocity(pose, parameters, vertices, past, scene), np.ndarray)
     return array_of(draper, told, (len(vertices), 3, 6 + len(pose.angles) + len(parameters)), "velocities")

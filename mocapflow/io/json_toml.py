@@ -50,15 +50,25 @@ def read_toml(path: Path, hint: str = "") -> dict[str, Any]:
         raise RecordingError(f"not TOML: {what}", where=where, hint=hint) from None
 
 
-def place(path: Path, name: str) -> str:
-    """Return where a name is first written in a file, as file:line:column; the file alone where it is not."""
+def place(path: Path, name: str, entry: int = 0) -> str:
+    """Return where a name is first written in a file, as file:line:column; the file alone where it is not.
+
+    Args:
+        path: the file.
+        name: what is looked for.
+        entry: where the file is a list of plain objects, in which of them.
+    """
     word = re.compile(rf"(?<!\w){re.escape(name)}(?!\w)")
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError):
         return str(path)
-    found = ((number, match) for number, line in enumerate(lines, 1) if (match := word.search(line)))
-    return next((f"{path}:{number}:{match.start() + 1}" for number, match in found), str(path))
+    opened = [match.start() for match in re.finditer(r"\{", text)]
+    found = word.search(text, opened[entry] if 0 < entry < len(opened) else 0)
+    if found is None:
+        return str(path)
+    line, column = text.count("\n", 0, found.start()), found.start() - text.rfind("\n", 0, found.start())
+    return f"{path}:{line + 1}:{column}"
 
 
 def _text(path: Path, hint: str) -> str:

@@ -79,6 +79,5 @@ class SampledForces(ClothFitter):
         for k in range(self.rounds):
             for columns in forces:
                 yield partial(samples.neighbours, garment, columns=columns, step=STEP / 2**k)
-            if first and THICKNESS in garment.parameter_names:
-                column = garment.parameter_names.index(THICKNESS)
+            for column in garment.columns(THICKNESS) if first else ():
                 yield partial(samples.neighbours, garment, columns=[column], step=THICKNESS_STEP / 2**k)

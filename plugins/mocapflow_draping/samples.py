@@ -11,7 +11,7 @@ from mocapflow.assets import GarmentMesh
 from mocapflow.geometry.sewing import THICKNESS
 from mocapflow.records import F64
 
-FORCE = re.compile(r"(?P<force>\w+?)(_cos|_sin)?_rad")
+FORCE = re.compile(r"(?P<force>[\w.]+?)(_cos|_sin)?_rad")
 THICKNESSES = 6  # evenly spaced within the bounds
 
 
@@ -19,8 +19,7 @@ def coarse(garment: GarmentMesh, directions: int, amounts: F64) -> Iterator[tupl
     """Yield, one force after the other and the thickness last, its columns and the values (B, columns) to try."""
     for columns in forces(garment):
         yield columns, in_all_directions(len(columns), directions, amounts)
-    if THICKNESS in garment.parameter_names:
-        column = garment.parameter_names.index(THICKNESS)
+    for column in garment.columns(THICKNESS):
         low, high = garment.parameter_bounds[column]
         yield [column], np.linspace(low, high, THICKNESSES)[:, None]
 

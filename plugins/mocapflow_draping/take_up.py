@@ -41,15 +41,18 @@ class TakeUp(ClothFitter):
         cloth, garment = model.drape(estimate.pose, estimate.parameters, past), model.scene.garment
         if garment is None or not segmentation.silhouettes or turn.index > 0 or not past.moments:
             return cloth
-        names, lived = garment.parameter_names, len(past.moments)
-        due = TAKE_UP in names and (lived == 1 or falls_due(past.moments[-1].time, frame.time, EVERY))
-        early = THICKNESS in names and lived < REMEMBERED
-        if not (due or early):
+        lived = len(past.moments)
+        due = lived == 1 or falls_due(past.moments[-1].time, frame.time, EVERY)
+        lengths = garment.columns(TAKE_UP) if due else []
+        depths = garment.columns(THICKNESS) if lived < REMEMBERED else []
+        if not (lengths or depths):
             return cloth
         trials = Trials(estimate.pose, model, past, outline_error(estimate.pose, cloth, segmentation, model))
-        if due:
-            cloth = taken_up(cloth, trials, frame.time)
-        return thickened(cloth, trials) if early else cloth
+        for column in lengths:
+            cloth = taken_up(cloth, column, trials, frame.time)
+        for column in depths:
+            cloth = thickened(cloth, column, trials)
+        return cloth
 
 
 class Trials(NamedTuple):
@@ -60,11 +63,12 @@ class Trials(NamedTuple):
     past: Past
     error: Callable[[F64], float]  # of the outline of cloth (W, 3) m
 
-    def parameter(self, name: str) -> tuple[int, F64]:
-        """Return the column of a parameter, and its bounds (2,)."""
-        assert self.model.scene.garment is not None
-        column = self.model.scene.garment.parameter_names.index(name)
-        return column, self.model.scene.garment.parameter_bounds[column]
+    def bounds(self, column: int) -> F64:
+        """Return the bounds (2,) of a parameter."""
+        garment = self.model.scene.garment
+        assert garment is not None
+        bounds: F64 = garment.parameter_bounds[column]
+        return bounds
 
     def errors(self, cloth: Cloth, column: int, values: F64) -> F64:
         """Return the error of the outline (B,) for each value of a parameter."""
@@ -80,9 +84,9 @@ class Trials(NamedTuple):
         return samples.replaced(self.model.scene.garment, cloth.parameters, [column], values[:, None])
 
 
-def taken_up(cloth: Cloth, trials: Trials, time: float) -> Cloth:
+def taken_up(cloth: Cloth, column: int, trials: Trials, time: float) -> Cloth:
     """Return the garment taken up as the outline says, not far from what it was the frame before."""
-    column, (low, high) = trials.parameter(TAKE_UP)
+    low, high = trials.bounds(column)
     last = trials.past.moments[-1]
     if len(trials.past.moments) == 1:
         spread, tried = SPREAD, np.arange(low, high + STEP / 2, STEP)
@@ -93,9 +97,9 @@ def taken_up(cloth: Cloth, trials: Trials, time: float) -> Cloth:
     return trials.draped(cloth, column, lowest(tried, trials.errors(cloth, column, tried) + moved**2))
 
 
-def thickened(cloth: Cloth, trials: Trials) -> Cloth:
+def thickened(cloth: Cloth, column: int, trials: Trials) -> Cloth:
     """Return the garment as thick as the outlines of the frames from the second to this one say in the mean."""
-    column, (low, high) = trials.parameter(THICKNESS)
+    low, high = trials.bounds(column)
     tried, frames = np.linspace(low, high, samples.THICKNESSES), len(trials.past.moments)
     found = float(np.clip(lowest(tried, trials.errors(cloth, column, tried)), low, high))
     before = trials.past.moments[-1].cloth.parameters[column] if frames > 1 else found

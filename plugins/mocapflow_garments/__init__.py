@@ -10,7 +10,8 @@ from mocapflow.hookspecs import hookimpl
 def mocapflow_garments() -> list[type[Garment]]:
     """Return the garments of this package."""
     from mocapflow_garments.cylinder import Cylinder
+    from mocapflow_garments.outfit import Outfit
     from mocapflow_garments.shorts import Shorts
     from mocapflow_garments.skirt import Skirt
 
-    return [Cylinder, Shorts, Skirt]
+    return [Cylinder, Outfit, Shorts, Skirt]

@@ -43,7 +43,7 @@ class Cylinder(Garment):
         rows = pattern.even_links(rows + along[:, None] * plane.normal, link)
         carried = [sewing.carrier(body, sewing.nearest_skin(body, rows[:, row])) for row in range(self.rings)]
         return sewing.sheet(
-            self.name,
+            f"{self.name}_{self.joint}",
             body,
             rows,
             closed=True,

@@ -9,6 +9,7 @@ import numpy as np
 
 from mocapflow.data import NO_CLOTH, Cloth, FrameResult, Past, Pose, PoseBatch, Surface
 from mocapflow.dressing.guards import drape_of
+from mocapflow.dressing.pieces import touchable
 from mocapflow.model import ClothedModel
 from mocapflow.records import F64
 from mocapflow.scene import Scene
@@ -106,7 +107,7 @@ def drapes(model: ClothedModel, poses: Sequence[Pose], parameters: F64, past: Pa
     """Return the garment laid on each of several poses; poses that lay it alike are draped once."""
     if model.draper is None or not model.clothed:
         return [NO_CLOTH] * len(poses)
-    lays = model.draper.touchable(model.scene)[model.scene.body.screw_joint]
+    lays = touchable(model.draper, model.scene)[model.scene.body.screw_joint]
     root, angles = np.stack([pose.root for pose in poses]), np.stack([pose.angles for pose in poses])
     differing = np.concatenate([root.reshape(len(poses), -1), angles[:, lays]], axis=1)
     _, first, same = np.unique(differing, axis=0, return_index=True, return_inverse=True)

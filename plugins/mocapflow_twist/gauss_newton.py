@@ -118,8 +118,8 @@ class Task(NamedTuple):
         """Return the cloth after one damped step, its parameters within their bounds."""
         low, high = self.garment.parameter_bounds.T
         parameters, downhill = cloth.parameters, -equations.gradient
-        forces = np.array([name not in NO_FORCES for name in self.garment.parameter_names], bool)
-        free = forces & ~steps.at_bound(parameters, downhill, low, high)
+        free = ~steps.at_bound(parameters, downhill, low, high)
+        free[self.garment.columns(*NO_FORCES)] = False
         if not free.any():  # the garment knows no forces, or each stands at a bound
             return cloth
         part = Equations(equations.hessian[np.ix_(free, free)], equations.gradient[free], equations.energy)

@@ -10,7 +10,7 @@ import numpy as np
 from mocapflow.data import Cloth, Past, Pose
 from mocapflow.geometry.sewing import NO_FORCES
 from mocapflow.model import ClothedModel, moved
-from mocapflow.records import F64, Bool
+from mocapflow.records import F64
 from mocapflow_twist.normal_equations import Equations
 from mocapflow_twist.steps import at_bound
 
@@ -62,7 +62,9 @@ class ClothMotion:
         low, high = self.bounds.T
         first = 6 + len(guess.pose.angles)
         downhill, parameters = -equations.gradient[first:], guess.cloth.parameters
-        held = first + np.flatnonzero(at_bound(parameters, downhill, low, high) | self._slow)
+        still = at_bound(parameters, downhill, low, high)
+        still[self._slow] = True
+        held = first + np.flatnonzero(still)
         hessian, gradient = equations.hessian.copy(), equations.gradient.copy()
         gradient[held] = 0.0
         diagonal = hessian[held, held]
@@ -71,10 +73,10 @@ class ClothMotion:
         return Equations(hessian, gradient, equations.energy)
 
     @property
-    def _slow(self) -> Bool:
-        """Which cloth parameters (Q,) follow the recording, not the frame: a cloth fitter moves them."""
+    def _slow(self) -> list[int]:
+        """Which cloth parameters follow the recording, not the frame: a cloth fitter moves them."""
         assert self.model.scene.garment is not None
-        return np.array([name in NO_FORCES for name in self.model.scene.garment.parameter_names])
+        return self.model.scene.garment.columns(*NO_FORCES)
 
     @property
     def bounds(self) -> F64:

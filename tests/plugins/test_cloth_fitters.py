@@ -9,12 +9,14 @@ from mocapflow_draping import samples
 from mocapflow_draping.kinematic import Kinematic
 from mocapflow_draping.sampled_forces import SampledForces
 from mocapflow_draping.take_up import TakeUp, lowest
+from mocapflow_garments.cylinder import Cylinder
 from mocapflow_twist.gauss_newton import GaussNewton, Task
 from mocapflow_twist.normal_equations import Equations
 
 from mocapflow.data import REMEMBERED, Estimate, Frame, Moment, Past, Pose, Segmentation, Silhouette, Turn
 from mocapflow.geometry.misfit import bilinear, misfit, unclipped
-from mocapflow.geometry.sewing import THICKNESS
+from mocapflow.geometry.outfits import together
+from mocapflow.geometry.sewing import THICKNESS, with_take_up
 from mocapflow.geometry.silhouettes import model_distance
 from mocapflow.model import ClothedModel
 from mocapflow.testing.views import SIZE, tiny_camera
@@ -194,6 +196,38 @@ def test_nothing_is_taken_up_while_the_person_is_being_found_or_is_not_seen(mode
     frame = Frame(index=2, time=2 / 30, images=(), usable=np.zeros(4, bool))
     kept = TakeUp().fit(frame, Segmentation(silhouettes=()), unseen, model, later(model), TURN)
     np.testing.assert_array_equal(kept.parameters, start)
+
+
+@pytest.fixture(scope="module")
+def dressed_twice(model):
+    """The same skirt, and a tube on the right leg that shows below its hem."""
+    tube = Cylinder(joint="hip_r", start=0.9, upper_circumference_m=0.7, lower_circumference_m=0.9, length_m=0.5)
+    tube = tube.sew(model.scene.body)
+    names, bounds = with_take_up((tube.parameter_names, tube.parameter_bounds))
+    worn = together("both", [model.scene.garment, replace(tube, parameter_names=names, parameter_bounds=bounds)])
+    return replace(model, scene=replace(model.scene, garment=worn))
+
+
+def test_each_garment_is_fitted_by_its_own_parameters(dressed_twice):
+    model = dressed_twice
+    start = parameters(model, **{"skirt.flare_rad": 0.3})
+    truth = start + parameters(model, **{"skirt.take_up": 0.12, "cylinder_hip_r.take_up": 0.06})
+    found = fitted(TakeUp(), model, truth, start, lived(model, model.drape(STANDING, start, Past()), 0.0), 1 / 30)
+    columns = model.scene.garment.columns("take_up")
+    np.testing.assert_allclose(found.parameters[columns], [0.12, 0.06], atol=0.01)
+    np.testing.assert_array_equal(np.delete(found.parameters, columns), np.delete(truth, columns))
+
+
+def test_the_forces_of_each_garment_are_found(fitter, dressed_twice):
+    model = dressed_twice
+    truth = parameters(model, **{"skirt.flare_rad": 0.12, "cylinder_hip_r.flare_rad": 0.4})
+    found = parameters(model)
+    for _ in range(4):
+        found = fitted(fitter, model, truth, found, later(model)).parameters
+    column = model.scene.garment.parameter_names.index
+    assert abs(found[column("skirt.flare_rad")] - 0.12) < np.radians(2.5)
+    assert found[column("cylinder_hip_r.flare_rad")] > 0.1
+    assert not found[model.scene.garment.columns("thickness_m", "take_up")].any()
 
 
 def test_values_of_a_parabola_tell_where_it_is_lowest():

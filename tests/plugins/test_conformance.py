@@ -33,6 +33,9 @@ NEEDED = {  # what has no default, as a pipeline would write it; measures fit th
         waist_height_m=1.05, waist_circumference_m=1.05, hip_circumference_m=1.2, leg_opening_circumference_m=0.8,
         inseam_m=0.3, length_m=0.6,
     ),
+    ("garment", "outfit"): dict(
+        garments=["cylinder", {"use": "cylinder", "joint": "hip_r"}]
+    ),
 }  # fmt: skip
 EXTRAS = {("draper", "xpbd"): "newton"}  # what they need beyond the base installation
 TRAITS = {("prior", "parzen"): {"bounds_energy": True}}  # what the conformance class has to know of them

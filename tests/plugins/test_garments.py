@@ -7,6 +7,7 @@ import pytest
 from drape_bodies import SKIRT, legs
 from mocapflow_garments import sections
 from mocapflow_garments.cylinder import Cylinder
+from mocapflow_garments.outfit import Outfit
 from mocapflow_garments.shorts import Shorts
 from mocapflow_garments.skirt import Skirt
 from pydantic import ValidationError
@@ -294,3 +295,20 @@ def test_a_cylinder_on_an_unknown_limb_is_refused():
         Cylinder(joint="hip_left").sew(BODY)
     with pytest.raises(GarmentError, match="nothing follows joint 'knee_l'"):
         Cylinder(joint="knee_l").sew(BODY)
+
+
+def test_an_outfit_is_what_its_garments_are():
+    tubes = [Cylinder(joint=joint, upper_circumference_m=0.6) for joint in ("hip_l", "hip_r")]
+    both = Outfit(garments=(Skirt(**SKIRT), *tubes)).sew(BODY)
+    assert both.name == "outfit" and [piece.name for piece in both.pieces] == [
+        "skirt", "cylinder_hip_l", "cylinder_hip_r"
+    ]  # fmt: skip
+    alone = Skirt(**SKIRT).sew(BODY)
+    np.testing.assert_array_equal(both.vertices[: len(alone.vertices)], alone.vertices)
+    np.testing.assert_array_equal(both.pieces[2].vertices, tubes[1].sew(BODY).vertices)
+
+
+def test_a_garment_of_an_outfit_that_can_not_be_sewn_is_told():
+    outfit = Outfit(garments=(Skirt(**SKIRT), Cylinder(upper_circumference_m=0.1)))
+    with pytest.raises(GarmentError, match="cylinder: upper_circumference_m is 0.10 m"):
+        outfit.sew(BODY)
