@@ -271,6 +271,25 @@ def test_the_other_pipelines_run(tmp_path, pipeline):
     assert len(table(tmp_path / "out/results/angles.csv")["frame"]) == 2
 
 
+@long
+def test_a_skirt_with_two_sleeves_is_tracked(tmp_path):
+    recording = tmp_path / "recording"
+    shutil.copytree(CLIPS["skirt"], recording)
+    measured = recording / "subject" / "garment.json"
+    sleeves = [
+        {"type": "cylinder", "joint": f"shoulder_{side}", "start": 0.2, "upper_circumference": 0.36,
+         "lower_circumference": 0.40, "length": 0.2}
+        for side in "lr"
+    ]  # fmt: skip
+    measured.write_text(json.dumps([json.loads(measured.read_text()), *sleeves]))
+    call("doctor", recording, cwd=tmp_path)
+    call("show", "garment", "outfit", "--recording", recording, "--out", "outfit.png", cwd=tmp_path)
+    said = call("run", PIPELINES / "skirt.yaml", "--recording", recording, "--frames", "0:4", "--out", "out",
+                cwd=tmp_path)  # fmt: skip
+    assert "track: 4 of 4 frames" in said and (tmp_path / "outfit.png").exists()
+    assert len(table(tmp_path / "out/results/angles.csv")["frame"]) == 4
+
+
 def knees_of_a_template(recording, folder, *words):
     """How far a template's knees are off in the first frames, at most.
 
